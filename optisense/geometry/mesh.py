@@ -1,0 +1,269 @@
+"""Triangle meshes: the one shape type that every other package passes around."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy import sparse
+
+from optisense.errors import MeshError
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int32]
+
+WELD_DISTANCE = 1e-6
+"""Vertices closer than this (mm) count as one when edges are compared."""
+
+_BOX_SIDES = (  # (axis across the side, the two axes in it, which end of the axis)
+    (2, 0, 1, 1), (2, 1, 0, 0), (0, 1, 2, 1), (0, 2, 1, 0), (1, 2, 0, 1), (1, 0, 2, 0),
+)  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class TriangleMesh:
+    """An indexed triangle mesh, open or closed, in mm.
+
+    Faces wind counter-clockwise seen from the side their normal points to. Nothing is
+    checked on construction beyond the array shapes; see `validate`.
+
+    Attributes:
+        vertices: (n, 3) float64, mm.
+        faces: (m, 3) int32, rows of `vertices`.
+        normals: (n, 3) float64 unit shading normals of the vertices, or None.
+    """
+
+    vertices: FloatArray
+    faces: IntArray
+    normals: FloatArray | None = None
+
+    def __post_init__(self) -> None:
+        vertices = np.asarray(self.vertices, dtype=np.float64).reshape(-1, 3)
+        object.__setattr__(self, "vertices", vertices)
+        object.__setattr__(self, "faces", np.asarray(self.faces, dtype=np.int32).reshape(-1, 3))
+        if self.normals is not None:
+            normals = np.asarray(self.normals, dtype=np.float64).reshape(-1, 3)
+            if len(normals) != len(vertices):
+                raise MeshError(
+                    f"a mesh has {len(vertices)} vertices but {len(normals)} normals",
+                    hint="give one normal a vertex, or none",
+                )
+            object.__setattr__(self, "normals", normals)
+
+    # ---- making
+
+    @staticmethod
+    def load(path: str | Path) -> TriangleMesh:
+        """Read an OBJ, STL or PLY file (its numbers are taken as mm).
+
+        Raises:
+            MeshError: the file is missing, of another format, or malformed.
+        """
+        from optisense.geometry.mesh_files import load_mesh
+
+        return load_mesh(Path(path))
+
+    @staticmethod
+    def box(
+        lower: ArrayLike, upper: ArrayLike, divisions: tuple[int, int, int] = (1, 1, 1)
+    ) -> TriangleMesh:
+        """A closed box from corner `lower` to corner `upper` (mm), each side cut into a grid."""
+        corners = np.array([lower, upper], dtype=np.float64)
+        sides = []
+        for across, first, second, end in _BOX_SIDES:
+            side = TriangleMesh.grid((1.0, 1.0), (divisions[first], divisions[second]))
+            points = np.empty_like(side.vertices)
+            points[:, across] = corners[end, across]
+            for axis, column in ((first, 0), (second, 1)):
+                fraction = side.vertices[:, column] + 0.5
+                points[:, axis] = (1.0 - fraction) * corners[0, axis] + fraction * corners[1, axis]
+            sides.append(TriangleMesh(points, side.faces))
+        return TriangleMesh.joined(sides).welded()
+
+    @staticmethod
+    def grid(
+        size: tuple[float, float], divisions: tuple[int, int] = (1, 1), height: float = 0.0
+    ) -> TriangleMesh:
+        """A flat rectangle `size` (x, y mm) around the z axis at z = `height`, facing +z."""
+        nx, ny = divisions
+        x = np.linspace(-0.5, 0.5, nx + 1) * size[0]
+        y = np.linspace(-0.5, 0.5, ny + 1) * size[1]
+        xx, yy = np.meshgrid(x, y, indexing="ij")
+        vertices = np.column_stack([xx.ravel(), yy.ravel(), np.full(xx.size, height)])
+        return TriangleMesh(vertices, grid_faces(nx + 1, ny + 1))
+
+    @staticmethod
+    def joined(meshes: list[TriangleMesh]) -> TriangleMesh:
+        """All meshes in one, without welding; keeps normals when every mesh has them."""
+        offsets = np.cumsum([0] + [len(mesh.vertices) for mesh in meshes[:-1]])
+        normals = [mesh.normals for mesh in meshes if mesh.normals is not None]
+        return TriangleMesh(
+            np.concatenate([mesh.vertices for mesh in meshes]),
+            np.concatenate([m.faces + o for m, o in zip(meshes, offsets, strict=True)]),
+            np.concatenate(normals) if len(normals) == len(meshes) else None,
+        )
+
+    def save_obj(self, path: str | Path) -> None:
+        """Write a Wavefront OBJ file; every coordinate survives the round trip."""
+        from optisense.geometry.mesh_files import write_obj
+
+        write_obj(self, Path(path))
+
+    # ---- measuring
+
+    @cached_property
+    def bounds(self) -> FloatArray:
+        """(2, 3) float64, mm: the lowest and highest corner."""
+        return np.array([self.vertices.min(axis=0), self.vertices.max(axis=0)])
+
+    @cached_property
+    def triangles(self) -> FloatArray:
+        """(m, 3, 3) float64, mm: face, corner, coordinate."""
+        return self.vertices[self.faces]
+
+    @cached_property
+    def face_vectors(self) -> FloatArray:
+        """(m, 3) float64, mm^2: face normals times twice the face areas."""
+        a, b, c = self.triangles[:, 0], self.triangles[:, 1], self.triangles[:, 2]
+        return np.cross(b - a, c - a)
+
+    @cached_property
+    def face_areas(self) -> FloatArray:
+        """(m,) float64, mm^2."""
+        areas: FloatArray = 0.5 * np.linalg.norm(self.face_vectors, axis=1)
+        return areas
+
+    @cached_property
+    def face_normals(self) -> FloatArray:
+        """(m, 3) float64 unit normals; zero for a degenerate face."""
+        length = np.linalg.norm(self.face_vectors, axis=1, keepdims=True)
+        return np.divide(
+            self.face_vectors, length, out=np.zeros_like(self.face_vectors), where=length > 0
+        )
+
+    @cached_property
+    def area(self) -> float:
+        """The surface area, mm^2."""
+        return float(self.face_areas.sum())
+
+    @cached_property
+    def volume(self) -> float:
+        """The signed volume (mm^3) of a closed mesh; positive when its faces look outward."""
+        corners = self.triangles
+        return float(np.einsum("ij,ij->", corners[:, 0], self.face_vectors) / 6.0)
+
+    @cached_property
+    def is_closed(self) -> bool:
+        """Whether each edge is run through as often one way as the other."""
+        from optisense.geometry.mesh_checks import unmatched_edges
+
+        return len(self.faces) > 0 and len(unmatched_edges(self)) == 0
+
+    def validate(self, name: str, closed: bool) -> TriangleMesh:
+        """Check the mesh of part `name` and return it, turned outward when `closed`.
+
+        Raises:
+            MeshError: no triangles, a coordinate that is not finite, a face that names a
+                missing vertex, or (`closed`) an open edge; the message says where.
+        """
+        from optisense.geometry.mesh_checks import validate
+
+        return validate(self, name, closed)
+
+    # ---- changing
+
+    def transformed(self, matrix: ArrayLike) -> TriangleMesh:
+        """Apply a (4, 4) or (3, 3) affine matrix; a mirroring one also turns the faces over."""
+        full = np.eye(4)
+        given = np.asarray(matrix, dtype=np.float64)
+        full[: given.shape[0], : given.shape[1]] = given
+        linear = full[:3, :3]
+        faces = self.faces if np.linalg.det(linear) > 0 else self.faces[:, ::-1]
+        normals = None
+        if self.normals is not None:
+            normals = self.normals @ np.linalg.inv(linear)
+            normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+        return TriangleMesh(self.vertices @ linear.T + full[:3, 3], faces, normals)
+
+    def with_vertices(self, vertices: FloatArray) -> TriangleMesh:
+        """The same faces over moved vertices (n, 3); shading normals are dropped."""
+        return TriangleMesh(vertices, self.faces)
+
+    def with_faces(self, faces: NDArray[Any]) -> TriangleMesh:
+        """Other faces (k, 3) over the same vertices and normals."""
+        return replace(self, faces=faces)
+
+    def flipped(self) -> TriangleMesh:
+        """The same surface facing the other way."""
+        normals = None if self.normals is None else -self.normals
+        return replace(self, faces=self.faces[:, ::-1], normals=normals)
+
+    def welded(self, distance: float = WELD_DISTANCE) -> TriangleMesh:
+        """Merge vertices that agree to `distance` (mm) and drop faces that collapse.
+
+        Shading normals are dropped.
+        """
+        cells = np.round(self.vertices / distance).astype(np.int64)
+        _, first, inverse = np.unique(cells, axis=0, return_index=True, return_inverse=True)
+        rank = np.argsort(np.argsort(first))  # keep the vertices in their old order
+        faces = rank[inverse.reshape(-1)][self.faces]
+        whole = (
+            (faces[:, 0] != faces[:, 1])
+            & (faces[:, 1] != faces[:, 2])
+            & (faces[:, 2] != faces[:, 0])
+        )
+        return TriangleMesh(self.vertices[np.sort(first)], faces[whole])
+
+    def vertex_normals(self, crease: float = 40.0) -> TriangleMesh:
+        """Add smooth shading normals, kept apart across edges sharper than `crease` degrees.
+
+        Corner normals are averages over the faces around the vertex, weighted by the corner
+        angle (Thuermer and Wuethrich, J. Graphics Tools 3, 1998); vertices are split where
+        their corners disagree.
+        """
+        corner_vertex = self.faces.reshape(-1)
+        n_corners = len(corner_vertex)
+        incidence = sparse.csr_matrix(
+            (np.ones(n_corners, np.int8), corner_vertex, np.arange(n_corners + 1)),
+            shape=(n_corners, len(self.vertices)),
+        )
+        pairs = (incidence @ incidence.T).tocoo()
+        normal = np.repeat(self.face_normals, 3, axis=0)
+        agree = np.einsum("ij,ij->i", normal[pairs.row], normal[pairs.col])
+        near = (agree >= np.cos(np.radians(crease))) | (pairs.row == pairs.col)
+        weights = sparse.csr_matrix(
+            (self._corner_angles()[pairs.col[near]], (pairs.row[near], pairs.col[near])),
+            shape=(n_corners, n_corners),
+        )
+        smooth = weights @ normal
+        length = np.linalg.norm(smooth, axis=1, keepdims=True)
+        smooth = np.where(length > 1e-12, smooth / np.maximum(length, 1e-12), normal)
+        key = np.column_stack([corner_vertex, np.round(smooth * 1e6).astype(np.int64)])
+        _, first, inverse = np.unique(key, axis=0, return_index=True, return_inverse=True)
+        return TriangleMesh(
+            self.vertices[corner_vertex[first]], inverse.reshape(-1, 3), smooth[first]
+        )
+
+    def _corner_angles(self) -> FloatArray:
+        """(3 m,) float64, radians: the angle of each face corner."""
+        corners = self.triangles
+        after = np.roll(corners, -1, axis=1) - corners
+        before = np.roll(corners, 1, axis=1) - corners
+        cross = np.linalg.norm(np.cross(after, before), axis=2)
+        angles: Any = np.arctan2(cross, np.einsum("ijk,ijk->ij", after, before))
+        return np.maximum(angles, 1e-9).reshape(-1)
+
+
+def grid_faces(rows: int, columns: int) -> IntArray:
+    """Two triangles a cell for vertices numbered row by row; (2 (rows-1) (columns-1), 3) int32.
+
+    Faces look along (row direction) x (column direction).
+    """
+    index = np.arange(rows * columns, dtype=np.int32).reshape(rows, columns)
+    a, b = index[:-1, :-1].ravel(), index[1:, :-1].ravel()
+    c, d = index[1:, 1:].ravel(), index[:-1, 1:].ravel()
+    return np.concatenate([np.column_stack([a, b, c]), np.column_stack([a, c, d])])

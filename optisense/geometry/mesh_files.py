@@ -1,0 +1,150 @@
+"""Reading OBJ, STL and PLY files; writing OBJ.
+
+OBJ is parsed here (positions, faces and per-vertex normals only), so that line numbers can be
+named and material files are never opened; STL and PLY go through trimesh.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from optisense.errors import MeshError
+from optisense.geometry.mesh import TriangleMesh
+
+FORMATS = (".obj", ".stl", ".ply")
+
+
+def load_mesh(path: Path) -> TriangleMesh:
+    """See `TriangleMesh.load`."""
+    suffix = path.suffix.lower()
+    if suffix not in FORMATS:
+        raise MeshError(
+            f"cannot read a mesh of type '{suffix or 'unknown'}'",
+            where=str(path),
+            hint="use one of " + ", ".join(FORMATS),
+        )
+    try:
+        data = path.read_bytes()
+    except OSError as error:
+        raise MeshError(
+            f"cannot read the mesh file: {error.strerror or error}",
+            where=str(path),
+            hint="check the path",
+        ) from error
+    mesh = _parse_obj(data, path) if suffix == ".obj" else _load_with_trimesh(data, path, suffix)
+    if len(mesh.faces) == 0:
+        raise MeshError(
+            "the mesh file has no triangles", where=str(path), hint="export a surface, not points"
+        )
+    return mesh
+
+
+def write_obj(mesh: TriangleMesh, path: Path) -> None:
+    """See `TriangleMesh.save_obj`."""
+    lines = ["# millimetres"]
+    lines += [f"v {x!r} {y!r} {z!r}" for x, y, z in mesh.vertices.tolist()]
+    faces = (mesh.faces + 1).tolist()
+    if mesh.normals is None:
+        lines += [f"f {a} {b} {c}" for a, b, c in faces]
+    else:
+        lines += [f"vn {x!r} {y!r} {z!r}" for x, y, z in mesh.normals.tolist()]
+        lines += [f"f {a}//{a} {b}//{b} {c}//{c}" for a, b, c in faces]
+    path.write_text("\n".join(lines) + "\n", encoding="ascii")
+
+
+def _load_with_trimesh(data: bytes, path: Path, suffix: str) -> TriangleMesh:
+    import io
+
+    import trimesh
+
+    try:
+        loaded = trimesh.load_mesh(io.BytesIO(data), file_type=suffix[1:], process=False)
+        mesh = TriangleMesh(np.asarray(loaded.vertices), np.asarray(loaded.faces))
+    except Exception as error:  # trimesh raises many kinds on malformed files
+        raise MeshError(
+            f"the mesh file is malformed: {error}", where=str(path), hint="export it again"
+        ) from error
+    return mesh.welded() if suffix == ".stl" and np.isfinite(mesh.vertices).all() else mesh
+
+
+def _parse_obj(data: bytes, path: Path) -> TriangleMesh:
+    positions: list[list[float]] = []
+    normals: list[list[float]] = []
+    polygons: list[list[int]] = []
+    own_normals = True  # every corner's normal has the number of its vertex
+    text = data.decode("utf-8", errors="replace")
+    for number, line in enumerate(text.replace("\\\n", "  ").splitlines(), start=1):
+        words = line.split("#", 1)[0].split()
+        if not words or words[0] not in ("v", "vn", "f"):
+            continue
+        try:
+            if words[0] == "f":
+                corners = [_corner(word, len(positions), len(normals)) for word in words[1:]]
+                own_normals &= all(vertex == normal for vertex, normal in corners)
+                if len(corners) < 3:
+                    raise ValueError("a face needs three corners")
+                polygons.append([vertex for vertex, _ in corners])
+            else:
+                values = [float(word) for word in words[1:4]]
+                if len(values) != 3:
+                    raise ValueError("three numbers are needed")
+                (positions if words[0] == "v" else normals).append(values)
+        except (ValueError, IndexError) as error:
+            raise MeshError(
+                f"malformed line '{line.strip()[:60]}': {error}",
+                where=f"{path}:{number}",
+                hint="export the mesh again",
+            ) from error
+    vertices = np.array(positions, dtype=np.float64).reshape(-1, 3)
+    faces = _triangulated(polygons, vertices)
+    keep_normals = own_normals and len(normals) == len(vertices) > 0
+    return TriangleMesh(vertices, faces, np.array(normals) if keep_normals else None)
+
+
+def _corner(word: str, n_vertices: int, n_normals: int) -> tuple[int, int]:
+    """Zero-based (vertex, normal) of 'v', 'v/t', 'v//n' or 'v/t/n'; a missing normal is -1."""
+    fields = word.split("/")
+    vertex = _index(fields[0], n_vertices)
+    normal = _index(fields[2], n_normals) if len(fields) > 2 and fields[2] else -1
+    return vertex, normal
+
+
+def _index(field: str, count: int) -> int:
+    given = int(field)
+    index = given - 1 if given > 0 else count + given
+    if given == 0 or index < 0:
+        raise ValueError(f"index {given} is out of range")
+    return index
+
+
+def _triangulated(polygons: list[list[int]], vertices: NDArray[np.float64]) -> NDArray[np.int32]:
+    faces: list[list[int]] = []
+    for polygon in polygons:
+        if max(polygon) >= len(vertices):
+            raise MeshError(
+                f"a face names vertex {max(polygon) + 1}, but there are {len(vertices)}",
+                hint="export the mesh again",
+            )
+        if len(polygon) == 3:
+            faces.append(polygon)
+        else:
+            faces.extend(_triangulated_polygon(polygon, vertices[polygon]))
+    return np.array(faces, dtype=np.int32).reshape(-1, 3)
+
+
+def _triangulated_polygon(polygon: list[int], corners: NDArray[np.float64]) -> list[list[int]]:
+    """A fan where the polygon is convex, else manifold3d's triangulation in its plane."""
+    fan = [[0, i, i + 1] for i in range(1, len(polygon) - 1)]
+    normal = np.cross(corners, np.roll(corners, -1, axis=0)).sum(axis=0)  # Newell's method
+    edges = np.roll(corners, -1, axis=0) - corners
+    turns = np.cross(np.roll(edges, 1, axis=0), edges) @ normal
+    if (turns < -1e-12).any():
+        import manifold3d
+
+        axis = int(np.argmax(np.abs(normal)))
+        flat = np.roll(corners, -axis - 1, axis=1)[:, :2] * [np.sign(normal[axis]), 1.0]
+        fan = np.asarray(manifold3d.triangulate([flat])).tolist()
+    return [[polygon[i] for i in triangle] for triangle in fan]

@@ -1,0 +1,138 @@
+"""Facts about triangle meshes: closed forms, round trips, and bad files."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from optisense.errors import MeshError
+from optisense.geometry import TriangleMesh
+
+
+def box(divisions: tuple[int, int, int] = (2, 3, 1)) -> TriangleMesh:
+    return TriangleMesh.box((-1, -2, -3), (2, 2, 1), divisions)
+
+
+def test_box_is_closed_with_the_volume_and_area_of_a_box() -> None:
+    mesh = box()
+    assert mesh.is_closed
+    assert mesh.volume == pytest.approx(3 * 4 * 4)
+    assert mesh.area == pytest.approx(2 * (3 * 4 + 3 * 4 + 4 * 4))
+    np.testing.assert_allclose(mesh.bounds, [[-1, -2, -3], [2, 2, 1]])
+
+
+def test_grid_faces_up() -> None:
+    mesh = TriangleMesh.grid((4, 2), (5, 3), height=1.5)
+    np.testing.assert_allclose(mesh.face_normals, np.tile([0, 0, 1], (30, 1)))
+    assert mesh.area == pytest.approx(8)
+    assert not mesh.is_closed
+
+
+def test_obj_round_trip_keeps_every_number(tmp_path: Path) -> None:
+    rng = np.random.default_rng(0)
+    mesh = box((1, 1, 1)).with_vertices(rng.normal(size=(8, 3)) / 3.0)
+    for saved in (mesh, mesh.vertex_normals()):
+        saved.save_obj(tmp_path / "mesh.obj")
+        loaded = TriangleMesh.load(tmp_path / "mesh.obj")
+        np.testing.assert_array_equal(loaded.vertices, saved.vertices)
+        np.testing.assert_array_equal(loaded.faces, saved.faces)
+        assert (loaded.normals is None) == (saved.normals is None)
+        if saved.normals is not None and loaded.normals is not None:
+            np.testing.assert_array_equal(loaded.normals, saved.normals)
+
+
+@pytest.mark.parametrize("suffix", ["stl", "ply"])
+def test_stl_and_ply_are_read_as_closed_solids(tmp_path: Path, suffix: str) -> None:
+    import trimesh
+
+    mesh = box()
+    trimesh.Trimesh(mesh.vertices, mesh.faces).export(tmp_path / f"box.{suffix}")
+    loaded = TriangleMesh.load(tmp_path / f"box.{suffix}")
+    assert loaded.is_closed
+    assert loaded.volume == pytest.approx(48)
+
+
+def test_obj_polygons_are_triangulated_even_when_concave(tmp_path: Path) -> None:
+    (tmp_path / "arrow.obj").write_text(
+        "v 0 0 0\nv 2 -2 0\nv 0 2 0\nv -2 -2 0\nf 1/1 2/2 3/3 4/4\nf -4 -1 -2 -3\n"
+    )
+    mesh = TriangleMesh.load(tmp_path / "arrow.obj")
+    assert mesh.area == pytest.approx(2 * 4.0)
+    np.testing.assert_allclose(np.sort(mesh.face_normals[:, 2]), [-1, -1, 1, 1])
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("v 0 0 zero\n", ":1"),
+        ("v 0 0 0\nv 1 0 0\nf 1 2\n", ":3"),
+        ("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 9\n", "vertex 9"),
+        ("v 0 0 0\n", "no triangles"),
+    ],
+)
+def test_malformed_obj_names_the_place(tmp_path: Path, text: str, expected: str) -> None:
+    (tmp_path / "bad.obj").write_text(text)
+    with pytest.raises(MeshError, match=expected):
+        TriangleMesh.load(tmp_path / "bad.obj")
+
+
+def test_unreadable_files_are_mesh_errors(tmp_path: Path) -> None:
+    with pytest.raises(MeshError, match="No such file"):
+        TriangleMesh.load(tmp_path / "none.obj")
+    with pytest.raises(MeshError, match=r"\.obj, \.stl, \.ply"):
+        TriangleMesh.load(tmp_path / "part.step")
+    (tmp_path / "bad.ply").write_bytes(b"ply\nformat ascii 1.0\nelement vertex 3\n")
+    with pytest.raises(MeshError, match="malformed"):
+        TriangleMesh.load(tmp_path / "bad.ply")
+
+
+def test_a_leaky_solid_is_refused_at_its_hole() -> None:
+    mesh = box((1, 1, 1))
+    top = mesh.face_normals[:, 2] > 0.5
+    leaky = TriangleMesh(mesh.vertices, mesh.faces[~top])
+    leaky.validate("gel", closed=False)
+    with pytest.raises(MeshError, match=r"part gel") as caught:
+        leaky.validate("gel", closed=True)
+    assert "1.000) mm" in str(caught.value)  # the rim of the missing top lies at z = 1
+
+
+def test_inside_out_and_mixed_windings_are_turned_outward() -> None:
+    mesh = box((2, 2, 2))
+    mixed = mesh.faces.copy()
+    mixed[::3] = mixed[::3, ::-1]
+    for faces in (mesh.faces[:, ::-1], mixed):
+        fixed = TriangleMesh(mesh.vertices, faces).validate("gel", closed=True)
+        assert fixed.is_closed
+        assert fixed.volume == pytest.approx(48)
+
+
+def test_not_a_number_and_empty_meshes_are_refused() -> None:
+    mesh = box((1, 1, 1))
+    vertices = mesh.vertices.copy()
+    vertices[3, 1] = np.nan
+    with pytest.raises(MeshError, match="vertex 3"):
+        mesh.with_vertices(vertices).validate("gel", closed=True)
+    with pytest.raises(MeshError, match="no triangles"):
+        TriangleMesh(mesh.vertices, np.zeros((0, 3))).validate("gel", closed=False)
+
+
+def test_crease_keeps_box_edges_sharp_and_a_fine_sphere_smooth() -> None:
+    sharp = box((2, 2, 2)).vertex_normals()
+    assert sharp.normals is not None
+    np.testing.assert_allclose(np.abs(sharp.normals).max(axis=1), 1.0)
+    import trimesh
+
+    ball = trimesh.creation.icosphere(subdivisions=4, radius=2.0)
+    smooth = TriangleMesh(ball.vertices, ball.faces).vertex_normals()
+    assert smooth.normals is not None
+    assert len(smooth.vertices) == len(ball.vertices)
+    radial = smooth.vertices / 2.0
+    assert np.degrees(np.arccos((smooth.normals * radial).sum(1).clip(-1, 1))).max() < 0.5
+
+
+def test_mirroring_keeps_the_faces_outward() -> None:
+    mirrored = box().vertex_normals().transformed(np.diag([-1.0, 1.0, 1.0]))
+    assert mirrored.volume == pytest.approx(48)
+    assert mirrored.normals is not None
+    corner = mirrored.normals[mirrored.faces[:, 0]]
+    assert ((corner * mirrored.face_normals).sum(axis=1) > 0.9).all()
