@@ -197,6 +197,13 @@ class TriangleMesh:
         """Other faces (k, 3) over the same vertices and normals."""
         return replace(self, faces=faces)
 
+    def compacted(self) -> TriangleMesh:
+        """The same faces without the vertices that no face uses."""
+        used, inverse = np.unique(self.faces, return_inverse=True)
+        faces = inverse.reshape(-1, 3).astype(np.int32)
+        normals = None if self.normals is None else self.normals[used]
+        return TriangleMesh(self.vertices[used], faces, normals)
+
     def flipped(self) -> TriangleMesh:
         """The same surface facing the other way."""
         normals = None if self.normals is None else -self.normals
@@ -245,7 +252,9 @@ class TriangleMesh:
         key = np.column_stack([corner_vertex, np.round(smooth * 1e6).astype(np.int64)])
         _, first, inverse = np.unique(key, axis=0, return_index=True, return_inverse=True)
         return TriangleMesh(
-            self.vertices[corner_vertex[first]], inverse.reshape(-1, 3), smooth[first]
+            self.vertices[corner_vertex[first]],
+            inverse.reshape(-1, 3).astype(np.int32),
+            smooth[first],
         )
 
     def _corner_angles(self) -> FloatArray:

@@ -1,0 +1,311 @@
+"""Where two meshes lie on one another, whatever their triangles, and cutting along it.
+
+Two faces coincide where, over a common patch, they are no farther apart than a tolerance and
+their planes nearly parallel. Patches are found pairwise and cut out in the plane of the face.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import manifold3d
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from optisense.geometry.mesh import FloatArray, TriangleMesh
+
+PARALLEL = float(np.cos(np.radians(10.0)))
+"""Faces of two tessellations of one curved surface differ by a few degrees at most."""
+
+_GRID = 1e-7  # mm: rounding of cut polygons, so that neighbouring cuts close
+_THINNEST = 1e-5  # mm: leftovers thinner than this are rounding, not shape
+
+Pairs = NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class Overlay:
+    """The pairs of faces of two meshes that coincide somewhere.
+
+    Attributes:
+        first, second: the meshes.
+        pairs: (k, 2) int64, face of `first` and face of `second`.
+    """
+
+    first: TriangleMesh
+    second: TriangleMesh
+    pairs: Pairs
+
+    def reversed(self) -> Overlay:
+        """The same coincidences seen from the other mesh."""
+        return Overlay(self.second, self.first, self.pairs[:, ::-1])
+
+
+def find_coincident(
+    first: TriangleMesh, second: TriangleMesh, tolerance: float, facing: bool
+) -> Overlay:
+    """Pairs of faces that lie on one another to `tolerance` (mm).
+
+    Args:
+        first, second: any meshes.
+        tolerance: mm.
+        facing: only faces that look at each other (solids that touch); else either way.
+    """
+    twins = _twins(first, second, tolerance)
+    pairs = np.concatenate([twins, _near_pairs(first, second, tolerance, without=twins)])
+    cosine = np.einsum(
+        "ij,ij->i", first.face_normals[pairs[:, 0]], second.face_normals[pairs[:, 1]]
+    )
+    pairs = pairs[(-cosine if facing else np.abs(cosine)) > PARALLEL]
+    frames = _Frames.of(first, pairs[:, 0])
+    corners = frames.flat(second.triangles[pairs[:, 1]])
+    height = corners[:, :, 2]
+    near = (height.min(axis=1) <= tolerance) & (height.max(axis=1) >= -tolerance)
+    near &= ~_apart(frames.corners, corners[:, :, :2]) & ~_apart(corners[:, :, :2], frames.corners)
+    pairs, frames, corners = pairs[near], frames.take(near), corners[near]
+    inside = _contains(corners[:, :, :2], frames.corners, tolerance=_THINNEST)
+    whole = inside & (_heights(frames.corners, corners).max(axis=1, initial=0) <= tolerance)
+    others = np.flatnonzero(~whole)
+    patches = shapely.intersection(
+        shapely.polygons(frames.corners[others]), shapely.polygons(corners[others, :, :2])
+    )
+    points, patch = shapely.get_coordinates(patches, return_index=True)
+    apart = np.zeros(len(others))
+    np.maximum.at(apart, patch, _heights(points[:, None], corners[others[patch]])[:, 0])
+    whole[others] = _is_shape(patches) & (apart <= tolerance)
+    return Overlay(first, second, pairs[whole])
+
+
+def cut(mesh: TriangleMesh, overlays: list[Overlay]) -> list[TriangleMesh]:
+    """Divide a mesh by what lies on it.
+
+    Args:
+        mesh: the mesh that is `first` in each overlay.
+        overlays: what lies on the mesh; where several do, the first one counts.
+
+    Returns:
+        One mesh an overlay (the part that it covers) and last the part that nothing covers.
+        Together they are `mesh`; whole faces stay whole, others are cut up.
+    """
+    state = _Remainder(mesh)
+    parts = []
+    for overlay in overlays:
+        parts.append(state.take(overlay))
+    parts.append(state.rest())
+    return parts
+
+
+class _Remainder:
+    """What is left of each face while patches are taken from it."""
+
+    def __init__(self, mesh: TriangleMesh) -> None:
+        self.mesh = mesh
+        self.whole = mesh.face_areas > 0.0
+        self.partial: dict[int, Any] = {}  # face -> shapely polygon in the face's frame
+
+    def take(self, overlay: Overlay) -> TriangleMesh:
+        pairs = overlay.pairs
+        pairs = pairs[self.whole[pairs[:, 0]] | np.isin(pairs[:, 0], list(self.partial))]
+        frames = _Frames.of(self.mesh, pairs[:, 0])
+        corners = frames.flat(overlay.second.triangles[pairs[:, 1]])[:, :, :2]
+        full = np.unique(pairs[_contains(corners, frames.corners, _THINNEST), 0])
+        taken_whole = [face for face in full.tolist() if self.whole[face]]
+        taken: dict[int, Any] = {
+            face: self.partial.pop(face) for face in full.tolist() if face in self.partial
+        }
+        self.whole[full] = False
+        rows = np.flatnonzero(~np.isin(pairs[:, 0], full))
+        rows = rows[np.argsort(pairs[rows, 0], kind="stable")]
+        faces, starts = np.unique(pairs[rows, 0], return_index=True)
+        for face, group in zip(faces.tolist(), np.split(rows, starts[1:]), strict=False):
+            outline = self.partial.get(face, shapely.Polygon(frames.corners[group[0]]))
+            cover = _united(overlay.second.faces[pairs[group, 1]], corners[group])
+            rest = _without_slivers(shapely.difference(outline, cover, grid_size=_GRID))
+            if rest.is_empty and self.whole[face]:
+                taken_whole.append(face)
+            else:
+                taken[face] = shapely.intersection(outline, cover, grid_size=_GRID)
+            self.whole[face] = False
+            self.partial.pop(face, None)
+            if not rest.is_empty:
+                self.partial[face] = rest
+        return _assembled(self.mesh, np.array(taken_whole, dtype=np.int64), taken)
+
+    def rest(self) -> TriangleMesh:
+        return _assembled(self.mesh, np.flatnonzero(self.whole), self.partial)
+
+
+@dataclass(frozen=True)
+class _Frames:
+    """A plane coordinate system for each of k faces: origin at corner 0, x along edge 01."""
+
+    origin: FloatArray  # (k, 3)
+    axes: FloatArray  # (k, 3, 3): rows x, y, normal
+    corners: FloatArray  # (k, 3, 2): the face itself, counter-clockwise
+
+    @staticmethod
+    def of(mesh: TriangleMesh, faces: NDArray[np.int64]) -> _Frames:
+        corners = mesh.triangles[faces]
+        x = corners[:, 1] - corners[:, 0]
+        x = x / np.maximum(np.linalg.norm(x, axis=1, keepdims=True), 1e-300)
+        normal = mesh.face_normals[faces]
+        axes = np.stack([x, np.cross(normal, x), normal], axis=1)
+        frames = _Frames(corners[:, 0], axes, np.zeros((len(faces), 3, 2)))
+        return _Frames(frames.origin, axes, frames.flat(corners)[:, :, :2])
+
+    def flat(self, points: FloatArray) -> FloatArray:
+        """(k, c, 3) points -> their (x, y, height) in the frame of each face."""
+        return (points - self.origin[:, None]) @ self.axes.transpose(0, 2, 1)
+
+    def take(self, which: NDArray[Any]) -> _Frames:
+        return _Frames(self.origin[which], self.axes[which], self.corners[which])
+
+
+def _twins(first: TriangleMesh, second: TriangleMesh, tolerance: float) -> Pairs:
+    """Pairs of faces with the same corners: the common case, and far cheaper to find."""
+    kept = np.flatnonzero(_in_reach(first, second, tolerance))
+    if len(kept) == 0:
+        return np.zeros((0, 2), dtype=np.int64)
+    tree = cKDTree(second.triangles.mean(axis=1))
+    triangles = first.triangles[kept]
+    distance, other = tree.query(triangles.mean(axis=1), distance_upper_bound=tolerance)
+    found = np.isfinite(distance)
+    pairs = np.column_stack([kept[found], other[found]]).astype(np.int64)
+    apart = triangles[found][:, :, None] - second.triangles[pairs[:, 1]][:, None]
+    same = (np.linalg.norm(apart, axis=3).min(axis=2) <= tolerance).all(axis=1)
+    return pairs[same]
+
+
+def _in_reach(first: TriangleMesh, second: TriangleMesh, tolerance: float) -> NDArray[np.bool_]:
+    """(m,) which faces of `first` meet the bounding box of `second`."""
+    low, high = second.bounds[0] - tolerance, second.bounds[1] + tolerance
+    corners = first.triangles
+    reach: NDArray[np.bool_] = ((corners.min(axis=1) <= high) & (corners.max(axis=1) >= low)).all(
+        axis=1
+    )
+    return reach
+
+
+def _near_pairs(
+    first: TriangleMesh, second: TriangleMesh, tolerance: float, without: Pairs
+) -> Pairs:
+    """Pairs of faces whose boxes, grown by `tolerance`, meet; those in `without` are done with."""
+    reach_1, reach_2 = _in_reach(first, second, tolerance), _in_reach(second, first, tolerance)
+    reach_1[without[:, 0]] = False
+    reach_2[without[:, 1]] = False
+    kept_1, kept_2 = np.flatnonzero(reach_1), np.flatnonzero(reach_2)
+    if len(kept_1) == 0 or len(kept_2) == 0:
+        return np.zeros((0, 2), dtype=np.int64)
+    low_1, high_1 = first.triangles.min(axis=1), first.triangles.max(axis=1)
+    low_2 = second.triangles.min(axis=1) - tolerance
+    high_2 = second.triangles.max(axis=1) + tolerance
+    extent = np.minimum(high_1[kept_1].max(0), high_2[kept_2].max(0)) - np.maximum(
+        low_1[kept_1].min(0), low_2[kept_2].min(0)
+    )
+    third, x, y = np.argsort(extent)
+    tree = shapely.STRtree(_boxes(low_2[kept_2], high_2[kept_2], x, y))
+    one, other = tree.query(_boxes(low_1[kept_1], high_1[kept_1], x, y))
+    one, other = kept_1[one], kept_2[other]
+    meet = (low_1[one, third] <= high_2[other, third]) & (high_1[one, third] >= low_2[other, third])
+    return np.column_stack([one[meet], other[meet]]).astype(np.int64)
+
+
+def _boxes(low: FloatArray, high: FloatArray, x: int, y: int) -> NDArray[Any]:
+    return shapely.box(low[:, x], low[:, y], high[:, x], high[:, y])
+
+
+def _contains(triangles: FloatArray, points: FloatArray, tolerance: float) -> NDArray[np.bool_]:
+    """(k,) whether all points (k, c, 2) lie in the triangle (k, 3, 2), of either winding."""
+    inside: NDArray[np.bool_] = np.all(_inward(triangles, points) >= -tolerance, axis=(1, 2))
+    return inside
+
+
+def _apart(triangles: FloatArray, points: FloatArray) -> NDArray[np.bool_]:
+    """(k,) whether some edge of the triangle (k, 3, 2) has all points (k, c, 2) beyond it."""
+    beyond = _inward(triangles, points) <= _THINNEST
+    apart: NDArray[np.bool_] = np.any(np.all(beyond, axis=2), axis=1)
+    return apart
+
+
+def _inward(triangles: FloatArray, points: FloatArray) -> FloatArray:
+    """(k, 3, c) distance of points (k, c, 2) from each edge line, positive towards the inside."""
+    edges = np.roll(triangles, -1, axis=1) - triangles
+    length = np.maximum(np.linalg.norm(edges, axis=2), 1e-300)
+    turn = np.sign(edges[:, 0, 0] * edges[:, 1, 1] - edges[:, 0, 1] * edges[:, 1, 0])
+    across = np.stack([-edges[..., 1], edges[..., 0]], axis=2) * (turn[:, None] / length)[..., None]
+    offset = np.einsum("kei,kei->ke", across, triangles)
+    result: FloatArray = across @ points.transpose(0, 2, 1) - offset[:, :, None]
+    return result
+
+
+def _united(faces: NDArray[np.int32], corners: FloatArray) -> Any:
+    """The union of flat triangles (g, 3, 2) whose vertices are numbered by `faces` (g, 3).
+
+    Edges between two of the faces cancel; their outline is all that needs overlaying.
+    """
+    size = int(faces.max()) + 1
+    starts, ends = faces.reshape(-1).astype(np.int64), np.roll(faces, -1, axis=1).reshape(-1)
+    outer = ~np.isin(starts * size + ends, ends * np.int64(size) + starts)
+    lines = np.stack([corners, np.roll(corners, -1, axis=1)], axis=2).reshape(-1, 2, 2)[outer]
+    outline = shapely.build_area(shapely.multilinestrings(lines))
+    triangles = shapely.polygons(corners)
+    if abs(outline.area - shapely.area(triangles).sum()) <= 1e-9 * outline.area:
+        return outline
+    return shapely.union_all(triangles, grid_size=_GRID)
+
+
+def _heights(points: FloatArray, triangles: FloatArray) -> FloatArray:
+    """(k, c) absolute height, over points (k, c, 2), of the planes of triangles (k, 3, 3)."""
+    a = triangles[:, 0]
+    normal = np.cross(triangles[:, 1] - a, triangles[:, 2] - a)
+    slope = -normal[:, :2] / np.where(normal[:, 2:] == 0.0, 1e-300, normal[:, 2:])
+    return np.abs(a[:, None, 2] + np.einsum("ki,kci->kc", slope, points - a[:, None, :2]))
+
+
+def _is_shape(polygons: Any) -> NDArray[np.bool_]:
+    """Whether polygons are more than rounding."""
+    shape: NDArray[np.bool_] = 2.0 * shapely.area(polygons) > _THINNEST * shapely.length(polygons)
+    return shape
+
+
+def _without_slivers(shape: Any) -> Any:
+    parts = shapely.get_parts(shape)
+    return shapely.multipolygons(parts[_is_shape(parts)])
+
+
+def _assembled(
+    mesh: TriangleMesh, whole: NDArray[np.int64], patches: dict[int, Any]
+) -> TriangleMesh:
+    """Whole faces of a mesh, and patches of other faces (given in the faces' frames)."""
+    kept = TriangleMesh(mesh.vertices, mesh.faces[np.sort(whole)], mesh.normals)
+    pieces = [kept.compacted()]
+    faces = np.array(list(patches), dtype=np.int64)
+    frames = _Frames.of(mesh, faces)
+    for k, face in enumerate(faces.tolist()):
+        for polygon in shapely.get_parts(_without_slivers(patches[face])):
+            rings = [polygon.exterior, *polygon.interiors]
+            signs = [1] + [-1] * len(polygon.interiors)
+            flat = [
+                shapely.get_coordinates(ring)[:-1][:: sign if ring.is_ccw else -sign]
+                for ring, sign in zip(rings, signs, strict=True)
+            ]
+            points = np.concatenate(flat)
+            vertices = frames.origin[k] + points @ frames.axes[k, :2]
+            triangles = np.asarray(manifold3d.triangulate(flat))
+            normals = None
+            if mesh.normals is not None:
+                normals = _interpolated(mesh.normals[mesh.faces[face]], frames.corners[k], points)
+            pieces.append(TriangleMesh(vertices, triangles, normals))
+    return TriangleMesh.joined(pieces)
+
+
+def _interpolated(values: FloatArray, corners: FloatArray, points: FloatArray) -> FloatArray:
+    """Unit vectors at points (n, 2), from `values` (3, 3) at the corners (3, 2) of a triangle."""
+    edges = (corners[1:] - corners[0]).T
+    bary = np.linalg.solve(edges, (points - corners[0]).T).T
+    mixed = values[0] + bary @ (values[1:] - values[0])
+    unit: FloatArray = mixed / np.linalg.norm(mixed, axis=1, keepdims=True)
+    return unit

@@ -1,0 +1,380 @@
+"""Media of touching, nested and overlapping solids.
+
+The fact that counts: along any straight ray the interfaces form a chain. The medium that the ray
+is in is the near side of the next interface, and halfway between two interfaces it is the medium
+that belongs there.
+"""
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+import pytest
+
+from optisense.errors import DesignError, MeshError
+from optisense.geometry import TriangleMesh
+from optisense.geometry.rays import ray_hits
+from optisense.optics.media import Interface, Sheet, Solid, resolve_media
+
+GEL, ACRYLIC = 1.41, 1.49
+
+Truth = Callable[[np.ndarray], float]
+
+
+def box(
+    lower: Sequence[float], upper: Sequence[float], divisions: tuple[int, int, int] = (1, 1, 1)
+) -> TriangleMesh:
+    return TriangleMesh.box(lower, upper, divisions)
+
+
+def in_box(point: np.ndarray, lower: Sequence[float], upper: Sequence[float]) -> bool:
+    return bool((point > lower).all() and (point < upper).all())
+
+
+def ball(radius: float, centre: Sequence[float] = (0, 0, 0), subdivisions: int = 3) -> TriangleMesh:
+    import trimesh
+
+    sphere = trimesh.creation.icosphere(subdivisions=subdivisions, radius=radius)
+    return TriangleMesh(sphere.vertices + np.asarray(centre), sphere.faces)
+
+
+def random_rays(reach: float, count: int, seed: int = 0) -> tuple[np.ndarray, np.ndarray]:
+    """Rays from a sphere of radius 3 `reach` through points of a ball of radius `reach`."""
+    rng = np.random.default_rng(seed)
+    start = rng.normal(size=(count, 3))
+    start *= 3 * reach / np.linalg.norm(start, axis=1, keepdims=True)
+    target = rng.uniform(-reach, reach, size=(count, 3))
+    direction = target - start
+    return start, direction / np.linalg.norm(direction, axis=1, keepdims=True)
+
+
+def check_chain(
+    interfaces: list[Interface],
+    truth: Truth,
+    reach: float = 6.0,
+    count: int = 1500,
+    margin: float = 1e-4,
+    stop: TriangleMesh | None = None,
+) -> None:
+    """Follow random rays and assert the chain; `stop` is an opaque surface that ends a ray."""
+    start, direction = random_rays(reach, count)
+    meshes = [face.mesh for face in interfaces]
+    owner = np.repeat(np.arange(len(meshes)), [len(mesh.faces) for mesh in meshes])
+    everything = TriangleMesh.joined([TriangleMesh(m.vertices, m.faces) for m in meshes])
+    hits = ray_hits(everything, start, direction)
+    end = np.full(count, np.inf)
+    if stop is not None:
+        stopped = ray_hits(stop, start, direction)
+        np.minimum.at(end, stopped.ray, stopped.distance)
+    crossed = 0
+    for ray in range(count):
+        mine = (hits.ray == ray) & (hits.distance < end[ray])
+        state, here = 1.0, 0.0
+        for distance, face in zip(hits.distance[mine], hits.face[mine], strict=True):
+            interface = interfaces[owner[face]]
+            leaving = everything.face_normals[face] @ direction[ray] > 0
+            near, far = interface.ior_inside, interface.ior_outside
+            if not leaving:
+                near, far = far, near
+            place = start[ray] + distance * direction[ray]
+            assert near == state, f"ray {ray} at {place}: in {state}, but the face is {interface}"
+            if distance - here > margin:
+                middle = start[ray] + 0.5 * (here + distance) * direction[ray]
+                assert state == truth(middle), f"ray {ray} at {middle}"
+            state, here = far, distance
+            crossed += 1
+        if end[ray] == np.inf:
+            assert state == 1.0, f"ray {ray} ends inside a solid"
+    assert crossed > count / 4
+
+
+def pairs(interfaces: list[Interface]) -> set[tuple[str, str]]:
+    return {(face.inside, face.outside) for face in interfaces}
+
+
+def area(interfaces: list[Interface], *names: str) -> float:
+    return sum(face.mesh.area for face in interfaces if face.names == names)
+
+
+def test_a_single_solid_lies_in_air() -> None:
+    interfaces = resolve_media([Solid("gel", ball(3), "silicone", GEL)])
+    assert pairs(interfaces) == {("silicone", "air")}
+    facets = ball(3)
+    check_chain(
+        interfaces,
+        lambda p: GEL if ray_hits(facets, p, [0.3, 0.2, 0.9]).ray.size % 2 else 1.0,
+        count=200,
+    )
+
+
+@pytest.mark.parametrize("divisions", [(1, 1, 1), (7, 5, 2)])
+def test_gel_on_acrylic_with_other_triangles_on_their_common_face(
+    divisions: tuple[int, int, int],
+) -> None:
+    gel = Solid("gel", box((-3, -2, 0), (3, 2, 2), divisions), "silicone", GEL, roughness=0.1)
+    guide = Solid("guide", box((-3, -2, -2), (3, 2, 0), (4, 3, 1)), "acrylic", ACRYLIC)
+    interfaces = resolve_media([gel, guide])
+    assert pairs(interfaces) == {("silicone", "acrylic"), ("silicone", "air"), ("acrylic", "air")}
+    assert area(interfaces, "gel", "guide") == pytest.approx(24)
+    assert area(interfaces, "gel") == pytest.approx(24 + 40)
+    shared = next(face for face in interfaces if face.names == ("gel", "guide"))
+    np.testing.assert_allclose(shared.mesh.face_normals @ [0, 0, 1], -1.0)
+    assert shared.roughness == 0.1
+
+    def truth(p: np.ndarray) -> float:
+        if in_box(p, (-3, -2, 0), (3, 2, 2)):
+            return GEL
+        return ACRYLIC if in_box(p, (-3, -2, -2), (3, 2, 0)) else 1.0
+
+    check_chain(interfaces, truth)
+
+
+def test_faces_that_overlap_in_part_are_cut_at_the_rim() -> None:
+    gel = Solid("gel", box((-1, -3, 0), (4, 1.5, 2), (9, 8, 2)), "silicone", GEL)
+    guide = Solid("guide", box((-3, -2, -2), (3, 2, 0), (4, 3, 2)), "acrylic", ACRYLIC)
+    interfaces = resolve_media([gel, guide])
+    common = 4 * 3.5
+    assert area(interfaces, "gel", "guide") == pytest.approx(common)
+    assert area(interfaces, "guide") == pytest.approx(2 * (24 + 12 + 8) - common)
+    assert area(interfaces, "gel") == pytest.approx(2 * (22.5 + 10 + 9) - common)
+
+    def truth(p: np.ndarray) -> float:
+        if in_box(p, (-1, -3, 0), (4, 1.5, 2)):
+            return GEL
+        return ACRYLIC if in_box(p, (-3, -2, -2), (3, 2, 0)) else 1.0
+
+    check_chain(interfaces, truth)
+
+
+def test_turned_faces_and_a_corner_that_touches_two_parts() -> None:
+    """A block turned by 30 degrees across the joint of two others."""
+    turn = np.eye(3)
+    turn[:2, :2] = [[np.cos(0.5236), -np.sin(0.5236)], [np.sin(0.5236), np.cos(0.5236)]]
+    block = box((-2, -1.5, 0), (2, 1.5, 1.5), (5, 4, 1)).transformed(turn)
+    left, right = box((-4, -3, -1), (0, 3, 0), (3, 3, 1)), box((0, -3, -1), (4, 3, 0))
+    interfaces = resolve_media(
+        [
+            Solid("left", left, "acrylic", ACRYLIC),
+            Solid("right", right, "epoxy", 1.54),
+            Solid("block", block, "silicone", GEL),
+        ]
+    )
+    assert area(interfaces, "left", "block") + area(interfaces, "right", "block") == (
+        pytest.approx(12)
+    )
+    assert area(interfaces, "left", "right") == pytest.approx(6)
+
+    def truth(p: np.ndarray) -> float:
+        if in_box(turn.T @ p, (-2, -1.5, 0), (2, 1.5, 1.5)):
+            return GEL
+        if in_box(p, (-4, -3, -1), (0, 3, 0)):
+            return ACRYLIC
+        return 1.54 if in_box(p, (0, -3, -1), (4, 3, 0)) else 1.0
+
+    check_chain(interfaces, truth)
+
+
+def test_inner_faces_of_three_blocks_of_equal_index_vanish() -> None:
+    blocks = [
+        Solid(f"block {k}", box((-3 + 2 * k, -2, -2), (-1 + 2 * k, 2, 2), (2, k + 1, 3)), m, 1.5)
+        for k, m in enumerate(["acrylic", "acrylic", "glue"])
+    ]
+    interfaces = resolve_media(blocks)
+    assert sum(face.mesh.area for face in interfaces) == pytest.approx(2 * (24 + 24 + 16))
+    check_chain(interfaces, lambda p: 1.5 if in_box(p, (-3, -2, -2), (3, 2, 2)) else 1.0)
+
+
+def test_nested_solids_go_by_priority() -> None:
+    outer = Solid("gel", ball(4), "silicone", GEL, priority=0)
+    inner = Solid("bead", box((-1, -1, -1), (1, 1, 1)), "glass", 1.52, priority=1)
+    hidden = Solid("lost", box((-0.5, -0.5, -0.5), (0.5, 0.5, 0.5)), "acrylic", ACRYLIC)
+    interfaces = resolve_media([outer, inner, hidden])
+    assert area(interfaces, "gel", "bead") == pytest.approx(24)
+    assert all("lost" not in face.names for face in interfaces)
+    shell = ball(4)
+
+    def truth(p: np.ndarray) -> float:
+        if in_box(p, (-1, -1, -1), (1, 1, 1)):
+            return 1.52
+        return GEL if ray_hits(shell, p, [0.3, 0.2, 0.9]).ray.size % 2 else 1.0
+
+    check_chain(interfaces, truth, count=300)
+
+
+@pytest.mark.parametrize("priorities", [(1, 0), (0, 1)])
+def test_where_solids_overlap_the_larger_priority_keeps_the_place(
+    priorities: tuple[int, int],
+) -> None:
+    first = Solid("a", box((-3, -2, -2), (1, 2, 2), (3, 2, 2)), "silicone", GEL, 0.0, priorities[0])
+    second = Solid("b", box((-1, -1, -2), (3, 3, 1)), "acrylic", ACRYLIC, 0.0, priorities[1])
+    interfaces = resolve_media([first, second])
+
+    def truth(p: np.ndarray) -> float:
+        in_first = in_box(p, (-3, -2, -2), (1, 2, 2))
+        in_second = in_box(p, (-1, -1, -2), (3, 3, 1))
+        if in_first and in_second:
+            return GEL if priorities[0] > priorities[1] else ACRYLIC
+        return GEL if in_first else ACRYLIC if in_second else 1.0
+
+    check_chain(interfaces, truth)
+
+
+def test_overlap_without_priority_names_both_parts_and_the_place() -> None:
+    first = Solid("gel", box((-3, -2, -2), (1, 2, 2)), "silicone", GEL)
+    second = Solid("guide", box((-1, -1, -2), (3, 3, 1)), "acrylic", ACRYLIC)
+    with pytest.raises(DesignError) as caught:
+        resolve_media([first, second])
+    for word in ("'gel'", "'guide'", "(0.000, 0.500, -0.500) mm"):
+        assert word in str(caught.value)
+
+
+def test_overlap_of_equal_media_needs_no_priority() -> None:
+    first = Solid("a", box((-3, -2, -2), (1, 2, 2)), "acrylic", ACRYLIC)
+    second = Solid("b", box((-1, -1, -2), (3, 3, 1)), "acrylic", ACRYLIC)
+
+    def truth(p: np.ndarray) -> float:
+        inside = in_box(p, (-3, -2, -2), (1, 2, 2)) or in_box(p, (-1, -1, -2), (3, 3, 1))
+        return ACRYLIC if inside else 1.0
+
+    check_chain(resolve_media([first, second]), truth)
+
+
+@pytest.mark.parametrize("as_solid", [False, True])
+def test_a_thin_film_of_air_is_kept(as_solid: bool) -> None:
+    film = 0.02
+    solids = [
+        Solid("belt", box((-3, -3, film), (3, 3, 2), (5, 5, 1)), "silicone", GEL),
+        Solid("plate", box((-3, -3, -2), (3, 3, 0), (2, 3, 1)), "acrylic", ACRYLIC),
+    ]
+    if as_solid:
+        solids.append(Solid("film", box((-3, -3, 0), (3, 3, film)), "air", 1.0))
+    interfaces = resolve_media(solids)
+    assert {(f.ior_inside, f.ior_outside) for f in interfaces} == {(GEL, 1.0), (ACRYLIC, 1.0)}
+    assert sum(f.mesh.area for f in interfaces) == pytest.approx(4 * 36 + 24 * (4 - film))
+
+    def truth(p: np.ndarray) -> float:
+        if in_box(p, (-3, -3, film), (3, 3, 2)):
+            return GEL
+        return ACRYLIC if in_box(p, (-3, -3, -2), (3, 3, 0)) else 1.0
+
+    check_chain(interfaces, truth)
+
+
+@pytest.mark.parametrize("gap", [-0.001, 0.0015])
+def test_a_gap_or_overlap_within_the_tolerance_is_a_contact(gap: float) -> None:
+    gel = Solid("gel", box((-3, -3, gap), (3, 3, 2), (4, 4, 1)), "silicone", GEL)
+    guide = Solid("guide", box((-4, -4, -2), (4, 4, 0), (3, 3, 1)), "acrylic", ACRYLIC)
+    interfaces = resolve_media([gel, guide])
+    assert area(interfaces, "gel", "guide") == pytest.approx(36)
+    assert area(interfaces, "guide") == pytest.approx(2 * 64 + 64 - 36)
+
+
+def dome(radius: float, rings: int, sectors: int, floor: float) -> TriangleMesh:
+    """The closed upper half of a ball that stands on a cylinder from z = `floor` to 0."""
+    polar = np.linspace(0, np.pi / 2, rings + 1)[1:]
+    around = np.linspace(0, 2 * np.pi, sectors, endpoint=False)
+    circle = np.column_stack([np.cos(around), np.sin(around)])
+    levels = [
+        np.column_stack([circle * r, np.full(sectors, z)])
+        for r, z in [
+            *zip(radius * np.sin(polar), radius * np.cos(polar), strict=True),
+            (radius, floor),
+        ]
+    ]
+    vertices = np.concatenate([*levels, [[0, 0, radius], [0, 0, floor]]])
+    top, bottom = len(vertices) - 2, len(vertices) - 1
+    faces = []
+    for k in range(sectors):
+        n = (k + 1) % sectors
+        faces.append((top, k, n))
+        for level in range(len(levels) - 1):
+            a, b = level * sectors, (level + 1) * sectors
+            faces += [(a + k, b + k, b + n), (a + k, b + n, a + n)]
+        faces.append((bottom, b + n, b + k))
+    return TriangleMesh(vertices, np.array(faces))
+
+
+def test_a_curved_shell_shares_its_inner_surface_with_the_core() -> None:
+    core = dome(2.0, 12, 40, -1.0)
+    outer = dome(3.0, 16, 52, -1.0)
+    shell = Solid("shell", outer, "silicone", GEL, priority=0)
+    interfaces = resolve_media([shell, Solid("core", core, "epoxy", 1.54, priority=1)])
+    assert area(interfaces, "shell", "core") == pytest.approx(
+        core.area - core.face_areas[core.face_normals[:, 2] < -0.99].sum()
+    )
+
+    def truth(p: np.ndarray) -> float:
+        for solid, ior in ((core, 1.54), (outer, GEL)):
+            if ray_hits(solid, p, [0.31, 0.22, 0.9]).ray.size % 2:
+                return ior
+        return 1.0
+
+    check_chain(interfaces, truth, count=300, reach=3.0)
+
+
+def test_solids_of_one_curved_surface_in_two_tessellations_touch() -> None:
+    """Chord errors below the tolerance on both sides: neither film nor overlap is left."""
+    floor, ceiling = (
+        box((-5, -5, -3), (5, 5, 0), (60, 1, 1)),
+        box((-5, -5, 0), (5, 5, 3), (84, 1, 1)),
+    )
+
+    def bent(mesh: TriangleMesh) -> TriangleMesh:
+        lift = (2.0 - 0.02 * mesh.vertices[:, 0] ** 2) * (np.abs(mesh.vertices[:, 2]) < 1)
+        return mesh.with_vertices(mesh.vertices + lift[:, None] * [0, 0, 1])
+
+    lower, upper = bent(floor), bent(ceiling)
+    interfaces = resolve_media(
+        [Solid("guide", lower, "acrylic", ACRYLIC), Solid("gel", upper, "silicone", GEL)]
+    )
+    top = lower.face_areas[(lower.face_normals[:, 2] > 0.5)].sum()
+    assert area(interfaces, "guide", "gel") == pytest.approx(top, rel=1e-6)
+    assert sum(f.mesh.area for f in interfaces if f.names == ("gel",)) == pytest.approx(
+        upper.area - top, rel=1e-4
+    )
+
+
+def test_a_coating_replaces_the_gel_faces_under_it() -> None:
+    mesh = box((-3, -3, 0), (3, 3, 2), (6, 6, 2))
+    top = mesh.face_normals[:, 2] > 0.5
+    skin = TriangleMesh(mesh.vertices, mesh.faces[top])
+    other_skin = TriangleMesh.grid((6, 6), (5, 4), height=2.0).flipped()
+    guide = Solid("guide", box((-4, -4, -1), (4, 4, 0)), "acrylic", ACRYLIC)
+
+    def truth(p: np.ndarray) -> float:
+        if in_box(p, (-3, -3, 0), (3, 3, 2)):
+            return GEL
+        return ACRYLIC if in_box(p, (-4, -4, -1), (4, 4, 0)) else 1.0
+
+    for coating in (skin, other_skin):
+        interfaces = resolve_media(
+            [Solid("gel", mesh, "silicone", GEL), guide], [Sheet("skin", coating)]
+        )
+        assert area(interfaces, "gel") == pytest.approx(4 * 12)
+        check_chain(interfaces, truth, stop=skin)
+
+
+def test_a_mirror_between_two_solids_hides_the_faces_of_both() -> None:
+    gel = Solid("gel", box((-3, -3, 0), (3, 3, 2)), "silicone", GEL)
+    guide = Solid("guide", box((-3, -3, -2), (3, 3, 0)), "acrylic", ACRYLIC)
+    mirror = Sheet("mirror", TriangleMesh.grid((2, 2)), "mirror")
+    interfaces = resolve_media([gel, guide], [mirror])
+    assert area(interfaces, "gel", "guide") == pytest.approx(36 - 4)
+    assert area(interfaces, "gel") == area(interfaces, "guide") == pytest.approx(36 + 48)
+
+
+def test_shading_normals_live_on_in_cut_faces() -> None:
+    core = dome(2.0, 12, 40, -1.0).vertex_normals()
+    band = box((0, -3, -1), (3, 3, 0.5))
+    interfaces = resolve_media(
+        [Solid("core", core, "epoxy", 1.54, priority=1), Solid("band", band, "silicone", GEL)]
+    )
+    for face in interfaces:
+        if face.names[0] == "core":
+            assert face.mesh.normals is not None
+            np.testing.assert_allclose(np.linalg.norm(face.mesh.normals, axis=1), 1.0)
+
+
+def test_a_leaky_solid_is_refused_by_name() -> None:
+    mesh = box((-1, -1, -1), (1, 1, 1))
+    with pytest.raises(MeshError, match="part gel"):
+        resolve_media([Solid("gel", TriangleMesh(mesh.vertices, mesh.faces[1:]), "m", GEL)])
