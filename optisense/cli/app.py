@@ -1,0 +1,57 @@
+"""The command ``optisense`` and its sub-commands."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from optisense import __version__
+from optisense.cli import console
+from optisense.cli.check import check
+from optisense.cli.doctor import doctor
+from optisense.cli.library import library_app
+from optisense.cli.new import new
+from optisense.cli.render import render
+
+app = typer.Typer(
+    name="optisense",
+    help="Simulate and design camera-based tactile sensors of the GelSight family.",
+    epilog="Lengths are in mm, angles in degrees, powers in mW.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    rich_markup_mode="rich",
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+app.command()(new)
+app.command()(check)
+app.command()(render)
+app.command()(doctor)
+app.add_typer(library_app, name="library")
+
+
+def _print_version(wanted: bool) -> None:
+    if wanted:
+        print(f"optisense {__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def _options(
+    version: Annotated[
+        bool,
+        typer.Option(
+            "--version", callback=_print_version, is_eager=True, help="Show the version and exit."
+        ),
+    ] = False,
+    debug: Annotated[
+        bool, typer.Option("--debug", help="Show the traceback of an unexpected error.")
+    ] = False,
+) -> None:
+    console.set_debug(debug)
+
+
+def main() -> None:
+    """Run the command line with the process's arguments and exit."""
+    app()

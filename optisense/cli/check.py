@@ -1,0 +1,64 @@
+"""``optisense check``: is a design in order, and what is in it?"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from rich.table import Table
+
+from optisense.cli.console import ends_well, output
+from optisense.cli.options import ContactOption, DesignArgument, parse_contacts
+
+if TYPE_CHECKING:
+    from optisense.design import SensorDesign
+
+
+@ends_well
+def check(design: DesignArgument, contact: ContactOption = None) -> None:
+    """Check a design, and whether contacts fit on it, without rendering."""
+    contacts = parse_contacts(contact)
+
+    from optisense import sensors
+
+    sensor = sensors.load(design)
+    sensors.check(sensor, contacts)
+    _describe(sensor)
+    if contacts:
+        word = "contact fits" if len(contacts) == 1 else "contacts fit"
+        output.print(f"{len(contacts)} {word} on the sensing surface.")
+    output.print("The design is in order.", style="green")
+
+
+def _describe(design: SensorDesign) -> None:
+    """Print what the design is made of."""
+    output.print(design.name, style="bold", markup=False)
+    if design.description:
+        output.print(design.description, markup=False)
+
+    parts = Table("part", "role", "material", "size (mm)", "triangles", box=None, pad_edge=False)
+    for name, mesh in design.deformed_meshes().items():
+        part = design.parts[name]
+        size = mesh.bounds[1] - mesh.bounds[0]
+        parts.add_row(
+            name,
+            part.role.value,
+            part.material or ("(coating)" if part.role == "sensing_surface" else "-"),
+            " x ".join(f"{length:.4g}" for length in size),
+            f"{len(mesh.faces)}",
+        )
+    lights = Table("lights", "model", "number", "flux each (mW)", box=None, pad_edge=False)
+    for name, group in design.lights.items():
+        lights.add_row(name, group.model, f"{len(group.lights)}", f"{group.flux:g}")
+    camera = design.camera
+    for table in (parts, lights):
+        output.print()
+        output.print(table)
+    output.print()
+    output.print(
+        f"camera  {camera.model}, {camera.projection}, {camera.fov:g} degrees across, "
+        f"{camera.resolution[0]} x {camera.resolution[1]} pixels",
+        markup=False,
+    )
+    assumed = sum(entry.status == "assumed" for entry in design.provenance.values())
+    if assumed:
+        output.print(f"{assumed} of its values are marked as assumed.", style="yellow")

@@ -1,0 +1,108 @@
+"""What commands say and with which exit code they end.
+
+Results go to standard output, everything else to standard error, so that output can be piped.
+"""
+
+from __future__ import annotations
+
+import errno
+import functools
+import os
+import sys
+import traceback
+from collections.abc import Callable
+from typing import ParamSpec, TypeVar
+
+import typer
+from rich.console import Console
+
+from optisense.errors import OptiSenseError, OutputError, SetupError
+
+EXIT_FAILURE = 1
+EXIT_BAD_INPUT = 2
+EXIT_INTERRUPTED = 130
+
+output = Console(highlight=False, soft_wrap=True)
+messages = Console(stderr=True, highlight=False, soft_wrap=True)
+
+_P = ParamSpec("_P")
+_R = TypeVar("_R")
+_debug = False
+
+
+def set_debug(debug: bool) -> None:
+    """Show tracebacks of unexpected errors from here on, or don't."""
+    global _debug
+    _debug = debug
+
+
+def say_error(message: str, *, where: str | None = None, hint: str | None = None) -> None:
+    """Print an error: what is wrong, where, and what to do."""
+    messages.print("error:", style="bold red", end=" ")
+    messages.print(message, markup=False)
+    if where:
+        messages.print(f"  where: {where}", markup=False)
+    if hint:
+        messages.print(f"  try:   {hint}", markup=False)
+
+
+def ends_well(command: Callable[_P, _R]) -> Callable[_P, _R]:
+    """Decorate a command so that no error of the user's shows a traceback.
+
+    Exit codes: 2 for bad input, 1 for a failure, 130 for Ctrl-C.
+    """
+
+    @functools.wraps(command)
+    def run(*args: _P.args, **kwargs: _P.kwargs) -> _R:
+        try:
+            return command(*args, **kwargs)
+        except OptiSenseError as error:
+            say_error(error.message, where=error.where, hint=error.hint)
+            failure = isinstance(error, (OutputError, SetupError))
+            raise typer.Exit(EXIT_FAILURE if failure else EXIT_BAD_INPUT) from None
+        except KeyboardInterrupt:
+            messages.print("interrupted")
+            raise typer.Exit(EXIT_INTERRUPTED) from None
+        except BrokenPipeError:
+            # The reader of a pipe has gone; keep Python from complaining at exit.
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+            raise typer.Exit(EXIT_FAILURE) from None
+        except OSError as error:
+            failed = output_error(error)
+            say_error(failed.message, where=failed.where, hint=failed.hint)
+            _show_traceback()
+            raise typer.Exit(EXIT_FAILURE) from None
+        except MemoryError:
+            say_error("not enough memory", hint="Use a smaller --resolution or fewer --photons")
+            raise typer.Exit(EXIT_FAILURE) from None
+        except typer.Exit:
+            raise
+        except Exception as error:
+            # Usage errors are told by typer itself; everything else is a defect.
+            if type(error).__module__.split(".")[0] in ("click", "typer"):
+                raise
+            say_error(
+                f"unexpected {type(error).__name__}: {error}",
+                hint="This is a defect of OptiSense; `optisense --debug ...` shows where it is",
+            )
+            _show_traceback()
+            raise typer.Exit(EXIT_FAILURE) from None
+
+    return run
+
+
+def output_error(error: OSError) -> OutputError:
+    """What an error of the operating system means to the user."""
+    where = str(error.filename) if error.filename else None
+    if error.errno in (errno.ENOSPC, errno.EDQUOT):
+        return OutputError("the disk is full", where=where, hint="Free some space and try again")
+    if error.errno in (errno.EACCES, errno.EPERM, errno.EROFS):
+        return OutputError(
+            "permission denied", where=where, hint="Choose a folder that you may write to"
+        )
+    return OutputError(error.strerror or str(error), where=where)
+
+
+def _show_traceback() -> None:
+    if _debug:
+        messages.print(traceback.format_exc(), markup=False)

@@ -1,0 +1,44 @@
+"""``optisense new``: a built-in sensor as a design folder of one's own."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from optisense.cli.console import ends_well, output
+from optisense.errors import DesignError, OutputError
+
+
+@ends_well
+def new(
+    name: Annotated[
+        str,
+        typer.Argument(metavar="NAME", help="A built-in sensor, such as gelsight-mini."),
+    ],
+    folder: Annotated[
+        Path,
+        typer.Argument(metavar="DIR", help="The folder to make; it must not exist or be empty."),
+    ],
+) -> None:
+    """Start a design of your own from a built-in sensor."""
+    from difflib import get_close_matches
+
+    from optisense.design import save_design
+    from optisense.sensors import BUILDERS
+
+    if name not in BUILDERS:
+        near = get_close_matches(name, BUILDERS, n=1)
+        hint = f"Did you mean {near[0]}?" if near else f"Choose one of: {', '.join(BUILDERS)}"
+        raise DesignError(f"there is no built-in sensor '{name}'", hint=hint)
+    if folder.is_file():
+        raise OutputError("this is a file, not a folder", where=str(folder))
+    if folder.is_dir() and any(folder.iterdir()):
+        raise OutputError(
+            "the folder is not empty", where=str(folder), hint="Name a folder that doesn't exist"
+        )
+    save_design(BUILDERS[name](), folder)
+    output.print(f"{folder / 'design.yaml'}", markup=False)
+    output.print(f"Look at it:  optisense check {folder}", markup=False, style="dim")
+    output.print(f"Render it:   optisense render {folder} --out picture", markup=False, style="dim")

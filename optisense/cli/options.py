@@ -1,0 +1,83 @@
+"""Options that several commands share, and how their values are read."""
+
+from __future__ import annotations
+
+import re
+from typing import TYPE_CHECKING, Annotated, Literal
+
+import typer
+
+if TYPE_CHECKING:
+    from optisense.geometry import Contact
+
+DesignArgument = Annotated[
+    str,
+    typer.Argument(
+        metavar="DESIGN",
+        help="A built-in sensor's name (gelsight-mini, ...) or the folder of a design.",
+        show_default=False,
+    ),
+]
+
+ContactOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--contact",
+        "-c",
+        metavar="KIND:SIZE@U,V:DEPTH",
+        help="What presses on the sensor, for example sphere:1.5@0,0:0.8 (a ball of 1.5 mm "
+        "radius, at the middle, 0.8 mm deep). May be given several times.",
+        show_default=False,
+    ),
+]
+
+MAX_PIXELS = 100_000_000
+
+
+def parse_resolution(text: str) -> tuple[int, int]:
+    """Read ``WIDTHxHEIGHT`` in pixels.
+
+    Raises:
+        typer.BadParameter: anything else.
+    """
+    match = re.fullmatch(r"\s*(\d{1,6})\s*[xX×]\s*(\d{1,6})\s*", text)
+    if match is None:
+        raise typer.BadParameter(
+            f"'{text}' is not WIDTHxHEIGHT, such as 320x240", param_hint="--resolution"
+        )
+    width, height = int(match[1]), int(match[2])
+    if width < 1 or height < 1 or width * height > MAX_PIXELS:
+        raise typer.BadParameter(
+            f"'{text}' is not between 1x1 and {MAX_PIXELS:,} pixels", param_hint="--resolution"
+        )
+    return width, height
+
+
+def parse_exposure(text: str) -> float | Literal["auto"]:
+    """Read ``auto`` or a positive factor.
+
+    Raises:
+        typer.BadParameter: anything else.
+    """
+    if text.strip().lower() == "auto":
+        return "auto"
+    try:
+        value = float(text)
+    except ValueError:
+        value = -1.0
+    if not 0.0 < value < float("inf"):
+        raise typer.BadParameter(
+            f"'{text}' is neither 'auto' nor a number above 0", param_hint="--exposure"
+        )
+    return value
+
+
+def parse_contacts(texts: list[str] | None) -> list[Contact]:
+    """Read the values of ``--contact``.
+
+    Raises:
+        ContactError: one of them can't be read.
+    """
+    from optisense.geometry import parse_contact
+
+    return [parse_contact(text) for text in texts or []]

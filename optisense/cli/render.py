@@ -1,0 +1,188 @@
+"""``optisense render``: from a design and contacts to a tactile image and its report."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from optisense.cli.console import EXIT_INTERRUPTED, ends_well, messages, output
+from optisense.cli.options import (
+    ContactOption,
+    DesignArgument,
+    parse_contacts,
+    parse_exposure,
+    parse_resolution,
+)
+from optisense.errors import OutputError
+
+if TYPE_CHECKING:
+    from optisense.optics import Progress as RenderProgress
+    from optisense.optics import TactileImage
+
+REPORT = "report.html"
+PICTURE = "image.png"
+
+
+@ends_well
+def render(
+    design: DesignArgument,
+    out: Annotated[
+        Path, typer.Option("--out", "-o", metavar="DIR", help="Folder for the results.")
+    ],
+    contact: ContactOption = None,
+    resolution: Annotated[
+        str | None,
+        typer.Option(
+            metavar="WIDTHxHEIGHT",
+            help="Pixels of the picture, as 320x240. The camera's own when left out.",
+            show_default=False,
+        ),
+    ] = None,
+    photons: Annotated[
+        int | None,
+        typer.Option(
+            min=1,
+            metavar="N",
+            help="Photons to trace. Enough for a good picture when left out.",
+            show_default=False,
+        ),
+    ] = None,
+    noise: Annotated[
+        float | None,
+        typer.Option(
+            min=0.01,
+            max=100.0,
+            metavar="PERCENT",
+            help="Stop when the noise has come down to this.",
+            show_default=False,
+        ),
+    ] = None,
+    seconds: Annotated[
+        float | None,
+        typer.Option(min=0.01, metavar="S", help="Stop after this time.", show_default=False),
+    ] = None,
+    seed: Annotated[
+        int,
+        typer.Option(
+            min=0, max=2**32 - 1, metavar="N", help="The same seed gives the same picture."
+        ),
+    ] = 0,
+    exposure: Annotated[
+        str,
+        typer.Option(
+            metavar="auto|VALUE",
+            help="Brightness of the picture: a factor on the radiance, or found by itself.",
+        ),
+    ] = "auto",
+    variant: Annotated[
+        str,
+        typer.Option(
+            metavar="auto|llvm|cuda", help="Render on the processor (llvm) or a GPU (cuda)."
+        ),
+    ] = "auto",
+) -> None:
+    """Render what the sensor's camera sees, with or without contacts.
+
+    Writes image.png, radiance.exr, normals.npy, contact_mask.npy, layers/*.exr, run.json and
+    report.html into the folder. Ctrl-C stops early and writes what there is.
+    """
+    size = None if resolution is None else parse_resolution(resolution)
+    brightness = parse_exposure(exposure)
+    if noise is not None and seconds is not None:
+        raise typer.BadParameter("give either --noise or --seconds, not both")
+    contacts = parse_contacts(contact)
+
+    from optisense.optics.variant import select_variant
+    from optisense.report import write_report
+    from optisense.sensors import load
+
+    sensor = load(design)
+    ensure_writable(out)
+    select_variant(variant)  # complains about libLLVM before the renderer is imported
+
+    from optisense.optics import OpticalModel
+
+    with _progress_bar() as show:
+        model = OpticalModel(sensor, variant=variant)
+        image = model.render(
+            contacts,
+            resolution=size,
+            photons=photons,
+            noise=noise,
+            seconds=seconds,
+            seed=seed,
+            progress=show,
+        )
+    image.settings["design"] = sensor.name
+    image.settings["contacts"] = list(contact or [])
+    image.save(out, brightness)
+    write_report(out / REPORT, sensor, image, contacts, exposure=brightness)
+    _say_what_came(image, out)
+    if image.interrupted:
+        messages.print("interrupted: the files hold what was finished until then")
+        raise typer.Exit(EXIT_INTERRUPTED)
+
+
+def ensure_writable(folder: Path) -> None:
+    """Make the folder if need be, and try whether a file can be written into it.
+
+    Raises:
+        OutputError: it can't, found out before the work instead of after it.
+    """
+    if folder.exists() and not folder.is_dir():
+        raise OutputError(
+            "the output folder is a file", where=str(folder), hint="Name a folder after --out"
+        )
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=folder) as trial:
+            trial.write(bytes(4096))
+            trial.flush()
+    except OSError as error:
+        raise OutputError(
+            f"the output folder can't be written: {error.strerror or error}",
+            where=str(folder),
+            hint="Choose another folder after --out, or free space on this disk",
+        ) from error
+
+
+@contextmanager
+def _progress_bar() -> Iterator[Callable[[RenderProgress], None]]:
+    """A bar on standard error with photons, noise and time; silent when that is no terminal."""
+    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+
+    with Progress(
+        TextColumn("rendering"),
+        BarColumn(bar_width=32),
+        TextColumn("{task.percentage:>3.0f} %"),
+        TextColumn("{task.fields[note]}"),
+        TimeElapsedColumn(),
+        console=messages,
+        transient=True,
+        disable=not messages.is_terminal,
+    ) as bar:
+        task = bar.add_task("render", total=1.0, note="preparing the scene")
+
+        def show(progress: RenderProgress) -> None:
+            note = f"{progress.photons / 1e6:.1f} million photons"
+            if progress.noise is not None:
+                note += f", noise {progress.noise:.1f} %"
+            bar.update(task, completed=progress.fraction, note=note)
+
+        yield show
+
+
+def _say_what_came(image: TactileImage, folder: Path) -> None:
+    height, width = image.contact_mask.shape
+    facts = [f"{width} x {height} pixels"]
+    settings = image.settings
+    if settings.get("photons"):
+        facts.append(f"{settings['photons'] / 1e6:.2g} million photons")
+    output.print(", ".join(facts), style="dim")
+    output.print(f"picture: {folder / PICTURE}", markup=False)
+    output.print(f"report:  {folder / REPORT}", markup=False)

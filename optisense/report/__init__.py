@@ -1,0 +1,5 @@
+"""Reports: one self-contained HTML page a render, to look at, keep and send."""
+
+from optisense.report.page import write_report
+
+__all__ = ["write_report"]

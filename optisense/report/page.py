@@ -1,0 +1,204 @@
+"""The HTML page of a render: one file that holds everything and asks the network for nothing."""
+
+from __future__ import annotations
+
+import json
+import os
+import tempfile
+from collections.abc import Mapping, Sequence
+from importlib.resources import files
+from pathlib import Path
+from typing import Any, Literal, Protocol
+
+import numpy as np
+from jinja2 import DictLoader, Environment, StrictUndefined
+from markupsafe import Markup
+from numpy.typing import NDArray
+
+from optisense import __version__
+from optisense.design import LightGroup, SensorDesign
+from optisense.errors import OutputError
+from optisense.geometry import Contact, TriangleMesh
+from optisense.report import tables
+from optisense.report.pictures import (
+    auto_scale,
+    data_uri,
+    exposed,
+    mask_overlay,
+    normal_colours,
+)
+from optisense.report.scene_view import scene_data
+
+
+class RenderedImage(Protocol):
+    """What a page needs to know of a tactile image (see `optisense.optics.TactileImage`)."""
+
+    @property
+    def radiance(self) -> NDArray[np.float32]:
+        """(h, w, 3), linear."""
+
+    @property
+    def layers(self) -> Mapping[str, NDArray[np.float32]]:
+        """(h, w, 3), linear, for each light group."""
+
+    @property
+    def normals(self) -> NDArray[np.float32]:
+        """(h, w, 3), unit normals in the design's frame."""
+
+    @property
+    def contact_mask(self) -> NDArray[np.bool_]:
+        """(h, w)."""
+
+    @property
+    def settings(self) -> Mapping[str, Any]:
+        """How it was rendered; can be written as JSON."""
+
+    @property
+    def interrupted(self) -> bool:
+        """Whether it was stopped before it was finished."""
+
+    def picture(self, exposure: float | Literal["auto"] = "auto") -> NDArray[np.uint8]:
+        """(h, w, 3), as a camera would give it."""
+
+
+def write_report(
+    path: str | Path,
+    design: SensorDesign,
+    image: RenderedImage,
+    contacts: Sequence[Contact] = (),
+    *,
+    exposure: float | Literal["auto"] = "auto",
+    indenters: Mapping[str, TriangleMesh] | None = None,
+) -> Path:
+    """Write a render as one self-contained HTML page.
+
+    Args:
+        path: the file to write; it is written whole or not at all.
+        design: the sensor that was rendered.
+        image: what its camera saw.
+        contacts: what touched it.
+        exposure: of the picture, as for `TactileImage.picture`.
+        indenters: the contacts' shapes in the design's frame (mm), drawn in the 3-D view.
+
+    Returns:
+        The path.
+
+    Raises:
+        OutputError: the file can't be written.
+    """
+    path = Path(path)
+    page = render_page(design, image, contacts, exposure=exposure, indenters=indenters)
+    try:
+        _write_whole(path, page)
+    except OSError as error:
+        raise OutputError(
+            f"the report can't be written: {error.strerror or error}", where=str(path)
+        ) from error
+    return path
+
+
+def render_page(
+    design: SensorDesign,
+    image: RenderedImage,
+    contacts: Sequence[Contact] = (),
+    *,
+    exposure: float | Literal["auto"] = "auto",
+    indenters: Mapping[str, TriangleMesh] | None = None,
+) -> str:
+    """The page of `write_report` as text."""
+    height, width = image.contact_mask.shape
+    assumed, sourced = tables.provenance_rows(design)
+    environment = Environment(
+        loader=DictLoader({"report": _template("report.html.j2")}),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    return environment.get_template("report").render(
+        title=design.name,
+        description=design.description,
+        headline=tables.headline(image.settings, width, height),
+        interrupted=image.interrupted,
+        width=width,
+        height=height,
+        pictures=_pictures(design, image, exposure),
+        cross_at=_place_to_look_at(image.contact_mask),
+        groups=[_group(name, group) for name, group in design.lights.items()],
+        contacts=tables.contact_rows(contacts),
+        settings=tables.setting_rows(image.settings),
+        assumed=assumed,
+        sourced=sourced,
+        version=__version__,
+        css=Markup(_template("report.css")),
+        scene=_json(scene_data(design, dict(indenters or {}))),
+        picture_script=Markup(_template("picture.js")),
+        viewer_script=Markup(_template("viewer.js")),
+    )
+
+
+def _pictures(
+    design: SensorDesign, image: RenderedImage, exposure: float | Literal["auto"]
+) -> list[dict[str, str]]:
+    """The pictures with their captions; the tactile image comes first."""
+    picture = image.picture(exposure)
+    scale = auto_scale(image.radiance) if exposure == "auto" else float(exposure)
+    shown = [("picture", picture, "tactile image", "")]
+    shown += [
+        (f"layer {name}", exposed(layer, scale), f"{name} lights alone", "")
+        for name, layer in image.layers.items()
+    ]
+    normals = normal_colours(image.normals, design.camera.axes())
+    shown.append(("normals", normals, "surface normals", "red right, green up, blue to the camera"))
+    if image.contact_mask.any():
+        covered = 100 * float(image.contact_mask.mean())
+        overlay = mask_overlay(picture, image.contact_mask)
+        shown.append(("contact", overlay, "contact", f"{covered:.1f} % of the picture"))
+    return [
+        {"name": name, "uri": data_uri(pixels), "caption": caption, "note": note}
+        for name, pixels, caption, note in shown
+    ]
+
+
+def _place_to_look_at(mask: NDArray[np.bool_]) -> tuple[int, int]:
+    """Column and row where the first profile runs: the middle of the contact, if there is one."""
+    height, width = mask.shape
+    rows, columns = np.nonzero(mask)
+    if len(rows) == 0:
+        return width // 2, height // 2
+    return round(float(columns.mean())), round(float(rows.mean()))
+
+
+def _group(name: str, group: LightGroup) -> dict[str, Any]:
+    brightest = max(*group.colour, 1e-9)
+    red, green, blue = (round(255 * value / brightest) for value in group.colour)
+    return {
+        "name": name,
+        "swatch": f"rgb({red}, {green}, {blue})",
+        "model": group.model,
+        "count": len(group.lights),
+        "flux": f"{group.flux:g} mW",
+    }
+
+
+def _template(name: str) -> str:
+    return (files("optisense.report") / "templates" / name).read_text(encoding="utf-8")
+
+
+def _json(value: Any) -> Markup:
+    """JSON that can't end the script element it stands in."""
+    text = json.dumps(value, separators=(",", ":"), allow_nan=False)
+    return Markup(text.replace("<", "\\u003c"))
+
+
+def _write_whole(path: Path, text: str) -> None:
+    """Write to a temporary file beside the wanted one, then rename it."""
+    handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
+    try:
+        with os.fdopen(handle, "w", encoding="utf-8") as file:
+            file.write(text)
+        Path(temporary).chmod(0o644)
+        Path(temporary).replace(path)
+    except BaseException:
+        Path(temporary).unlink(missing_ok=True)
+        raise

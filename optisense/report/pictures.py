@@ -1,0 +1,102 @@
+"""Arrays as PNG pictures inside a page.
+
+Colours are written as they would look on a screen (sRGB transfer curve, IEC 61966-2-1).
+"""
+
+from __future__ import annotations
+
+import base64
+import struct
+import zlib
+
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.floating]
+ByteArray = NDArray[np.uint8]
+
+
+def png(picture: ByteArray) -> bytes:
+    """A PNG file of a picture.
+
+    Args:
+        picture: (h, w, 3) or (h, w) uint8, row 0 on top.
+    """
+    if picture.dtype != np.uint8 or picture.ndim not in (2, 3):
+        raise ValueError(f"expected a (h, w[, 3]) uint8 picture, got {picture.dtype}")
+    height, width = picture.shape[:2]
+    colour_type = 0 if picture.ndim == 2 else 2
+    rows = picture.reshape(height, -1)
+    filtered = np.zeros((height, rows.shape[1] + 1), dtype=np.uint8)
+    filtered[:, 1:] = rows
+    header = struct.pack(">IIBBBBB", width, height, 8, colour_type, 0, 0, 0)
+    return b"".join(
+        [
+            b"\x89PNG\r\n\x1a\n",
+            _chunk(b"IHDR", header),
+            _chunk(b"IDAT", zlib.compress(filtered.tobytes(), 6)),
+            _chunk(b"IEND", b""),
+        ]
+    )
+
+
+def data_uri(picture: ByteArray) -> str:
+    """A picture as the address of an ``<img>``, its data inside."""
+    return "data:image/png;base64," + base64.b64encode(png(picture)).decode("ascii")
+
+
+def exposed(radiance: FloatArray, scale: float) -> ByteArray:
+    """Radiance times an exposure, clipped, on the sRGB curve.
+
+    Args:
+        radiance: (h, w, 3), linear, any unit.
+        scale: the factor that takes the radiance to 0..1.
+
+    Returns:
+        (h, w, 3) uint8.
+    """
+    linear = np.clip(np.nan_to_num(radiance) * scale, 0.0, 1.0)
+    curve = np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
+    return np.round(curve * 255).astype(np.uint8)
+
+
+def auto_scale(radiance: FloatArray) -> float:
+    """The exposure that takes the brightest one in 200 values to just below white."""
+    finite = radiance[np.isfinite(radiance)]
+    bright = float(np.percentile(finite, 99.5)) if finite.size else 0.0
+    return 0.9 / bright if bright > 0 else 1.0
+
+
+def normal_colours(normals: FloatArray, axes: NDArray[np.float64]) -> ByteArray:
+    """Surface normals as the usual normal-map colours, seen by the camera.
+
+    Args:
+        normals: (h, w, 3) unit normals in the design's frame; zero or NaN where there is none.
+        axes: (3, 3) rows: image right, image up, viewing direction, in the design's frame.
+
+    Returns:
+        (h, w, 3) uint8: red = image right, green = image up, blue = towards the camera; black
+        where there is no surface.
+    """
+    valid = np.isfinite(normals).all(axis=-1) & (np.linalg.norm(normals, axis=-1) > 0.5)
+    seen = np.nan_to_num(normals) @ (axes * np.array([[1.0], [1.0], [-1.0]])).T
+    # A normal may be given for either side of the surface: show the one towards the camera.
+    seen = np.where(seen[..., 2:] < 0, -seen, seen)
+    colours = np.round((0.5 + 0.5 * np.clip(seen, -1, 1)) * 255).astype(np.uint8)
+    colours[~valid] = 0
+    return colours
+
+
+def mask_overlay(picture: ByteArray, mask: NDArray[np.bool_]) -> ByteArray:
+    """The picture in grey with the masked pixels in their own colours and a white outline."""
+    grey = (picture.astype(np.float64) @ [0.299, 0.587, 0.114] * 0.45)[..., None]
+    shown = np.where(mask[..., None], picture, grey.astype(np.uint8))
+    padded = np.pad(mask, 1)
+    inside = padded[:-2, 1:-1] & padded[2:, 1:-1] & padded[1:-1, :-2] & padded[1:-1, 2:]
+    shown[mask & ~inside] = 255
+    return shown.astype(np.uint8)
+
+
+def _chunk(kind: bytes, content: bytes) -> bytes:
+    checksum = zlib.crc32(kind + content)
+    return struct.pack(">I", len(content)) + kind + content + struct.pack(">I", checksum)

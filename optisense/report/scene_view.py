@@ -1,0 +1,147 @@
+"""A design as data for the page's 3-D view: solids, lights, camera and contacts."""
+
+from __future__ import annotations
+
+import base64
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from optisense.design import LightGroup, SensorDesign
+from optisense.errors import OptiSenseError
+from optisense.geometry import TriangleMesh
+from optisense.report.edges import feature_edges
+
+CREASE = 35.0
+"""Edges sharper than this (degrees) are drawn and not shaded smoothly."""
+
+ROLE_LOOKS: dict[str, tuple[str, float]] = {
+    "sensing_surface": ("#8d99a6", 0.55),
+    "elastomer": ("#f2a65a", 0.28),
+    "support": ("#6fb7e9", 0.24),
+    "mirror": ("#cfd8e3", 0.75),
+    "blocker": ("#3b3f46", 1.0),
+    "interface": ("#b7a6f2", 0.3),
+    "indenter": ("#b9a44c", 1.0),
+}
+"""Colour and opacity of each role, shown in the legend."""
+
+MAX_TRIANGLES = 400_000
+"""More are not put into a page: a browser would stall on them."""
+
+MARKER_SIZE = 0.35
+"""Radius (mm) at which lights without an emitting window are drawn."""
+
+
+def scene_data(design: SensorDesign, indenters: dict[str, TriangleMesh]) -> dict[str, Any]:
+    """The 3-D view's data, ready for JSON.
+
+    Args:
+        design: the sensor.
+        indenters: what touches it, in the design's frame.
+
+    Returns:
+        ``parts`` (name, role, colour, alpha, meshes), ``lights`` (groups with discs and
+        directions), ``camera`` (pose and frustum), ``centre`` (3,) and ``size`` in mm.
+    """
+    meshes = design.deformed_meshes()
+    parts = [_part(name, design.parts[name].role.value, mesh) for name, mesh in meshes.items()]
+    parts += [_part(name, "indenter", mesh) for name, mesh in indenters.items()]
+    corners = np.concatenate([mesh.bounds for mesh in meshes.values()])
+    camera = np.asarray(design.camera.position)[None]
+    corners = np.concatenate([corners, camera])
+    low, high = corners.min(axis=0), corners.max(axis=0)
+    return {
+        "parts": [part for part in parts if part is not None],
+        "lights": [_lights(name, group) for name, group in design.lights.items()],
+        "camera": _camera(design, meshes),
+        "centre": _rounded((low + high) / 2),
+        "size": float(np.linalg.norm(high - low)),
+    }
+
+
+def _part(name: str, role: str, mesh: TriangleMesh) -> dict[str, Any] | None:
+    if len(mesh.faces) > MAX_TRIANGLES:
+        return None
+    colour, alpha = ROLE_LOOKS.get(role, ("#999999", 1.0))
+    smooth = mesh if mesh.normals is not None else mesh.vertex_normals(CREASE)
+    normals = smooth.normals
+    assert normals is not None
+    return {
+        "name": name,
+        "role": role,
+        "colour": colour,
+        "alpha": alpha,
+        "points": _encoded(smooth.vertices, np.float32),
+        "normals": _encoded(np.round(normals * 127), np.int8),
+        "faces": _encoded(smooth.faces, np.uint32),
+        "edges": _encoded(feature_edges(mesh, CREASE), np.float32),
+    }
+
+
+def _lights(name: str, group: LightGroup) -> dict[str, Any]:
+    radius = _window_radius(group)
+    return {
+        "name": name,
+        "colour": _rounded(group.colour),
+        "lights": [
+            {
+                "position": _rounded(light.position),
+                "direction": _rounded(
+                    np.asarray(light.direction) / np.linalg.norm(light.direction)
+                ),
+                "radius": radius,
+            }
+            for light in group.lights
+        ],
+    }
+
+
+def _window_radius(group: LightGroup) -> float:
+    """Radius (mm) of a disc as large as the light's emitting window."""
+    from optisense import library
+
+    try:
+        model = group.emitter or library.light(group.model)
+    except OptiSenseError:
+        return MARKER_SIZE
+    size = getattr(model, "size", None)
+    return MARKER_SIZE if size is None else float(np.sqrt(size[0] * size[1])) / 2
+
+
+def _camera(design: SensorDesign, meshes: dict[str, TriangleMesh]) -> dict[str, Any]:
+    """The pupil and the four corners of what the camera sees, at the sensing surface's depth."""
+    camera = design.camera
+    position = np.asarray(camera.position, dtype=np.float64)
+    right, up, forward = camera.axes()
+    surfaces = [
+        mesh.vertices
+        for name, mesh in meshes.items()
+        if design.parts[name].role.value == "sensing_surface"
+    ]
+    depths = (np.concatenate(surfaces) - position) @ forward if surfaces else np.array([20.0])
+    depth = max(float(np.median(depths)), 1.0)
+    half_angle = np.radians(min(camera.fov, 150.0) / 2)
+    half_width = depth * np.tan(half_angle)
+    half_height = half_width * camera.resolution[1] / camera.resolution[0]
+    corners = [
+        position + depth * forward + x * half_width * right + y * half_height * up
+        for x, y in ((-1, 1), (1, 1), (1, -1), (-1, -1))
+    ]
+    return {
+        "name": camera.model,
+        "position": _rounded(position),
+        "corners": [_rounded(corner) for corner in corners],
+        "up": _rounded(up),
+        "forward": _rounded(forward),
+    }
+
+
+def _encoded(values: NDArray[Any], dtype: Any) -> str:
+    little_endian = np.ascontiguousarray(values, dtype=np.dtype(dtype).newbyteorder("<"))
+    return base64.b64encode(little_endian.tobytes()).decode("ascii")
+
+
+def _rounded(values: Any) -> list[float]:
+    return [round(float(value), 4) for value in values]
