@@ -1,0 +1,55 @@
+"""Sensor designs: their parts, the file format, and dotted paths to every value in them.
+
+A design is a folder with `design.yaml` and `meshes/`. Nothing here renders.
+"""
+
+from optisense.design.addressing import get_value, numbers, parse_path, set_value
+from optisense.design.cage import Cage, Point, Share
+from optisense.design.camera import Camera
+from optisense.design.check import check_design
+from optisense.design.emitters import AreaEmitter, IesEmitter, LightModel, SpotEmitter
+from optisense.design.lights import Light, LightGroup
+from optisense.design.materials import (
+    Absorber,
+    Coating,
+    Conductor,
+    Dielectric,
+    Diffuse,
+    Material,
+)
+from optisense.design.parts import Part, Role
+from optisense.design.problems import Problem
+from optisense.design.sensor_design import Provenance, SensorDesign, Status
+from optisense.design.storage import load_design, save_design
+
+__all__ = [
+    "Absorber",
+    "AreaEmitter",
+    "Cage",
+    "Camera",
+    "Coating",
+    "Conductor",
+    "Dielectric",
+    "Diffuse",
+    "IesEmitter",
+    "Light",
+    "LightGroup",
+    "LightModel",
+    "Material",
+    "Part",
+    "Point",
+    "Problem",
+    "Provenance",
+    "Role",
+    "SensorDesign",
+    "Share",
+    "SpotEmitter",
+    "Status",
+    "check_design",
+    "get_value",
+    "load_design",
+    "numbers",
+    "parse_path",
+    "save_design",
+    "set_value",
+]

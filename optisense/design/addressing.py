@@ -1,0 +1,147 @@
+"""Reading and setting any value of a design by a dotted path.
+
+Grammar: names and list indices, as in `coating.specularity`, `lights.red.flux`,
+`cages.skin.points[13].z`. Three numbers in a row can also be named: `.x .y .z` of a vector,
+`.r .g .b` of a colour.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from typing import Any
+
+from pydantic import BaseModel, ValidationError
+
+from optisense.design.near import suggestion
+from optisense.design.problems import design_error
+from optisense.design.sensor_design import SensorDesign, dotted
+from optisense.errors import DesignError
+
+_STEP = re.compile(r"(?:^|\.)(?P<name>[A-Za-z0-9_][A-Za-z0-9_-]*)|\[(?P<index>\d{1,9})\]")
+_LETTERS = {"x": 0, "y": 1, "z": 2, "r": 0, "g": 1, "b": 2}
+
+Steps = tuple[str | int, ...]
+
+
+def get_value(design: SensorDesign, path: str) -> Any:
+    """The value at `path`: a number, text, vector (tuple), list or a whole section.
+
+    Raises:
+        DesignError: the path is malformed or leads nowhere; names the near match.
+    """
+    value: Any = design
+    for done, step in _walk(path):
+        value = _child(value, step, path, done)
+    return value
+
+
+def set_value(design: SensorDesign, path: str, value: object) -> SensorDesign:
+    """A new, checked design with `value` at `path`; the given design is left as it is.
+
+    Raises:
+        DesignError: the path leads nowhere, or the value does not fit there.
+    """
+    get_value(design, path)  # names the near match when there is no such value
+    data = design.model_dump(mode="json")
+    target: Any = data
+    steps = parse_path(path)
+    for step in steps[:-1]:
+        target = target[_key(target, step)]
+    target[_key(target, steps[-1])] = _plain(value)
+    try:
+        return design._replaced(data)
+    except ValidationError as error:
+        raise design_error(error, data, where=path) from None
+
+
+def numbers(design: SensorDesign) -> Iterator[tuple[str, float]]:
+    """Every number of the design with its path, in file order."""
+    yield from _numbers(design.model_dump(mode="json", exclude={"provenance"}), ())
+
+
+def parse_path(path: str) -> Steps:
+    """Split a path into names and indices.
+
+    Raises:
+        DesignError: it is malformed.
+    """
+    steps: list[str | int] = []
+    position = 0
+    while position < len(path):
+        match = _STEP.match(path, position)
+        if match is None or (position == 0 and match["name"] is None):
+            break
+        steps.append(match["name"] if match["index"] is None else int(match["index"]))
+        position = match.end()
+    if not steps or position < len(path):
+        raise DesignError(
+            f"'{path}' is not a path to a value",
+            hint="Write it like lights.red.flux or cages.skin.points[13].z",
+        )
+    return tuple(steps)
+
+
+def _walk(path: str) -> Iterator[tuple[Steps, str | int]]:
+    steps = parse_path(path)
+    for count, step in enumerate(steps):
+        yield steps[:count], step
+
+
+def _child(value: Any, step: str | int, path: str, done: Steps) -> Any:
+    here = f"'{dotted(done)}'" if done else "the design"
+    if isinstance(value, BaseModel):
+        fields = type(value).model_fields
+        if step in fields:
+            return getattr(value, str(step))
+        known = list(fields)
+    elif isinstance(value, dict):
+        if step in value:
+            return value[step]
+        known = list(value)
+    elif isinstance(value, list | tuple):
+        key = _key(value, step)
+        if isinstance(key, int):
+            if key < len(value):
+                return value[key]
+            raise DesignError(
+                f"'{path}' leads nowhere: {here} has {len(value)} entries",
+                hint=f"Indices run from 0 to {len(value) - 1}",
+            )
+        known = ["x", "y", "z"] if len(value) == 3 else []
+    else:
+        raise DesignError(f"'{path}' leads nowhere: {here} has nothing inside it")
+    raise DesignError(
+        f"'{path}' leads nowhere: {here} has no '{step}'",
+        hint=suggestion(str(step), known, limit=20),
+    )
+
+
+def _key(container: Any, step: str | int) -> str | int:
+    """The key or index of `step`; x, y, z and r, g, b stand for 0, 1, 2 in three numbers."""
+    if isinstance(container, list | tuple) and len(container) == 3 and step in _LETTERS:
+        return _LETTERS[str(step)]
+    return step
+
+
+def _plain(value: object) -> object:
+    """Models and NumPy numbers and arrays as plain Python values."""
+    if isinstance(value, BaseModel):
+        return value.model_dump(mode="json")
+    to_list = getattr(value, "tolist", None)  # NumPy scalars and arrays
+    if callable(to_list):
+        return to_list()
+    if isinstance(value, tuple | list):
+        return [_plain(item) for item in value]
+    return value
+
+
+def _numbers(value: Any, path: Steps) -> Iterator[tuple[str, float]]:
+    if isinstance(value, dict):
+        for key, item in value.items():
+            yield from _numbers(item, (*path, key))
+    elif isinstance(value, list):
+        for index, item in enumerate(value):
+            yield from _numbers(item, (*path, index))
+    elif isinstance(value, int | float) and not isinstance(value, bool):
+        yield dotted(path), float(value)

@@ -1,0 +1,221 @@
+"""Checking a whole design without rendering it."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+
+import numpy as np
+from numpy.typing import NDArray
+
+from optisense.design.addressing import get_value
+from optisense.design.limits import unit_slips
+from optisense.design.near import suggestion
+from optisense.design.parts import TRANSPARENT_SOLIDS, Role
+from optisense.design.problems import Problem
+from optisense.design.sensor_design import SensorDesign
+from optisense.errors import DesignError, LibraryError, MeshError, OptiSenseError
+from optisense.geometry import TriangleMesh
+
+OPAQUE_ROLES = frozenset({Role.BLOCKER, Role.MIRROR, Role.INDENTER})
+
+PROBE = 0.05
+"""mm: how far beside the sensing surface its medium is looked up."""
+
+PROBES = 64
+
+
+def check_design(design: SensorDesign, light_names: Collection[str] | None = None) -> list[Problem]:
+    """All that can be found wrong with a design without tracing light through it.
+
+    Meshes that are empty, not closed or not finite, unit slips, missing meshes, unknown lights,
+    lights or a camera inside something opaque, a sensing surface that faces the wrong way or
+    lies off the elastomer, and provenance of values that don't exist. (Fields, ranges and
+    references between parts are checked as soon as a design is made.)
+
+    Args:
+        light_names: the lights of the library; None skips looking up light models.
+
+    Returns:
+        Problems in the order of the design file, an empty list when all is well.
+    """
+    problems: list[Problem] = []
+    meshes: dict[str, TriangleMesh] = {}
+    for name in design.parts:
+        problems += _check_mesh(design, name, meshes)
+    problems += unit_slips(design)
+    problems += _check_lights(design, light_names)
+    if not any(problem.severity == "error" for problem in problems):
+        try:
+            meshes = {n: m for n, m in design.deformed_meshes().items() if n in meshes}
+        except OptiSenseError as error:
+            place = error.where or design.where("cages")
+            problems.append(Problem(error.message, place, error.hint))
+        else:
+            problems += _check_poses(design, meshes)
+            problems += _check_sensing_surfaces(design, meshes)
+    problems += _check_provenance(design)
+    return problems
+
+
+def _check_mesh(design: SensorDesign, name: str, meshes: dict[str, TriangleMesh]) -> list[Problem]:
+    """Put the part's mesh into `meshes` unless something is wrong with it."""
+    part = design.parts[name]
+    place = design.where("parts", name, "mesh")
+    if name not in design.meshes:
+        return [Problem(f"part '{name}' has no mesh", place, "Set design.meshes[name]")]
+    try:
+        mesh = design.meshes[name].validate(name, closed=part.role in TRANSPARENT_SOLIDS)
+    except MeshError as error:
+        return [Problem(error.message, error.where or place, error.hint)]
+    meshes[name] = mesh
+    if part.role is Role.SENSING_SURFACE and mesh.is_closed:
+        return [
+            Problem(
+                f"part '{name}' is a sensing_surface, but its mesh is closed",
+                place,
+                "A sensing surface is open: only the coated faces of the elastomer",
+                severity="warning",
+            )
+        ]
+    return []
+
+
+def _check_lights(design: SensorDesign, light_names: Collection[str] | None) -> list[Problem]:
+    problems: list[Problem] = []
+    if sum(group.flux * len(group.lights) for group in design.lights.values()) <= 0.0:
+        problems.append(
+            Problem(
+                "no light is on: every picture will be black",
+                design.where("lights"),
+                "Add a light group, or set a flux above 0",
+                severity="warning",
+            )
+        )
+    for name, group in design.lights.items():
+        if group.emitter is not None and group.emitter.kind == "ies":
+            try:
+                group.emitter.intensity_table()
+            except LibraryError as error:
+                place = error.where or design.where("lights", name, "emitter", "file")
+                problems.append(Problem(error.message, place, error.hint))
+        elif group.emitter is None and light_names is not None and group.model not in light_names:
+            problems.append(
+                Problem(
+                    f"light group '{name}' has an unknown model '{group.model}'",
+                    design.where("lights", name, "model"),
+                    suggestion(group.model, light_names)
+                    or "Name a light of the library, or describe it under 'emitter'",
+                )
+            )
+    return problems
+
+
+def _check_poses(design: SensorDesign, meshes: dict[str, TriangleMesh]) -> list[Problem]:
+    """No light and no camera may be shut up inside an opaque solid."""
+    opaque = {
+        name: mesh
+        for name, mesh in meshes.items()
+        if design.parts[name].role in OPAQUE_ROLES and mesh.is_closed
+    }
+    if not opaque:
+        return []
+    poses: list[tuple[str, tuple[float, float, float], tuple[str | int, ...]]] = [
+        ("the camera", design.camera.position, ("camera", "position"))
+    ]
+    for name, group in design.lights.items():
+        for index, light in enumerate(group.lights):
+            path: tuple[str | int, ...] = ("lights", name, "lights", index, "position")
+            poses.append((f"light {index} of group '{name}'", light.position, path))
+    points = np.array([position for _, position, _ in poses])
+    problems = []
+    for part, mesh in opaque.items():
+        role = design.parts[part].role.value
+        for (label, position, path), within in zip(poses, inside(points, mesh), strict=True):
+            if within:
+                at = ", ".join(f"{value:g}" for value in position)
+                problems.append(
+                    Problem(
+                        f"{label} is inside the opaque part '{part}' ({role}) at ({at})",
+                        design.where(*path),
+                        "Move it out, or make a hole in the part",
+                    )
+                )
+    return problems
+
+
+def _check_sensing_surfaces(design: SensorDesign, meshes: dict[str, TriangleMesh]) -> list[Problem]:
+    """Normals of a sensing surface must look into the medium behind it."""
+    solids = [mesh for n, mesh in meshes.items() if design.parts[n].role in TRANSPARENT_SOLIDS]
+    problems: list[Problem] = []
+    if not solids:
+        return problems
+    for name in design.parts_of(Role.SENSING_SURFACE):
+        mesh = meshes[name]
+        chosen = np.linspace(0, len(mesh.faces) - 1, min(PROBES, len(mesh.faces))).astype(int)
+        centres, normals = mesh.triangles[chosen].mean(axis=1), mesh.face_normals[chosen]
+        front = _inside_any(centres + PROBE * normals, solids)
+        back = _inside_any(centres - PROBE * normals, solids)
+        place = design.where("parts", name, "mesh")
+        if np.count_nonzero(back & ~front) > len(chosen) / 2:
+            problems.append(
+                Problem(
+                    f"the sensing surface '{name}' faces outward: its normals must look into the "
+                    "elastomer, to where the light comes from",
+                    place,
+                    "Turn the faces of the mesh over",
+                )
+            )
+        elif np.count_nonzero(front) < len(chosen) / 2:
+            problems.append(
+                Problem(
+                    f"most of the sensing surface '{name}' does not lie on a transparent solid",
+                    place,
+                    "Let it share its faces with the elastomer, unless light reaches it in air",
+                    severity="warning",
+                )
+            )
+    return problems
+
+
+def _check_provenance(design: SensorDesign) -> list[Problem]:
+    problems = []
+    for path in design.provenance:
+        try:
+            get_value(design, path)
+        except DesignError as error:
+            problems.append(
+                Problem(
+                    f"provenance is given for '{path}', which does not exist",
+                    design.where("provenance", path),
+                    error.hint,
+                    severity="warning",
+                )
+            )
+    return problems
+
+
+def _inside_any(points: NDArray[np.float64], solids: list[TriangleMesh]) -> NDArray[np.bool_]:
+    result = np.zeros(len(points), dtype=bool)
+    for mesh in solids:
+        result |= inside(points, mesh)
+    return result
+
+
+def inside(points: NDArray[np.float64], mesh: TriangleMesh) -> NDArray[np.bool_]:
+    """(n,) bool: which of (n, 3) points (mm) are inside a closed mesh, however its faces wind.
+
+    By the winding number: the mesh's solid angle seen from the point, summed with Van Oosterom
+    and Strackee, "The solid angle of a plane triangle", IEEE Trans. Biomed. Eng. 30 (1983).
+    """
+    result = np.zeros(len(points), dtype=bool)
+    low, high = mesh.bounds
+    for index in np.flatnonzero(((points > low) & (points < high)).all(axis=1)):
+        corners = mesh.triangles - points[index]
+        a, b, c = corners[:, 0], corners[:, 1], corners[:, 2]
+        la, lb, lc = (np.linalg.norm(corner, axis=1) for corner in (a, b, c))
+        determinant = np.einsum("ij,ij->i", a, np.cross(b, c))
+        divisor = la * lb * lc + np.einsum("ij,ij->i", a, b) * lc
+        divisor += np.einsum("ij,ij->i", b, c) * la + np.einsum("ij,ij->i", c, a) * lb
+        solid_angle = 2.0 * np.arctan2(determinant, divisor).sum()
+        result[index] = abs(solid_angle) > 2.0 * np.pi
+    return result

@@ -1,0 +1,85 @@
+"""How a lamp sends out light: a flat area, a measured IES profile, or a spot."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Literal
+
+from pydantic import Field, PrivateAttr, model_validator
+
+from optisense.design.fields import Model, Number, Positive, RelativePath
+from optisense.design.ies import IesProfile, read_ies
+from optisense.errors import LibraryError
+
+HalfAngle = Annotated[Number, Field(gt=0.0, le=90.0)]
+
+
+class AreaEmitter(Model):
+    """A flat emitting window, such as that of an LED without a lens."""
+
+    kind: Literal["area"] = "area"
+    shape: Literal["rectangle", "disc"] = Field(default="disc", description="rectangle; disc")
+    size: tuple[Positive, Positive] = Field(
+        description="mm, width and height of the window; a disc's diameter twice"
+    )
+    lambertian: Literal[True] = Field(default=True, description="as bright from all sides")
+
+    @model_validator(mode="after")
+    def _disc_is_round(self) -> AreaEmitter:
+        if self.shape == "disc" and self.size[0] != self.size[1]:
+            raise ValueError("a disc has its diameter twice in size")
+        return self
+
+
+class IesEmitter(Model):
+    """A point that radiates as an IES file says; the file's vertical angle 0 is the light's
+    direction, its horizontal angle 0 the light's `up`."""
+
+    kind: Literal["ies"] = "ies"
+    file: RelativePath = Field(description="LM-63 file, inside this folder")
+    _folder: Path | None = PrivateAttr(default=None)
+
+    def path(self) -> Path:
+        """The IES file on disk.
+
+        Raises:
+            LibraryError: it is not known which folder the file is in, or it is not in it.
+        """
+        if self._folder is None:
+            raise LibraryError(
+                f"the IES file '{self.file}' has no folder",
+                hint="Load the design or the library entry that names it from its folder",
+            )
+        folder = self._folder.resolve()
+        path = (folder / self.file).resolve()
+        if not path.is_relative_to(folder):
+            raise LibraryError(
+                f"the IES file '{self.file}' lies outside its folder", where=str(folder)
+            )
+        return path
+
+    def intensity_table(self) -> IesProfile:
+        """Read the file: luminous intensity (candela) over vertical and horizontal angles.
+
+        Raises:
+            LibraryError: the file is missing or malformed.
+        """
+        return read_ies(self.path())
+
+
+class SpotEmitter(Model):
+    """A point whose light is even up to `beam` and falls to nothing at `cutoff`."""
+
+    kind: Literal["spot"] = "spot"
+    cutoff: HalfAngle = Field(description="degrees from the axis where the light ends")
+    beam: HalfAngle = Field(description="degrees from the axis up to which it is full")
+
+    @model_validator(mode="after")
+    def _beam_inside_cutoff(self) -> SpotEmitter:
+        if self.beam > self.cutoff:
+            raise ValueError("beam can't be wider than cutoff")
+        return self
+
+
+LightModel = Annotated[AreaEmitter | IesEmitter | SpotEmitter, Field(discriminator="kind")]
+"""Any kind of lamp; `kind` tells which."""

@@ -1,0 +1,72 @@
+"""Types that the models of a design share, and the base model itself."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field
+
+Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
+"""A finite number; text, true and false are refused."""
+
+Fraction = Annotated[Number, Field(ge=0.0, le=1.0)]
+"""A number from 0 to 1."""
+
+NonNegative = Annotated[Number, Field(ge=0.0)]
+Positive = Annotated[Number, Field(gt=0.0)]
+Count = Annotated[int, Field(strict=True, ge=1)]
+
+Vector = tuple[Number, Number, Number]
+"""x, y, z."""
+
+Colour = tuple[Fraction, Fraction, Fraction]
+"""One value for each of red, green and blue, 0 to 1."""
+
+PositiveRGB = tuple[Positive, Positive, Positive]
+NonNegativeRGB = tuple[NonNegative, NonNegative, NonNegative]
+
+Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_-]{0,63}$")]
+"""The name of a part, material, light group or cage: letters, digits, '-' and '_'."""
+
+
+def _not_zero(vector: tuple[float, float, float]) -> tuple[float, float, float]:
+    if sum(value * value for value in vector) < 1e-18:
+        raise ValueError("a direction can't be the zero vector")
+    return vector
+
+
+Direction = Annotated[Vector, AfterValidator(_not_zero)]
+"""x, y, z of a direction; of any length but zero."""
+
+
+def _inside_folder(path: str) -> str:
+    parts = path.split("/")
+    if "\\" in path or ":" in path or "\0" in path or path.startswith("/") or ".." in parts:
+        raise ValueError("must be a path inside the design folder, with '/' between its parts")
+    if not parts[-1]:
+        raise ValueError("must name a file")
+    return path
+
+
+RelativePath = Annotated[str, AfterValidator(_inside_folder)]
+"""A file inside the design folder."""
+
+
+class Model(BaseModel):
+    """Base of everything in a design file: unknown fields are refused, changes are checked."""
+
+    model_config = ConfigDict(extra="forbid", validate_assignment=True)
+
+
+class MisfitError(ValueError):
+    """A value that is fine by itself but does not fit the rest of the design.
+
+    Attributes:
+        path: keys and indices from the model that found it down to the value.
+        hint: what to do.
+    """
+
+    def __init__(self, message: str, path: tuple[str | int, ...], hint: str | None = None) -> None:
+        super().__init__(message)
+        self.path = path
+        self.hint = hint

@@ -1,0 +1,253 @@
+"""Reading IES files (ANSI/IESNA LM-63): luminous intensity over direction.
+
+Only type C photometry is read: the vertical angle is measured from the lamp's axis (0 is
+straight ahead), the horizontal angle around it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from optisense.errors import LibraryError
+
+FloatArray = NDArray[np.float64]
+
+MAX_VALUES = 4_000_000
+MAX_FILE_BYTES = 64 * 1024 * 1024
+
+
+@dataclass(frozen=True)
+class IesProfile:
+    """Luminous intensity of a lamp, with the symmetries of its file written out.
+
+    Attributes:
+        vertical_angles: (nv,) degrees from the axis, ascending, within 0..180. Outside their
+            range the lamp is dark.
+        horizontal_angles: (nh,) degrees around the axis, ascending, from 0 to 360 inclusive.
+        candela: (nh, nv) intensity; multiplier and ballast factor are applied.
+        rated_lumens: lumens the header claims for its bare lamps, or None (absolute photometry).
+    """
+
+    vertical_angles: FloatArray
+    horizontal_angles: FloatArray
+    candela: FloatArray
+    rated_lumens: float | None
+
+    @property
+    def lumens(self) -> float:
+        """The flux: the integral of intensity, linear between the angles, over all directions."""
+        theta = np.radians(self.vertical_angles)
+        low, high = theta[:-1], theta[1:]
+        # The integrals of the two hat functions times sin(theta) over each interval.
+        sines = (np.sin(high) - np.sin(low)) / (high - low)
+        ring = self.candela[:, :-1] * (np.cos(low) - sines)
+        ring = (ring + self.candela[:, 1:] * (sines - np.cos(high))).sum(axis=1)
+        around = np.radians(np.diff(self.horizontal_angles))
+        return float((0.5 * (ring[:-1] + ring[1:]) * around).sum())
+
+
+def read_ies(path: str | Path) -> IesProfile:
+    """Read an LM-63 file of 1986, 1991, 1995 or 2002; values may wrap freely.
+
+    TILT=INCLUDE is read, and its factor for the untilted lamp applied.
+
+    Raises:
+        LibraryError: the file is missing, truncated, malformed or of another photometric type;
+            says the line.
+    """
+    path = Path(path)
+    try:
+        data = path.read_bytes()
+    except OSError as error:
+        raise LibraryError(
+            f"can't read the IES file: {error.strerror or error}",
+            where=str(path),
+            hint="Check the path",
+        ) from error
+    if len(data) > MAX_FILE_BYTES:
+        raise LibraryError("the IES file is too large", where=str(path))
+    return parse_ies(data.decode("latin-1"), str(path))
+
+
+def parse_ies(text: str, source: str) -> IesProfile:
+    """Parse the text of an LM-63 file; `source` names it in errors. See `read_ies`."""
+    lines = text.splitlines()
+    tilt_line = next(
+        (n for n, line in enumerate(lines) if line.strip().upper().startswith("TILT=")), None
+    )
+    if tilt_line is None:
+        raise LibraryError(
+            "not an IES file, or cut off in its header: there is no TILT= line",
+            where=f"{source}:{max(len(lines), 1)}",
+            hint="Get the file again from its maker",
+        )
+    values = _Values(lines, tilt_line + 1, source)
+    tilt = _tilt_factor(lines[tilt_line].split("=", 1)[1].strip(), values, tilt_line, source)
+
+    lamps = values.integer("number of lamps", 1, 1_000_000)
+    lumens_per_lamp = values.number("lumens per lamp")
+    multiplier = values.number("candela multiplier")
+    n_vertical = values.integer("number of vertical angles", 2, MAX_VALUES)
+    n_horizontal = values.integer("number of horizontal angles", 1, MAX_VALUES)
+    if n_vertical * n_horizontal > MAX_VALUES:
+        values.fail(f"{n_vertical} x {n_horizontal} intensities are too many")
+    if values.integer("photometric type", 1, 3) != 1:
+        values.fail("only type C photometry (1) is read, not type A or B")
+    values.integer("units type", 1, 2)
+    for name in ("opening width", "opening length", "opening height"):
+        values.number(name)
+    ballast = values.number("ballast factor")
+    values.number("the value kept for future use")
+    values.number("input watts")
+    vertical = values.array("vertical angles", n_vertical)
+    horizontal = values.array("horizontal angles", n_horizontal)
+    candela = values.array("intensities", n_vertical * n_horizontal)
+    values.expect_end()
+
+    _check_vertical(vertical, values)
+    scale = multiplier * ballast * tilt
+    if not np.isfinite(scale) or scale <= 0.0:
+        values.fail("multiplier and ballast factor must be above 0")
+    if (candela < 0.0).any() or candela.max() <= 0.0:
+        values.fail("intensities must not be negative, and not all 0")
+    table = candela.reshape(n_horizontal, n_vertical) * scale
+    horizontal, table = _expanded(horizontal, table, values)
+    rated = lamps * lumens_per_lamp if lumens_per_lamp > 0.0 else None
+    return IesProfile(vertical, horizontal, table, rated)
+
+
+class _Values:
+    """The numbers of the file in order, each with its line."""
+
+    def __init__(self, lines: list[str], start: int, source: str) -> None:
+        self._source = source
+        self._words: list[tuple[str, int]] = []
+        for number in range(start, len(lines)):
+            for word in lines[number].replace(",", " ").split():
+                self._words.append((word, number + 1))
+        self._next = 0
+        self._last_line = len(lines)
+
+    def fail(self, message: str) -> None:
+        line = self._words[self._next - 1][1] if self._next else self._last_line
+        raise LibraryError(
+            message, where=f"{self._source}:{line}", hint="Get the file again from its maker"
+        )
+
+    def number(self, name: str) -> float:
+        return float(self.array(name, 1)[0])
+
+    def integer(self, name: str, low: int, high: int) -> int:
+        value = self.number(name)
+        if value != int(value) or not low <= value <= high:
+            self.fail(f"the {name} is {value:g}, it must be a whole number from {low} to {high}")
+        return int(value)
+
+    def array(self, name: str, count: int) -> FloatArray:
+        words = self._words[self._next : self._next + count]
+        result = np.empty(len(words))
+        for index, (word, _) in enumerate(words):
+            self._next += 1
+            try:
+                result[index] = float(word)
+            except ValueError:
+                self.fail(f"'{word[:30]}' is not a number (reading {name})")
+            if not np.isfinite(result[index]):
+                self.fail(f"'{word[:30]}' is not a finite number (reading {name})")
+        if len(words) < count:
+            raise LibraryError(
+                f"the file is cut off: it ends after {len(words)} of {count} {name}",
+                where=f"{self._source}:{self._last_line}",
+                hint="Get the file again from its maker",
+            )
+        return result
+
+    def expect_end(self) -> None:
+        left = len(self._words) - self._next
+        if left:
+            self._next += 1
+            self.fail(f"{left} values too many: the counts in the header don't fit")
+
+
+def _tilt_factor(tilt: str, values: _Values, line: int, source: str) -> float:
+    """The factor of the lamp in its untilted position."""
+    if tilt.upper() == "NONE":
+        return 1.0
+    if tilt.upper() != "INCLUDE":
+        raise LibraryError(
+            f"TILT={tilt[:40]} is not read: it points to another file",
+            where=f"{source}:{line + 1}",
+            hint="Use a file with TILT=NONE or TILT=INCLUDE",
+        )
+    values.integer("lamp geometry", 1, 3)
+    count = values.integer("number of tilt angles", 1, 10_000)
+    angles = values.array("tilt angles", count)
+    factors = values.array("tilt factors", count)
+    if (np.diff(angles) <= 0.0).any():
+        values.fail("tilt angles must ascend")
+    return float(np.interp(0.0, angles, factors))
+
+
+def _check_vertical(vertical: FloatArray, values: _Values) -> None:
+    if (np.diff(vertical) <= 0.0).any():
+        values.fail("vertical angles must ascend")
+    if vertical[0] not in (0.0, 90.0) or vertical[-1] not in (90.0, 180.0):
+        values.fail("vertical angles of type C run over 0-90, 90-180 or 0-180 degrees")
+
+
+def _expanded(
+    horizontal: FloatArray, table: FloatArray, values: _Values
+) -> tuple[FloatArray, FloatArray]:
+    """Write out the symmetry that the last horizontal angle stands for, to 0..360 degrees."""
+    if (np.diff(horizontal) <= 0.0).any():
+        values.fail("horizontal angles must ascend")
+    first, last = horizontal[0], horizontal[-1]
+    if len(horizontal) == 1 and first == 0.0:
+        return np.array([0.0, 360.0]), np.repeat(table, 2, axis=0)
+    if (first, last) == (90.0, 270.0):  # mirrored in the 90-270 plane
+        horizontal, table = _mirrored(horizontal, table, 270.0)
+        # Now 90..450: bring the turn beyond 360 back to the front.
+        turned = horizontal >= 360.0
+        kept = (horizontal <= 360.0) & (horizontal > 90.0)
+        first_row = _row_at(360.0, horizontal, table)
+        angles = np.concatenate([horizontal[turned] - 360.0, horizontal[kept]])
+        rows = np.concatenate([table[turned], table[kept]])
+        return _with_ends(angles, rows, first_row)
+    if first != 0.0 or len(horizontal) < 2:
+        values.fail("horizontal angles of type C start at 0 (or run from 90 to 270)")
+    if last == 90.0:
+        horizontal, table = _mirrored(horizontal, table, 90.0)
+        last = 180.0
+    if last == 180.0:
+        return _mirrored(horizontal, table, 180.0)
+    if not 180.0 < last <= 360.0:
+        values.fail("the last horizontal angle of type C is 0, 90, 180 or more than 180, up to 360")
+    return _with_ends(horizontal, table, table[0])
+
+
+def _mirrored(
+    horizontal: FloatArray, table: FloatArray, at: float
+) -> tuple[FloatArray, FloatArray]:
+    angles = np.concatenate([horizontal, 2.0 * at - horizontal[-2::-1]])
+    return angles, np.concatenate([table, table[-2::-1]])
+
+
+def _row_at(angle: float, horizontal: FloatArray, table: FloatArray) -> FloatArray:
+    return np.array([np.interp(angle, horizontal, column) for column in table.T])
+
+
+def _with_ends(
+    horizontal: FloatArray, table: FloatArray, row: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Add the planes 0 and 360 degrees, which are the same `row`, where they are missing."""
+    if horizontal[0] != 0.0:
+        horizontal = np.concatenate([[0.0], horizontal])
+        table = np.concatenate([row[None], table])
+    if horizontal[-1] != 360.0:
+        horizontal = np.concatenate([horizontal, [360.0]])
+        table = np.concatenate([table, row[None]])
+    return horizontal, table

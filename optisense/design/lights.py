@@ -1,0 +1,43 @@
+"""Light groups: lights of one type and colour, each with a pose."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field, model_validator
+
+from optisense.design.emitters import LightModel
+from optisense.design.fields import Colour, Direction, Model, Name, NonNegative, Vector
+
+
+class Light(Model):
+    """The pose of one light."""
+
+    position: Vector = Field(description="mm, x y z")
+    direction: Direction = Field(description="where it shines, any length")
+    up: Direction | None = Field(default=None, description="along the height of its window")
+
+
+class LightGroup(Model):
+    """Lights that are switched and recoloured together."""
+
+    model: Name = Field(description="library light, or a name for the emitter below")
+    colour: Colour = Field(description="how its flux is shared among R, G, B; only ratios count")
+    flux: NonNegative = Field(description="mW, radiant flux of each light, over all channels")
+    emitter: LightModel | None = Field(default=None, description="instead of the library's light")
+    lights: Annotated[list[Light], Field(min_length=1)] = Field(
+        description="position in mm, direction of any length"
+    )
+
+    @model_validator(mode="after")
+    def _has_a_colour(self) -> LightGroup:
+        if sum(self.colour) <= 0.0:
+            raise ValueError("a colour needs at least one value above 0; use flux: 0 for darkness")
+        return self
+
+    def channel_flux(self) -> NDArray[np.float64]:
+        """(3,) mW: the radiant flux of each light in R, G and B; they sum to `flux`."""
+        colour = np.array(self.colour)
+        return np.asarray(self.flux * colour / colour.sum())

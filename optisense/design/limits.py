@@ -1,0 +1,58 @@
+"""Sizes that a tactile sensor can have; others come from a slip of units."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from optisense.design.problems import Problem
+from optisense.design.sensor_design import SensorDesign
+
+LARGEST = 1000.0
+"""mm: no part of a sensor is larger, nor any light or camera farther from the origin."""
+
+SMALLEST = 0.5
+"""mm: no part of a sensor is smaller in its largest dimension."""
+
+
+def unit_slips(design: SensorDesign) -> list[Problem]:
+    """Parts, lights and a camera whose sizes or distances suggest another unit than mm."""
+    problems: list[Problem] = []
+    for name, mesh in design.meshes.items():
+        place = design.where("parts", name, "mesh")
+        extent = float(np.ptp(mesh.bounds, axis=0).max())
+        far = float(np.abs(mesh.bounds).max())
+        if extent > LARGEST or far > 2.0 * LARGEST:
+            size = f"{extent:.6g} mm large" if extent > LARGEST else f"{far:.6g} mm from the origin"
+            problems.append(
+                Problem(
+                    f"part '{name}' is {size}: looks like micrometres or another smaller unit",
+                    place,
+                    f"Scale the mesh to millimetres; a sensor is smaller than {LARGEST:g} mm",
+                )
+            )
+        elif extent < SMALLEST:
+            problems.append(
+                Problem(
+                    f"part '{name}' is only {extent:.3g} mm large: looks like metres or inches",
+                    place,
+                    "Scale the mesh to millimetres (metres times 1000)",
+                )
+            )
+    places: list[tuple[str, tuple[float, float, float], tuple[str | int, ...]]] = [
+        ("the camera", design.camera.position, ("camera", "position"))
+    ]
+    for name, group in design.lights.items():
+        for index, light in enumerate(group.lights):
+            path: tuple[str | int, ...] = ("lights", name, "lights", index, "position")
+            places.append((f"light {index} of '{name}'", light.position, path))
+    for label, position, path in places:
+        distance = float(np.linalg.norm(position))
+        if distance > LARGEST:
+            problems.append(
+                Problem(
+                    f"{label} is {distance:.6g} mm from the origin: not in millimetres?",
+                    design.where(*path),
+                    "Give positions in millimetres",
+                )
+            )
+    return problems

@@ -1,0 +1,196 @@
+"""From what pydantic reports to messages for the person who wrote the design file."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from types import UnionType
+from typing import Annotated, Any, Literal, Union, get_args, get_origin
+
+from pydantic import BaseModel, ValidationError
+
+from optisense.design.fields import MisfitError
+from optisense.design.near import near_match, suggestion
+from optisense.design.sensor_design import SensorDesign, dotted
+from optisense.errors import DesignError
+
+MAX_SHOWN = 8
+
+Path = tuple[str | int, ...]
+Lines = dict[Path, int]
+
+
+@dataclass(frozen=True)
+class Problem:
+    """Something that is wrong with a design.
+
+    Attributes:
+        message: what is wrong.
+        where: file and line, part name or dotted path.
+        hint: what to do, or None.
+        severity: "error" (it can't be simulated, or wrongly) or "warning" (it looks odd).
+    """
+
+    message: str
+    where: str
+    hint: str | None = None
+    severity: Literal["error", "warning"] = "error"
+
+    def __str__(self) -> str:
+        text = f"{self.message} ({self.where})"
+        return f"{text}. {self.hint}" if self.hint else text
+
+
+def raise_problems(problems: list[Problem], source: str) -> None:
+    """Raise one DesignError for all problems of severity "error"; none, and it returns."""
+    errors = [problem for problem in problems if problem.severity == "error"]
+    if not errors:
+        return
+    if len(errors) == 1:
+        only = errors[0]
+        raise DesignError(only.message, where=only.where, hint=only.hint)
+    shown = "\n".join(f"  {problem}" for problem in errors[:MAX_SHOWN])
+    more = len(errors) - MAX_SHOWN
+    shown += f"\n  and {more} more" if more > 0 else ""
+    raise DesignError(f"{source} has {len(errors)} problems:\n{shown}")
+
+
+def design_error(
+    error: ValidationError, data: Any, *, where: str, lines: Lines | None = None
+) -> DesignError:
+    """The DesignError for what pydantic found.
+
+    Args:
+        data: what was validated.
+        where: the file, or the dotted path that was being set.
+        lines: the line of each path in the file, when there is one.
+    """
+    problems = _problems(error, data, where, lines or {})
+    try:
+        raise_problems(problems, where)
+    except DesignError as found:
+        return found
+    raise AssertionError("pydantic reported no problem")  # it always reports one
+
+
+def _problems(error: ValidationError, data: Any, where: str, lines: Lines) -> list[Problem]:
+    reports = error.errors(include_url=False)
+    found: list[Problem] = []
+    explained: set[Path] = set()  # missing fields that a misspelt one stands for
+    for report in reports:
+        if report["type"] == "extra_forbidden":
+            path = _path_in(data, report["loc"])
+            fields = _fields_at(report["loc"][:-1])
+            match = near_match(str(path[-1]), fields)
+            if match is not None:
+                explained.add((*path[:-1], match))
+            hint = suggestion(str(path[-1]), fields, limit=20)
+            found.append(
+                Problem(f"unknown field '{dotted(path)}'", _place(path, where, lines), hint)
+            )
+    for report in reports:
+        kind, location = report["type"], report["loc"]
+        path = _path_in(data, location)
+        context = report.get("ctx", {})
+        if kind == "extra_forbidden":
+            continue
+        if kind == "missing":
+            path = (*path, location[-1])
+            if path not in explained:
+                found.append(
+                    Problem(f"'{dotted(path)}' is missing", _place(path, where, lines), "Add it")
+                )
+            continue
+        if kind in ("union_tag_invalid", "union_tag_not_found"):
+            path = (*path, "kind")
+            known = str(context.get("expected_tags", "")).replace("'", "").split(", ")
+            tag = str(context.get("tag", ""))
+            message = f"unknown kind '{tag}' at '{dotted(path)}'" if tag else (
+                f"'{dotted(path)}' is missing"
+            )  # fmt: skip
+            hint = suggestion(tag, known) if known[0] else None
+            found.append(Problem(message, _place(path, where, lines), hint))
+            continue
+        cause = context.get("error")
+        if isinstance(cause, MisfitError):
+            path = (*path, *cause.path)
+            found.append(Problem(str(cause), _place(path, where, lines), cause.hint))
+            continue
+        text = str(cause) if cause is not None else _sentence(report["msg"])
+        given = report.get("input")
+        shown = f" = {given!r}" if isinstance(given, str | int | float | bool | None) else ""
+        hint = None
+        if kind in ("enum", "literal_error") and isinstance(given, str):
+            words = str(context.get("expected", "")).replace(" or ", ", ").replace("'", "")
+            hint = suggestion(given, words.split(", "))
+        found.append(Problem(f"'{dotted(path)}'{shown}: {text}", _place(path, where, lines), hint))
+    return found
+
+
+def _sentence(message: str) -> str:
+    text = message.removeprefix("Value error, ").replace("Input should be", "should be")
+    if "should match pattern" in text:
+        return "should be letters, digits, '-' and '_' only, at most 64"
+    return text
+
+
+def _path_in(data: Any, location: tuple[str | int, ...]) -> Path:
+    """The location without the union members and '[key]' marks that pydantic adds to it."""
+    path: list[str | int] = []
+    for step in location:
+        known = step in data if isinstance(data, dict) else False
+        if isinstance(data, list | tuple):
+            known = isinstance(step, int) and step < len(data)
+        if known:
+            path.append(step)
+            data = data[step]
+    return tuple(path)
+
+
+def _place(path: Path, where: str, lines: Lines) -> str:
+    if not lines:
+        return where
+    for length in range(len(path), -1, -1):
+        if path[:length] in lines:
+            return f"{where}:{lines[path[:length]]}"
+    return where
+
+
+def _fields_at(location: tuple[str | int, ...]) -> list[str]:
+    """The fields of the model at a location of the design."""
+    kind: Any = SensorDesign
+    for step in location:
+        kind = _step_into(kind, step)
+    kind = _bare(kind)
+    if isinstance(kind, type) and issubclass(kind, BaseModel):
+        return list(kind.model_fields)
+    return []
+
+
+def _step_into(kind: Any, step: str | int) -> Any:
+    kind = _bare(kind)
+    if isinstance(kind, type) and issubclass(kind, BaseModel):
+        field = kind.model_fields.get(str(step))
+        return field.annotation if field else None
+    if get_origin(kind) in (Union, UnionType):  # the step names the member: by kind or class
+        for member in get_args(kind):
+            fields = getattr(_bare(member), "model_fields", {})
+            if "kind" in fields and fields["kind"].default == step:
+                return member
+        return kind
+    if get_origin(kind) is dict:
+        return get_args(kind)[1]
+    return get_args(kind)[0] if get_args(kind) else None
+
+
+def _bare(kind: Any) -> Any:
+    """A type without its annotations, and without None where only one other is left."""
+    while True:
+        if get_origin(kind) is Annotated:
+            kind = get_args(kind)[0]
+        elif get_origin(kind) in (Union, UnionType):
+            members = [member for member in get_args(kind) if member is not type(None)]
+            if len(members) > 1:
+                return Union[tuple(members)]  # noqa: UP007
+            kind = members[0]
+        else:
+            return kind

@@ -1,0 +1,215 @@
+"""The sensor design: all that is needed to simulate a sensor, except what touches it."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+from pathlib import Path
+from typing import Annotated, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field, PrivateAttr, StringConstraints, model_validator
+
+from optisense.design.cage import Cage
+from optisense.design.camera import Camera
+from optisense.design.fields import MisfitError, Model, Name
+from optisense.design.lights import LightGroup
+from optisense.design.materials import Coating, Material
+from optisense.design.near import suggestion
+from optisense.design.parts import Part, Role
+from optisense.geometry import TriangleMesh
+
+SCHEMA_VERSION = 1
+
+KINDS_OF_ROLE: dict[Role, tuple[str, ...]] = {
+    Role.ELASTOMER: ("dielectric",),
+    Role.SUPPORT: ("dielectric",),
+    Role.INTERFACE: ("dielectric",),
+    Role.MIRROR: ("conductor", "diffuse"),
+    Role.BLOCKER: ("absorber", "diffuse", "conductor"),
+    Role.INDENTER: ("diffuse", "conductor", "absorber"),
+}
+"""The kinds of material a role can be made of. A sensing surface has none: it is coated."""
+
+MATERIAL_REQUIRED = frozenset({Role.ELASTOMER, Role.SUPPORT, Role.INTERFACE, Role.MIRROR})
+
+
+class Status(StrEnum):
+    """How far a number can be trusted."""
+
+    MEASURED = "measured"
+    DATASHEET = "datasheet"
+    SOURCED = "sourced"
+    DERIVED = "derived"
+    ASSUMED = "assumed"
+
+
+class Provenance(Model):
+    """Where a number of the design comes from."""
+
+    status: Status = Field(description="; ".join(status.value for status in Status))
+    source: str = Field(description="where it is from, or how it was derived")
+
+
+class SensorDesign(Model):
+    """A camera-based tactile sensor. Lengths in mm, angles in degrees, powers in mW.
+
+    `design.meshes` holds the undeformed mesh of each part by name; it is not part of the
+    design file but stored next to it. Changing a field checks it; see also `set_value`.
+    """
+
+    schema_version: Literal[1] = Field(default=1, description="version of this file format")
+    name: Annotated[str, StringConstraints(min_length=1, max_length=200)]
+    description: str = ""
+    coating: Coating = Field(description="of the sensing surface")
+    materials: dict[Name, Material] = Field(description="optical materials, by name")
+    parts: Annotated[dict[Name, Part], Field(min_length=1)] = Field(
+        description="solids and surfaces; lengths in mm"
+    )
+    lights: dict[Name, LightGroup] = Field(description="light groups")
+    camera: Camera
+    cages: dict[Name, Cage] = Field(
+        default_factory=dict, description="control points that deform parts"
+    )
+    provenance: dict[str, Provenance] = Field(
+        default_factory=dict, description="where the numbers come from, by dotted path"
+    )
+
+    _meshes: dict[str, TriangleMesh] = PrivateAttr(default_factory=dict)
+    _source: Path | None = PrivateAttr(default=None)
+    _lines: dict[tuple[str | int, ...], int] = PrivateAttr(default_factory=dict)
+
+    @model_validator(mode="after")
+    def _references_hold(self) -> SensorDesign:
+        for name, part in self.parts.items():
+            self._check_material(name, part)
+        if not any(part.role is Role.SENSING_SURFACE for part in self.parts.values()):
+            raise MisfitError("no part is a sensing_surface", ("parts",), "Give one part this role")
+        caged: dict[str, str] = {}
+        for cage_name, cage in self.cages.items():
+            for index, part_name in enumerate(cage.parts):
+                path = ("cages", cage_name, "parts", index)
+                if part_name not in self.parts:
+                    raise MisfitError(
+                        f"cage '{cage_name}' deforms an unknown part '{part_name}'",
+                        path,
+                        suggestion(part_name, self.parts),
+                    )
+                if part_name in caged:
+                    raise MisfitError(
+                        f"part '{part_name}' is in two cages, or twice in one "
+                        f"('{caged[part_name]}', '{cage_name}')",
+                        path,
+                        "Name each part in one cage only",
+                    )
+                caged[part_name] = cage_name
+        return self
+
+    def _check_material(self, name: str, part: Part) -> None:
+        path: tuple[str | int, ...] = ("parts", name, "material")
+        if part.material is None:
+            if part.role in MATERIAL_REQUIRED:
+                raise MisfitError(
+                    f"part '{name}' ({part.role.value}) has no material",
+                    path,
+                    "Name one of: " + (", ".join(self.materials) or "(none are defined yet)"),
+                )
+            return
+        if part.role is Role.SENSING_SURFACE:
+            raise MisfitError(
+                f"part '{name}' is a sensing_surface and wears the coating, not a material",
+                path,
+                "Remove its material",
+            )
+        if part.material not in self.materials:
+            raise MisfitError(
+                f"part '{name}' is made of an unknown material '{part.material}'",
+                path,
+                suggestion(part.material, self.materials),
+            )
+        kind, fitting = self.materials[part.material].kind, KINDS_OF_ROLE[part.role]
+        if kind not in fitting:
+            raise MisfitError(
+                f"part '{name}' ({part.role.value}) can't be made of '{part.material}', "
+                f"which is a {kind}",
+                path,
+                "Use a material of kind " + " or ".join(fitting),
+            )
+
+    @property
+    def meshes(self) -> dict[str, TriangleMesh]:
+        """The undeformed mesh of each part, by part name."""
+        return self._meshes
+
+    def deformed_meshes(self) -> dict[str, TriangleMesh]:
+        """The mesh of each part in its current shape: as stored, then moved by its cage.
+
+        Raises:
+            OptiSenseError: a vertex of a caged part lies outside the cage's box.
+        """
+        from optisense.geometry.cage import cage_weights, deform
+
+        result = dict(self._meshes)
+        for cage in self.cages.values():
+            box = np.array(cage.box, dtype=np.float64)
+            points = cage.current_points()
+            for name in cage.parts:
+                if name in result:
+                    weights = cage_weights(result[name].vertices, box, cage.resolution)
+                    result[name] = result[name].with_vertices(deform(weights, points))
+        return result
+
+    def parts_of(self, *roles: Role) -> list[str]:
+        """The names of the parts that have one of the roles, in file order."""
+        return [name for name, part in self.parts.items() if part.role in roles]
+
+    def bounds(self) -> NDArray[np.float64]:
+        """(2, 3) mm: the box around all undeformed meshes, indenters left out.
+
+        Raises:
+            ValueError: there are no meshes.
+        """
+        boxes = [
+            mesh.bounds
+            for name, mesh in self._meshes.items()
+            if self.parts[name].role is not Role.INDENTER
+        ]
+        if not boxes:
+            raise ValueError("the design has no meshes")
+        corners = np.array(boxes)
+        return np.array([corners[:, 0].min(axis=0), corners[:, 1].max(axis=0)])
+
+    def copy(self) -> SensorDesign:  # type: ignore[override]
+        """An independent design; the meshes, which never change, are shared."""
+        return self._replaced(self.model_dump(mode="json"))
+
+    def where(self, *path: str | int) -> str:
+        """File and line of a value when the design was read from a file, else its dotted path."""
+        if self._source is None:
+            return dotted(path)
+        for length in range(len(path), -1, -1):
+            if path[:length] in self._lines:
+                return f"{self._source}:{self._lines[path[:length]]}"
+        return f"{self._source}: {dotted(path)}"
+
+    def _replaced(self, data: dict[str, object]) -> SensorDesign:
+        """A design of these values with this one's meshes and files."""
+        design = type(self).model_validate(data)
+        design._meshes = {n: m for n, m in self._meshes.items() if n in design.parts}
+        design._source = self._source
+        design._lines = self._lines
+        for name, group in design.lights.items():
+            old = self.lights.get(name)
+            if old is not None and old.emitter is not None and group.emitter is not None:
+                old_folder = getattr(old.emitter, "_folder", None)
+                if old_folder is not None and group.emitter.kind == "ies":
+                    group.emitter._folder = old_folder
+        return design
+
+
+def dotted(path: tuple[str | int, ...]) -> str:
+    """'lights.red.lights[0].position' of its keys and indices."""
+    text = ""
+    for step in path:
+        text += f"[{step}]" if isinstance(step, int) else f".{step}" if text else step
+    return text

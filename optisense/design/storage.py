@@ -1,0 +1,199 @@
+"""Sensor designs on disk: a folder with `design.yaml` and the meshes it names."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+from pathlib import Path
+from typing import Any
+from uuid import uuid4
+
+from pydantic import ValidationError
+
+from optisense.design.emitters import IesEmitter
+from optisense.design.limits import unit_slips
+from optisense.design.near import near_match
+from optisense.design.problems import design_error, raise_problems
+from optisense.design.sensor_design import SCHEMA_VERSION, SensorDesign
+from optisense.design.yaml_reader import Lines, read_yaml
+from optisense.design.yaml_writer import to_yaml
+from optisense.errors import DesignError, MeshError, OutputError
+from optisense.geometry import TriangleMesh
+
+DESIGN_FILE = "design.yaml"
+HEAD = "Sensor design. Lengths in mm, angles in degrees, powers in mW."
+
+
+def load_design(path: str | Path) -> SensorDesign:
+    """Read a design folder (or its design.yaml) and the meshes it names.
+
+    Raises:
+        DesignError: a file is missing, a field is missing, misspelt or out of range, a mesh path
+            leaves the folder, or the sizes look like another unit than mm; says file and line.
+        MeshError: a mesh has no triangles, can't be read, or holds numbers that are not finite.
+    """
+    path = Path(path)
+    file = path / DESIGN_FILE if path.is_dir() else path
+    if not file.is_file():
+        raise DesignError(
+            "there is no sensor design here",
+            where=str(file),
+            hint="Name a folder that holds a design.yaml",
+        )
+    data, lines = read_yaml(file)
+    _check_version(data, lines, str(file))
+    try:
+        design = SensorDesign.model_validate(data)
+    except ValidationError as error:
+        raise design_error(error, data, where=str(file), lines=lines) from None
+    design._source, design._lines = file, lines
+    folder = file.parent
+    for name, part in design.parts.items():
+        mesh_path = _inside(folder, part.mesh, design.where("parts", name, "mesh"))
+        design.meshes[name] = _load_mesh(mesh_path, name, design)
+    for name, group in design.lights.items():
+        if isinstance(group.emitter, IesEmitter):
+            where = design.where("lights", name, "emitter", "file")
+            _inside(folder, group.emitter.file, where)
+            group.emitter._folder = folder
+    raise_problems(unit_slips(design), str(file))
+    return design
+
+
+def save_design(design: SensorDesign, folder: str | Path) -> None:
+    """Write a design folder: design.yaml with a comment on each unit, meshes as OBJ.
+
+    Each file is written whole under a temporary name; only when all are there are they renamed
+    into place, design.yaml last. Other files in the folder are left alone.
+
+    Raises:
+        DesignError: a part has no mesh, or two parts with different meshes share a file.
+        OutputError: the folder can't be written.
+    """
+    folder = Path(folder)
+    meshes = {name: _as_obj(part.mesh) for name, part in design.parts.items()}
+    _check_saveable(design, meshes)
+    saved = design.copy()
+    for name, file in meshes.items():
+        saved.parts[name].mesh = file
+    staged: list[tuple[Path, Path]] = []
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        written: set[str] = set()
+        for name, file in meshes.items():
+            if file not in written:
+                written.add(file)
+                design.meshes[name].save_obj(_stage(folder, file, staged))
+        for group in design.lights.values():
+            emitter = group.emitter
+            if isinstance(emitter, IesEmitter) and emitter.file not in written:
+                written.add(emitter.file)
+                _stage(folder, emitter.file, staged).write_bytes(emitter.path().read_bytes())
+        text = to_yaml(saved, HEAD)
+        _stage(folder, DESIGN_FILE, staged).write_text(text, encoding="utf-8")
+        for temporary, final in staged:
+            temporary.replace(final)
+    except OSError as error:
+        raise OutputError(
+            f"can't write the design: {error.strerror or error}",
+            where=str(error.filename or folder),
+            hint="Check that the folder can be written and the disk is not full",
+        ) from error
+    finally:
+        for temporary, _ in staged:
+            with contextlib.suppress(OSError):
+                temporary.unlink(missing_ok=True)
+
+
+def _check_version(data: dict[str, Any], lines: Lines, source: str) -> None:
+    version = data.get("schema_version")
+    if "schema_version" not in data:
+        near = near_match("schema_version", [str(key) for key in data])
+        line = lines.get((near,), 1) if near else 1
+        add = f"Add: schema_version: {SCHEMA_VERSION}"
+        raise DesignError(
+            "'schema_version' is missing",
+            where=f"{source}:{line}",
+            hint=f"Is '{near}' meant to be it?" if near else add,
+        )
+    if version != SCHEMA_VERSION or isinstance(version, bool):
+        newer = isinstance(version, int) and version > SCHEMA_VERSION
+        raise DesignError(
+            f"schema_version {version!r} can't be read; this release reads {SCHEMA_VERSION}",
+            where=f"{source}:{lines[('schema_version',)]}",
+            hint="A newer release wrote it: update OptiSense Studio" if newer else None,
+        )
+
+
+def _inside(folder: Path, relative: str, where: str) -> Path:
+    """The file at a path that must not leave the folder, links followed."""
+    path = (folder / relative).resolve()
+    if not path.is_relative_to(folder.resolve()):
+        raise DesignError(
+            f"'{relative}' leads out of the design folder",
+            where=where,
+            hint="Copy the file into the folder and name it there",
+        )
+    if not path.is_file():
+        siblings = path.parent.iterdir() if path.parent.is_dir() else ()
+        near = near_match(path.name, [sibling.name for sibling in siblings])
+        raise DesignError(
+            f"there is no file '{relative}' in the design folder",
+            where=where,
+            hint=f"Did you mean '{near}'?" if near else "Add the file or correct its path",
+        )
+    return path
+
+
+def _load_mesh(path: Path, name: str, design: SensorDesign) -> TriangleMesh:
+    try:
+        return TriangleMesh.load(path).validate(name, closed=False)
+    except MeshError as error:
+        where = error.where or design.where("parts", name, "mesh")
+        message = error.message if name in error.message else f"part '{name}': {error.message}"
+        raise MeshError(message, where=where, hint=error.hint) from error
+
+
+def _as_obj(file: str) -> str:
+    return str(Path(file).with_suffix(".obj").as_posix())
+
+
+def _check_saveable(design: SensorDesign, files: dict[str, str]) -> None:
+    owner: dict[str, str] = {}
+    for name, file in files.items():
+        if name not in design.meshes:
+            raise DesignError(
+                f"part '{name}' has no mesh", where=f"parts.{name}", hint="Set design.meshes[name]"
+            )
+        first = owner.setdefault(file.casefold(), name)
+        if design.meshes[first] is not design.meshes[name] and not _same(
+            design.meshes[first], design.meshes[name]
+        ):
+            raise DesignError(
+                f"parts '{first}' and '{name}' have different meshes but one file '{file}'",
+                where=f"parts.{name}.mesh",
+                hint="Give each its own file",
+            )
+
+
+def _same(one: TriangleMesh, other: TriangleMesh) -> bool:
+    return (
+        one.vertices.shape == other.vertices.shape
+        and one.faces.shape == other.faces.shape
+        and bool((one.vertices == other.vertices).all() and (one.faces == other.faces).all())
+    )
+
+
+def _stage(folder: Path, relative: str, staged: list[tuple[Path, Path]]) -> Path:
+    """A temporary file beside the final one; both are inside the folder, links followed."""
+    final = folder / relative
+    final.parent.mkdir(parents=True, exist_ok=True)
+    if not final.parent.resolve().is_relative_to(folder.resolve()):
+        raise OutputError(
+            f"'{relative}' leads out of the design folder",
+            where=str(folder),
+            hint="Remove the link in the folder",
+        )
+    temporary = final.with_name(f".{final.name}.{os.getpid()}-{uuid4().hex[:8]}.tmp")
+    staged.append((temporary, final))
+    return temporary

@@ -1,0 +1,143 @@
+"""Reading YAML that strangers wrote: plain data with the line of each value, and nothing more.
+
+Only YAML's events are used, never its object construction; anchors, aliases and tags are
+refused, so no input can run code or grow in memory.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from optisense.errors import DesignError, OptiSenseError
+
+MAX_BYTES = 32 * 1024 * 1024
+MAX_DEPTH = 50
+
+_LOADER: Any = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
+_INTEGER = re.compile(r"[-+]?\d{1,300}$")
+_FLOAT = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?$")
+_INFINITY = re.compile(r"[-+]?\.(?:inf|Inf|INF)$")
+_WORDS: dict[str, Any] = {
+    **dict.fromkeys(("", "~", "null", "Null", "NULL")),
+    **dict.fromkeys(("true", "True", "TRUE"), True),
+    **dict.fromkeys(("false", "False", "FALSE"), False),
+    **dict.fromkeys((".nan", ".NaN", ".NAN"), float("nan")),
+}
+
+Steps = tuple[str | int, ...]
+Lines = dict[Steps, int]
+
+
+def read_yaml(
+    path: Path, error: type[OptiSenseError] = DesignError
+) -> tuple[dict[str, Any], Lines]:
+    """Read a YAML file whose top is a mapping.
+
+    Returns:
+        The data (dict, list, str, int, float, bool, None) and the line of each value, by its
+        keys and indices; the line of the whole is under ().
+
+    Raises:
+        error: the file is missing, too large, or not plain YAML; says the line.
+    """
+    try:
+        if path.stat().st_size > MAX_BYTES:
+            raise error(f"larger than {MAX_BYTES // 2**20} MiB", where=str(path))
+        text = path.read_text(encoding="utf-8")
+    except OSError as found:
+        raise error(
+            f"can't be read: {found.strerror or found}", where=str(path), hint="Check the path"
+        ) from found
+    except UnicodeDecodeError as found:
+        raise error("is not UTF-8 text", where=str(path)) from found
+    return parse_yaml(text, str(path), error)
+
+
+def parse_yaml(
+    text: str, source: str, error: type[OptiSenseError] = DesignError
+) -> tuple[dict[str, Any], Lines]:
+    """As `read_yaml`, from text; `source` names it in errors."""
+    try:
+        return _Reader(text, source, error).read()
+    except yaml.MarkedYAMLError as found:
+        mark = found.problem_mark or found.context_mark
+        raise error(
+            f"not valid YAML: {found.problem or found.context or 'unknown problem'}",
+            where=f"{source}:{mark.line + 1}" if mark else source,
+            hint="Check indentation, colons and brackets there",
+        ) from None
+    except yaml.YAMLError as found:  # characters that YAML does not allow
+        raise error(f"not valid YAML: {found}", where=source) from None
+
+
+class _Reader:
+    def __init__(self, text: str, source: str, error: type[OptiSenseError]) -> None:
+        self._events: Iterator[Any] = yaml.parse(text, Loader=_LOADER)
+        self._source = source
+        self._error = error
+        self._lines: Lines = {}
+
+    def read(self) -> tuple[dict[str, Any], Lines]:
+        event = next(self._events)
+        while isinstance(event, yaml.StreamStartEvent | yaml.DocumentStartEvent):
+            event = next(self._events)
+        if not isinstance(event, yaml.MappingStartEvent):
+            raise self._error("holds no 'key: value' lines at its top", where=f"{self._source}:1")
+        data = self._value(event, ())
+        for event in self._events:
+            if isinstance(event, yaml.DocumentStartEvent):
+                self._fail(event, "holds more than one document ('---')")
+        return data, self._lines
+
+    def _value(self, event: Any, path: Steps) -> Any:
+        if isinstance(event, yaml.AliasEvent) or event.anchor is not None:
+            self._fail(event, "anchors (&) and aliases (*) are not read")
+        if event.tag not in (None, "!"):
+            self._fail(event, f"tags are not read: {event.tag}")
+        if len(path) > MAX_DEPTH:
+            self._fail(event, f"nested deeper than {MAX_DEPTH} levels")
+        self._lines.setdefault(path, event.start_mark.line + 1)
+        if isinstance(event, yaml.ScalarEvent):
+            plain = event.implicit[0]
+            return _scalar(event.value) if plain else event.value
+        if isinstance(event, yaml.SequenceStartEvent):
+            items: list[Any] = []
+            while not isinstance(event := next(self._events), yaml.SequenceEndEvent):
+                items.append(self._value(event, (*path, len(items))))
+            return items
+        return self._mapping(path)
+
+    def _mapping(self, path: Steps) -> dict[str, Any]:
+        result: dict[str, Any] = {}
+        while not isinstance(key := next(self._events), yaml.MappingEndEvent):
+            if not isinstance(key, yaml.ScalarEvent):
+                self._fail(key, "a key must be plain text")
+            if key.anchor is not None or key.tag not in (None, "!"):
+                self._fail(key, "anchors and tags are not read")
+            if key.value in result:
+                self._fail(key, f"'{key.value}' is there twice")
+            inside = (*path, key.value)
+            self._lines[inside] = key.start_mark.line + 1
+            result[key.value] = self._value(next(self._events), inside)
+        return result
+
+    def _fail(self, event: Any, message: str) -> None:
+        raise self._error(message, where=f"{self._source}:{event.start_mark.line + 1}")
+
+
+def _scalar(text: str) -> Any:
+    """A plain scalar by YAML 1.2's core schema (so 1e-3 is a number and `no` is text)."""
+    if text in _WORDS:
+        return _WORDS[text]
+    if _INTEGER.match(text):
+        return int(text)
+    if _FLOAT.match(text):
+        return float(text)
+    if _INFINITY.match(text):
+        return float(text.replace(".", "", 1))
+    return text
