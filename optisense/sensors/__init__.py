@@ -1,0 +1,18 @@
+"""Built-in sensors: functions that build a SensorDesign from a few dimensions."""
+
+from optisense.sensors.gelsight_mini import (
+    gelsight_mini,
+    gelsight_mini_cylindrical,
+    gelsight_mini_spherical,
+)
+from optisense.sensors.registry import BUILDERS, build, check, load
+
+__all__ = [
+    "BUILDERS",
+    "build",
+    "check",
+    "gelsight_mini",
+    "gelsight_mini_cylindrical",
+    "gelsight_mini_spherical",
+    "load",
+]

@@ -1,0 +1,79 @@
+"""The built-in sensors by name, and opening a design by name or folder."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+from optisense import library
+from optisense.design import Problem, SensorDesign, check_design, load_design
+from optisense.design.near import suggestion
+from optisense.design.problems import raise_problems
+from optisense.errors import DesignError
+from optisense.sensors.gelsight_mini import (
+    gelsight_mini,
+    gelsight_mini_cylindrical,
+    gelsight_mini_spherical,
+)
+
+BUILDERS: dict[str, Callable[[], SensorDesign]] = {
+    "gelsight-mini": gelsight_mini,
+    "gelsight-mini-cylindrical": gelsight_mini_cylindrical,
+    "gelsight-mini-spherical": gelsight_mini_spherical,
+}
+"""Built-in sensors: a function that makes each with its default dimensions."""
+
+BUILT_IN = "builtin:"
+
+
+def build(name: str) -> SensorDesign:
+    """A built-in sensor with its default dimensions.
+
+    Raises:
+        DesignError: there is no such sensor; names the near match.
+    """
+    if name not in BUILDERS:
+        raise DesignError(
+            f"there is no built-in sensor '{name}'", hint=suggestion(name, BUILDERS, limit=20)
+        )
+    return BUILDERS[name]()
+
+
+def load(name_or_folder: str | Path) -> SensorDesign:
+    """A built-in sensor by its name, or a design by its folder (or its design.yaml).
+
+    `builtin:NAME` always means the built-in sensor and `./NAME` the folder; a plain name must
+    not be both.
+
+    Raises:
+        OptiSenseError: there is neither, both, or the design can't be read.
+    """
+    text = str(name_or_folder)
+    if text.startswith(BUILT_IN):
+        return build(text.removeprefix(BUILT_IN))
+    path = Path(name_or_folder)
+    if isinstance(name_or_folder, str) and text in BUILDERS:
+        if path.is_dir():
+            raise DesignError(
+                f"'{text}' is a built-in sensor and also a folder here",
+                hint=f"Write ./{text} for the folder, {BUILT_IN}{text} for the built-in sensor",
+            )
+        return build(text)
+    if not path.exists():
+        hint = suggestion(text, BUILDERS, limit=20)
+        raise DesignError(f"there is no built-in sensor and no folder '{text}'", hint=hint)
+    return load_design(path)
+
+
+def check(design: SensorDesign) -> list[Problem]:
+    """Check a design without rendering it, and that the library knows its lights.
+
+    Returns:
+        What looks odd but can be simulated (problems of severity "warning").
+
+    Raises:
+        DesignError: anything that can't be simulated, or only wrongly.
+    """
+    problems = check_design(design, light_names=library.names("light"))
+    raise_problems(problems, f"design '{design.name}'")
+    return problems
