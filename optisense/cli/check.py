@@ -21,9 +21,12 @@ def check(design: DesignArgument, contact: ContactOption = None) -> None:
     from optisense import sensors
 
     sensor = sensors.load(design)
-    sensors.check(sensor, contacts)
+    problems = sensors.check(sensor)
     _describe(sensor)
+    for problem in problems:
+        output.print(f"odd: {problem}", markup=False, style="yellow")
     if contacts:
+        place_contacts(sensor, contacts)
         word = "contact fits" if len(contacts) == 1 else "contacts fit"
         output.print(f"{len(contacts)} {word} on the sensing surface.")
     output.print("The design is in order.", style="green")

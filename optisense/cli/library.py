@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import json
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
+from rich.table import Table
 
 from optisense.cli.console import ends_well, output
 from optisense.errors import LibraryError
@@ -28,11 +28,12 @@ def list_entries(
     """List what the library holds."""
     from optisense import library
 
-    if kind is not None and kind.rstrip("s") not in KINDS:
-        raise LibraryError(f"unknown kind '{kind}'", hint=f"Choose one of: {', '.join(KINDS)}")
-    for each in KINDS if kind is None else (kind.rstrip("s"),):
+    table = Table("kind", "name", "description", box=None, pad_edge=False)
+    for each in KINDS if kind is None else (kind,):
         for name in library.names(each):
-            output.print(f"{each:<10} {name}", markup=False)
+            entry = library.entry(each, name)
+            table.add_row(each, name, entry.description)
+    output.print(table)
 
 
 @library_app.command("show")
@@ -43,21 +44,37 @@ def show_entry(
     """Show an entry with the sources of its numbers."""
     from difflib import get_close_matches
 
-    from rich.pretty import Pretty
-
     from optisense import library
 
-    everything = {entry: kind for kind in KINDS for entry in library.names(kind)}
-    if name not in everything:
-        near = get_close_matches(name, everything, n=1)
+    kinds = [kind for kind in KINDS if name in library.names(kind)]
+    if not kinds:
+        known = [known for kind in KINDS for known in library.names(kind)]
+        near = get_close_matches(name, known, n=1)
         raise LibraryError(
             f"the library has no '{name}'",
             hint=f"Did you mean {near[0]}?" if near else "See: optisense library list",
         )
-    entry: Any = getattr(library, everything[name])(name)
-    output.print(f"{everything[name]} {name}", style="bold", markup=False)
-    content = entry.model_dump(mode="json", exclude_none=True)
-    if output.is_terminal:
-        output.print(Pretty(content, expand_all=True))
-    else:
-        print(json.dumps(content, indent=2))
+    for kind in kinds:
+        entry = library.entry(kind, name)
+        output.print(f"{kind} {name}", style="bold", markup=False)
+        output.print(entry.description, markup=False)
+        content = entry.model_dump(mode="json", exclude_none=True)
+        sources = content.pop("sources")
+        content.pop("description")
+        for field, value in {**content.pop("value"), **content}.items():
+            output.print(f"  {field}: {_short(value)}", markup=False)
+        output.print("where its numbers come from", style="bold")
+        for field, source in sources.items():
+            date = f" ({source['date']})" if "date" in source else ""
+            output.print(
+                f"  {field}: {source['status']}, {source['source']}{date}", markup=False
+            )
+
+
+def _short(value: object) -> str:
+    """A value on one line, without Python's quotes."""
+    if isinstance(value, dict):
+        return "{" + ", ".join(f"{key}: {_short(inner)}" for key, inner in value.items()) + "}"
+    if isinstance(value, list):
+        return "[" + ", ".join(_short(inner) for inner in value) + "]"
+    return f"{value:g}" if isinstance(value, float) else str(value)

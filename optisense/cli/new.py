@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from optisense.cli.console import ends_well, output
-from optisense.errors import DesignError, OutputError
+from optisense.errors import OutputError
 
 
 @ends_well
@@ -23,22 +23,17 @@ def new(
     ],
 ) -> None:
     """Start a design of your own from a built-in sensor."""
-    from difflib import get_close_matches
-
     from optisense.design import save_design
-    from optisense.sensors import BUILDERS
+    from optisense.sensors import build
 
-    if name not in BUILDERS:
-        near = get_close_matches(name, BUILDERS, n=1)
-        hint = f"Did you mean {near[0]}?" if near else f"Choose one of: {', '.join(BUILDERS)}"
-        raise DesignError(f"there is no built-in sensor '{name}'", hint=hint)
+    design = build(name)
     if folder.is_file():
         raise OutputError("this is a file, not a folder", where=str(folder))
     if folder.is_dir() and any(folder.iterdir()):
         raise OutputError(
             "the folder is not empty", where=str(folder), hint="Name a folder that doesn't exist"
         )
-    save_design(BUILDERS[name](), folder)
+    save_design(design, folder)
     output.print(f"{folder / 'design.yaml'}", markup=False)
     output.print(f"Look at it:  optisense check {folder}", markup=False, style="dim")
     output.print(f"Render it:   optisense render {folder} --out picture", markup=False, style="dim")
