@@ -1,5 +1,32 @@
 """Meshes, cages, indenters, and where and how deep a contact sits."""
 
+from optisense.geometry.cage import cage_points, cage_weights, deform
+from optisense.geometry.contact import Contact, available_depth, locate, place
+from optisense.geometry.contact_text import parse_contact
+from optisense.geometry.indenters import Cylinder, Indenter, MeshIndenter, Plane, Sphere
 from optisense.geometry.mesh import TriangleMesh
+from optisense.geometry.places import nine_places
+from optisense.geometry.rays import RayHits, ray_hits
+from optisense.geometry.surface import SensingSurface, SurfacePoint
 
-__all__ = ["TriangleMesh"]
+__all__ = [
+    "Contact",
+    "Cylinder",
+    "Indenter",
+    "MeshIndenter",
+    "Plane",
+    "RayHits",
+    "SensingSurface",
+    "Sphere",
+    "SurfacePoint",
+    "TriangleMesh",
+    "available_depth",
+    "cage_points",
+    "cage_weights",
+    "deform",
+    "locate",
+    "nine_places",
+    "parse_contact",
+    "place",
+    "ray_hits",
+]

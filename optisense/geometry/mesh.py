@@ -225,6 +225,14 @@ class TriangleMesh:
         )
         return TriangleMesh(self.vertices[np.sort(first)], faces[whole])
 
+    def wound_like_normals(self) -> TriangleMesh:
+        """Faces turned over where they look away from their shading normals."""
+        if self.normals is None:
+            return self
+        shading = self.normals[self.faces].sum(axis=1)
+        wrong = np.einsum("ij,ij->i", shading, self.face_vectors) < 0.0
+        return self.with_faces(np.where(wrong[:, None], self.faces[:, ::-1], self.faces))
+
     def vertex_normals(self, crease: float = 40.0) -> TriangleMesh:
         """Add smooth shading normals, kept apart across edges sharper than `crease` degrees.
 

@@ -1,0 +1,155 @@
+"""A contact: what presses on the sensor, where, and how deep."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from optisense.errors import ContactError
+from optisense.geometry.indenters import Indenter
+from optisense.geometry.mesh import TriangleMesh
+from optisense.geometry.rays import ray_hits
+from optisense.geometry.surface import SensingSurface, SurfacePoint
+
+REACH_MARGIN = 0.5
+"""An indenter is modelled to this height (mm) above what it can touch."""
+
+ON_SURFACE = 0.5
+"""A contact point given as x, y, z may lie this far (mm) from the sensing surface."""
+
+
+@dataclass(frozen=True)
+class Contact:
+    """An indenter pressed into the sensing surface along its inward normal.
+
+    Attributes:
+        indenter: what presses.
+        at: (u, v) mm, surface coordinates (see `SensingSurface`); (0, 0) if neither is given.
+        point: (x, y, z) mm in the design's frame, instead of `at`; its nearest surface point
+            counts.
+        depth: mm, from the undeformed surface to the indenter's lowest point.
+        rotation: degrees about the outward normal, counter-clockwise seen from outside, from
+            the position in which the indenter's x axis runs along u.
+    """
+
+    indenter: Indenter
+    at: tuple[float, float] | None = None
+    point: tuple[float, float, float] | None = None
+    depth: float = 0.5
+    rotation: float = 0.0
+
+    def __post_init__(self) -> None:
+        if self.at is not None and self.point is not None:
+            raise ContactError("a contact has both `at` and `point`", hint="give one of them")
+        for values, count in ((self.at, 2), (self.point, 3)):
+            if values is not None and (
+                len(values) != count or not all(math.isfinite(value) for value in values)
+            ):
+                raise ContactError(
+                    f"a contact place needs {count} finite numbers, not {values}",
+                    hint="give `at` as (u, v) or `point` as (x, y, z), in mm",
+                )
+        if not (math.isfinite(self.depth) and self.depth > 0.0):
+            raise ContactError(
+                f"the depth of a contact is {self.depth:g}", hint="give a depth above 0, in mm"
+            )
+        if not math.isfinite(self.rotation):
+            raise ContactError("the rotation of a contact is not finite", hint="give degrees")
+
+
+def locate(contact: Contact, surface: SensingSurface) -> SurfacePoint:
+    """Where a contact sits on a sensing surface.
+
+    Raises:
+        ContactError: it is off the surface.
+    """
+    if contact.point is None:
+        return surface.point_at(*(contact.at or (0.0, 0.0)))
+    place = surface.nearest(contact.point)
+    distance = float(np.linalg.norm(place.point - np.asarray(contact.point)))
+    if distance > ON_SURFACE:
+        x, y, z = contact.point
+        raise ContactError(
+            f"the point ({x:g}, {y:g}, {z:g}) is {distance:.2f} mm away from the sensing surface",
+            hint="the nearest surface point is ({:.3f}, {:.3f}, {:.3f})".format(*place.point),
+        )
+    return place
+
+
+def place(
+    contact: Contact, surface: SensingSurface, gel: TriangleMesh | None = None
+) -> TriangleMesh:
+    """The indenter's mesh in the design's frame, pressed in.
+
+    The gel is not cut: where the indenter lies below the sensing surface it replaces it, so the
+    first of both surfaces that a ray inside the gel meets is the one that counts.
+
+    Args:
+        contact: the contact.
+        surface: the sensing surface.
+        gel: the elastomer under it, closed; None leaves the depth unchecked.
+
+    Returns:
+        The part of the indenter that can reach the surface, mm; faces and shading normals point
+        out of the indenter, into the gel.
+
+    Raises:
+        ContactError: the contact is off the surface or as deep as the gel.
+    """
+    spot = locate(contact, surface)
+    if gel is not None:
+        available = available_depth(spot.point, spot.inward, gel)
+        if contact.depth >= available:
+            raise ContactError(
+                f"a contact is {contact.depth:g} mm deep, but the gel there is only "
+                f"{available:.2f} mm thick",
+                where="at ({:.2f}, {:.2f}, {:.2f}) mm".format(*spot.point),
+                hint="press less deep",
+            )
+    reach = contact.depth + surface.height_above(spot) + REACH_MARGIN
+    pose = np.eye(4)
+    pose[:3, :3] = _axes(spot.inward, surface, contact.rotation)
+    pose[:3, 3] = spot.point + contact.depth * spot.inward
+    return contact.indenter.mesh(reach).transformed(pose)
+
+
+def available_depth(point: ArrayLike, inward: ArrayLike, gel: TriangleMesh) -> float:
+    """How thick (mm) the gel is from a point of its surface along the inward normal.
+
+    Args:
+        point: (3,) mm, on the surface of the gel.
+        inward: (3,) unit vector into the gel.
+        gel: closed mesh, mm, faces outward.
+
+    Raises:
+        ContactError: there is no gel behind the point.
+    """
+    way = np.asarray(inward, dtype=np.float64)
+    hits = ray_hits(gel, np.asarray(point, dtype=np.float64), way)
+    leaving = (gel.face_normals[hits.face] @ way > 0.0) & (hits.distance > 1e-3)
+    if not leaving.any():
+        raise ContactError(
+            "there is no gel under a contact",
+            where="at ({:.2f}, {:.2f}, {:.2f}) mm".format(*np.asarray(point, dtype=np.float64)),
+            hint="check that the sensing surface lies on the elastomer and its normals point in",
+        )
+    return float(hits.distance[leaving][0])
+
+
+def _axes(
+    inward: NDArray[np.float64], surface: SensingSurface, rotation: float
+) -> NDArray[np.float64]:
+    """(3, 3): columns are the indenter's x, y, z; z is outward, x along u, then turned."""
+    z = -inward
+    x = surface.u_axis - (surface.u_axis @ z) * z
+    if np.linalg.norm(x) < 1e-6:  # the surface has turned by 90 degrees since the origin
+        x = np.cross(surface.v_axis, z)
+    x = x / np.linalg.norm(x)
+    y = np.cross(z, x)
+    a = math.radians(rotation)
+    return np.column_stack(
+        [math.cos(a) * x + math.sin(a) * y, math.cos(a) * y - math.sin(a) * x, z]
+    )

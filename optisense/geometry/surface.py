@@ -1,0 +1,178 @@
+"""Coordinates on a sensing surface, which may be curved: where (u, v) lies."""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import Any, NamedTuple
+
+import numpy as np
+import trimesh
+from numpy.typing import ArrayLike, NDArray
+
+from optisense.errors import ContactError, MeshError
+from optisense.geometry.mesh import TriangleMesh
+
+FloatArray = NDArray[np.float64]
+
+_ARRIVED = 1e-9  # mm
+_triangles: Any = trimesh.triangles  # untyped
+
+
+class SurfacePoint(NamedTuple):
+    """A place on the sensing surface.
+
+    Attributes:
+        point: (3,) float64, mm.
+        inward: (3,) float64 unit normal, into the gel.
+    """
+
+    point: FloatArray
+    inward: FloatArray
+
+
+class SensingSurface:
+    """A sensing surface with coordinates (u, v) in mm.
+
+    From the origin, (u, v) is reached by walking sqrt(u^2 + v^2) mm straight ahead in direction
+    u * u_axis + v * v_axis. Straight means unfolded across each edge (the straightest geodesics
+    of Polthier and Schmies, 1998). On a flat surface (u, v) are plain plane coordinates.
+    """
+
+    def __init__(
+        self, mesh: TriangleMesh, origin: ArrayLike, u_axis: ArrayLike, v_axis: ArrayLike
+    ) -> None:
+        """Put coordinates on a surface.
+
+        Args:
+            mesh: the sensing surface, mm; its face normals point into the gel.
+            origin: (3,) mm; the surface point nearest to it becomes (0, 0).
+            u_axis, v_axis: (3,) directions; made to lie in the surface at the origin and
+                square to each other, with u kept as it is.
+
+        Raises:
+            MeshError: the mesh is empty.
+            ContactError: an axis stands on the surface, or both are parallel.
+        """
+        mesh.validate("sensing surface", closed=False)
+        self.mesh = mesh.welded()
+        self._origin_face, self.origin = self._closest(origin)
+        normal = self.mesh.face_normals[self._origin_face]
+        self.u_axis = _in_plane(np.asarray(u_axis, dtype=np.float64), [normal], "u")
+        self.v_axis = _in_plane(np.asarray(v_axis, dtype=np.float64), [normal, self.u_axis], "v")
+
+    def point_at(self, u: float, v: float) -> SurfacePoint:
+        """The place with surface coordinates (u, v) mm.
+
+        Raises:
+            ContactError: the way there leads over the edge of the surface.
+        """
+        way = u * self.u_axis + v * self.v_axis
+        length = float(np.hypot(u, v))
+        if length == 0.0:
+            return self._surface_point(self._origin_face, self.origin)
+        face, point, left = self._walk(self._origin_face, self.origin, way / length, length)
+        if left > _ARRIVED:
+            raise ContactError(
+                f"the place ({u:g}, {v:g}) is off the sensing surface, whose edge lies "
+                f"{length - left:.2f} mm from its middle in that direction",
+                hint="choose a place nearer to the middle",
+            )
+        return self._surface_point(face, point)
+
+    def nearest(self, point: ArrayLike) -> SurfacePoint:
+        """The place nearest to `point` (3,) mm."""
+        return self._surface_point(*self._closest(point))
+
+    def height_above(self, place: SurfacePoint) -> float:
+        """How far (mm) the surface rises outward over its tangent plane at a place."""
+        outward = (self.mesh.vertices - place.point) @ -place.inward
+        return max(0.0, float(outward.max()))
+
+    def _closest(self, point: ArrayLike) -> tuple[int, FloatArray]:
+        where = np.asarray(point, dtype=np.float64).reshape(3)
+        if not np.isfinite(where).all():
+            raise ContactError("a contact point is not a finite number", hint="give x,y,z in mm")
+        count = len(self.mesh.faces)
+        on_faces = _triangles.closest_point(self.mesh.triangles, np.tile(where, (count, 1)))
+        distance = np.linalg.norm(on_faces - where, axis=1)
+        face = int(np.argmin(np.where(np.isfinite(distance), distance, np.inf)))
+        return face, np.asarray(on_faces[face], dtype=np.float64)
+
+    def _surface_point(self, face: int, point: FloatArray) -> SurfacePoint:
+        """With the smooth normal, so that neighbouring places press in nearly one direction."""
+        smooth = self._smooth
+        assert smooth.normals is not None
+        share = _triangles.points_to_barycentric(
+            self.mesh.triangles[face][None], point[None], method="cross"
+        )[0]
+        normal = share @ smooth.normals[smooth.faces[face]]
+        return SurfacePoint(point, normal / np.linalg.norm(normal))
+
+    @cached_property
+    def _smooth(self) -> TriangleMesh:
+        return self.mesh.vertex_normals()
+
+    @cached_property
+    def _neighbours(self) -> dict[tuple[int, int], list[int]]:
+        """The faces at each edge, by its (lower, higher) vertex."""
+        result: dict[tuple[int, int], list[int]] = {}
+        for face, (a, b, c) in enumerate(self.mesh.faces.tolist()):
+            for one, other in ((a, b), (b, c), (c, a)):
+                result.setdefault((min(one, other), max(one, other)), []).append(face)
+        return result
+
+    def _walk(
+        self, face: int, point: FloatArray, direction: FloatArray, length: float
+    ) -> tuple[int, FloatArray, float]:
+        """Go straight from a point of `face`; also what was left of `length` at a border."""
+        mesh = self.mesh
+        for _ in range(10 * len(mesh.faces) + 100):
+            corners = mesh.triangles[face]
+            edges = np.roll(corners, -1, axis=0) - corners
+            inward = np.cross(mesh.face_normals[face], edges)
+            inward /= np.linalg.norm(inward, axis=1, keepdims=True)
+            speed = -inward @ direction
+            room = np.einsum("ij,ij->i", inward, point - corners)
+            with np.errstate(divide="ignore", invalid="ignore"):
+                steps = np.where(speed > 1e-12, np.maximum(room, 0.0) / speed, np.inf)
+            exit_edge = int(np.argmin(steps))
+            step = float(steps[exit_edge])
+            if step >= length:
+                return face, point + length * direction, 0.0
+            point, length = point + step * direction, length - step
+            ends = mesh.faces[face][[exit_edge, (exit_edge + 1) % 3]].tolist()
+            across = [f for f in self._neighbours[min(ends), max(ends)] if f != face]
+            if not across:
+                return face, point, length
+            face = across[0]
+            direction = self._unfolded(direction, ends, face)
+        raise MeshError(
+            "a straight way over the sensing surface does not end",
+            hint="the mesh has degenerate triangles; export it again",
+        )
+
+    def _unfolded(self, direction: FloatArray, ends: list[int], face: int) -> FloatArray:
+        """The direction after stepping over the edge `ends` into `face`."""
+        start = self.mesh.vertices[ends[0]]
+        edge = self.mesh.vertices[ends[1]] - start
+        edge = edge / np.linalg.norm(edge)
+        apex = next(v for v in self.mesh.faces[face].tolist() if v not in ends)
+        into = self.mesh.vertices[apex] - start
+        into = into - (into @ edge) * edge
+        into = into / np.linalg.norm(into)
+        along = float(direction @ edge)
+        turned: FloatArray = along * edge + np.sqrt(max(0.0, 1.0 - along * along)) * into
+        return turned
+
+
+def _in_plane(axis: FloatArray, square_to: list[FloatArray], name: str) -> FloatArray:
+    length = np.linalg.norm(axis)
+    for other in square_to:
+        axis = axis - (axis @ other) * other
+    rest = np.linalg.norm(axis)
+    if not rest > 1e-6 * length:
+        raise ContactError(
+            f"the {name} axis does not lie along the sensing surface",
+            hint="check the camera's `up` and `direction`: they must not be parallel",
+        )
+    return axis / rest
