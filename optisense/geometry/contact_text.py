@@ -28,8 +28,8 @@ def parse_contact(text: str) -> Contact:
     """Read a contact such as `sphere:1.5@0,0:0.8`; the module says all it may be.
 
     Raises:
-        ContactError: the text is not a contact, or its numbers make no sense; or a mesh file
-            can't be read (MeshError).
+        ContactError: the text is not a contact, or its numbers make no sense. (A mesh file is
+            read when the contact is placed.)
     """
     try:
         shape, separator, rest = text.strip().rpartition("@")

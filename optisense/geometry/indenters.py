@@ -109,7 +109,7 @@ class Cylinder:
         """See `Indenter.mesh`: the lower part of the side and of both ends."""
         end = _arc(self.radius, reach)
         step = 2.0 * math.acos(1.0 - min(facet_error / self.radius, 0.1))
-        count = max(4, math.ceil(2.0 * end / step))
+        count = 2 * max(2, math.ceil(end / step))  # even: the lowest line is a vertex line
         around = np.linspace(-end, end, count + 1)
         profile = np.column_stack([np.zeros(count + 1), np.sin(around), -np.cos(around)])
         half = np.array([0.5 * self.length, 0.0, 0.0])

@@ -7,7 +7,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from optisense.errors import ContactError
 
-_ROUNDS = 100
+FloatArray = NDArray[np.float64]
+
+_ROUNDS = 200
+_STILL = 1e-4  # of the size of the surface: the places no longer move
 
 
 def nine_places(points: ArrayLike, weights: ArrayLike | None = None) -> NDArray[np.int64]:
@@ -36,29 +39,40 @@ def nine_places(points: ArrayLike, weights: ArrayLike | None = None) -> NDArray[
             hint="check that the camera sees the sensing surface",
         )
     where, share = where[seen], share[seen]
+    where = where - np.average(where, axis=0, weights=share)
     nearest = _three_by_three(where, share)
     centres = np.zeros((9, 3))
     for _ in range(_ROUNDS):
-        mass = np.bincount(nearest, share, 9)
-        for axis in range(3):
-            total = np.bincount(nearest, share * where[:, axis], 9)
-            centres[:, axis] = np.where(
-                mass > 0, total / np.maximum(mass, 1e-300), centres[:, axis]
-            )
-        distance = np.linalg.norm(where[:, None] - centres, axis=2)
-        before, nearest = nearest, np.argmin(distance, axis=1)
-        if (before == nearest).all():
+        before = centres
+        centres = _middles(where, share, nearest, before)
+        nearest = np.argmin(_distances(where, centres), axis=1)
+        if np.abs(centres - before).max() < _STILL * np.abs(where).max():
             break
-    return seen[np.argmin(distance, axis=0)]
+    return seen[np.argmin(_distances(where, centres), axis=0)]
 
 
-def _three_by_three(points: NDArray[np.float64], share: NDArray[np.float64]) -> NDArray[np.int64]:
+def _middles(
+    points: FloatArray, share: FloatArray, patch: NDArray[np.int64], before: FloatArray
+) -> FloatArray:
+    """(9, 3): the weighted middle of each patch; an empty patch keeps its place."""
+    mass = np.bincount(patch, share, 9)[:, None]
+    total = np.stack([np.bincount(patch, share * column, 9) for column in points.T], axis=1)
+    return np.where(mass > 0.0, total / np.maximum(mass, 1e-300), before)
+
+
+def _distances(points: FloatArray, centres: FloatArray) -> FloatArray:
+    """(n, 9): squared distances, mm^2."""
+    squares = (points**2).sum(axis=1)[:, None] + (centres**2).sum(axis=1)
+    distances: FloatArray = squares - 2.0 * points @ centres.T
+    return distances
+
+
+def _three_by_three(points: FloatArray, share: FloatArray) -> NDArray[np.int64]:
     """Patch numbers 0..8: three strips of equal area, each in three parts of equal area."""
-    centred = points - np.average(points, axis=0, weights=share)
-    _, axes = np.linalg.eigh(np.cov(centred.T, aweights=share))
+    _, axes = np.linalg.eigh(np.cov(points.T, aweights=share))
     main = axes[:, :0:-1]  # the two axes along which the points spread most
     main = main * np.sign(main[np.abs(main).argmax(axis=0), [0, 1]])
-    flat = centred @ main
+    flat = points @ main
     patch = np.zeros(len(points), dtype=np.int64)
     strip = _thirds(flat[:, 0], share)
     for row in range(3):
@@ -67,7 +81,7 @@ def _three_by_three(points: NDArray[np.float64], share: NDArray[np.float64]) -> 
     return patch
 
 
-def _thirds(values: NDArray[np.float64], share: NDArray[np.float64]) -> NDArray[np.int64]:
+def _thirds(values: FloatArray, share: FloatArray) -> NDArray[np.int64]:
     """0, 1 or 2: the third of the total share that each value falls in."""
     order = np.argsort(values, kind="stable")
     below = np.cumsum(share[order]) - 0.5 * share[order]

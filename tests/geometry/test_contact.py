@@ -1,0 +1,157 @@
+"""Contacts: their text, where they end up, and which are refused."""
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from optisense.errors import ContactError
+from optisense.geometry import (
+    Contact,
+    Cylinder,
+    MeshIndenter,
+    Plane,
+    SensingSurface,
+    Sphere,
+    TriangleMesh,
+    available_depth,
+    parse_contact,
+    place,
+)
+
+GEL = TriangleMesh.box((-12, -10, -4.25), (12, 10, 0), (24, 20, 2))
+
+
+def surface_of(gel: TriangleMesh) -> SensingSurface:
+    top = (gel.face_normals[:, 2] > 0.3) & (gel.triangles[:, :, 2].max(axis=1) > -1)
+    skin = TriangleMesh(gel.vertices, gel.faces[top]).flipped()
+    return SensingSurface(skin, (0, 0, 0), (1, 0, 0), (0, 1, 0))
+
+
+FLAT = surface_of(GEL)
+
+
+@pytest.mark.parametrize(
+    ("text", "contact"),
+    [
+        ("sphere:1.5@0,0:0.8", Contact(Sphere(1.5), at=(0, 0), depth=0.8)),
+        ("cylinder:2@1,-3:0.5:90", Contact(Cylinder(2), at=(1, -3), depth=0.5, rotation=90)),
+        ("cylinder:2,8@1,-3:0.5", Contact(Cylinder(2, 8), at=(1, -3), depth=0.5)),
+        ("plane@0,0:0.1", Contact(Plane(), at=(0, 0), depth=0.1)),
+        ("plane:2,-3,6@0,0:.1", Contact(Plane(2, -3, 6), at=(0, 0), depth=0.1)),
+        ("sphere:1@1,2,-0.1:0.3", Contact(Sphere(1), point=(1, 2, -0.1), depth=0.3)),
+        ("mesh:a@b/c:d.stl@1,2:0.4", Contact(MeshIndenter("a@b/c:d.stl"), (1, 2), depth=0.4)),
+        ("mesh:m.stl,1000@1,2:0.4", Contact(MeshIndenter("m.stl", 1000), (1, 2), depth=0.4)),
+    ],
+)
+def test_contact_text(text: str, contact: Contact) -> None:
+    assert parse_contact(text) == contact
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("spher:1.5@0,0:0.8", "did you mean 'sphere'"),
+        ("donut:1@0,0:0.8", "sphere, cylinder, plane, mesh"),
+        ("sphere:1.5", "no '@'"),
+        ("sphere:1.5@0,0", "no depth"),
+        ("sphere@0,0:1", "radius of the sphere"),
+        ("sphere:1.5@0:0.8", "the place needs 2 or 3 numbers"),
+        ("sphere:1.5@0,0:deep", "the depth"),
+        ("sphere:1.5@0,0:-1", "depth above 0"),
+        ("sphere:nan@0,0:1", "radius"),
+        ("sphere:1@nan,0:1", "finite"),
+        ("mesh:@0,0:1", "no mesh file"),
+        ("", "no '@'"),
+    ],
+)
+def test_bad_contact_text_says_what_is_wrong(text: str, expected: str) -> None:
+    with pytest.raises(ContactError) as caught:
+        parse_contact(text)
+    assert expected in str(caught.value)
+    assert f"'{text}'" in str(caught.value)
+
+
+def test_a_ball_goes_in_as_deep_as_asked() -> None:
+    mesh = place(Contact(Sphere(1.5), at=(3, -2), depth=0.8), FLAT, GEL)
+    lowest = mesh.vertices[np.argmin(mesh.vertices[:, 2])]
+    np.testing.assert_allclose(lowest, [3, -2, -0.8], atol=1e-9)
+    assert mesh.bounds[1, 2] > 0.3  # and reaches out of the gel
+    rim = mesh.vertices[np.abs(mesh.vertices[:, 2]) < 0.02]
+    np.testing.assert_allclose(
+        np.hypot(rim[:, 0] - 3, rim[:, 1] + 2), math.sqrt(1.5**2 - 0.7**2), atol=0.02
+    )
+    assert mesh.normals is not None
+    middle = np.array([3, -2, 0.7])
+    np.testing.assert_allclose(mesh.normals, (mesh.vertices - middle) / 1.5, atol=1e-9)
+
+
+def test_a_point_counts_as_the_surface_point_next_to_it() -> None:
+    by_point = place(Contact(Sphere(1), point=(2, 1, 0.1), depth=0.5), FLAT, GEL)
+    by_place = place(Contact(Sphere(1), at=(2, 1), depth=0.5), FLAT, GEL)
+    np.testing.assert_allclose(by_point.vertices, by_place.vertices, atol=1e-9)
+
+
+def test_rotation_turns_a_cylinder_counter_clockwise_seen_from_outside() -> None:
+    for rotation, angle in [(30.0, 0.0), (0.0, 30.0), (20.0, 10.0)]:
+        contact = Contact(Cylinder(1.0, 10.0, angle), at=(0, 0), depth=0.4, rotation=rotation)
+        mesh = place(contact, FLAT, GEL)
+        far = mesh.vertices[np.argmax(mesh.vertices @ [1, 1, 0])]
+        along = [math.cos(math.radians(30)), math.sin(math.radians(30))]
+        assert far[:2] @ along == pytest.approx(5.0)
+    flat = place(Contact(Cylinder(1.0, 10.0), at=(1, 2), depth=0.4), FLAT, GEL)
+    np.testing.assert_allclose(flat.bounds[:, 0], [-4, 6], atol=1e-9)
+
+
+def test_on_a_dome_the_way_in_is_the_inward_normal() -> None:
+    vertices = GEL.vertices.copy()
+    share = (vertices[:, 2] + 4.25) / 4.25
+    vertices[:, 2] -= share * (vertices[:, 0] ** 2 + vertices[:, 1] ** 2) / 60
+    gel = GEL.with_vertices(vertices)
+    surface = surface_of(gel)
+    contact = Contact(Sphere(1.5), point=(6.0, 0, -0.6), depth=0.5)
+    mesh = place(contact, surface, gel)
+    spot = surface.nearest((6.0, 0, -0.6))
+    assert math.degrees(math.atan2(spot.inward[0], spot.inward[2])) == pytest.approx(
+        -180 + math.degrees(math.atan(0.2)), abs=0.5
+    )
+    assert mesh.normals is not None
+    centre = (mesh.vertices - 1.5 * mesh.normals).mean(axis=0)
+    np.testing.assert_allclose(centre, spot.point - (1.5 - 0.5) * spot.inward, atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("contact", "expected"),
+    [
+        (Contact(Sphere(1.5), at=(13, 0), depth=0.5), "off the sensing surface"),
+        (Contact(Sphere(1.5), point=(0, 0, 3), depth=0.5), "3.00 mm away"),
+        (Contact(Sphere(1.5), at=(0, 0), depth=4.25), "only 4.25 mm thick"),
+    ],
+)
+def test_contacts_that_cannot_be_are_refused(contact: Contact, expected: str) -> None:
+    with pytest.raises(ContactError, match=expected):
+        place(contact, FLAT, GEL)
+
+
+def test_contact_arguments_are_checked() -> None:
+    with pytest.raises(ContactError, match="both"):
+        Contact(Sphere(1), at=(0, 0), point=(0, 0, 0))
+    with pytest.raises(ContactError, match="2 finite numbers"):
+        Contact(Sphere(1), at=(0, 0, 0))  # type: ignore[arg-type]
+
+
+def test_gel_thickness_along_slanted_normals() -> None:
+    assert available_depth((0, 0, 0), (0, 0, -1), GEL) == pytest.approx(4.25)
+    slanted = np.array([0.6, 0, -0.8])
+    assert available_depth((1, 1, 0), slanted, GEL) == pytest.approx(4.25 / 0.8)
+    with pytest.raises(ContactError, match="no gel"):
+        available_depth((0, 0, 0), (0, 0, 1), GEL)
+
+
+def test_a_missing_mesh_file_is_named(tmp_path: Path) -> None:
+    from optisense.errors import MeshError
+
+    contact = parse_contact(f"mesh:{tmp_path}/none.stl@0,0:0.2")
+    with pytest.raises(MeshError, match=r"none\.stl"):
+        place(contact, FLAT, GEL)
