@@ -1,0 +1,116 @@
+"""A small design that uses every field of the format."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from optisense.design import SensorDesign
+from optisense.design.ies import parse_ies
+from optisense.geometry import TriangleMesh
+
+LAMP = "IESNA:LM-63-2002\nTILT=NONE\n1 -1 2 3 1 1 2 0 0 0\n1 1 5\n0 45 90\n0\n10 5 0\n"
+
+
+def corner(x: float, y: float, z: float) -> dict[str, float]:
+    return {"x": x, "y": y, "z": z}
+
+
+def lattice(lower: list[float], upper: list[float], lift: float = 0.0) -> list[dict[str, float]]:
+    """2 x 2 x 2 control points, the top ones lifted."""
+    return [
+        corner(x, y, z + (lift if z == upper[2] else 0.0))
+        for x in (lower[0], upper[0])
+        for y in (lower[1], upper[1])
+        for z in (lower[2], upper[2])
+    ]
+
+
+def full_data() -> dict[str, object]:
+    """Every field of the format, none left at its default where it can be helped."""
+    low, high = [-5.0, -4.0, -2.0], [5.0, 4.0, 0.0]
+    light = {"position": [6, 0.1, -4], "direction": [-1, 0, 0.25], "up": [0, 0, 1]}
+    return {
+        "schema_version": 1,
+        "name": "every field: a \"test\" # 1",
+        "description": "two\nlines, 'quotes', \u00fcml\u00e4uts, \u2028 and a tab\t",
+        "coating": {
+            "library": "diffuse-grey",
+            "reflectance": [0.1, 0.2, 1 / 3],
+            "eta": [1.43, 0.92, 0.69],
+            "k": [7.5, 6.4, 5.6],
+            "specularity": 0.25,
+        },
+        "materials": {
+            "gel": {"kind": "dielectric", "ior": 1.41, "roughness": 0.125},
+            "silver": {"kind": "conductor", "eta": [0.1] * 3, "k": [3] * 3, "roughness": 0.01},
+            "white": {"kind": "diffuse", "reflectance": [0.8, 0.7, 0.6]},
+            "black": {"kind": "absorber"},
+        },
+        "parts": {
+            "skin": {"role": "sensing_surface", "mesh": "meshes/skin.obj"},
+            "gel": {
+                "role": "elastomer", "mesh": "meshes/gel.obj", "material": "gel", "priority": 2,
+            },
+            "wall": {"role": "blocker", "mesh": "meshes/deep/wall.obj", "material": "black"},
+            "mirror": {"role": "mirror", "mesh": "meshes/mirror.obj", "material": "silver"},
+        },
+        "lights": {
+            "red": {"model": "smd-3528", "colour": [1, 0, 0.5], "flux": 12.5, "lights": [light]},
+            "own-area": {
+                "model": "mine", "colour": [0, 1, 0], "flux": 1e-3, "lights": [light],
+                "emitter": {
+                    "kind": "area", "shape": "rectangle", "size": [2, 1], "lambertian": True
+                },
+            },
+            "own-ies": {
+                "model": "mine-2", "colour": [0, 1, 1], "flux": 3, "lights": [light, light],
+                "emitter": {"kind": "ies", "file": "lamps/lamp.ies"},
+            },
+            "own-spot": {
+                "model": "mine-3", "colour": [0, 0, 1], "flux": 3, "lights": [light],
+                "emitter": {"kind": "spot", "cutoff": 40, "beam": 20},
+            },
+        },
+        "camera": {
+            "model": "pi-v2", "projection": "equidistant", "fov": 150, "resolution": [64, 48],
+            "position": [0.5, 0, -20], "direction": [0, 0, 1], "up": [0, 1, 0],
+        },
+        "cages": {
+            "skin": {
+                "parts": ["skin", "gel"], "resolution": [2, 2, 2], "box": [low, high],
+                "points": lattice(low, high, 0.5),
+            },
+            "mirror": {
+                "parts": ["mirror"], "resolution": [2, 2, 2],
+                "box": [[8, -4, -9], [9, 4, -1]],
+                "c_min": lattice([8, -4, -9], [9, 4, -1]),
+                "c_max": lattice([8, -4, -9], [9, 4, -1], 1.0),
+                "blend": [corner(0.5, 0.25, 0.75)] * 8,
+            },
+        },
+        "provenance": {"parts.gel": {"status": "assumed", "source": "for the test"}},
+    }  # fmt: skip
+
+
+@pytest.fixture
+def data() -> dict[str, object]:
+    return full_data()
+
+
+@pytest.fixture
+def design(data: dict[str, object], tmp_path_factory: pytest.TempPathFactory) -> SensorDesign:
+    made = SensorDesign.model_validate(data)
+    gel = TriangleMesh.box((-5, -4, -2), (5, 4, 0), (4, 4, 2))
+    made.meshes.update(
+        skin=TriangleMesh.grid((10, 8), (4, 4)).flipped(),
+        gel=gel,
+        wall=TriangleMesh.box((-20, -20, -30), (-15, 20, 0)),
+        mirror=TriangleMesh(np.array([[8.5, -3, -8], [8.5, 3, -8], [8.2, 0, -2]]), [[0, 1, 2]]),
+    )
+    lamps = tmp_path_factory.mktemp("source") / "lamps"
+    lamps.mkdir()
+    (lamps / "lamp.ies").write_text(LAMP)
+    assert parse_ies(LAMP, "lamp").candela[0, 0] == 20.0
+    made.lights["own-ies"].emitter._folder = lamps.parent
+    return made

@@ -1,0 +1,103 @@
+"""What can be found wrong with a design without rendering it."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from optisense.design import Problem, SensorDesign, check_design, set_value
+from optisense.design.check import inside
+from optisense.geometry import TriangleMesh
+
+LIGHTS = ["smd-3528", "generic-spot"]
+
+
+def only(problems: list[Problem], severity: str = "error") -> Problem:
+    found = [problem for problem in problems if problem.severity == severity]
+    assert len(found) == 1, found
+    return found[0]
+
+
+def test_a_good_design_has_no_problems(design: SensorDesign) -> None:
+    assert check_design(design, LIGHTS) == []
+
+
+def test_an_unknown_light(design: SensorDesign) -> None:
+    problem = only(check_design(set_value(design, "lights.red.model", "smd3528"), LIGHTS))
+    assert "'smd3528'" in problem.message and "smd-3528" in str(problem.hint)
+
+
+def test_an_open_solid(design: SensorDesign) -> None:
+    gel = design.meshes["gel"]
+    design.meshes["gel"] = TriangleMesh(gel.vertices, gel.faces[1:])
+    assert "gel" in only(check_design(design)).message
+
+
+def test_nan_in_a_mesh(design: SensorDesign) -> None:
+    vertices = design.meshes["wall"].vertices.copy()
+    vertices[0, 0] = np.nan
+    design.meshes["wall"] = design.meshes["wall"].with_vertices(vertices)
+    assert any("'wall'" in problem.message for problem in check_design(design))
+
+
+def test_a_missing_mesh(design: SensorDesign) -> None:
+    del design.meshes["wall"]
+    assert "'wall' has no mesh" in only(check_design(design)).message
+
+
+@pytest.mark.parametrize("path", ["lights.red.lights[0].position", "camera.position"])
+def test_lights_and_camera_inside_a_blocker(design: SensorDesign, path: str) -> None:
+    problem = only(check_design(set_value(design, path, [-17, 0, -10])))
+    assert "inside the opaque part 'wall'" in problem.message and path == problem.where
+
+
+def test_a_light_in_the_gel_is_fine(design: SensorDesign) -> None:
+    embedded = set_value(design, "lights.red.lights[0].position", [0, 0, -1])
+    assert check_design(embedded, LIGHTS) == []
+
+
+def test_a_sensing_surface_that_faces_outward(design: SensorDesign) -> None:
+    design.meshes["skin"] = design.meshes["skin"].flipped()
+    assert "faces outward" in only(check_design(design)).message
+
+
+def test_a_sensing_surface_away_from_the_gel(design: SensorDesign) -> None:
+    lifted = design.meshes["skin"].vertices + [0, 0, 3]
+    design.meshes["skin"] = design.meshes["skin"].with_vertices(lifted)
+    del design.cages["skin"]
+    problem = only(check_design(design), "warning")
+    assert "does not lie on" in problem.message
+
+
+def test_metres_and_far_lights(design: SensorDesign) -> None:
+    assert (
+        "millimetres"
+        in only(check_design(set_value(design, "lights.red.lights[0].position.x", 30_000))).message
+    )
+    small = design.meshes["wall"].transformed(np.diag([1e-3, 1e-3, 1e-3]))
+    design.meshes["wall"] = small
+    assert "metres" in only(check_design(design)).message
+
+
+def test_darkness_and_idle_provenance_are_warnings(design: SensorDesign) -> None:
+    for name in design.lights:
+        design.lights[name].flux = 0.0
+    design.provenance["parts.gell"] = design.provenance.pop("parts.gel")
+    problems = check_design(design)
+    assert {problem.severity for problem in problems} == {"warning"}
+    assert [("black" in p.message, "parts.gell" in p.message) for p in problems] == [
+        (True, False),
+        (False, True),
+    ]
+
+
+def test_inside_agrees_with_a_sphere() -> None:
+    angles = np.linspace(0, 2 * np.pi, 40, endpoint=False)
+    box = TriangleMesh.box((-1, -1, -1), (1, 1, 1), (12, 12, 12))
+    unit = box.vertices / np.linalg.norm(box.vertices, axis=1, keepdims=True)
+    ball = TriangleMesh(3.0 * unit, box.faces)
+    ring = np.column_stack([np.cos(angles), np.sin(angles), 0.3 * np.sin(3 * angles)])
+    ring /= np.linalg.norm(ring, axis=1, keepdims=True)
+    assert inside(2.9 * ring, ball).all()
+    assert not inside(3.01 * ring, ball).any()
+    assert inside(2.9 * ring, ball.flipped()).all()

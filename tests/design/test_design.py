@@ -1,0 +1,74 @@
+"""What a design computes from its fields."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from pydantic import ValidationError
+
+from optisense.design import Cage, Camera, LightGroup, Point, SensorDesign
+
+
+def test_channel_flux_adds_up_to_the_flux(design: SensorDesign) -> None:
+    np.testing.assert_allclose(
+        design.lights["red"].channel_flux(), [12.5 / 1.5, 0.0, 12.5 * 0.5 / 1.5]
+    )
+
+
+def test_a_light_without_colour_is_refused(design: SensorDesign) -> None:
+    group = design.lights["red"].model_dump()
+    with pytest.raises(ValidationError, match="colour"):
+        LightGroup.model_validate(group | {"colour": (0, 0, 0)})
+
+
+def test_camera_axes_are_a_picture_that_is_not_mirrored() -> None:
+    camera = Camera(
+        model="x", fov=50, resolution=(4, 3), position=(0, 0, 0), direction=(0, 0, 2), up=(0, 3, 1)
+    )
+    right, up, forward = camera.axes()
+    np.testing.assert_allclose(forward, [0, 0, 1])
+    np.testing.assert_allclose(up, [0, 1, 0], atol=1e-15)
+    np.testing.assert_allclose(right, np.cross(forward, up))
+    np.testing.assert_allclose(right, [-1, 0, 0])
+
+
+def test_blend_mixes_the_two_ends(design: SensorDesign) -> None:
+    cage = design.cages["mirror"]
+    low = np.array([(p.x, p.y, p.z) for p in cage.c_min or []])
+    high = np.array([(p.x, p.y, p.z) for p in cage.c_max or []])
+    share = np.array([0.5, 0.25, 0.75])
+    np.testing.assert_allclose(cage.current_points(), (1 - share) * low + share * high)
+    cage.blend = 1.0
+    np.testing.assert_allclose(cage.current_points(), high)
+
+
+def test_a_cage_at_rest_changes_nothing(design: SensorDesign) -> None:
+    gel = design.meshes["gel"]
+    design.cages = {"gel": Cage.around(["gel"], gel.bounds, (4, 3, 5))}
+    moved = design.deformed_meshes()["gel"].vertices
+    np.testing.assert_allclose(moved, gel.vertices, atol=1e-12)
+
+
+def test_cage_index_is_x_slowest_z_fastest() -> None:
+    cage = Cage.around(["gel"], [[0, 0, 0], [2, 3, 4]], (3, 4, 5))
+    for i, j, k in [(0, 0, 1), (2, 3, 4), (1, 2, 3)]:
+        expected = Point(x=float(i), y=float(j), z=float(k))
+        assert cage.points[cage.index(i, j, k)] == expected
+
+
+def test_a_cage_moves_all_its_parts_alike(design: SensorDesign) -> None:
+    meshes = design.deformed_meshes()
+    assert meshes["gel"].bounds[1, 2] == pytest.approx(0.5)
+    assert meshes["skin"].bounds[1, 2] == pytest.approx(0.5)
+    np.testing.assert_array_equal(meshes["wall"].vertices, design.meshes["wall"].vertices)
+
+
+def test_bounds_enclose_all_parts(design: SensorDesign) -> None:
+    np.testing.assert_allclose(design.bounds(), [[-20, -20, -30], [8.5, 20, 0]])
+
+
+def test_changes_in_place_are_checked(design: SensorDesign) -> None:
+    with pytest.raises(ValidationError):
+        design.camera.fov = float("inf")
+    with pytest.raises(ValidationError):
+        design.coating.specularity = 2.0

@@ -1,0 +1,153 @@
+"""GelSight Mini and its curved variants as built in."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import optisense
+from optisense import sensors
+from optisense.design import SensorDesign, load_design, save_design
+from optisense.errors import DesignError
+
+FIELD_OF_VIEW = (18.6, 14.3)
+"""mm on the gel, by the maker's datasheet."""
+
+
+@pytest.fixture(scope="module", params=list(sensors.BUILDERS))
+def sensor(request: pytest.FixtureRequest) -> SensorDesign:
+    return sensors.build(request.param)
+
+
+def test_the_design_is_in_order(sensor: SensorDesign) -> None:
+    assert sensors.check(sensor) == []
+
+
+def test_it_survives_a_trip_through_a_folder(sensor: SensorDesign, tmp_path: Path) -> None:
+    save_design(sensor, tmp_path / "mini")
+    again = load_design(tmp_path / "mini")
+    assert again.model_dump() == sensor.model_dump()
+    for name, mesh in sensor.meshes.items():
+        np.testing.assert_array_equal(again.meshes[name].vertices, mesh.vertices)
+
+
+def test_the_skin_stays_on_the_gel(sensor: SensorDesign) -> None:
+    """Each vertex of the skin is, bit for bit, one of the gel, also when bent."""
+    meshes = sensor.deformed_meshes()
+    gel = {tuple(vertex) for vertex in meshes["gel"].vertices.tolist()}
+    assert all(tuple(vertex) in gel for vertex in meshes["skin"].vertices.tolist())
+    assert meshes["skin"].area <= meshes["gel"].area
+    assert meshes["gel"].is_closed
+
+
+def test_the_gel_lies_flat_on_the_tray(sensor: SensorDesign) -> None:
+    gel, tray = (sensor.deformed_meshes()[name].bounds for name in ("gel", "tray"))
+    np.testing.assert_allclose([gel[0, 2], tray[1, 2]], -4.25, atol=1e-9)
+    np.testing.assert_allclose(gel[:, :2], [[-12.625, -10.375], [12.625, 10.375]], atol=1e-9)
+
+
+def test_normals_of_the_skin_look_into_the_gel(sensor: SensorDesign) -> None:
+    assert (sensor.deformed_meshes()["skin"].face_normals[:, 2] < 0).all()
+
+
+def test_flat_gel_volume_is_its_box() -> None:
+    gel = sensors.gelsight_mini().meshes["gel"]
+    assert gel.volume == pytest.approx(25.25 * 20.75 * 4.25)
+
+
+def test_the_camera_sees_the_published_part_of_the_gel() -> None:
+    """Trace the outermost ray of the image's width and height through the flat layers."""
+    camera = sensors.gelsight_mini().camera
+    half_width = math.tan(math.radians(camera.fov / 2))
+    half_height = half_width * camera.resolution[1] / camera.resolution[0]
+    for slope, length, tolerance in zip(
+        (half_width, half_height), FIELD_OF_VIEW, (1e-3, 0.04), strict=True
+    ):
+        angle = math.atan(slope)
+        in_acrylic = math.asin(math.sin(angle) / 1.491)
+        in_gel = math.asin(math.sin(angle) / 1.41)
+        seen = 13.0 * slope + 5.0 * math.tan(in_acrylic) + 4.25 * math.tan(in_gel)
+        assert 2.0 * seen == pytest.approx(length, rel=tolerance)
+
+
+def test_the_lights_face_the_guide_across_a_gap() -> None:
+    design = sensors.gelsight_mini()
+    low, high = design.meshes["guide"].bounds
+    for group in design.lights.values():
+        assert len(group.lights) == 5
+        for light in group.lights:
+            position, direction = np.array(light.position), np.array(light.direction)
+            outside = np.maximum(low - position, position - high).max()
+            assert outside == pytest.approx(0.2)
+            inward = position + 0.3 * direction
+            assert ((inward > low) & (inward < high)).all()
+
+
+def test_light_comes_from_top_right_and_bottom_of_the_picture() -> None:
+    """As published ball presses shade: red +94..+99, green -4..-7, blue -63..-76 degrees."""
+    design = sensors.gelsight_mini()
+    right, up, _ = design.camera.axes()
+    for name, angle in {"red": 90, "green": 0, "blue": -90}.items():
+        centre = np.mean([light.position for light in design.lights[name].lights], axis=0)
+        assert math.degrees(math.atan2(centre @ up, centre @ right)) == pytest.approx(angle)
+
+
+def test_the_cylinder_is_bent_along_x_only() -> None:
+    skin = sensors.gelsight_mini_cylindrical().deformed_meshes()["skin"].vertices
+    x = skin[:, 0] / 25.25 + 0.5
+    np.testing.assert_allclose(skin[:, 2], 6.0 * 2 * x * (1 - x), atol=1e-9)
+
+
+def test_the_dome_is_highest_in_the_middle() -> None:
+    skin = sensors.gelsight_mini_spherical().deformed_meshes()["skin"].vertices
+    x, y = skin[:, 0] / 25.25 + 0.5, skin[:, 1] / 20.75 + 0.5
+    np.testing.assert_allclose(skin[:, 2], 9.0 * 4 * x * (1 - x) * y * (1 - y), atol=1e-9)
+
+
+def test_the_first_sensor_marks_what_is_assumed() -> None:
+    provenance = sensors.gelsight_mini().provenance
+    for path in ("parts.guide", "lights.red", "camera.position", "materials.silicone-xp565.ior"):
+        assert provenance[path].status == "assumed"
+
+
+def test_dimensions_can_be_chosen() -> None:
+    design = sensors.gelsight_mini(gel_thickness=3.0, leds_per_group=8, led_pitch=2.5)
+    assert design.meshes["gel"].bounds[0, 2] == -3.0
+    assert design.camera.position[2] == -3.0 - 1.0 - 17.0
+    assert len(design.lights["blue"].lights) == 8
+    assert sensors.check(design) == []
+    with pytest.raises(ValueError, match="above 0"):
+        sensors.gelsight_mini(led_gap=0.0)
+
+
+class TestLoad:
+    def test_by_name(self) -> None:
+        assert optisense.load("gelsight-mini").name == "gelsight-mini"
+
+    def test_by_folder(self, tmp_path: Path) -> None:
+        save_design(sensors.gelsight_mini(), tmp_path / "mine")
+        assert optisense.load(tmp_path / "mine").name == "gelsight-mini"
+        assert optisense.load(str(tmp_path / "mine")).name == "gelsight-mini"
+
+    def test_a_misspelt_name(self) -> None:
+        with pytest.raises(DesignError, match="Did you mean 'gelsight-mini'"):
+            optisense.load("gelsight_mini")
+
+    def test_a_name_that_is_also_a_folder(
+        self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        save_design(sensors.gelsight_mini_spherical(), tmp_path / "gelsight-mini")
+        monkeypatch.chdir(tmp_path)
+        with pytest.raises(DesignError, match="also a folder"):
+            optisense.load("gelsight-mini")
+        assert optisense.load("./gelsight-mini").name == "gelsight-mini-spherical"
+        assert optisense.load("builtin:gelsight-mini").name == "gelsight-mini"
+
+    def test_an_unknown_light_is_an_error(self) -> None:
+        design = sensors.gelsight_mini()
+        design.lights["red"].model = "smd-3529"
+        with pytest.raises(DesignError, match="Did you mean 'smd-3528'"):
+            sensors.check(design)

@@ -1,0 +1,33 @@
+"""Importing the package is light, and its public names are there."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+
+import pytest
+
+import optisense
+
+
+def test_import_loads_neither_the_renderer_nor_numpy() -> None:
+    code = (
+        "import sys, optisense;"
+        "print([m for m in ('mitsuba', 'drjit', 'numpy') if m in sys.modules])"
+    )
+    ran = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert ran.stdout.strip() == "[]"
+
+
+def test_loading_a_design_does_not_load_the_renderer() -> None:
+    code = (
+        "import sys, optisense as o; o.load('gelsight-mini');"
+        "print([m for m in ('mitsuba', 'drjit') if m in sys.modules])"
+    )
+    ran = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert ran.stdout.strip() == "[]"
+
+
+def test_unknown_names_are_attribute_errors() -> None:
+    with pytest.raises(AttributeError, match="nothing"):
+        optisense.nothing  # noqa: B018
