@@ -66,7 +66,7 @@ def _check_mesh(design: SensorDesign, name: str, meshes: dict[str, TriangleMesh]
     try:
         mesh = design.meshes[name].validate(name, closed=part.role in TRANSPARENT_SOLIDS)
     except MeshError as error:
-        return [Problem(error.message, error.where or place, error.hint)]
+        return [Problem(f"part '{name}': {error.message}", place, error.hint)]
     meshes[name] = mesh
     if part.role is Role.SENSING_SURFACE and mesh.is_closed:
         return [

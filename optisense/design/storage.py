@@ -13,6 +13,7 @@ from pydantic import ValidationError
 from optisense.design.emitters import IesEmitter
 from optisense.design.limits import unit_slips
 from optisense.design.near import near_match
+from optisense.design.parts import TRANSPARENT_SOLIDS
 from optisense.design.problems import design_error, raise_problems
 from optisense.design.sensor_design import SCHEMA_VERSION, SensorDesign
 from optisense.design.yaml_reader import Lines, read_yaml
@@ -30,7 +31,8 @@ def load_design(path: str | Path) -> SensorDesign:
     Raises:
         DesignError: a file is missing, a field is missing, misspelt or out of range, a mesh path
             leaves the folder, or the sizes look like another unit than mm; says file and line.
-        MeshError: a mesh has no triangles, can't be read, or holds numbers that are not finite.
+        MeshError: a mesh can't be read, has no triangles, holds numbers that are not finite, or
+            is not closed though it is an elastomer or a support.
     """
     path = Path(path)
     file = path / DESIGN_FILE if path.is_dir() else path
@@ -147,11 +149,12 @@ def _inside(folder: Path, relative: str, where: str) -> Path:
 
 def _load_mesh(path: Path, name: str, design: SensorDesign) -> TriangleMesh:
     try:
-        return TriangleMesh.load(path).validate(name, closed=False)
+        closed = design.parts[name].role in TRANSPARENT_SOLIDS
+        return TriangleMesh.load(path).validate(name, closed=closed)
     except MeshError as error:
-        where = error.where or design.where("parts", name, "mesh")
-        message = error.message if name in error.message else f"part '{name}': {error.message}"
-        raise MeshError(message, where=where, hint=error.hint) from error
+        in_file = error.where is not None and error.where.startswith(str(path))
+        where = error.where if in_file else design.where("parts", name, "mesh")
+        raise MeshError(f"part '{name}': {error.message}", where=where, hint=error.hint) from error
 
 
 def _as_obj(file: str) -> str:

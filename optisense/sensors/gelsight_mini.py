@@ -7,14 +7,18 @@ neither the light guide, the LEDs nor the camera's place: these are marked as as
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from optisense import library
 from optisense.design import (
     Cage,
     Camera,
+    Dielectric,
     Light,
     LightGroup,
+    Material,
     Part,
     Point,
     Provenance,
@@ -35,7 +39,8 @@ def gelsight_mini(
     tray_thickness: float = 1.0,
     guide_thickness: float = 4.0,
     pupil_distance: float = 17.0,
-    fov: float = 48.4,
+    view_width: float = 18.6,
+    fov: float | None = None,
     resolution: tuple[int, int] = (320, 240),
     leds_per_group: int = 5,
     led_pitch: float = 4.0,
@@ -53,7 +58,8 @@ def gelsight_mini(
         tray_thickness: mm.
         guide_thickness: mm, of the side-lit acrylic block under the tray (as large as the gel).
         pupil_distance: mm, from the back of the tray to the camera's entrance pupil.
-        fov: degrees, across the image width.
+        view_width: mm, what the image width shows of the flat gel.
+        fov: degrees, across the image width; None derives it from view_width.
         resolution: pixels, width and height.
         leds_per_group: LEDs in each of the three rows.
         led_pitch: mm, between LEDs of a row.
@@ -63,18 +69,26 @@ def gelsight_mini(
         tessellation: mm, edge length of the triangles on top of the gel.
 
     Raises:
-        ValueError: led_gap, a thickness or the tessellation is not above 0.
+        ValueError: a size, led_gap or tessellation is not above 0, or the pupil is in the guide.
         LibraryError: there is no such coating.
     """
     lengths = (*gel_size, gel_thickness, *tray_size, tray_thickness, guide_thickness)
-    if min(*lengths, pupil_distance, led_gap, tessellation) <= 0.0:
+    if min(*lengths, pupil_distance, led_gap, tessellation, view_width) <= 0.0:
         raise ValueError("all sizes, led_gap and tessellation must be above 0")
     tray_top = -gel_thickness
     guide_top = tray_top - tray_thickness
     guide_bottom = guide_top - guide_thickness
+    if pupil_distance <= guide_thickness:
+        raise ValueError("pupil_distance must be larger than guide_thickness")
     lamp_z = 0.5 * (guide_top + guide_bottom)
     half_x, half_y = 0.5 * gel_size[0], 0.5 * gel_size[1]
 
+    support, gel_index = library.material(GUIDE), library.material(GEL)
+    layers = [
+        (pupil_distance - guide_thickness, 1.0),
+        (guide_thickness + tray_thickness, _index(support)),
+        (gel_thickness, _index(gel_index)),
+    ]
     leds = (leds_per_group, led_pitch, led_flux)
 
     gel = _gel(gel_size, gel_thickness, tessellation)
@@ -97,7 +111,7 @@ def gelsight_mini(
         },
         camera=Camera(
             model="gelsight-mini",
-            fov=fov,
+            fov=_field_of_view(view_width, layers) if fov is None else fov,
             resolution=resolution,
             position=(0.0, 0.0, guide_top - pupil_distance),
             direction=(0.0, 0.0, 1.0),
@@ -150,6 +164,29 @@ def gelsight_mini_spherical(rise: float = 9.0) -> SensorDesign:
         status=Status.SOURCED, source="OptiSense paper: centre point of the cage +9 mm along z"
     )
     return design
+
+
+def _index(material: Material) -> float:
+    assert isinstance(material, Dielectric)  # of the two named above
+    return material.ior
+
+
+def _field_of_view(view_width: float, layers: list[tuple[float, float]]) -> float:
+    """Degrees a pinhole needs to see `view_width` (mm) behind flat layers.
+
+    Args:
+        layers: thickness (mm) and refractive index of each, from the pinhole on.
+    """
+
+    def too_wide(sine: float) -> bool:  # Snell: the index times the sine is the same throughout
+        offsets = (t * sine / math.sqrt(n * n - sine * sine) for t, n in layers)
+        return 2.0 * sum(offsets) > view_width
+
+    low, high = 0.0, 1.0 - 1e-12
+    for _ in range(60):
+        middle = 0.5 * (low + high)
+        low, high = (low, middle) if too_wide(middle) else (middle, high)
+    return round(2.0 * math.degrees(math.asin(low)), 3)
 
 
 def _gel(size: tuple[float, float], thickness: float, tessellation: float) -> TriangleMesh:
@@ -233,8 +270,8 @@ def _provenance() -> dict[str, Provenance]:
         "camera.position": (assumed, "pupil 17 mm behind the back of the tray"),
         "camera.fov": (
             Status.DERIVED,
-            "18.6 mm on the gel (datasheet, second hand) at an apparent depth of "
-            "17 + 1 / 1.49 + 4.25 / 1.41 = 20.7 mm",
+            "the width that shows 18.6 mm of the flat gel (datasheet, second hand), refracted "
+            "through 13 mm air, 5 mm acrylic and 4.25 mm gel; from the assumed pupil",
         ),
         "camera.resolution": (sourced, "320 x 240 is the default of gsrobotics"),
     }
