@@ -10,6 +10,8 @@ from pydantic import Field, model_validator
 
 from optisense.design.fields import Count, Direction, Model, Name, Number, Vector
 
+Pixels = Annotated[Count, Field(le=65_536)]
+
 
 class Camera(Model):
     """A pinhole with a pose. Image right is direction x up: pictures are never mirrored."""
@@ -21,7 +23,7 @@ class Camera(Model):
     fov: Annotated[Number, Field(gt=0.0, le=360.0)] = Field(
         description="degrees, across the image width"
     )
-    resolution: tuple[Count, Count] = Field(description="pixels, width and height")
+    resolution: tuple[Pixels, Pixels] = Field(description="pixels, width and height")
     position: Vector = Field(description="mm, entrance pupil, x y z")
     direction: Direction = Field(description="where it looks, any length")
     up: Direction = Field(description="upward in the picture, any length")

@@ -13,7 +13,7 @@ from optisense.design.near import suggestion
 from optisense.design.parts import TRANSPARENT_SOLIDS, Role
 from optisense.design.problems import Problem
 from optisense.design.sensor_design import SensorDesign
-from optisense.errors import DesignError, LibraryError, MeshError, OptiSenseError
+from optisense.errors import DesignError, LibraryError, MeshError
 from optisense.geometry import TriangleMesh
 
 OPAQUE_ROLES = frozenset({Role.BLOCKER, Role.MIRROR, Role.INDENTER})
@@ -47,7 +47,7 @@ def check_design(design: SensorDesign, light_names: Collection[str] | None = Non
     if not any(problem.severity == "error" for problem in problems):
         try:
             meshes = {n: m for n, m in design.deformed_meshes().items() if n in meshes}
-        except OptiSenseError as error:
+        except DesignError as error:
             place = error.where or design.where("cages")
             problems.append(Problem(error.message, place, error.hint))
         else:

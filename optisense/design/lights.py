@@ -25,7 +25,9 @@ class LightGroup(Model):
 
     model: Name = Field(description="library light, or a name for the emitter below")
     colour: Colour = Field(description="how its flux is shared among R, G, B; only ratios count")
-    flux: NonNegative = Field(description="mW, radiant flux of each light, over all channels")
+    flux: Annotated[NonNegative, Field(le=1e6)] = Field(
+        description="mW, radiant flux of each light, over all channels"
+    )
     emitter: LightModel | None = Field(default=None, description="instead of the library's light")
     lights: Annotated[list[Light], Field(min_length=1)] = Field(
         description="position in mm, direction of any length"

@@ -38,6 +38,16 @@ def unit_slips(design: SensorDesign) -> list[Problem]:
                     "Scale the mesh to millimetres (metres times 1000)",
                 )
             )
+    for cage_name, cage in design.cages.items():
+        far = float(np.abs(cage.current_points()).max())
+        if far > 2.0 * LARGEST:
+            problems.append(
+                Problem(
+                    f"cage '{cage_name}' has a control point {far:.6g} mm from the origin",
+                    design.where("cages", cage_name, "points"),
+                    "Give control points in millimetres",
+                )
+            )
     places: list[tuple[str, tuple[float, float, float], tuple[str | int, ...]]] = [
         ("the camera", design.camera.position, ("camera", "position"))
     ]

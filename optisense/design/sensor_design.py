@@ -17,6 +17,7 @@ from optisense.design.lights import LightGroup
 from optisense.design.materials import Coating, Material
 from optisense.design.near import suggestion
 from optisense.design.parts import Part, Role
+from optisense.errors import DesignError
 from optisense.geometry import TriangleMesh
 
 SCHEMA_VERSION = 1
@@ -145,17 +146,22 @@ class SensorDesign(Model):
         """The mesh of each part in its current shape: as stored, then moved by its cage.
 
         Raises:
-            OptiSenseError: a vertex of a caged part lies outside the cage's box.
+            DesignError: a vertex of a caged part lies outside the cage's box.
         """
         from optisense.geometry.cage import cage_weights, deform
 
         result = dict(self._meshes)
-        for cage in self.cages.values():
+        for cage_name, cage in self.cages.items():
             box = np.array(cage.box, dtype=np.float64)
             points = cage.current_points()
             for name in cage.parts:
                 if name in result:
-                    weights = cage_weights(result[name].vertices, box, cage.resolution)
+                    try:
+                        weights = cage_weights(result[name].vertices, box, cage.resolution)
+                    except DesignError as error:
+                        message = f"cage '{cage_name}', part '{name}': {error.message}"
+                        where = self.where("cages", cage_name, "box")
+                        raise DesignError(message, where=where, hint=error.hint) from error
                     result[name] = result[name].with_vertices(deform(weights, points))
         return result
 

@@ -79,6 +79,16 @@ def test_metres_and_far_lights(design: SensorDesign) -> None:
     assert "metres" in only(check_design(design)).message
 
 
+def test_a_control_point_far_away(design: SensorDesign) -> None:
+    far = set_value(design, "cages.skin.points[3].z", 1e300)
+    assert "control point" in only(check_design(far)).message
+
+
+def test_a_cage_smaller_than_its_part(design: SensorDesign) -> None:
+    small = set_value(design, "cages.skin.box[1].x", 4.0)
+    assert "cage 'skin', part 'skin'" in only(check_design(small)).message
+
+
 def test_darkness_and_idle_provenance_are_warnings(design: SensorDesign) -> None:
     for name in design.lights:
         design.lights[name].flux = 0.0
