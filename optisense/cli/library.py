@@ -66,9 +66,7 @@ def show_entry(
         output.print("where its numbers come from", style="bold")
         for field, source in sources.items():
             date = f" ({source['date']})" if "date" in source else ""
-            output.print(
-                f"  {field}: {source['status']}, {source['source']}{date}", markup=False
-            )
+            output.print(f"  {field}: {source['status']}, {source['source']}{date}", markup=False)
 
 
 def _short(value: object) -> str:

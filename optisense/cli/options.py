@@ -72,6 +72,17 @@ def parse_exposure(text: str) -> float | Literal["auto"]:
     return value
 
 
+def parse_variant(text: str) -> str:
+    """Read ``auto``, ``llvm`` or ``cuda``.
+
+    Raises:
+        typer.BadParameter: anything else.
+    """
+    if text not in ("auto", "llvm", "cuda"):
+        raise typer.BadParameter(f"'{text}' is none of auto, llvm, cuda", param_hint="--variant")
+    return text
+
+
 def parse_contacts(texts: list[str] | None) -> list[Contact]:
     """Read the values of ``--contact``.
 

@@ -17,6 +17,7 @@ from optisense.cli.options import (
     parse_contacts,
     parse_exposure,
     parse_resolution,
+    parse_variant,
 )
 from optisense.errors import OutputError
 
@@ -93,8 +94,9 @@ def render(
     """
     size = None if resolution is None else parse_resolution(resolution)
     brightness = parse_exposure(exposure)
+    parse_variant(variant)
     if noise is not None and seconds is not None:
-        raise typer.BadParameter("give either --noise or --seconds, not both")
+        raise typer.BadParameter("give one of them, not both", param_hint="--noise, --seconds")
     contacts = parse_contacts(contact)
 
     from optisense.optics.variant import select_variant

@@ -103,7 +103,7 @@ def _window_radius(group: LightGroup) -> float:
     from optisense import library
 
     try:
-        model = group.emitter or library.light(group.model)
+        model = library.emitter(group)
     except OptiSenseError:
         return MARKER_SIZE
     size = getattr(model, "size", None)

@@ -1,0 +1,138 @@
+"""What the commands print, write and exit with."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+import optisense
+from optisense.cli import app
+from optisense.sensors import BUILDERS
+
+runner = CliRunner()
+
+
+def run(*arguments: str) -> tuple[int, str]:
+    """Exit code and everything that was printed."""
+    result = runner.invoke(app, list(arguments))
+    assert "Traceback" not in result.output
+    return result.exit_code, result.output
+
+
+def test_version() -> None:
+    assert run("--version") == (0, f"optisense {optisense.__version__}\n")
+
+
+@pytest.mark.parametrize("command", ["new", "check", "render", "doctor", "library"])
+def test_each_command_explains_itself(command: str) -> None:
+    code, text = run(command, "--help")
+    assert code == 0
+    assert "Usage" in text
+
+
+def test_help_does_not_load_the_renderer_or_numpy() -> None:
+    script = (
+        "import sys\n"
+        "from typer.testing import CliRunner\n"
+        "from optisense.cli import app\n"
+        "assert CliRunner().invoke(app, ['render', '--help']).exit_code == 0\n"
+        "heavy = {'mitsuba', 'drjit', 'numpy', 'scipy', 'trimesh', 'matplotlib'}\n"
+        "print(sorted(heavy & set(sys.modules)))\n"
+    )
+    child = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True)
+    assert child.stdout.strip() == "[]", child.stderr
+
+
+@pytest.mark.parametrize("name", sorted(BUILDERS))
+def test_a_new_design_passes_the_check(name: str, tmp_path: Path) -> None:
+    folder = tmp_path / "mine"
+    assert run("new", name, str(folder))[0] == 0
+    code, text = run("check", str(folder))
+    assert code == 0, text
+    assert "in order" in text
+    assert name in text
+
+
+def test_new_keeps_off_folders_with_something_in_them(tmp_path: Path) -> None:
+    (tmp_path / "notes.txt").write_text("mine")
+    code, text = run("new", "gelsight-mini", str(tmp_path))
+    assert code != 0
+    assert "not empty" in text
+    assert [path.name for path in tmp_path.iterdir()] == ["notes.txt"]
+
+
+def test_a_misspelt_sensor_gets_the_near_match(tmp_path: Path) -> None:
+    code, text = run("new", "gelsight-minni", str(tmp_path / "new"))
+    assert code == 2
+    assert "gelsight-mini" in text
+    assert not (tmp_path / "new").exists()
+
+
+def test_a_misspelt_field_is_told_with_file_and_line(tmp_path: Path) -> None:
+    run("new", "gelsight-mini", str(tmp_path / "mine"))
+    file = tmp_path / "mine" / "design.yaml"
+    lines = file.read_text().splitlines()
+    place = next(i for i, line in enumerate(lines) if line.strip().startswith("fov:"))
+    lines[place] = lines[place].replace("fov:", "fow:")
+    file.write_text("\n".join(lines))
+    code, text = run("check", str(tmp_path / "mine"))
+    assert code == 2
+    assert f"design.yaml:{place + 1}" in text
+    assert "fov" in text
+
+
+@pytest.mark.parametrize(
+    ("contact", "complaint"),
+    [
+        ("spere:1@0,0:1", "sphere"),
+        ("sphere:1.5@0,0:20", "deep"),
+        ("sphere:1.5@90,0:0.5", "off the sensing surface"),
+        ("sphere", "@"),
+    ],
+)
+def test_a_contact_that_does_not_fit_is_bad_input(contact: str, complaint: str) -> None:
+    code, text = run("check", "gelsight-mini", "--contact", contact)
+    assert code == 2
+    assert complaint in text
+
+
+def test_a_contact_that_fits_passes() -> None:
+    code, text = run("check", "gelsight-mini", "--contact", "sphere:1.5@2,1:0.8")
+    assert code == 0, text
+    assert "1 contact fits" in text
+
+
+def test_the_library_lists_and_shows_with_sources() -> None:
+    code, text = run("library", "list", "light")
+    assert code == 0
+    assert "smd-3528" in text
+    code, text = run("library", "show", "smd-3528")
+    assert code == 0
+    assert "2.4" in text
+    assert "assumed" in text
+
+
+@pytest.mark.parametrize("arguments", [("list", "lamps"), ("show", "acrilic")])
+def test_unknown_library_words_are_bad_input(arguments: tuple[str, ...]) -> None:
+    assert run("library", *arguments)[0] == 2
+
+
+def test_the_doctor_finds_this_machine_well() -> None:
+    code, text = run("doctor")
+    assert code == 0, text
+    assert "libLLVM" in text
+    assert "Everything needed is here" in text
+
+
+def test_the_doctor_says_what_to_do_about_a_bad_libllvm(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    (tmp_path / "libLLVM-15.so").write_text("")
+    monkeypatch.setenv("DRJIT_LIBLLVM_PATH", str(tmp_path / "libLLVM-15.so"))
+    code, text = run("doctor")
+    assert code == 1
+    assert "too old" in text
