@@ -21,7 +21,7 @@ PARALLEL = float(np.cos(np.radians(10.0)))
 """Faces of two tessellations of one curved surface differ by a few degrees at most."""
 
 _GRID = 1e-7  # mm: rounding of cut polygons, so that neighbouring cuts close
-_THINNEST = 1e-5  # mm: leftovers thinner than this are rounding, not shape
+_THINNEST = 1e-4  # mm: leftovers thinner than this are rounding, not shape
 
 Pairs = NDArray[np.int64]
 

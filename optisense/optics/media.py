@@ -28,6 +28,9 @@ COINCIDENCE_TOLERANCE = 0.002
 """Faces closer than this (mm) touch; overlaps thinner than this are contacts. A gap that is
 meant (a film of air) must be wider."""
 
+CUT_CLEARANCE = 2e-5
+"""A solid is cut out with this much room (mm): more than rounding, far less than a contact."""
+
 EQUAL_INDEX = 1e-6
 """Refractive indices that differ by less bend no light."""
 
@@ -161,8 +164,8 @@ def _contacts(solids: list[Solid], tolerance: float) -> dict[tuple[int, int], Ov
 
 
 def _disjoint(solids: list[Solid], tolerance: float) -> list[Solid]:
-    """Cut each solid out of those of lower priority that it overlaps."""
-    result = list(solids)
+    """Cut each solid out of those of lower priority that it overlaps; highest priority first."""
+    result = sorted(solids, key=lambda solid: -solid.priority)
     for i, j in combinations(range(len(solids)), 2):
         if not _boxes_overlap(result[i].mesh, result[j].mesh, tolerance):
             continue
@@ -179,11 +182,21 @@ def _disjoint(solids: list[Solid], tolerance: float) -> list[Solid]:
                 hint="move them apart, or give the part that fills the common space the "
                 "larger priority",
             )
-        if result[i].priority >= result[j].priority:
-            result[j] = replace(result[j], mesh=_from_manifold(other - one))
-        else:
-            result[i] = replace(result[i], mesh=_from_manifold(one - other))
+        result[j] = replace(result[j], mesh=_from_manifold(other - _manifold(_grown(result[i]))))
     return [solid for solid in result if len(solid.mesh.faces)]
+
+
+def _grown(solid: Solid) -> Solid:
+    """A little larger all round, so that faces in one plane up to rounding are cut cleanly."""
+    mesh = solid.mesh.welded()
+    normal = mesh.face_normals
+    sums, rights = np.zeros((len(mesh.vertices), 3, 3)), np.zeros((len(mesh.vertices), 3))
+    for corner in mesh.faces.T:  # each vertex moves by the same step off all of its faces
+        np.add.at(sums, corner, normal[:, :, None] * normal[:, None])
+        np.add.at(rights, corner, normal)
+    step = np.linalg.solve(sums + 1e-3 * np.eye(3), rights[:, :, None])[:, :, 0]
+    step /= np.maximum(1.0, np.linalg.norm(step, axis=1, keepdims=True) / 3.0)
+    return replace(solid, mesh=mesh.with_vertices(mesh.vertices + CUT_CLEARANCE * step))
 
 
 def _boxes_overlap(first: TriangleMesh, second: TriangleMesh, tolerance: float) -> bool:
