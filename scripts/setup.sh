@@ -69,20 +69,22 @@ say "Installing the locked dependencies into .venv (a few minutes the first time
 "$venv/bin/python" -m pip install --quiet --disable-pip-version-check --no-input \
     --no-deps --no-build-isolation --editable .
 
-# --- libLLVM ----------------------------------------------------------------------------------
-llvm_fits() {
+# --- system libraries that the renderer needs: libLLVM, and on Linux libatomic ---------------------
+renderer_loads() {
     "$venv/bin/python" - "$@" <<'EOF'
 import sys
 from optisense.errors import OptiSenseError
-from optisense.optics.variant import find_llvm
+from optisense.optics.llvm import find_llvm
+from optisense.optics.variant import import_renderer
 try:
     library = find_llvm()
+    import_renderer("mitsuba")
 except OptiSenseError as error:
     sys.exit("" if "--quiet" in sys.argv else f"set-up: {error}")
 print(f"The renderer will use {library}")
 EOF
 }
-if ! llvm_fits --quiet 2>/dev/null; then
+if ! renderer_loads --quiet 2>/dev/null; then
     if [ "$(uname)" = Darwin ]; then
         if command -v brew >/dev/null 2>&1; then
             say "Installing LLVM through Homebrew ..."
@@ -90,8 +92,9 @@ if ! llvm_fits --quiet 2>/dev/null; then
         fi
     elif [ "$can_install" = yes ]; then
         apt_install libllvm19 libllvm18 libllvm20 libllvm21 libllvm17t64 libllvm17 || true
+        apt_install libatomic1 || true
     fi
-    llvm_fits || exit 1
+    renderer_loads || fail "Type the command above, then run make again."
 fi
 
 touch "$venv/.set-up"

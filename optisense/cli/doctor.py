@@ -87,7 +87,7 @@ def _renderer() -> Finding:
 
 
 def _llvm() -> Finding:
-    from optisense.optics.variant import find_llvm
+    from optisense.optics.llvm import find_llvm
 
     try:
         return Finding("libLLVM", "good", str(find_llvm()))
