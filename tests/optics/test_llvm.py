@@ -26,7 +26,7 @@ def pretend_installed(
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_bytes(content)
         paths.append(path)
-    monkeypatch.setattr(variant, "_library_files", lambda: iter(paths))
+    monkeypatch.setattr(llvm, "_library_files", lambda: iter(paths))
 
 
 def test_this_machine_has_a_fit_libllvm() -> None:
