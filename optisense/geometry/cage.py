@@ -10,9 +10,10 @@ middle one has weight 1/2 over itself.
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.special import comb
 
 from optisense.errors import DesignError
 
@@ -83,4 +84,5 @@ def _bernstein(t: FloatArray, count: int) -> FloatArray:
     """The `count` Bernstein polynomials of degree `count` - 1 at t (n,): (n, count)."""
     i = np.arange(count)
     degree = count - 1
-    return comb(degree, i) * t[:, None] ** i * (1.0 - t[:, None]) ** (degree - i)
+    binomial = np.array([math.comb(degree, k) for k in range(count)], dtype=np.float64)
+    return binomial * t[:, None] ** i * (1.0 - t[:, None]) ** (degree - i)

@@ -6,8 +6,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import sparse
-from scipy.sparse import csgraph
 
 from optisense.errors import MeshError
 
@@ -91,6 +89,9 @@ def _directed_edges(mesh: TriangleMesh) -> tuple[NDArray[np.int64], int]:
 
 def _with_consistent_winding(mesh: TriangleMesh) -> TriangleMesh:
     """Turn single faces over until neighbours agree, walking from face to face."""
+    from scipy import sparse
+    from scipy.sparse import csgraph
+
     forward, size = _directed_edges(mesh)
     first, second = forward // size, forward % size
     edge = np.minimum(first, second) * size + np.maximum(first, second)

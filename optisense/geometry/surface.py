@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
-import trimesh
 from numpy.typing import ArrayLike, NDArray
 
 from optisense.errors import ContactError, MeshError
@@ -15,7 +14,6 @@ from optisense.geometry.mesh import TriangleMesh
 FloatArray = NDArray[np.float64]
 
 _ARRIVED = 1e-9  # mm
-_triangles: Any = trimesh.triangles  # untyped
 
 
 class SurfacePoint(NamedTuple):
@@ -92,8 +90,7 @@ class SensingSurface:
         where = np.asarray(point, dtype=np.float64).reshape(3)
         if not np.isfinite(where).all():
             raise ContactError("a contact point is not a finite number", hint="give x,y,z in mm")
-        count = len(self.mesh.faces)
-        on_faces = _triangles.closest_point(self.mesh.triangles, np.tile(where, (count, 1)))
+        on_faces = closest_points(self.mesh, where)
         distance = np.linalg.norm(on_faces - where, axis=1)
         face = int(np.argmin(np.where(np.isfinite(distance), distance, np.inf)))
         return face, np.asarray(on_faces[face], dtype=np.float64)
@@ -102,9 +99,7 @@ class SensingSurface:
         """With the smooth normal, so that neighbouring places press in nearly one direction."""
         smooth = self._smooth
         assert smooth.normals is not None
-        share = _triangles.points_to_barycentric(
-            self.mesh.triangles[face][None], point[None], method="cross"
-        )[0]
+        share = _barycentric(self.mesh.triangles[face], point)
         normal = share @ smooth.normals[smooth.faces[face]]
         return SurfacePoint(point, normal / np.linalg.norm(normal))
 
@@ -163,6 +158,30 @@ class SensingSurface:
         along = float(direction @ edge)
         turned: FloatArray = along * edge + np.sqrt(max(0.0, 1.0 - along * along)) * into
         return turned
+
+
+def closest_points(mesh: TriangleMesh, point: FloatArray) -> FloatArray:
+    """The point of each face that lies nearest to `point` (3,) mm: (m, 3) mm."""
+    corners = mesh.triangles
+    edges = np.roll(corners, -1, axis=1) - corners
+    squares = np.maximum(np.einsum("mei,mei->me", edges, edges), 1e-300)
+    along = (np.einsum("mei,mei->me", point - corners, edges) / squares).clip(0.0, 1.0)
+    on_edges = corners + along[:, :, None] * edges
+    nearest = np.linalg.norm(on_edges - point, axis=2).argmin(axis=1)
+    normals = mesh.face_normals
+    height = np.einsum("mi,mi->m", point - corners[:, 0], normals)
+    foot = point - height[:, None] * normals
+    inward = np.cross(normals[:, None], edges)
+    inside = (np.einsum("mei,mei->me", inward, foot[:, None] - corners) >= 0.0).all(axis=1)
+    inside &= mesh.face_areas > 0.0
+    return np.where(inside[:, None], foot, on_edges[np.arange(len(corners)), nearest])
+
+
+def _barycentric(triangle: FloatArray, point: FloatArray) -> FloatArray:
+    """(3,) shares of the corners (3, 3) in a point of their plane."""
+    edges = (triangle[1:] - triangle[0]).T
+    second, third = np.linalg.lstsq(edges, point - triangle[0], rcond=None)[0]
+    return np.array([1.0 - second - third, second, third])
 
 
 def _in_plane(axis: FloatArray, square_to: list[FloatArray], name: str) -> FloatArray:
