@@ -80,7 +80,7 @@ def install_command() -> str:
     if sys.platform == "darwin":
         return "brew install llvm"
     return system_command(
-        f"libllvm{TESTED_LLVM}", "llvm-libs", "llvm-libs", f"libLLVM{TESTED_LLVM}"
+        f"libllvm{TESTED_LLVM} libatomic1", "llvm-libs", "llvm-libs", f"libLLVM{TESTED_LLVM}"
     )
 
 
