@@ -19,14 +19,9 @@ from optisense import __version__
 from optisense.design import LightGroup, SensorDesign
 from optisense.errors import OutputError
 from optisense.geometry import Contact, TriangleMesh
+from optisense.optics.response import auto_exposure, encode
 from optisense.report import tables
-from optisense.report.pictures import (
-    auto_scale,
-    data_uri,
-    exposed,
-    mask_overlay,
-    normal_colours,
-)
+from optisense.report.pictures import data_uri, mask_overlay, normal_colours
 from optisense.report.scene_view import scene_data
 
 
@@ -142,10 +137,10 @@ def _pictures(
 ) -> list[dict[str, str]]:
     """The pictures with their captions; the tactile image comes first."""
     picture = image.picture(exposure)
-    scale = auto_scale(image.radiance) if exposure == "auto" else float(exposure)
+    factor = auto_exposure(image.radiance) if exposure == "auto" else float(exposure)
     shown = [("picture", picture, "tactile image", "")]
     shown += [
-        (f"layer {name}", exposed(layer, scale), f"{name} lights alone", "")
+        (f"layer {name}", encode(factor * layer), f"{name} lights alone", "")
         for name, layer in image.layers.items()
     ]
     normals = normal_colours(image.normals, design.camera.axes())

@@ -1,7 +1,4 @@
-"""Arrays as PNG pictures inside a page.
-
-Colours are written as they would look on a screen (sRGB transfer curve, IEC 61966-2-1).
-"""
+"""Arrays as PNG pictures inside a page."""
 
 from __future__ import annotations
 
@@ -43,28 +40,6 @@ def png(picture: ByteArray) -> bytes:
 def data_uri(picture: ByteArray) -> str:
     """A picture as the address of an ``<img>``, its data inside."""
     return "data:image/png;base64," + base64.b64encode(png(picture)).decode("ascii")
-
-
-def exposed(radiance: FloatArray, scale: float) -> ByteArray:
-    """Radiance times an exposure, clipped, on the sRGB curve.
-
-    Args:
-        radiance: (h, w, 3), linear, any unit.
-        scale: the factor that takes the radiance to 0..1.
-
-    Returns:
-        (h, w, 3) uint8.
-    """
-    linear = np.clip(np.nan_to_num(radiance) * scale, 0.0, 1.0)
-    curve = np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
-    return np.round(curve * 255).astype(np.uint8)
-
-
-def auto_scale(radiance: FloatArray) -> float:
-    """The exposure that takes the brightest one in 200 values to just below white."""
-    finite = radiance[np.isfinite(radiance)]
-    bright = float(np.percentile(finite, 99.5)) if finite.size else 0.0
-    return 0.9 / bright if bright > 0 else 1.0
 
 
 def normal_colours(normals: FloatArray, axes: NDArray[np.float64]) -> ByteArray:

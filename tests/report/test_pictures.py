@@ -9,9 +9,7 @@ import numpy as np
 from PIL import Image
 
 from optisense.report.pictures import (
-    auto_scale,
     data_uri,
-    exposed,
     mask_overlay,
     normal_colours,
     png,
@@ -33,20 +31,6 @@ def test_the_data_uri_holds_the_png() -> None:
     head, _, body = data_uri(pixels).partition(",")
     assert head == "data:image/png;base64"
     assert base64.b64decode(body) == png(pixels)
-
-
-def test_exposure_follows_the_srgb_curve() -> None:
-    # IEC 61966-2-1: linear 0.2159 is sRGB 128/255; 18 % grey is 118 of 255.
-    radiance = np.array([[[0.0, 0.215861, 0.18]]]) / 2
-    assert exposed(radiance, 2.0).tolist() == [[[0, 128, 118]]]
-    assert exposed(np.full((1, 1, 3), 7.0), 1.0).max() == 255
-
-
-def test_auto_exposure_does_not_clip_or_divide_by_zero() -> None:
-    ramp = np.linspace(0, 40, 3000).reshape(-1, 20, 3)
-    clipped = (exposed(ramp, auto_scale(ramp)) == 255).mean()
-    assert clipped < 0.01
-    assert auto_scale(np.zeros((2, 2, 3))) == 1.0
 
 
 def test_a_surface_facing_the_camera_is_the_normal_maps_blue() -> None:
