@@ -74,6 +74,24 @@ def select_variant(variant: str = "auto") -> str:
     return VARIANTS["llvm"]
 
 
+def use_variant(variant: str = "auto") -> str:
+    """Make a variant the current one of this process, and return Mitsuba's name for it.
+
+    ``auto`` keeps the one that is already in use. Models of different variants must not be mixed.
+
+    Raises:
+        SetupError: as :func:`select_variant`.
+    """
+    name = select_variant(variant)
+    mitsuba = import_renderer("mitsuba")
+    current = mitsuba.variant()
+    if variant == "auto" and current in VARIANTS.values():
+        return str(current)
+    if current != name:
+        mitsuba.set_variant(name)
+    return name
+
+
 def cuda_device_found() -> bool:
     """Whether Dr.Jit sees a CUDA device and the driver has the OptiX library for ray tracing."""
     if sys.platform == "darwin" or not _cuda_driver_present():

@@ -1,0 +1,223 @@
+"""From a sensor design to the surfaces, emitters and camera that light meets."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from optisense import library
+from optisense.design import SensorDesign
+from optisense.design.check import inside
+from optisense.design.materials import Absorber, Coating, Conductor, Dielectric, Diffuse, Material
+from optisense.design.parts import TRANSPARENT_SOLIDS, Role
+from optisense.errors import DesignError
+from optisense.geometry import TriangleMesh
+from optisense.optics.emitters import Emitter, Intensity, Shape, spot_intensity
+from optisense.optics.media import AIR, Sheet, Solid, resolve_media
+from optisense.optics.ray_scene import Piece
+from optisense.optics.surfaces import Region, Surface, SurfaceKind
+
+SMOOTH_METAL = 0.01
+"""A metal of less roughness (GGX alpha) is an ideal mirror."""
+
+FLAT = 1e-6
+"""A mesh whose corner normals differ by less from its face normals has flat facets."""
+
+DISC_CORNERS = 48
+PROBE = 0.02
+"""The medium before a coating is looked up this far (mm) off it."""
+
+
+@dataclass(frozen=True)
+class Assembly:
+    """A design as ray tracing needs it.
+
+    pieces: all fixed surfaces. sensing: the meshes of the sensing surface (deformed). gels: the elastomers. emitters:
+    all lights, ``group`` counting in the order of ``groups``. indenter: the coating where an indenter carries it.
+    """
+
+    pieces: list[Piece]
+    sensing: TriangleMesh
+    gels: list[TriangleMesh]
+    emitters: list[Emitter]
+    groups: list[str]
+    light_areas: list[float]
+
+
+def assemble(design: SensorDesign) -> Assembly:
+    """Resolve media, and turn parts and lights into surfaces and emitters.
+
+    Raises:
+        DesignError: solids overlap without priority, a light's library entry is unknown, or a sensing
+            surface has no elastomer before it.
+        MeshError: a solid is not closed.
+    """
+    meshes = design.deformed_meshes()
+    solids, sheets, pieces = [], [], []
+    for name, part in design.parts.items():
+        mesh = meshes.get(name)
+        if mesh is None:
+            raise DesignError(f"part '{name}' has no mesh", where=design.where("parts", name))
+        material = design.materials.get(part.material) if part.material else None
+        if part.role in TRANSPARENT_SOLIDS:
+            assert isinstance(material, Dielectric) and part.material is not None
+            solids.append(
+                Solid(name, mesh, part.material, material.ior, material.roughness, part.priority)
+            )
+        elif part.role is Role.INTERFACE:
+            assert isinstance(material, Dielectric)
+            surface = Surface(SurfaceKind.DIELECTRIC, eta=material.ior, alpha=material.roughness)
+            pieces.append(_piece(name, mesh, surface))
+        elif part.role is not Role.INDENTER:
+            sheets.append(Sheet(name, mesh, part.role.value))
+    for face in resolve_media(solids, sheets):
+        surface = Surface(
+            SurfaceKind.DIELECTRIC, eta=face.ior_inside / face.ior_outside, alpha=face.roughness
+        )
+        pieces.append(_piece("/".join(face.names) + "|" + face.outside, face.mesh, surface))
+    for sheet in sheets:
+        part = design.parts[sheet.name]
+        ior = _index_before(sheet.mesh, solids)
+        if part.role is Role.SENSING_SURFACE:
+            surface = coating_surface(design.coating, ior, Region.SENSING)
+        else:
+            surface = _opaque(design.materials.get(part.material or ""), ior)
+        pieces.append(_piece(sheet.name, sheet.mesh, surface))
+    sensing = [meshes[name] for name in design.parts_of(Role.SENSING_SURFACE)]
+    emitters, areas = _emitters(design)
+    for number, emitter in enumerate(emitters):
+        if emitter.shape is not Shape.POINT:
+            pieces.append(_window(number, emitter))
+    return Assembly(
+        pieces=pieces,
+        sensing=sensing[0] if len(sensing) == 1 else TriangleMesh.joined(sensing),
+        gels=[meshes[name] for name in design.parts_of(Role.ELASTOMER)],
+        emitters=emitters,
+        groups=list(design.lights),
+        light_areas=areas,
+    )
+
+
+def coating_surface(coating: Coating, ior: float, region: Region) -> Surface:
+    """The coating as seen from a medium of refractive index ``ior``."""
+    return Surface(
+        SurfaceKind.OPAQUE,
+        alpha=library.specularity_to_roughness(coating.specularity),
+        specularity=coating.specularity,
+        reflectance=coating.reflectance,
+        metal_eta=_relative(coating.eta, ior),
+        metal_k=_relative(coating.k, ior),
+        region=region,
+    )
+
+
+def index_before_sensing(design: SensorDesign) -> float:
+    """Refractive index of what lies on the inner side of the sensing surface."""
+    meshes = design.deformed_meshes()
+    solids = []
+    for name in design.parts_of(*TRANSPARENT_SOLIDS):
+        part = design.parts[name]
+        material = design.materials[part.material or ""]
+        assert isinstance(material, Dielectric)
+        solids.append(
+            Solid(name, meshes[name], part.material or "", material.ior, 0.0, part.priority)
+        )
+    return _index_before(meshes[design.parts_of(Role.SENSING_SURFACE)[0]], solids)
+
+
+def indenter_piece(mesh: TriangleMesh, coating: Surface) -> Piece:
+    """An indenter that carries the coating."""
+    surface = Surface(**{**coating.__dict__, "region": Region.INDENTER})
+    return Piece("indenter", mesh.vertices, mesh.faces, surface, mesh.normals)
+
+
+def _relative(values: tuple[float, float, float], ior: float) -> tuple[float, float, float]:
+    return values[0] / ior, values[1] / ior, values[2] / ior
+
+
+def _opaque(material: Material | None, ior: float) -> Surface:
+    if isinstance(material, Diffuse):
+        return Surface(SurfaceKind.OPAQUE, alpha=1.0, reflectance=material.reflectance)
+    if isinstance(material, Conductor):
+        kind = (
+            SurfaceKind.MIRROR if material.roughness < SMOOTH_METAL else SurfaceKind.OPAQUE
+        )
+        return Surface(
+            kind,
+            alpha=material.roughness,
+            specularity=1.0,
+            metal_eta=_relative(material.eta, ior),
+            metal_k=_relative(material.k, ior),
+        )
+    assert material is None or isinstance(material, Absorber)
+    return Surface(SurfaceKind.ABSORBER)
+
+
+def _index_before(mesh: TriangleMesh, solids: list[Solid]) -> float:
+    """Refractive index on the side that the middle face's normal points to."""
+    face = int(np.argmax(mesh.face_areas))
+    probe = (mesh.triangles[face].mean(axis=0) + PROBE * mesh.face_normals[face])[None]
+    around = [solid for solid in solids if inside(probe, solid.mesh)[0]]
+    return max(around, key=lambda solid: solid.priority).ior if around else 1.0
+
+
+def _piece(name: str, mesh: TriangleMesh, surface: Surface) -> Piece:
+    smooth = mesh if mesh.normals is not None else mesh.vertex_normals()
+    assert smooth.normals is not None
+    corners = smooth.normals[smooth.faces]
+    if np.abs(corners - smooth.face_normals[:, None]).max() < FLAT:
+        return Piece(name, mesh.vertices, mesh.faces, surface)
+    return Piece(name, smooth.vertices, smooth.faces, surface, smooth.normals)
+
+
+def _emitters(design: SensorDesign) -> tuple[list[Emitter], list[float]]:
+    emitters, areas = [], []
+    for number, (name, group) in enumerate(design.lights.items()):
+        model = library.emitter(group)
+        intensity, shape, size, area = None, Shape.POINT, (0.0, 0.0), 0.0
+        if model.kind == "area":
+            shape = Shape.DISC if model.shape == "disc" else Shape.RECTANGLE
+            size = model.size
+            area = size[0] * size[1] * (np.pi / 4 if shape is Shape.DISC else 1.0)
+        elif model.kind == "spot":
+            intensity = spot_intensity(model.cutoff, model.beam)
+        else:
+            table = model.intensity_table()
+            intensity = Intensity(table.vertical_angles, table.horizontal_angles, table.candela)
+            if np.ptp(table.candela, axis=0).max() <= 1e-9 * table.candela.max():
+                intensity = Intensity(table.vertical_angles, np.zeros(1), table.candela[:1])
+        for light in group.lights:
+            emitters.append(
+                Emitter(
+                    group=number,
+                    position=light.position,
+                    direction=light.direction,
+                    up=light.up,
+                    shape=shape,
+                    size=size,
+                    intensity=intensity,
+                )
+            )
+            areas.append(float(area))
+    if not emitters:
+        raise DesignError("the design has no lights", where=design.where("lights"))
+    return emitters, areas
+
+
+def _window(number: int, emitter: Emitter) -> Piece:
+    """The emitting face of a light, facing the way it shines."""
+    s, t, _ = emitter.frame()
+    half = np.array(emitter.size) / 2
+    if emitter.shape is Shape.DISC:
+        turn = np.arange(DISC_CORNERS) * 2 * np.pi / DISC_CORNERS
+        outline = np.stack([np.cos(turn), np.sin(turn)], axis=1) * half
+    else:
+        outline = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]) * half
+    points = np.asarray(emitter.position) + outline[:, :1] * s + outline[:, 1:] * t
+    count = len(points)
+    faces = np.array([[0, k, k + 1] for k in range(1, count - 1)])
+    return Piece(f"light {number}", points, faces, Surface(SurfaceKind.LIGHT, light=number))
+
+
+__all__ = ["AIR", "Assembly", "assemble", "coating_surface", "indenter_piece"]

@@ -1,0 +1,164 @@
+"""Light fields of one sensor, kept between images: the guide, the cells, and the tallies of each seed."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from optisense.optics.emitters import EmitterTable
+from optisense.optics.guide import Guide, even_guide, learn_guide
+from optisense.optics.light_field import BINS, FieldCells, FieldTally, LightField, build_cells
+from optisense.optics.photons import trace_photons
+from optisense.optics.ray_scene import Piece, RayScene
+from optisense.optics.sampling import seed_of
+
+PASS_PHOTONS = 500_000
+PILOT_PHOTONS = 300_000
+CELL_SIZE = 0.25
+"""mm; larger where the tally would outgrow its memory."""
+RADIUS = 0.7
+"""mm of the smoothing kernel: what a light field of LEDs some mm away can bear (see benchmarks)."""
+MOST_BYTES = 300e6
+KEPT_FIELDS = 2
+LANDINGS = 3.0
+"""Room for so many landings a photon."""
+
+
+@dataclass
+class _Running:
+    tally: FieldTally
+    per_light: int
+
+
+class FieldStore:
+    """Traces photons pass by pass and keeps what it finds."""
+
+    def __init__(
+        self, scene: RayScene, opaque: list[Piece], table: EmitterTable, coloured: bool
+    ) -> None:
+        self._scene = scene
+        self._table = table
+        self._coloured = coloured
+        self._opaque = opaque
+        self._guide: Guide | None = None
+        self._cells: FieldCells | None = None
+        self._running: dict[tuple[int, int], _Running] = {}
+        self._done: dict[tuple[int, int, int], LightField] = {}
+
+    def forget_light(self, coloured: bool) -> None:
+        """Surfaces reflect otherwise now: drop the fields, keep guide and cells."""
+        self._coloured = coloured
+        self._running.clear()
+        self._done.clear()
+
+    @property
+    def guide(self) -> Guide:
+        """Where to send photons, learned on first use from a pilot pass."""
+        if self._guide is None:
+            even = even_guide(self._table.count)
+            pilot = trace_photons(
+                self._scene,
+                self._table,
+                even,
+                max(1, PILOT_PHOTONS // self._table.count),
+                seed_of(0, 1),
+                coloured=False,
+                landings=LANDINGS,
+            )
+            self._guide = learn_guide(pilot.cells, self._table.count)
+        return self._guide
+
+    @property
+    def cells(self) -> FieldCells:
+        """The cells over all opaque surfaces of the sensor."""
+        if self._cells is None:
+            vertices, faces, start = [], [], 0
+            for piece in self._opaque:
+                vertices.append(np.asarray(piece.vertices, dtype=np.float64))
+                faces.append(np.asarray(piece.faces, dtype=np.int64) + start)
+                start += len(piece.vertices)
+            points, triangles = np.concatenate(vertices), np.concatenate(faces)
+            a, b, c = (points[triangles[:, k]] for k in range(3))
+            area = np.linalg.norm(np.cross(b - a, c - a), axis=1).sum() / 2
+            entry = BINS * self._table.groups * 16 * (2 if self._coloured else 1)
+            size = max(CELL_SIZE, float(np.sqrt(1.3 * area * entry / MOST_BYTES)))
+            self._cells = build_cells(points, triangles, size, max(RADIUS, 2.5 * size))
+        return self._cells
+
+    def field(
+        self,
+        seed: int,
+        photons: int | None,
+        noise: float | None,
+        seconds: float | None,
+        most: int,
+        began: float,
+        tell: Callable[[float, int, float | None], None],
+    ) -> tuple[LightField, bool]:
+        """The field after ``photons``, or once ``noise`` (relative) or ``seconds`` (since ``began``) are reached.
+
+        Returns the field and whether Ctrl-C ended it early.
+        """
+        lights = self._table.count
+        size = PASS_PHOTONS if photons is None else min(PASS_PHOTONS, -(-photons // 2))
+        per_light = max(1, size // lights)
+        wanted = None if photons is None else max(2, round(photons / (per_light * lights)))
+        cap = max(2, most // (per_light * lights))
+        key = (seed, per_light)
+        if wanted is not None and noise is None and seconds is None:
+            done = self._done.get((*key, wanted))
+            if done is not None:
+                return done, False
+        running = self._running.get(key)
+        if running is None or (wanted is not None and running.tally.passes > wanted) or (
+            wanted is None and seconds is None
+        ):
+            running = _Running(
+                FieldTally(self.cells, self._table.groups, self._coloured), per_light
+            )
+            self._running = {key: running}
+        tally = running.tally
+        limit = cap if wanted is None else wanted
+        check, reached, interrupted = 2, None, False
+        try:
+            while tally.passes < limit:
+                started = time.perf_counter()
+                tally.add(
+                    trace_photons(
+                        self._scene,
+                        self._table,
+                        self.guide,
+                        per_light,
+                        seed_of(seed, 2),
+                        first=tally.passes * per_light,
+                        coloured=self._coloured,
+                        landings=LANDINGS,
+                    )
+                )
+                now = time.perf_counter()
+                fraction = tally.passes / limit if wanted is not None else 0.0
+                if noise is not None and tally.passes >= check:
+                    reached = tally.noise()
+                    if reached <= noise:
+                        break
+                    check = tally.passes * 2
+                if noise is not None and reached:
+                    fraction = max(fraction, min(0.95, (noise / reached) ** 2))
+                if seconds is not None:
+                    fraction = max(fraction, min(0.95, (now - began) / seconds))
+                    if tally.passes >= 2 and now - began + (now - started) > 0.8 * seconds:
+                        break
+                tell(0.95 * fraction, tally.photons, reached)
+        except KeyboardInterrupt:
+            if tally.passes < 1:
+                raise
+            interrupted = True
+        name = (*key, tally.passes)
+        if name not in self._done:
+            self._done[name] = tally.smoothed()
+            while len(self._done) > KEPT_FIELDS:
+                del self._done[next(iter(self._done))]
+        return self._done[name], interrupted

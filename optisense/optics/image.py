@@ -1,0 +1,89 @@
+"""A tactile image: what the sensor's camera sees, and what is true about it."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import mitsuba as mi
+import numpy as np
+from numpy.typing import NDArray
+
+from optisense.errors import OutputError
+from optisense.optics.response import auto_exposure, picture
+
+
+@dataclass
+class TactileImage:
+    """The result of a render; arrays are (h, w, ...), row 0 is the top.
+
+    layers: linear radiance (mW / (mm^2 sr)) of each light group with its colour and flux; they add up to the radiance.
+    normals: unit, of the coating as it is seen, in the design's frame, towards the camera's side; NaN where the
+    camera sees none. contact_mask: where an indenter is seen. depth: mm that the coating is pushed in along the
+    inward normal, 0 outside contacts. settings: what was asked and what was reached, ready for JSON.
+    """
+
+    layers: dict[str, NDArray[np.float32]]
+    normals: NDArray[np.float32]
+    contact_mask: NDArray[np.bool_]
+    points: NDArray[np.float32]
+    settings: dict[str, Any] = field(default_factory=dict)
+    interrupted: bool = False
+
+    @property
+    def radiance(self) -> NDArray[np.float32]:
+        """(h, w, 3) linear radiance, the sum of all layers."""
+        total: NDArray[np.float32] = np.sum(list(self.layers.values()), axis=0, dtype=np.float32)
+        return total
+
+    def picture(self, exposure: float | str = "auto") -> NDArray[np.uint8]:
+        """(h, w, 3) uint8: exposed, saturated and sRGB-encoded."""
+        return picture(self.radiance, exposure)
+
+    def save(self, folder: str | Path, exposure: float | str = "auto") -> None:
+        """Write image.png, radiance.exr, normals.npy, contact_mask.npy, layers/*.exr and run.json.
+
+        Each file is written under a temporary name and then renamed.
+
+        Raises:
+            OutputError: a file can't be written, for instance because the disk is full.
+        """
+        out = Path(folder)
+        self.settings["exposure"] = (
+            auto_exposure(self.radiance) if exposure == "auto" else float(exposure)
+        )
+        try:
+            (out / "layers").mkdir(parents=True, exist_ok=True)
+            _write(out / "image.png", lambda p: _bitmap(self.picture(exposure), p))
+            _write(out / "radiance.exr", lambda p: _bitmap(self.radiance, p))
+            for name, layer in self.layers.items():
+                _write(out / "layers" / f"{name}.exr", lambda p, v=layer: _bitmap(v, p))
+            _write(out / "normals.npy", lambda p: np.save(p, self.normals))
+            _write(out / "contact_mask.npy", lambda p: np.save(p, self.contact_mask))
+            text = json.dumps(self.settings, indent=2) + "\n"
+            _write(out / "run.json", lambda p: p.write_text(text, encoding="utf-8"))
+        except (OSError, RuntimeError) as error:
+            raise OutputError(
+                f"the results can't be written: {getattr(error, 'strerror', None) or error}",
+                where=str(out),
+                hint="Free space on this disk or choose another folder",
+            ) from error
+
+
+def _bitmap(values: NDArray[Any], path: Path) -> None:
+    mi.Bitmap(np.ascontiguousarray(values)).write(str(path))
+
+
+def _write(path: Path, writer: Callable[[Path], Any]) -> None:
+    temporary = path.with_name(f".{path.stem}.{os.getpid()}{path.suffix}")
+    try:
+        writer(temporary)
+        if temporary.stat().st_size == 0:
+            raise OSError(28, "no space left on the device")
+        temporary.replace(path)
+    finally:
+        temporary.unlink(missing_ok=True)

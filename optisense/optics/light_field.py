@@ -1,0 +1,302 @@
+"""The light that falls on the undeformed opaque surfaces, pooled into cells and directions.
+
+Light arriving at the sensing surface varies slowly from place to place; what varies within a tenth of a millimetre
+in a contact is the surface's tilt and what it hides. So photons are traced once a design, without contacts, and
+pooled where they land: each cell and bin of directions keeps the flux through a plane *across the light*
+(a photon's power over the cosine of its landing) and the mean direction. What a contact makes of it is
+``shading.py``'s part. The cost of an image then does not depend on the number of photons.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from optisense.optics.photons import GROUP_MASK, PhotonMap
+
+FloatArray = NDArray[np.floating]
+
+# An isolated photon that grazes the surface must not become a bright beam: cosines below are raised to this.
+LEAST_COSINE = 0.02
+# Equal-area bins of the sphere of directions, about the mean normal of the surfaces.
+BANDS = 16
+SECTORS = 16
+BINS = BANDS * SECTORS
+# Where a bin of no light is told from one of little.
+DARK = 1e-7
+
+
+@dataclass
+class FieldCells:
+    """Cells of a uniform 3-D grid that surfaces pass through, and a smoothing kernel among them.
+
+    ``index`` is the number + 1 of the cell at each grid place (0: none); ``axes`` (3, 3) the frame of the bins.
+    """
+
+    lower: mi.Point3f
+    inverse_size: mi.Float
+    counts: mi.Vector3u
+    index: mi.UInt32
+    cells: int
+    normals: mi.Float
+    centres: FloatArray
+    near_start: mi.UInt32
+    near_cell: mi.UInt32
+    near_weight: mi.Float
+    axes: FloatArray
+
+
+def surface_samples(
+    vertices: FloatArray, faces: NDArray[np.integer], spacing: float
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Points (n, 3) mm, normals (n, 3), areas (n,) mm^2 spread over a mesh, about one per spacing^2."""
+    a, b, c = (vertices[faces[:, k]] for k in range(3))
+    cross = np.cross(b - a, c - a)
+    area = np.linalg.norm(cross, axis=1) / 2
+    count = np.maximum(1, np.ceil(area / spacing**2)).astype(int)
+    owner = np.repeat(np.arange(len(faces)), count)
+    order = np.arange(len(owner)) - np.repeat(np.cumsum(count) - count, count)
+    # The R2 sequence (Roberts 2018), folded into the triangle by the square-root map.
+    u = np.mod(0.5 + 0.7548776662466927 * (order + 1), 1.0)
+    v = np.mod(0.5 + 0.5698402909980532 * (order + 1), 1.0)
+    root = np.sqrt(u)[:, None]
+    points = a[owner] * (1 - root) + (b[owner] * (1 - v)[:, None] + c[owner] * v[:, None]) * root
+    normals = cross / np.maximum(2 * area, 1e-30)[:, None]
+    return points, normals[owner], (area / count)[owner]
+
+
+def build_cells(
+    vertices: FloatArray, faces: NDArray[np.integer], size: float, radius: float
+) -> FieldCells:
+    """Cells of ``size`` mm over a mesh, smoothed by Epanechnikov's kernel of ``radius`` mm.
+
+    The kernel is normalised by the surface's area under it, so edges and oblique cells lose nothing.
+    """
+    vertices = np.asarray(vertices, dtype=np.float64)
+    points, normals, areas = surface_samples(vertices, faces, size / 8)
+    # Off any round number, so that a plane does not run along the border between two cells.
+    lower = points.min(axis=0) - 0.37 * size
+    counts = np.floor((points.max(axis=0) - lower) / size).astype(int) + 1
+    place = np.floor((points - lower) / size).astype(int)
+    flat = place[:, 0] + counts[0] * (place[:, 1] + counts[1] * place[:, 2])
+    used, owner = np.unique(flat, return_inverse=True)
+    cells = len(used)
+
+    def mean_of(values: FloatArray) -> FloatArray:
+        return np.stack([np.bincount(owner, areas * values[:, k], cells) for k in range(3)], 1)
+
+    area = np.bincount(owner, areas, cells)
+    centre = mean_of(points) / area[:, None]
+    normal = mean_of(normals)
+    normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-12)
+    index = np.zeros(int(np.prod(counts)), dtype=np.uint32)
+    index[used] = np.arange(cells) + 1
+
+    near = cKDTree(centre).sparse_distance_matrix(
+        cKDTree(centre), radius, output_type="coo_matrix"
+    ).tocsr()
+    near.setdiag(1e-9)
+    near.sort_indices()
+    rows = np.repeat(np.arange(cells), np.diff(near.indptr))
+    columns = near.indices
+    alike = np.einsum("ij,ij->i", normal[rows], normal[columns]) > 0.5
+    weight = np.maximum(1 - near.data**2 / radius**2, 0.0) * alike
+    weight /= np.bincount(rows, weight * area[columns], cells)[rows]
+
+    lower3, counts3 = mi.Point3f(*lower.tolist()), mi.Vector3u(*counts.tolist())
+    dr.make_opaque(lower3, counts3)
+    four = np.zeros((cells, 4), dtype=np.float32)
+    four[:, :3] = normal
+    return FieldCells(
+        lower=lower3,
+        inverse_size=dr.opaque(mi.Float, 1 / size),
+        counts=counts3,
+        index=mi.UInt32(index),
+        cells=cells,
+        normals=mi.Float(four.ravel()),
+        centres=centre,
+        near_start=mi.UInt32(near.indptr.astype(np.uint32)),
+        near_cell=mi.UInt32(columns.astype(np.uint32)),
+        near_weight=mi.Float(weight.astype(np.float32)),
+        axes=_frame(normal.sum(axis=0)),
+    )
+
+
+def _frame(z: FloatArray) -> FloatArray:
+    z = z / np.linalg.norm(z) if np.linalg.norm(z) > 1e-6 else np.array([0.0, 0.0, 1.0])
+    x = np.cross((1.0, 0.0, 0.0) if abs(z[0]) < 0.9 else (0.0, 1.0, 0.0), z)
+    x /= np.linalg.norm(x)
+    return np.stack([x, np.cross(z, x), z])
+
+
+def cell_at(cells: FieldCells, point: mi.Point3f, active: mi.Bool) -> tuple[mi.UInt32, mi.Bool]:
+    """Number of the cell that holds a point, and whether there is one."""
+    relative = (point - cells.lower) * cells.inverse_size
+    inside = mi.Bool(active)
+    for i in range(3):
+        inside &= (relative[i] >= 0) & (relative[i] < mi.Float(cells.counts[i]))
+    x, y, z = (mi.UInt32(dr.maximum(relative[i], 0)) for i in range(3))
+    found = dr.gather(mi.UInt32, cells.index, x + cells.counts.x * (y + cells.counts.y * z), inside)
+    return dr.maximum(found, 1) - 1, inside & (found > 0)
+
+
+def direction_bin(cells: FieldCells, direction: mi.Vector3f) -> mi.UInt32:
+    """Equal-area bin (of BINS on the sphere) of a unit direction."""
+    x, y, z = (dr.dot(direction, mi.Vector3f(*map(float, row))) for row in cells.axes)
+    band = dr.minimum(mi.UInt32(dr.maximum((z + 1) * (BANDS / 2), 0)), BANDS - 1)
+    turn = dr.atan2(y, x) * (1 / dr.two_pi)
+    turn -= dr.floor(turn)
+    return band * SECTORS + dr.minimum(mi.UInt32(turn * SECTORS), SECTORS - 1)
+
+
+def bin_centres(cells: FieldCells, bins: NDArray[np.integer]) -> mi.Float:
+    """Middle direction of bins, four floats each."""
+    z = (bins // SECTORS + 0.5) * (2 / BANDS) - 1
+    turn = (bins % SECTORS + 0.5) * (2 * np.pi / SECTORS)
+    flat = np.sqrt(1 - z * z)
+    local = np.stack([flat * np.cos(turn), flat * np.sin(turn), z], axis=1)
+    out = np.zeros((len(bins), 4), dtype=np.float32)
+    out[:, :3] = local @ cells.axes
+    return mi.Float(out.ravel())
+
+
+@dataclass
+class LightField:
+    """The smoothed field: per cell, bin and group four floats; lights of 1 mW.
+
+    ``moments``: flux density across the light (mW/mm^2) times the direction towards the light (3), flux density (1).
+    ``colours``: the flux density per channel R, G, B where surfaces are coloured, else the same array.
+    """
+
+    cells: FieldCells
+    bins: int
+    groups: int
+    moments: mi.Float
+    colours: mi.Float
+    coloured: bool
+    centres: mi.Float
+    photons: int
+    noise: float
+
+
+class FieldTally:
+    """Sums of landings per cell, direction bin and light group, over photon passes."""
+
+    def __init__(self, cells: FieldCells, groups: int, coloured: bool) -> None:
+        self.cells = cells
+        self.groups = groups
+        self.coloured = coloured
+        self.passes = 0
+        self.photons = 0
+        entries = cells.cells * BINS * groups * 4
+        self.moments = dr.zeros(mi.Float, entries)
+        self.colours = dr.zeros(mi.Float, entries if coloured else 4)
+        # The irradiance of odd and of even passes; their difference tells the noise.
+        self.halves = [dr.zeros(mi.Float, cells.cells * groups) for _ in range(2)]
+
+    def add(self, photons: PhotonMap) -> None:
+        """Add a photon pass. All passes must have the same number of photons."""
+        index = dr.arange(mi.UInt32, photons.count)
+        place = dr.gather(mi.Vector4f, photons.place, index)
+        travel = dr.gather(mi.Vector4f, photons.travel, index)
+        group = dr.reinterpret_array(mi.UInt32, place.w) & GROUP_MASK
+        cell, found = cell_at(self.cells, mi.Point3f(place.x, place.y, place.z), mi.Bool(True))
+        direction = mi.Vector3f(travel.x, travel.y, travel.z)
+        across = dr.rcp(dr.maximum(travel.w, LEAST_COSINE))
+        entry = (cell * BINS + direction_bin(self.cells, -direction)) * self.groups + group
+        if self.coloured:
+            power = dr.gather(mi.Vector4f, photons.power, index)
+            for k in range(3):
+                dr.scatter_add(self.colours, power[k] * across, entry * 4 + k, found)
+            scalar = (power.x + power.y + power.z) * (1 / 3)
+        else:
+            scalar = dr.gather(mi.Float, photons.power, index)
+        for k in range(3):
+            dr.scatter_add(self.moments, -direction[k] * (scalar * across), entry * 4 + k, found)
+        dr.scatter_add(self.moments, scalar * across, entry * 4 + 3, found)
+        dr.scatter_add(
+            self.halves[self.passes % 2], scalar, cell * self.groups + group, found
+        )
+        self.passes += 1
+        self.photons += photons.emitted
+        dr.eval(self.moments, self.colours, self.halves)
+
+    def noise(self) -> float:
+        """Relative RMS noise of the smoothed irradiance (1 = 100 %), from the difference of both halves.
+
+        Over all cells and groups, in relation to each group's mean; infinite before the second pass.
+        """
+        if self.passes < 2:
+            return float("inf")
+        one = dr.opaque(mi.UInt32, 1)
+        bins = dr.zeros(mi.UInt32, 1)
+        means = []
+        for k, half in enumerate(self.halves):
+            four = dr.zeros(mi.Float, dr.width(half) * 4)
+            dr.scatter(four, half, dr.arange(mi.UInt32, dr.width(half)) * 4)
+            count = (self.passes + 1 - k) // 2
+            smooth = _smooth(self.cells, four, bins, one, self.groups)
+            means.append(np.asarray(smooth).reshape(-1, self.groups, 4)[:, :, 0] / count)
+        mean = (means[0] + means[1]) / 2
+        # Half the difference of two halves has the deviation of their mean.
+        spread = ((means[0] - means[1]) / 2) ** 2
+        scale = mean.mean(axis=0)
+        lit = scale > 0
+        if not lit.any():
+            return 0.0
+        return float(np.sqrt((spread[:, lit] / scale[lit] ** 2).mean()))
+
+    def smoothed(self) -> LightField:
+        """The field so far; only bins that hold light are kept."""
+        total = dr.zeros(mi.Float, BINS)
+        lanes = dr.arange(mi.UInt32, self.cells.cells * BINS * self.groups)
+        value = dr.gather(mi.Float, self.moments, lanes * 4 + 3)
+        dr.scatter_add(total, value, (lanes // self.groups) % BINS)
+        power = np.asarray(total)
+        used = np.flatnonzero(power > DARK * power.sum())
+        if len(used) == 0:
+            used = np.zeros(1, dtype=np.int64)
+        bins = mi.UInt32(used.astype(np.uint32))
+        every = dr.opaque(mi.UInt32, BINS)
+        scale = dr.opaque(mi.Float, 1 / self.passes)
+        moments = _smooth(self.cells, self.moments, bins, every, self.groups) * scale
+        colours = moments
+        if self.coloured:
+            colours = _smooth(self.cells, self.colours, bins, every, self.groups) * scale
+        dr.eval(moments, colours)
+        return LightField(
+            cells=self.cells,
+            bins=len(used),
+            groups=self.groups,
+            moments=moments,
+            colours=colours,
+            coloured=self.coloured,
+            centres=bin_centres(self.cells, used),
+            photons=self.photons,
+            noise=self.noise(),
+        )
+
+
+@dr.syntax
+def _smooth(cells: FieldCells, values: mi.Float, bins: mi.UInt32, stride: mi.UInt32, groups: int):
+    """Kernel-weighted sums over neighbouring cells of the chosen bins, four floats an entry."""
+    used = dr.width(bins)
+    lane = dr.arange(mi.UInt32, cells.cells * used * groups)
+    group = lane % groups
+    rest = lane // groups
+    slot = dr.gather(mi.UInt32, bins, rest % used) * groups + group
+    cell = rest // used
+    j = dr.gather(mi.UInt32, cells.near_start, cell)
+    end = dr.gather(mi.UInt32, cells.near_start, cell + 1)
+    total = mi.Vector4f(0)
+    while j < end:
+        other = dr.gather(mi.UInt32, cells.near_cell, j)
+        weight = dr.gather(mi.Float, cells.near_weight, j)
+        total += weight * dr.gather(mi.Vector4f, values, other * (stride * groups) + slot)
+        j += 1
+    return dr.ravel(total)

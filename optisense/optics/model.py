@@ -1,0 +1,418 @@
+"""A sensor design made ready to render: scene, tables, guide and light field are kept between images."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from optisense.design import SensorDesign, set_value
+from optisense.errors import ContactError, RenderError
+from optisense.geometry import Contact, Indenter, SensingSurface, Sphere, TriangleMesh
+from optisense.geometry import nine_places, place
+from optisense.optics.assembly import (
+    assemble,
+    coating_surface,
+    index_before_sensing,
+    indenter_piece,
+)
+from optisense.optics.camera import RayCamera
+from optisense.optics.chief_rays import ChiefRays, Outcome, trace_chief_rays
+from optisense.optics.emitters import EmitterTable, emitter_table
+from optisense.optics.field_store import FieldStore
+from optisense.optics.guide import Guide
+from optisense.optics.image import TactileImage
+from optisense.optics.imaging import ImageLayers, render_field
+from optisense.optics.ray_scene import Piece, RayScene
+from optisense.optics.scattering import surface_table
+from optisense.optics.shading import ContactScenes
+from optisense.optics.sppm import render_sppm
+from optisense.optics.surfaces import Region, Surface, SurfaceKind
+from optisense.optics.versions import versions
+
+DEFAULT_PHOTONS = 4_000_000
+"""Photons of a light field where nothing else is asked."""
+
+MOST_PHOTONS = 512_000_000
+"""A noise target gives up here."""
+
+SPPM_PASS = 1_000_000
+
+
+@dataclass(frozen=True)
+class Progress:
+    """How far a render is: fraction 0..1, photons traced, relative noise (per cent) if known, seconds so far."""
+
+    fraction: float
+    photons: int
+    noise: float | None
+    seconds: float
+
+
+class OpticalModel:
+    """A sensor whose image can be rendered, again and again.
+
+    The scene of the sensor itself, the photon guide and the light field are made once; a contact adds only its own surface,
+    a light's flux or colour only scales its layer, a coating's specularity only rewrites its row of the surface table.
+    """
+
+    def __init__(self, design: SensorDesign, variant: str = "auto") -> None:
+        """Resolve media and build the scene.
+
+        Args:
+            design: the sensor; not changed, and later changes of it are not seen (see ``update``).
+            variant: "auto" (what was selected before, else CUDA where there is a GPU), "llvm" or "cuda".
+
+        Raises:
+            SetupError: the variant is not to be had on this machine.
+            DesignError, MeshError, LibraryError: the design can't be built.
+        """
+        from optisense.optics.variant import use_variant
+
+        self.variant = use_variant(variant)
+        self.design = design.copy()
+        self._assemble()
+
+    def _assemble(self) -> None:
+        parts = assemble(self.design)
+        self.groups = parts.groups
+        self.sensing = parts.sensing
+        self.gels = parts.gels
+        self._light_areas = parts.light_areas
+        self._emitters = parts.emitters
+        self._pieces: list[Piece] = parts.pieces
+        self._ior_before = index_before_sensing(self.design)
+        self._surfaces = [piece.surface for piece in parts.pieces]
+        self._surfaces.append(self._indenter_surface())
+        self._fields: FieldStore | None = None
+        self._refresh_surfaces()
+        self.scene = RayScene(self._pieces, table=self._table)
+        opaque = [i for i, s in enumerate(self._surfaces[:-1]) if s.kind is SurfaceKind.OPAQUE]
+        self._fixed = RayScene([self._pieces[i] for i in opaque], opaque, self._table)
+        self._emitter_table: EmitterTable = emitter_table(parts.emitters, len(parts.groups))
+        self._sensing_faces = _sensing_faces(self._pieces)
+
+    def _indenter_surface(self) -> Surface:
+        return coating_surface(self.design.coating, self._ior_before, Region.INDENTER)
+
+    def _refresh_surfaces(self) -> None:
+        self._table = surface_table(self._surfaces)
+        self._coloured = any(_is_coloured(surface) for surface in self._surfaces)
+
+    def update(self, path: str, value: Any) -> None:
+        """Change one value of the design by its dotted path, redoing only what depends on it.
+
+        Raises:
+            DesignError: there is no such value, or it does not fit.
+        """
+        changed = set_value(self.design, path, value)
+        section = path.split(".")[0]
+        leaf = path.rsplit(".", 1)[-1]
+        self.design = changed
+        if section in ("name", "description", "provenance"):
+            return
+        if section == "lights" and leaf.split("[")[0] in ("flux", "colour", "r", "g", "b"):
+            return
+        if section == "camera":
+            self.__dict__.pop("surface", None)
+            return
+        if section == "coating":
+            coat = coating_surface(changed.coating, self._ior_before, Region.SENSING)
+            self._surfaces = [
+                coat if surface.region is Region.SENSING else surface
+                for surface in self._surfaces[:-1]
+            ] + [self._indenter_surface()]
+            self._refresh_surfaces()
+            self.scene.table = self._fixed.table = self._table
+            if self._fields is not None:
+                self._fields.forget_light(self._coloured)
+            return
+        self.__dict__.pop("surface", None)
+        self._assemble()
+
+    def camera(self, resolution: tuple[int, int] | None = None) -> RayCamera:
+        """The design's camera, at another resolution (width, height) if asked."""
+        camera = self.design.camera
+        width, height = camera.resolution if resolution is None else resolution
+        if width < 1 or height < 1:
+            raise RenderError(f"the resolution is {width}x{height}", hint="give e.g. 320x240")
+        return RayCamera(
+            position=camera.position,
+            direction=camera.direction,
+            up=camera.up,
+            fov=camera.fov,
+            width=int(width),
+            height=int(height),
+            equidistant=camera.projection == "equidistant",
+        )
+
+    @cached_property
+    def surface(self) -> SensingSurface:
+        """The sensing surface with coordinates in mm: (0, 0) where the camera's axis meets it (or nearest),
+        u towards the right and v towards the top of the image."""
+        axes = self.design.camera.axes()
+        rays = trace_chief_rays(self.scene, self.camera((3, 3)), self._sensing_faces)
+        if rays.hit[1, 1]:
+            origin = rays.points[1, 1].astype(float)
+        else:
+            fine = self.chief_rays((64, 48))
+            if not fine.hit.any():
+                raise _sees_nothing(fine)
+            origin = np.median(fine.points[fine.hit].astype(float), axis=0)
+        return SensingSurface(self.sensing, origin, axes[0], axes[1])
+
+    def chief_rays(
+        self, resolution: tuple[int, int] | None = None, contacts: Sequence[Contact] = ()
+    ) -> ChiefRays:
+        """Where each pixel looks, by ideal refraction and reflection; (h, w, ...) arrays."""
+        scene = self.scene if not contacts else self._scenes(contacts).full
+        return trace_chief_rays(scene, self.camera(resolution), self._sensing_faces)
+
+    def nine_contacts(
+        self, indenter: Indenter | None = None, depth: float = 0.8
+    ) -> list[Contact]:
+        """One contact at each of nine places that cover the visible sensing surface evenly.
+
+        The default indenter is the OptiSense paper's ball of radius 1.5 mm.
+        """
+        rays = self.chief_rays((96, 72))
+        if rays.hit.sum() < 9:
+            raise _sees_nothing(rays)
+        points = rays.points[rays.hit].astype(np.float64)
+        # Each pixel stands for the area that its solid angle cuts out of the surface.
+        weights = _pixel_areas(rays)[rays.hit]
+        chosen = nine_places(points, weights)
+        ball = indenter if indenter is not None else Sphere(radius=1.5)
+        return [
+            Contact(ball, point=(float(p[0]), float(p[1]), float(p[2])), depth=depth)
+            for p in points[chosen]
+        ]
+
+    def _place(self, contact: Contact) -> TriangleMesh:
+        errors = []
+        for gel in self.gels or [None]:
+            try:
+                return place(contact, self.surface, gel)
+            except ContactError as error:
+                errors.append(error)
+        raise errors[0]
+
+    def _scenes(self, contacts: Sequence[Contact]) -> ContactScenes:
+        number = len(self._surfaces) - 1
+        if not contacts:
+            return ContactScenes(self.scene, self._fixed, None, number)
+        coat = self._surfaces[number]
+        pieces = [indenter_piece(self._place(contact), coat) for contact in contacts]
+        numbers = [*range(number), *[number] * len(pieces)]
+        return ContactScenes(
+            RayScene([*self._pieces, *pieces], numbers, self._table),
+            self._fixed,
+            RayScene(pieces, [number] * len(pieces), self._table),
+            number,
+        )
+
+    @property
+    def _store(self) -> FieldStore:
+        if self._fields is None:
+            opaque = [p for p in self._pieces if p.surface.kind is SurfaceKind.OPAQUE]
+            self._fields = FieldStore(self.scene, opaque, self._emitter_table, self._coloured)
+        return self._fields
+
+    def guide(self) -> Guide:
+        """The photon guide, learned from a pilot pass on first use."""
+        return self._store.guide
+
+    def render(
+        self,
+        contacts: Sequence[Contact] = (),
+        resolution: tuple[int, int] | None = None,
+        photons: int | None = None,
+        noise: float | None = None,
+        seconds: float | None = None,
+        seed: int = 0,
+        progress: Callable[[Progress], None] | None = None,
+        estimator: str = "field",
+    ) -> TactileImage:
+        """What the camera sees while ``contacts`` press in.
+
+        Args:
+            contacts: indenters, places and depths; none for the untouched sensor.
+            resolution: (width, height) pixels; the camera's own by default.
+            photons: to trace in all; DEFAULT_PHOTONS if no other limit is given.
+            noise: per cent; trace until the relative RMS noise of the light on the sensing surface is this small.
+            seconds: stop tracing in time to be ready then.
+            seed: the same seed and settings give the same image.
+            progress: called now and then.
+            estimator: "field" (pooled light field, fast) or "sppm" (progressive photon mapping, for checking).
+
+        Returns:
+            The image; ``interrupted`` is set if Ctrl-C ended the tracing early.
+
+        Raises:
+            ContactError: a contact is off the surface or deeper than the gel.
+            RenderError: the camera sees nothing of the sensing surface, or a setting makes no sense.
+        """
+        if estimator not in ("field", "sppm"):
+            raise RenderError(f"there is no estimator '{estimator}'", hint="use field or sppm")
+        for name, value in (("photons", photons), ("noise", noise), ("seconds", seconds)):
+            if value is not None and not value > 0:
+                raise RenderError(f"{name} is {value}", hint="give a number above 0")
+        began = time.perf_counter()
+        camera = self.camera(resolution)
+        scenes = self._scenes(contacts)
+        built = time.perf_counter()
+
+        def tell(fraction: float, traced: int, reached: float | None) -> None:
+            if progress is not None:
+                shown = None if reached is None or not np.isfinite(reached) else 100 * reached
+                progress(Progress(fraction, traced, shown, time.perf_counter() - began))
+
+        if estimator == "sppm":
+            layers = self._render_sppm(scenes, camera, photons, seconds, seed, began, tell)
+        else:
+            target = None if noise is None else noise / 100
+            wanted = photons
+            if photons is None and noise is None and seconds is None:
+                wanted = DEFAULT_PHOTONS
+            field = self._store.field(seed, wanted, target, seconds, MOST_PHOTONS, began, tell)
+            lit = time.perf_counter()
+            layers = render_field(
+                field, scenes, camera, self._emitters, self._light_areas, seed
+            )
+            layers.light_seconds = lit - built
+        if not layers.sees_sensing:
+            raise _sees_nothing(self.chief_rays((64, 48)))
+        ended = time.perf_counter()
+        tell(1.0, layers.photons, layers.noise)
+        image = TactileImage(
+            layers=self._coloured_layers(layers),
+            normals=layers.normals,
+            contact_mask=layers.contact_mask,
+            points=layers.points,
+            interrupted=layers.interrupted,
+        )
+        image.settings = {
+            "design": self.design.name,
+            "seed": seed,
+            "resolution": [camera.width, camera.height],
+            "estimator": estimator,
+            "photons": layers.photons,
+            "photons_asked": photons,
+            "noise_asked_percent": noise,
+            "seconds_asked": seconds,
+            "noise_reached_percent": _percent(layers.noise),
+            "samples_per_pixel": layers.samples,
+            "interrupted": layers.interrupted,
+            "contacts": [repr(contact) for contact in contacts],
+            "seconds": {
+                "scene": round(built - began, 4),
+                "light": round(layers.light_seconds, 4),
+                "image": round(layers.image_seconds, 4),
+                "total": round(ended - began, 4),
+            },
+            "versions": versions(self.variant),
+        }
+        return image
+
+    def _render_sppm(
+        self,
+        scenes: ContactScenes,
+        camera: RayCamera,
+        photons: int | None,
+        seconds: float | None,
+        seed: int,
+        began: float,
+        tell: Callable[[float, int, float | None], None],
+    ) -> ImageLayers:
+        per_light = max(1, SPPM_PASS // self._emitter_table.count)
+        emitted = per_light * self._emitter_table.count
+        passes = max(1, -(-(photons or 16 * DEFAULT_PHOTONS) // emitted))
+
+        def stop(done: int) -> bool:
+            tell(done / passes, done * emitted, None)
+            return seconds is not None and time.perf_counter() - began > seconds
+
+        result = render_sppm(
+            scenes.full,
+            self._emitter_table,
+            self.guide(),
+            camera,
+            passes,
+            per_light,
+            seed,
+            coloured=self._coloured,
+            stop=stop,
+        )
+        return ImageLayers.from_sppm(result, self.chief_rays_of(scenes, camera), began)
+
+    def chief_rays_of(self, scenes: ContactScenes, camera: RayCamera) -> ChiefRays:
+        """Chief rays in a scene with contacts."""
+        return trace_chief_rays(scenes.full, camera, self._sensing_faces)
+
+    def _coloured_layers(self, layers: ImageLayers) -> dict[str, Any]:
+        out = {}
+        for number, name in enumerate(self.groups):
+            flux = self.design.lights[name].channel_flux().astype(np.float32)
+            out[name] = layers.radiance[number] * flux
+        return out
+
+
+def _percent(noise: float) -> float | None:
+    return round(100 * noise, 4) if np.isfinite(noise) else None
+
+
+def _is_coloured(surface: Surface) -> bool:
+    metal = surface.specularity > 0 or surface.kind is SurfaceKind.MIRROR
+    values = [surface.reflectance]
+    if metal:
+        values += [surface.metal_eta, surface.metal_k]
+    if surface.kind not in (SurfaceKind.OPAQUE, SurfaceKind.MIRROR):
+        return False
+    return any(max(v) - min(v) > 1e-6 for v in values)
+
+
+def _sensing_faces(pieces: list[Piece]) -> np.ndarray:
+    out, start = [], 0
+    for piece in pieces:
+        count = len(piece.faces)
+        if piece.surface.region is Region.SENSING:
+            out.append(np.arange(start, start + count))
+            start += count
+        else:
+            out.append(np.full(count, -1, dtype=np.int64))
+    # Indenters come after all pieces; a hit on one has no face of the sensing surface.
+    return np.concatenate([*out, np.full(10_000_000, -1, dtype=np.int64)[:0]])
+
+
+def _pixel_areas(rays: ChiefRays) -> np.ndarray:
+    """(h, w) mm^2 of surface behind each pixel, from its neighbours' points; 0 where these do not hit."""
+    p = rays.points.astype(np.float64)
+    along_x = np.zeros_like(p)
+    along_y = np.zeros_like(p)
+    along_x[:, 1:-1] = (p[:, 2:] - p[:, :-2]) / 2
+    along_x[:, 0], along_x[:, -1] = p[:, 1] - p[:, 0], p[:, -1] - p[:, -2]
+    along_y[1:-1] = (p[2:] - p[:-2]) / 2
+    along_y[0], along_y[-1] = p[1] - p[0], p[-1] - p[-2]
+    area = np.linalg.norm(np.cross(along_x, along_y), axis=2)
+    hit = rays.hit
+    whole = hit.copy()
+    whole[:, 1:] &= hit[:, :-1]
+    whole[:, :-1] &= hit[:, 1:]
+    whole[1:] &= hit[:-1]
+    whole[:-1] &= hit[1:]
+    return np.where(whole, area, 0.0)
+
+
+def _sees_nothing(rays: ChiefRays) -> RenderError:
+    names = {outcome: outcome.name.lower().replace("_", " ") for outcome in Outcome}
+    counts = {names[o]: int((rays.outcome == o).sum()) for o in Outcome}
+    met = ", ".join(f"{name}: {count}" for name, count in counts.items() if count)
+    return RenderError(
+        "the camera sees nothing of the sensing surface",
+        where=f"of {rays.outcome.size} rays, {met}",
+        hint="Check the camera's position, direction and field of view, and what is in its way",
+    )

@@ -1,0 +1,180 @@
+"""The geometry of a sensor as one ray-traced mesh with a table of faces and a table of surfaces.
+
+All surfaces (interfaces between media, coating, mirrors, blockers, lights, indenters) are merged into a
+single Mitsuba mesh. A hit's triangle number then leads straight to its normal and its optical data by
+two gathers: no virtual function calls in the inner loops, and replacing an indenter never
+changes a compiled kernel.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+from numpy.typing import NDArray
+
+from optisense.optics.scattering import SMOOTH_ALPHA, surface_table
+from optisense.optics.surfaces import RAY_OFFSET, Surface, SurfaceKind
+
+FloatArray = NDArray[np.floating]
+
+SMOOTH_FACE = 1 << 16
+
+
+@dataclass(frozen=True)
+class Piece:
+    """A triangle mesh with one surface.
+
+    vertices (n, 3) mm, faces (m, 3), corner normals (n, 3) or None for flat facets. Face normals point to the
+    outside of a dielectric.
+    """
+
+    name: str
+    vertices: FloatArray
+    faces: NDArray[np.integer]
+    surface: Surface
+    normals: FloatArray | None = None
+
+
+@dataclass
+class Hit:
+    """Where rays met a surface. ``normal`` is the face normal, ``shading_normal`` the smooth one."""
+
+    valid: mi.Bool
+    distance: mi.Float
+    point: mi.Point3f
+    normal: mi.Vector3f
+    shading_normal: mi.Vector3f
+    surface: mi.UInt32
+    face: mi.UInt32
+
+
+class RayScene:
+    """A merged mesh for ray tracing, with its tables on the device.
+
+    ``rows`` holds four floats a face: the normal, and surface number (with ``SMOOTH_FACE`` set where the
+    shading normal varies) as bits; ``corners`` twelve floats a face: three corner normals, padded to four.
+    """
+
+    def __init__(
+        self,
+        pieces: list[Piece],
+        numbers: list[int] | None = None,
+        table: mi.Float | None = None,
+    ) -> None:
+        """Build the mesh and its acceleration structure.
+
+        Several scenes of one sensor share a ``table`` (see ``surface_table``); ``numbers`` then says which of
+        its surfaces each piece has. By default a scene numbers its own.
+        """
+        surfaces = [piece.surface for piece in pieces]
+        numbers = list(range(len(pieces))) if numbers is None else numbers
+        vertices, faces, rows, corners = _merge(pieces, numbers)
+        self.bounds = vertices.min(axis=0), vertices.max(axis=0)
+        self.vertices = vertices
+        self.faces = faces
+        mesh = mi.Mesh("sensor", len(vertices), len(faces))
+        params = mi.traverse(mesh)
+        params["vertex_positions"] = mi.Float(vertices.ravel())
+        params["faces"] = mi.UInt32(faces.ravel())
+        params.update()
+        self.scene = mi.load_dict({"type": "scene", "sensor": mesh})
+        self.rows = mi.Float(rows.ravel())
+        self.corners = mi.Float(corners.ravel())
+        self.table = surface_table(surfaces) if table is None else table
+        self.rough = any(
+            s.kind is SurfaceKind.DIELECTRIC and s.alpha > SMOOTH_ALPHA for s in surfaces
+        )
+
+    def intersect(
+        self, origin: mi.Point3f, direction: mi.Vector3f, active: mi.Bool, coherent: bool = False
+    ) -> Hit:
+        """First hit along rays (unit directions), with normals."""
+        return intersect(self.scene, self.rows, self.corners, origin, direction, active, coherent)
+
+    def occluded(
+        self, origin: mi.Point3f, direction: mi.Vector3f, length: mi.Float, active: mi.Bool
+    ) -> mi.Bool:
+        """Whether anything lies within ``length`` mm along rays."""
+        return self.scene.ray_test(mi.Ray3f(origin, direction, length, 0.0, []), False, active)
+
+
+def intersect(
+    scene: mi.Scene,
+    rows: mi.Float,
+    corners: mi.Float,
+    origin: mi.Point3f,
+    direction: mi.Vector3f,
+    active: mi.Bool,
+    coherent: bool = False,
+) -> Hit:
+    """First hit of rays with a scene; free function, so that symbolic loops may call it."""
+    found = scene.ray_intersect_preliminary(
+        mi.Ray3f(origin, direction), coherent=coherent, active=active
+    )
+    valid = active & found.is_valid()
+    face = found.prim_index
+    row = dr.gather(mi.Vector4f, rows, face, valid)
+    normal = mi.Vector3f(row.x, row.y, row.z)
+    bits = dr.reinterpret_array(mi.UInt32, row.w)
+    smooth = valid & ((bits & SMOOTH_FACE) != 0)
+    u, v = found.prim_uv.x, found.prim_uv.y
+    n0 = dr.gather(mi.Vector4f, corners, face * 3, smooth)
+    n1 = dr.gather(mi.Vector4f, corners, face * 3 + 1, smooth)
+    n2 = dr.gather(mi.Vector4f, corners, face * 3 + 2, smooth)
+    blended = n0 * (1 - u - v) + n1 * u + n2 * v
+    shading = dr.select(
+        smooth, dr.normalize(mi.Vector3f(blended.x, blended.y, blended.z)), normal
+    )
+    return Hit(
+        valid=valid,
+        distance=found.t,
+        point=origin + direction * found.t,
+        normal=normal,
+        shading_normal=shading,
+        surface=bits & (SMOOTH_FACE - 1),
+        face=face,
+    )
+
+
+def leave(point: mi.Point3f, normal: mi.Vector3f, direction: mi.Vector3f) -> mi.Point3f:
+    """Start of a ray from a surface: moved off it to the side that ``direction`` points to."""
+    return point + normal * dr.select(dr.dot(direction, normal) > 0, RAY_OFFSET, -RAY_OFFSET)
+
+
+def _merge(
+    pieces: list[Piece], numbers: list[int]
+) -> tuple[FloatArray, NDArray[np.uint32], NDArray[np.float32], NDArray[np.float32]]:
+    vertices, faces, rows, corners = [], [], [], []
+    start = 0
+    for number, piece in zip(numbers, pieces, strict=True):
+        points = np.asarray(piece.vertices, dtype=np.float64)
+        triangles = np.asarray(piece.faces, dtype=np.int64)
+        a, b, c = (points[triangles[:, i]] for i in range(3))
+        cross = np.cross(b - a, c - a)
+        length = np.linalg.norm(cross, axis=1)
+        keep = length > 0
+        triangles, normal = triangles[keep], cross[keep] / length[keep, None]
+        row = np.zeros((len(triangles), 4), dtype=np.float32)
+        row[:, :3] = normal
+        corner = np.zeros((len(triangles), 3, 4), dtype=np.float32)
+        bits = number
+        if piece.normals is not None:
+            bits |= SMOOTH_FACE
+            corner[:, :, :3] = np.asarray(piece.normals)[triangles]
+            against = np.einsum("fck,fk->fc", corner[:, :, :3], normal) < 0
+            corner[against] *= -1
+        row[:, 3] = np.array([bits], dtype=np.uint32).view(np.float32)
+        vertices.append(points)
+        faces.append(triangles + start)
+        rows.append(row)
+        corners.append(corner)
+        start += len(points)
+    return (
+        np.concatenate(vertices).astype(np.float32),
+        np.concatenate(faces).astype(np.uint32),
+        np.concatenate(rows),
+        np.concatenate(corners),
+    )

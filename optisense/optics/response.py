@@ -1,0 +1,77 @@
+"""The camera's response: from linear radiance to the picture that a camera would store.
+
+Exposure, then saturation as in the OptiSense paper (section "Camera"): where a channel is overexposed, a mask of the
+excess is blurred and spread over all three channels, which gives the whitish spots around bright lights. The paper
+gives no constants: the knee is the sensor's full well (1), the blur of 6 pixels at a width of 640 is an assumption.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import gaussian_filter
+
+from optisense.errors import RenderError
+
+KNEE = 1.0
+BLUR_OF_WIDTH = 6.0 / 640.0
+TARGET = 0.55
+"""Automatic exposure puts the 95th percentile of the brightest channel here (of 1), before gamma."""
+MOST_EXCESS = 4.0
+
+FloatArray = NDArray[np.floating]
+
+
+def auto_exposure(radiance: FloatArray) -> float:
+    """The factor that makes a good picture of a radiance image (h, w, 3)."""
+    brightest = np.asarray(radiance).max(axis=2)
+    seen = brightest[brightest > 0]
+    level = float(np.percentile(seen, 95)) if seen.size else 0.0
+    return TARGET / level if level > 0 else 1.0
+
+
+def saturate(exposed: FloatArray) -> NDArray[np.float32]:
+    """Spread overexposure over the channels and clip; (h, w, 3) linear, 1 is full well."""
+    exposed = np.asarray(exposed, dtype=np.float32)
+    excess = np.clip(exposed - KNEE, 0.0, MOST_EXCESS).max(axis=2)
+    if excess.any():
+        mask = np.clip(gaussian_filter(excess, BLUR_OF_WIDTH * exposed.shape[1]), 0.0, 1.0)
+        exposed = exposed + mask[:, :, None] * (KNEE - np.minimum(exposed, KNEE))
+    return np.clip(exposed, 0.0, 1.0).astype(np.float32)
+
+
+def add_noise(
+    exposed: FloatArray, full_well: float, seed: int, read_noise: float = 0.0
+) -> NDArray[np.float32]:
+    """Shot noise of a sensor that holds ``full_well`` electrons at level 1, and read noise in electrons RMS."""
+    rng = np.random.default_rng(seed)
+    electrons = rng.poisson(np.maximum(np.asarray(exposed, dtype=float), 0) * full_well)
+    noisy = electrons + rng.normal(0.0, read_noise, electrons.shape)
+    return (noisy / full_well).astype(np.float32)
+
+
+def encode(linear: FloatArray) -> NDArray[np.uint8]:
+    """sRGB transfer curve (IEC 61966-2-1) and 8 bits; linear in 0..1."""
+    linear = np.clip(np.asarray(linear, dtype=float), 0.0, 1.0)
+    curve = np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
+    return np.round(255 * curve).astype(np.uint8)
+
+
+def picture(radiance: FloatArray, exposure: float | str = "auto") -> NDArray[np.uint8]:
+    """An 8-bit picture (h, w, 3) of a radiance image.
+
+    Raises:
+        RenderError: the exposure is neither "auto" nor a number above 0.
+    """
+    if exposure == "auto":
+        factor = auto_exposure(radiance)
+    else:
+        try:
+            factor = float(exposure)
+        except ValueError:
+            factor = -1.0
+        if not (np.isfinite(factor) and factor > 0):
+            raise RenderError(
+                f"the exposure is {exposure!r}", hint='give "auto" or a factor above 0'
+            )
+    return encode(saturate(np.asarray(radiance) * factor))
