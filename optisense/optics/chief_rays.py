@@ -104,7 +104,8 @@ def _trace(
 def trace_chief_rays(scene: RayScene, camera: RayCamera, sensing_faces: NDArray[np.int64]) -> ChiefRays:
     """Follow the ray through the middle of every pixel.
 
-    ``sensing_faces`` maps the scene's triangles to those of the sensing surface (-1: another).
+    ``sensing_faces`` maps the scene's triangles to those of the sensing surface (-1, as for any
+    triangles that follow: another).
     """
     shape = camera.height, camera.width
     index = dr.arange(mi.UInt32, camera.width * camera.height)
@@ -132,6 +133,8 @@ def trace_chief_rays(scene: RayScene, camera: RayCamera, sensing_faces: NDArray[
         directions=image(arriving),
         incidence=np.asarray(incidence, dtype=np.float32).reshape(shape),
         outcome=np.asarray(outcome).astype(np.uint8).reshape(shape),
-        face=sensing_faces[np.asarray(face)].reshape(shape),
+        face=np.append(sensing_faces, -1)[
+            np.minimum(np.asarray(face), len(sensing_faces))
+        ].reshape(shape),
         region=np.asarray(region).astype(np.uint8).reshape(shape),
     )

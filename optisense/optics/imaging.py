@@ -16,7 +16,6 @@ from optisense.optics.chief_rays import ChiefRays
 from optisense.optics.emitters import Emitter
 from optisense.optics.light_field import LightField
 from optisense.optics.sampling import seed_of
-from optisense.optics.scattering import surface_region
 from optisense.optics.shading import ContactScenes, shade
 from optisense.optics.sppm import SppmResult
 from optisense.optics.surfaces import Region
@@ -36,7 +35,6 @@ class ImageLayers:
     normals: NDArray[np.float32]
     points: NDArray[np.float32]
     contact_mask: NDArray[np.bool_]
-    sees_sensing: bool
     photons: int
     noise: float
     samples: list[int]
@@ -53,10 +51,9 @@ class ImageLayers:
         noise = float(np.sqrt((difference**2).mean()) / 2 / mean) if mean > 0 else 0.0
         return cls(
             radiance=result.layers,
-            normals=np.where(hit[..., None], rays.normals, np.nan).astype(np.float32),
-            points=np.where(hit[..., None], rays.points, np.nan).astype(np.float32),
+            normals=masked(rays.normals, hit),
+            points=masked(rays.points, hit),
             contact_mask=hit & (rays.region == Region.INDENTER),
-            sees_sensing=bool(hit.any()),
             photons=result.photons,
             noise=noise if result.passes > 1 else float("inf"),
             samples=[result.passes, result.passes],
@@ -64,6 +61,11 @@ class ImageLayers:
             light_seconds=0.0,
             image_seconds=time.perf_counter() - began,
         )
+
+
+def masked(values: NDArray[np.float32], where: NDArray[np.bool_]) -> NDArray[np.float32]:
+    """Values (h, w, 3) with NaN outside a mask."""
+    return np.where(where[..., None], values, np.nan).astype(np.float32)
 
 
 class _Film:
@@ -75,12 +77,6 @@ class _Film:
 
     def count(self, pixel: mi.UInt32) -> None:
         dr.scatter_add(self.counts, mi.Float(1), pixel)
-
-    def keep(self, kept: mi.Float) -> None:
-        """Forget the samples of pixels where ``kept`` is 0."""
-        self.sums = [total * dr.repeat(kept, 3) for total in self.sums]
-        self.counts = self.counts * kept
-        dr.eval(self.sums, self.counts)
 
     def add(self, points: VisiblePoints, radiance: list[mi.Color3f]) -> None:
         for total, value in zip(self.sums, radiance, strict=True):
@@ -115,6 +111,7 @@ def render_field(
     light: tuple[LightField, bool],
     scenes: ContactScenes,
     camera: RayCamera,
+    rays: ChiefRays,
     emitters: list[Emitter],
     areas: list[float],
     seed: int,
@@ -125,47 +122,35 @@ def render_field(
     width, height = camera.width, camera.height
     film = _Film(width * height, field.groups)
 
-    def sample(pixel: mi.UInt32, number: mi.UInt32, stream: int) -> VisiblePoints:
+    def sample(pixel: mi.UInt32, number: mi.UInt32, thorough: bool) -> None:
         spots = film_samples(pixel, width, number, seed_of(seed, 3))
-        own = seed_of(seed, 4, stream)
+        own = seed_of(seed, 4, int(thorough))
         main, reflected = find_visible_points(scenes.full, camera, pixel, spots, own)
         film.count(pixel)
-        for points, exchange in ((main, stream > 0), (reflected, False)):
+        for points, close in ((main, thorough), (reflected, False)):
             if points is not None:
-                film.add(points, shade(field, scenes, points, own, exchange))
+                film.add(points, shade(field, scenes, points, own, close))
                 film.add_light(points, emitters, areas)
-        return main
 
-    every = dr.arange(mi.UInt32, width * height)
-    first = sample(every, dr.zeros(mi.UInt32, width * height), 0)
-    region = surface_region(scenes.full.table, first.surface, first.valid)
-    region_image = np.where(np.asarray(first.valid), np.asarray(region), 0).reshape(height, width)
+    region_image = np.where(rays.hit, rays.region, 0)
     mask = region_image == Region.INDENTER
+    near = np.zeros_like(mask)
     samples = [1, 1]
     if mask.any():
-        reach = max(1, round(REFINED * width))
-        near = np.flatnonzero(maximum_filter(mask, 2 * reach + 1)).astype(np.uint32)
-        more = CONTACT_SAMPLES
-        pixel = mi.UInt32(np.tile(near, more))
-        number = mi.UInt32(np.repeat(np.arange(1, more + 1, dtype=np.uint32), len(near)))
-        # The first sample of these pixels knows nothing of exchanged light: it is replaced.
-        kept = mi.Float(np.asarray(~maximum_filter(mask, 2 * reach + 1), dtype=np.float32).ravel())
-        film.keep(kept)
-        sample(pixel, number, 1)
-        samples = [1, more]
-    found = region_image != Region.OTHER
-
-    def truth(values: mi.Vector3f) -> NDArray[np.float32]:
-        picture = np.asarray(values, dtype=np.float32).T.reshape(height, width, 3)
-        return np.where(found[..., None], picture, np.nan).astype(np.float32)
-
+        near = maximum_filter(mask, 2 * max(1, round(REFINED * width)) + 1)
+        pixel = np.flatnonzero(near).astype(np.uint32)
+        number = np.repeat(np.arange(1, CONTACT_SAMPLES + 1, dtype=np.uint32), len(pixel))
+        sample(mi.UInt32(np.tile(pixel, CONTACT_SAMPLES)), mi.UInt32(number), True)
+        samples = [1, CONTACT_SAMPLES]
+    far = mi.UInt32(np.flatnonzero(~near).astype(np.uint32))
+    if dr.width(far):
+        sample(far, dr.zeros(mi.UInt32, dr.width(far)), False)
     layers = film.layers(width, height)
     return ImageLayers(
         radiance=layers,
-        normals=truth(first.normal),
-        points=truth(first.point),
+        normals=masked(rays.normals, rays.hit),
+        points=masked(rays.points, rays.hit),
         contact_mask=mask,
-        sees_sensing=bool(found.any()),
         photons=field.photons,
         noise=field.noise,
         samples=samples,

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
+import mitsuba as mi
 import numpy as np
 
 from optisense.design import SensorDesign, set_value
@@ -204,15 +205,17 @@ class OpticalModel:
     def _scenes(self, contacts: Sequence[Contact]) -> ContactScenes:
         number = len(self._surfaces) - 1
         if not contacts:
-            return ContactScenes(self.scene, self._fixed, None, number)
+            return ContactScenes(self.scene, self._fixed, None, number, mi.Float())
         coat = self._surfaces[number]
-        pieces = [indenter_piece(self._place(contact), coat) for contact in contacts]
+        placed = [self._place(contact) for contact in contacts]
+        pieces = [indenter_piece(mesh, coat) for mesh in placed]
         numbers = [*range(number), *[number] * len(pieces)]
         return ContactScenes(
             RayScene([*self._pieces, *pieces], numbers, self._table),
             self._fixed,
             RayScene(pieces, [number] * len(pieces), self._table),
             number,
+            mi.Float(np.concatenate([_ball(mesh) for mesh in placed]).astype(np.float32)),
         )
 
     @property
@@ -264,6 +267,9 @@ class OpticalModel:
         began = time.perf_counter()
         camera = self.camera(resolution)
         scenes = self._scenes(contacts)
+        rays = trace_chief_rays(scenes.full, camera, self._sensing_faces)
+        if not rays.hit.any():
+            raise _sees_nothing(rays)
         built = time.perf_counter()
 
         def tell(fraction: float, traced: int, reached: float | None) -> None:
@@ -272,7 +278,7 @@ class OpticalModel:
                 progress(Progress(fraction, traced, shown, time.perf_counter() - began))
 
         if estimator == "sppm":
-            layers = self._render_sppm(scenes, camera, photons, seconds, seed, began, tell)
+            layers = self._render_sppm(scenes, camera, rays, photons, seconds, seed, began, tell)
         else:
             target = None if noise is None else noise / 100
             wanted = photons
@@ -281,11 +287,9 @@ class OpticalModel:
             field = self._store.field(seed, wanted, target, seconds, MOST_PHOTONS, began, tell)
             lit = time.perf_counter()
             layers = render_field(
-                field, scenes, camera, self._emitters, self._light_areas, seed
+                field, scenes, camera, rays, self._emitters, self._light_areas, seed
             )
             layers.light_seconds = lit - built
-        if not layers.sees_sensing:
-            raise _sees_nothing(self.chief_rays((64, 48)))
         ended = time.perf_counter()
         tell(1.0, layers.photons, layers.noise)
         image = TactileImage(
@@ -322,6 +326,7 @@ class OpticalModel:
         self,
         scenes: ContactScenes,
         camera: RayCamera,
+        rays: ChiefRays,
         photons: int | None,
         seconds: float | None,
         seed: int,
@@ -347,11 +352,7 @@ class OpticalModel:
             coloured=self._coloured,
             stop=stop,
         )
-        return ImageLayers.from_sppm(result, self.chief_rays_of(scenes, camera), began)
-
-    def chief_rays_of(self, scenes: ContactScenes, camera: RayCamera) -> ChiefRays:
-        """Chief rays in a scene with contacts."""
-        return trace_chief_rays(scenes.full, camera, self._sensing_faces)
+        return ImageLayers.from_sppm(result, rays, began)
 
     def _coloured_layers(self, layers: ImageLayers) -> dict[str, Any]:
         out = {}
@@ -359,6 +360,12 @@ class OpticalModel:
             flux = self.design.lights[name].channel_flux().astype(np.float32)
             out[name] = layers.radiance[number] * flux
         return out
+
+
+def _ball(mesh: TriangleMesh) -> np.ndarray:
+    """(4,) centre and radius of a ball around a mesh."""
+    centre = mesh.bounds.mean(axis=0)
+    return np.append(centre, np.linalg.norm(mesh.vertices - centre, axis=1).max())
 
 
 def _percent(noise: float) -> float | None:
@@ -384,8 +391,7 @@ def _sensing_faces(pieces: list[Piece]) -> np.ndarray:
             start += count
         else:
             out.append(np.full(count, -1, dtype=np.int64))
-    # Indenters come after all pieces; a hit on one has no face of the sensing surface.
-    return np.concatenate([*out, np.full(10_000_000, -1, dtype=np.int64)[:0]])
+    return np.concatenate(out)
 
 
 def _pixel_areas(rays: ChiefRays) -> np.ndarray:

@@ -155,8 +155,8 @@ def _merge(
         a, b, c = (points[triangles[:, i]] for i in range(3))
         cross = np.cross(b - a, c - a)
         length = np.linalg.norm(cross, axis=1)
-        keep = length > 0
-        triangles, normal = triangles[keep], cross[keep] / length[keep, None]
+        # A triangle without area is never hit; it keeps its place so that numbers stay those of the piece.
+        normal = cross / np.where(length > 0, length, 1.0)[:, None]
         row = np.zeros((len(triangles), 4), dtype=np.float32)
         row[:, :3] = normal
         corner = np.zeros((len(triangles), 3, 4), dtype=np.float32)
