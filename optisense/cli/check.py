@@ -11,7 +11,6 @@ from optisense.cli.options import ContactOption, DesignArgument, parse_contacts
 
 if TYPE_CHECKING:
     from optisense.design import SensorDesign
-    from optisense.geometry import Contact
 
 
 @ends_well
@@ -27,28 +26,13 @@ def check(design: DesignArgument, contact: ContactOption = None) -> None:
     for problem in problems:
         output.print(f"odd: {problem}", markup=False, style="yellow")
     if contacts:
-        _place(sensor, contacts)
+        from optisense.cli.placing import place_contacts
+        from optisense.optics import OpticalModel
+
+        place_contacts(OpticalModel(sensor), contacts)
         word = "contact fits" if len(contacts) == 1 else "contacts fit"
         output.print(f"{len(contacts)} {word} on the sensing surface.")
     output.print("The design is in order.", style="green")
-
-
-def _place(design: SensorDesign, contacts: list[Contact]) -> None:
-    """Try each contact on the sensing surface.
-
-    Raises:
-        ContactError: one is off the surface or deeper than the gel.
-    """
-    from optisense.geometry import SensingSurface, TriangleMesh, place
-
-    meshes = design.deformed_meshes()
-    skins = [mesh for name, mesh in meshes.items() if design.parts[name].role == "sensing_surface"]
-    gels = [mesh for name, mesh in meshes.items() if design.parts[name].role == "elastomer"]
-    skin = TriangleMesh.joined(skins)
-    middle = skin.bounds.mean(axis=0)
-    surface = SensingSurface(skin, middle, (1.0, 0.0, 0.0), (0.0, 1.0, 0.0))
-    for contact in contacts:
-        place(contact, surface, gels[0] if gels else None)
 
 
 def _describe(design: SensorDesign) -> None:

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from optisense.cli.console import EXIT_INTERRUPTED, ends_well, messages, output
+from optisense.cli.interrupt import held_interrupt
 from optisense.cli.options import (
     ContactOption,
     DesignArgument,
@@ -99,34 +100,47 @@ def render(
         raise typer.BadParameter("give one of them, not both", param_hint="--noise, --seconds")
     contacts = parse_contacts(contact)
 
-    from optisense.optics.variant import select_variant
-    from optisense.report import write_report
     from optisense.sensors import load
 
     sensor = load(design)
     ensure_writable(out)
-    select_variant(variant)  # complains about libLLVM before the renderer is imported
 
+    from optisense.cli.placing import place_contacts
     from optisense.optics import OpticalModel
+    from optisense.report import write_report
 
     with _progress_bar() as show:
         model = OpticalModel(sensor, variant=variant)
-        image = model.render(
-            contacts,
-            resolution=size,
-            photons=photons,
-            noise=noise,
-            seconds=seconds,
-            seed=seed,
-            progress=show,
-        )
-    image.settings["design"] = sensor.name
+
+        def report_progress(progress: RenderProgress) -> None:
+            show(progress)
+            if progress.fraction < 1:
+                interrupt.raise_if_requested()
+
+        with held_interrupt() as interrupt:
+            image = model.render(
+                contacts,
+                resolution=size,
+                photons=photons,
+                noise=noise,
+                seconds=seconds,
+                seed=seed,
+                progress=report_progress,
+            )
     image.settings["contacts"] = list(contact or [])
     image.save(out, brightness)
-    write_report(out / REPORT, sensor, image, contacts, exposure=brightness)
+    write_report(
+        out / REPORT,
+        sensor,
+        image,
+        contacts,
+        exposure=brightness,
+        indenters=place_contacts(model, contacts),
+    )
     _say_what_came(image, out)
     if image.interrupted:
         messages.print("interrupted: the files hold what was finished until then")
+    if interrupt.requested:
         raise typer.Exit(EXIT_INTERRUPTED)
 
 
@@ -181,10 +195,11 @@ def _progress_bar() -> Iterator[Callable[[RenderProgress], None]]:
 
 def _say_what_came(image: TactileImage, folder: Path) -> None:
     height, width = image.contact_mask.shape
-    facts = [f"{width} x {height} pixels"]
     settings = image.settings
-    if settings.get("photons"):
-        facts.append(f"{settings['photons'] / 1e6:.2g} million photons")
+    facts = [f"{width} x {height} pixels", f"{settings['photons'] / 1e6:.2g} million photons"]
+    if settings["noise_reached_percent"] is not None:
+        facts.append(f"noise {settings['noise_reached_percent']:.2g} %")
+    facts.append(f"{settings['seconds']['total']:.2g} s")
     output.print(", ".join(facts), style="dim")
     output.print(f"picture: {folder / PICTURE}", markup=False)
     output.print(f"report:  {folder / REPORT}", markup=False)

@@ -12,35 +12,45 @@ from optisense.geometry import Contact
 
 Row = tuple[str, str]
 
-UNITS = {
-    "noise": "%",
-    "noise_percent": "%",
-    "noise_target": "%",
-    "seconds": "s",
-    "time": "s",
+LABELS = {
+    "photons_asked": "photons asked for",
+    "noise_asked_percent": "noise asked for",
+    "noise_reached_percent": "noise reached",
+    "seconds_asked": "time asked for",
+    "samples_per_pixel": "samples a pixel",
+    "seconds": "time",
 }
-"""Units of settings whose name does not tell them."""
+"""Settings whose name is not what a reader would call them."""
+
+ELSEWHERE = ("design", "contacts", "resolution", "interrupted")
+"""Settings that the page shows in another place."""
 
 
 def headline(settings: Mapping[str, Any], width: int, height: int) -> list[Row]:
     """The few facts that stand under the title."""
     facts = [("picture", f"{width} × {height}")]
-    for key, label in (("photons", "photons"), ("noise", "noise"), ("seconds", "time")):
-        value = settings.get(key)
+    seconds = settings.get("seconds")
+    total = seconds.get("total") if isinstance(seconds, Mapping) else None
+    for label, key, value in (
+        ("photons", "photons", settings.get("photons")),
+        ("noise", "noise_percent", settings.get("noise_reached_percent")),
+        ("time", "seconds", total),
+    ):
         if isinstance(value, int | float) and math.isfinite(value):
             facts.append((label, _value(key, value)))
     return facts
 
 
-def setting_rows(settings: Mapping[str, Any]) -> list[Row]:
+def setting_rows(settings: Mapping[str, Any], unit: str = "") -> list[Row]:
     """Every setting by name and value; those within settings as ``outer, inner``."""
     rows: list[Row] = []
     for key, value in settings.items():
-        label = key.replace("_", " ")
+        label = LABELS.get(key, key.replace("_", " "))
         if isinstance(value, Mapping):
-            rows += [(f"{label}, {inner}", text) for inner, text in setting_rows(value)]
-        elif value is not None and key not in ("design", "contacts"):
-            rows.append((label, _value(key, value)))
+            inside = setting_rows(value, "seconds" if key == "seconds" else "")
+            rows += [(f"{label}, {inner}", text) for inner, text in inside]
+        elif value is not None and key not in ELSEWHERE:
+            rows.append((label, _value(unit or key, value)))
     return rows
 
 
@@ -67,13 +77,14 @@ def provenance_rows(design: SensorDesign) -> tuple[list[dict[str, str]], list[di
 
 
 def _value(key: str, value: Any) -> str:
-    unit = f" {UNITS[key]}" if key in UNITS else ""
+    """A value with the unit that its key tells."""
+    unit = " %" if key.endswith("percent") else " s" if key.startswith("seconds") else ""
     if isinstance(value, bool):
         return "yes" if value else "no"
-    if isinstance(value, int):
-        return f"{value:,}{unit}" if key != "seed" else str(value)
+    if isinstance(value, int) and key != "seed":
+        return f"{value:,}{unit}"
     if isinstance(value, float):
-        return f"{value:.4g}{unit}"
+        return f"{value:.3g}{unit}"
     if isinstance(value, list | tuple):
         return ", ".join(_value("", item) for item in value)
     return str(value)

@@ -1,0 +1,46 @@
+"""Ctrl-C during a render: stop at the next safe point, so that what is finished can be written."""
+
+from __future__ import annotations
+
+import signal
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from types import FrameType
+
+from optisense.cli.console import messages
+
+
+class Interrupt:
+    """Whether Ctrl-C was pressed."""
+
+    def __init__(self) -> None:
+        self.requested = False
+
+    def raise_if_requested(self) -> None:
+        """Raise KeyboardInterrupt here, at a safe point, if Ctrl-C was pressed."""
+        if self.requested:
+            raise KeyboardInterrupt
+
+    def _pressed(self, number: int, frame: FrameType | None) -> None:
+        if self.requested:
+            raise KeyboardInterrupt
+        self.requested = True
+        messages.print("stopping; Ctrl-C again drops the picture", style="yellow")
+
+
+@contextmanager
+def held_interrupt() -> Iterator[Interrupt]:
+    """Hold the first Ctrl-C back until a safe point; the second one acts at once.
+
+    Outside the main thread, where signals can't be handled, nothing changes.
+    """
+    interrupt = Interrupt()
+    if threading.current_thread() is not threading.main_thread():
+        yield interrupt
+        return
+    before = signal.signal(signal.SIGINT, interrupt._pressed)
+    try:
+        yield interrupt
+    finally:
+        signal.signal(signal.SIGINT, before)

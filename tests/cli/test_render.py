@@ -1,0 +1,181 @@
+"""`optisense render`: the files it writes, and what it does when something is in the way."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+from typer.testing import CliRunner
+
+from optisense.cli import app
+
+SMALL = ("--resolution", "40x30", "--photons", "20000")
+BALL = ("--contact", "sphere:1.5@0,0:0.8")
+LAYERS = ("red", "green", "blue")
+
+FILES = {
+    "image.png",
+    "radiance.exr",
+    "normals.npy",
+    "contact_mask.npy",
+    "run.json",
+    "report.html",
+    *(f"layers/{name}.exr" for name in LAYERS),
+}
+
+
+def render(*arguments: str, design: str = "gelsight-mini") -> tuple[int, str]:
+    result = CliRunner().invoke(app, ["render", design, *arguments])
+    assert "Traceback" not in result.output
+    return result.exit_code, result.output
+
+
+def child(script: str, folder: Path) -> subprocess.CompletedProcess[str]:
+    """Run a script in a process of its own, with the output folder as its argument."""
+    return subprocess.run(
+        [sys.executable, "-c", script, str(folder)], capture_output=True, text=True, timeout=300
+    )
+
+
+def written(folder: Path) -> set[str]:
+    return {str(path.relative_to(folder)) for path in folder.rglob("*") if path.is_file()}
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A finished render of a ball on a GelSight Mini."""
+    path = tmp_path_factory.mktemp("render") / "not" / "there" / "yet"
+    code, text = render(*SMALL, *BALL, "--seed", "7", "--out", str(path))
+    assert code == 0, text
+    assert str(path / "image.png") in text
+    assert str(path / "report.html") in text
+    return path
+
+
+def test_every_promised_file_is_there_and_nothing_else(folder: Path) -> None:
+    assert written(folder) == FILES
+
+
+def test_the_files_have_the_wanted_size(folder: Path) -> None:
+    assert Image.open(folder / "image.png").size == (40, 30)
+    assert np.load(folder / "normals.npy").shape == (30, 40, 3)
+    mask = np.load(folder / "contact_mask.npy")
+    assert mask.shape == (30, 40)
+    assert mask.dtype == bool
+
+
+def test_the_ball_is_in_the_middle_of_the_picture(folder: Path) -> None:
+    rows, columns = np.nonzero(np.load(folder / "contact_mask.npy"))
+    assert abs(rows.mean() - 14.5) < 1.0
+    assert abs(columns.mean() - 19.5) < 1.0
+
+
+def test_run_json_says_how_it_was_made(folder: Path) -> None:
+    run = json.loads((folder / "run.json").read_text())
+    assert run["seed"] == 7
+    assert run["design"] == "gelsight-mini"
+    assert run["contacts"] == ["sphere:1.5@0,0:0.8"]
+
+
+def test_the_report_asks_the_network_for_nothing(folder: Path) -> None:
+    page = (folder / "report.html").read_text(encoding="utf-8")
+    assert "default-src 'none'" in page
+    assert not re.findall(r"""(?:src|href|action)\s*=\s*["'](?!data:)""", page)
+    assert not re.findall(r"url\(|@import|fetch\(|XMLHttpRequest", page)
+    assert page.count("data:image/png;base64,") == 1 + len(("image", *LAYERS, "normals", "mask"))
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ("--resolution", "wide"),
+        ("--resolution", "0x10"),
+        ("--photons", "0"),
+        ("--noise", "0"),
+        ("--noise", "5", "--seconds", "2"),
+        ("--exposure", "bright"),
+        ("--exposure", "-1"),
+        ("--seed", "-1"),
+        ("--variant", "opencl"),
+        ("--contact", "sphere:1.5@90,0:0.5"),
+        ("--contact", "sphere:1.5@0,0:9"),
+        ("--contact", "ball"),
+    ],
+    ids=" ".join,
+)
+def test_bad_input_exits_with_2(arguments: tuple[str, ...], tmp_path: Path) -> None:
+    code, text = render(*arguments, "--out", str(tmp_path / "out"))
+    assert code == 2, text
+    assert len(text) > 20
+
+
+def test_an_output_folder_that_is_a_file_is_an_error_before_rendering(tmp_path: Path) -> None:
+    file = tmp_path / "notes.txt"
+    file.write_text("mine")
+    code, text = render(*SMALL, "--out", str(file))
+    assert code == 1
+    assert "is a file" in text
+    assert file.read_text() == "mine"
+
+
+@pytest.mark.skipif(os.geteuid() == 0, reason="root may write everywhere")
+def test_a_folder_without_write_permission_is_an_error(tmp_path: Path) -> None:
+    tmp_path.chmod(0o500)
+    code, text = render(*SMALL, "--out", str(tmp_path / "out"))
+    tmp_path.chmod(0o700)
+    assert code == 1
+    assert "can't be written" in text
+
+
+def test_ctrl_c_writes_what_there_is_and_exits_with_130(tmp_path: Path) -> None:
+    script = """
+import signal, sys
+from optisense.cli import app
+from optisense.optics import OpticalModel
+
+plain = OpticalModel.render
+
+def render(self, *arguments, progress, **options):
+    pressed = []
+    def press_once(state):
+        if not pressed:
+            pressed.append(True)
+            signal.raise_signal(signal.SIGINT)
+        progress(state)
+    return plain(self, *arguments, progress=press_once, **options)
+
+OpticalModel.render = render
+app(["render", "gelsight-mini", "--resolution", "40x30", "--seconds", "200", "--out", sys.argv[1]])
+"""
+    result = child(script, tmp_path / "out")
+    assert result.returncode == 130, result.stderr
+    assert "Traceback" not in result.stderr
+    assert written(tmp_path / "out") == FILES
+    assert "was interrupted" in (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
+    assert json.loads((tmp_path / "out" / "run.json").read_text())["interrupted"] is True
+
+
+def test_a_disk_that_fills_up_is_an_error_and_leaves_no_half_files(tmp_path: Path) -> None:
+    # A limit on the size of files fails a write midway, as a full disk does.
+    script = """
+import resource, sys
+from optisense.cli import app
+
+resource.setrlimit(resource.RLIMIT_FSIZE, (9000, 9000))
+app(["render", "gelsight-mini", "--resolution", "40x30", "--photons", "20000",
+     "--out", sys.argv[1]])
+"""
+    result = child(script, tmp_path / "out")
+    assert result.returncode == 1, result.stderr
+    assert "Traceback" not in result.stderr
+    assert "can't be written" in result.stderr
+    names = written(tmp_path / "out")
+    assert not any(Path(name).name.startswith(".") for name in names)
+    assert "radiance.exr" not in names
