@@ -167,8 +167,15 @@ def test_a_disk_that_fills_up_is_an_error_and_leaves_no_half_files(tmp_path: Pat
     script = """
 import resource, sys
 from optisense.cli import app
+from optisense.optics import TactileImage
 
-resource.setrlimit(resource.RLIMIT_FSIZE, (9000, 9000))
+plain = TactileImage.save
+
+def save(self, *arguments):
+    resource.setrlimit(resource.RLIMIT_FSIZE, (9000, 9000))
+    plain(self, *arguments)
+
+TactileImage.save = save
 app(["render", "gelsight-mini", "--resolution", "40x30", "--photons", "20000",
      "--out", sys.argv[1]])
 """
