@@ -1,0 +1,78 @@
+"""The page shows the render, and nothing in a design can get out of its place on it."""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+
+import pytest
+
+from optisense.design import Provenance
+from optisense.errors import OutputError
+from optisense.geometry import Contact, Sphere
+from optisense.optics import OpticalModel, TactileImage
+from optisense.report import write_report
+from optisense.report.page import render_page
+from optisense.sensors import gelsight_mini
+
+BALL = Contact(Sphere(radius=1.5), at=(0.0, 0.0), depth=0.8)
+EVIL = "</script><img src=x onerror=alert(1)>"
+
+
+@pytest.fixture(scope="module")
+def image() -> TactileImage:
+    model = OpticalModel(gelsight_mini())
+    return model.render([BALL], resolution=(32, 24), photons=20_000)
+
+
+def test_settings_lights_contacts_and_sources_are_on_the_page(image: TactileImage) -> None:
+    design = gelsight_mini()
+    page = render_page(design, image, [BALL])
+    for words in (
+        "32 × 24",
+        f"{image.settings['photons']:,}",
+        "sphere, radius 1.5 mm",
+        "0, 0 mm on the surface",
+        "0.8 mm",
+        *(f"{name} lights alone" for name in design.lights),
+        *(path for path, entry in design.provenance.items() if entry.status == "assumed"),
+    ):
+        assert words in page, words
+
+
+def test_the_scene_data_is_json(image: TactileImage) -> None:
+    page = render_page(gelsight_mini(), image, [BALL])
+    found = re.search(r'<script type="application/json" id="scene-data">(.*?)</script>', page)
+    assert found
+    assert [part["name"] for part in json.loads(found[1])["parts"]] == list(gelsight_mini().parts)
+
+
+def test_texts_of_a_design_stay_texts(image: TactileImage) -> None:
+    design = gelsight_mini().copy()
+    design.name = design.description = EVIL
+    design.provenance["camera.fov"] = Provenance(status="assumed", source=EVIL)
+    design.camera.model = "pi-v2"
+    page = render_page(design, image, [BALL])
+    assert "<img src=x" not in page
+    assert page.count("</script>") == 3  # the page's own: data and two scripts
+
+
+def test_an_interrupted_render_is_told(image: TactileImage) -> None:
+    assert "was interrupted" not in render_page(gelsight_mini(), image)
+    stopped = TactileImage(
+        image.layers, image.normals, image.contact_mask, image.points, dict(image.settings), True
+    )
+    assert "was interrupted" in render_page(gelsight_mini(), stopped)
+
+
+def test_a_render_without_contacts_says_so(image: TactileImage) -> None:
+    assert "Nothing touches the sensor" in render_page(gelsight_mini(), image)
+
+
+def test_the_file_is_written_whole_or_not_at_all(image: TactileImage, tmp_path: Path) -> None:
+    path = write_report(tmp_path / "report.html", gelsight_mini(), image, [BALL])
+    assert path.read_text(encoding="utf-8").rstrip().endswith("</html>")
+    assert [file.name for file in tmp_path.iterdir()] == ["report.html"]
+    with pytest.raises(OutputError, match="can't be written"):
+        write_report(tmp_path / "missing" / "report.html", gelsight_mini(), image, [BALL])
