@@ -87,7 +87,9 @@ def write_report(
         _write_whole(path, page)
     except OSError as error:
         raise OutputError(
-            f"the report can't be written: {error.strerror or error}", where=str(path)
+            f"the report can't be written: {error.strerror or error}",
+            where=str(path),
+            hint="Free space on this disk or choose another folder",
         ) from error
     return path
 
