@@ -13,6 +13,7 @@ from optisense.design.materials import Absorber, Coating, Conductor, Dielectric,
 from optisense.design.parts import TRANSPARENT_SOLIDS, Role
 from optisense.errors import DesignError
 from optisense.geometry import TriangleMesh
+from optisense.geometry.coplanar import merge_coplanar
 from optisense.optics.emitters import Emitter, Intensity, Shape, spot_intensity
 from optisense.optics.media import AIR, Sheet, Solid, resolve_media
 from optisense.optics.ray_scene import Piece
@@ -24,7 +25,7 @@ SMOOTH_METAL = 0.01
 FLAT = 1e-6
 """A mesh whose corner normals differ by less from its face normals has flat facets."""
 
-DISC_CORNERS = 48
+DISC_CORNERS = 12
 PROBE = 0.02
 """The medium before a coating is looked up this far (mm) off it."""
 
@@ -34,7 +35,8 @@ class Assembly:
     """A design as ray tracing needs it.
 
     pieces: all fixed surfaces. sensing: the meshes of the sensing surface (deformed). gels: the elastomers. emitters:
-    all lights, ``group`` counting in the order of ``groups``. indenter: the coating where an indenter carries it.
+    all lights, ``group`` counting in the order of ``groups``; light_areas: mm^2 of their windows, 0 for points. fine: for
+    the pieces of the sensing surface, by number, the same piece with all its triangles.
     """
 
     pieces: list[Piece]
@@ -43,6 +45,7 @@ class Assembly:
     emitters: list[Emitter]
     groups: list[str]
     light_areas: list[float]
+    fine: dict[int, Piece]
 
 
 def assemble(design: SensorDesign) -> Assembly:
@@ -54,11 +57,11 @@ def assemble(design: SensorDesign) -> Assembly:
         MeshError: a solid is not closed.
     """
     meshes = design.deformed_meshes()
-    solids, sheets, pieces = [], [], []
+    solids, sheets, pieces, fine = [], [], [], {}
     for name, part in design.parts.items():
-        mesh = meshes.get(name)
-        if mesh is None:
+        if name not in meshes:
             raise DesignError(f"part '{name}' has no mesh", where=design.where("parts", name))
+        mesh = _merged(meshes[name])
         material = design.materials.get(part.material) if part.material else None
         if part.role in TRANSPARENT_SOLIDS:
             assert isinstance(material, Dielectric) and part.material is not None
@@ -81,6 +84,7 @@ def assemble(design: SensorDesign) -> Assembly:
         ior = _index_before(sheet.mesh, solids)
         if part.role is Role.SENSING_SURFACE:
             surface = coating_surface(design.coating, ior, Region.SENSING)
+            fine[len(pieces)] = _piece(sheet.name, meshes[sheet.name], surface)
         else:
             surface = _opaque(design.materials.get(part.material or ""), ior)
         pieces.append(_piece(sheet.name, sheet.mesh, surface))
@@ -96,6 +100,7 @@ def assemble(design: SensorDesign) -> Assembly:
         emitters=emitters,
         groups=list(design.lights),
         light_areas=areas,
+        fine=fine,
     )
 
 
@@ -160,6 +165,17 @@ def _index_before(mesh: TriangleMesh, solids: list[Solid]) -> float:
     probe = (mesh.triangles[face].mean(axis=0) + PROBE * mesh.face_normals[face])[None]
     around = [solid for solid in solids if inside(probe, solid.mesh)[0]]
     return max(around, key=lambda solid: solid.priority).ior if around else 1.0
+
+
+def _merged(mesh: TriangleMesh) -> TriangleMesh:
+    """A mesh with flat facets in as few triangles as will do: fewer to trace, fewer to compare."""
+    smooth = mesh if mesh.normals is not None else mesh.vertex_normals()
+    assert smooth.normals is not None
+    bend = np.abs(smooth.normals[smooth.faces] - smooth.face_normals[:, None]).max(axis=(1, 2))
+    if bend.max() < FLAT:
+        return merge_coplanar(mesh)
+    # A curved mesh may still have flat walls; shading normals would be lost, so only these are merged.
+    return mesh
 
 
 def _piece(name: str, mesh: TriangleMesh, surface: Surface) -> Piece:

@@ -101,11 +101,13 @@ def _trace(
     return outcome, point, normal, direction, region, face
 
 
-def trace_chief_rays(scene: RayScene, camera: RayCamera, sensing_faces: NDArray[np.int64]) -> ChiefRays:
+def trace_chief_rays(
+    scene: RayScene, camera: RayCamera, sensing_faces: NDArray[np.int64] | None = None
+) -> ChiefRays:
     """Follow the ray through the middle of every pixel.
 
     ``sensing_faces`` maps the scene's triangles to those of the sensing surface (-1, as for any
-    triangles that follow: another).
+    triangles that follow: another); without it ``face`` is -1 everywhere.
     """
     shape = camera.height, camera.width
     index = dr.arange(mi.UInt32, camera.width * camera.height)
@@ -122,6 +124,8 @@ def trace_chief_rays(scene: RayScene, camera: RayCamera, sensing_faces: NDArray[
         dr.opaque(mi.UInt32, MAX_DEPTH),
     )
     incidence = -dr.dot(arriving, normal)
+    if sensing_faces is None:
+        sensing_faces = np.zeros(0, dtype=np.int64)
     dr.eval(outcome, point, normal, arriving, region, face, incidence)
 
     def image(values: object) -> NDArray[np.float32]:

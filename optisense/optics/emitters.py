@@ -225,4 +225,4 @@ def emit(
     offset = dr.select(shape == int(Shape.DISC), disc, square)
     point = mi.Point3f(a.x, a.y, a.z) + s * (offset.x * b.w) + t * (offset.y * c.w) + n * RAY_OFFSET
     direction = s * local.x + t * local.y + n * local.z
-    return point, direction, group
+    return mi.Point3f(point), mi.Vector3f(direction), group

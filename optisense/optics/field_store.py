@@ -6,12 +6,15 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 
+import mitsuba as mi
 import numpy as np
+from numpy.typing import NDArray
 
 from optisense.optics.emitters import EmitterTable
 from optisense.optics.guide import Guide, even_guide, learn_guide
-from optisense.optics.light_field import BINS, FieldCells, FieldTally, LightField, build_cells
-from optisense.optics.photons import trace_photons
+from optisense.optics.cells import SurfaceCells, build_cells, cells_near
+from optisense.optics.light_field import BINS, FieldTally, LightField
+from optisense.optics.photons import Target, trace_photons, trace_pilot
 from optisense.optics.ray_scene import Piece, RayScene
 from optisense.optics.sampling import seed_of
 
@@ -22,9 +25,9 @@ CELL_SIZE = 0.25
 RADIUS = 0.7
 """mm of the smoothing kernel: what a light field of LEDs some mm away can bear (see benchmarks)."""
 MOST_BYTES = 300e6
+SEEN_MARGIN = 2.0
+"""mm around what the camera sees that photons are sent to: an indenter's flank catches light that would land there."""
 KEPT_FIELDS = 2
-LANDINGS = 3.0
-"""Room for so many landings a photon."""
 
 
 @dataclass
@@ -37,14 +40,21 @@ class FieldStore:
     """Traces photons pass by pass and keeps what it finds."""
 
     def __init__(
-        self, scene: RayScene, opaque: list[Piece], table: EmitterTable, coloured: bool
+        self,
+        scene: RayScene,
+        opaque: list[Piece],
+        table: EmitterTable,
+        seen: NDArray[np.floating],
+        coloured: bool,
     ) -> None:
+        """``scene`` without contacts, its opaque pieces, and ``seen`` (n, 3) mm: points that the camera sees."""
+        self._seen = seen
         self._scene = scene
         self._table = table
         self._coloured = coloured
         self._opaque = opaque
         self._guide: Guide | None = None
-        self._cells: FieldCells | None = None
+        self._cells: SurfaceCells | None = None
         self._running: dict[tuple[int, int], _Running] = {}
         self._done: dict[tuple[int, int, int], LightField] = {}
 
@@ -56,23 +66,20 @@ class FieldStore:
 
     @property
     def guide(self) -> Guide:
-        """Where to send photons, learned on first use from a pilot pass."""
+        """Where to send photons: to what the camera sees, learned on first use from a pilot pass."""
         if self._guide is None:
-            even = even_guide(self._table.count)
-            pilot = trace_photons(
-                self._scene,
-                self._table,
-                even,
-                max(1, PILOT_PHOTONS // self._table.count),
-                seed_of(0, 1),
-                coloured=False,
-                landings=LANDINGS,
+            lights = self._table.count
+            near = cells_near(self.cells, self._seen, SEEN_MARGIN)
+            target = Target(self.cells, mi.UInt32(near.astype(np.uint32)))
+            per_light = max(1, PILOT_PHOTONS // lights)
+            arrived = trace_pilot(
+                self._scene, self._table, even_guide(lights), per_light, seed_of(0, 1), target
             )
-            self._guide = learn_guide(pilot.cells, self._table.count)
+            self._guide = learn_guide(arrived, lights)
         return self._guide
 
     @property
-    def cells(self) -> FieldCells:
+    def cells(self) -> SurfaceCells:
         """The cells over all opaque surfaces of the sensor."""
         if self._cells is None:
             vertices, faces, start = [], [], 0
@@ -135,7 +142,6 @@ class FieldStore:
                         seed_of(seed, 2),
                         first=tally.passes * per_light,
                         coloured=self._coloured,
-                        landings=LANDINGS,
                     )
                 )
                 now = time.perf_counter()

@@ -11,8 +11,10 @@ from dataclasses import dataclass
 
 import drjit as dr
 import mitsuba as mi
+import numpy as np
+from numpy.typing import NDArray
 
-from optisense.optics.photons import FIRST_LANDING, GROUP_MASK, PhotonMap
+from optisense.optics.photons import GROUP_MASK, PhotonMap
 from optisense.optics.scattering import Coating, coating_of, evaluate_coating
 from optisense.optics.visible_points import VisiblePoints
 
@@ -44,7 +46,9 @@ def _cell(point: mi.Point3f, lower: mi.Point3f, inverse: mi.Float, counts: mi.Ve
     )
 
 
-def build_grid(photons: PhotonMap, lower, upper, radius: float, first_landings: bool | None = None) -> PhotonGrid:
+def build_grid(
+    photons: PhotonMap, lower: NDArray[np.floating], upper: NDArray[np.floating], radius: float
+) -> PhotonGrid:
     """Sort photons into cells of side ``radius`` (mm) by counting; no comparison sort is needed."""
     size = [max(float(upper[i] - lower[i]), radius) for i in range(3)]
     cell_size = max(radius, max(size) / 1000)
@@ -62,24 +66,20 @@ def build_grid(photons: PhotonMap, lower, upper, radius: float, first_landings: 
     place = dr.gather(mi.Vector4f, photons.place, index)
     cell = _cell(mi.Point3f(place.x, place.y, place.z), lower3, inverse, counts3)
     flat = cell.x + counts3.x * (cell.y + counts3.y * cell.z)
-    keep = mi.Bool(True)
-    if first_landings is not None:
-        bits = dr.reinterpret_array(mi.UInt32, place.w)
-        keep = ((bits & FIRST_LANDING) != 0) == first_landings
     tally = dr.zeros(mi.UInt32, cells + 1)
-    rank = dr.scatter_inc(tally, flat, keep)
+    rank = dr.scatter_inc(tally, flat)
     dr.eval(rank, tally)
     starts = dr.prefix_sum(tally)
     target = dr.gather(mi.UInt32, starts, flat) + rank
     out_place = dr.zeros(mi.Float, photons.count * 4)
     out_travel = dr.zeros(mi.Float, photons.count * 4)
     out_power = dr.zeros(mi.Float, photons.count * (4 if photons.coloured else 1))
-    dr.scatter(out_place, place, target, keep)
-    dr.scatter(out_travel, dr.gather(mi.Vector4f, photons.travel, index), target, keep)
+    dr.scatter(out_place, place, target)
+    dr.scatter(out_travel, dr.gather(mi.Vector4f, photons.travel, index), target)
     if photons.coloured:
-        dr.scatter(out_power, dr.gather(mi.Vector4f, photons.power, index), target, keep)
+        dr.scatter(out_power, dr.gather(mi.Vector4f, photons.power, index), target)
     else:
-        dr.scatter(out_power, dr.gather(mi.Float, photons.power, index), target, keep)
+        dr.scatter(out_power, dr.gather(mi.Float, photons.power, index), target)
     dr.eval(out_place, out_travel, out_power, starts)
     return PhotonGrid(
         lower3, inverse, counts3, starts, out_place, out_travel, out_power, photons.coloured

@@ -15,8 +15,8 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
+from optisense.optics.cells import SurfaceCells, cell_at
 from optisense.optics.photons import GROUP_MASK, PhotonMap
 
 FloatArray = NDArray[np.floating]
@@ -31,121 +31,7 @@ BINS = BANDS * SECTORS
 DARK = 1e-7
 
 
-@dataclass
-class FieldCells:
-    """Cells of a uniform 3-D grid that surfaces pass through, and a smoothing kernel among them.
-
-    ``index`` is the number + 1 of the cell at each grid place (0: none); ``axes`` (3, 3) the frame of the bins.
-    """
-
-    lower: mi.Point3f
-    inverse_size: mi.Float
-    counts: mi.Vector3u
-    index: mi.UInt32
-    cells: int
-    normals: mi.Float
-    centres: FloatArray
-    near_start: mi.UInt32
-    near_cell: mi.UInt32
-    near_weight: mi.Float
-    axes: FloatArray
-
-
-def surface_samples(
-    vertices: FloatArray, faces: NDArray[np.integer], spacing: float
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Points (n, 3) mm, normals (n, 3), areas (n,) mm^2 spread over a mesh, about one per spacing^2."""
-    a, b, c = (vertices[faces[:, k]] for k in range(3))
-    cross = np.cross(b - a, c - a)
-    area = np.linalg.norm(cross, axis=1) / 2
-    count = np.maximum(1, np.ceil(area / spacing**2)).astype(int)
-    owner = np.repeat(np.arange(len(faces)), count)
-    order = np.arange(len(owner)) - np.repeat(np.cumsum(count) - count, count)
-    # The R2 sequence (Roberts 2018), folded into the triangle by the square-root map.
-    u = np.mod(0.5 + 0.7548776662466927 * (order + 1), 1.0)
-    v = np.mod(0.5 + 0.5698402909980532 * (order + 1), 1.0)
-    root = np.sqrt(u)[:, None]
-    points = a[owner] * (1 - root) + (b[owner] * (1 - v)[:, None] + c[owner] * v[:, None]) * root
-    normals = cross / np.maximum(2 * area, 1e-30)[:, None]
-    return points, normals[owner], (area / count)[owner]
-
-
-def build_cells(
-    vertices: FloatArray, faces: NDArray[np.integer], size: float, radius: float
-) -> FieldCells:
-    """Cells of ``size`` mm over a mesh, smoothed by Epanechnikov's kernel of ``radius`` mm.
-
-    The kernel is normalised by the surface's area under it, so edges and oblique cells lose nothing.
-    """
-    vertices = np.asarray(vertices, dtype=np.float64)
-    points, normals, areas = surface_samples(vertices, faces, size / 8)
-    # Off any round number, so that a plane does not run along the border between two cells.
-    lower = points.min(axis=0) - 0.37 * size
-    counts = np.floor((points.max(axis=0) - lower) / size).astype(int) + 1
-    place = np.floor((points - lower) / size).astype(int)
-    flat = place[:, 0] + counts[0] * (place[:, 1] + counts[1] * place[:, 2])
-    used, owner = np.unique(flat, return_inverse=True)
-    cells = len(used)
-
-    def mean_of(values: FloatArray) -> FloatArray:
-        return np.stack([np.bincount(owner, areas * values[:, k], cells) for k in range(3)], 1)
-
-    area = np.bincount(owner, areas, cells)
-    centre = mean_of(points) / area[:, None]
-    normal = mean_of(normals)
-    normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-12)
-    index = np.zeros(int(np.prod(counts)), dtype=np.uint32)
-    index[used] = np.arange(cells) + 1
-
-    near = cKDTree(centre).sparse_distance_matrix(
-        cKDTree(centre), radius, output_type="coo_matrix"
-    ).tocsr()
-    near.setdiag(1e-9)
-    near.sort_indices()
-    rows = np.repeat(np.arange(cells), np.diff(near.indptr))
-    columns = near.indices
-    alike = np.einsum("ij,ij->i", normal[rows], normal[columns]) > 0.5
-    weight = np.maximum(1 - near.data**2 / radius**2, 0.0) * alike
-    weight /= np.bincount(rows, weight * area[columns], cells)[rows]
-
-    lower3, counts3 = mi.Point3f(*lower.tolist()), mi.Vector3u(*counts.tolist())
-    dr.make_opaque(lower3, counts3)
-    four = np.zeros((cells, 4), dtype=np.float32)
-    four[:, :3] = normal
-    return FieldCells(
-        lower=lower3,
-        inverse_size=dr.opaque(mi.Float, 1 / size),
-        counts=counts3,
-        index=mi.UInt32(index),
-        cells=cells,
-        normals=mi.Float(four.ravel()),
-        centres=centre,
-        near_start=mi.UInt32(near.indptr.astype(np.uint32)),
-        near_cell=mi.UInt32(columns.astype(np.uint32)),
-        near_weight=mi.Float(weight.astype(np.float32)),
-        axes=_frame(normal.sum(axis=0)),
-    )
-
-
-def _frame(z: FloatArray) -> FloatArray:
-    z = z / np.linalg.norm(z) if np.linalg.norm(z) > 1e-6 else np.array([0.0, 0.0, 1.0])
-    x = np.cross((1.0, 0.0, 0.0) if abs(z[0]) < 0.9 else (0.0, 1.0, 0.0), z)
-    x /= np.linalg.norm(x)
-    return np.stack([x, np.cross(z, x), z])
-
-
-def cell_at(cells: FieldCells, point: mi.Point3f, active: mi.Bool) -> tuple[mi.UInt32, mi.Bool]:
-    """Number of the cell that holds a point, and whether there is one."""
-    relative = (point - cells.lower) * cells.inverse_size
-    inside = mi.Bool(active)
-    for i in range(3):
-        inside &= (relative[i] >= 0) & (relative[i] < mi.Float(cells.counts[i]))
-    x, y, z = (mi.UInt32(dr.maximum(relative[i], 0)) for i in range(3))
-    found = dr.gather(mi.UInt32, cells.index, x + cells.counts.x * (y + cells.counts.y * z), inside)
-    return dr.maximum(found, 1) - 1, inside & (found > 0)
-
-
-def direction_bin(cells: FieldCells, direction: mi.Vector3f) -> mi.UInt32:
+def direction_bin(cells: SurfaceCells, direction: mi.Vector3f) -> mi.UInt32:
     """Equal-area bin (of BINS on the sphere) of a unit direction."""
     x, y, z = (dr.dot(direction, mi.Vector3f(*map(float, row))) for row in cells.axes)
     band = dr.minimum(mi.UInt32(dr.maximum((z + 1) * (BANDS / 2), 0)), BANDS - 1)
@@ -154,7 +40,7 @@ def direction_bin(cells: FieldCells, direction: mi.Vector3f) -> mi.UInt32:
     return band * SECTORS + dr.minimum(mi.UInt32(turn * SECTORS), SECTORS - 1)
 
 
-def bin_centres(cells: FieldCells, bins: NDArray[np.integer]) -> mi.Float:
+def bin_centres(cells: SurfaceCells, bins: NDArray[np.integer]) -> mi.Float:
     """Middle direction of bins, four floats each."""
     z = (bins // SECTORS + 0.5) * (2 / BANDS) - 1
     turn = (bins % SECTORS + 0.5) * (2 * np.pi / SECTORS)
@@ -173,7 +59,7 @@ class LightField:
     ``colours``: the flux density per channel R, G, B where surfaces are coloured, else the same array.
     """
 
-    cells: FieldCells
+    cells: SurfaceCells
     bins: int
     groups: int
     moments: mi.Float
@@ -187,7 +73,7 @@ class LightField:
 class FieldTally:
     """Sums of landings per cell, direction bin and light group, over photon passes."""
 
-    def __init__(self, cells: FieldCells, groups: int, coloured: bool) -> None:
+    def __init__(self, cells: SurfaceCells, groups: int, coloured: bool) -> None:
         self.cells = cells
         self.groups = groups
         self.coloured = coloured
@@ -283,7 +169,7 @@ class FieldTally:
 
 
 @dr.syntax
-def _smooth(cells: FieldCells, values: mi.Float, bins: mi.UInt32, stride: mi.UInt32, groups: int):
+def _smooth(cells: SurfaceCells, values: mi.Float, bins: mi.UInt32, stride: mi.UInt32, groups: int):
     """Kernel-weighted sums over neighbouring cells of the chosen bins, four floats an entry."""
     used = dr.width(bins)
     lane = dr.arange(mi.UInt32, cells.cells * used * groups)

@@ -95,7 +95,9 @@ class OpticalModel:
         opaque = [i for i, s in enumerate(self._surfaces[:-1]) if s.kind is SurfaceKind.OPAQUE]
         self._fixed = RayScene([self._pieces[i] for i in opaque], opaque, self._table)
         self._emitter_table: EmitterTable = emitter_table(parts.emitters, len(parts.groups))
-        self._sensing_faces = _sensing_faces(self._pieces)
+        self._fine_pieces = [parts.fine.get(i, piece) for i, piece in enumerate(self._pieces)]
+        self._sensing_faces = _sensing_faces(self._fine_pieces)
+        self._fine_scene: RayScene | None = None
 
     def _indenter_surface(self) -> Surface:
         return coating_surface(self.design.coating, self._ior_before, Region.INDENTER)
@@ -120,6 +122,7 @@ class OpticalModel:
             return
         if section == "camera":
             self.__dict__.pop("surface", None)
+            self._fields = None
             return
         if section == "coating":
             coat = coating_surface(changed.coating, self._ior_before, Region.SENSING)
@@ -129,6 +132,7 @@ class OpticalModel:
             ] + [self._indenter_surface()]
             self._refresh_surfaces()
             self.scene.table = self._fixed.table = self._table
+            self._fine_scene = None
             if self._fields is not None:
                 self._fields.forget_light(self._coloured)
             return
@@ -156,7 +160,7 @@ class OpticalModel:
         """The sensing surface with coordinates in mm: (0, 0) where the camera's axis meets it (or nearest),
         u towards the right and v towards the top of the image."""
         axes = self.design.camera.axes()
-        rays = trace_chief_rays(self.scene, self.camera((3, 3)), self._sensing_faces)
+        rays = self.chief_rays((3, 3))
         if rays.hit[1, 1]:
             origin = rays.points[1, 1].astype(float)
         else:
@@ -170,7 +174,13 @@ class OpticalModel:
         self, resolution: tuple[int, int] | None = None, contacts: Sequence[Contact] = ()
     ) -> ChiefRays:
         """Where each pixel looks, by ideal refraction and reflection; (h, w, ...) arrays."""
-        scene = self.scene if not contacts else self._scenes(contacts).full
+        if contacts:
+            placed = [self._place(contact) for contact in contacts]
+            scene = self._with_indenters(self._fine_pieces, placed)
+        else:
+            if self._fine_scene is None:
+                self._fine_scene = RayScene(self._fine_pieces, table=self._table)
+            scene = self._fine_scene
         return trace_chief_rays(scene, self.camera(resolution), self._sensing_faces)
 
     def nine_contacts(
@@ -209,20 +219,28 @@ class OpticalModel:
         coat = self._surfaces[number]
         placed = [self._place(contact) for contact in contacts]
         pieces = [indenter_piece(mesh, coat) for mesh in placed]
-        numbers = [*range(number), *[number] * len(pieces)]
         return ContactScenes(
-            RayScene([*self._pieces, *pieces], numbers, self._table),
+            self._with_indenters(self._pieces, placed),
             self._fixed,
             RayScene(pieces, [number] * len(pieces), self._table),
             number,
             mi.Float(np.concatenate([_ball(mesh) for mesh in placed]).astype(np.float32)),
         )
 
+    def _with_indenters(self, fixed: list[Piece], placed: list[TriangleMesh]) -> RayScene:
+        number = len(fixed)
+        pieces = [indenter_piece(mesh, self._surfaces[number]) for mesh in placed]
+        numbers = [*range(number), *[number] * len(pieces)]
+        return RayScene([*fixed, *pieces], numbers, self._table)
+
     @property
     def _store(self) -> FieldStore:
         if self._fields is None:
             opaque = [p for p in self._pieces if p.surface.kind is SurfaceKind.OPAQUE]
-            self._fields = FieldStore(self.scene, opaque, self._emitter_table, self._coloured)
+            rays = self.chief_rays((96, 72))
+            self._fields = FieldStore(
+                self.scene, opaque, self._emitter_table, rays.points[rays.hit], self._coloured
+            )
         return self._fields
 
     def guide(self) -> Guide:
@@ -267,7 +285,7 @@ class OpticalModel:
         began = time.perf_counter()
         camera = self.camera(resolution)
         scenes = self._scenes(contacts)
-        rays = trace_chief_rays(scenes.full, camera, self._sensing_faces)
+        rays = trace_chief_rays(scenes.full, camera)
         if not rays.hit.any():
             raise _sees_nothing(rays)
         built = time.perf_counter()

@@ -7,15 +7,16 @@ estimation) and no light is counted twice.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import drjit as dr
 import mitsuba as mi
 
+from optisense.optics.cells import SurfaceCells, cell_at
 from optisense.optics.emitters import EmitterTable, emit
 from optisense.optics.guide import CELLS, Guide, warp
 from optisense.optics.ray_scene import RayScene, intersect, leave
-from optisense.optics.sampling import sequence_4d
+from optisense.optics.sampling import seed_of, sequence_4d
 from optisense.optics.scattering import (
     SMOOTH_ALPHA,
     coating_of,
@@ -30,17 +31,15 @@ from optisense.optics.surfaces import SurfaceKind
 # Photons are dropped after so many surfaces; in GelSight-like sensors less than 0.1 % of the light gets there.
 MAX_DEPTH = 32
 
-FIRST_LANDING = 1 << 8
-GROUP_MASK = FIRST_LANDING - 1
-SURFACE_SHIFT = 9
+GROUP_MASK = 0xFF
+SURFACE_SHIFT = 8
 
 
 @dataclass
 class PhotonMap:
     """Landings of photons, all of one pass.
 
-    ``cells`` tells for each photon emitted which cell of the guide it came from, all ones if it never landed.
-    ``place`` holds x, y, z (mm) and bits (light group, whether first landing, surface); ``travel`` the unit direction
+    ``place`` holds x, y, z (mm) and bits (light group, surface); ``travel`` the unit direction
     and the cosine with the face normal; ``power`` the photon's share of a light of 1 mW, per channel.
     """
 
@@ -50,67 +49,118 @@ class PhotonMap:
     travel: mi.Float
     power: mi.Float
     coloured: bool
-    cells: mi.UInt32
 
 
-@dr.syntax
-def _trace(
-    scene: mi.Scene,
-    rows: mi.Float,
-    corners: mi.Float,
-    surfaces: mi.Float,
-    table: EmitterTable,
-    guide: Guide,
-    first: mi.UInt32,
-    per_light: mi.UInt32,
-    seed: mi.UInt32,
-    capacity: mi.UInt32,
-    counter: mi.UInt32,
-    place: mi.Float,
-    travel: mi.Float,
-    power: mi.Float,
-    photons: int,
-    coloured: bool,
-    max_depth: mi.UInt32,
-    rough: bool,
-):
+# Photons that travel long leave most lanes of a vector idle; survivors are gathered anew after so many surfaces.
+STAGES = (4, 4, 6)
+
+
+@dataclass
+class _Flight:
+    """Photons under way. ``origin_cell`` is the cell of the guide that each came from; ``number`` its place in the pass."""
+
+    origin: mi.Point3f
+    direction: mi.Vector3f
+    throughput: mi.Color3f
+    group: mi.UInt32
+    landed: mi.Bool
+    active: mi.Bool
+    number: mi.UInt32
+
+
+@dataclass
+class Target:
+    """Cells of surfaces that matter: ``flags`` is 1 in those that the camera sees."""
+
+    cells: SurfaceCells
+    flags: mi.UInt32
+
+
+@dataclass
+class _Record:
+    """Where landings are written."""
+
+    capacity: mi.UInt32
+    counter: mi.UInt32
+    place: mi.Float
+    travel: mi.Float
+    power: mi.Float
+
+
+def _launch(
+    table: EmitterTable, guide: Guide, first: mi.UInt32, per_light: mi.UInt32, seed: mi.UInt32, photons: int
+) -> tuple[_Flight, mi.UInt32]:
     index = dr.arange(mi.UInt32, photons)
     light = index % table.count
     number = first + index // table.count
     u0, u1, u2, u3 = sequence_4d(number, light, seed)
     angle, weight, cell = warp(guide, light, mi.Point2f(u0, u1))
     origin, direction, group = emit(table, light, angle, mi.Point2f(u2, u3))
-    weight /= mi.Float(per_light)
-    rng = mi.PCG32(size=photons, initstate=mi.UInt64(seed), initseq=mi.UInt64(index + first))
-    throughput = mi.Color3f(weight)
-    active = mi.Bool(True)
-    landed = mi.Bool(False)
+    flight = _Flight(
+        origin=origin,
+        direction=direction,
+        throughput=mi.Color3f(weight / mi.Float(per_light)),
+        group=group,
+        landed=dr.full(mi.Bool, False, photons),
+        active=dr.full(mi.Bool, True, photons),
+        number=index,
+    )
+    return flight, light * (CELLS * CELLS) + cell
+
+
+@dr.syntax
+def _fly(
+    scene: mi.Scene,
+    rows: mi.Float,
+    corners: mi.Float,
+    surfaces: mi.Float,
+    flight: _Flight,
+    record: _Record,
+    target: Target | None,
+    coloured: bool,
+    rough: bool,
+    limit: mi.UInt32,
+    seed: mi.UInt64,
+) -> _Flight:
+    origin = mi.Point3f(flight.origin)
+    direction = mi.Vector3f(flight.direction)
+    throughput = mi.Color3f(flight.throughput)
+    group = flight.group
+    landed = mi.Bool(flight.landed)
+    active = mi.Bool(flight.active)
+    rng = mi.PCG32(
+        size=dr.width(flight.number), initstate=seed, initseq=mi.UInt64(flight.number)
+    )
     depth = mi.UInt32(0)
-    while active:
+    while active & (depth < limit):
         hit = intersect(scene, rows, corners, origin, direction, active)
         kind, eta, alpha, specularity = surface_kind(surfaces, hit.surface, hit.valid)
         active &= hit.valid & (kind != int(SurfaceKind.ABSORBER)) & (kind != int(SurfaceKind.LIGHT))
         opaque = active & (kind == int(SurfaceKind.OPAQUE))
-        cosine = dr.abs(dr.dot(direction, hit.normal))
-        if opaque:
-            slot = dr.scatter_inc(counter, mi.UInt32(0), opaque)
-            kept = opaque & (slot < capacity)
-            bits = (
-                group
-                | dr.select(landed, mi.UInt32(0), mi.UInt32(FIRST_LANDING))
-                | (hit.surface << SURFACE_SHIFT)
-            )
-            p = hit.point
-            d = direction
-            dr.scatter(
-                place, mi.Vector4f(p.x, p.y, p.z, dr.reinterpret_array(mi.Float, bits)), slot, kept
-            )
-            dr.scatter(travel, mi.Vector4f(d.x, d.y, d.z, cosine), slot, kept)
-            if dr.hint(coloured, mode="scalar"):
-                t = throughput
-                dr.scatter(power, mi.Vector4f(t.x, t.y, t.z, 0), slot, kept)
-            else:
-                dr.scatter(power, throughput.x, slot, kept)
+        if dr.hint(target is None, mode="scalar"):
+            if opaque:
+                slot = dr.scatter_inc(record.counter, mi.UInt32(0), opaque)
+                kept = opaque & (slot < record.capacity)
+                bits = group | (hit.surface << SURFACE_SHIFT)
+                p = hit.point
+                d = direction
+                cosine = dr.abs(dr.dot(d, hit.normal))
+                dr.scatter(
+                    record.place,
+                    mi.Vector4f(p.x, p.y, p.z, dr.reinterpret_array(mi.Float, bits)),
+                    slot,
+                    kept,
+                )
+                dr.scatter(record.travel, mi.Vector4f(d.x, d.y, d.z, cosine), slot, kept)
+                if dr.hint(coloured, mode="scalar"):
+                    t = throughput
+                    dr.scatter(record.power, mi.Vector4f(t.x, t.y, t.z, 0), slot, kept)
+                else:
+                    dr.scatter(record.power, throughput.x, slot, kept)
+            landed |= opaque
+        else:
+            cell, found = cell_at(target.cells, hit.point, opaque)
+            landed |= found & (dr.gather(mi.UInt32, target.flags, cell, found) != 0)
         pick = rng.next_float32()
         sample = mi.Point2f(rng.next_float32(), rng.next_float32())
         reflectance, reflected, transmitted, relative = refract(direction, hit.shading_normal, eta)
@@ -137,12 +187,68 @@ def _trace(
             survival = dr.minimum(dr.max(albedo), 0.95)
             active &= rng.next_float32() < survival
             throughput *= albedo / dr.maximum(survival, 1e-6)
-        landed |= opaque
         direction = dr.normalize(outgoing)
         origin = leave(hit.point, hit.normal, direction)
         depth += 1
-        active &= depth < max_depth
-    return dr.select(landed, light * (CELLS * CELLS) + cell, mi.UInt32(0xFFFFFFFF))
+    return _Flight(origin, direction, throughput, group, landed, active, flight.number)
+
+
+def _gathered(flight: _Flight, lanes: mi.UInt32) -> _Flight:
+    values = [getattr(flight, field.name) for field in fields(_Flight)]
+    return _Flight(*(dr.gather(type(value), value, lanes) for value in values))
+
+
+def _trace(
+    scene: RayScene,
+    table: EmitterTable,
+    guide: Guide,
+    per_light: int,
+    seed: int,
+    first: int,
+    record: _Record,
+    target: Target | None,
+    coloured: bool,
+) -> mi.UInt32:
+    """Fly a pass stage by stage; returns the guide's cell of each photon, all ones if it never landed."""
+    photons = per_light * table.count
+    numbers = [dr.opaque(mi.UInt32, value) for value in (first, per_light, seed)]
+    flight, cell = _launch(table, guide, *numbers, photons)
+    landed = dr.full(mi.Bool, False, photons)
+    arrived = dr.zeros(mi.UInt32, photons)
+    travelled = 0
+    for stage in range(len(STAGES) + 1):
+        steps = STAGES[stage] if stage < len(STAGES) else MAX_DEPTH - travelled
+        travelled += steps
+        flight = _fly(
+            scene.scene,
+            scene.rows,
+            scene.corners,
+            scene.table,
+            flight,
+            record,
+            target,
+            coloured,
+            scene.rough,
+            dr.opaque(mi.UInt32, steps),
+            dr.opaque(mi.UInt64, seed_of(seed, first, stage)),
+        )
+        if target is not None:
+            dr.scatter(arrived, mi.UInt32(1), flight.number, flight.landed)
+        dr.eval(flight, arrived, cell, record.counter, record.place, record.travel, record.power)
+        lanes = dr.compress(flight.active)
+        if dr.width(lanes) == 0 or travelled >= MAX_DEPTH:
+            break
+        flight = _gathered(flight, lanes)
+    return dr.select(arrived != 0, cell, mi.UInt32(0xFFFFFFFF))
+
+
+def trace_pilot(
+    scene: RayScene, table: EmitterTable, guide: Guide, per_light: int, seed: int, target: Target
+) -> mi.UInt32:
+    """For every photon of a pass the guide's cell that it came from, or all ones if it missed the target."""
+    one = dr.zeros(mi.Float, 4)
+    record = _Record(mi.UInt32(0), dr.zeros(mi.UInt32, 1), one, one, one)
+    return _trace(scene, table, guide, per_light, seed, 0, record, target, False)
 
 
 def trace_photons(
@@ -154,49 +260,34 @@ def trace_photons(
     *,
     first: int = 0,
     coloured: bool,
-    landings: float = 1.0,
-    max_depth: int = MAX_DEPTH,
+    landings: float = 1.5,
 ) -> PhotonMap:
     """Emit ``per_light`` photons from each light and record where they land.
 
-    ``first`` is the number of photons a light has already sent in earlier passes of the same seed; ``landings`` an upper
-    bound of landings a photon, for the size of the record (more are counted but dropped, and reported as an error).
-    Each light has 1 mW in all.
+    ``first`` is the number of photons a light has already sent in earlier passes of the same seed; ``landings`` is room
+    for so many landings a photon; where they turn out to be more, the pass is traced once more with more room. Each
+    light has 1 mW in all.
     """
     photons = per_light * table.count
-    capacity = int(photons * landings) + 1024
-    counter = mi.UInt32(0)
-    dr.make_opaque(counter)
-    place, travel = dr.empty(mi.Float, capacity * 4), dr.empty(mi.Float, capacity * 4)
-    power = dr.empty(mi.Float, capacity * (4 if coloured else 1))
-    opaque = [dr.opaque(mi.UInt32, v) for v in (first, per_light, seed, capacity, max_depth)]
-    cells = _trace(
-        scene.scene,
-        scene.rows,
-        scene.corners,
-        scene.table,
-        table,
-        guide,
-        opaque[0],
-        opaque[1],
-        opaque[2],
-        opaque[3],
-        counter,
-        place,
-        travel,
-        power,
-        photons,
-        coloured,
-        opaque[4],
-        scene.rough,
-    )
-    dr.eval(cells, counter, place, travel, power)
+    while True:
+        capacity = int(photons * landings) + 1024
+        record = _Record(
+            capacity=dr.opaque(mi.UInt32, capacity),
+            counter=dr.zeros(mi.UInt32, 1),
+            place=dr.empty(mi.Float, capacity * 4),
+            travel=dr.empty(mi.Float, capacity * 4),
+            power=dr.empty(mi.Float, capacity * (4 if coloured else 1)),
+        )
+        _trace(scene, table, guide, per_light, seed, first, record, None, coloured)
+        count = int(record.counter[0])
+        if count <= capacity:
+            break
+        landings = 1.2 * count / photons
     return PhotonMap(
-        count=min(int(counter[0]), capacity),
+        count=count,
         emitted=photons,
-        place=place,
-        travel=travel,
-        power=power,
+        place=record.place,
+        travel=record.travel,
+        power=record.power,
         coloured=coloured,
-        cells=cells,
     )

@@ -131,7 +131,7 @@ def intersect(
     return Hit(
         valid=valid,
         distance=found.t,
-        point=origin + direction * found.t,
+        point=mi.Point3f(origin + direction * found.t),
         normal=normal,
         shading_normal=shading,
         surface=bits & (SMOOTH_FACE - 1),
@@ -141,7 +141,8 @@ def intersect(
 
 def leave(point: mi.Point3f, normal: mi.Vector3f, direction: mi.Vector3f) -> mi.Point3f:
     """Start of a ray from a surface: moved off it to the side that ``direction`` points to."""
-    return point + normal * dr.select(dr.dot(direction, normal) > 0, RAY_OFFSET, -RAY_OFFSET)
+    side = dr.select(dr.dot(direction, normal) > 0, RAY_OFFSET, -RAY_OFFSET)
+    return mi.Point3f(point + normal * side)
 
 
 def _merge(

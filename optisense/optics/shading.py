@@ -14,7 +14,8 @@ from dataclasses import dataclass
 import drjit as dr
 import mitsuba as mi
 
-from optisense.optics.light_field import FieldCells, LightField, cell_at
+from optisense.optics.cells import SurfaceCells, cell_at
+from optisense.optics.light_field import LightField
 from optisense.optics.ray_scene import RayScene, leave
 from optisense.optics.sampling import unit_float
 from optisense.optics.scattering import (
@@ -106,7 +107,7 @@ def _sum_all(
 
 @dr.syntax
 def _sum_chosen(
-    cells: FieldCells,
+    cells: SurfaceCells,
     tables: tuple[mi.Float, mi.Float],
     centres: mi.Float,
     bins: mi.UInt32,
@@ -281,7 +282,8 @@ def _shade_field(
         field.groups,
         field.coloured,
         scenes.fixed.scene if indenters is None else indenters.scene,
-        scenes.balls,
+        # A loop takes no empty array.
+        scenes.balls if dr.width(scenes.balls) else dr.zeros(mi.Float, 4),
         dr.width(scenes.balls) // 4,
         coating,
         points,
@@ -293,7 +295,7 @@ def _shade_field(
 
 
 def _interpolating_cell(
-    cells: FieldCells, base: mi.Point3f, active: mi.Bool, random: mi.UInt32
+    cells: SurfaceCells, base: mi.Point3f, active: mi.Bool, random: mi.UInt32
 ) -> tuple[mi.UInt32, mi.Vector3f, mi.Bool]:
     """A random cell next to points, how far it was moved, and whether there is one.
 

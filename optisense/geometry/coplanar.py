@@ -1,0 +1,108 @@
+"""Merge coplanar triangles: a flat face needs no fine tessellation to be ray traced."""
+
+from __future__ import annotations
+
+import manifold3d
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
+
+from optisense.geometry.mesh import TriangleMesh
+
+SAME_DIRECTION = 1e-10
+"""Faces whose normals' cosine differs by less from 1 may be coplanar."""
+SAME_PLANE = 1e-6
+"""Planes closer than this (mm) are one."""
+STRAIGHT = 1e-6
+"""A corner whose sides' directions differ by less (sine) is no corner."""
+
+Loop = list[int]
+
+
+def merge_coplanar(mesh: TriangleMesh) -> TriangleMesh:
+    """The same surface with every flat, connected patch of triangles triangulated anew from its outline.
+
+    Patches keep their outlines, less the points along straight lines. Shading normals are dropped, so this is for meshes with flat
+    facets. A patch whose outline touches itself is left as it is.
+    """
+    mesh = mesh.welded()
+    patches = _patches(mesh)
+    faces: list[NDArray[np.int64]] = []
+    for members in np.split(np.argsort(patches, kind="stable"), np.cumsum(np.bincount(patches))[:-1]):
+        old = np.asarray(mesh.faces[members], dtype=np.int64)
+        new = _triangulated(mesh, old) if len(old) > 2 else None
+        faces.append(old if new is None else new)
+    merged = TriangleMesh(mesh.vertices, np.concatenate(faces).astype(np.int32))
+    return merged.compacted()
+
+
+def _patches(mesh: TriangleMesh) -> NDArray[np.int64]:
+    """(m,) number of the coplanar, connected patch that each face belongs to."""
+    faces = np.asarray(mesh.faces, dtype=np.int64)
+    normals = mesh.face_normals
+    offsets = np.einsum("ij,ij->i", normals, mesh.vertices[faces[:, 0]])
+    edges = np.sort(faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
+    owner = np.repeat(np.arange(len(faces)), 3)
+    order = np.lexsort((edges[:, 1], edges[:, 0]))
+    edges, owner = edges[order], owner[order]
+    twin = (edges[1:] == edges[:-1]).all(axis=1)
+    one, other = owner[:-1][twin], owner[1:][twin]
+    flat = (np.einsum("ij,ij->i", normals[one], normals[other]) > 1 - SAME_DIRECTION) & (
+        np.abs(offsets[one] - offsets[other]) < SAME_PLANE
+    )
+    graph = coo_matrix(
+        (np.ones(int(flat.sum())), (one[flat], other[flat])), shape=(len(faces), len(faces))
+    )
+    return np.asarray(connected_components(graph, directed=False)[1], dtype=np.int64)
+
+
+def _triangulated(mesh: TriangleMesh, faces: NDArray[np.int64]) -> NDArray[np.int64] | None:
+    """New faces for a patch, or None where its outline is not made of simple loops."""
+    loops = _outline(faces)
+    if loops is None:
+        return None
+    loops = [_corners(mesh.vertices, loop) for loop in loops]
+    if any(len(loop) < 3 for loop in loops):
+        return None
+    a, b, c = mesh.vertices[faces[0]]
+    x = (b - a) / np.linalg.norm(b - a)
+    normal = np.cross(b - a, c - a)
+    y = np.cross(normal / np.linalg.norm(normal), x)
+    flat = [np.stack([mesh.vertices[loop] @ x, mesh.vertices[loop] @ y], axis=1) for loop in loops]
+    corners = np.concatenate([np.asarray(loop, dtype=np.int64) for loop in loops])
+    triangles = np.asarray(manifold3d.triangulate(flat), dtype=np.int64)
+    if len(triangles) == 0 or len(triangles) >= len(faces):
+        return None
+    return np.asarray(corners[triangles])
+
+
+def _outline(faces: NDArray[np.int64]) -> list[Loop] | None:
+    """Closed loops of vertices around a patch, with its inside on the left; None if two loops touch."""
+    directed = {(int(a), int(b)) for f in faces for a, b in ((f[0], f[1]), (f[1], f[2]), (f[2], f[0]))}
+    follow: dict[int, int] = {}
+    for a, b in directed:
+        if (b, a) not in directed:
+            if a in follow:
+                return None
+            follow[a] = b
+    loops = []
+    while follow:
+        start, here = follow.popitem()
+        loop = [start]
+        while here != start:
+            loop.append(here)
+            if here not in follow:
+                return None
+            here = follow.pop(here)
+        loops.append(loop)
+    return loops
+
+
+def _corners(vertices: NDArray[np.float64], loop: Loop) -> Loop:
+    """The loop without the vertices that lie on a straight line between their neighbours."""
+    points = vertices[loop]
+    before, after = points - np.roll(points, 1, axis=0), np.roll(points, -1, axis=0) - points
+    sine = np.linalg.norm(np.cross(before, after), axis=1)
+    bent = sine > STRAIGHT * np.linalg.norm(before, axis=1) * np.linalg.norm(after, axis=1)
+    return [vertex for vertex, keep in zip(loop, bent, strict=True) if keep]

@@ -1,0 +1,205 @@
+"""A sensor's surfaces, lights and camera as an ordinary Mitsuba scene.
+
+Mitsuba's own ``path`` integrator then renders what this package renders, with Mitsuba's BSDFs, emitters and sensor:
+a second opinion for tests, and a rival for benchmarks. A path tracer finds an area light through
+smooth glass only by chance, and never a point light or a spot.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import mitsuba as mi
+import numpy as np
+from numpy.typing import NDArray
+
+from optisense.errors import RenderError
+from optisense.optics.camera import RayCamera
+from optisense.optics.emitters import Emitter, Shape
+from optisense.optics.ray_scene import Piece
+from optisense.optics.scattering import SMOOTH_ALPHA
+from optisense.optics.surfaces import Surface, SurfaceKind
+
+Colour = tuple[float, float, float]
+
+PATH_DEPTH = 64
+"""Surfaces of a path; the light lost beyond is far below a thousandth."""
+
+SPOT_PIXELS = 512
+WIDEST_SPOT = 80.0
+"""Degrees: Mitsuba's spot paints its profile on a plane across the axis, so it can't reach 90."""
+
+BLACK = {"type": "diffuse", "reflectance": {"type": "rgb", "value": 0.0}}
+
+
+def mitsuba_scene(
+    pieces: Sequence[Piece],
+    emitters: Sequence[Emitter],
+    camera: RayCamera,
+    flux: Sequence[Colour],
+    *,
+    samples: int = 64,
+    max_depth: int = PATH_DEPTH,
+) -> dict[str, Any]:
+    """A dictionary for ``mi.load_dict``.
+
+    Args:
+        pieces: all surfaces; the emitting faces among them are left out, the emitters bring theirs.
+        emitters: the lights.
+        camera: must be perspective.
+        flux: mW per channel of each light of a group, in the order of the groups.
+        samples: per pixel.
+        max_depth: as Mitsuba counts it.
+
+    Raises:
+        RenderError: Mitsuba has no such camera, or a light's profile reaches too far from its axis.
+    """
+    scene: dict[str, Any] = {
+        "type": "scene",
+        "integrator": {"type": "path", "max_depth": max_depth, "rr_depth": 16},
+        "sensor": _sensor(camera, samples),
+    }
+    for number, piece in enumerate(pieces):
+        if piece.surface.kind is not SurfaceKind.LIGHT:
+            scene[f"piece_{number}"] = _mesh(piece)
+    for number, emitter in enumerate(emitters):
+        scene[f"light_{number}"] = _emitter(emitter, np.asarray(flux[emitter.group], float))
+    return scene
+
+
+def surface_bsdf(surface: Surface) -> dict[str, Any]:
+    """Mitsuba's description of a surface. Indices are relative to the medium before it already."""
+    if surface.kind is SurfaceKind.DIELECTRIC:
+        smooth = {"int_ior": float(surface.eta), "ext_ior": 1.0}
+        if surface.alpha <= SMOOTH_ALPHA:
+            return {"type": "dielectric", **smooth}
+        return {
+            "type": "roughdielectric",
+            "distribution": "ggx",
+            "alpha": float(surface.alpha),
+            "sample_visible": True,
+            **smooth,
+        }
+    if surface.kind in (SurfaceKind.ABSORBER, SurfaceKind.LIGHT):
+        return {"type": "twosided", "bsdf": BLACK}
+    index = {"eta": _rgb(surface.metal_eta), "k": _rgb(surface.metal_k)}
+    if surface.kind is SurfaceKind.MIRROR:
+        return {"type": "twosided", "bsdf": {"type": "conductor", **index}}
+    diffuse = {"type": "diffuse", "reflectance": _rgb(surface.reflectance)}
+    metal = {
+        "type": "roughconductor",
+        "distribution": "ggx",
+        "alpha": float(surface.alpha),
+        "sample_visible": True,
+        **index,
+    }
+    if surface.specularity <= 0.0:
+        return {"type": "twosided", "bsdf": diffuse}
+    if surface.specularity >= 1.0:
+        return {"type": "twosided", "bsdf": metal}
+    blend = {"type": "blendbsdf", "weight": float(surface.specularity), "a": diffuse, "b": metal}
+    return {"type": "twosided", "bsdf": blend}
+
+
+def _rgb(values: Sequence[float] | NDArray[np.floating]) -> dict[str, Any]:
+    return {"type": "rgb", "value": [float(v) for v in values]}
+
+
+def _mesh(piece: Piece) -> Any:
+    properties = mi.Properties()
+    properties["bsdf"] = mi.load_dict(surface_bsdf(piece.surface))
+    vertices = np.asarray(piece.vertices, dtype=np.float32)
+    smooth = piece.normals is not None
+    mesh = mi.Mesh(piece.name, len(vertices), len(piece.faces), properties, smooth)
+    parameters = mi.traverse(mesh)
+    parameters["vertex_positions"] = mi.Float(vertices.ravel())
+    parameters["faces"] = mi.UInt32(np.asarray(piece.faces, dtype=np.uint32).ravel())
+    if smooth:
+        normals = np.asarray(piece.normals, dtype=np.float32)
+        parameters["vertex_normals"] = mi.Float(normals.ravel())
+    parameters.update()
+    return mesh
+
+
+def _sensor(camera: RayCamera, samples: int) -> dict[str, Any]:
+    if camera.equidistant:
+        raise RenderError("Mitsuba has no equidistant camera", hint="use a perspective one")
+    target = np.asarray(camera.position, float) + np.asarray(camera.direction, float)
+    return {
+        "type": "perspective",
+        "fov": float(camera.fov),
+        "fov_axis": "x",
+        "near_clip": 1e-3,
+        "far_clip": 1e5,
+        "to_world": mi.ScalarTransform4f().look_at(
+            origin=list(map(float, camera.position)), target=target.tolist(), up=list(camera.up)
+        ),
+        "sampler": {"type": "independent", "sample_count": samples},
+        "film": {
+            "type": "hdrfilm",
+            "width": camera.width,
+            "height": camera.height,
+            "pixel_format": "rgb",
+            "component_format": "float32",
+            "rfilter": {"type": "box"},
+        },
+    }
+
+
+def _emitter(emitter: Emitter, power: NDArray[np.floating]) -> dict[str, Any]:
+    if emitter.shape is Shape.POINT:
+        return _point(emitter, power)
+    if emitter.intensity is not None or emitter.exponent != 1.0:
+        raise RenderError("Mitsuba's area lights are Lambertian", where=f"group {emitter.group}")
+    half = np.asarray(emitter.size, float) / 2
+    area = 4 * half[0] * half[1]
+    kind = "rectangle"
+    if emitter.shape is Shape.DISC:
+        kind, area = "disk", np.pi * half[0] * half[1]
+    return {
+        "type": kind,
+        "to_world": _pose(emitter, half),
+        "bsdf": BLACK,
+        "emitter": {"type": "area", "radiance": _rgb(power / (np.pi * area))},
+    }
+
+
+def _point(emitter: Emitter, power: NDArray[np.floating]) -> dict[str, Any]:
+    profile = emitter.intensity
+    if profile is not None and profile.polar[-1] >= 180.0 and np.ptp(profile.values) == 0.0:
+        position = [float(v) for v in emitter.position]
+        return {"type": "point", "position": position, "intensity": _rgb(power / (4 * np.pi))}
+    if profile is None or profile.polar[-1] > WIDEST_SPOT:
+        raise RenderError(
+            f"Mitsuba has no point light that shines up to more than {WIDEST_SPOT} degrees from "
+            "its axis, save evenly all around",
+            where=f"group {emitter.group}",
+        )
+    cutoff = float(profile.polar[-1])
+    # Mitsuba multiplies a spot's intensity by a texture over the plane across the axis.
+    reach = np.tan(np.radians(cutoff))
+    steps = (np.arange(SPOT_PIXELS) + 0.5) * (2 / SPOT_PIXELS) - 1
+    x, y = np.meshgrid(steps * reach, steps * reach)
+    polar = np.degrees(np.arctan(np.hypot(x, y)))
+    image = profile.at(polar, np.degrees(np.arctan2(y, x)))
+    cell = (2 * reach / SPOT_PIXELS) ** 2
+    total = float((image * cell * np.cos(np.radians(polar)) ** 3).sum())
+    bitmap = mi.Bitmap(np.repeat(image[:, :, None], 3, axis=2).astype(np.float32))
+    return {
+        "type": "spot",
+        "to_world": _pose(emitter, np.ones(2)),
+        "cutoff_angle": cutoff,
+        "beam_width": cutoff * 0.9999,
+        "intensity": _rgb(power / total),
+        "texture": {"type": "bitmap", "bitmap": bitmap, "raw": True, "wrap_mode": "clamp"},
+    }
+
+
+def _pose(emitter: Emitter, half: NDArray[np.floating]) -> Any:
+    """From the light's own frame (shining along +z, half sizes 1) to the scene."""
+    frame = emitter.frame()
+    matrix = np.eye(4)
+    matrix[:3, 0], matrix[:3, 1], matrix[:3, 2] = frame[0] * half[0], frame[1] * half[1], frame[2]
+    matrix[:3, 3] = emitter.position
+    return mi.ScalarTransform4f(matrix)

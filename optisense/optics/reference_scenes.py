@@ -1,0 +1,252 @@
+"""Small scenes with known answers, and the ways to render one: photon mapping, the pooled light field, Mitsuba's path.
+
+Tests and benchmarks share them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import mitsuba as mi
+import numpy as np
+from numpy.typing import NDArray
+
+from optisense.optics.camera import RayCamera
+from optisense.optics.chief_rays import ChiefRays, trace_chief_rays
+from optisense.optics.emitters import Emitter, EmitterTable, Intensity, Shape, emitter_table
+from optisense.optics.field_store import FieldStore
+from optisense.optics.guide import even_guide
+from optisense.optics.imaging import render_field
+from optisense.optics.mitsuba_export import PATH_DEPTH, Colour, mitsuba_scene
+from optisense.optics.ray_scene import Piece, RayScene
+from optisense.optics.shading import ContactScenes
+from optisense.optics.sppm import render_sppm
+from optisense.optics.surfaces import Region, Surface, SurfaceKind
+
+FloatArray = NDArray[np.floating]
+
+GEL_INDEX = 1.41
+REFEREE_SLAB = (16.0, 12.0, 4.0)
+REFEREE_RADIANCE = 40.0
+REFEREE_INTENSITY = 400.0
+REFEREE_BUMP = (3.0, 0.8)
+"""Radius of the sphere and how deep it is pressed in, mm."""
+
+
+@dataclass(frozen=True)
+class ReferenceScene:
+    """Surfaces, lights and a camera. ``flux`` is mW per channel of each light of a group."""
+
+    pieces: list[Piece]
+    emitters: list[Emitter]
+    flux: list[Colour]
+    camera: RayCamera
+
+    def ray_scene(self) -> RayScene:
+        """The scene for rays."""
+        return RayScene(self.pieces)
+
+    def table(self) -> EmitterTable:
+        """The lights, on the device."""
+        return emitter_table(self.emitters, len(self.flux))
+
+    def _coloured(self) -> bool:
+        surfaces = [p.surface for p in self.pieces if p.surface.kind is not SurfaceKind.DIELECTRIC]
+        return any(
+            np.ptp(s.reflectance) + np.ptp(s.metal_eta) + np.ptp(s.metal_k) > 0 for s in surfaces
+        )
+
+    def chief_rays(self) -> ChiefRays:
+        """One ray through the middle of every pixel."""
+        count = sum(len(piece.faces) for piece in self.pieces)
+        return trace_chief_rays(self.ray_scene(), self.camera, np.arange(count))
+
+    def _scaled(self, layers: FloatArray) -> FloatArray:
+        return np.asarray(layers, np.float64) * np.asarray(self.flux)[:, None, None, :]
+
+    def pairwise(
+        self, passes: int, per_light: int, seed: int = 0, radius: float = 0.1
+    ) -> tuple[FloatArray, FloatArray]:
+        """Progressive photon mapping: radiance (groups, h, w, 3), and the same from either half of the passes."""
+        result = render_sppm(
+            self.ray_scene(),
+            self.table(),
+            even_guide(len(self.emitters)),
+            self.camera,
+            passes,
+            per_light,
+            seed,
+            coloured=self._coloured(),
+            radius=radius,
+        )
+        return self._scaled(result.layers), np.stack([self._scaled(h) for h in result.halves])
+
+    def pooled(self, photons: int, seed: int = 0) -> FloatArray:
+        """The pooled light field: radiance (groups, h, w, 3)."""
+        scene = self.ray_scene()
+        surfaces = [piece.surface for piece in self.pieces]
+        opaque = [i for i, s in enumerate(surfaces) if s.kind is SurfaceKind.OPAQUE]
+        rays = trace_chief_rays(scene, self.camera, np.zeros(len(scene.faces), dtype=np.int64))
+        store = FieldStore(
+            scene,
+            [self.pieces[i] for i in opaque],
+            self.table(),
+            rays.points[rays.hit],
+            self._coloured(),
+        )
+        light = store.field(
+            seed, photons, None, None, 2 * photons, 0.0, lambda fraction, traced, noise: None
+        )
+        fixed = RayScene([self.pieces[i] for i in opaque], opaque, scene.table)
+        scenes = ContactScenes(scene, fixed, None, len(surfaces), mi.Float())
+        areas = [_area(emitter) for emitter in self.emitters]
+        layers = render_field(light, scenes, self.camera, rays, self.emitters, areas, seed)
+        return self._scaled(layers.radiance)
+
+    def path(self, samples: int, seed: int = 0, max_depth: int = PATH_DEPTH) -> FloatArray:
+        """Mitsuba's path tracer: radiance (h, w, 3) of all groups together."""
+        described = mitsuba_scene(
+            self.pieces,
+            self.emitters,
+            self.camera,
+            self.flux,
+            samples=samples,
+            max_depth=max_depth,
+        )
+        return np.asarray(mi.render(mi.load_dict(described), seed=seed), dtype=np.float64)
+
+
+def _area(emitter: Emitter) -> float:
+    round_off = np.pi / 4 if emitter.shape is Shape.DISC else 1.0
+    return float(emitter.size[0] * emitter.size[1] * round_off)
+
+
+def isotropic() -> Intensity:
+    """The same intensity all around."""
+    return Intensity(np.array([0.0, 180.0]), np.zeros(1), np.ones((1, 2)))
+
+
+def diffuse_coating(reflectance: float) -> Surface:
+    """A Lambertian sensing surface."""
+    return Surface(SurfaceKind.OPAQUE, 1.0, 1.0, 0.0, (reflectance,) * 3, region=Region.SENSING)
+
+
+def metal_coating(alpha: float, eta: Colour, k: Colour, specularity: float = 1.0) -> Surface:
+    """A rough metal (GGX) as sensing surface; below specularity 1, blended with a diffuse reflectance of 0.5."""
+    return Surface(
+        SurfaceKind.OPAQUE,
+        1.0,
+        alpha,
+        specularity,
+        (0.5, 0.5, 0.5),
+        eta,
+        k,
+        region=Region.SENSING,
+    )
+
+
+def quad(name: str, corners: Sequence[Sequence[float]], surface: Surface) -> Piece:
+    """A plane quadrilateral; its normal follows the right hand along the corners."""
+    return Piece(name, np.asarray(corners, float), np.array([[0, 1, 2], [0, 2, 3]]), surface)
+
+
+def box(
+    name: str,
+    low: Sequence[float],
+    high: Sequence[float],
+    surface: Surface,
+    without: Sequence[str] = (),
+    inward: bool = False,
+) -> Piece:
+    """An axis-parallel box of two triangles a side, normals outward unless ``inward``.
+
+    ``without`` leaves out sides, named "-x", "+x", ... "+z".
+    """
+    points = np.array(
+        [[(low, high)[i][0], (low, high)[j][1], (low, high)[k][2]]
+         for i in range(2) for j in range(2) for k in range(2)],
+        dtype=float,
+    )  # fmt: skip
+    sides = {
+        "-x": (0, 1, 3, 2), "+x": (4, 6, 7, 5), "-y": (0, 4, 5, 1),
+        "+y": (2, 3, 7, 6), "-z": (0, 2, 6, 4), "+z": (1, 5, 7, 3),
+    }  # fmt: skip
+    faces = []
+    for side, (a, b, c, d) in sides.items():
+        if side not in without:
+            faces += [[a, b, c], [a, c, d]]
+    turned = np.array(faces)
+    return Piece(name, points, turned[:, ::-1] if inward else turned, surface)
+
+
+def bumped_plane(
+    surface: Surface,
+    size: tuple[float, float] = REFEREE_SLAB[:2],
+    ball: tuple[float, float] = REFEREE_BUMP,
+    spacing: float = 0.1,
+) -> Piece:
+    """The plane z = 0 about the origin, a ball of (radius, depth) pressed in along +z in its middle; flat facets."""
+    counts = [round(s / spacing) + 1 for s in size]
+    x, y = (np.linspace(-s / 2, s / 2, n) for s, n in zip(size, counts, strict=True))
+    grid_x, grid_y = np.meshgrid(x, y, indexing="ij")
+    radius, depth = ball
+    cap = np.sqrt(np.maximum(radius**2 - grid_x**2 - grid_y**2, 0.0)) - (radius - depth)
+    points = np.stack([grid_x, grid_y, np.maximum(cap, 0.0)], axis=-1).reshape(-1, 3)
+    index = np.arange(len(points)).reshape(counts)
+    a, b, c, d = index[:-1, :-1], index[1:, :-1], index[1:, 1:], index[:-1, 1:]
+    faces = np.concatenate([np.stack([a, b, c], -1), np.stack([a, c, d], -1)]).reshape(-1, 3)
+    return Piece("coating", points, faces, surface)
+
+
+def referee_scene(
+    coating: Surface,
+    slab: bool = True,
+    lights: str = "area",
+    resolution: tuple[int, int] = (160, 120),
+) -> ReferenceScene:
+    """A coated slab of gel with a bump, lit from three sides through its walls, seen from above.
+
+    Args:
+        coating: of the bottom, z = 0.
+        slab: whether there is gel; without it the coating lies bare.
+        lights: "area" (4 x 2 mm, radiance REFEREE_RADIANCE, outside the slab), "point" (intensity REFEREE_INTENSITY, at
+            the same places), or "embedded" (smaller area lights inside the gel).
+        resolution: pixels, width and height.
+    """
+    half_x, half_y, height = REFEREE_SLAB[0] / 2, REFEREE_SLAB[1] / 2, REFEREE_SLAB[2]
+    pieces = [bumped_plane(coating)]
+    if slab:
+        gel = Surface(SurfaceKind.DIELECTRIC, eta=GEL_INDEX)
+        low, high = (-half_x, -half_y, 0.0), (half_x, half_y, height)
+        pieces.append(box("slab", low, high, gel, without=["-z"]))
+    size = (4.0, 2.0)
+    distances = (9.5, 9.5, 7.5)
+    if lights == "embedded":
+        size, distances = (3.0, 1.0), (7.0, 7.0, 5.0)
+    ways = ((1.0, 0.0, 0.0), (-1.0, 0.0, 0.0), (0.0, -1.0, 0.0))
+    emitters, flux = [], []
+    for number, (way, distance) in enumerate(zip(ways, distances, strict=True)):
+        place = (-way[0] * distance, -way[1] * distance, height / 2)
+        colour = np.eye(3)[number]
+        if lights == "point":
+            emitter = Emitter(number, place, way, intensity=isotropic())
+            power = 4 * np.pi * REFEREE_INTENSITY
+        else:
+            emitter = Emitter(number, place, way, shape=Shape.RECTANGLE, size=size)
+            power = np.pi * size[0] * size[1] * REFEREE_RADIANCE
+            pieces.append(emitting_face(number, emitter))
+        emitters.append(emitter)
+        flux.append((float(colour[0] * power), float(colour[1] * power), float(colour[2] * power)))
+    camera = RayCamera(
+        (0.0, 0.0, 24.0), (0.0, 0.0, -1.0), (0.0, 1.0, 0.0), 42.0, *resolution
+    )
+    return ReferenceScene(pieces, emitters, flux, camera)
+
+
+def emitting_face(number: int, emitter: Emitter) -> Piece:
+    """The face of a rectangular area light, for cameras to see and light to end on."""
+    s, t, _ = emitter.frame()
+    corners = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]) * (np.array(emitter.size) / 2)
+    points = np.asarray(emitter.position) + corners[:, :1] * s + corners[:, 1:] * t
+    return quad(f"light {number}", points.tolist(), Surface(SurfaceKind.LIGHT, light=number))
