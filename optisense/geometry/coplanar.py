@@ -21,15 +21,19 @@ Loop = list[int]
 
 
 def merge_coplanar(mesh: TriangleMesh) -> TriangleMesh:
-    """The same surface with every flat, connected patch of triangles triangulated anew from its outline.
+    """The same surface with every flat, connected patch of triangles triangulated anew from its
+    outline.
 
-    Patches keep their outlines, less the points along straight lines. Shading normals are dropped, so this is for meshes with flat
-    facets. A patch whose outline touches itself is left as it is.
+    Patches keep their outlines, less the points along straight lines. Shading normals are
+    dropped, so this is for meshes with flat facets. A patch whose outline touches itself is
+    left as it is.
     """
     mesh = mesh.welded()
     patches = _patches(mesh)
     faces: list[NDArray[np.int64]] = []
-    for members in np.split(np.argsort(patches, kind="stable"), np.cumsum(np.bincount(patches))[:-1]):
+    for members in np.split(
+        np.argsort(patches, kind="stable"), np.cumsum(np.bincount(patches))[:-1]
+    ):
         old = np.asarray(mesh.faces[members], dtype=np.int64)
         new = _triangulated(mesh, old) if len(old) > 2 else None
         faces.append(old if new is None else new)
@@ -78,8 +82,12 @@ def _triangulated(mesh: TriangleMesh, faces: NDArray[np.int64]) -> NDArray[np.in
 
 
 def _outline(faces: NDArray[np.int64]) -> list[Loop] | None:
-    """Closed loops of vertices around a patch, with its inside on the left; None if two loops touch."""
-    directed = {(int(a), int(b)) for f in faces for a, b in ((f[0], f[1]), (f[1], f[2]), (f[2], f[0]))}
+    """Closed loops of vertices around a patch, with its inside on the left; None if two loops
+    touch.
+    """
+    directed = {
+        (int(a), int(b)) for f in faces for a, b in ((f[0], f[1]), (f[1], f[2]), (f[2], f[0]))
+    }
     follow: dict[int, int] = {}
     for a, b in directed:
         if (b, a) not in directed:

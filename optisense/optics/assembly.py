@@ -34,9 +34,10 @@ PROBE = 0.02
 class Assembly:
     """A design as ray tracing needs it.
 
-    pieces: all fixed surfaces. sensing: the meshes of the sensing surface (deformed). gels: the elastomers. emitters:
-    all lights, ``group`` counting in the order of ``groups``; light_areas: mm^2 of their windows, 0 for points. fine: for
-    the pieces of the sensing surface, by number, the same piece with all its triangles.
+    pieces: all fixed surfaces. sensing: the deformed sensing surface. gels: the
+        elastomers. emitters: all lights, ``group`` counting in the order of ``groups``;
+        light_areas: mm^2 of their windows, 0 for points. fine: for the pieces of the sensing
+        surface, by number, the same piece with all its triangles.
     """
 
     pieces: list[Piece]
@@ -145,9 +146,7 @@ def _opaque(material: Material | None, ior: float) -> Surface:
     if isinstance(material, Diffuse):
         return Surface(SurfaceKind.OPAQUE, alpha=1.0, reflectance=material.reflectance)
     if isinstance(material, Conductor):
-        kind = (
-            SurfaceKind.MIRROR if material.roughness < SMOOTH_METAL else SurfaceKind.OPAQUE
-        )
+        kind = SurfaceKind.MIRROR if material.roughness < SMOOTH_METAL else SurfaceKind.OPAQUE
         return Surface(
             kind,
             alpha=material.roughness,
@@ -174,7 +173,8 @@ def _merged(mesh: TriangleMesh) -> TriangleMesh:
     bend = np.abs(smooth.normals[smooth.faces] - smooth.face_normals[:, None]).max(axis=(1, 2))
     if bend.max() < FLAT:
         return merge_coplanar(mesh)
-    # A curved mesh may still have flat walls; shading normals would be lost, so only these are merged.
+    # A curved mesh may still have flat walls; shading normals would be lost, so only these are
+    # merged.
     return mesh
 
 
@@ -189,7 +189,7 @@ def _piece(name: str, mesh: TriangleMesh, surface: Surface) -> Piece:
 
 def _emitters(design: SensorDesign) -> tuple[list[Emitter], list[float]]:
     emitters, areas = [], []
-    for number, (name, group) in enumerate(design.lights.items()):
+    for number, group in enumerate(design.lights.values()):
         model = library.emitter(group)
         intensity, shape, size, area = None, Shape.POINT, (0.0, 0.0), 0.0
         if model.kind == "area":

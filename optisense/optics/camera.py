@@ -25,7 +25,9 @@ class RayCamera:
     equidistant: bool = False
 
     def axes(self) -> np.ndarray:
-        """(3, 3): image right, image up, viewing direction as rows, right-handed as seen from the camera."""
+        """(3, 3): image right, image up, viewing direction as rows, right-handed as seen from
+        the camera.
+        """
         forward = np.asarray(self.direction, float)
         forward = forward / np.linalg.norm(forward)
         right = np.cross(forward, np.asarray(self.up, float))

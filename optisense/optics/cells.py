@@ -17,7 +17,8 @@ FloatArray = NDArray[np.floating]
 class SurfaceCells:
     """Cells of a uniform 3-D grid that surfaces pass through, and a smoothing kernel among them.
 
-    ``index`` is the number + 1 of the cell at each grid place (0: none); ``axes`` (3, 3) the frame of the bins.
+    ``index`` is the number + 1 of the cell at each grid place (0: none); ``axes`` (3, 3) the
+    frame of the bins.
     """
 
     lower: mi.Point3f
@@ -36,7 +37,9 @@ class SurfaceCells:
 def surface_samples(
     vertices: FloatArray, faces: NDArray[np.integer], spacing: float
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Points (n, 3) mm, normals (n, 3), areas (n,) mm^2 spread over a mesh, about one per spacing^2."""
+    """Points (n, 3) mm, normals (n, 3), areas (n,) mm^2 spread over a mesh, about one per
+    spacing^2.
+    """
     a, b, c = (vertices[faces[:, k]] for k in range(3))
     cross = np.cross(b - a, c - a)
     area = np.linalg.norm(cross, axis=1) / 2
@@ -57,7 +60,8 @@ def build_cells(
 ) -> SurfaceCells:
     """Cells of ``size`` mm over a mesh, smoothed by Epanechnikov's kernel of ``radius`` mm.
 
-    The kernel is normalised by the surface's area under it, so edges and oblique cells lose nothing.
+    The kernel is normalised by the surface's area under it, so edges and oblique cells lose
+    nothing.
     """
     vertices = np.asarray(vertices, dtype=np.float64)
     points, normals, areas = surface_samples(vertices, faces, size / 8)
@@ -79,9 +83,11 @@ def build_cells(
     index = np.zeros(int(np.prod(counts)), dtype=np.uint32)
     index[used] = np.arange(cells) + 1
 
-    near = cKDTree(centre).sparse_distance_matrix(
-        cKDTree(centre), radius, output_type="coo_matrix"
-    ).tocsr()
+    near = (
+        cKDTree(centre)
+        .sparse_distance_matrix(cKDTree(centre), radius, output_type="coo_matrix")
+        .tocsr()
+    )
     near.setdiag(1e-9)
     near.sort_indices()
     rows = np.repeat(np.arange(cells), np.diff(near.indptr))
@@ -130,7 +136,9 @@ def cell_at(cells: SurfaceCells, point: mi.Point3f, active: mi.Bool) -> tuple[mi
 def cells_near(
     cells: SurfaceCells, points: NDArray[np.floating], distance: float
 ) -> NDArray[np.bool_]:
-    """(cells,) whether the middle of a cell lies within ``distance`` mm of any of the points (n, 3)."""
+    """(cells,) whether the middle of a cell lies within ``distance`` mm of any of the points
+    (n, 3).
+    """
     if len(points) == 0:
         return np.ones(cells.cells, dtype=bool)
     nearest, _ = cKDTree(points).query(cells.centres, distance_upper_bound=distance)

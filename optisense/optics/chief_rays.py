@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import IntEnum
+from typing import Any
 
 import drjit as dr
 import mitsuba as mi
@@ -30,11 +31,13 @@ class Outcome(IntEnum):
 
 @dataclass(frozen=True)
 class ChiefRays:
-    """One chief ray a pixel; arrays are (h, w, ...). Entries other than ``outcome`` count where it is HIT.
+    """One chief ray a pixel; arrays are (h, w, ...). Entries other than ``outcome`` count where
+    it is HIT.
 
     points: mm; normals: unit, towards the ray; incidence: cosine of the angle between ray and
-    normal (1 is perpendicular); directions: unit, the way the ray travels when it arrives; face: triangle of the
-    sensing surface hit, in the order of its mesh; region: 1 sensing surface, 2 indenter.
+    normal (1 is perpendicular); directions: unit, the way the ray travels when it arrives;
+    face: triangle of the sensing surface hit, in the order of its mesh; region: 1 sensing
+    surface, 2 indenter.
     """
 
     points: NDArray[np.float32]
@@ -60,7 +63,7 @@ def _trace(
     origin: mi.Point3f,
     direction: mi.Vector3f,
     limit: mi.UInt32,
-):
+) -> tuple[Any, ...]:
     active = mi.Bool(True)
     depth = mi.UInt32(0)
     outcome = mi.UInt32(int(Outcome.DEPTH_LIMIT))
@@ -71,12 +74,14 @@ def _trace(
     face = mi.UInt32(0)
     while active:
         hit = intersect(scene, rows, corners, origin, direction, active, True)
-        kind, eta, alpha, specularity = surface_kind(surfaces, hit.surface, hit.valid)
+        kind, eta, _alpha = surface_kind(surfaces, hit.surface, hit.valid)
         where = surface_region(surfaces, hit.surface, hit.valid)
         opaque = hit.valid & (kind == int(SurfaceKind.OPAQUE))
         arrived = opaque & (where != int(Region.OTHER))
-        ended = hit.valid & ~arrived & (
-            opaque | (kind == int(SurfaceKind.ABSORBER)) | (kind == int(SurfaceKind.LIGHT))
+        ended = (
+            hit.valid
+            & ~arrived
+            & (opaque | (kind == int(SurfaceKind.ABSORBER)) | (kind == int(SurfaceKind.LIGHT)))
         )
         outcome = dr.select(active & ~hit.valid, int(Outcome.ESCAPED), outcome)
         outcome = dr.select(ended, int(Outcome.ABSORBED), outcome)
@@ -87,7 +92,7 @@ def _trace(
         region = dr.select(arrived, where, region)
         face = dr.select(arrived, hit.face, face)
         active &= hit.valid & ~arrived & ~ended
-        reflectance, reflected, transmitted, relative = refract(direction, hit.shading_normal, eta)
+        reflectance, reflected, transmitted, _relative = refract(direction, hit.shading_normal, eta)
         mirror = kind == int(SurfaceKind.MIRROR)
         totally = active & ~mirror & (reflectance >= 1)
         total |= totally
@@ -137,8 +142,8 @@ def trace_chief_rays(
         directions=image(arriving),
         incidence=np.asarray(incidence, dtype=np.float32).reshape(shape),
         outcome=np.asarray(outcome).astype(np.uint8).reshape(shape),
-        face=np.append(sensing_faces, -1)[
-            np.minimum(np.asarray(face), len(sensing_faces))
-        ].reshape(shape),
+        face=np.append(sensing_faces, -1)[np.minimum(np.asarray(face), len(sensing_faces))].reshape(
+            shape
+        ),
         region=np.asarray(region).astype(np.uint8).reshape(shape),
     )

@@ -1,8 +1,9 @@
 """Light sources that emit photons: where they sit, how large they are, and how they radiate.
 
-A light is a rectangle, a disc or a point with an angular profile that is rotationally exact: a power of the cosine
-(1 is Lambertian), or a table of radiant intensity over true angles (IES, spot). Emission is importance sampled so that every photon
-carries the same power; a *guide* (see ``guide.py``) may redistribute photons towards what matters.
+A light is a rectangle, a disc or a point with an angular profile that is rotationally exact: a
+power of the cosine (1 is Lambertian), or a table of radiant intensity over true angles (IES,
+spot). Emission is importance sampled so that every photon carries the same power; a *guide*
+(see ``guide.py``) may redistribute photons towards what matters.
 """
 
 from __future__ import annotations
@@ -37,8 +38,9 @@ class Shape(IntEnum):
 class Intensity:
     """Radiant intensity over the polar angle from the axis and the azimuth.
 
-    polar (n,) degrees ascending from 0; azimuth (m,) degrees, [0] alone if symmetric, else covering 0..360;
-    values (m, n) relative intensity, linear between the given angles, zero beyond the last.
+    polar (n,) degrees ascending from 0; azimuth (m,) degrees, [0] alone if symmetric, else
+    covering 0..360; values (m, n) relative intensity, linear between the given angles, zero
+    beyond the last.
     """
 
     polar: FloatArray
@@ -65,7 +67,9 @@ class Intensity:
 
 
 def spot_intensity(cutoff: float, beam: float) -> Intensity:
-    """A spot: full intensity within ``beam`` degrees of the axis, falling smoothly to 0 at ``cutoff``."""
+    """A spot: full intensity within ``beam`` degrees of the axis, falling smoothly to 0 at
+    ``cutoff``.
+    """
     polar = np.unique(np.concatenate([[0.0, beam], np.linspace(beam, cutoff, 65)]))
     t = np.clip((cutoff - polar) / max(cutoff - beam, 1e-9), 0.0, 1.0)
     values = (t * t * (3 - 2 * t))[None]
@@ -74,7 +78,8 @@ def spot_intensity(cutoff: float, beam: float) -> Intensity:
 
 @dataclass(frozen=True)
 class Emitter:
-    """One light. Lengths mm; ``direction`` and ``up`` need not be unit vectors; size is (width, height).
+    """One light. Lengths mm; ``direction`` and ``up`` need not be unit vectors; size is (width,
+    height).
 
     ``exponent`` is the power of the cosine of a profile without a table.
     """
@@ -113,7 +118,9 @@ class EmitterTable:
 
 
 def inverse_tables(intensity: Intensity) -> tuple[FloatArray, FloatArray]:
-    """Cosines at equal-probability steps (POLAR_CELLS+1,), and azimuths / 2 pi (POLAR_CELLS, AZIMUTH_CELLS+1)."""
+    """Cosines at equal-probability steps (POLAR_CELLS+1,), and azimuths / 2 pi (POLAR_CELLS,
+    AZIMUTH_CELLS+1).
+    """
     fine = 8192
     # Cells are even in angle near the axis, where narrow beams live, and exact in solid angle.
     angles = np.linspace(0.0, np.radians(intensity.polar[-1]), fine + 1)
@@ -124,7 +131,10 @@ def inverse_tables(intensity: Intensity) -> tuple[FloatArray, FloatArray]:
         ring = intensity.at(middle, np.zeros(fine))
     else:
         ring = np.mean(
-            [intensity.at(middle, np.full(fine, angle)) for angle in phi[:: max(1, len(phi) // 128)]],
+            [
+                intensity.at(middle, np.full(fine, angle))
+                for angle in phi[:: max(1, len(phi) // 128)]
+            ],
             axis=0,
         )
     power = np.concatenate([[0.0], np.cumsum(ring * -np.diff(edges))])
@@ -179,7 +189,9 @@ def emitter_table(emitters: list[Emitter], groups: int) -> EmitterTable:
 def profile_direction(
     table: EmitterTable, profile: mi.UInt32, exponent: mi.Float, sample: mi.Point2f
 ) -> mi.Vector3f:
-    """Local direction (axis = +z) of equal-power samples; ``profile`` 0 is a power of the cosine."""
+    """Local direction (axis = +z) of equal-power samples; ``profile`` 0 is a power of the
+    cosine.
+    """
     tabulated = profile > 0
     base = dr.maximum(profile, 1) - 1
     place = sample.x * POLAR_CELLS

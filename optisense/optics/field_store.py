@@ -1,4 +1,6 @@
-"""Light fields of one sensor, kept between images: the guide, the cells, and the tallies of each seed."""
+"""Light fields of one sensor, kept between images: the guide, the cells, and the tallies of
+each seed.
+"""
 
 from __future__ import annotations
 
@@ -10,9 +12,9 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
+from optisense.optics.cells import SurfaceCells, build_cells, cells_near
 from optisense.optics.emitters import EmitterTable
 from optisense.optics.guide import Guide, even_guide, learn_guide
-from optisense.optics.cells import SurfaceCells, build_cells, cells_near
 from optisense.optics.light_field import BINS, FieldTally, LightField
 from optisense.optics.photons import Target, trace_photons, trace_pilot
 from optisense.optics.ray_scene import Piece, RayScene
@@ -26,7 +28,9 @@ RADIUS = 0.7
 """mm of the smoothing kernel: what a light field of LEDs some mm away can bear (see benchmarks)."""
 MOST_BYTES = 300e6
 SEEN_MARGIN = 2.0
-"""mm around what the camera sees that photons are sent to: an indenter's flank catches light that would land there."""
+"""mm around what the camera sees that photons are sent to: an indenter's flank catches light
+that would land there.
+"""
 KEPT_FIELDS = 2
 
 
@@ -47,7 +51,9 @@ class FieldStore:
         seen: NDArray[np.floating],
         coloured: bool,
     ) -> None:
-        """``scene`` without contacts, its opaque pieces, and ``seen`` (n, 3) mm: points that the camera sees."""
+        """``scene`` without contacts, its opaque pieces, and ``seen`` (n, 3) mm: points that
+        the camera sees.
+        """
         self._seen = seen
         self._scene = scene
         self._table = table
@@ -66,7 +72,9 @@ class FieldStore:
 
     @property
     def guide(self) -> Guide:
-        """Where to send photons: to what the camera sees, learned on first use from a pilot pass."""
+        """Where to send photons: to what the camera sees, learned on first use from a pilot
+        pass.
+        """
         if self._guide is None:
             lights = self._table.count
             near = cells_near(self.cells, self._seen, SEEN_MARGIN)
@@ -105,7 +113,8 @@ class FieldStore:
         began: float,
         tell: Callable[[float, int, float | None], None],
     ) -> tuple[LightField, bool]:
-        """The field after ``photons``, or once ``noise`` (relative) or ``seconds`` (since ``began``) are reached.
+        """The field after ``photons``, or once ``noise`` (relative) or ``seconds`` (since
+        ``began``) are reached.
 
         Returns the field and whether Ctrl-C ended it early.
         """
@@ -120,8 +129,10 @@ class FieldStore:
             if done is not None:
                 return done, False
         running = self._running.get(key)
-        if running is None or (wanted is not None and running.tally.passes > wanted) or (
-            wanted is None and seconds is None
+        if (
+            running is None
+            or (wanted is not None and running.tally.passes > wanted)
+            or (wanted is None and seconds is None)
         ):
             running = _Running(
                 FieldTally(self.cells, self._table.groups, self._coloured), per_light

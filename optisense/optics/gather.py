@@ -1,8 +1,10 @@
-"""Density estimation: photons in a uniform grid, and the light they bring to visible points (pairwise SPPM).
+"""Density estimation: photons in a uniform grid, and the light they bring to visible points
+(pairwise SPPM).
 
-A photon's power is divided by the cosine at the place where *it* landed: that gives the flux through a plane across
-its path, which hardly changes in the neighbourhood, while the density of landings follows the local tilt. Reflection is
-then evaluated with the visible point's own normal. The kernel is Epanechnikov's, over a disc of radius r.
+A photon's power is divided by the cosine at the place where *it* landed: that gives the flux
+through a plane across its path, which hardly changes in the neighbourhood, while the density of
+landings follows the local tilt. Reflection is then evaluated with the visible point's own
+normal. The kernel is Epanechnikov's, over a disc of radius r.
 """
 
 from __future__ import annotations
@@ -18,13 +20,16 @@ from optisense.optics.photons import GROUP_MASK, PhotonMap
 from optisense.optics.scattering import Coating, coating_of, evaluate_coating
 from optisense.optics.visible_points import VisiblePoints
 
-# Cosines of landing below this are raised to it: an isolated grazing photon must not become a bright spot.
+# Cosines of landing below this are raised to it: an isolated grazing photon must not become a
+# bright spot.
 LEAST_COSINE = 0.03
 
 
 @dataclass
 class PhotonGrid:
-    """Photons in the order of the cells of a uniform grid; ``starts`` has one entry a cell and one more."""
+    """Photons in the order of the cells of a uniform grid; ``starts`` has one entry a cell and
+    one more.
+    """
 
     lower: mi.Point3f
     inverse_size: mi.Float
@@ -36,13 +41,12 @@ class PhotonGrid:
     coloured: bool
 
 
-def _cell(point: mi.Point3f, lower: mi.Point3f, inverse: mi.Float, counts: mi.Vector3u) -> mi.Vector3u:
+def _cell(
+    point: mi.Point3f, lower: mi.Point3f, inverse: mi.Float, counts: mi.Vector3u
+) -> mi.Vector3u:
     relative = (point - lower) * inverse
     return mi.Vector3u(
-        *(
-            mi.UInt32(dr.clip(relative[i], 0.0, mi.Float(counts[i] - 1)))
-            for i in range(3)
-        )
+        *(mi.UInt32(dr.clip(relative[i], 0.0, mi.Float(counts[i] - 1))) for i in range(3))
     )
 
 
@@ -97,7 +101,7 @@ def _gather(
     active: mi.Bool,
     radius: mi.Float,
     groups: int,
-):
+) -> list[mi.Color3f]:
     centre = _cell(point, grid.lower, grid.inverse_size, grid.counts)
     r2 = radius * radius
     totals = [mi.Color3f(0) for _ in range(groups)]

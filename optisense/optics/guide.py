@@ -1,8 +1,9 @@
 """Where to send photons: for each light, a table over the unit square of its emission angles.
 
-Light that never reaches the sensing surface (it leaves through a side, or circles in the light guide) tells
-nothing. A pilot pass finds out from which emission angles photons arrive; later passes send more photons there and weight them down
-in exchange, so the estimate stays unbiased: no cell gets less than ``FLOOR`` of the even density.
+Light that never reaches the sensing surface (it leaves through a side, or circles in the light
+guide) tells nothing. A pilot pass finds out from which emission angles photons arrive; later
+passes send more photons there and weight them down in exchange, so the estimate stays unbiased:
+no cell gets less than ``FLOOR`` of the even density.
 """
 
 from __future__ import annotations
@@ -27,7 +28,9 @@ class Guide:
 
 
 def guide_from_density(density: NDArray[np.floating]) -> Guide:
-    """A guide that follows ``density`` (lights, CELLS, CELLS), any scale, floored at FLOOR of its mean."""
+    """A guide that follows ``density`` (lights, CELLS, CELLS), any scale, floored at FLOOR of
+    its mean.
+    """
     density = np.asarray(density, dtype=np.float64)
     mean = density.mean(axis=(1, 2), keepdims=True)
     even = np.where(mean > 0, density / np.where(mean > 0, mean, 1), 1.0)
@@ -47,7 +50,9 @@ def even_guide(lights: int) -> Guide:
     return guide_from_density(np.ones((lights, CELLS, CELLS)))
 
 
-def _invert(table: mi.Float, start: mi.UInt32, value: mi.Float) -> tuple:
+def _invert(
+    table: mi.Float, start: mi.UInt32, value: mi.Float
+) -> tuple[mi.UInt32, mi.Float, mi.Float]:
     cell = mi.UInt32(0)
     step = CELLS // 2
     while step:
@@ -60,7 +65,9 @@ def _invert(table: mi.Float, start: mi.UInt32, value: mi.Float) -> tuple:
     return cell, dr.clip((value - low) / width, 0, 0.999999), width
 
 
-def warp(guide: Guide, light: mi.UInt32, sample: mi.Point2f) -> tuple[mi.Point2f, mi.Float, mi.UInt32]:
+def warp(
+    guide: Guide, light: mi.UInt32, sample: mi.Point2f
+) -> tuple[mi.Point2f, mi.Float, mi.UInt32]:
     """Moved sample, its weight (1 / density), and the number of its cell."""
     row, y, dy = _invert(guide.rows, light * (CELLS + 1), sample.x)
     column, x, dx = _invert(guide.columns, (light * CELLS + row) * (CELLS + 1), sample.y)
@@ -70,7 +77,9 @@ def warp(guide: Guide, light: mi.UInt32, sample: mi.Point2f) -> tuple[mi.Point2f
 
 
 def learn_guide(cells: mi.UInt32, lights: int) -> Guide:
-    """A guide from a pilot pass: ``cells`` holds the cell (over all lights) of every photon that arrived."""
+    """A guide from a pilot pass: ``cells`` holds the cell (over all lights) of every photon
+    that arrived.
+    """
     arrived = np.asarray(cells)
     arrived = arrived[arrived < lights * CELLS * CELLS]
     counts = np.bincount(arrived, minlength=lights * CELLS * CELLS).reshape(-1, CELLS, CELLS)

@@ -6,6 +6,7 @@ import json
 import os
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -21,10 +22,12 @@ from optisense.optics.response import auto_exposure, picture
 class TactileImage:
     """The result of a render; arrays are (h, w, ...), row 0 is the top.
 
-    layers: linear radiance (mW / (mm^2 sr)) of each light group with its colour and flux; they add up to the radiance.
-    normals: unit, of the coating as it is seen, in the design's frame, towards the camera's side; NaN where the
-    camera sees none. contact_mask: where an indenter is seen. depth: mm that the coating is pushed in along the
-    inward normal, 0 outside contacts. settings: what was asked and what was reached, ready for JSON.
+    layers: linear radiance (mW / (mm^2 sr)) of each light group with its colour and flux; they
+        add up to the radiance.
+    normals: unit, of the coating as it is seen, in the design's frame, towards the camera's
+        side; NaN where the camera sees none. contact_mask: where an indenter is seen. depth: mm
+        that the coating is pushed in along the inward normal, 0 outside contacts. settings:
+        what was asked and what was reached, ready for JSON.
     """
 
     layers: dict[str, NDArray[np.float32]]
@@ -61,7 +64,7 @@ class TactileImage:
             _write(out / "image.png", lambda p: _bitmap(self.picture(exposure), p))
             _write(out / "radiance.exr", lambda p: _bitmap(self.radiance, p))
             for name, layer in self.layers.items():
-                _write(out / "layers" / f"{name}.exr", lambda p, v=layer: _bitmap(v, p))
+                _write(out / "layers" / f"{name}.exr", partial(_bitmap, layer))
             _write(out / "normals.npy", lambda p: np.save(p, self.normals))
             _write(out / "contact_mask.npy", lambda p: np.save(p, self.contact_mask))
             text = json.dumps(self.settings, indent=2) + "\n"

@@ -1,4 +1,6 @@
-"""From the light field to the layers of an image: camera samples, shading, and what is true about each pixel."""
+"""From the light field to the layers of an image: camera samples, shading, and what is true
+about each pixel.
+"""
 
 from __future__ import annotations
 
@@ -29,7 +31,9 @@ REFINED = 8.0 / 320.0
 
 @dataclass
 class ImageLayers:
-    """radiance (groups, h, w, 3) for lights of 1 mW in each channel, and the ground truth of an image."""
+    """radiance (groups, h, w, 3) for lights of 1 mW in each channel, and the ground truth of an
+    image.
+    """
 
     radiance: NDArray[np.float32]
     normals: NDArray[np.float32]
@@ -85,7 +89,9 @@ class _Film:
                 dr.scatter_add(total, weighted[k], points.pixel * 3 + k, points.valid)
 
     def add_light(self, points: VisiblePoints, emitters: list[Emitter], areas: list[float]) -> None:
-        """The windows of flat lights that are seen directly; a Lambertian window of 1 mW has radiance 1 / (pi A)."""
+        """The windows of flat lights that are seen directly; a Lambertian window of 1 mW has
+        radiance 1 / (pi A).
+        """
         radiance = [1 / (np.pi * area) if area > 0 else 0.0 for area in areas]
         values = mi.Float(np.array([0.0, *radiance], dtype=np.float32))
         groups = mi.UInt32(np.array([0, *(e.group for e in emitters)], dtype=np.uint32))

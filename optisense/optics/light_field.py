@@ -1,10 +1,11 @@
 """The light that falls on the undeformed opaque surfaces, pooled into cells and directions.
 
-Light arriving at the sensing surface varies slowly from place to place; what varies within a tenth of a millimetre
-in a contact is the surface's tilt and what it hides. So photons are traced once a design, without contacts, and
-pooled where they land: each cell and bin of directions keeps the flux through a plane *across the light*
-(a photon's power over the cosine of its landing) and the mean direction. What a contact makes of it is
-``shading.py``'s part. The cost of an image then does not depend on the number of photons.
+Light arriving at the sensing surface varies slowly from place to place; what varies within a
+tenth of a millimetre in a contact is the surface's tilt and what it hides. So photons are
+traced once a design, without contacts, and pooled where they land: each cell and bin of
+directions keeps the flux through a plane *across the light* (a photon's power over the cosine
+of its landing) and the mean direction. What a contact makes of it is ``shading.py``'s part. The
+cost of an image then does not depend on the number of photons.
 """
 
 from __future__ import annotations
@@ -21,7 +22,8 @@ from optisense.optics.photons import GROUP_MASK, PhotonMap
 
 FloatArray = NDArray[np.floating]
 
-# An isolated photon that grazes the surface must not become a bright beam: cosines below are raised to this.
+# An isolated photon that grazes the surface must not become a bright beam: cosines below are
+# raised to this.
 LEAST_COSINE = 0.02
 # Equal-area bins of the sphere of directions, about the mean normal of the surfaces.
 BANDS = 16
@@ -55,8 +57,9 @@ def bin_centres(cells: SurfaceCells, bins: NDArray[np.integer]) -> mi.Float:
 class LightField:
     """The smoothed field: per cell, bin and group four floats; lights of 1 mW.
 
-    ``moments``: flux density across the light (mW/mm^2) times the direction towards the light (3), flux density (1).
-    ``colours``: the flux density per channel R, G, B where surfaces are coloured, else the same array.
+    ``moments``: flux density across the light (mW/mm^2) times the direction towards the light
+    (3), flux density (1). ``colours``: the flux density per channel R, G, B where surfaces are
+    coloured, else the same array.
     """
 
     cells: SurfaceCells
@@ -105,17 +108,17 @@ class FieldTally:
         for k in range(3):
             dr.scatter_add(self.moments, -direction[k] * (scalar * across), entry * 4 + k, found)
         dr.scatter_add(self.moments, scalar * across, entry * 4 + 3, found)
-        dr.scatter_add(
-            self.halves[self.passes % 2], scalar, cell * self.groups + group, found
-        )
+        dr.scatter_add(self.halves[self.passes % 2], scalar, cell * self.groups + group, found)
         self.passes += 1
         self.photons += photons.emitted
         dr.eval(self.moments, self.colours, self.halves)
 
     def noise(self) -> float:
-        """Relative RMS noise of the smoothed irradiance (1 = 100 %), from the difference of both halves.
+        """Relative RMS noise of the smoothed irradiance (1 = 100 %), from the difference of
+        both halves.
 
-        Over all cells and groups, in relation to each group's mean; infinite before the second pass.
+        Over all cells and groups, in relation to each group's mean; infinite before the second
+        pass.
         """
         if self.passes < 2:
             return float("inf")
@@ -169,7 +172,9 @@ class FieldTally:
 
 
 @dr.syntax
-def _smooth(cells: SurfaceCells, values: mi.Float, bins: mi.UInt32, stride: mi.UInt32, groups: int):
+def _smooth(
+    cells: SurfaceCells, values: mi.Float, bins: mi.UInt32, stride: mi.UInt32, groups: int
+) -> mi.Float:
     """Kernel-weighted sums over neighbouring cells of the chosen bins, four floats an entry."""
     used = dr.width(bins)
     lane = dr.arange(mi.UInt32, cells.cells * used * groups)

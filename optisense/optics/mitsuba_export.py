@@ -1,8 +1,8 @@
 """A sensor's surfaces, lights and camera as an ordinary Mitsuba scene.
 
-Mitsuba's own ``path`` integrator then renders what this package renders, with Mitsuba's BSDFs, emitters and sensor:
-a second opinion for tests, and a rival for benchmarks. A path tracer finds an area light through
-smooth glass only by chance, and never a point light or a spot.
+Mitsuba's own ``path`` integrator then renders what this package renders, with Mitsuba's BSDFs,
+emitters and sensor: a second opinion for tests, and a rival for benchmarks. A path tracer finds
+an area light through smooth glass only by chance, and never a point light or a spot.
 """
 
 from __future__ import annotations

@@ -1,4 +1,6 @@
-"""A sensor design made ready to render: scene, tables, guide and light field are kept between images."""
+"""A sensor design made ready to render: scene, tables, guide and light field are kept between
+images.
+"""
 
 from __future__ import annotations
 
@@ -13,13 +15,20 @@ import numpy as np
 
 from optisense.design import SensorDesign, set_value
 from optisense.errors import ContactError, RenderError
-from optisense.geometry import Contact, Indenter, SensingSurface, Sphere, TriangleMesh
-from optisense.geometry import nine_places, place
+from optisense.geometry import (
+    Contact,
+    Indenter,
+    SensingSurface,
+    Sphere,
+    TriangleMesh,
+    nine_places,
+    place,
+)
 from optisense.optics.assembly import (
     assemble,
     coating_surface,
-    index_before_sensing,
     indenter_piece,
+    index_before_sensing,
 )
 from optisense.optics.camera import RayCamera
 from optisense.optics.chief_rays import ChiefRays, Outcome, trace_chief_rays
@@ -46,7 +55,9 @@ SPPM_PASS = 1_000_000
 
 @dataclass(frozen=True)
 class Progress:
-    """How far a render is: fraction 0..1, photons traced, relative noise (per cent) if known, seconds so far."""
+    """How far a render is: fraction 0..1, photons traced, relative noise (per cent) if known,
+    seconds so far.
+    """
 
     fraction: float
     photons: int
@@ -57,16 +68,18 @@ class Progress:
 class OpticalModel:
     """A sensor whose image can be rendered, again and again.
 
-    The scene of the sensor itself, the photon guide and the light field are made once; a contact adds only its own surface,
-    a light's flux or colour only scales its layer, a coating's specularity only rewrites its row of the surface table.
+    The scene of the sensor itself, the photon guide and the light field are made once; a
+    contact adds only its own surface, a light's flux or colour only scales its layer, a
+    coating's specularity only rewrites its row of the surface table.
     """
 
     def __init__(self, design: SensorDesign, variant: str = "auto") -> None:
         """Resolve media and build the scene.
 
         Args:
-            design: the sensor; not changed, and later changes of it are not seen (see ``update``).
-            variant: "auto" (what was selected before, else CUDA where there is a GPU), "llvm" or "cuda".
+            design: the sensor; not changed, and later changes of it are not seen (see
+                ``update``). variant: "auto" (what was selected before, else CUDA where there is
+                a GPU), "llvm" or "cuda".
 
         Raises:
             SetupError: the variant is not to be had on this machine.
@@ -157,8 +170,11 @@ class OpticalModel:
 
     @cached_property
     def surface(self) -> SensingSurface:
-        """The sensing surface with coordinates in mm: (0, 0) where the camera's axis meets it (or nearest),
-        u towards the right and v towards the top of the image."""
+        """The sensing surface with coordinates in mm.
+
+        (0, 0) is where the camera's axis meets it (or the middle of what is seen), u runs
+        towards the right and v towards the top of the image.
+        """
         axes = self.design.camera.axes()
         rays = self.chief_rays((3, 3))
         if rays.hit[1, 1]:
@@ -183,9 +199,7 @@ class OpticalModel:
             scene = self._fine_scene
         return trace_chief_rays(scene, self.camera(resolution), self._sensing_faces)
 
-    def nine_contacts(
-        self, indenter: Indenter | None = None, depth: float = 0.8
-    ) -> list[Contact]:
+    def nine_contacts(self, indenter: Indenter | None = None, depth: float = 0.8) -> list[Contact]:
         """One contact at each of nine places that cover the visible sensing surface evenly.
 
         The default indenter is the OptiSense paper's ball of radius 1.5 mm.
@@ -204,8 +218,10 @@ class OpticalModel:
         ]
 
     def _place(self, contact: Contact) -> TriangleMesh:
+        if not self.gels:
+            return place(contact, self.surface)
         errors = []
-        for gel in self.gels or [None]:
+        for gel in self.gels:
             try:
                 return place(contact, self.surface, gel)
             except ContactError as error:
@@ -261,21 +277,20 @@ class OpticalModel:
         """What the camera sees while ``contacts`` press in.
 
         Args:
-            contacts: indenters, places and depths; none for the untouched sensor.
-            resolution: (width, height) pixels; the camera's own by default.
-            photons: to trace in all; DEFAULT_PHOTONS if no other limit is given.
-            noise: per cent; trace until the relative RMS noise of the light on the sensing surface is this small.
-            seconds: stop tracing in time to be ready then.
-            seed: the same seed and settings give the same image.
-            progress: called now and then.
-            estimator: "field" (pooled light field, fast) or "sppm" (progressive photon mapping, for checking).
+            contacts: indenters, places and depths; none for the untouched sensor. resolution:
+                (width, height) pixels; the camera's own by default. photons: to trace in all;
+                DEFAULT_PHOTONS if no other limit is given. noise: per cent; trace until the
+                relative RMS noise of the light on the sensing surface is this small.
+            seconds: stop tracing in time to be ready then. seed: the same seed and settings
+                give the same image. progress: called now and then. estimator: "field" (pooled
+                light field, fast) or "sppm" (progressive photon mapping, for checking).
 
         Returns:
             The image; ``interrupted`` is set if Ctrl-C ended the tracing early.
 
         Raises:
-            ContactError: a contact is off the surface or deeper than the gel.
-            RenderError: the camera sees nothing of the sensing surface, or a setting makes no sense.
+            ContactError: a contact is off the surface or deeper than the gel. RenderError: the
+                camera sees nothing of the sensing surface, or a setting makes no sense.
         """
         if estimator not in ("field", "sppm"):
             raise RenderError(f"there is no estimator '{estimator}'", hint="use field or sppm")
@@ -413,7 +428,9 @@ def _sensing_faces(pieces: list[Piece]) -> np.ndarray:
 
 
 def _pixel_areas(rays: ChiefRays) -> np.ndarray:
-    """(h, w) mm^2 of surface behind each pixel, from its neighbours' points; 0 where these do not hit."""
+    """(h, w) mm^2 of surface behind each pixel, from its neighbours' points; 0 where these do
+    not hit.
+    """
     p = rays.points.astype(np.float64)
     along_x = np.zeros_like(p)
     along_y = np.zeros_like(p)

@@ -1,8 +1,8 @@
-"""The photon pass: light leaves the emitters, is refracted, reflected and scattered, and is recorded wherever
-it lands on an opaque surface.
+"""The photon pass: light leaves the emitters, is refracted, reflected and scattered, and is
+recorded wherever it lands on an opaque surface.
 
-Photons carry all light, direct light included, so nothing is connected to lights from elsewhere (no next-event
-estimation) and no light is counted twice.
+Photons carry all light, direct light included, so nothing is connected to lights from elsewhere
+(no next-event estimation) and no light is counted twice.
 """
 
 from __future__ import annotations
@@ -28,7 +28,8 @@ from optisense.optics.scattering import (
 )
 from optisense.optics.surfaces import SurfaceKind
 
-# Photons are dropped after so many surfaces; in GelSight-like sensors less than 0.1 % of the light gets there.
+# Photons are dropped after so many surfaces; in GelSight-like sensors less than 0.1 % of the
+# light gets there.
 MAX_DEPTH = 32
 
 GROUP_MASK = 0xFF
@@ -40,7 +41,8 @@ class PhotonMap:
     """Landings of photons, all of one pass.
 
     ``place`` holds x, y, z (mm) and bits (light group, surface); ``travel`` the unit direction
-    and the cosine with the face normal; ``power`` the photon's share of a light of 1 mW, per channel.
+    and the cosine with the face normal; ``power`` the photon's share of a light of 1 mW, per
+    channel.
     """
 
     count: int
@@ -51,13 +53,16 @@ class PhotonMap:
     coloured: bool
 
 
-# Photons that travel long leave most lanes of a vector idle; survivors are gathered anew after so many surfaces.
+# Photons that travel long leave most lanes of a vector idle; survivors are gathered anew after
+# so many surfaces.
 STAGES = (4, 4, 6)
 
 
 @dataclass
 class _Flight:
-    """Photons under way. ``origin_cell`` is the cell of the guide that each came from; ``number`` its place in the pass."""
+    """Photons under way. ``origin_cell`` is the cell of the guide that each came from;
+    ``number`` its place in the pass.
+    """
 
     origin: mi.Point3f
     direction: mi.Vector3f
@@ -88,7 +93,12 @@ class _Record:
 
 
 def _launch(
-    table: EmitterTable, guide: Guide, first: mi.UInt32, per_light: mi.UInt32, seed: mi.UInt32, photons: int
+    table: EmitterTable,
+    guide: Guide,
+    first: mi.UInt32,
+    per_light: mi.UInt32,
+    seed: mi.UInt32,
+    photons: int,
 ) -> tuple[_Flight, mi.UInt32]:
     index = dr.arange(mi.UInt32, photons)
     light = index % table.count
@@ -128,16 +138,14 @@ def _fly(
     group = flight.group
     landed = mi.Bool(flight.landed)
     active = mi.Bool(flight.active)
-    rng = mi.PCG32(
-        size=dr.width(flight.number), initstate=seed, initseq=mi.UInt64(flight.number)
-    )
+    rng = mi.PCG32(size=dr.width(flight.number), initstate=seed, initseq=mi.UInt64(flight.number))
     depth = mi.UInt32(0)
     while active & (depth < limit):
         hit = intersect(scene, rows, corners, origin, direction, active)
-        kind, eta, alpha, specularity = surface_kind(surfaces, hit.surface, hit.valid)
+        kind, eta, alpha = surface_kind(surfaces, hit.surface, hit.valid)
         active &= hit.valid & (kind != int(SurfaceKind.ABSORBER)) & (kind != int(SurfaceKind.LIGHT))
         opaque = active & (kind == int(SurfaceKind.OPAQUE))
-        if dr.hint(target is None, mode="scalar"):
+        if target is None:
             if opaque:
                 slot = dr.scatter_inc(record.counter, mi.UInt32(0), opaque)
                 kept = opaque & (slot < record.capacity)
@@ -163,12 +171,12 @@ def _fly(
             landed |= found & (dr.gather(mi.UInt32, target.flags, cell, found) != 0)
         pick = rng.next_float32()
         sample = mi.Point2f(rng.next_float32(), rng.next_float32())
-        reflectance, reflected, transmitted, relative = refract(direction, hit.shading_normal, eta)
+        reflectance, reflected, transmitted, _relative = refract(direction, hit.shading_normal, eta)
         outgoing = dr.select(pick < reflectance, reflected, transmitted)
         if dr.hint(rough, mode="scalar"):
             is_rough = active & (kind == int(SurfaceKind.DIELECTRIC)) & (alpha > SMOOTH_ALPHA)
             if is_rough:
-                scattered, rough_weight, through, relative = sample_rough_interface(
+                scattered, rough_weight, _through, _relative = sample_rough_interface(
                     direction, hit.shading_normal, eta, alpha, pick, sample
                 )
                 outgoing = scattered
@@ -209,11 +217,12 @@ def _trace(
     target: Target | None,
     coloured: bool,
 ) -> mi.UInt32:
-    """Fly a pass stage by stage; returns the guide's cell of each photon, all ones if it never landed."""
+    """Fly a pass stage by stage; returns the guide's cell of each photon, all ones if it never
+    landed.
+    """
     photons = per_light * table.count
-    numbers = [dr.opaque(mi.UInt32, value) for value in (first, per_light, seed)]
-    flight, cell = _launch(table, guide, *numbers, photons)
-    landed = dr.full(mi.Bool, False, photons)
+    a, b, c = (dr.opaque(mi.UInt32, value) for value in (first, per_light, seed))
+    flight, cell = _launch(table, guide, a, b, c, photons)
     arrived = dr.zeros(mi.UInt32, photons)
     travelled = 0
     for stage in range(len(STAGES) + 1):
@@ -245,7 +254,9 @@ def _trace(
 def trace_pilot(
     scene: RayScene, table: EmitterTable, guide: Guide, per_light: int, seed: int, target: Target
 ) -> mi.UInt32:
-    """For every photon of a pass the guide's cell that it came from, or all ones if it missed the target."""
+    """For every photon of a pass the guide's cell that it came from, or all ones if it missed
+    the target.
+    """
     one = dr.zeros(mi.Float, 4)
     record = _Record(mi.UInt32(0), dr.zeros(mi.UInt32, 1), one, one, one)
     return _trace(scene, table, guide, per_light, seed, 0, record, target, False)
@@ -264,9 +275,9 @@ def trace_photons(
 ) -> PhotonMap:
     """Emit ``per_light`` photons from each light and record where they land.
 
-    ``first`` is the number of photons a light has already sent in earlier passes of the same seed; ``landings`` is room
-    for so many landings a photon; where they turn out to be more, the pass is traced once more with more room. Each
-    light has 1 mW in all.
+    ``first`` is the number of photons a light has already sent in earlier passes of the same
+    seed; ``landings`` is room for so many landings a photon; where they turn out to be more,
+    the pass is traced once more with more room. Each light has 1 mW in all.
     """
     photons = per_light * table.count
     while True:

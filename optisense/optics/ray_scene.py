@@ -1,9 +1,9 @@
 """The geometry of a sensor as one ray-traced mesh with a table of faces and a table of surfaces.
 
-All surfaces (interfaces between media, coating, mirrors, blockers, lights, indenters) are merged into a
-single Mitsuba mesh. A hit's triangle number then leads straight to its normal and its optical data by
-two gathers: no virtual function calls in the inner loops, and replacing an indenter never
-changes a compiled kernel.
+All surfaces (interfaces between media, coating, mirrors, blockers, lights, indenters) are
+merged into a single Mitsuba mesh. A hit's triangle number then leads straight to its normal and
+its optical data by two gathers: no virtual function calls in the inner loops, and replacing an
+indenter never changes a compiled kernel.
 """
 
 from __future__ import annotations
@@ -27,8 +27,8 @@ SMOOTH_FACE = 1 << 16
 class Piece:
     """A triangle mesh with one surface.
 
-    vertices (n, 3) mm, faces (m, 3), corner normals (n, 3) or None for flat facets. Face normals point to the
-    outside of a dielectric.
+    vertices (n, 3) mm, faces (m, 3), corner normals (n, 3) or None for flat facets. Face
+    normals point to the outside of a dielectric.
     """
 
     name: str
@@ -40,7 +40,9 @@ class Piece:
 
 @dataclass
 class Hit:
-    """Where rays met a surface. ``normal`` is the face normal, ``shading_normal`` the smooth one."""
+    """Where rays met a surface. ``normal`` is the face normal, ``shading_normal`` the smooth
+    one.
+    """
 
     valid: mi.Bool
     distance: mi.Float
@@ -54,8 +56,9 @@ class Hit:
 class RayScene:
     """A merged mesh for ray tracing, with its tables on the device.
 
-    ``rows`` holds four floats a face: the normal, and surface number (with ``SMOOTH_FACE`` set where the
-    shading normal varies) as bits; ``corners`` twelve floats a face: three corner normals, padded to four.
+    ``rows`` holds four floats a face: the normal, and surface number (with ``SMOOTH_FACE`` set
+    where the shading normal varies) as bits; ``corners`` twelve floats a face: three corner
+    normals, padded to four.
     """
 
     def __init__(
@@ -66,8 +69,8 @@ class RayScene:
     ) -> None:
         """Build the mesh and its acceleration structure.
 
-        Several scenes of one sensor share a ``table`` (see ``surface_table``); ``numbers`` then says which of
-        its surfaces each piece has. By default a scene numbers its own.
+        Several scenes of one sensor share a ``table`` (see ``surface_table``); ``numbers`` then
+        says which of its surfaces each piece has. By default a scene numbers its own.
         """
         surfaces = [piece.surface for piece in pieces]
         numbers = list(range(len(pieces))) if numbers is None else numbers
@@ -125,9 +128,7 @@ def intersect(
     n1 = dr.gather(mi.Vector4f, corners, face * 3 + 1, smooth)
     n2 = dr.gather(mi.Vector4f, corners, face * 3 + 2, smooth)
     blended = n0 * (1 - u - v) + n1 * u + n2 * v
-    shading = dr.select(
-        smooth, dr.normalize(mi.Vector3f(blended.x, blended.y, blended.z)), normal
-    )
+    shading = dr.select(smooth, dr.normalize(mi.Vector3f(blended.x, blended.y, blended.z)), normal)
     return Hit(
         valid=valid,
         distance=found.t,
@@ -156,7 +157,8 @@ def _merge(
         a, b, c = (points[triangles[:, i]] for i in range(3))
         cross = np.cross(b - a, c - a)
         length = np.linalg.norm(cross, axis=1)
-        # A triangle without area is never hit; it keeps its place so that numbers stay those of the piece.
+        # A triangle without area is never hit; it keeps its place so that numbers stay those of
+        # the piece.
         normal = cross / np.where(length > 0, length, 1.0)[:, None]
         row = np.zeros((len(triangles), 4), dtype=np.float32)
         row[:, :3] = normal

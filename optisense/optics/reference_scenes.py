@@ -1,4 +1,5 @@
-"""Small scenes with known answers, and the ways to render one: photon mapping, the pooled light field, Mitsuba's path.
+"""Small scenes with known answers, and the ways to render one: photon mapping, the pooled light
+field, Mitsuba's path.
 
 Tests and benchmarks share them.
 """
@@ -68,7 +69,9 @@ class ReferenceScene:
     def pairwise(
         self, passes: int, per_light: int, seed: int = 0, radius: float = 0.1
     ) -> tuple[FloatArray, FloatArray]:
-        """Progressive photon mapping: radiance (groups, h, w, 3), and the same from either half of the passes."""
+        """Progressive photon mapping: radiance (groups, h, w, 3), and the same from either half
+        of the passes.
+        """
         result = render_sppm(
             self.ray_scene(),
             self.table(),
@@ -133,7 +136,9 @@ def diffuse_coating(reflectance: float) -> Surface:
 
 
 def metal_coating(alpha: float, eta: Colour, k: Colour, specularity: float = 1.0) -> Surface:
-    """A rough metal (GGX) as sensing surface; below specularity 1, blended with a diffuse reflectance of 0.5."""
+    """A rough metal (GGX) as sensing surface; below specularity 1, blended with a diffuse
+    reflectance of 0.5.
+    """
     return Surface(
         SurfaceKind.OPAQUE,
         1.0,
@@ -186,7 +191,9 @@ def bumped_plane(
     ball: tuple[float, float] = REFEREE_BUMP,
     spacing: float = 0.1,
 ) -> Piece:
-    """The plane z = 0 about the origin, a ball of (radius, depth) pressed in along +z in its middle; flat facets."""
+    """The plane z = 0 about the origin, a ball of (radius, depth) pressed in along +z in its
+    middle; flat facets.
+    """
     counts = [round(s / spacing) + 1 for s in size]
     x, y = (np.linspace(-s / 2, s / 2, n) for s, n in zip(size, counts, strict=True))
     grid_x, grid_y = np.meshgrid(x, y, indexing="ij")
@@ -208,9 +215,9 @@ def referee_scene(
     """A coated slab of gel with a bump, lit from three sides through its walls, seen from above.
 
     Args:
-        coating: of the bottom, z = 0.
-        slab: whether there is gel; without it the coating lies bare.
-        lights: "area" (4 x 2 mm, radiance REFEREE_RADIANCE, outside the slab), "point" (intensity REFEREE_INTENSITY, at
+        coating: of the bottom, z = 0. slab: whether there is gel; without it the coating lies
+            bare. lights: "area" (4 x 2 mm, radiance REFEREE_RADIANCE, outside the slab),
+            "point" (intensity REFEREE_INTENSITY, at
             the same places), or "embedded" (smaller area lights inside the gel).
         resolution: pixels, width and height.
     """
@@ -238,9 +245,7 @@ def referee_scene(
             pieces.append(emitting_face(number, emitter))
         emitters.append(emitter)
         flux.append((float(colour[0] * power), float(colour[1] * power), float(colour[2] * power)))
-    camera = RayCamera(
-        (0.0, 0.0, 24.0), (0.0, 0.0, -1.0), (0.0, 1.0, 0.0), 42.0, *resolution
-    )
+    camera = RayCamera((0.0, 0.0, 24.0), (0.0, 0.0, -1.0), (0.0, 1.0, 0.0), 42.0, *resolution)
     return ReferenceScene(pieces, emitters, flux, camera)
 
 

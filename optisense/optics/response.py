@@ -1,8 +1,9 @@
 """The camera's response: from linear radiance to the picture that a camera would store.
 
-Exposure, then saturation as in the OptiSense paper (section "Camera"): where a channel is overexposed, a mask of the
-excess is blurred and spread over all three channels, which gives the whitish spots around bright lights. The paper
-gives no constants: the knee is the sensor's full well (1), the blur of 6 pixels at a width of 640 is an assumption.
+Exposure, then saturation as in the OptiSense paper (section "Camera"): where a channel is
+overexposed, a mask of the excess is blurred and spread over all three channels, which gives the
+whitish spots around bright lights. The paper gives no constants: the knee is the sensor's full
+well (1), the blur of 6 pixels at a width of 640 is an assumption.
 """
 
 from __future__ import annotations
@@ -16,7 +17,9 @@ from optisense.errors import RenderError
 KNEE = 1.0
 BLUR_OF_WIDTH = 6.0 / 640.0
 TARGET = 0.55
-"""Automatic exposure puts the 95th percentile of the brightest channel here (of 1), before gamma."""
+"""Automatic exposure puts the 95th percentile of the brightest channel here (of 1), before
+gamma.
+"""
 MOST_EXCESS = 4.0
 
 FloatArray = NDArray[np.floating]
@@ -43,7 +46,9 @@ def saturate(exposed: FloatArray) -> NDArray[np.float32]:
 def add_noise(
     exposed: FloatArray, full_well: float, seed: int, read_noise: float = 0.0
 ) -> NDArray[np.float32]:
-    """Shot noise of a sensor that holds ``full_well`` electrons at level 1, and read noise in electrons RMS."""
+    """Shot noise of a sensor that holds ``full_well`` electrons at level 1, and read noise in
+    electrons RMS.
+    """
     rng = np.random.default_rng(seed)
     electrons = rng.poisson(np.maximum(np.asarray(exposed, dtype=float), 0) * full_well)
     noisy = electrons + rng.normal(0.0, read_noise, electrons.shape)

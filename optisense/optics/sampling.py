@@ -1,12 +1,11 @@
 """Low-discrepancy points: a Kronecker sequence in fixed point, shifted by a seed.
 
-The steps are the powers of 1/phi_4, phi_4 the root of x^5 = x + 1 (the generalised golden ratio; Roberts 2018), so
-that every prefix of the sequence is spread evenly in four dimensions.
+The steps are the powers of 1/phi_4, phi_4 the root of x^5 = x + 1 (the generalised golden
+ratio; Roberts 2018), so that every prefix of the sequence is spread evenly in four dimensions.
 """
 
 from __future__ import annotations
 
-import drjit as dr
 import mitsuba as mi
 import numpy as np
 
@@ -15,7 +14,7 @@ def _steps(dimensions: int) -> list[int]:
     root = 1.5
     for _ in range(64):
         root = (1 + root) ** (1 / (dimensions + 1))
-    return [int(round((root ** -(k + 1)) * 2**32)) & 0xFFFFFFFF for k in range(dimensions)]
+    return [round((root ** -(k + 1)) * 2**32) & 0xFFFFFFFF for k in range(dimensions)]
 
 
 STEPS = _steps(4)
@@ -27,8 +26,10 @@ def unit_float(bits: mi.UInt32) -> mi.Float:
     return mi.Float(bits >> 8) * 2**-24
 
 
-def sequence_4d(index: mi.UInt32, stream: mi.UInt32, seed: mi.UInt32) -> tuple:
-    """Four coordinates in [0, 1) of element ``index`` of the sequence numbered by ``stream`` and ``seed``."""
+def sequence_4d(index: mi.UInt32, stream: mi.UInt32, seed: mi.UInt32) -> tuple[mi.Float, ...]:
+    """Four coordinates in [0, 1) of element ``index`` of the sequence numbered by ``stream``
+    and ``seed``.
+    """
     out = []
     for k, step in enumerate(STEPS):
         shift = mi.sample_tea_32(stream * 4 + k, seed)[0]
@@ -37,7 +38,9 @@ def sequence_4d(index: mi.UInt32, stream: mi.UInt32, seed: mi.UInt32) -> tuple:
 
 
 def sequence_2d(index: mi.UInt32, stream: mi.UInt32, seed: mi.UInt32) -> mi.Point2f:
-    """A point of the unit square, element ``index`` of a sequence numbered by ``stream`` and ``seed``."""
+    """A point of the unit square, element ``index`` of a sequence numbered by ``stream`` and
+    ``seed``.
+    """
     out = []
     for k, step in enumerate(STEPS_2D):
         shift = mi.sample_tea_32(stream * 4 + k, seed)[0]

@@ -1,7 +1,9 @@
-"""What happens to light at a surface: refraction, mirror reflection, and the coating's blend of two lobes.
+"""What happens to light at a surface: refraction, mirror reflection, and the coating's blend of
+two lobes.
 
-The coating is ``(1 - s)`` times a Lambertian lobe of its reflectance plus ``s`` times a metallic GGX lobe (Walter et
-al. 2007, separable Smith shadowing, sampled by visible normals: Heitz 2018) of its complex index.
+The coating is ``(1 - s)`` times a Lambertian lobe of its reflectance plus ``s`` times a
+metallic GGX lobe (Walter et al. 2007, separable Smith shadowing, sampled by visible normals:
+Heitz 2018) of its complex index.
 """
 
 from __future__ import annotations
@@ -25,7 +27,9 @@ def surface_table(surfaces: list[Surface]) -> mi.Float:
 
 
 def surface_rows(surfaces: list[Surface]) -> np.ndarray:
-    """(n, 16) float32: kind (as bits), eta, alpha, specularity | reflectance, region | metal eta | metal k."""
+    """(n, 16) float32: kind (as bits), eta, alpha, specularity | reflectance, region | metal
+    eta | metal k.
+    """
     rows = np.zeros((len(surfaces), ROW), dtype=np.float32)
     for row, surface in zip(rows, surfaces, strict=True):
         bits = np.array([int(surface.kind), int(surface.region), surface.light], dtype=np.uint32)
@@ -48,10 +52,12 @@ class Coating:
     alpha: mi.Float
 
 
-def surface_kind(table: mi.Float, surface: mi.UInt32, active: mi.Bool) -> tuple:
-    """kind, eta, alpha, specularity of surfaces."""
+def surface_kind(
+    table: mi.Float, surface: mi.UInt32, active: mi.Bool
+) -> tuple[mi.UInt32, mi.Float, mi.Float]:
+    """kind, eta, alpha of surfaces."""
     row = dr.gather(mi.Vector4f, table, surface * 4, active)
-    return dr.reinterpret_array(mi.UInt32, row.x), row.y, row.z, row.w
+    return dr.reinterpret_array(mi.UInt32, row.x), row.y, row.z
 
 
 def surface_region(table: mi.Float, surface: mi.UInt32, active: mi.Bool) -> mi.UInt32:
@@ -160,9 +166,7 @@ def sample_ggx(local: mi.Vector3f, alpha: mi.Float, sample: mi.Point2f) -> mi.Ve
     y = (1 - s) * dr.safe_sqrt(1 - disk.x * disk.x) + s * disk.y
     z = dr.safe_sqrt(1 - disk.x * disk.x - y * y)
     half = t1 * disk.x + t2 * y + stretched * z
-    return dr.normalize(
-        mi.Vector3f(alpha * half.x, alpha * half.y, dr.maximum(half.z, 1e-6))
-    )
+    return dr.normalize(mi.Vector3f(alpha * half.x, alpha * half.y, dr.maximum(half.z, 1e-6)))
 
 
 def refract(
@@ -170,8 +174,8 @@ def refract(
 ) -> tuple[mi.Float, mi.Vector3f, mi.Vector3f, mi.Float]:
     """Ideal interface: reflectance, reflected direction, transmitted direction, relative index.
 
-    ``eta`` is the index behind the normal over the index before it. The relative index is that of the far side over the
-    near side. At total internal reflection the reflectance is 1.
+    ``eta`` is the index behind the normal over the index before it. The relative index is that
+    of the far side over the near side. At total internal reflection the reflectance is 1.
     """
     cosine = -dr.dot(incoming, normal)
     reflectance, cos_t, eta_it, eta_ti = mi.fresnel(cosine, eta)
@@ -188,7 +192,9 @@ def sample_rough_interface(
     pick: mi.Float,
     sample: mi.Point2f,
 ) -> tuple[mi.Vector3f, mi.Float, mi.Bool, mi.Float]:
-    """Rough (GGX) interface: direction, weight, whether it was transmitted, and the relative index."""
+    """Rough (GGX) interface: direction, weight, whether it was transmitted, and the relative
+    index.
+    """
     facing = normal * dr.sign(-dr.dot(incoming, normal))
     frame = mi.Frame3f(facing)
     half = frame.to_world(sample_ggx(frame.to_local(-incoming), alpha, sample))
@@ -201,5 +207,3 @@ def sample_rough_interface(
     proper = dr.select(through, cosine < 0, cosine > 0)
     weight = dr.select(proper, _smith(dr.abs(cosine), alpha), 0.0)
     return outgoing, weight, through, dr.select(through, eta_it, 1.0)
-
-

@@ -1,10 +1,11 @@
 """What visible points make of the light field: tilt, shadows, and light exchanged inside a contact.
 
-A visible point sums the field over bins of directions and reflects each with its own normal. On an indenter, which
-stands off the undeformed surface, a bin is looked up where the light's line goes on to meet that surface. A shadow ray
-tests whether an indenter is in the way; it is drawn within the bin's spread, so that lights of some size cast soft shadows.
-Directions in which a point sees an indenter or, from an indenter, the near skin are sampled
-once more: the light that comes from there is the field, shaded at that other place.
+A visible point sums the field over bins of directions and reflects each with its own normal. On
+an indenter, which stands off the undeformed surface, a bin is looked up where the light's line
+goes on to meet that surface. A shadow ray tests whether an indenter is in the way; it is drawn
+within the bin's spread, so that lights of some size cast soft shadows. Directions in which a
+point sees an indenter or, from an indenter, the near skin are sampled once more: the light that
+comes from there is the field, shaded at that other place.
 """
 
 from __future__ import annotations
@@ -34,9 +35,10 @@ CHOSEN_BINS = 24.0
 
 @dataclass
 class ContactScenes:
-    """Ray scenes of one image: ``full`` has everything, ``fixed`` the opaque surfaces without indenters,
-    ``indenters`` these alone (None without contacts); ``indenter_surface`` is their surface number;
-    ``balls`` holds centre and radius of a ball around each, four floats a ball."""
+    """Ray scenes of one image: ``full`` has everything, ``fixed`` the opaque surfaces without
+    indenters, ``indenters`` these alone (None without contacts); ``indenter_surface`` is their
+    surface number; ``balls`` holds centre and radius of a ball around each, four floats a
+    ball."""
 
     full: RayScene
     fixed: RayScene
@@ -61,7 +63,7 @@ def _sum_all(
     cell: mi.UInt32,
     active: mi.Bool,
     random: mi.UInt32,
-):
+) -> list[mi.Color3f]:
     """Every bin of the field, for points on the undeformed surface."""
     moments, colours = tables
     totals = [mi.Color3f(0) for _ in range(groups)]
@@ -124,9 +126,11 @@ def _sum_chosen(
     shift: mi.Vector3f,
     random: mi.UInt32,
     chosen: mi.Float,
-):
-    """Bins drawn in proportion to what they bring, evenly spaced in their running sum (systematic sampling), each
-    looked up and tested with rays."""
+) -> list[mi.Color3f]:
+    """Bins drawn in proportion to what they bring, evenly spaced in their running sum.
+
+    This is systematic sampling; each bin drawn is looked up along its line and tested with rays.
+    """
     moments, colours = tables
     totals = [mi.Color3f(0) for _ in range(groups)]
     state = mi.UInt32(random)
@@ -157,7 +161,8 @@ def _sum_chosen(
                 widened(coating, spread2), points.normal, towards, points.towards_eye
             )
             bright = dr.mean(reflected)
-            # A bin that is dark here may be lit where an indenter's point looks it up: keep a small chance.
+            # A bin that is dark here may be lit where an indenter's point looks it up: keep a
+            # small chance.
             share = dr.select(known, value.w * bright / step, dr.select(raised, 0.05, 0))
             share = dr.select(bright > 0, share, 0)
             before = dr.floor(running)
@@ -202,7 +207,9 @@ def _sum_chosen(
 
 
 def beam(value: mi.Vector4f) -> tuple[mi.Vector3f, mi.Float]:
-    """Mean direction of an entry of the field, and the squared angular radius of a disc that has its mean cosine."""
+    """Mean direction of an entry of the field, and the squared angular radius of a disc that
+    has its mean cosine.
+    """
     mean = mi.Vector3f(value.x, value.y, value.z)
     length = dr.norm(mean)
     # The mean cosine over a disc of radius R is 1 - R^2 / 4.
@@ -236,13 +243,16 @@ def within(towards: mi.Vector3f, spread2: mi.Float, state: mi.UInt32) -> mi.Vect
 def _shade_field(
     field: LightField, scenes: ContactScenes, points: VisiblePoints, seed: int, thorough: bool
 ) -> list[mi.Color3f]:
-    """The field's own light at points, one colour a group; ``thorough`` points may be on indenters."""
+    """The field's own light at points, one colour a group; ``thorough`` points may be on
+    indenters.
+    """
     table = scenes.full.table
     active, base, raised = points.valid, points.point, mi.Bool(False)
     if thorough:
         region = surface_region(table, points.surface, points.valid)
         raised = points.valid & (region == int(Region.INDENTER))
-        # Behind an indenter, along the line of sight, lies the undeformed surface that the eye would have met.
+        # Behind an indenter, along the line of sight, lies the undeformed surface that the eye
+        # would have met.
         onward = scenes.fixed.intersect(points.point, -points.towards_eye, raised)
         base = dr.select(raised & onward.valid, onward.point, points.point)
     random = mi.sample_tea_32(
@@ -299,8 +309,8 @@ def _interpolating_cell(
 ) -> tuple[mi.UInt32, mi.Vector3f, mi.Bool]:
     """A random cell next to points, how far it was moved, and whether there is one.
 
-    The same for all bins, as light that straddles two bins must not be taken twice; over the samples of a pixel
-    this interpolates between cells.
+    The same for all bins, as light that straddles two bins must not be taken twice; over the
+    samples of a pixel this interpolates between cells.
     """
     home, found = cell_at(cells, base, active)
     upright = dr.gather(mi.Vector4f, cells.normals, home, found)
@@ -319,7 +329,9 @@ def _interpolating_cell(
 def _exchanged(
     field: LightField, scenes: ContactScenes, points: VisiblePoints, seed: int
 ) -> list[mi.Color3f] | None:
-    """Light that reaches points by way of an indenter, or indenters by way of the near skin (one sample each)."""
+    """Light that reaches points by way of an indenter, or indenters by way of the near skin
+    (one sample each).
+    """
     assert scenes.indenters is not None
     table = scenes.full.table
     count = dr.width(points.point)
@@ -371,8 +383,8 @@ def shade(
 ) -> list[mi.Color3f]:
     """Radiance of visible points towards the eye, for each light group with lights of 1 mW.
 
-    ``thorough`` is for points on and near indenters: each bin is looked up along its own line, and light that
-    indenters and the skin near them send to each other is added.
+    ``thorough`` is for points on and near indenters: each bin is looked up along its own line,
+    and light that indenters and the skin near them send to each other is added.
     """
     totals = _shade_field(field, scenes, points, seed, thorough)
     dr.eval(totals)

@@ -1,8 +1,9 @@
 """Stochastic progressive photon mapping, pair by pair: the estimator without pooling.
 
-Every pass traces photons through the scene as it is, contacts included, and gathers them at fresh visible points with
-a radius that shrinks as passes^(-1/6) (area as passes^(-1/3), the rate of Knaus and Zwicker 2011, alpha = 2/3), so that both noise and bias
-go to zero. It is slower than the light field and is what that is checked against.
+Every pass traces photons through the scene as it is, contacts included, and gathers them at
+fresh visible points with a radius that shrinks as passes^(-1/6) (area as passes^(-1/3), the
+rate of Knaus and Zwicker 2011, alpha = 2/3), so that both noise and bias go to zero. It is
+slower than the light field and is what that is checked against.
 """
 
 from __future__ import annotations
@@ -29,7 +30,9 @@ FIRST_RADIUS = 0.3
 
 @dataclass
 class SppmResult:
-    """layers (groups, h, w, 3): radiance for lights of 1 mW; halves: the same of even and odd passes."""
+    """layers (groups, h, w, 3): radiance for lights of 1 mW; halves: the same of even and odd
+    passes.
+    """
 
     layers: NDArray[np.float32]
     halves: NDArray[np.float32]
@@ -50,7 +53,9 @@ def render_sppm(
     radius: float = FIRST_RADIUS,
     stop: Callable[[int], bool] | None = None,
 ) -> SppmResult:
-    """Average ``passes`` passes of ``per_light`` photons from each light; ``stop(done)`` may end earlier."""
+    """Average ``passes`` passes of ``per_light`` photons from each light; ``stop(done)`` may
+    end earlier.
+    """
     width, height = camera.width, camera.height
     pixel = dr.arange(mi.UInt32, width * height)
     halves = np.zeros((2, table.groups, height, width, 3), dtype=np.float64)

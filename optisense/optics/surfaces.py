@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import IntEnum
 
-# Rays start this far off a surface (mm): a hundred times the rounding of 30 mm in single precision, a
-# hundredth of the thinnest film a design holds (0.02 mm).
+# Rays start this far off a surface (mm): a hundred times the rounding of 30 mm in single
+# precision, a hundredth of the thinnest film a design holds (0.02 mm).
 RAY_OFFSET = 2e-4
 
 
@@ -32,8 +32,8 @@ class Region(IntEnum):
 class Surface:
     """Optical data of one surface.
 
-    For a dielectric ``eta`` is the index on the inside (behind the face normal) over the index on the
-    outside. ``reflectance``, ``metal_eta`` and ``metal_k`` are per channel R, G, B.
+    For a dielectric ``eta`` is the index on the inside (behind the face normal) over the index
+    on the outside. ``reflectance``, ``metal_eta`` and ``metal_k`` are per channel R, G, B.
     """
 
     kind: SurfaceKind

@@ -1,13 +1,15 @@
 """The camera pass: which points of the coating every pixel sees, and through what.
 
-The main path of a pixel sample always goes through smooth interfaces (weighted with the transmittance), so the
-image carries no noise of Fresnel reflections drawn at random. What interfaces reflect is followed by one more path
-a sample, its branch drawn in proportion to its weight.
+The main path of a pixel sample always goes through smooth interfaces (weighted with the
+transmittance), so the image carries no noise of Fresnel reflections drawn at random. What
+interfaces reflect is followed by one more path a sample, its branch drawn in proportion to its
+weight.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import drjit as dr
 import mitsuba as mi
@@ -33,8 +35,8 @@ MAX_DEPTH = 24
 class VisiblePoints:
     """Points of opaque surfaces that the camera sees; one entry a path.
 
-    ``weight`` multiplies the radiance that leaves the point along ``towards_eye``; ``light`` is the number + 1 of a
-    light that the path ends on instead (its emission is seen), else 0.
+    ``weight`` multiplies the radiance that leaves the point along ``towards_eye``; ``light`` is
+    the number + 1 of a light that the path ends on instead (its emission is seen), else 0.
     """
 
     pixel: mi.UInt32
@@ -63,7 +65,7 @@ def _follow(
     coherent: bool,
     rough: bool,
     max_depth: mi.UInt32,
-):
+) -> tuple[Any, ...]:
     active = mi.Bool(start)
     depth = mi.UInt32(0)
     found = mi.Bool(False)
@@ -78,7 +80,7 @@ def _follow(
     branch_direction = mi.Vector3f(0, 0, 1)
     while active:
         hit = intersect(scene, rows, corners, origin, direction, active, coherent)
-        kind, eta, alpha, specularity = surface_kind(surfaces, hit.surface, hit.valid)
+        kind, eta, alpha = surface_kind(surfaces, hit.surface, hit.valid)
         active &= hit.valid & (kind != int(SurfaceKind.ABSORBER))
         is_light = active & (kind == int(SurfaceKind.LIGHT))
         seen = active & (kind == int(SurfaceKind.OPAQUE))
@@ -97,7 +99,9 @@ def _follow(
         interface = active & (kind == int(SurfaceKind.DIELECTRIC))
         if dr.hint(split, mode="scalar"):
             through = reflectance < 1
-            branch = dr.select(interface & through & (alpha <= SMOOTH_ALPHA), 1.0, 0.0) * reflectance
+            branch = (
+                dr.select(interface & through & (alpha <= SMOOTH_ALPHA), 1.0, 0.0) * reflectance
+            )
             branch_weight = weight * branch
             branch_total += branch_weight
             chosen = (branch > 0) & (
@@ -117,7 +121,7 @@ def _follow(
             pick = rng.next_float32()
             sample = mi.Point2f(rng.next_float32(), rng.next_float32())
             if interface & (alpha > SMOOTH_ALPHA):
-                scattered, rough_weight, rough_through, rough_relative = sample_rough_interface(
+                scattered, rough_weight, _through, rough_relative = sample_rough_interface(
                     direction, hit.shading_normal, eta, alpha, pick, sample
                 )
                 outgoing = scattered
@@ -128,9 +132,7 @@ def _follow(
             facing = hit.shading_normal * side
             cosine = -dr.dot(direction, facing)
             outgoing = direction + facing * (2 * cosine)
-            factor = fresnel_metal(
-                dr.abs(cosine), coating.metal_eta, coating.metal_k
-            )
+            factor = fresnel_metal(dr.abs(cosine), coating.metal_eta, coating.metal_k)
         weight = dr.select(active, weight * factor, weight)
         direction = dr.select(active, dr.normalize(outgoing), direction)
         origin = dr.select(active, leave(hit.point, hit.normal, direction), origin)
@@ -152,7 +154,9 @@ def _follow(
 
 
 def film_samples(pixel: mi.UInt32, width: int, sample: mi.UInt32, seed: int) -> mi.Point2f:
-    """Film positions of samples of pixels; sample 0 is the pixel's middle, the others are spread over it."""
+    """Film positions of samples of pixels; sample 0 is the pixel's middle, the others are
+    spread over it.
+    """
     jitter = sequence_2d(sample, pixel, dr.opaque(mi.UInt32, seed))
     middle = sample == 0
     x = mi.Float(pixel % width) + dr.select(middle, 0.5, jitter.x)
@@ -196,4 +200,6 @@ def find_visible_points(
     if dr.width(kept) == 0:
         return main, None
     picked = [dr.gather(type(value), value, kept) for value in branch[:8]]
-    return main, VisiblePoints(dr.gather(mi.UInt32, pixel, dr.gather(mi.UInt32, lanes, kept)), *picked)
+    return main, VisiblePoints(
+        dr.gather(mi.UInt32, pixel, dr.gather(mi.UInt32, lanes, kept)), *picked
+    )
