@@ -93,6 +93,12 @@ class Emitter:
     exponent: float = 1.0
     intensity: Intensity | None = None
 
+    @property
+    def area(self) -> float:
+        """mm^2 of the emitting face, 0 for a point."""
+        filled = {Shape.POINT: 0.0, Shape.RECTANGLE: 1.0, Shape.DISC: np.pi / 4}[self.shape]
+        return float(self.size[0] * self.size[1] * filled)
+
     def frame(self) -> FloatArray:
         """(3, 3): width axis, height axis, direction as rows."""
         n = np.asarray(self.direction, float)

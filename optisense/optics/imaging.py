@@ -16,12 +16,13 @@ from scipy.ndimage import maximum_filter
 from optisense.optics.camera import RayCamera
 from optisense.optics.chief_rays import ChiefRays
 from optisense.optics.emitters import Emitter
+from optisense.optics.film import Film
 from optisense.optics.light_field import LightField
 from optisense.optics.sampling import seed_of
 from optisense.optics.shading import ContactScenes, shade
 from optisense.optics.sppm import SppmResult
 from optisense.optics.surfaces import Region
-from optisense.optics.visible_points import VisiblePoints, film_samples, find_visible_points
+from optisense.optics.visible_points import film_samples, find_visible_points
 
 CONTACT_SAMPLES = 8
 """Camera samples of a pixel in and around contacts, where tilt and shadow change within it."""
@@ -72,47 +73,6 @@ def masked(values: NDArray[np.float32], where: NDArray[np.bool_]) -> NDArray[np.
     return np.where(where[..., None], values, np.nan).astype(np.float32)
 
 
-class _Film:
-    """Sums of radiance and of samples per pixel and group."""
-
-    def __init__(self, pixels: int, groups: int) -> None:
-        self.sums = [dr.zeros(mi.Float, pixels * 3) for _ in range(groups)]
-        self.counts = dr.zeros(mi.Float, pixels)
-
-    def count(self, pixel: mi.UInt32) -> None:
-        dr.scatter_add(self.counts, mi.Float(1), pixel)
-
-    def add(self, points: VisiblePoints, radiance: list[mi.Color3f]) -> None:
-        for total, value in zip(self.sums, radiance, strict=True):
-            weighted = points.weight * value
-            for k in range(3):
-                dr.scatter_add(total, weighted[k], points.pixel * 3 + k, points.valid)
-
-    def add_light(self, points: VisiblePoints, emitters: list[Emitter], areas: list[float]) -> None:
-        """The windows of flat lights that are seen directly; a Lambertian window of 1 mW has
-        radiance 1 / (pi A).
-        """
-        radiance = [1 / (np.pi * area) if area > 0 else 0.0 for area in areas]
-        values = mi.Float(np.array([0.0, *radiance], dtype=np.float32))
-        groups = mi.UInt32(np.array([0, *(e.group for e in emitters)], dtype=np.uint32))
-        seen = points.light > 0
-        value = dr.gather(mi.Float, values, points.light, seen)
-        group = dr.gather(mi.UInt32, groups, points.light, seen)
-        for number, total in enumerate(self.sums):
-            for k in range(3):
-                dr.scatter_add(
-                    total,
-                    points.weight[k] * value,
-                    points.pixel * 3 + k,
-                    seen & (group == number),
-                )
-
-    def layers(self, width: int, height: int) -> NDArray[np.float32]:
-        share = 1 / np.maximum(np.asarray(self.counts), 1).reshape(height, width, 1)
-        out = [np.asarray(total).reshape(height, width, 3) * share for total in self.sums]
-        return np.stack(out).astype(np.float32)
-
-
 def render_field(
     light: tuple[LightField, bool],
     scenes: ContactScenes,
@@ -126,7 +86,7 @@ def render_field(
     began = time.perf_counter()
     field, interrupted = light
     width, height = camera.width, camera.height
-    film = _Film(width * height, field.groups)
+    film = Film(width * height, field.groups)
 
     def sample(pixel: mi.UInt32, number: mi.UInt32, thorough: bool) -> None:
         spots = film_samples(pixel, width, number, seed_of(seed, 3))

@@ -103,7 +103,7 @@ class ReferenceScene:
         )
         fixed = RayScene([self.pieces[i] for i in opaque], opaque, scene.table)
         scenes = ContactScenes(scene, fixed, None, len(surfaces), mi.Float())
-        areas = [_area(emitter) for emitter in self.emitters]
+        areas = [emitter.area for emitter in self.emitters]
         layers = render_field(light, scenes, self.camera, rays, self.emitters, areas, seed)
         return self._scaled(layers.radiance)
 
@@ -118,11 +118,6 @@ class ReferenceScene:
             max_depth=max_depth,
         )
         return np.asarray(mi.render(mi.load_dict(described), seed=seed), dtype=np.float64)
-
-
-def _area(emitter: Emitter) -> float:
-    round_off = np.pi / 4 if emitter.shape is Shape.DISC else 1.0
-    return float(emitter.size[0] * emitter.size[1] * round_off)
 
 
 def isotropic() -> Intensity:
@@ -218,7 +213,8 @@ def referee_scene(
         coating: of the bottom, z = 0. slab: whether there is gel; without it the coating lies
             bare. lights: "area" (4 x 2 mm, radiance REFEREE_RADIANCE, outside the slab),
             "point" (intensity REFEREE_INTENSITY, at
-            the same places), or "embedded" (smaller area lights inside the gel).
+            the same places), or "embedded" (smaller area lights inside the gel, tilted towards the coating so that
+            the camera sees their dark backs).
         resolution: pixels, width and height.
     """
     half_x, half_y, height = REFEREE_SLAB[0] / 2, REFEREE_SLAB[1] / 2, REFEREE_SLAB[2]
@@ -236,6 +232,8 @@ def referee_scene(
     for number, (way, distance) in enumerate(zip(ways, distances, strict=True)):
         place = (-way[0] * distance, -way[1] * distance, height / 2)
         colour = np.eye(3)[number]
+        if lights == "embedded":
+            way = (way[0], way[1], -1.0)
         if lights == "point":
             emitter = Emitter(number, place, way, intensity=isotropic())
             power = 4 * np.pi * REFEREE_INTENSITY

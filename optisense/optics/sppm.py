@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from optisense.optics.camera import RayCamera
 from optisense.optics.emitters import EmitterTable
+from optisense.optics.film import Film
 from optisense.optics.gather import build_grid, gather_pairwise
 from optisense.optics.guide import Guide
 from optisense.optics.photons import trace_photons
@@ -59,6 +60,7 @@ def render_sppm(
     width, height = camera.width, camera.height
     pixel = dr.arange(mi.UInt32, width * height)
     halves = np.zeros((2, table.groups, height, width, 3), dtype=np.float64)
+    areas = [emitter.area for emitter in table.emitters]
     done = emitted = 0
     for number in range(passes):
         film = film_samples(pixel, width, dr.opaque(mi.UInt32, number + 1), seed)
@@ -68,18 +70,17 @@ def render_sppm(
         )
         reach = radius * (number + 1) ** (-1 / 6)
         grid = build_grid(photons, *scene.bounds, reach)
+        image = Film(width * height, table.groups)
+        image.count(pixel)
         for points in (main, reflected):
             if points is None:
                 continue
             light = gather_pairwise(
                 grid, scene.table, points, dr.opaque(mi.Float, reach), table.groups
             )
-            for group, radiance in enumerate(light):
-                value = dr.select(points.valid, points.weight * radiance, 0)
-                out = dr.zeros(mi.Float, width * height * 3)
-                for k in range(3):
-                    dr.scatter_add(out, value[k], points.pixel * 3 + k)
-                halves[number % 2, group] += np.asarray(out).reshape(height, width, 3)
+            image.add(points, light)
+            image.add_light(points, table.emitters, areas)
+        halves[number % 2] += image.layers(width, height)
         done, emitted = number + 1, emitted + photons.emitted
         if stop is not None and stop(done):
             break
