@@ -53,8 +53,7 @@ def assemble(design: SensorDesign) -> Assembly:
     """Resolve media, and turn parts and lights into surfaces and emitters.
 
     Raises:
-        DesignError: solids overlap without priority, a light's library entry is unknown, or a sensing
-            surface has no elastomer before it.
+        DesignError: solids overlap without priority, or a light is not in the library.
         MeshError: a solid is not closed.
     """
     meshes = design.deformed_meshes()

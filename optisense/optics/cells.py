@@ -8,9 +8,13 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import distance_transform_edt
 from scipy.spatial import cKDTree
 
 FloatArray = NDArray[np.floating]
+
+REACH = 3
+"""A point this many grid places off the surface still finds the nearest cell."""
 
 
 @dataclass
@@ -26,7 +30,7 @@ class SurfaceCells:
     counts: mi.Vector3u
     index: mi.UInt32
     cells: int
-    normals: mi.Float
+    planes: mi.Float
     centres: FloatArray
     near_start: mi.UInt32
     near_cell: mi.UInt32
@@ -66,8 +70,8 @@ def build_cells(
     vertices = np.asarray(vertices, dtype=np.float64)
     points, normals, areas = surface_samples(vertices, faces, size / 8)
     # Off any round number, so that a plane does not run along the border between two cells.
-    lower = points.min(axis=0) - 0.37 * size
-    counts = np.floor((points.max(axis=0) - lower) / size).astype(int) + 1
+    lower = points.min(axis=0) - (0.37 + REACH) * size
+    counts = np.floor((points.max(axis=0) - lower) / size).astype(int) + 1 + REACH
     place = np.floor((points - lower) / size).astype(int)
     flat = place[:, 0] + counts[0] * (place[:, 1] + counts[1] * place[:, 2])
     used, owner = np.unique(flat, return_inverse=True)
@@ -80,8 +84,7 @@ def build_cells(
     centre = mean_of(points) / area[:, None]
     normal = mean_of(normals)
     normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-12)
-    index = np.zeros(int(np.prod(counts)), dtype=np.uint32)
-    index[used] = np.arange(cells) + 1
+    index = _index(used, counts)
 
     near = (
         cKDTree(centre)
@@ -100,19 +103,30 @@ def build_cells(
     dr.make_opaque(lower3, counts3)
     four = np.zeros((cells, 4), dtype=np.float32)
     four[:, :3] = normal
+    four[:, 3] = np.einsum("ij,ij->i", normal, centre)
     return SurfaceCells(
         lower=lower3,
         inverse_size=dr.opaque(mi.Float, 1 / size),
         counts=counts3,
         index=mi.UInt32(index),
         cells=cells,
-        normals=mi.Float(four.ravel()),
+        planes=mi.Float(four.ravel()),
         centres=centre,
         near_start=mi.UInt32(near.indptr.astype(np.uint32)),
         near_cell=mi.UInt32(columns.astype(np.uint32)),
         near_weight=mi.Float(weight.astype(np.float32)),
         axes=_frame(normal.sum(axis=0)),
     )
+
+
+def _index(used: NDArray[np.int64], counts: NDArray[np.int64]) -> NDArray[np.uint32]:
+    """Number + 1 of the nearest cell of each grid place within REACH places, else 0."""
+    numbers = np.zeros(int(np.prod(counts)), dtype=np.uint32)
+    numbers[used] = np.arange(len(used)) + 1
+    grid = numbers.reshape(counts[::-1])
+    distance, nearest = distance_transform_edt(grid == 0, return_indices=True)
+    spread = grid[tuple(nearest)]
+    return np.asarray(np.where(distance <= REACH, spread, 0).ravel(), dtype=np.uint32)
 
 
 def _frame(z: FloatArray) -> FloatArray:
@@ -131,6 +145,12 @@ def cell_at(cells: SurfaceCells, point: mi.Point3f, active: mi.Bool) -> tuple[mi
     x, y, z = (mi.UInt32(dr.maximum(relative[i], 0)) for i in range(3))
     found = dr.gather(mi.UInt32, cells.index, x + cells.counts.x * (y + cells.counts.y * z), inside)
     return dr.maximum(found, 1) - 1, inside & (found > 0)
+
+
+def plane_of(cells: SurfaceCells, cell: mi.UInt32, active: mi.Bool) -> tuple[mi.Vector3f, mi.Float]:
+    """Normal and offset of the plane of cells: points x on it have dot(normal, x) = offset."""
+    plane = dr.gather(mi.Vector4f, cells.planes, cell, active)
+    return mi.Vector3f(plane.x, plane.y, plane.z), plane.w
 
 
 def cells_near(

@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from optisense.optics.cells import SurfaceCells, cell_at
+from optisense.optics.exchange import irradiance_table
 from optisense.optics.photons import GROUP_MASK, PhotonMap
 
 FloatArray = NDArray[np.floating]
@@ -69,6 +70,7 @@ class LightField:
     colours: mi.Float
     coloured: bool
     centres: mi.Float
+    irradiance: mi.Float
     photons: int
     noise: float
 
@@ -157,7 +159,10 @@ class FieldTally:
         colours = moments
         if self.coloured:
             colours = _smooth(self.cells, self.colours, bins, every, self.groups) * scale
-        dr.eval(moments, colours)
+        table = irradiance_table(
+            moments, self.cells.cells, dr.opaque(mi.UInt32, len(used)), self.groups
+        )
+        dr.eval(moments, colours, table)
         return LightField(
             cells=self.cells,
             bins=len(used),
@@ -166,6 +171,7 @@ class FieldTally:
             colours=colours,
             coloured=self.coloured,
             centres=bin_centres(self.cells, used),
+            irradiance=table,
             photons=self.photons,
             noise=self.noise(),
         )

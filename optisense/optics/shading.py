@@ -15,22 +15,24 @@ from dataclasses import dataclass
 import drjit as dr
 import mitsuba as mi
 
-from optisense.optics.cells import SurfaceCells, cell_at
-from optisense.optics.light_field import LightField
+from optisense.optics.cells import SurfaceCells, cell_at, plane_of
+from optisense.optics.exchange import exchanged
+from optisense.optics.light_field import LEAST_COSINE, LightField
 from optisense.optics.ray_scene import RayScene, leave
 from optisense.optics.sampling import unit_float
 from optisense.optics.scattering import (
     Coating,
     coating_of,
     evaluate_coating,
-    sample_coating,
     surface_region,
 )
 from optisense.optics.surfaces import Region
 from optisense.optics.visible_points import VisiblePoints
 
-CHOSEN_BINS = 24.0
-"""Bins of each light group that a camera sample near a contact follows with rays."""
+CHOSEN_BINS = 16.0
+"""Shadow rays of each light group for a camera sample near a contact."""
+SHADOW_RAYS = 4
+"""Shadow rays of a bin whose light passes near an indenter, for points that are sampled once."""
 
 
 @dataclass
@@ -90,13 +92,16 @@ def _sum_all(
                         gap2 = dr.squared_norm(offset) - along * along
                         near |= (along > -ball.w) & (gap2 < reach * reach)
                     if seen & near:
-                        state = next_random(state)
-                        blocked = indenters.ray_test(
-                            mi.Ray3f(start, within(towards, spread2, state)),
-                            coherent=False,
-                            active=mi.Bool(True),
-                        )
-                        seen &= ~blocked
+                        open_rays = mi.Float(0)
+                        for _ in range(SHADOW_RAYS):
+                            state = next_random(state)
+                            blocked = indenters.ray_test(
+                                mi.Ray3f(start, within(towards, spread2, state)),
+                                coherent=False,
+                                active=mi.Bool(True),
+                            )
+                            open_rays += dr.select(blocked, 0.0, 1.0 / SHADOW_RAYS)
+                        reflected *= open_rays
                 if dr.hint(coloured, mode="scalar"):
                     flux = dr.gather(mi.Vector4f, colours, entry)
                     reflected *= mi.Color3f(flux.x, flux.y, flux.z)
@@ -116,7 +121,6 @@ def _sum_chosen(
     groups: int,
     coloured: bool,
     indenters: mi.Scene,
-    fixed: mi.Scene,
     coating: Coating,
     points: VisiblePoints,
     start: mi.Point3f,
@@ -127,9 +131,10 @@ def _sum_chosen(
     random: mi.UInt32,
     chosen: mi.Float,
 ) -> list[mi.Color3f]:
-    """Bins drawn in proportion to what they bring, evenly spaced in their running sum.
+    """Every bin, looked up along its own line, and shadow rays for some of them.
 
-    This is systematic sampling; each bin drawn is looked up along its line and tested with rays.
+    These are drawn in proportion to what they bring, evenly spaced in the running sum (systematic
+    sampling): where nothing is hidden, the sum is exact.
     """
     moments, colours = tables
     totals = [mi.Color3f(0) for _ in range(groups)]
@@ -138,7 +143,9 @@ def _sum_chosen(
         expected = mi.Float(0)
         k = mi.UInt32(0)
         while active & (k < bins):
-            value = dr.gather(mi.Vector4f, moments, (cell * bins + k) * groups + g, active)
+            entry, value = _entry(
+                cells, moments, centres, bins, groups, points, cell, shift, raised, active, k, g
+            )
             if value.w > 0:
                 towards, spread2 = beam(value)
                 reflected = evaluate_coating(
@@ -151,44 +158,19 @@ def _sum_chosen(
         running = unit_float(state)
         k = mi.UInt32(0)
         while active & (expected > 0) & (k < bins):
-            entry = (cell * bins + k) * groups + g
-            value = dr.gather(mi.Vector4f, moments, entry, active)
-            known = value.w > 0
-            middle = dr.gather(mi.Vector4f, centres, k)
-            value = dr.select(known, value, mi.Vector4f(middle.x, middle.y, middle.z, 1))
-            towards, spread2 = beam(value)
-            reflected = evaluate_coating(
-                widened(coating, spread2), points.normal, towards, points.towards_eye
+            entry, value = _entry(
+                cells, moments, centres, bins, groups, points, cell, shift, raised, active, k, g
             )
-            bright = dr.mean(reflected)
-            # A bin that is dark here may be lit where an indenter's point looks it up: keep a
-            # small chance.
-            share = dr.select(known, value.w * bright / step, dr.select(raised, 0.05, 0))
-            share = dr.select(bright > 0, share, 0)
-            before = dr.floor(running)
-            running += share
-            times = dr.floor(running) - before
-            if times > 0:
-                usable = mi.Bool(known)
-                if raised:
-                    # Follow the light's line on to the undeformed surface and look there.
-                    below = fixed.ray_intersect_preliminary(
-                        mi.Ray3f(points.point, -towards), coherent=False, active=mi.Bool(True)
-                    )
-                    reached = below.is_valid()
-                    landing = points.point - towards * dr.select(reached, below.t, 0)
-                    there, exists = cell_at(cells, landing + shift, reached)
-                    if exists:
-                        entry = (there * bins + k) * groups + g
-                        value = dr.gather(mi.Vector4f, moments, entry)
-                        usable = value.w > 0
-                        towards, spread2 = beam(
-                            dr.select(usable, value, mi.Vector4f(middle.x, middle.y, middle.z, 1))
-                        )
-                        reflected = evaluate_coating(
-                            widened(coating, spread2), points.normal, towards, points.towards_eye
-                        )
-                if usable:
+            if value.w > 0:
+                towards, spread2 = beam(value)
+                reflected = evaluate_coating(
+                    widened(coating, spread2), points.normal, towards, points.towards_eye
+                )
+                share = value.w * dr.mean(reflected) / step
+                before = dr.floor(running)
+                running += share
+                times = dr.floor(running) - before
+                if times > 0:
                     state = next_random(state)
                     blocked = indenters.ray_test(
                         mi.Ray3f(start, within(towards, spread2, state)),
@@ -204,6 +186,47 @@ def _sum_chosen(
                     totals[g] += reflected * weight
             k += 1
     return totals
+
+
+def _entry(
+    cells: SurfaceCells,
+    moments: mi.Float,
+    centres: mi.Float,
+    bins: mi.UInt32,
+    groups: int,
+    points: VisiblePoints,
+    cell: mi.UInt32,
+    shift: mi.Vector3f,
+    raised: mi.Bool,
+    active: mi.Bool,
+    k: mi.UInt32,
+    g: int,
+) -> tuple[mi.UInt32, mi.Vector4f]:
+    """Place and value of a bin of the field for points; on an indenter, where the bin's line through
+    the point goes on to meet the undeformed surface (found on the planes of two cells in turn)."""
+    entry = (cell * bins + k) * groups + g
+    value = dr.gather(mi.Vector4f, moments, entry, active)
+    middle = dr.gather(mi.Vector4f, centres, k)
+    known = value.w > 0
+    towards = dr.normalize(
+        mi.Vector3f(
+            dr.select(known, value.x, middle.x),
+            dr.select(known, value.y, middle.y),
+            dr.select(known, value.z, middle.z),
+        )
+    )
+    there = mi.UInt32(cell)
+    exists = mi.Bool(raised)
+    for _ in range(2):
+        normal, offset = plane_of(cells, there, exists)
+        facing = dr.dot(normal, towards)
+        exists &= facing > LEAST_COSINE
+        way = (dr.dot(normal, points.point) - offset) / dr.maximum(facing, LEAST_COSINE)
+        there, found = cell_at(cells, points.point - towards * way + shift, exists)
+        exists &= found
+    moved = (there * bins + k) * groups + g
+    entry = dr.select(exists, moved, entry)
+    return entry, dr.select(raised, dr.gather(mi.Vector4f, moments, moved, exists), value)
 
 
 def beam(value: mi.Vector4f) -> tuple[mi.Vector3f, mi.Float]:
@@ -240,11 +263,13 @@ def within(towards: mi.Vector3f, spread2: mi.Float, state: mi.UInt32) -> mi.Vect
     return dr.normalize(towards + frame.s * (radius * cos_a) + frame.t * (radius * sin_a))
 
 
-def _shade_field(
+def shade(
     field: LightField, scenes: ContactScenes, points: VisiblePoints, seed: int, thorough: bool
 ) -> list[mi.Color3f]:
-    """The field's own light at points, one colour a group; ``thorough`` points may be on
-    indenters.
+    """Radiance of visible points towards the eye, for each light group with lights of 1 mW.
+
+    ``thorough`` is for points on and near indenters: each bin is looked up along its own line, and
+    light that indenters and the skin near them send to each other is added.
     """
     table = scenes.full.table
     active, base, raised = points.valid, points.point, mi.Bool(False)
@@ -266,7 +291,7 @@ def _shade_field(
     indenters = scenes.indenters
     if thorough:
         assert indenters is not None
-        return _sum_chosen(
+        far = _sum_chosen(
             field.cells,
             tables,
             field.centres,
@@ -274,7 +299,6 @@ def _shade_field(
             field.groups,
             field.coloured,
             indenters.scene,
-            scenes.fixed.scene,
             coating,
             points,
             start,
@@ -285,6 +309,8 @@ def _shade_field(
             random,
             dr.opaque(mi.Float, CHOSEN_BINS),
         )
+        near = exchanged(field, scenes, points, coating, cell, active, raised, random)
+        return [one + other for one, other in zip(far, near, strict=True)]
     return _sum_all(
         field,
         tables,
@@ -313,8 +339,7 @@ def _interpolating_cell(
     samples of a pixel this interpolates between cells.
     """
     home, found = cell_at(cells, base, active)
-    upright = dr.gather(mi.Vector4f, cells.normals, home, found)
-    upright = mi.Vector3f(upright.x, upright.y, upright.z)
+    upright, _ = plane_of(cells, home, found)
     shift = mi.Vector3f(
         unit_float(random),
         unit_float(random * 277803737),
@@ -324,72 +349,3 @@ def _interpolating_cell(
     shift -= upright * dr.dot(upright, shift)
     beside, exists = cell_at(cells, base + shift, found)
     return dr.select(exists, beside, home), shift, found
-
-
-def _exchanged(
-    field: LightField, scenes: ContactScenes, points: VisiblePoints, seed: int
-) -> list[mi.Color3f] | None:
-    """Light that reaches points by way of an indenter, or indenters by way of the near skin
-    (one sample each).
-    """
-    assert scenes.indenters is not None
-    table = scenes.full.table
-    count = dr.width(points.point)
-    rng = mi.PCG32(size=count, initstate=dr.opaque(mi.UInt64, seed))
-    coating = coating_of(table, points.surface, points.valid)
-    sample = mi.Point2f(rng.next_float32(), rng.next_float32())
-    way, albedo = sample_coating(
-        coating, points.normal, -points.towards_eye, rng.next_float32(), sample
-    )
-    usable = points.valid & (dr.dot(way, points.face_normal) > 0) & (dr.max(albedo) > 0)
-    start = leave(points.point, points.face_normal, way)
-    pressed = scenes.indenters.intersect(start, way, usable)
-    raised = surface_region(table, points.surface, usable) == int(Region.INDENTER)
-    skin = scenes.fixed.intersect(start, way, usable & raised)
-    behind = scenes.fixed.occluded(start, -way, mi.Float(1e6), usable & raised)
-    on_indenter = pressed.valid & (~skin.valid | (pressed.distance < skin.distance))
-    on_skin = skin.valid & ~on_indenter & ~behind
-    hit_surface = dr.select(on_indenter, scenes.indenter_surface, skin.surface)
-    lanes = dr.compress(on_indenter | on_skin)
-    if dr.width(lanes) == 0:
-        return None
-    facing = dr.select(on_indenter, pressed.normal, skin.normal)
-    side = -dr.sign(dr.dot(way, facing))
-    shading = dr.select(on_indenter, pressed.shading_normal, skin.shading_normal)
-    met = VisiblePoints(
-        pixel=dr.gather(mi.UInt32, dr.arange(mi.UInt32, count), lanes),
-        valid=dr.full(mi.Bool, True, dr.width(lanes)),
-        weight=dr.gather(mi.Color3f, albedo, lanes),
-        point=dr.gather(
-            mi.Point3f, mi.Point3f(dr.select(on_indenter, pressed.point, skin.point)), lanes
-        ),
-        normal=dr.gather(mi.Vector3f, mi.Vector3f(shading * side), lanes),
-        face_normal=dr.gather(mi.Vector3f, mi.Vector3f(facing * side), lanes),
-        towards_eye=dr.gather(mi.Vector3f, mi.Vector3f(-way), lanes),
-        surface=dr.gather(mi.UInt32, hit_surface, lanes),
-        light=dr.zeros(mi.UInt32, dr.width(lanes)),
-    )
-    out = []
-    for light in _shade_field(field, scenes, met, seed + 1, True):
-        channels = [dr.zeros(mi.Float, count) for _ in range(3)]
-        for k in range(3):
-            dr.scatter(channels[k], light[k] * met.weight[k], met.pixel)
-        out.append(mi.Color3f(*channels))
-    return out
-
-
-def shade(
-    field: LightField, scenes: ContactScenes, points: VisiblePoints, seed: int, thorough: bool
-) -> list[mi.Color3f]:
-    """Radiance of visible points towards the eye, for each light group with lights of 1 mW.
-
-    ``thorough`` is for points on and near indenters: each bin is looked up along its own line,
-    and light that indenters and the skin near them send to each other is added.
-    """
-    totals = _shade_field(field, scenes, points, seed, thorough)
-    dr.eval(totals)
-    if thorough:
-        more = _exchanged(field, scenes, points, seed + 7)
-        if more is not None:
-            totals = [a + b for a, b in zip(totals, more, strict=True)]
-    return totals
