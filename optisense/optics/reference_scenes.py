@@ -210,11 +210,11 @@ def referee_scene(
     """A coated slab of gel with a bump, lit from three sides through its walls, seen from above.
 
     Args:
-        coating: of the bottom, z = 0. slab: whether there is gel; without it the coating lies
-            bare. lights: "area" (4 x 2 mm, radiance REFEREE_RADIANCE, outside the slab),
-            "point" (intensity REFEREE_INTENSITY, at
-            the same places), or "embedded" (smaller area lights inside the gel, tilted towards the coating so that
-            the camera sees their dark backs).
+        coating: of the bottom, z = 0.
+        slab: whether there is gel; without it the coating lies bare.
+        lights: "area" (4 x 2 mm, radiance REFEREE_RADIANCE, outside the slab), "point"
+            (intensity REFEREE_INTENSITY, at the same places), or "embedded" (smaller area
+            lights inside the gel, tilted so that the camera sees their dark backs).
         resolution: pixels, width and height.
     """
     half_x, half_y, height = REFEREE_SLAB[0] / 2, REFEREE_SLAB[1] / 2, REFEREE_SLAB[2]

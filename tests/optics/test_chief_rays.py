@@ -1,0 +1,122 @@
+"""Chief rays against the laws of refraction and reflection, written out."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from optisense.optics.camera import RayCamera
+from optisense.optics.chief_rays import ChiefRays, Outcome, trace_chief_rays
+from optisense.optics.ray_scene import Piece, RayScene
+from optisense.optics.reference_scenes import box, diffuse_coating, quad
+from optisense.optics.surfaces import Surface, SurfaceKind
+
+# Single precision over some 10 mm, and rays that start RAY_OFFSET (0.0002 mm) off each surface.
+PLACE = 2e-3
+GLASS = Surface(SurfaceKind.DIELECTRIC, eta=1.5)
+COATING = diffuse_coating(0.5)
+
+
+def trace(pieces: list[Piece], camera: RayCamera) -> ChiefRays:
+    scene = RayScene(pieces)
+    return trace_chief_rays(scene, camera, np.arange(sum(len(p.faces) for p in pieces)))
+
+
+def camera(
+    direction: tuple[float, float, float] = (0, 0, 1),
+    fov: float = 60.0,
+    equidistant: bool = False,
+    position: tuple[float, float, float] = (0, 0, -10),
+    pixels: tuple[int, int] = (32, 24),
+) -> RayCamera:
+    return RayCamera(position, direction, (0, 1, 0), fov, *pixels, equidistant)
+
+
+def slopes(fov: float, width: int, height: int) -> tuple[np.ndarray, np.ndarray]:
+    """Right and up components of pixel rays whose forward component is 1."""
+    tangent = np.tan(np.radians(fov) / 2)
+    x = (2 * (np.arange(width) + 0.5) / width - 1) * tangent
+    y = (height - 2 * (np.arange(height) + 0.5)) / width * tangent
+    return np.meshgrid(x, y)
+
+
+def plane(z: float, half: float = 50.0) -> Piece:
+    corners = [(-half, -half, z), (-half, half, z), (half, half, z), (half, -half, z)]
+    return quad("plane", corners, COATING)
+
+
+def test_a_flat_plate_shifts_rays_by_snells_law() -> None:
+    plate = box("plate", (-50, -50, -2), (50, 50, 0), GLASS)
+    rays = trace([plate, plane(3.0)], camera())
+    x, y = slopes(60.0, 32, 24)
+    tangent = np.hypot(x, y)
+    inside = np.sin(np.arctan(tangent)) / 1.5
+    reach = (8 + 3) * tangent + 2 * inside / np.sqrt(1 - inside**2)
+    # Looking along +z with +y up, image right is -x.
+    expected = np.stack([-x / tangent * reach, y / tangent * reach], axis=-1)
+    assert rays.hit.all()
+    assert np.abs(rays.points[..., :2] - expected).max() < PLACE
+    assert np.abs(rays.points[..., 2] - 3).max() < PLACE
+    # Parallel faces leave the direction as it was, and the normal looks back along the ray.
+    assert np.abs(rays.incidence - np.cos(np.arctan(tangent))).max() < 1e-5
+    assert np.allclose(rays.normals, (0, 0, -1))
+
+
+def test_a_mirror_at_45_degrees_swaps_two_axes() -> None:
+    tilted = [(-9.0, -50, -4), (9.0, -50, 14), (9.0, 50, 14), (-9.0, 50, -4)]
+    silver = Surface(SurfaceKind.MIRROR, metal_eta=(0.1,) * 3, metal_k=(4.0,) * 3)
+    wall = [(12.0, -50, -50), (12.0, 50, -50), (12.0, 50, 50), (12.0, -50, 50)]
+    rays = trace([quad("mirror", tilted, silver), quad("wall", wall, COATING)], camera(fov=30))
+    right, up = slopes(30.0, 32, 24)
+    x = -right
+    # The mirror is the plane x = z - 5; it turns (x, y, 1) into (1, y, x).
+    t = 15 / (1 - x)
+    travel = 12 - t * x
+    expected = np.stack([np.full_like(x, 12.0), t * up + travel * up, t - 10 + travel * x], axis=-1)
+    assert rays.hit.all()
+    assert np.abs(rays.points - expected).max() < PLACE
+
+
+def test_a_ray_that_meets_nothing_escapes() -> None:
+    rays = trace([plane(3.0)], camera(direction=(0, 0, -1)))
+    assert (rays.outcome == Outcome.ESCAPED).all()
+
+
+@pytest.mark.parametrize("kind", [SurfaceKind.ABSORBER, SurfaceKind.LIGHT, SurfaceKind.OPAQUE])
+def test_a_ray_ends_on_what_is_not_the_sensing_surface(kind: SurfaceKind) -> None:
+    half = [(0.0, -50, 0), (0.0, 50, 0), (50.0, 50, 0), (50.0, -50, 0)]
+    rays = trace([quad("blocker", half, Surface(kind)), plane(3.0)], camera())
+    assert (rays.outcome[:, :16] == Outcome.ABSORBED).all()
+    assert (rays.outcome[:, 16:] == Outcome.HIT).all()
+
+
+def test_rays_caught_in_a_glass_cube_are_totally_reflected() -> None:
+    cube = box("cube", (-1, -1, -1), (1, 1, 1), GLASS)
+    # To all six faces at 54.7 degrees; the critical angle is 41.8.
+    caught = trace([cube], camera((1, 1, 1), 1.0, position=(0.1, 0.05, 0.02)))
+    assert (caught.outcome == Outcome.TOTAL_REFLECTION).all()
+    free = trace([cube], camera((0, 0, 1), 1.0, position=(0.1, 0.05, 0.02)))
+    assert (free.outcome == Outcome.ESCAPED).all()
+
+
+def test_a_fisheye_maps_angle_to_radius_evenly() -> None:
+    room = box("room", (-4, -4, -4), (4, 4, 4), COATING, inward=True)
+    rays = trace([room], camera(fov=180, equidistant=True, position=(0, 0, 0), pixels=(64, 48)))
+    ways = rays.points / np.linalg.norm(rays.points, axis=-1, keepdims=True)
+    x = 2 * (np.arange(64) + 0.5) / 64 - 1
+    y = (48 - 2 * (np.arange(48) + 0.5)) / 64
+    radius = np.hypot(*np.meshgrid(x, y))
+    assert np.abs(np.degrees(np.arccos(ways[..., 2])) - 90 * radius).max() < 0.05
+    assert rays.points[24, 0, 0] > 0 > rays.points[24, 63, 0]
+    assert rays.points[0, 32, 1] > 0 > rays.points[47, 32, 1]
+
+
+def test_face_numbers_are_those_of_the_mesh_hit() -> None:
+    room = box("room", (-4, -4, -4), (4, 4, 4), COATING, inward=True)
+    rays = trace([room], camera(fov=120, position=(0.3, 0.2, 0.1)))
+    corners = np.asarray(room.vertices)[np.asarray(room.faces)][rays.face]
+    normal = np.cross(
+        corners[..., 1, :] - corners[..., 0, :], corners[..., 2, :] - corners[..., 0, :]
+    )
+    off = np.einsum("hwk,hwk->hw", rays.points - corners[..., 0, :], normal)
+    assert np.abs(off).max() < PLACE * 64
