@@ -20,7 +20,8 @@ from optisense.optics.surfaces import RAY_OFFSET
 
 FloatArray = NDArray[np.floating]
 
-# Equal-probability cells of a tabulated profile: polar, and azimuthal for each polar cell.
+# Cells of a tabulated profile: polar, of less probability towards the rim, and for each of them
+# azimuthal, of equal probability.
 POLAR_CELLS = 512
 AZIMUTH_CELLS = 128
 ROW = 20
@@ -124,7 +125,7 @@ class EmitterTable:
 
 
 def inverse_tables(intensity: Intensity) -> tuple[FloatArray, FloatArray]:
-    """Cosines at equal-probability steps (POLAR_CELLS+1,), and azimuths / 2 pi (POLAR_CELLS,
+    """Cosines at the borders of cells (POLAR_CELLS+1,), and azimuths / 2 pi (POLAR_CELLS,
     AZIMUTH_CELLS+1).
     """
     fine = 8192
@@ -146,7 +147,9 @@ def inverse_tables(intensity: Intensity) -> tuple[FloatArray, FloatArray]:
     power = np.concatenate([[0.0], np.cumsum(ring * -np.diff(edges))])
     power /= power[-1]
     keep = np.concatenate([[True], np.diff(power) > 0])
-    cosines = np.interp(np.linspace(0, 1, POLAR_CELLS + 1), power[keep], edges[keep])
+    # Cells get smaller towards the rim, where intensity falls to nothing.
+    share = 1 - (1 - np.linspace(0, 1, POLAR_CELLS + 1)) ** 2
+    cosines = np.interp(share, power[keep], edges[keep])
     steps = np.linspace(0.0, 1.0, AZIMUTH_CELLS + 1)
     if len(intensity.azimuth) == 1:
         return cosines, np.tile(steps, (POLAR_CELLS, 1))
@@ -200,7 +203,8 @@ def profile_direction(
     """
     tabulated = profile > 0
     base = dr.maximum(profile, 1) - 1
-    place = sample.x * POLAR_CELLS
+    # The inverse of the spacing of cells in ``inverse_tables``.
+    place = (1 - dr.safe_sqrt(1 - sample.x)) * POLAR_CELLS
     cell = dr.minimum(mi.UInt32(place), POLAR_CELLS - 1)
     start = base * (POLAR_CELLS + 1) + cell
     c0 = dr.gather(mi.Float, table.polar, start, tabulated)

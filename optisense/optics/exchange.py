@@ -17,7 +17,7 @@ import mitsuba as mi
 from optisense.optics.cells import SurfaceCells, cell_at
 from optisense.optics.ray_scene import RayScene, intersect, leave
 from optisense.optics.sampling import STEPS_2D, unit_float
-from optisense.optics.scattering import Coating, fresnel_metal, sample_coating
+from optisense.optics.scattering import Coating, albedo_of, sample_coating
 
 if TYPE_CHECKING:
     from optisense.optics.light_field import LightField
@@ -75,8 +75,10 @@ def irradiance_table(moments: mi.Float, cells: int, bins: mi.UInt32, groups: int
     return out
 
 
-def irradiance(table: mi.Float, entry: mi.UInt32, normal: mi.Vector3f) -> tuple:
-    """Irradiance (mW/mm^2) at normals, and the direction where its light comes from."""
+def irradiance(
+    table: mi.Float, entry: mi.UInt32, normal: mi.Vector3f
+) -> tuple[mi.Float, mi.Float, mi.Vector3f]:
+    """Irradiance (mW/mm^2) at normals, its mean over all normals, and where its light is from."""
     a = dr.gather(mi.Vector4f, table, entry * 3)
     b = dr.gather(mi.Vector4f, table, entry * 3 + 1)
     c = dr.gather(mi.Vector4f, table, entry * 3 + 2)
@@ -85,7 +87,7 @@ def irradiance(table: mi.Float, entry: mi.UInt32, normal: mi.Vector3f) -> tuple:
     total = mi.Float(0)
     for value, weight in zip(values, basis, strict=True):
         total = total + value * weight
-    return dr.maximum(total, 0), mi.Vector3f(c.y, c.z, c.w)
+    return dr.maximum(total, 0), a.x * basis[0], mi.Vector3f(c.y, c.z, c.w)
 
 
 @dr.syntax
@@ -108,8 +110,7 @@ def _sample(
 ) -> list[mi.Color3f]:
     totals = [mi.Color3f(0) for _ in range(groups)]
     # How much of the light the place that is seen sends on, if it is diffuse.
-    metal = fresnel_metal(mi.Float(1), coating.metal_eta, coating.metal_k)
-    albedo = coating.reflectance * (1 - coating.specularity) + metal * coating.specularity
+    albedo = albedo_of(coating)
     k = mi.UInt32(0)
     while active & (k < directions):
         u = unit_float(random + k * STEPS_2D[0])
@@ -134,7 +135,7 @@ def _sample(
             there = dr.select(exists, there, cell)
             lift = leave(seen, facing, facing)
             for g in range(groups):
-                light, towards = irradiance(table, there * groups + g, facing)
+                light, _mean, towards = irradiance(table, there * groups + g, facing)
                 hidden = indenters.scene.ray_test(
                     mi.Ray3f(lift, towards), coherent=False, active=mi.Bool(True)
                 )

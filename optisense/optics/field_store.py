@@ -24,7 +24,7 @@ PASS_PHOTONS = 500_000
 PILOT_PHOTONS = 300_000
 CELL_SIZE = 0.25
 """mm; larger where the tally would outgrow its memory."""
-RADIUS = 0.7
+RADIUS = 1.0
 """mm of the smoothing kernel: what a light field of LEDs some mm away can bear (see benchmarks)."""
 MOST_BYTES = 300e6
 SEEN_MARGIN = 2.0
@@ -50,6 +50,7 @@ class FieldStore:
         table: EmitterTable,
         seen: NDArray[np.floating],
         coloured: bool,
+        metallic: bool = True,
     ) -> None:
         """``scene`` without contacts, its opaque pieces, and ``seen`` (n, 3) mm: points that
         the camera sees.
@@ -58,15 +59,17 @@ class FieldStore:
         self._scene = scene
         self._table = table
         self._coloured = coloured
+        self._metallic = metallic
         self._opaque = opaque
         self._guide: Guide | None = None
         self._cells: SurfaceCells | None = None
         self._running: dict[tuple[int, int], _Running] = {}
         self._done: dict[tuple[int, int, int], LightField] = {}
 
-    def forget_light(self, coloured: bool) -> None:
+    def forget_light(self, coloured: bool, metallic: bool = True) -> None:
         """Surfaces reflect otherwise now: drop the fields, keep guide and cells."""
         self._coloured = coloured
+        self._metallic = metallic
         self._running.clear()
         self._done.clear()
 
@@ -135,7 +138,8 @@ class FieldStore:
             or (wanted is None and seconds is None)
         ):
             running = _Running(
-                FieldTally(self.cells, self._table.groups, self._coloured), per_light
+                FieldTally(self.cells, self._table.groups, self._coloured, self._metallic),
+                per_light,
             )
             self._running = {key: running}
         tally = running.tally

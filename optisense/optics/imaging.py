@@ -24,7 +24,7 @@ from optisense.optics.sppm import SppmResult
 from optisense.optics.surfaces import Region
 from optisense.optics.visible_points import film_samples, find_visible_points
 
-CONTACT_SAMPLES = 8
+CONTACT_SAMPLES = 12
 """Camera samples of a pixel in and around contacts, where tilt and shadow change within it."""
 REFINED = 8.0 / 320.0
 """How far around a contact, as a part of the image width."""
@@ -95,7 +95,11 @@ def render_field(
         film.count(pixel)
         for points, close in ((main, thorough), (reflected, False)):
             if points is not None:
-                film.add(points, shade(field, scenes, points, own, close))
+                # Merging gathers into packets makes Dr.Jit write one of several kernels by chance,
+                # and compile them all in turn.
+                with dr.scoped_set_flag(dr.JitFlag.PacketOps, False):
+                    light = shade(field, scenes, points, own, close)
+                film.add(points, light)
                 film.add_light(points, emitters, areas)
 
     region_image = np.where(rays.hit, rays.region, 0)

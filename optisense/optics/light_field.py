@@ -69,6 +69,7 @@ class LightField:
     moments: mi.Float
     colours: mi.Float
     coloured: bool
+    metallic: bool
     centres: mi.Float
     irradiance: mi.Float
     photons: int
@@ -78,7 +79,10 @@ class LightField:
 class FieldTally:
     """Sums of landings per cell, direction bin and light group, over photon passes."""
 
-    def __init__(self, cells: SurfaceCells, groups: int, coloured: bool) -> None:
+    def __init__(
+        self, cells: SurfaceCells, groups: int, coloured: bool, metallic: bool = True
+    ) -> None:
+        self.metallic = metallic
         self.cells = cells
         self.groups = groups
         self.coloured = coloured
@@ -170,6 +174,7 @@ class FieldTally:
             moments=moments,
             colours=colours,
             coloured=self.coloured,
+            metallic=self.metallic,
             centres=bin_centres(self.cells, used),
             irradiance=table,
             photons=self.photons,

@@ -44,7 +44,7 @@ from optisense.optics.sppm import render_sppm
 from optisense.optics.surfaces import Region, Surface, SurfaceKind
 from optisense.optics.versions import versions
 
-DEFAULT_PHOTONS = 4_000_000
+DEFAULT_PHOTONS = 3_000_000
 """Photons of a light field where nothing else is asked."""
 
 MOST_PHOTONS = 512_000_000
@@ -118,6 +118,10 @@ class OpticalModel:
     def _refresh_surfaces(self) -> None:
         self._table = surface_table(self._surfaces)
         self._coloured = any(_is_coloured(surface) for surface in self._surfaces)
+        self._metallic = any(
+            surface.kind is SurfaceKind.OPAQUE and surface.specularity > 0
+            for surface in self._surfaces
+        )
 
     def update(self, path: str, value: Any) -> None:
         """Change one value of the design by its dotted path, redoing only what depends on it.
@@ -147,7 +151,7 @@ class OpticalModel:
             self.scene.table = self._fixed.table = self._table
             self._fine_scene = None
             if self._fields is not None:
-                self._fields.forget_light(self._coloured)
+                self._fields.forget_light(self._coloured, self._metallic)
             return
         self.__dict__.pop("surface", None)
         self._assemble()
@@ -255,7 +259,12 @@ class OpticalModel:
             opaque = [p for p in self._pieces if p.surface.kind is SurfaceKind.OPAQUE]
             rays = self.chief_rays((96, 72))
             self._fields = FieldStore(
-                self.scene, opaque, self._emitter_table, rays.points[rays.hit], self._coloured
+                self.scene,
+                opaque,
+                self._emitter_table,
+                rays.points[rays.hit],
+                self._coloured,
+                self._metallic,
             )
         return self._fields
 

@@ -294,6 +294,10 @@ def trace_photons(
         if count <= capacity:
             break
         landings = 1.2 * count / photons
+    if count == 0:
+        # The renderer takes no empty arrays: one photon without power stands for none.
+        count = 1
+        record.place, record.travel, record.power = (dr.zeros(mi.Float, 4) for _ in range(3))
     return PhotonMap(
         count=count,
         emitted=photons,

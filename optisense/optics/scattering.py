@@ -43,13 +43,18 @@ def surface_rows(surfaces: list[Surface]) -> np.ndarray:
 
 @dataclass
 class Coating:
-    """Opaque reflectance of hits: per-lane parameters of the blend."""
+    """Opaque reflectance of hits: per-lane parameters of the blend.
+
+    ``metallic`` is False where it is known that no surface has a metallic lobe, which then is not
+    compiled into kernels.
+    """
 
     reflectance: mi.Color3f
     metal_eta: mi.Color3f
     metal_k: mi.Color3f
     specularity: mi.Float
     alpha: mi.Float
+    metallic: bool = True
 
 
 def surface_kind(
@@ -70,7 +75,9 @@ def surface_light(table: mi.Float, surface: mi.UInt32, active: mi.Bool) -> mi.UI
     return dr.reinterpret_array(mi.UInt32, dr.gather(mi.Float, table, surface * ROW + 11, active))
 
 
-def coating_of(table: mi.Float, surface: mi.UInt32, active: mi.Bool) -> Coating:
+def coating_of(
+    table: mi.Float, surface: mi.UInt32, active: mi.Bool, metallic: bool = True
+) -> Coating:
     """The reflective parameters of surfaces."""
     first = dr.gather(mi.Vector4f, table, surface * 4, active)
     base = dr.gather(mi.Vector4f, table, surface * 4 + 1, active)
@@ -82,7 +89,14 @@ def coating_of(table: mi.Float, surface: mi.UInt32, active: mi.Bool) -> Coating:
         metal_k=mi.Color3f(k.x, k.y, k.z),
         specularity=first.w,
         alpha=first.z,
+        metallic=metallic,
     )
+
+
+def albedo_of(coating: Coating) -> mi.Color3f:
+    """About how much light the coating sends back, per channel (its metal at normal incidence)."""
+    metal = fresnel_metal(mi.Float(1), coating.metal_eta, coating.metal_k)
+    return coating.reflectance * (1 - coating.specularity) + metal * coating.specularity
 
 
 def fresnel_metal(cosine: mi.Float, eta: mi.Color3f, k: mi.Color3f) -> mi.Color3f:
@@ -118,6 +132,8 @@ def evaluate_coating(
     cos_i = dr.dot(normal, towards_light)
     cos_o = dr.dot(normal, towards_eye)
     lit = (cos_i > 0) & (cos_o > 0)
+    if not coating.metallic:
+        return dr.select(lit, coating.reflectance * (dr.inv_pi * cos_i), 0.0)
     half = dr.normalize(towards_light + towards_eye)
     cos_m = dr.dot(half, normal)
     lobe = (

@@ -10,18 +10,19 @@ comes from there is the field, shaded at that other place.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import drjit as dr
 import mitsuba as mi
 
 from optisense.optics.cells import SurfaceCells, cell_at, plane_of
-from optisense.optics.exchange import exchanged
+from optisense.optics.exchange import exchanged, irradiance
 from optisense.optics.light_field import LEAST_COSINE, LightField
 from optisense.optics.ray_scene import RayScene, leave
 from optisense.optics.sampling import unit_float
 from optisense.optics.scattering import (
     Coating,
+    albedo_of,
     coating_of,
     evaluate_coating,
     surface_region,
@@ -29,7 +30,9 @@ from optisense.optics.scattering import (
 from optisense.optics.surfaces import Region
 from optisense.optics.visible_points import VisiblePoints
 
-CHOSEN_BINS = 16.0
+LEAST_LIGHT = 0.2
+"""Part of the mean irradiance below which the spacing of shadow rays does not go."""
+CHOSEN_BINS = 32.0
 """Shadow rays of each light group for a camera sample near a contact."""
 SHADOW_RAYS = 4
 """Shadow rays of a bin whose light passes near an indenter, for points that are sampled once."""
@@ -117,6 +120,7 @@ def _sum_chosen(
     cells: SurfaceCells,
     tables: tuple[mi.Float, mi.Float],
     centres: mi.Float,
+    table: mi.Float,
     bins: mi.UInt32,
     groups: int,
     coloured: bool,
@@ -134,25 +138,15 @@ def _sum_chosen(
     """Every bin, looked up along its own line, and shadow rays for some of them.
 
     These are drawn in proportion to what they bring, evenly spaced in the running sum (systematic
-    sampling): where nothing is hidden, the sum is exact.
+    sampling), so that where nothing is hidden, the sum is exact to half a step.
     """
     moments, colours = tables
     totals = [mi.Color3f(0) for _ in range(groups)]
     state = mi.UInt32(random)
     for g in range(groups):
-        expected = mi.Float(0)
-        k = mi.UInt32(0)
-        while active & (k < bins):
-            entry, value = _entry(
-                cells, moments, centres, bins, groups, points, cell, shift, raised, active, k, g
-            )
-            if value.w > 0:
-                towards, spread2 = beam(value)
-                reflected = evaluate_coating(
-                    widened(coating, spread2), points.normal, towards, points.towards_eye
-                )
-                expected += value.w * dr.mean(reflected)
-            k += 1
+        # About what the bins bring in all: how far apart the shadow rays are in the running sum.
+        light, mean, _ = irradiance(table, cell * groups + g, points.normal)
+        expected = (light + LEAST_LIGHT * mean) * dr.mean(albedo_of(coating)) * dr.inv_pi
         step = expected / chosen
         state = next_random(state)
         running = unit_float(state)
@@ -202,8 +196,11 @@ def _entry(
     k: mi.UInt32,
     g: int,
 ) -> tuple[mi.UInt32, mi.Vector4f]:
-    """Place and value of a bin of the field for points; on an indenter, where the bin's line through
-    the point goes on to meet the undeformed surface (found on the planes of two cells in turn)."""
+    """Place and value of a bin of the field for points.
+
+    On an indenter that is where the bin's line through the point goes on to meet the undeformed
+    surface, found on the planes of two cells in turn.
+    """
     entry = (cell * bins + k) * groups + g
     value = dr.gather(mi.Vector4f, moments, entry, active)
     middle = dr.gather(mi.Vector4f, centres, k)
@@ -244,10 +241,9 @@ def widened(coating: Coating, spread2: mi.Float) -> Coating:
 
     The half vector moves half as far as the light, which adds R^2 / 8 to alpha^2.
     """
-    alpha = dr.sqrt(coating.alpha * coating.alpha + spread2 * 0.125)
-    return Coating(
-        coating.reflectance, coating.metal_eta, coating.metal_k, coating.specularity, alpha
-    )
+    if not coating.metallic:
+        return coating
+    return replace(coating, alpha=dr.sqrt(coating.alpha * coating.alpha + spread2 * 0.125))
 
 
 def next_random(state: mi.UInt32) -> mi.UInt32:
@@ -285,7 +281,7 @@ def shade(
     )[0]
     cell, shift, active = _interpolating_cell(field.cells, base, active, random)
     start = leave(points.point, points.face_normal, points.face_normal)
-    coating = coating_of(table, points.surface, active)
+    coating = coating_of(table, points.surface, active, field.metallic)
     tables = (field.moments, field.colours)
     bins = dr.opaque(mi.UInt32, field.bins)
     indenters = scenes.indenters
@@ -295,6 +291,7 @@ def shade(
             field.cells,
             tables,
             field.centres,
+            field.irradiance,
             bins,
             field.groups,
             field.coloured,
