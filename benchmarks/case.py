@@ -1,0 +1,60 @@
+"""The case that everything is measured on: GelSight Mini with one ball."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+import optisense
+from optisense.optics import OpticalModel
+
+FloatArray = NDArray[np.float32]
+
+DESIGN = "gelsight-mini"
+RADIUS, DEPTH = 1.5, 0.8
+"""mm: the ball of the OptiSense paper."""
+RESOLUTION = (320, 240)
+CONTACT_TEXT = f"sphere:{RADIUS}@0,0:{DEPTH}"
+
+
+def ball(u: float = 0.0, v: float = 0.0) -> optisense.Contact:
+    """The ball, pressed in at surface coordinates (mm)."""
+    return optisense.Contact(optisense.Sphere(radius=RADIUS), at=(u, v), depth=DEPTH)
+
+
+@dataclass(frozen=True)
+class Case:
+    """The model, and what its camera sees of the ball."""
+
+    model: OpticalModel
+
+    @classmethod
+    def load(cls, variant: str = "auto") -> Case:
+        """The case with a model of its own."""
+        return cls(OpticalModel(optisense.load(DESIGN), variant))
+
+    @cached_property
+    def mask(self) -> NDArray[np.bool_]:
+        """(h, w): pixels whose middle sees the ball."""
+        from optisense.optics.surfaces import Region
+
+        rays = self.model.chief_rays(RESOLUTION, [ball()])
+        seen: NDArray[np.bool_] = rays.hit & (rays.region == Region.INDENTER)
+        return seen
+
+
+def relative_error(
+    image: FloatArray, truth: FloatArray, mask: NDArray[np.bool_], truth_noise: float = 0.0
+) -> float:
+    """Relative RMS error inside a mask: the RMS of the difference over pixels and channels, by the
+    mean of the truth.
+
+    ``truth_noise``, the truth's own error in the same measure, is subtracted in quadrature; 0 if
+    that is the larger.
+    """
+    difference = image[mask].astype(np.float64) - truth[mask]
+    square = (difference**2).mean() / truth[mask].astype(np.float64).mean() ** 2
+    return float(np.sqrt(max(square - truth_noise**2, 0.0)))

@@ -1,0 +1,64 @@
+"""The case in Mitsuba's own ``path`` integrator."""
+
+from __future__ import annotations
+
+import time
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+
+from benchmarks.case import RESOLUTION, Case, ball
+from benchmarks.snapshots import Snapshot, due_times
+from optisense.optics import assembly
+from optisense.optics.mitsuba_export import mitsuba_scene
+from optisense.optics.ray_scene import Piece
+
+PASS_SAMPLES = 16
+DEPTH = 32
+"""Of paths; what is beyond is less than 0.1 % of the light."""
+
+
+def case_pieces(case: Case) -> tuple[assembly.Assembly, list[Piece]]:
+    """The parts of the sensor, and all pieces with the ball's."""
+    model = case.model
+    parts = assembly.assemble(model.design)
+    coat = assembly.coating_surface(
+        model.design.coating,
+        assembly.index_before_sensing(model.design),
+        assembly.Region.INDENTER,
+    )
+    return parts, [*parts.pieces, assembly.indenter_piece(model._place(ball()), coat)]
+
+
+def render_path(case: Case, budget: float) -> list[Snapshot]:
+    """Images of the whole budget (seconds) and of halves of it; kernels are compiled before."""
+    model = case.model
+    parts, pieces = case_pieces(case)
+    flux = [model.design.lights[name].channel_flux() for name in parts.groups]
+    scene = mi.load_dict(
+        mitsuba_scene(
+            pieces,
+            parts.emitters,
+            model.camera(RESOLUTION),
+            flux,
+            samples=PASS_SAMPLES,
+            max_depth=DEPTH,
+        )
+    )
+    width, height = RESOLUTION
+    total = np.zeros((height, width, 3))
+    np.asarray(mi.render(scene, spp=PASS_SAMPLES, seed=0))
+    due, out, passes = due_times(budget), [], 0
+    began, cpu = time.perf_counter(), time.process_time()
+    while due:
+        total += np.asarray(mi.render(scene, spp=PASS_SAMPLES, seed=passes + 1))
+        passes += 1
+        elapsed = time.perf_counter() - began
+        if elapsed >= due[0]:
+            image = (total / passes).astype(np.float32)
+            spent = time.process_time() - cpu
+            out.append(Snapshot(elapsed, spent, image, passes * PASS_SAMPLES))
+            due = [at for at in due if at > elapsed]
+    dr.sync_thread()
+    return out

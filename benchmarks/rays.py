@@ -1,0 +1,87 @@
+"""Photons and rays a second, against what the ray tracer alone can do on the same scene."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from statistics import median
+from typing import Any
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+
+from benchmarks.case import Case
+from benchmarks.timing import timed
+from optisense.optics import photons as photon_pass
+from optisense.optics.photons import trace_photons
+
+PHOTONS = 1_000_000
+PURE_RAYS = 4_000_000
+RUNS = 5
+
+
+def photon_rates(case: Case) -> dict[str, Any]:
+    """Photons and rays a second of the photon pass alone, and the pure ray rate."""
+    model = case.model
+    table = model._emitter_table
+    per_light = PHOTONS // table.count
+    guide = model.guide()
+
+    def trace(seed: int) -> None:
+        trace_photons(model.scene, table, guide, per_light, seed, coloured=False)
+        dr.sync_thread()
+
+    trace(0)
+    seconds = median(timed(lambda s=s: trace(s)).wall for s in range(1, RUNS + 1))  # type: ignore[misc]
+    with _counted() as counter:
+        trace(1)
+    rays = int(counter[0])
+    pure = _pure_rate(model.scene)
+    emitted = per_light * table.count
+    return {
+        "photons_per_s": round(emitted / seconds),
+        "rays_per_photon": round(rays / emitted, 2),
+        "rays_per_s": round(rays / seconds),
+        "pure_rays_per_s": round(pure),
+        "share_of_pure_rate": round(rays / seconds / pure, 3),
+    }
+
+
+def _pure_rate(scene: Any) -> float:
+    """Incoherent first hits a second: origins and directions drawn evenly from the scene's box."""
+    lower, upper = (np.asarray(bound, dtype=float) for bound in scene.bounds)
+    rng = np.random.default_rng(0)
+    points = lower + rng.random((PURE_RAYS, 3)) * (upper - lower)
+    ways = rng.normal(size=(PURE_RAYS, 3))
+    ways /= np.linalg.norm(ways, axis=1, keepdims=True)
+    origin = mi.Point3f(*(mi.Float(points[:, k].astype(np.float32)) for k in range(3)))
+    way = mi.Vector3f(*(mi.Float(ways[:, k].astype(np.float32)) for k in range(3)))
+    dr.eval(origin, way)
+
+    def shoot() -> None:
+        found = scene.scene.ray_intersect_preliminary(mi.Ray3f(origin, way), coherent=False)
+        dr.eval(found.t, found.prim_index)
+        dr.sync_thread()
+
+    shoot()
+    return PURE_RAYS / median(timed(shoot).wall for _ in range(RUNS))
+
+
+@contextmanager
+def _counted() -> Iterator[mi.UInt32]:
+    """Count the photon pass's rays while the context lasts."""
+    counter = dr.zeros(mi.UInt32, 1)
+    dr.make_opaque(counter)
+    original = photon_pass.intersect
+
+    def counting(*arguments: Any) -> Any:
+        active = arguments[5]
+        dr.scatter_inc(counter, mi.UInt32(0), active)
+        return original(*arguments)
+
+    photon_pass.intersect = counting
+    try:
+        yield counter
+    finally:
+        photon_pass.intersect = original

@@ -1,0 +1,196 @@
+"""Results as a JSON file, and as tables for people."""
+
+from __future__ import annotations
+
+import datetime
+import json
+import os
+import platform
+from collections.abc import Sequence
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Any
+
+from rich.console import Console
+from rich.table import Table
+
+FOLDER = Path(__file__).parent
+JSON = FOLDER / "results.json"
+MARKDOWN = FOLDER / "results.md"
+BUSY = 0.4
+"""Load average at the start above which timings are marked as those of a busy machine."""
+
+TARGETS = {
+    "image_320x240": "1.0 s or less at 3 % error or less",
+    "image_640x480": "2.5 s or less",
+    "new_process": "5 s or less, under 2 GB",
+    "other_contact_new_light": "1.1 times the first or less",
+}
+NAMES = {
+    "image_320x240": "Image 320x240, warm, new photons",
+    "image_640x480": "Image 640x480, warm, new photons",
+    "model_set_up": "Model set-up (scene, photon guide)",
+    "other_contact_new_light": "Other contact, new photons",
+    "other_contact_kept_light": "Other contact, light field kept",
+    "after_flux_change": "After a change of flux",
+    "after_first_specularity": "After the first specularity above 0",
+    "after_specularity_change": "After a change of specularity",
+    "new_process": "New process, command to files",
+}
+
+
+def machine() -> dict[str, Any]:
+    """What the numbers were measured on and with; no names of hosts or people."""
+    model = platform.processor() or platform.machine()
+    info = Path("/proc/cpuinfo")
+    if info.is_file():
+        names = [x.split(":", 1)[1] for x in info.read_text().splitlines() if "model name" in x]
+        model = names[0].strip() if names else model
+    versions = {}
+    for name in ("mitsuba", "drjit", "numpy", "pyluxcore"):
+        try:
+            versions[name] = version(name)
+        except PackageNotFoundError:
+            versions[name] = "not installed"
+    load = os.getloadavg()[0]
+    return {
+        "date": datetime.date.today().isoformat(),
+        "processor": model,
+        "cores": os.cpu_count(),
+        "system": f"{platform.system()} {platform.machine()}",
+        "python": platform.python_version(),
+        "versions": versions,
+        "load_at_start": round(load, 2),
+        "busy": load > BUSY,
+    }
+
+
+def merged(part: str, values: dict[str, Any], about: dict[str, Any]) -> dict[str, Any]:
+    """Results so far with one part replaced; each part says what it was measured on."""
+    kept = json.loads(JSON.read_text()) if JSON.is_file() else {}
+    kept[part] = {"machine": about, **values}
+    return kept
+
+
+def write(results: dict[str, Any]) -> None:
+    """Write results.json and results.md."""
+    for path, text in (
+        (JSON, json.dumps(results, indent=2) + "\n"),
+        (MARKDOWN, _markdown(results)),
+    ):
+        temporary = path.with_name(f".{path.name}")
+        temporary.write_text(text, encoding="utf-8")
+        temporary.replace(path)
+
+
+def show(results: dict[str, Any], console: Console) -> None:
+    """Print the tables."""
+    for title, heads, rows in _tables(results):
+        table = Table(*heads, title=title)
+        for row in rows:
+            table.add_row(*row)
+        console.print(table)
+
+
+_TableData = tuple[str, Sequence[str], list[list[str]]]
+
+
+def _tables(results: dict[str, Any]) -> list[_TableData]:
+    out: list[_TableData] = []
+    if "speed" in results:
+        out += [_speed_table(results["speed"]), _breakdown_table(results["speed"])]
+    if "renderers" in results:
+        out.append(_renderer_table(results["renderers"]))
+    return out
+
+
+def _speed_table(speed: dict[str, Any]) -> _TableData:
+    rows = []
+    for key, name in NAMES.items():
+        values = speed.get(key)
+        if not values:
+            continue
+        more = []
+        if "relative_rms_error" in values:
+            more.append(f"error in the contact {100 * values['relative_rms_error']:.2f} %")
+        if "ratio_to_first" in values:
+            more.append(f"{values['ratio_to_first']:.2f} times the first image")
+        if "peak_memory_gb" in values:
+            more.append(f"peak memory {values['peak_memory_gb']:.2f} GB")
+        time, cpu = f"{values['wall_s']:.2f}", f"{values['cpu_s']:.2f}"
+        rows.append([name, time, cpu, ", ".join(more), TARGETS.get(key, "")])
+    return "Speed", ["what", "seconds", "CPU seconds", "and", "target"], rows
+
+
+def _breakdown_table(speed: dict[str, Any]) -> _TableData:
+    image, rays = speed["image_320x240"], speed["rays"]
+    parts = image["breakdown_s"]
+    rows = [[f"{name} (s)", f"{parts[name]:.3f}"] for name in parts]
+    rows += [
+        ["photons of an image", f"{image['photons']:,}"],
+        ["photons a second, field included", f"{image['photons_per_s_with_field']:,}"],
+        ["photons a second, tracing alone", f"{rays['photons_per_s']:,}"],
+        ["rays a photon", f"{rays['rays_per_photon']:.2f}"],
+        ["rays a second in the photon pass", f"{rays['rays_per_s']:,}"],
+        ["rays a second, ray tracer alone", f"{rays['pure_rays_per_s']:,}"],
+        ["share of the ray tracer's rate", f"{100 * rays['share_of_pure_rate']:.0f} %"],
+    ]
+    return "Where the time goes, 320x240", ["what", "value"], rows
+
+
+def _renderer_table(comparison: dict[str, Any]) -> _TableData:
+    rows = []
+    for row in comparison["rows"]:
+        if "failed" in row:
+            rows.append([row["renderer"], "failed: " + row["failed"][:60], "", "", "", ""])
+            continue
+        last = row["steps"][-1]
+        rows.append(
+            [
+                row["renderer"],
+                f"{last['wall_s']:.0f}",
+                f"{100 * last['relative_rms_error']:.1f} %",
+                f"{last['scale_to_reference']:.3f}",
+                f"{row['seconds_to_target']:,.0f}" + (" *" if row["extrapolated"] else ""),
+                f"{row['time_ratio']:,.0f}",
+            ]
+        )
+    error, ours = comparison["target_error"], comparison["our_seconds"]
+    title = f"Seconds to the error of our warm image ({100 * error:.2f} %, {ours:.2f} s)"
+    heads = ["renderer", "rendered s", "error", "scale", "s to our error", "times ours"]
+    return title, heads, rows
+
+
+def _markdown(results: dict[str, Any]) -> str:
+    lines = ["# Benchmark results", "", "Written by `python -m benchmarks`; do not edit.", ""]
+    for part in ("reference", "speed", "renderers"):
+        if part in results:
+            lines += [f"- {part}: {_about(results[part]['machine'])}"]
+    if "reference" in results:
+        ref = results["reference"]
+        lines += [
+            "",
+            f"Reference: {ref['photons']:,} photons of {ref['seeds']} seeds, noise inside the "
+            f"contact {100 * ref['noise']:.2f} % (subtracted in quadrature), {ref['seconds']:.0f} s.",
+        ]
+    for title, heads, rows in _tables(results):
+        lines += ["", f"## {title}", "", "| " + " | ".join(heads) + " |"]
+        lines += ["|" + "---|" * len(heads)]
+        lines += ["| " + " | ".join(row) + " |" for row in rows]
+    if "renderers" in results:
+        lines += [
+            "",
+            "\\* extrapolated from the last image: error falls as 1/sqrt(time). Scale: what the "
+            "renderer's image is multiplied by so that its mean inside the contact is the "
+            "reference's.",
+        ]
+    return "\n".join(lines) + "\n"
+
+
+def _about(machine: dict[str, Any]) -> str:
+    versions = ", ".join(f"{name} {value}" for name, value in machine["versions"].items())
+    busy = f"; the machine was busy (load {machine['load_at_start']})" if machine["busy"] else ""
+    return (
+        f"{machine['date']}, {machine['processor']}, {machine['cores']} cores, "
+        f"{machine['system']}, Python {machine['python']}, {versions}{busy}"
+    )

@@ -1,0 +1,25 @@
+"""What a progressive renderer had after so many seconds."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from benchmarks.case import FloatArray
+
+
+@dataclass(frozen=True)
+class Snapshot:
+    """image (h, w, 3) linear radiance after ``seconds`` of wall time and ``cpu`` seconds of all threads.
+
+    samples: per pixel, where the renderer tells.
+    """
+
+    seconds: float
+    cpu: float
+    image: FloatArray
+    samples: float
+
+
+def due_times(budget: float, count: int = 4) -> list[float]:
+    """Times of snapshots, each twice the one before, the last at the end of the budget (seconds)."""
+    return [budget / 2 ** (count - 1 - k) for k in range(count)]
