@@ -44,7 +44,7 @@ from optisense.optics.sppm import render_sppm
 from optisense.optics.surfaces import Region, Surface, SurfaceKind
 from optisense.optics.versions import versions
 
-DEFAULT_PHOTONS = 3_000_000
+DEFAULT_PHOTONS = 4_000_000
 """Photons of a light field where nothing else is asked."""
 
 MOST_PHOTONS = 512_000_000

@@ -61,7 +61,8 @@ def _sum_all(
     coloured: bool,
     indenters: mi.Scene,
     balls: mi.Float,
-    ball_count: int,
+    ball_count: mi.UInt32,
+    contacts: bool,
     coating: Coating,
     points: VisiblePoints,
     start: mi.Point3f,
@@ -84,9 +85,10 @@ def _sum_all(
                     widened(coating, spread2), points.normal, towards, points.towards_eye
                 )
                 seen = dr.max(reflected) > 0
-                if dr.hint(ball_count > 0, mode="scalar"):
+                if dr.hint(contacts, mode="scalar"):
                     near = mi.Bool(False)
-                    for n in range(ball_count):
+                    n = mi.UInt32(0)
+                    while n < ball_count:
                         ball = dr.gather(mi.Vector4f, balls, n)
                         offset = mi.Point3f(ball.x, ball.y, ball.z) - start
                         along = dr.dot(offset, towards)
@@ -94,6 +96,7 @@ def _sum_all(
                         reach = ball.w + along * dr.sqrt(spread2)
                         gap2 = dr.squared_norm(offset) - along * along
                         near |= (along > -ball.w) & (gap2 < reach * reach)
+                        n += 1
                     if seen & near:
                         open_rays = mi.Float(0)
                         for _ in range(SHADOW_RAYS):
@@ -316,8 +319,9 @@ def shade(
         field.coloured,
         scenes.fixed.scene if indenters is None else indenters.scene,
         # A loop takes no empty array.
-        scenes.balls if dr.width(scenes.balls) else dr.zeros(mi.Float, 4),
-        dr.width(scenes.balls) // 4,
+        scenes.balls if indenters is not None else dr.zeros(mi.Float, 4),
+        dr.opaque(mi.UInt32, dr.width(scenes.balls) // 4),
+        indenters is not None,
         coating,
         points,
         start,
