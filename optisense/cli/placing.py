@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from optisense.errors import ContactError
-
 if TYPE_CHECKING:
     from optisense.geometry import Contact, TriangleMesh
     from optisense.optics import OpticalModel
@@ -24,19 +22,5 @@ def place_contacts(model: OpticalModel, contacts: Sequence[Contact]) -> dict[str
     placed = {}
     for number, contact in enumerate(contacts, 1):
         kind = type(contact.indenter).__name__.removesuffix("Indenter").lower()
-        placed[f"{kind} {number}"] = _place(model, contact)
+        placed[f"{kind} {number}"] = model.place(contact)
     return placed
-
-
-def _place(model: OpticalModel, contact: Contact) -> TriangleMesh:
-    from optisense.geometry import place
-
-    failure: ContactError | None = None
-    gels: list[TriangleMesh | None] = [*model.gels]
-    for gel in gels or [None]:
-        try:
-            return place(contact, model.surface, gel)
-        except ContactError as error:
-            failure = failure or error
-    assert failure is not None
-    raise failure

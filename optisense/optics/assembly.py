@@ -34,10 +34,13 @@ PROBE = 0.02
 class Assembly:
     """A design as ray tracing needs it.
 
-    pieces: all fixed surfaces. sensing: the deformed sensing surface. gels: the
-        elastomers. emitters: all lights, ``group`` counting in the order of ``groups``;
-        light_areas: mm^2 of their windows, 0 for points. fine: for the pieces of the sensing
-        surface, by number, the same piece with all its triangles.
+    Attributes:
+        pieces: all fixed surfaces; flat faces in as few triangles as will do.
+        sensing: the deformed sensing surface, with all its triangles.
+        gels: the elastomers.
+        emitters: all lights; ``group`` counts in the order of ``groups``.
+        light_areas: mm^2 of the lights' windows, 0 for points.
+        fine: for pieces of the sensing surface, by number, the same with all its triangles.
     """
 
     pieces: list[Piece]

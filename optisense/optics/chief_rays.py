@@ -11,6 +11,7 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
+from optisense.errors import RenderError
 from optisense.optics.camera import RayCamera
 from optisense.optics.ray_scene import RayScene, intersect, leave
 from optisense.optics.scattering import refract, surface_kind, surface_region
@@ -146,4 +147,37 @@ def trace_chief_rays(
             shape
         ),
         region=np.asarray(region).astype(np.uint8).reshape(shape),
+    )
+
+
+def pixel_areas(rays: ChiefRays) -> NDArray[np.float64]:
+    """(h, w) mm^2 of surface behind each pixel, from its neighbours' points; 0 where these do
+    not hit.
+    """
+    p = rays.points.astype(np.float64)
+    along_x = np.zeros_like(p)
+    along_y = np.zeros_like(p)
+    along_x[:, 1:-1] = (p[:, 2:] - p[:, :-2]) / 2
+    along_x[:, 0], along_x[:, -1] = p[:, 1] - p[:, 0], p[:, -1] - p[:, -2]
+    along_y[1:-1] = (p[2:] - p[:-2]) / 2
+    along_y[0], along_y[-1] = p[1] - p[0], p[-1] - p[-2]
+    area = np.linalg.norm(np.cross(along_x, along_y), axis=2)
+    hit = rays.hit
+    whole = hit.copy()
+    whole[:, 1:] &= hit[:, :-1]
+    whole[:, :-1] &= hit[:, 1:]
+    whole[1:] &= hit[:-1]
+    whole[:-1] &= hit[1:]
+    return np.where(whole, area, 0.0)
+
+
+def sees_nothing(rays: ChiefRays) -> RenderError:
+    """The error to raise where no chief ray meets the sensing surface; says what became of them."""
+    names = {outcome: outcome.name.lower().replace("_", " ") for outcome in Outcome}
+    counts = {names[o]: int((rays.outcome == o).sum()) for o in Outcome}
+    met = ", ".join(f"{name}: {count}" for name, count in counts.items() if count)
+    return RenderError(
+        "the camera sees nothing of the sensing surface",
+        where=f"of {rays.outcome.size} rays, {met}",
+        hint="Check the camera's position, direction and field of view, and what is in its way",
     )

@@ -13,6 +13,7 @@ from typing import Any
 import mitsuba as mi
 import numpy as np
 
+from optisense import geometry
 from optisense.design import SensorDesign, set_value
 from optisense.errors import ContactError, RenderError
 from optisense.geometry import (
@@ -22,7 +23,6 @@ from optisense.geometry import (
     Sphere,
     TriangleMesh,
     nine_places,
-    place,
 )
 from optisense.optics.assembly import (
     assemble,
@@ -31,7 +31,12 @@ from optisense.optics.assembly import (
     index_before_sensing,
 )
 from optisense.optics.camera import RayCamera
-from optisense.optics.chief_rays import ChiefRays, Outcome, trace_chief_rays
+from optisense.optics.chief_rays import (
+    ChiefRays,
+    pixel_areas,
+    sees_nothing,
+    trace_chief_rays,
+)
 from optisense.optics.emitters import EmitterTable, emitter_table
 from optisense.optics.field_store import FieldStore
 from optisense.optics.guide import Guide
@@ -186,7 +191,7 @@ class OpticalModel:
         else:
             fine = self.chief_rays((64, 48))
             if not fine.hit.any():
-                raise _sees_nothing(fine)
+                raise sees_nothing(fine)
             origin = np.median(fine.points[fine.hit].astype(float), axis=0)
         return SensingSurface(self.sensing, origin, axes[0], axes[1])
 
@@ -195,7 +200,7 @@ class OpticalModel:
     ) -> ChiefRays:
         """Where each pixel looks, by ideal refraction and reflection; (h, w, ...) arrays."""
         if contacts:
-            placed = [self._place(contact) for contact in contacts]
+            placed = [self.place(contact) for contact in contacts]
             scene = self._with_indenters(self._fine_pieces, placed)
         else:
             if self._fine_scene is None:
@@ -210,10 +215,10 @@ class OpticalModel:
         """
         rays = self.chief_rays((96, 72))
         if rays.hit.sum() < 9:
-            raise _sees_nothing(rays)
+            raise sees_nothing(rays)
         points = rays.points[rays.hit].astype(np.float64)
         # Each pixel stands for the area that its solid angle cuts out of the surface.
-        weights = _pixel_areas(rays)[rays.hit]
+        weights = pixel_areas(rays)[rays.hit]
         chosen = nine_places(points, weights)
         ball = indenter if indenter is not None else Sphere(radius=1.5)
         return [
@@ -221,13 +226,18 @@ class OpticalModel:
             for p in points[chosen]
         ]
 
-    def _place(self, contact: Contact) -> TriangleMesh:
+    def place(self, contact: Contact) -> TriangleMesh:
+        """The part of an indenter that can touch, where a contact puts it in the design's frame.
+
+        Raises:
+            ContactError: the contact is off the surface or deeper than the gel.
+        """
         if not self.gels:
-            return place(contact, self.surface)
+            return geometry.place(contact, self.surface)
         errors = []
         for gel in self.gels:
             try:
-                return place(contact, self.surface, gel)
+                return geometry.place(contact, self.surface, gel)
             except ContactError as error:
                 errors.append(error)
         raise errors[0]
@@ -237,7 +247,7 @@ class OpticalModel:
         if not contacts:
             return ContactScenes(self.scene, self._fixed, None, number, mi.Float())
         coat = self._surfaces[number]
-        placed = [self._place(contact) for contact in contacts]
+        placed = [self.place(contact) for contact in contacts]
         pieces = [indenter_piece(mesh, coat) for mesh in placed]
         return ContactScenes(
             self._with_indenters(self._pieces, placed),
@@ -286,20 +296,24 @@ class OpticalModel:
         """What the camera sees while ``contacts`` press in.
 
         Args:
-            contacts: indenters, places and depths; none for the untouched sensor. resolution:
-                (width, height) pixels; the camera's own by default. photons: to trace in all;
-                DEFAULT_PHOTONS if no other limit is given. noise: per cent; trace until the
-                relative RMS noise of the light on the sensing surface is this small.
-            seconds: stop tracing in time to be ready then. seed: the same seed and settings
-                give the same image. progress: called now and then. estimator: "field" (pooled
-                light field, fast) or "sppm" (progressive photon mapping, for checking).
+            contacts: indenters, places and depths; none for the untouched sensor.
+            resolution: (width, height) pixels; the camera's own by default.
+            photons: to trace in all; DEFAULT_PHOTONS if no other limit is given.
+            noise: per cent; trace until the relative RMS noise of the light on the sensing
+                surface is this small.
+            seconds: stop tracing in time to be ready then.
+            seed: the same seed and settings give the same image.
+            progress: called now and then.
+            estimator: "field" (pooled light field, fast) or "sppm" (progressive photon mapping,
+                for checking).
 
         Returns:
             The image; ``interrupted`` is set if Ctrl-C ended the tracing early.
 
         Raises:
-            ContactError: a contact is off the surface or deeper than the gel. RenderError: the
-                camera sees nothing of the sensing surface, or a setting makes no sense.
+            ContactError: a contact is off the surface or deeper than the gel.
+            RenderError: the camera sees nothing of the sensing surface, or a setting makes no
+                sense.
         """
         if estimator not in ("field", "sppm"):
             raise RenderError(f"there is no estimator '{estimator}'", hint="use field or sppm")
@@ -311,7 +325,7 @@ class OpticalModel:
         scenes = self._scenes(contacts)
         rays = trace_chief_rays(scenes.full, camera)
         if not rays.hit.any():
-            raise _sees_nothing(rays)
+            raise sees_nothing(rays)
         built = time.perf_counter()
 
         def tell(fraction: float, traced: int, reached: float | None) -> None:
@@ -434,35 +448,3 @@ def _sensing_faces(pieces: list[Piece]) -> np.ndarray:
         else:
             out.append(np.full(count, -1, dtype=np.int64))
     return np.concatenate(out)
-
-
-def _pixel_areas(rays: ChiefRays) -> np.ndarray:
-    """(h, w) mm^2 of surface behind each pixel, from its neighbours' points; 0 where these do
-    not hit.
-    """
-    p = rays.points.astype(np.float64)
-    along_x = np.zeros_like(p)
-    along_y = np.zeros_like(p)
-    along_x[:, 1:-1] = (p[:, 2:] - p[:, :-2]) / 2
-    along_x[:, 0], along_x[:, -1] = p[:, 1] - p[:, 0], p[:, -1] - p[:, -2]
-    along_y[1:-1] = (p[2:] - p[:-2]) / 2
-    along_y[0], along_y[-1] = p[1] - p[0], p[-1] - p[-2]
-    area = np.linalg.norm(np.cross(along_x, along_y), axis=2)
-    hit = rays.hit
-    whole = hit.copy()
-    whole[:, 1:] &= hit[:, :-1]
-    whole[:, :-1] &= hit[:, 1:]
-    whole[1:] &= hit[:-1]
-    whole[:-1] &= hit[1:]
-    return np.where(whole, area, 0.0)
-
-
-def _sees_nothing(rays: ChiefRays) -> RenderError:
-    names = {outcome: outcome.name.lower().replace("_", " ") for outcome in Outcome}
-    counts = {names[o]: int((rays.outcome == o).sum()) for o in Outcome}
-    met = ", ".join(f"{name}: {count}" for name, count in counts.items() if count)
-    return RenderError(
-        "the camera sees nothing of the sensing surface",
-        where=f"of {rays.outcome.size} rays, {met}",
-        hint="Check the camera's position, direction and field of view, and what is in its way",
-    )
