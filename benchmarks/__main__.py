@@ -10,7 +10,7 @@ from rich.console import Console
 from benchmarks import results
 from benchmarks.reference import PHOTONS, SEEDS, make_reference
 from benchmarks.renderers import BUDGET, compare_renderers
-from benchmarks.speed import measure_speed
+from benchmarks.speed import measure_speed, warm_images
 
 PARTS = ("reference", "speed", "renderers")
 
@@ -47,9 +47,8 @@ def main() -> None:
         if not options.dry:
             results.write(measured)
     if "renderers" in wanted:
-        if "speed" not in measured:
-            raise SystemExit("run --only speed first: the comparison needs our own time")
-        image = measured["speed"]["image_320x240"]
+        tell("our own warm image")
+        image = warm_images(case, reference)
         compared = compare_renderers(
             case,
             reference,

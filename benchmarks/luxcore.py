@@ -19,7 +19,8 @@ from benchmarks.snapshots import Snapshot, due_times
 THREADS = 2
 DISC_CORNERS = 16
 SCALE = 1000.0
-"""Radiances are a thousandth in mW / (mm^2 sr); LuxCore sees them larger, away from any of its thresholds."""
+"""Radiances are some thousandths of a mW / (mm^2 sr); LuxCore gets them larger, clear of its
+thresholds."""
 
 PATH = {
     "path.pathdepth.total": 32,
@@ -61,7 +62,7 @@ def render_luxcore(scene: dict[str, Any], engine: str, budget: float) -> list[Sn
     Args:
         scene: see ``plain_scene``.
         engine: one of ENGINES.
-        budget: seconds of rendering; LuxCore's preparation (photon caches) counts, its scene set-up not.
+        budget: seconds of rendering; LuxCore's photon caches count, its scene set-up does not.
 
     Raises:
         RuntimeError: LuxCore is not installed, or failed.
@@ -95,6 +96,7 @@ def plain_scene(pieces: Any, emitters: Any, camera: Any, flux: Any) -> dict[str,
         kind = piece.surface.kind.name
         if kind == "LIGHT":
             continue
+        material: dict[str, Any]
         if kind == "OPAQUE":
             material = {"type": "matte", "kd": list(piece.surface.reflectance)}
         elif kind == "DIELECTRIC":

@@ -13,6 +13,7 @@ from benchmarks.snapshots import Snapshot, due_times
 from optisense.optics import assembly
 from optisense.optics.mitsuba_export import mitsuba_scene
 from optisense.optics.ray_scene import Piece
+from optisense.optics.surfaces import Region
 
 PASS_SAMPLES = 16
 DEPTH = 32
@@ -26,7 +27,7 @@ def case_pieces(case: Case) -> tuple[assembly.Assembly, list[Piece]]:
     coat = assembly.coating_surface(
         model.design.coating,
         assembly.index_before_sensing(model.design),
-        assembly.Region.INDENTER,
+        Region.INDENTER,
     )
     return parts, [*parts.pieces, assembly.indenter_piece(model._place(ball()), coat)]
 
@@ -35,7 +36,7 @@ def render_path(case: Case, budget: float) -> list[Snapshot]:
     """Images of the whole budget (seconds) and of halves of it; kernels are compiled before."""
     model = case.model
     parts, pieces = case_pieces(case)
-    flux = [model.design.lights[name].channel_flux() for name in parts.groups]
+    flux = [tuple(model.design.lights[name].channel_flux().tolist()) for name in parts.groups]
     scene = mi.load_dict(
         mitsuba_scene(
             pieces,

@@ -73,15 +73,16 @@ def _counted() -> Iterator[mi.UInt32]:
     """Count the photon pass's rays while the context lasts."""
     counter = dr.zeros(mi.UInt32, 1)
     dr.make_opaque(counter)
-    original = photon_pass.intersect
+    module: Any = photon_pass
+    original = module.intersect
 
     def counting(*arguments: Any) -> Any:
         active = arguments[5]
         dr.scatter_inc(counter, mi.UInt32(0), active)
         return original(*arguments)
 
-    photon_pass.intersect = counting
+    module.intersect = counting
     try:
         yield counter
     finally:
-        photon_pass.intersect = original
+        module.intersect = original

@@ -1,8 +1,9 @@
 """The converged image of the case, by progressive photon mapping, kept in a file.
 
-Photons are traced through the scene with the ball in it and gathered one by one within a small radius, which shares
-neither the pooling nor the shading of the light field that is judged. Only the pixels in and around
-the contact are gathered: that is where error is measured, and it saves four fifths of the time.
+Photons are traced through the scene with the ball in it and gathered one by one within a small
+radius, which shares neither the pooling nor the shading of the light field that is judged. Only
+the pixels in and around the contact are gathered: that is where error is measured, and it saves
+most of the time.
 """
 
 from __future__ import annotations
@@ -29,7 +30,7 @@ SEEDS = 6
 PHOTONS = 60_000_000
 """Of each seed."""
 FIRST_RADIUS = 0.12
-"""mm; two pixels. The radius of pass n is smaller by n^(1/6), so most passes gather within one pixel."""
+"""mm; two pixels. Pass n gathers within n^(1/6) times less, so most within one pixel."""
 PASS_PHOTONS = 1_000_000
 MARGIN = 10
 """Pixels around the contact."""
@@ -54,8 +55,8 @@ class WindowCamera(RayCamera):
 class Reference:
     """radiance (h, w, 3) within ``known`` (h, w), a box around the contact; zero elsewhere.
 
-    noise: relative RMS error inside the contact, from the scatter of independent seeds. photons: of all
-    seeds. seconds: what it took.
+    noise: relative RMS error inside the contact, from the scatter of independent seeds.
+    photons: of all seeds. seconds: what it took.
     """
 
     radiance: FloatArray

@@ -15,7 +15,7 @@ from benchmarks.case import RESOLUTION, Case, FloatArray, ball, relative_error
 from benchmarks.mitsuba_path import case_pieces, render_path
 from benchmarks.reference import CACHE, Reference
 from benchmarks.snapshots import Snapshot
-from optisense.optics.response import auto_exposure, picture
+from optisense.optics.response import auto_exposure, encode
 
 MITSUBA = "Mitsuba path"
 BUDGET = 60.0
@@ -38,7 +38,8 @@ def compare_renderers(
     times (error / target)^2: Monte Carlo noise falls so, bias does not, which favours the others.
     """
     ours = case.model.render([ball()], resolution=RESOLUTION).radiance
-    rows, pictures = [], {"OptiSense": ours}
+    rows: list[dict[str, Any]] = []
+    pictures = {"OptiSense": ours}
     for name in [MITSUBA, *luxcore.ENGINES]:
         if name != MITSUBA and find_spec("pyluxcore") is None:
             rows.append({"renderer": name, "failed": "pyluxcore is not installed"})
@@ -51,7 +52,8 @@ def compare_renderers(
             continue
         row = _row(case, reference, snapshots, target_error, our_seconds)
         whole = snapshots[-1].image.mean() / ours.mean()
-        rows.append({"renderer": name, **row, "whole_image_mean_over_ours": round(float(whole), 4)})
+        row["whole_image_mean_over_ours"] = round(float(whole), 4)
+        rows.append({"renderer": name, **row})
         pictures[name] = snapshots[-1].image
     _save_pictures(pictures)
     ratios = [row["time_ratio"] for row in rows if row.get("time_ratio")]
@@ -119,5 +121,5 @@ def _save_pictures(images: dict[str, FloatArray]) -> None:
     exposure = auto_exposure(ours)
     for name, image in images.items():
         scale = ours.mean() / max(float(image.mean()), sys.float_info.min)
-        shown = picture(image * np.float32(scale), exposure)
+        shown = encode(image * (scale * exposure))
         mi.Bitmap(np.ascontiguousarray(shown)).write(str(folder / f"{name.replace(' ', '-')}.png"))

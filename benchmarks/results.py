@@ -171,7 +171,8 @@ def _markdown(results: dict[str, Any]) -> str:
         lines += [
             "",
             f"Reference: {ref['photons']:,} photons of {ref['seeds']} seeds, noise inside the "
-            f"contact {100 * ref['noise']:.2f} % (subtracted in quadrature), {ref['seconds']:.0f} s.",
+            f"contact {100 * ref['noise']:.2f} % (subtracted in quadrature), "
+            f"{ref['seconds']:.0f} s.",
         ]
     for title, heads, rows in _tables(results):
         lines += ["", f"## {title}", "", "| " + " | ".join(heads) + " |"]

@@ -9,9 +9,9 @@ from benchmarks.case import FloatArray
 
 @dataclass(frozen=True)
 class Snapshot:
-    """image (h, w, 3) linear radiance after ``seconds`` of wall time and ``cpu`` seconds of all threads.
+    """image (h, w, 3) linear radiance after ``seconds`` of wall time.
 
-    samples: per pixel, where the renderer tells.
+    cpu: seconds of all threads. samples: per pixel, where the renderer tells.
     """
 
     seconds: float
@@ -21,5 +21,5 @@ class Snapshot:
 
 
 def due_times(budget: float, count: int = 4) -> list[float]:
-    """Times of snapshots, each twice the one before, the last at the end of the budget (seconds)."""
+    """Seconds at which to take snapshots: each twice the one before, the last at the end."""
     return [budget / 2 ** (count - 1 - k) for k in range(count)]

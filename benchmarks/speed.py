@@ -28,7 +28,7 @@ def measure_speed(case: Case, reference: Reference, tell: Callable[[str], None])
     model.render([ball()], resolution=RESOLUTION)
     setup = timed(lambda: _fresh_model(case))
     tell("speed: warm images")
-    warm = _warm(case, reference)
+    warm = warm_images(case, reference)
     large = _new_light(case, LARGE, RUNS - 2)
     tell("speed: other contacts, other flux, other specularity")
     kept = _kept_light(case)
@@ -57,7 +57,7 @@ def _fresh_model(case: Case) -> None:
     OpticalModel(case.model.design).guide()
 
 
-def _warm(case: Case, reference: Reference) -> dict[str, Any]:
+def warm_images(case: Case, reference: Reference) -> dict[str, Any]:
     """Images of the case, each from photons of its own (another seed)."""
     case.model.render([ball()], resolution=RESOLUTION, seed=99)
     times, errors, parts, ratios, image = [], [], [], [], None
