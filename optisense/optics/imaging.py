@@ -95,10 +95,7 @@ def render_field(
         film.count(pixel)
         for points, close in ((main, thorough), (reflected, False)):
             if points is not None:
-                # Merging gathers into packets makes Dr.Jit write one of several kernels by chance,
-                # and compile them all in turn.
-                with dr.scoped_set_flag(dr.JitFlag.PacketOps, False):
-                    light = shade(field, scenes, points, own, close)
+                light = shade(field, scenes, points, own, close)
                 film.add(points, light)
                 film.add_light(points, emitters, areas)
 

@@ -63,6 +63,7 @@ def _sum_all(
     balls: mi.Float,
     ball_count: mi.UInt32,
     contacts: bool,
+    single: bool,
     coating: Coating,
     points: VisiblePoints,
     start: mi.Point3f,
@@ -72,6 +73,7 @@ def _sum_all(
 ) -> list[mi.Color3f]:
     """Every bin of the field, for points on the undeformed surface."""
     moments, colours = tables
+    first_ball = dr.gather(mi.Vector4f, balls, mi.UInt32(0))
     totals = [mi.Color3f(0) for _ in range(groups)]
     state = mi.UInt32(random)
     k = mi.UInt32(0)
@@ -87,16 +89,14 @@ def _sum_all(
                 seen = dr.max(reflected) > 0
                 if dr.hint(contacts, mode="scalar"):
                     near = mi.Bool(False)
-                    n = mi.UInt32(0)
-                    while n < ball_count:
-                        ball = dr.gather(mi.Vector4f, balls, n)
-                        offset = mi.Point3f(ball.x, ball.y, ball.z) - start
-                        along = dr.dot(offset, towards)
-                        # The margin covers the spread of the beam over the way to the ball.
-                        reach = ball.w + along * dr.sqrt(spread2)
-                        gap2 = dr.squared_norm(offset) - along * along
-                        near |= (along > -ball.w) & (gap2 < reach * reach)
-                        n += 1
+                    if dr.hint(single, mode="scalar"):
+                        near = passes_near(first_ball, start, towards, spread2)
+                    else:
+                        n = mi.UInt32(0)
+                        while n < ball_count:
+                            ball = dr.gather(mi.Vector4f, balls, n)
+                            near |= passes_near(ball, start, towards, spread2)
+                            n += 1
                     if seen & near:
                         open_rays = mi.Float(0)
                         for _ in range(SHADOW_RAYS):
@@ -239,6 +239,18 @@ def beam(value: mi.Vector4f) -> tuple[mi.Vector3f, mi.Float]:
     return mean / length, 4 * dr.clip(1 - length / value.w, 0.0, 0.1)
 
 
+def passes_near(
+    ball: mi.Vector4f, start: mi.Point3f, towards: mi.Vector3f, spread2: mi.Float
+) -> mi.Bool:
+    """Whether a beam from ``start`` may touch a ball (centre, radius)."""
+    offset = mi.Vector3f(ball.x - start.x, ball.y - start.y, ball.z - start.z)
+    along = dr.dot(offset, towards)
+    # The margin covers the spread of the beam over the way to the ball.
+    reach = ball.w + along * dr.sqrt(spread2)
+    gap2 = dr.squared_norm(offset) - along * along
+    return (along > -ball.w) & (gap2 < reach * reach)
+
+
 def widened(coating: Coating, spread2: mi.Float) -> Coating:
     """A coating whose metallic lobe is blurred as if by light from a disc.
 
@@ -322,6 +334,7 @@ def shade(
         scenes.balls if indenters is not None else dr.zeros(mi.Float, 4),
         dr.opaque(mi.UInt32, dr.width(scenes.balls) // 4),
         indenters is not None,
+        dr.width(scenes.balls) == 4,
         coating,
         points,
         start,

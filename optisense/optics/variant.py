@@ -86,9 +86,13 @@ def use_variant(variant: str = "auto") -> str:
     mitsuba = import_renderer("mitsuba")
     current = mitsuba.variant()
     if variant == "auto" and current in VARIANTS.values():
-        return str(current)
-    if current != name:
+        name = str(current)
+    elif current != name:
         mitsuba.set_variant(name)
+    # Where Dr.Jit may merge gathers into packets it writes one of several kernels by chance, and
+    # compiles them all in turn; without it the kernels are as fast and always the same.
+    drjit = import_renderer("drjit")
+    drjit.set_flag(drjit.JitFlag.PacketOps, False)
     return name
 
 
