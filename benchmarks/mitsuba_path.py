@@ -29,7 +29,7 @@ def case_pieces(case: Case) -> tuple[assembly.Assembly, list[Piece]]:
         assembly.index_before_sensing(model.design),
         Region.INDENTER,
     )
-    return parts, [*parts.pieces, assembly.indenter_piece(model._place(ball()), coat)]
+    return parts, [*parts.pieces, assembly.indenter_piece(model.place(ball()), coat)]
 
 
 def render_path(case: Case, budget: float) -> list[Snapshot]:
