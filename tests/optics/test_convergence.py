@@ -17,8 +17,8 @@ spread ones."""
 
 DRIFT = 0.01
 """Relative, of the mean for radii from 0.4 to 0.1 mm. Under a lamp at height h, flux across the
-light falls as 1/d^2; the kernel (mean square radius r^2 / 3) takes r^2 / (3 h^2) off its peak: 0.3 %
-for 0.4 mm and 4 mm. Noise is 0.2 %."""
+light falls as 1/d^2; the kernel (mean square radius r^2 / 3) takes r^2 / (3 h^2) off its peak, 0.3
+% for 0.4 mm and 4 mm. Noise is 0.2 %."""
 
 FACTOR = 1.4
 """Between the noise that two halves tell and the true error, both over 768 pixels."""
@@ -87,5 +87,5 @@ def test_more_passes_lower_the_error() -> None:
     truth = closed_form(where)
     few, many = (where.pairwise(n, 20_000, seed=4, radius=0.3)[0][0, ..., 0] for n in (2, 32))
     gain = np.sqrt(((few - truth) ** 2).mean() / ((many - truth) ** 2).mean())
-    # Radii shrink as passes^(-1/6): 16 times the photons lower the error 16^(1/2 - 1/6) = 2.5 times.
+    # Radii shrink as passes^(-1/6): 16 times the photons leave 16^-(1/2 - 1/6) = 0.4 of it.
     assert gain > 2.0

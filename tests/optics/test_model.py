@@ -28,7 +28,7 @@ IN_CONTACT = {"gelsight-mini": 0.03, "gelsight-mini-cylindrical": 0.06}
 
 PER_PIXEL = {"gelsight-mini": 0.07, "gelsight-mini-cylindrical": 0.2}
 """RMS over the contact's pixels, photon mapping's own noise taken off. Measured: flat 0.01 to 0.04;
-cylinder, where few photons reach the ball's flanks and photon mapping is noisy too, 0.05 to 0.15."""
+cylinder, where few photons reach the ball's flanks and photon mapping is noisy, 0.05 to 0.15."""
 
 OUTSIDE = 0.02
 
