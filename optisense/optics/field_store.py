@@ -11,8 +11,9 @@ from dataclasses import dataclass
 import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial import cKDTree
 
-from optisense.optics.cells import SurfaceCells, build_cells, cells_near
+from optisense.optics.cells import SurfaceCells, build_cells, cells_near, surface_samples
 from optisense.optics.emitters import EmitterTable
 from optisense.optics.guide import Guide, even_guide, learn_guide
 from optisense.optics.light_field import BINS, FieldTally, LightField
@@ -24,8 +25,11 @@ PASS_PHOTONS = 500_000
 PILOT_PHOTONS = 300_000
 CELL_SIZE = 0.25
 """mm; larger where the tally would outgrow its memory."""
-RADIUS = 1.0
-"""mm of the smoothing kernel: what a light field of LEDs some mm away can bear (see benchmarks)."""
+RADIUS = 0.9
+"""mm of the smoothing kernel, where lamps are some mm away (see benchmarks)."""
+RADIUS_OF_DISTANCE = 0.4
+"""Of the distance to the nearest lamp: nearer lamps make light that varies faster."""
+LEAST_RADIUS = 0.3
 MOST_BYTES = 300e6
 SEEN_MARGIN = 2.0
 """mm around what the camera sees that photons are sent to: an indenter's flank catches light
@@ -103,8 +107,19 @@ class FieldStore:
             area = np.linalg.norm(np.cross(b - a, c - a), axis=1).sum() / 2
             entry = BINS * self._table.groups * 16 * (2 if self._coloured else 1)
             size = max(CELL_SIZE, float(np.sqrt(1.3 * area * entry / MOST_BYTES)))
-            self._cells = build_cells(points, triangles, size, max(RADIUS, 2.5 * size))
+            near = RADIUS_OF_DISTANCE * self._nearest_lamp(points, triangles)
+            radius = max(min(RADIUS, near), LEAST_RADIUS, 1.5 * size)
+            self._cells = build_cells(points, triangles, size, radius)
         return self._cells
+
+    def _nearest_lamp(self, points: NDArray[np.floating], triangles: NDArray[np.integer]) -> float:
+        """Distance (mm) from the opaque surfaces to the nearest lamp's window."""
+        places, _, _ = surface_samples(points, triangles, 1.0)
+        tree = cKDTree(places)
+        return min(
+            float(tree.query(lamp.position)[0]) - max(lamp.size) / 2
+            for lamp in self._table.emitters
+        )
 
     def field(
         self,

@@ -24,7 +24,7 @@ from optisense.optics.sppm import SppmResult
 from optisense.optics.surfaces import Region
 from optisense.optics.visible_points import film_samples, find_visible_points
 
-CONTACT_SAMPLES = 12
+CONTACT_SAMPLES = 16
 """Camera samples of a pixel in and around contacts, where tilt and shadow change within it."""
 REFINED = 8.0 / 320.0
 """How far around a contact, as a part of the image width."""

@@ -30,7 +30,7 @@ from optisense.optics.surfaces import SurfaceKind
 
 # Photons are dropped after so many surfaces; in GelSight-like sensors less than 0.1 % of the
 # light gets there.
-MAX_DEPTH = 32
+MAX_DEPTH = 64
 
 GROUP_MASK = 0xFF
 SURFACE_SHIFT = 8

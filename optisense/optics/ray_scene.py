@@ -87,6 +87,7 @@ class RayScene:
         self.rows = mi.Float(rows.ravel())
         self.corners = mi.Float(corners.ravel())
         self.table = surface_table(surfaces) if table is None else table
+        self.smooth = any(piece.normals is not None for piece in pieces)
         self.rough = any(
             s.kind is SurfaceKind.DIELECTRIC and s.alpha > SMOOTH_ALPHA for s in surfaces
         )

@@ -128,6 +128,8 @@ def _sum_chosen(
     groups: int,
     coloured: bool,
     indenters: mi.Scene,
+    fixed: mi.Scene,
+    curved: bool,
     coating: Coating,
     points: VisiblePoints,
     start: mi.Point3f,
@@ -156,7 +158,20 @@ def _sum_chosen(
         k = mi.UInt32(0)
         while active & (expected > 0) & (k < bins):
             entry, value = _entry(
-                cells, moments, centres, bins, groups, points, cell, shift, raised, active, k, g
+                cells,
+                moments,
+                centres,
+                bins,
+                groups,
+                fixed,
+                curved,
+                points,
+                cell,
+                shift,
+                raised,
+                active,
+                k,
+                g,
             )
             if value.w > 0:
                 towards, spread2 = beam(value)
@@ -185,12 +200,15 @@ def _sum_chosen(
     return totals
 
 
+@dr.syntax
 def _entry(
     cells: SurfaceCells,
     moments: mi.Float,
     centres: mi.Float,
     bins: mi.UInt32,
     groups: int,
+    fixed: mi.Scene,
+    curved: bool,
     points: VisiblePoints,
     cell: mi.UInt32,
     shift: mi.Vector3f,
@@ -202,7 +220,8 @@ def _entry(
     """Place and value of a bin of the field for points.
 
     On an indenter that is where the bin's line through the point goes on to meet the undeformed
-    surface, found on the planes of two cells in turn.
+    surface, found on the planes of two cells in turn; on a curved surface, lines that graze these
+    planes are followed by a ray.
     """
     entry = (cell * bins + k) * groups + g
     value = dr.gather(mi.Vector4f, moments, entry, active)
@@ -224,6 +243,14 @@ def _entry(
         way = (dr.dot(normal, points.point) - offset) / dr.maximum(facing, LEAST_COSINE)
         there, found = cell_at(cells, points.point - towards * way + shift, exists)
         exists &= found
+    if dr.hint(curved, mode="scalar"):  # noqa: SIM102 (the one is Python's, the other Dr.Jit's)
+        if raised & ~exists:
+            below = fixed.ray_intersect_preliminary(
+                mi.Ray3f(points.point, -towards), coherent=False, active=mi.Bool(True)
+            )
+            reached = below.is_valid()
+            landing = points.point - towards * dr.select(reached, below.t, 0)
+            there, exists = cell_at(cells, landing + shift, reached)
     moved = (there * bins + k) * groups + g
     entry = dr.select(exists, moved, entry)
     return entry, dr.select(raised, dr.gather(mi.Vector4f, moments, moved, exists), value)
@@ -311,6 +338,8 @@ def shade(
             field.groups,
             field.coloured,
             indenters.scene,
+            scenes.fixed.scene,
+            scenes.fixed.smooth,
             coating,
             points,
             start,
