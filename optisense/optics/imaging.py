@@ -11,7 +11,7 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import maximum_filter
+from scipy.ndimage import distance_transform_edt
 
 from optisense.optics.camera import RayCamera
 from optisense.optics.chief_rays import ChiefRays
@@ -25,7 +25,9 @@ from optisense.optics.surfaces import Region
 from optisense.optics.visible_points import film_samples, find_visible_points
 
 CONTACT_SAMPLES = 16
-"""Camera samples of a pixel in and around contacts, where tilt and shadow change within it."""
+"""Camera samples of a pixel in contacts, where tilt and shadow change within it."""
+RIM_SAMPLES = 6
+"""Camera samples of a pixel around contacts."""
 REFINED = 8.0 / 320.0
 """How far around a contact, as a part of the image width."""
 
@@ -68,6 +70,15 @@ class ImageLayers:
         )
 
 
+def _repeated(mask: NDArray[np.bool_], times: int) -> tuple[mi.UInt32, mi.UInt32]:
+    """Every pixel of a mask ``times`` times, and the number of the sample (from 1)."""
+    # Made on the device: arrays handed over from numpy differ in alignment, and so would kernels.
+    chosen = dr.compress(mi.Bool(mask.ravel()))
+    lane = dr.arange(mi.UInt32, dr.width(chosen) * times)
+    count = dr.opaque(mi.UInt32, max(dr.width(chosen), 1))
+    return dr.gather(mi.UInt32, chosen, lane % count), lane // count + 1
+
+
 def masked(values: NDArray[np.float32], where: NDArray[np.bool_]) -> NDArray[np.float32]:
     """Values (h, w, 3) with NaN outside a mask."""
     return np.where(where[..., None], values, np.nan).astype(np.float32)
@@ -102,14 +113,19 @@ def render_field(
     region_image = np.where(rays.hit, rays.region, 0)
     mask = region_image == Region.INDENTER
     near = np.zeros_like(mask)
-    samples = [1, 1]
+    samples = [1]
     if mask.any():
-        near = maximum_filter(mask, 2 * max(1, round(REFINED * width)) + 1)
-        pixel = np.flatnonzero(near).astype(np.uint32)
-        number = np.repeat(np.arange(1, CONTACT_SAMPLES + 1, dtype=np.uint32), len(pixel))
-        sample(mi.UInt32(np.tile(pixel, CONTACT_SAMPLES)), mi.UInt32(number), True)
-        samples = [1, CONTACT_SAMPLES]
-    far = mi.UInt32(np.flatnonzero(~near).astype(np.uint32))
+        distance = distance_transform_edt(~mask)
+        near = distance <= max(2.0, REFINED * width)
+        tiers = (
+            _repeated(distance <= 1.0, CONTACT_SAMPLES),
+            _repeated(near & (distance > 1.0), RIM_SAMPLES),
+        )
+        pixel, number = (dr.concat(pair) for pair in zip(*tiers, strict=True))
+        dr.eval(pixel, number)
+        sample(pixel, number, True)
+        samples = [1, RIM_SAMPLES, CONTACT_SAMPLES]
+    far = dr.compress(mi.Bool((~near).ravel()))
     if dr.width(far):
         sample(far, dr.zeros(mi.UInt32, dr.width(far)), False)
     layers = film.layers(width, height)

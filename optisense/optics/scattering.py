@@ -93,6 +93,11 @@ def coating_of(
     )
 
 
+def grey(colour: mi.Color3f) -> mi.Float:
+    """The mean of three channels. (``dr.mean`` writes the number of lanes into kernels.)"""
+    return (colour.x + colour.y + colour.z) * (1 / 3)
+
+
 def albedo_of(coating: Coating) -> mi.Color3f:
     """About how much light the coating sends back, per channel (its metal at normal incidence)."""
     metal = fresnel_metal(mi.Float(1), coating.metal_eta, coating.metal_k)

@@ -25,6 +25,7 @@ from optisense.optics.scattering import (
     albedo_of,
     coating_of,
     evaluate_coating,
+    grey,
     surface_region,
 )
 from optisense.optics.surfaces import Region
@@ -151,7 +152,7 @@ def _sum_chosen(
     for g in range(groups):
         # About what the bins bring in all: how far apart the shadow rays are in the running sum.
         light, mean, _ = irradiance(table, cell * groups + g, points.normal)
-        expected = (light + LEAST_LIGHT * mean) * dr.mean(albedo_of(coating)) * dr.inv_pi
+        expected = (light + LEAST_LIGHT * mean) * grey(albedo_of(coating)) * dr.inv_pi
         step = expected / chosen
         state = next_random(state)
         running = unit_float(state)
@@ -178,7 +179,7 @@ def _sum_chosen(
                 reflected = evaluate_coating(
                     widened(coating, spread2), points.normal, towards, points.towards_eye
                 )
-                share = value.w * dr.mean(reflected) / step
+                share = value.w * grey(reflected) / step
                 before = dr.floor(running)
                 running += share
                 times = dr.floor(running) - before

@@ -21,6 +21,7 @@ from optisense.optics.scattering import (
     SMOOTH_ALPHA,
     coating_of,
     fresnel_metal,
+    grey,
     refract,
     sample_rough_interface,
     surface_kind,
@@ -104,9 +105,7 @@ def _follow(
             )
             branch_weight = weight * branch
             branch_total += branch_weight
-            chosen = (branch > 0) & (
-                rng.next_float32() * dr.mean(branch_total) < dr.mean(branch_weight)
-            )
+            chosen = (branch > 0) & (rng.next_float32() * grey(branch_total) < grey(branch_weight))
             branch_origin = dr.select(
                 chosen, leave(hit.point, hit.normal, reflected), branch_origin
             )
@@ -199,7 +198,17 @@ def find_visible_points(
     kept = dr.compress(branch[0] | (branch[7] > 0))
     if dr.width(kept) == 0:
         return main, None
+    alone = dr.width(kept) == 1
+    if (
+        alone
+    ):  # Dr.Jit compiles other kernels for arrays of one entry: add one that counts for nothing
+        kept = dr.repeat(kept, 2)
     picked = [dr.gather(type(value), value, kept) for value in branch[:8]]
-    return main, VisiblePoints(
-        dr.gather(mi.UInt32, pixel, dr.gather(mi.UInt32, lanes, kept)), *picked
-    )
+    pixels = dr.gather(mi.UInt32, pixel, dr.gather(mi.UInt32, lanes, kept))
+    reflected = VisiblePoints(pixels, *picked)
+    if alone:
+        first = dr.arange(mi.UInt32, 2) == 0
+        reflected.valid &= first
+        reflected.light = dr.select(first, reflected.light, 0)
+    dr.eval(reflected)
+    return main, reflected
