@@ -28,6 +28,8 @@ if TYPE_CHECKING:
 
 REPORT = "report.html"
 PICTURE = "image.png"
+ONE_PICTURE = 2_000_000
+"""Photons for a single picture. A program that keeps its model pays once and takes more."""
 
 
 @ends_well
@@ -50,7 +52,7 @@ def render(
         typer.Option(
             min=1,
             metavar="N",
-            help="Photons to trace. Enough for a good picture when left out.",
+            help="Photons to trace: 2 million when no limit is given, enough for a good picture.",
             show_default=False,
         ),
     ] = None,
@@ -121,7 +123,7 @@ def render(
             image = model.render(
                 contacts,
                 resolution=size,
-                photons=photons,
+                photons=photons if photons or noise or seconds else ONE_PICTURE,
                 noise=noise,
                 seconds=seconds,
                 seed=seed,

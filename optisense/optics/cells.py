@@ -68,7 +68,7 @@ def build_cells(
     nothing.
     """
     vertices = np.asarray(vertices, dtype=np.float64)
-    points, normals, areas = surface_samples(vertices, faces, size / 8)
+    points, normals, areas = surface_samples(vertices, faces, size / 5)
     # Off any round number, so that a plane does not run along the border between two cells.
     lower = points.min(axis=0) - (0.37 + REACH) * size
     counts = np.floor((points.max(axis=0) - lower) / size).astype(int) + 1 + REACH

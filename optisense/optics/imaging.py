@@ -25,9 +25,11 @@ from optisense.optics.surfaces import Region
 from optisense.optics.visible_points import film_samples, find_visible_points
 
 CONTACT_SAMPLES = 16
-"""Camera samples of a pixel in contacts, where tilt and shadow change within it."""
+"""Camera samples of a pixel in contacts, where tilt and shadow change within it, in an image of
+USUAL_WIDTH; finer images have smaller pixels and take fewer."""
 RIM_SAMPLES = 6
-"""Camera samples of a pixel around contacts."""
+"""The same around contacts."""
+USUAL_WIDTH = 320
 REFINED = 8.0 / 320.0
 """How far around a contact, as a part of the image width."""
 
@@ -117,14 +119,16 @@ def render_field(
     if mask.any():
         distance = distance_transform_edt(~mask)
         near = distance <= max(2.0, REFINED * width)
+        share = min(1.0, USUAL_WIDTH / width)
+        inner, outer = (max(2, round(n * share)) for n in (CONTACT_SAMPLES, RIM_SAMPLES))
         tiers = (
-            _repeated(distance <= 1.0, CONTACT_SAMPLES),
-            _repeated(near & (distance > 1.0), RIM_SAMPLES),
+            _repeated(distance <= 1.0, inner),
+            _repeated(near & (distance > 1.0), outer),
         )
         pixel, number = (dr.concat(pair) for pair in zip(*tiers, strict=True))
         dr.eval(pixel, number)
         sample(pixel, number, True)
-        samples = [1, RIM_SAMPLES, CONTACT_SAMPLES]
+        samples = [1, outer, inner]
     far = dr.compress(mi.Bool((~near).ravel()))
     if dr.width(far):
         sample(far, dr.zeros(mi.UInt32, dr.width(far)), False)

@@ -49,8 +49,8 @@ from optisense.optics.sppm import render_sppm
 from optisense.optics.surfaces import Region, Surface, SurfaceKind
 from optisense.optics.versions import versions
 
-DEFAULT_PHOTONS = 4_000_000
-"""Photons of a light field where nothing else is asked."""
+DEFAULT_PHOTONS = 5_000_000
+"""Photons of a light field where nothing else is asked; it is kept for the next image."""
 
 MOST_PHOTONS = 512_000_000
 """A noise target gives up here."""

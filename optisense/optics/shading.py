@@ -83,27 +83,27 @@ def _sum_all(
             entry = (cell * bins + k) * groups + g
             value = dr.gather(mi.Vector4f, moments, entry, active)
             if value.w > 0:
-                towards, spread2 = beam(value)
+                towards, cosine = beam(value)
                 reflected = evaluate_coating(
-                    widened(coating, spread2), points.normal, towards, points.towards_eye
+                    widened(coating, cosine), points.normal, towards, points.towards_eye
                 )
                 seen = dr.max(reflected) > 0
                 if dr.hint(contacts, mode="scalar"):
                     near = mi.Bool(False)
                     if dr.hint(single, mode="scalar"):
-                        near = passes_near(first_ball, start, towards, spread2)
+                        near = passes_near(first_ball, start, towards, spread_of(cosine))
                     else:
                         n = mi.UInt32(0)
                         while n < ball_count:
                             ball = dr.gather(mi.Vector4f, balls, n)
-                            near |= passes_near(ball, start, towards, spread2)
+                            near |= passes_near(ball, start, towards, spread_of(cosine))
                             n += 1
                     if seen & near:
                         open_rays = mi.Float(0)
                         for _ in range(SHADOW_RAYS):
                             state = next_random(state)
                             blocked = indenters.ray_test(
-                                mi.Ray3f(start, within(towards, spread2, state)),
+                                mi.Ray3f(start, within(towards, spread_of(cosine), state)),
                                 coherent=False,
                                 active=mi.Bool(True),
                             )
@@ -175,9 +175,9 @@ def _sum_chosen(
                 g,
             )
             if value.w > 0:
-                towards, spread2 = beam(value)
+                towards, cosine = beam(value)
                 reflected = evaluate_coating(
-                    widened(coating, spread2), points.normal, towards, points.towards_eye
+                    widened(coating, cosine), points.normal, towards, points.towards_eye
                 )
                 share = value.w * grey(reflected) / step
                 before = dr.floor(running)
@@ -186,7 +186,7 @@ def _sum_chosen(
                 if times > 0:
                     state = next_random(state)
                     blocked = indenters.ray_test(
-                        mi.Ray3f(start, within(towards, spread2, state)),
+                        mi.Ray3f(start, within(towards, spread_of(cosine), state)),
                         coherent=False,
                         active=mi.Bool(True),
                     )
@@ -258,13 +258,15 @@ def _entry(
 
 
 def beam(value: mi.Vector4f) -> tuple[mi.Vector3f, mi.Float]:
-    """Mean direction of an entry of the field, and the squared angular radius of a disc that
-    has its mean cosine.
-    """
+    """Mean direction of an entry of the field, and the mean cosine with it of the entry's light."""
     mean = mi.Vector3f(value.x, value.y, value.z)
     length = dr.norm(mean)
-    # The mean cosine over a disc of radius R is 1 - R^2 / 4.
-    return mean / length, 4 * dr.clip(1 - length / value.w, 0.0, 0.1)
+    return mean / length, dr.minimum(length / value.w, 1.0)
+
+
+def spread_of(cosine: mi.Float) -> mi.Float:
+    """Squared angular radius R^2 of a disc of this mean cosine, which is 1 - R^2 / 4."""
+    return 4 * dr.minimum(1 - cosine, 0.1)
 
 
 def passes_near(
@@ -279,14 +281,18 @@ def passes_near(
     return (along > -ball.w) & (gap2 < reach * reach)
 
 
-def widened(coating: Coating, spread2: mi.Float) -> Coating:
-    """A coating whose metallic lobe is blurred as if by light from a disc.
+def widened(coating: Coating, cosine: mi.Float) -> Coating:
+    """A coating as it reflects light that is spread about its mean direction.
 
-    The half vector moves half as far as the light, which adds R^2 / 8 to alpha^2.
+    The diffuse lobe is linear in direction, so the mean cosine makes it exact. The metallic lobe is
+    blurred as if by light from a disc: the half vector moves half as far as the light, which adds
+    R^2 / 8 to alpha^2.
     """
+    reflectance = coating.reflectance * cosine
     if not coating.metallic:
-        return coating
-    return replace(coating, alpha=dr.sqrt(coating.alpha * coating.alpha + spread2 * 0.125))
+        return replace(coating, reflectance=reflectance)
+    alpha = dr.sqrt(coating.alpha * coating.alpha + spread_of(cosine) * 0.125)
+    return replace(coating, reflectance=reflectance, alpha=alpha)
 
 
 def next_random(state: mi.UInt32) -> mi.UInt32:
