@@ -19,23 +19,28 @@ VARIANTS = {
 }
 
 
-def main() -> None:
-    """Write each variant's picture with nine balls, and one of all three side by side."""
-    OUT.mkdir(parents=True, exist_ok=True)
-    figure, axes = plt.subplots(1, 3, figsize=(12, 3.3), facecolor="white")
-    for axis, (name, label) in zip(axes, VARIANTS.items(), strict=True):
+def render_variants() -> None:
+    """Nine balls pressed into each variant of GelSight Mini."""
+    for name in VARIANTS:
         model = ots.OpticalModel(ots.load(name))
         image = model.render(model.nine_contacts(), resolution=(640, 480), photons=8_000_000)
-        picture = image.picture()
-        plt.imsave(OUT / f"{name}.png", picture)
-        axis.imshow(picture)
-        axis.set_title(f"GelSight Mini, {label} gel", fontsize=11)
-        axis.set_axis_off()
+        plt.imsave(OUT / f"{name}.png", image.picture())
         print(OUT / f"{name}.png")
-    figure.tight_layout(pad=0.4)
-    figure.savefig(OUT / "gelsight-mini-variants.png", dpi=100)
+
+
+def show_side_by_side() -> None:
+    """All variants in one picture."""
+    figure, axes = plt.subplots(1, 3, figsize=(12, 3.4), facecolor="white")
+    for axis, (name, label) in zip(axes, VARIANTS.items(), strict=True):
+        axis.imshow(plt.imread(OUT / f"{name}.png"))
+        axis.set_title(f"GelSight Mini, {label} gel", fontsize=12)
+        axis.set_axis_off()
+    figure.tight_layout()
+    figure.savefig(OUT / "gelsight-mini-variants.png", dpi=100, bbox_inches="tight")
     print(OUT / "gelsight-mini-variants.png")
 
 
 if __name__ == "__main__":
-    main()
+    OUT.mkdir(parents=True, exist_ok=True)
+    render_variants()
+    show_side_by_side()
