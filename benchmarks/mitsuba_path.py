@@ -26,7 +26,7 @@ def case_pieces(case: Case) -> tuple[assembly.Assembly, list[Piece]]:
     parts = assembly.assemble(model.design)
     coat = assembly.coating_surface(
         model.design.coating,
-        assembly.index_before_sensing(model.design),
+        parts.ior_before,
         Region.INDENTER,
     )
     return parts, [*parts.pieces, assembly.indenter_piece(model.place(ball()), coat)]

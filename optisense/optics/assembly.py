@@ -15,7 +15,7 @@ from optisense.errors import DesignError
 from optisense.geometry import TriangleMesh
 from optisense.geometry.coplanar import merge_coplanar
 from optisense.optics.emitters import Emitter, Intensity, Shape, spot_intensity
-from optisense.optics.media import AIR, Sheet, Solid, resolve_media
+from optisense.optics.media import Sheet, Solid, resolve_media
 from optisense.optics.ray_scene import Piece
 from optisense.optics.surfaces import Region, Surface, SurfaceKind
 
@@ -41,6 +41,7 @@ class Assembly:
         emitters: all lights; ``group`` counts in the order of ``groups``.
         light_areas: mm^2 of the lights' windows, 0 for points.
         fine: for pieces of the sensing surface, by number, the same with all its triangles.
+        ior_before: refractive index on the inner side of the (first) sensing surface.
     """
 
     pieces: list[Piece]
@@ -50,6 +51,7 @@ class Assembly:
     groups: list[str]
     light_areas: list[float]
     fine: dict[int, Piece]
+    ior_before: float
 
 
 def assemble(design: SensorDesign) -> Assembly:
@@ -61,6 +63,7 @@ def assemble(design: SensorDesign) -> Assembly:
     """
     meshes = design.deformed_meshes()
     solids, sheets, pieces, fine = [], [], [], {}
+    before: list[float] = []
     for name, part in design.parts.items():
         if name not in meshes:
             raise DesignError(f"part '{name}' has no mesh", where=design.where("parts", name))
@@ -86,6 +89,7 @@ def assemble(design: SensorDesign) -> Assembly:
         part = design.parts[sheet.name]
         ior = _index_before(sheet.mesh, solids)
         if part.role is Role.SENSING_SURFACE:
+            before.append(ior)
             surface = coating_surface(design.coating, ior, Region.SENSING)
             fine[len(pieces)] = _piece(sheet.name, meshes[sheet.name], surface)
         else:
@@ -104,6 +108,7 @@ def assemble(design: SensorDesign) -> Assembly:
         groups=list(design.lights),
         light_areas=areas,
         fine=fine,
+        ior_before=before[0],
     )
 
 
@@ -118,20 +123,6 @@ def coating_surface(coating: Coating, ior: float, region: Region) -> Surface:
         metal_k=_relative(coating.k, ior),
         region=region,
     )
-
-
-def index_before_sensing(design: SensorDesign) -> float:
-    """Refractive index of what lies on the inner side of the sensing surface."""
-    meshes = design.deformed_meshes()
-    solids = []
-    for name in design.parts_of(*TRANSPARENT_SOLIDS):
-        part = design.parts[name]
-        material = design.materials[part.material or ""]
-        assert isinstance(material, Dielectric)
-        solids.append(
-            Solid(name, meshes[name], part.material or "", material.ior, 0.0, part.priority)
-        )
-    return _index_before(meshes[design.parts_of(Role.SENSING_SURFACE)[0]], solids)
 
 
 def indenter_piece(mesh: TriangleMesh, coating: Surface) -> Piece:
@@ -236,6 +227,3 @@ def _window(number: int, emitter: Emitter) -> Piece:
     count = len(points)
     faces = np.array([[0, k, k + 1] for k in range(1, count - 1)])
     return Piece(f"light {number}", points, faces, Surface(SurfaceKind.LIGHT, light=number))
-
-
-__all__ = ["AIR", "Assembly", "assemble", "coating_surface", "indenter_piece"]

@@ -28,7 +28,6 @@ from optisense.optics.assembly import (
     assemble,
     coating_surface,
     indenter_piece,
-    index_before_sensing,
 )
 from optisense.optics.camera import RayCamera
 from optisense.optics.chief_rays import (
@@ -104,7 +103,7 @@ class OpticalModel:
         self._light_areas = parts.light_areas
         self._emitters = parts.emitters
         self._pieces: list[Piece] = parts.pieces
-        self._ior_before = index_before_sensing(self.design)
+        self._ior_before = parts.ior_before
         self._surfaces = [piece.surface for piece in parts.pieces]
         self._surfaces.append(self._indenter_surface())
         self._fields: FieldStore | None = None
@@ -245,7 +244,7 @@ class OpticalModel:
     def _scenes(self, contacts: Sequence[Contact]) -> ContactScenes:
         number = len(self._surfaces) - 1
         if not contacts:
-            return ContactScenes(self.scene, self._fixed, None, number, mi.Float())
+            return ContactScenes(self.scene, self._fixed, None, mi.Float())
         coat = self._surfaces[number]
         placed = [self.place(contact) for contact in contacts]
         pieces = [indenter_piece(mesh, coat) for mesh in placed]
@@ -253,7 +252,6 @@ class OpticalModel:
             self._with_indenters(self._pieces, placed),
             self._fixed,
             RayScene(pieces, [number] * len(pieces), self._table),
-            number,
             mi.Float(np.concatenate([_ball(mesh) for mesh in placed]).astype(np.float32)),
         )
 

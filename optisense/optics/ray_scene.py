@@ -98,12 +98,6 @@ class RayScene:
         """First hit along rays (unit directions), with normals."""
         return intersect(self.scene, self.rows, self.corners, origin, direction, active, coherent)
 
-    def occluded(
-        self, origin: mi.Point3f, direction: mi.Vector3f, length: mi.Float, active: mi.Bool
-    ) -> mi.Bool:
-        """Whether anything lies within ``length`` mm along rays."""
-        return self.scene.ray_test(mi.Ray3f(origin, direction, length, 0.0, []), False, active)
-
 
 def intersect(
     scene: mi.Scene,

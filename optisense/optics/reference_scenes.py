@@ -102,7 +102,7 @@ class ReferenceScene:
             seed, photons, None, None, 2 * photons, 0.0, lambda fraction, traced, noise: None
         )
         fixed = RayScene([self.pieces[i] for i in opaque], opaque, scene.table)
-        scenes = ContactScenes(scene, fixed, None, len(surfaces), mi.Float())
+        scenes = ContactScenes(scene, fixed, None, mi.Float())
         areas = [emitter.area for emitter in self.emitters]
         layers = render_field(light, scenes, self.camera, rays, self.emitters, areas, seed)
         return self._scaled(layers.radiance)

@@ -42,20 +42,17 @@ SHADOW_RAYS = 4
 @dataclass
 class ContactScenes:
     """Ray scenes of one image: ``full`` has everything, ``fixed`` the opaque surfaces without
-    indenters, ``indenters`` these alone (None without contacts); ``indenter_surface`` is their
-    surface number; ``balls`` holds centre and radius of a ball around each, four floats a
-    ball."""
+    indenters, ``indenters`` these alone (None without contacts); ``balls`` holds centre and radius
+    of a ball around each, four floats a ball."""
 
     full: RayScene
     fixed: RayScene
     indenters: RayScene | None
-    indenter_surface: int
     balls: mi.Float
 
 
 @dr.syntax
 def _sum_all(
-    field: LightField,
     tables: tuple[mi.Float, mi.Float],
     bins: mi.UInt32,
     groups: int,
@@ -360,7 +357,6 @@ def shade(
         near = exchanged(field, scenes, points, coating, cell, active, raised, random)
         return [one + other for one, other in zip(far, near, strict=True)]
     return _sum_all(
-        field,
         tables,
         bins,
         field.groups,
