@@ -1,0 +1,1 @@
+"""What a robot would read from a sensor: datasets, perception tasks, shape reconstruction."""
