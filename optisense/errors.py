@@ -63,3 +63,7 @@ class SetupError(OptiSenseError):
 
 class OutputError(OptiSenseError):
     """A file or folder that can't be written."""
+
+
+class TaskError(OptiSenseError):
+    """A perception task, or a dataset, that can't be made or read as asked."""
