@@ -1,0 +1,172 @@
+"""Shapes that the sensors are put together from: turned solids, bent strips, rows of lights.
+
+Solids that share a surface take it from the same points, so that their vertices agree bit for
+bit there and the media on both its sides are found face by face.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from optisense.design import Light
+from optisense.geometry import TriangleMesh
+from optisense.geometry.mesh import grid_faces
+
+FloatArray = NDArray[np.float64]
+Vector = tuple[float, float, float]
+
+ON_AXIS = 1e-12
+"""mm: a profile point nearer to the axis is a pole."""
+
+
+def revolve(profile: ArrayLike, segments: int) -> TriangleMesh:
+    """A profile turned about the z axis.
+
+    Faces look to the right of the way along the profile (r to the right, z up): out of a solid
+    whose outline runs counter-clockwise. Two neighbouring points on the axis make no faces.
+
+    Args:
+        profile: (n, 2) r and z, mm, r >= 0; an outline of a ring ends on its first point.
+        segments: corners of a full turn, the first one on the x axis.
+
+    Returns:
+        n rings of `segments` vertices, one vertex where r is 0; welded, so closed outlines and
+        outlines from axis to axis make closed meshes.
+    """
+    points = np.asarray(profile, dtype=np.float64)
+    turn = 2.0 * np.pi * np.arange(segments) / segments
+    circle = np.column_stack([np.cos(turn), np.sin(turn)])
+    vertices, rings = [], []
+    start = 0
+    for radius, height in points:
+        pole = radius < ON_AXIS
+        ring = np.zeros((1, 3)) if pole else np.column_stack([radius * circle, np.zeros(segments)])
+        ring[:, 2] = height
+        vertices.append(ring)
+        rings.append(np.full(segments, start) if pole else start + np.arange(segments))
+        start += len(ring)
+    faces = []
+    for low, high in zip(rings[:-1], rings[1:], strict=True):
+        beside_low, beside_high = np.roll(low, -1), np.roll(high, -1)
+        if low[0] != low[1]:
+            faces.append(np.column_stack([low, beside_low, beside_high]))
+        if high[0] != high[1]:
+            faces.append(np.column_stack([low, beside_high, high]))
+    return TriangleMesh(np.concatenate(vertices), np.concatenate(faces)).welded()
+
+
+def ribbon(path: ArrayLike, half_width: float, rows: int) -> TriangleMesh:
+    """A path in the xz plane drawn out along y, to both sides; an open sheet.
+
+    Faces look to the left of the way along the path (x to the right, z up).
+
+    Args:
+        path: (n, 2) x and z, mm.
+        half_width: mm.
+        rows: strips that the width is cut into.
+
+    Returns:
+        n times (rows + 1) vertices, row by row along the path.
+    """
+    points = np.asarray(path, dtype=np.float64)
+    y = np.linspace(-half_width, half_width, rows + 1)
+    along, across = np.repeat(np.arange(len(points)), rows + 1), np.tile(y, len(points))
+    vertices = np.column_stack([points[along, 0], across, points[along, 1]])
+    return TriangleMesh(vertices, grid_faces(len(points), rows + 1))
+
+
+def strip(lower: ArrayLike, upper: ArrayLike, half_width: float, rows: int) -> TriangleMesh:
+    """The closed solid between two paths in the xz plane, drawn out along y.
+
+    Args:
+        lower, upper: (n, 2) x and z, mm; `upper` lies to the left of the way along them. Each
+            point is joined to its partner.
+        half_width: mm.
+        rows: strips that the width is cut into.
+
+    Returns:
+        A mesh that has, bit for bit, the vertices of `ribbon(upper)` and `ribbon(lower)`.
+    """
+    bottom, top = np.asarray(lower, dtype=np.float64), np.asarray(upper, dtype=np.float64)
+    count = len(bottom)
+    sides = []
+    for y, flip in ((half_width, False), (-half_width, True)):
+        points = np.concatenate([bottom, top])
+        wall = TriangleMesh(
+            np.column_stack([points[:, 0], np.full(2 * count, y), points[:, 1]]),
+            grid_faces(2, count),
+        )
+        sides.append(wall.flipped() if flip else wall)
+    ends = [
+        ribbon([bottom[0], top[0]], half_width, rows),
+        ribbon([top[-1], bottom[-1]], half_width, rows),
+    ]
+    faces = [ribbon(top, half_width, rows), ribbon(bottom, half_width, rows).flipped()]
+    return TriangleMesh.joined(faces + sides + ends).welded()
+
+
+def rod(outline: ArrayLike, half_width: float) -> TriangleMesh:
+    """A convex outline in the xz plane drawn out along y: a closed prism.
+
+    Args:
+        outline: (n, 2) x and z, mm, counter-clockwise (x to the right, z up).
+        half_width: mm.
+    """
+    points = np.asarray(outline, dtype=np.float64)
+    count = len(points)
+    near, far = (np.column_stack([points[:, 0], np.full(count, y), points[:, 1]])
+                 for y in (-half_width, half_width))  # fmt: skip
+    this, following = np.arange(count), np.roll(np.arange(count), -1)
+    inner = np.arange(1, count - 1)
+    cap = np.column_stack([np.zeros(count - 2, dtype=np.int64), inner, inner + 1])
+    faces = [
+        cap,
+        cap[:, ::-1] + count,
+        np.column_stack([this, this + count, following + count]),
+        np.column_stack([this, following + count, following]),
+    ]
+    return TriangleMesh(np.concatenate([near, far]), np.concatenate(faces))
+
+
+def arc(
+    centre: tuple[float, float], radius: float, start: float, end: float, pieces: int
+) -> FloatArray:
+    """Points on an arc in a plane, (pieces + 1, 2) mm.
+
+    Args:
+        start, end: degrees from the first axis towards the second.
+    """
+    angle = np.radians(np.linspace(start, end, pieces + 1))
+    return np.column_stack([centre[0] + radius * np.cos(angle), centre[1] + radius * np.sin(angle)])
+
+
+def pieces_of_arc(radius: float, degrees: float, tessellation: float, least: int = 2) -> int:
+    """How many pieces of about `tessellation` mm an arc is cut into, of 15 degrees at most."""
+    length = abs(math.radians(degrees)) * radius
+    return max(least, math.ceil(length / tessellation), math.ceil(abs(degrees) / 15.0))
+
+
+def row_of_lights(
+    centre: Vector, along: Vector, count: int, pitch: float, direction: Vector
+) -> list[Light]:
+    """Lights side by side that all shine the same way.
+
+    Args:
+        centre: mm, the middle of the row.
+        along: unit vector of the row, which is also the `up` of each light.
+        count: how many.
+        pitch: mm between neighbours.
+        direction: where they shine.
+    """
+    offsets: Sequence[float] = [(index - 0.5 * (count - 1)) * pitch for index in range(count)]
+    places = [
+        tuple(c + offset * a for c, a in zip(centre, along, strict=True)) for offset in offsets
+    ]
+    return [
+        Light(position=(place[0], place[1], place[2]), direction=direction, up=along)
+        for place in places
+    ]
