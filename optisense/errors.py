@@ -57,6 +57,10 @@ class RenderError(OptiSenseError):
     """A design or a setting that can't be rendered."""
 
 
+class ObjectiveError(OptiSenseError):
+    """An objective that is unknown or can't be loaded, or a sensor that it can't score."""
+
+
 class SetupError(OptiSenseError):
     """Something missing or too old on this machine, such as libLLVM."""
 

@@ -55,11 +55,15 @@ def add_noise(
     return (noisy / full_well).astype(np.float32)
 
 
-def encode(linear: FloatArray) -> NDArray[np.uint8]:
-    """sRGB transfer curve (IEC 61966-2-1) and 8 bits; linear in 0..1."""
+def srgb_curve(linear: FloatArray) -> NDArray[np.float64]:
+    """The sRGB transfer curve (IEC 61966-2-1): from linear 0..1 to 0..1, before rounding."""
     linear = np.clip(np.asarray(linear, dtype=float), 0.0, 1.0)
-    curve = np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
-    return np.round(255 * curve).astype(np.uint8)
+    return np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
+
+
+def encode(linear: FloatArray) -> NDArray[np.uint8]:
+    """sRGB transfer curve and 8 bits; linear in 0..1."""
+    return np.round(255 * srgb_curve(linear)).astype(np.uint8)
 
 
 def picture(radiance: FloatArray, exposure: float | str = "auto") -> NDArray[np.uint8]:
