@@ -23,7 +23,7 @@ from optisense.optics.sampling import seed_of
 
 PASS_PHOTONS = 500_000
 PILOT_PHOTONS = 300_000
-CELL_SIZE = 0.25
+CELL_SIZE = 0.3
 """mm; larger where the tally would outgrow its memory."""
 RADIUS = 0.9
 """mm of the smoothing kernel, where lamps are some mm away (see benchmarks)."""

@@ -94,8 +94,12 @@ def render_field(
     emitters: list[Emitter],
     areas: list[float],
     seed: int,
+    only_contacts: bool = False,
 ) -> ImageLayers:
-    """Shade an image from a light field: one sample a pixel, more in and around contacts."""
+    """Shade an image from a light field: one sample a pixel, more in and around contacts.
+
+    ``only_contacts`` leaves all pixels but those that see an indenter dark.
+    """
     began = time.perf_counter()
     field, interrupted = light
     width, height = camera.width, camera.height
@@ -121,16 +125,19 @@ def render_field(
         near = distance <= max(2.0, REFINED * width)
         share = min(1.0, USUAL_WIDTH / width)
         inner, outer = (max(2, round(n * share)) for n in (CONTACT_SAMPLES, RIM_SAMPLES))
-        tiers = (
-            _repeated(distance <= 1.0, inner),
-            _repeated(near & (distance > 1.0), outer),
-        )
-        pixel, number = (dr.concat(pair) for pair in zip(*tiers, strict=True))
+        if only_contacts:
+            pixel, number = _repeated(mask, inner)
+        else:
+            tiers = (
+                _repeated(distance <= 1.0, inner),
+                _repeated(near & (distance > 1.0), outer),
+            )
+            pixel, number = (dr.concat(pair) for pair in zip(*tiers, strict=True))
         dr.eval(pixel, number)
         sample(pixel, number, True)
         samples = [1, outer, inner]
     far = dr.compress(mi.Bool((~near).ravel()))
-    if dr.width(far):
+    if dr.width(far) and not only_contacts:
         sample(far, dr.zeros(mi.UInt32, dr.width(far)), False)
     layers = film.layers(width, height)
     return ImageLayers(

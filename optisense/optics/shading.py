@@ -35,6 +35,8 @@ LEAST_LIGHT = 0.2
 """Part of the mean irradiance below which the spacing of shadow rays does not go."""
 CHOSEN_BINS = 32.0
 """Shadow rays of each light group for a camera sample near a contact."""
+LEAST_STEP = 1e-20
+"""Of that spacing, where there is no light."""
 SHADOW_RAYS = 4
 """Shadow rays of a bin whose light passes near an indenter, for points that are sampled once."""
 
@@ -146,40 +148,44 @@ def _sum_chosen(
     moments, colours = tables
     totals = [mi.Color3f(0) for _ in range(groups)]
     state = mi.UInt32(random)
+    steps = []
+    running = []
     for g in range(groups):
         # About what the bins bring in all: how far apart the shadow rays are in the running sum.
         light, mean, _ = irradiance(table, cell * groups + g, points.normal)
         expected = (light + LEAST_LIGHT * mean) * grey(albedo_of(coating)) * dr.inv_pi
-        step = expected / chosen
+        steps.append(dr.maximum(expected / chosen, LEAST_STEP))
         state = next_random(state)
-        running = unit_float(state)
-        k = mi.UInt32(0)
-        while active & (expected > 0) & (k < bins):
-            entry, value = _entry(
-                cells,
-                moments,
-                centres,
-                bins,
-                groups,
-                fixed,
-                curved,
-                points,
-                cell,
-                shift,
-                raised,
-                active,
-                k,
-                g,
-            )
+        running.append(unit_float(state))
+    k = mi.UInt32(0)
+    while active & (k < bins):
+        there = _place(
+            cells,
+            moments,
+            centres,
+            bins,
+            groups,
+            fixed,
+            curved,
+            points,
+            cell,
+            shift,
+            raised,
+            active,
+            k,
+        )
+        for g in range(groups):
+            entry = (there * bins + k) * groups + g
+            value = dr.gather(mi.Vector4f, moments, entry, active)
             if value.w > 0:
                 towards, cosine = beam(value)
                 reflected = evaluate_coating(
                     widened(coating, cosine), points.normal, towards, points.towards_eye
                 )
-                share = value.w * grey(reflected) / step
-                before = dr.floor(running)
-                running += share
-                times = dr.floor(running) - before
+                share = value.w * grey(reflected) / steps[g]
+                before = dr.floor(running[g])
+                running[g] += share
+                times = dr.floor(running[g]) - before
                 if times > 0:
                     state = next_random(state)
                     blocked = indenters.ray_test(
@@ -194,12 +200,12 @@ def _sum_chosen(
                     else:
                         reflected *= value.w
                     totals[g] += reflected * weight
-            k += 1
+        k += 1
     return totals
 
 
 @dr.syntax
-def _entry(
+def _place(
     cells: SurfaceCells,
     moments: mi.Float,
     centres: mi.Float,
@@ -213,27 +219,27 @@ def _entry(
     raised: mi.Bool,
     active: mi.Bool,
     k: mi.UInt32,
-    g: int,
-) -> tuple[mi.UInt32, mi.Vector4f]:
-    """Place and value of a bin of the field for points.
+) -> mi.UInt32:
+    """The cell where bin ``k`` is looked up for points.
 
-    On an indenter that is where the bin's line through the point goes on to meet the undeformed
-    surface, found on the planes of two cells in turn; on a curved surface, lines that graze these
-    planes are followed by a ray.
+    On an indenter that is where the bin's line through the point (along the mean direction of
+    all groups' light) goes on to meet the undeformed surface, found on the planes of two cells
+    in turn; on a curved surface, lines that graze these planes are followed by a ray.
     """
-    entry = (cell * bins + k) * groups + g
-    value = dr.gather(mi.Vector4f, moments, entry, active)
+    lit = mi.Vector4f(0)
+    for g in range(groups):
+        lit += dr.gather(mi.Vector4f, moments, (cell * bins + k) * groups + g, active & raised)
     middle = dr.gather(mi.Vector4f, centres, k)
-    known = value.w > 0
+    known = lit.w > 0
     towards = dr.normalize(
         mi.Vector3f(
-            dr.select(known, value.x, middle.x),
-            dr.select(known, value.y, middle.y),
-            dr.select(known, value.z, middle.z),
+            dr.select(known, lit.x, middle.x),
+            dr.select(known, lit.y, middle.y),
+            dr.select(known, lit.z, middle.z),
         )
     )
     there = mi.UInt32(cell)
-    exists = mi.Bool(raised)
+    exists = active & raised
     for _ in range(2):
         normal, offset = plane_of(cells, there, exists)
         facing = dr.dot(normal, towards)
@@ -242,16 +248,14 @@ def _entry(
         there, found = cell_at(cells, points.point - towards * way + shift, exists)
         exists &= found
     if dr.hint(curved, mode="scalar"):  # noqa: SIM102 (the one is Python's, the other Dr.Jit's)
-        if raised & ~exists:
+        if active & raised & ~exists:
             below = fixed.ray_intersect_preliminary(
                 mi.Ray3f(points.point, -towards), coherent=False, active=mi.Bool(True)
             )
             reached = below.is_valid()
             landing = points.point - towards * dr.select(reached, below.t, 0)
             there, exists = cell_at(cells, landing + shift, reached)
-    moved = (there * bins + k) * groups + g
-    entry = dr.select(exists, moved, entry)
-    return entry, dr.select(raised, dr.gather(mi.Vector4f, moments, moved, exists), value)
+    return dr.select(exists, there, cell)
 
 
 def beam(value: mi.Vector4f) -> tuple[mi.Vector3f, mi.Float]:

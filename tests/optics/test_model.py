@@ -120,6 +120,17 @@ def test_a_contact_leaves_no_trace_in_the_next_image() -> None:
     assert same(render(used, BALL), render(fresh, BALL))
 
 
+def test_only_contacts_lights_what_the_whole_image_shows_there_and_nothing_else() -> None:
+    whole = model().render([BALL], PIXELS, PHOTONS)
+    only = model().render([BALL], PIXELS, PHOTONS, only_contacts=True)
+    mask = only.contact_mask
+    np.testing.assert_array_equal(mask, whole.contact_mask)
+    assert (only.radiance[~mask] == 0).all()
+    mean = whole.radiance[mask].mean(axis=0)
+    assert np.abs(only.radiance[mask].mean(axis=0) / mean - 1).max() < 0.005
+    assert np.sqrt(((only.radiance - whole.radiance)[mask] ** 2).mean()) < 0.05 * mean.mean()
+
+
 def test_ground_truth_of_a_ball_is_a_sphere() -> None:
     image = render(model(), BALL)
     inside = image.contact_mask
