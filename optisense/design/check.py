@@ -15,6 +15,9 @@ from optisense.design.problems import Problem
 from optisense.design.sensor_design import SensorDesign
 from optisense.errors import DesignError, LibraryError, MeshError
 from optisense.geometry import TriangleMesh
+from optisense.geometry.containment import inside
+
+__all__ = ["check_design", "inside"]
 
 OPAQUE_ROLES = frozenset({Role.BLOCKER, Role.MIRROR, Role.INDENTER})
 
@@ -198,24 +201,4 @@ def _inside_any(points: NDArray[np.float64], solids: list[TriangleMesh]) -> NDAr
     result = np.zeros(len(points), dtype=bool)
     for mesh in solids:
         result |= inside(points, mesh)
-    return result
-
-
-def inside(points: NDArray[np.float64], mesh: TriangleMesh) -> NDArray[np.bool_]:
-    """(n,) bool: which of (n, 3) points (mm) are inside a closed mesh, however its faces wind.
-
-    By the winding number: the mesh's solid angle seen from the point, summed with Van Oosterom
-    and Strackee, "The solid angle of a plane triangle", IEEE Trans. Biomed. Eng. 30 (1983).
-    """
-    result = np.zeros(len(points), dtype=bool)
-    low, high = mesh.bounds
-    for index in np.flatnonzero(((points > low) & (points < high)).all(axis=1)):
-        corners = mesh.triangles - points[index]
-        a, b, c = corners[:, 0], corners[:, 1], corners[:, 2]
-        la, lb, lc = (np.linalg.norm(corner, axis=1) for corner in (a, b, c))
-        determinant = np.einsum("ij,ij->i", a, np.cross(b, c))
-        divisor = la * lb * lc + np.einsum("ij,ij->i", a, b) * lc
-        divisor += np.einsum("ij,ij->i", b, c) * la + np.einsum("ij,ij->i", c, a) * lb
-        solid_angle = 2.0 * np.arctan2(determinant, divisor).sum()
-        result[index] = abs(solid_angle) > 2.0 * np.pi
     return result

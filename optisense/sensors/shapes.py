@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -50,12 +51,17 @@ def revolve(profile: ArrayLike, segments: int) -> TriangleMesh:
         rings.append(np.full(segments, start) if pole else start + np.arange(segments))
         start += len(ring)
     faces = []
-    for low, high in zip(rings[:-1], rings[1:], strict=True):
+    for index, (one, other) in enumerate(pairwise(rings)):
+        # The diagonal of a quad hangs on its corners only, not on the way along the profile.
+        upward = tuple(points[index, ::-1]) <= tuple(points[index + 1, ::-1])
+        low, high = (one, other) if upward else (other, one)
         beside_low, beside_high = np.roll(low, -1), np.roll(high, -1)
+        quads = []
         if low[0] != low[1]:
-            faces.append(np.column_stack([low, beside_low, beside_high]))
+            quads.append(np.column_stack([low, beside_low, beside_high]))
         if high[0] != high[1]:
-            faces.append(np.column_stack([low, beside_high, high]))
+            quads.append(np.column_stack([low, beside_high, high]))
+        faces += quads if upward else [triangles[:, ::-1] for triangles in quads]
     return TriangleMesh(np.concatenate(vertices), np.concatenate(faces)).welded()
 
 

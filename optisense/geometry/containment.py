@@ -1,0 +1,87 @@
+"""Which points are inside a closed mesh."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from optisense.geometry.mesh import FloatArray, TriangleMesh
+
+WAY = np.array([0.3578, 0.2113, 0.9096])
+"""Rays go this way: along no axis, so that they meet few edges of a mesh that has symmetries."""
+
+NEAR_EDGE = 1e-9
+"""A ray that passes an edge of a face this closely, as part of the face's size, is not trusted."""
+
+
+def inside(points: ArrayLike, mesh: TriangleMesh) -> NDArray[np.bool_]:
+    """(n,) bool: which of (n, 3) points (mm) are inside a closed mesh, however its faces wind.
+
+    A ray from the point is odd or even by the faces it leaves and enters through; where it
+    passes too near to an edge, the solid angle of the whole mesh decides.
+    """
+    places = np.asarray(points, dtype=np.float64).reshape(-1, 3)
+    result = np.zeros(len(places), dtype=bool)
+    low, high = mesh.bounds
+    near = np.flatnonzero(((places > low) & (places < high)).all(axis=1))
+    if len(near) == 0:
+        return result
+    frame = _frame()
+    corners = mesh.triangles @ frame.T
+    lowest, highest = corners.min(axis=1), corners.max(axis=1)
+    for index, place in zip(near, places[near] @ frame.T, strict=True):
+        beside = (lowest[:, 0] <= place[0]) & (highest[:, 0] >= place[0])
+        beside &= (lowest[:, 1] <= place[1]) & (highest[:, 1] >= place[1])
+        beside &= highest[:, 2] >= place[2]
+        crossings = _crossings(corners[beside] - place)
+        turns = _turns(mesh, places[index]) if crossings is None else crossings
+        result[index] = turns != 0
+    return result
+
+
+def _frame() -> FloatArray:
+    """(3, 3): rows are two axes square to the rays, and their way."""
+    way = WAY / np.linalg.norm(WAY)
+    across = np.cross(way, (1.0, 0.0, 0.0))
+    across /= np.linalg.norm(across)
+    return np.array([across, np.cross(way, across), way])
+
+
+def _crossings(corners: FloatArray) -> int | None:
+    """How often a ray from the origin along +z leaves more than it enters, or None if unsure."""
+    a, b, c = corners[:, 0], corners[:, 1], corners[:, 2]
+    edges = np.stack([_cross(b, c), _cross(c, a), _cross(a, b)], axis=1)
+    area = edges.sum(axis=1)
+    size = np.ptp(corners[:, :, :2], axis=1).max(axis=1) ** 2
+    with np.errstate(divide="ignore", invalid="ignore"):
+        share = edges / area[:, None]
+    unsure = (np.abs(edges) <= NEAR_EDGE * size[:, None]).any(axis=1)
+    # An edge that the ray's line passes nowhere near is no reason to doubt.
+    unsure &= (edges >= -NEAR_EDGE * size[:, None]).all(axis=1) | (
+        edges <= NEAR_EDGE * size[:, None]
+    ).all(axis=1)
+    if unsure.any():
+        return None
+    hit = (edges > 0.0).all(axis=1) | (edges < 0.0).all(axis=1)
+    height = np.einsum("mi,mi->m", share[hit], corners[hit][:, :, 2])
+    return int(np.sign(area[hit][height > 0.0]).sum())
+
+
+def _cross(one: FloatArray, other: FloatArray) -> FloatArray:
+    return one[:, 0] * other[:, 1] - one[:, 1] * other[:, 0]
+
+
+def _turns(mesh: TriangleMesh, point: FloatArray) -> int:
+    """How often a mesh goes around a point.
+
+    From its solid angle, summed with Van Oosterom and Strackee, "The solid angle of a plane
+    triangle", IEEE Trans. Biomed. Eng. 30 (1983).
+    """
+    corners = mesh.triangles - point
+    a, b, c = corners[:, 0], corners[:, 1], corners[:, 2]
+    la, lb, lc = (np.linalg.norm(corner, axis=1) for corner in (a, b, c))
+    determinant = np.einsum("ij,ij->i", a, np.cross(b, c))
+    divisor = la * lb * lc + np.einsum("ij,ij->i", a, b) * lc
+    divisor += np.einsum("ij,ij->i", b, c) * la + np.einsum("ij,ij->i", c, a) * lb
+    solid_angle = 2.0 * np.arctan2(determinant, divisor).sum()
+    return round(float(solid_angle) / (4.0 * np.pi))
