@@ -1,0 +1,203 @@
+"""What the objectives of one sensor share: images and rays, made once, on first use."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, Any, TypeVar, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from optisense.design import SensorDesign
+from optisense.errors import OptiSenseError
+from optisense.geometry import Contact, SensingSurface, Sphere, locate
+from optisense.objectives.press import Press
+from optisense.objectives.settings import IMAGE_WIDTH, RAY_WIDTH, Settings, size_for
+
+if TYPE_CHECKING:
+    from optisense.optics import ChiefRays, OpticalModel, TactileImage
+
+_T = TypeVar("_T")
+
+Tell = Callable[[float, str], None]
+"""Called with a fraction 0..1 of the rendering that is done, and with what is being done."""
+
+GAP = 0.5
+"""mm that must be free between contacts which share an image."""
+
+
+class Evaluation:
+    """One sensor, ready to be judged by several objectives.
+
+    Attributes:
+        model: the sensor's optical model; must not change while it is judged.
+        settings: which images and rays.
+        seconds: wall time of each shared step so far.
+    """
+
+    def __init__(
+        self, model: OpticalModel, settings: Settings | None = None, tell: Tell | None = None
+    ) -> None:
+        """Judge a model; nothing is rendered yet."""
+        self.model = model
+        self.settings = settings or Settings()
+        self.seconds: dict[str, float] = {}
+        self._tell = tell or (lambda fraction, text: None)
+        self._made: dict[str, Any] = {}
+
+    @property
+    def design(self) -> SensorDesign:
+        """The sensor design."""
+        return self.model.design
+
+    @property
+    def resolution(self) -> tuple[int, int]:
+        """(width, height) of the images."""
+        return self.settings.resolution or size_for(self.design.camera.resolution, IMAGE_WIDTH)
+
+    @property
+    def ray_resolution(self) -> tuple[int, int]:
+        """(width, height) of the chief rays."""
+        return self.settings.ray_resolution or size_for(self.design.camera.resolution, RAY_WIDTH)
+
+    @property
+    def sensing_faces(self) -> int:
+        """Number of triangles of the sensing surface; `ChiefRays.face` counts them."""
+        return len(self.model.sensing.faces)
+
+    @property
+    def chief_rays(self) -> ChiefRays:
+        """One chief ray a pixel of `ray_resolution`, of the untouched sensor."""
+        return self._once("chief rays", lambda: self.model.chief_rays(self.ray_resolution))
+
+    @property
+    def untouched(self) -> TactileImage:
+        """The image of the untouched sensor."""
+        return self._once("untouched image", lambda: self._render((), 0.0))
+
+    @property
+    def exposure(self) -> float:
+        """The factor from radiance to what the camera reads; 1 fills its wells."""
+        from optisense.optics.response import auto_exposure
+
+        if self.settings.exposure == "auto":
+            return auto_exposure(self.untouched.radiance)
+        return float(self.settings.exposure)
+
+    @property
+    def contacts(self) -> list[Contact]:
+        """The ball at each place."""
+        return self._once("contacts", self._contacts)
+
+    @property
+    def presses(self) -> list[Press]:
+        """One press a place, each checked.
+
+        Raises:
+            ObjectiveError: a place is not seen, overexposed or black.
+        """
+        return self._once("presses", self._presses)
+
+    def _once(self, name: str, make: Callable[[], _T]) -> _T:
+        """Make something on first use; an error is kept too, and raised again."""
+        if name not in self._made:
+            began = time.perf_counter()
+            inner = sum(self.seconds.values())
+            try:
+                self._made[name] = make()
+            except OptiSenseError as error:
+                self._made[name] = error
+            spent_inside = sum(self.seconds.values()) - inner
+            self.seconds[name] = round(time.perf_counter() - began - spent_inside, 4)
+        made = self._made[name]
+        if isinstance(made, OptiSenseError):
+            raise made
+        return cast("_T", made)
+
+    def _contacts(self) -> list[Contact]:
+        ball = Sphere(self.settings.radius)
+        if self.settings.places is None:
+            return self.model.nine_contacts(ball, self.settings.depth)
+        return [Contact(ball, at=at, depth=self.settings.depth) for at in self.settings.places]
+
+    def _presses(self) -> list[Press]:
+        contacts, surface = self.contacts, self.model.surface
+        before = self.model.chief_rays(self.resolution).normals
+        frames = [_frame(contact, surface) for contact in contacts]
+        together = self.settings.together and self._are_apart([each["place"] for each in frames])
+        groups = [contacts] if together else [[contact] for contact in contacts]
+        images = [self._render(group, n / len(groups)) for n, group in enumerate(groups)]
+        presses = []
+        for number, frame in enumerate(frames):
+            image = images[0] if together else images[number]
+            mask = image.contact_mask
+            if together:
+                mask = mask & (_nearest(image.points, mask, frames) == number)
+            press = Press(
+                number=number + 1,
+                mask=mask,
+                response=self._response(image),
+                normals=image.normals,
+                points=image.points,
+                before=before,
+                **frame,
+            )
+            press.check()
+            presses.append(press)
+        return presses
+
+    def _response(self, image: TactileImage) -> NDArray[np.float32]:
+        """(h, w, 3): the camera sensor's response, 0 to 1; the untouched one outside contacts."""
+        from optisense.optics.response import saturate
+
+        touched = image.contact_mask[..., None]
+        return saturate(np.where(touched, image.radiance, self.untouched.radiance) * self.exposure)
+
+    def _are_apart(self, places: Sequence[NDArray[np.float64]]) -> bool:
+        radius, depth = self.settings.radius, self.settings.depth
+        width = 2.0 * np.sqrt(depth * (2.0 * radius - depth)) + GAP
+        points = np.array(places)
+        distances = np.linalg.norm(points[:, None] - points, axis=2)
+        return bool((distances + np.eye(len(points)) * 2 * width > width).all())
+
+    def _render(self, contacts: Sequence[Contact], fraction: float) -> TactileImage:
+        what = "the untouched sensor" if not contacts else "presses"
+        self._tell(fraction, what)
+        return self.model.render(
+            contacts,
+            resolution=self.resolution,
+            photons=self.settings.photons,
+            seed=self.settings.seed,
+            only_contacts=bool(contacts),
+        )
+
+
+def _frame(contact: Contact, surface: SensingSurface) -> dict[str, NDArray[np.float64]]:
+    """Where a press sits: place, inward normal, compass directions, the ball's centre."""
+    assert isinstance(contact.indenter, Sphere)
+    spot = locate(contact, surface)
+    east = surface.u_axis - (surface.u_axis @ spot.inward) * spot.inward
+    if np.linalg.norm(east) < 1e-6:  # the surface has turned by 90 degrees since the origin
+        east = np.cross(surface.v_axis, spot.inward)
+    east = east / np.linalg.norm(east)
+    return {
+        "place": spot.point,
+        "inward": spot.inward,
+        "east": east,
+        "north": np.cross(spot.inward, east),
+        "centre": spot.point + (contact.depth - contact.indenter.radius) * spot.inward,
+    }
+
+
+def _nearest(
+    points: NDArray[np.float32],
+    mask: NDArray[np.bool_],
+    frames: Sequence[dict[str, NDArray[np.float64]]],
+) -> NDArray[np.int64]:
+    """(h, w): the press whose centre is nearest to what a pixel of the mask sees, else -1."""
+    centres = np.array([frame["centre"] for frame in frames])
+    owner = np.full(mask.shape, -1, dtype=np.int64)
+    seen = points[mask].astype(np.float64)
+    owner[mask] = np.linalg.norm(seen[:, None] - centres, axis=2).argmin(axis=1)
+    return owner

@@ -1,0 +1,146 @@
+"""Figures of scores. Matplotlib is loaded when one is drawn; nothing is shown or saved here."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from optisense.objectives.score import Score
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+DOT = "#1f6fb2"
+LINE = "#c0392b"
+
+
+def _figure(width: float, height: float) -> Figure:
+    from matplotlib.figure import Figure
+
+    return Figure(figsize=(width, height), layout="constrained")
+
+
+def draw_failure(score: Score) -> Figure:
+    """The reason why there is no score."""
+    figure = _figure(6, 1.2)
+    figure.text(
+        0.5, 0.5, f"{score.name} failed: {score.failure}", ha="center", va="center", wrap=True
+    )
+    return figure
+
+
+def draw_parts(score: Score) -> Figure:
+    """For objectives that draw nothing themselves: a bar for each number among the parts."""
+    numbers = {"value": score.value} | {
+        key: float(value)
+        for key, value in score.parts.items()
+        if isinstance(value, int | float) and not isinstance(value, bool)
+    }
+    figure = _figure(6, 0.8 + 0.4 * len(numbers))
+    axes = figure.subplots()
+    bars = axes.barh(list(numbers), list(numbers.values()), color=DOT)
+    axes.bar_label(bars, fmt="%.4g", padding=3)
+    axes.invert_yaxis()
+    axes.margins(x=0.15)
+    axes.set_title(score.name)
+    return figure
+
+
+def draw_rgb2normal(score: Score) -> Figure:
+    """Dominant colour against angle with the fitted lines, and R² by place and direction."""
+    places = score.parts["places"]
+    values = np.array([place["score"] for place in places])
+    typical = int(np.argsort(values)[len(values) // 2])
+    lines = score.arrays["lines"][typical]
+    columns = min(4, len(lines))
+    rows = -(-len(lines) // columns)
+    figure = _figure(12, 2.9 * rows + 2.6)
+    upper, lower = figure.subfigures(2, 1, squeeze=False, height_ratios=[2.9 * rows, 2.6])[:, 0]
+    grid = upper.subplots(rows, columns, sharex=True, squeeze=False).ravel()
+    for axes, (angle, fit) in zip(grid, lines.items(), strict=False):
+        axes.plot(fit.angles, fit.colours, "o", ms=3, color=DOT)
+        ends = np.array([fit.angles.min(), fit.angles.max()])
+        axes.plot(ends, fit.intercept + fit.slope * ends, color=LINE, lw=1.2)
+        axes.set_title(f"{angle:g}°: R² = {fit.linearity:.3f}", fontsize=10)
+        axes.set_xlabel("signed angle of the normal (°)")
+    grid[0].set_ylabel("dominant colour")
+    upper.suptitle(f"place {typical + 1}, which scores {values[typical]:.3f}", fontsize=11)
+    axes = lower.subplots()
+    table = np.array([list(place["directions"].values()) for place in places])
+    shown = axes.imshow(table.T, cmap="viridis", vmin=0, vmax=1, aspect="auto")
+    axes.set_yticks(range(table.shape[1]), [f"{a}°" for a in places[0]["directions"]])
+    axes.set_xticks(range(len(places)), [f"{i + 1}\n{value:.3f}" for i, value in enumerate(values)])
+    axes.set_xlabel("place and its score")
+    axes.set_ylabel("direction")
+    figure.colorbar(shown, ax=axes, label="R²")
+    return figure
+
+
+def draw_normdiff(score: Score) -> Figure:
+    """Confusion over the sphere of normals, seen from above, and its two parts."""
+    table = {key: np.asarray(value) for key, value in score.parts["confusion_map"].items()}
+    figure = _figure(12, 4.2)
+    titles = {
+        "confusion": "confusion (°)",
+        "theta_range": "range of polar angles (°)",
+        "phi_range": "range of azimuths on the sphere (°)",
+    }
+    grid = figure.subplots(1, 3, subplot_kw={"projection": "polar"})
+    for axes, (key, title) in zip(grid, titles.items(), strict=True):
+        shown = axes.scatter(
+            np.radians(table["phi"]), table["theta"], c=table[key], s=16, cmap="magma_r", vmin=0
+        )
+        axes.set_title(title, fontsize=10)
+        axes.set_ylim(0, float(table["theta"].max()) + 2)
+        axes.tick_params(labelsize=8)
+        figure.colorbar(shown, ax=axes, shrink=0.7)
+    figure.suptitle("by true normal: polar angle outward, azimuth from east", fontsize=10)
+    return figure
+
+
+def draw_aoap(score: Score) -> Figure:
+    """How upright each pixel's ray stands on the surface."""
+    cosine = np.where(score.arrays["hit"], score.arrays["cosine"], np.nan)
+    figure = _figure(9, 4.2)
+    picture, histogram = figure.subplots(1, 2, width_ratios=[2, 1])
+    degrees = np.degrees(np.arccos(np.clip(cosine, -1, 1)))
+    _map(figure, picture, degrees, "angle of incidence (°)", 0.0, 90.0)
+    seen = degrees[np.isfinite(degrees)]
+    histogram.hist(seen, bins=45, range=(0, 90), weights=np.full(len(seen), 100 / degrees.size))
+    histogram.set_xlabel("angle of incidence (°)")
+    histogram.set_ylabel("pixels (%)")
+    histogram.set_title(f"coverage {100 * score.parts['coverage']:.1f} %", fontsize=10)
+    return figure
+
+
+def draw_projection_warping(score: Score) -> Figure:
+    """The area on the surface behind each pixel, relative to the mean."""
+    areas = score.arrays["areas"]
+    known = np.isfinite(areas)
+    count = known.sum(axis=2)
+    total = np.where(known, areas, 0).sum(axis=2)
+    mean = np.divide(total, count, out=np.full(total.shape, np.nan), where=count > 0)
+    relative = mean / score.parts["mean_area"]
+    figure = _figure(9, 4.2)
+    picture, histogram = figure.subplots(1, 2, width_ratios=[2, 1])
+    largest = float(np.nanpercentile(relative, 99))
+    _map(figure, picture, relative, "area over mean", 0.0, max(2.0, largest))
+    histogram.hist(
+        areas[known] / score.parts["mean_area"], bins=50, range=(0, max(2.0, largest)), color=DOT
+    )
+    histogram.set_xlabel("area over mean")
+    histogram.set_ylabel("triangles")
+    return figure
+
+
+def _map(
+    figure: Figure, axes: Axes, values: Any, label: str, lowest: float, highest: float
+) -> None:
+    axes.set_facecolor("#888888")
+    shown = axes.imshow(values, cmap="viridis", vmin=lowest, vmax=highest)
+    axes.set_xticks([])
+    axes.set_yticks([])
+    axes.set_xlabel("grey: the surface is not seen", fontsize=9)
+    figure.colorbar(shown, ax=axes, label=label, shrink=0.8)

@@ -1,0 +1,50 @@
+"""Running a user's Python file for the objectives in it."""
+
+from __future__ import annotations
+
+import hashlib
+import importlib.util
+import sys
+import traceback
+from pathlib import Path
+from typing import Any
+
+from optisense.errors import ObjectiveError
+
+
+def run_file(path: Path) -> dict[str, Any]:
+    """Run a Python file as a module of its own and return the names it defines.
+
+    Raises:
+        ObjectiveError: it is missing or fails; names the line that failed.
+    """
+    if not path.is_file():
+        raise ObjectiveError(f"there is no file '{path}'", hint="Give FILE.py:FUNCTION")
+    whole = path.resolve()
+    name = f"optisense_user_{path.stem}_{hashlib.sha256(str(whole).encode()).hexdigest()[:8]}"
+    spec = importlib.util.spec_from_file_location(name, whole)
+    if spec is None or spec.loader is None:
+        raise ObjectiveError("the file is not a Python file", where=str(path))
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[name] = module
+    try:
+        spec.loader.exec_module(module)
+    except ObjectiveError:
+        raise
+    except SyntaxError as error:
+        raise ObjectiveError(
+            f"the file is not Python: {error.msg}", where=f"{path}:{error.lineno}"
+        ) from error
+    except Exception as error:
+        raise ObjectiveError(
+            f"the file failed: {type(error).__name__}: {error}",
+            where=place_of(error, str(whole)) or str(path),
+        ) from error
+    return vars(module)
+
+
+def place_of(error: BaseException, file: str | None = None) -> str | None:
+    """``file:line`` where an error came from: the last one in `file`, or the last of all."""
+    frames = traceback.extract_tb(error.__traceback__)
+    inside = [frame for frame in frames if file is None or frame.filename == file]
+    return f"{inside[-1].filename}:{inside[-1].lineno}" if inside else file

@@ -1,0 +1,204 @@
+"""NormDiff: how far apart normals may be that noise makes look alike (the OptiSense paper,
+"NormDiff objective function").
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from optisense.errors import ObjectiveError
+from optisense.objectives import figures
+from optisense.objectives.colour_boxes import ranges_in_boxes
+from optisense.objectives.press import FloatArray, azimuths
+from optisense.objectives.registry import objective
+
+if TYPE_CHECKING:
+    from optisense.objectives.evaluation import Evaluation
+
+NOISE = 0.30
+"""Noise of a colour, as a part of its value in each channel (the paper)."""
+
+COLOURS = "response"
+"""The paper's noise is proportional to the sensor's response."""
+
+LEAST_NOISE = 1.0 / 255.0
+"""Noise of dark channels, of a full well: one grey level. Relative noise alone would tell black
+from nearly black; a real GelSight Mini has noise of 1 to 2 levels everywhere."""
+
+THETA_WEIGHT = 1.0
+PHI_WEIGHT = 1.0
+"""The paper adds both ranges with weights that it does not give. Here both are degrees on the
+sphere of normals (see `azimuth_on_sphere`), and count alike."""
+
+LEAST_TILT = 1.0
+"""Degrees that a pixel's normal must have turned by for the pixel to count as indented."""
+
+POLE = 2.0
+"""Degrees: normals less tilted than this have no azimuth worth the name."""
+
+CELL = 3.0
+"""Degrees between neighbouring normals at which the confusion is looked up."""
+
+RING = 10_000
+"""More normals than a ring has, to number them."""
+
+LEAST_PIXELS = 50
+"""Indented pixels of a press."""
+
+
+class Confusion(NamedTuple):
+    """Confusion over the sphere of normals.
+
+    Attributes:
+        theta, phi: (k,) degrees, the normals it was looked up at.
+        confusion: (k,) degrees.
+        theta_range, phi_range: (k,) degrees, its two parts, unweighted.
+        cells: (k,) numbers of the normals, the same for all presses.
+    """
+
+    theta: FloatArray
+    phi: FloatArray
+    confusion: FloatArray
+    theta_range: FloatArray
+    phi_range: FloatArray
+    cells: NDArray[np.int64]
+
+
+@objective("normdiff", title="NormDiff", draw=figures.draw_normdiff)
+def normdiff(
+    evaluation: Evaluation,
+    *,
+    noise: float = NOISE,
+    theta_weight: float = THETA_WEIGHT,
+    phi_weight: float = PHI_WEIGHT,
+    colours: str = COLOURS,
+    least_pixels: int = LEAST_PIXELS,
+) -> tuple[float, dict[str, Any], dict[str, Any]]:
+    """How far apart normals may be that camera noise makes look alike: minus the mean, degrees.
+
+    0 is best. For each normal found on a pressed ball, the range of normals of all pixels whose
+    colour lies within the noise, averaged over normals and places.
+
+    Args:
+        evaluation: the sensor.
+        noise: half the width of the colour range, as a part of the value in each channel.
+        theta_weight, phi_weight: of the two ranges in the sum.
+        colours: what the noise is added to, "response" or "picture" (see `Press.colours`).
+        least_pixels: indented pixels that a press must have.
+    """
+    places: list[dict[str, Any]] = []
+    maps = []
+    for press in evaluation.presses:
+        # Step 1: indented pixels, by the normals before and after.
+        turned = (press.normals * press.before).sum(axis=2) < np.cos(np.radians(LEAST_TILT))
+        indented = press.mask & turned
+        count = int(indented.sum())
+        if count < least_pixels:
+            raise ObjectiveError(
+                f"only {count} pixels of {press.name} are indented, {least_pixels} are needed",
+                hint="use a higher resolution",
+            )
+        theta, phi = azimuths(press, press.normals[indented])
+        found = confusion(
+            press.colours(indented, colours), theta, phi, noise, theta_weight, phi_weight
+        )
+        maps.append(found)
+        places.append(
+            {
+                "place": press.place,
+                "score": -float(found.confusion.mean()),
+                "theta_range": float(found.theta_range.mean()),
+                "phi_range": float(found.phi_range.mean()),
+                "pixels": count,
+                "normals": len(found.cells),
+            }
+        )
+    parts = {
+        "theta_range": float(np.mean([place["theta_range"] for place in places])),
+        "phi_range": float(np.mean([place["phi_range"] for place in places])),
+        "places": places,
+        "confusion_map": _mean_map(maps),
+    }
+    return float(np.mean([place["score"] for place in places])), parts, {}
+
+
+def confusion(
+    colours: ArrayLike,
+    theta: ArrayLike,
+    phi: ArrayLike,
+    noise: float = NOISE,
+    theta_weight: float = THETA_WEIGHT,
+    phi_weight: float = PHI_WEIGHT,
+) -> Confusion:
+    """Steps 2 to 6 of the paper for the indented pixels of one press.
+
+    Args:
+        colours: (n, 3), 0 to 1.
+        theta, phi: (n,) degrees, polar angle and azimuth of the true normal.
+        noise, theta_weight, phi_weight: see `normdiff`.
+    """
+    c = np.asarray(colours, dtype=np.float64)
+    polar, azimuth = np.asarray(theta, dtype=np.float64), np.asarray(phi, dtype=np.float64)
+    # Steps 3 and 4: all pixels within the noise of each pixel's colour, and their normals.
+    width = np.maximum(noise * c, LEAST_NOISE)
+    theta_range, arc = ranges_in_boxes(c, c - width, c + width, polar, azimuth, polar >= POLE)
+    phi_range = azimuth_on_sphere(arc, polar)
+    total = theta_weight * theta_range + phi_weight * phi_range
+    # Steps 2, 5 and 6: each normal of a grid takes the mean over the pixels nearest to it.
+    cells, cell_theta, cell_phi = normal_cells(polar, azimuth)
+    found, first, member = np.unique(cells, return_index=True, return_inverse=True)
+    number = np.bincount(member)
+
+    def mean(values: FloatArray) -> FloatArray:
+        averaged: FloatArray = np.bincount(member, values) / number
+        return averaged
+
+    return Confusion(
+        cell_theta[first], cell_phi[first], mean(total), mean(theta_range), mean(phi_range), found
+    )
+
+
+def azimuth_on_sphere(arc: ArrayLike, theta: ArrayLike) -> FloatArray:
+    """Degrees between two normals of polar angle `theta` whose azimuths differ by `arc`.
+
+    A range of azimuths means little where the normal hardly tilts. So it counts as the angle that
+    it makes between normals: sin(theta) * arc for small arcs, never more than 2 theta.
+    """
+    half = np.radians(np.minimum(np.asarray(arc, dtype=np.float64), 180.0)) / 2
+    sine = np.sin(np.radians(np.asarray(theta, dtype=np.float64))) * np.sin(half)
+    angle: FloatArray = 2.0 * np.degrees(np.arcsin(np.clip(sine, 0.0, 1.0)))
+    return angle
+
+
+def normal_cells(
+    theta: ArrayLike, phi: ArrayLike, size: float = CELL
+) -> tuple[NDArray[np.int64], FloatArray, FloatArray]:
+    """The nearest of normals spread evenly over the sphere, on rings `size` degrees apart.
+
+    Returns:
+        (n,) number, and polar angle and azimuth (degrees) of the normal.
+    """
+    polar, azimuth = np.asarray(theta, dtype=np.float64), np.asarray(phi, dtype=np.float64)
+    ring = np.round(polar / size).astype(np.int64)
+    around = 360.0 * np.sin(np.radians(ring * size)) / size
+    sectors = np.maximum(1, np.round(around)).astype(np.int64)
+    sector = np.round(azimuth / 360.0 * sectors).astype(np.int64) % sectors
+    return ring * RING + sector, ring.astype(np.float64) * size, sector * 360.0 / sectors
+
+
+def _mean_map(maps: list[Confusion]) -> dict[str, FloatArray]:
+    """The confusion at each normal, averaged over the presses that have it."""
+    cells = np.concatenate([each.cells for each in maps])
+    _, first, member = np.unique(cells, return_index=True, return_inverse=True)
+    number = np.bincount(member)
+    columns = {
+        "theta": np.concatenate([each.theta for each in maps])[first],
+        "phi": np.concatenate([each.phi for each in maps])[first],
+    }
+    for name in ("confusion", "theta_range", "phi_range"):
+        values = np.concatenate([getattr(each, name) for each in maps])
+        columns[name] = np.round(np.bincount(member, values) / number, 3)
+    return columns

@@ -1,0 +1,119 @@
+"""One press of a ball: what is true about each pixel that sees it, and what a robot reads there."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from optisense.errors import ObjectiveError
+
+FloatArray = NDArray[np.float64]
+
+MOST_CLIPPED = 0.25
+"""A press with a larger part of its pixels overexposed can't be judged."""
+
+CLIPPED = 254.5 / 255
+"""A channel from here on is stored as 255."""
+
+DARK = 1.5 / 255
+"""A pixel whose brightest channel is no brighter is black."""
+
+
+@dataclass(frozen=True)
+class Press:
+    """A ball pressed in at one place. Images are (h, w, ...), row 0 on top.
+
+    Attributes:
+        number: of the place, from 1.
+        place: (3,) mm, on the undeformed sensing surface.
+        inward: (3,) unit normal of the undeformed surface there, into the gel.
+        east, north: (3,) unit vectors in the tangent plane; image right and image up in the
+            middle of a flat sensor.
+        centre: (3,) mm, the ball's centre.
+        mask: (h, w), true where this ball is seen in its contact.
+        response: (h, w, 3) the camera sensor's linear response, 0 to 1 (a full well).
+        normals: (h, w, 3) unit, of the surface seen.
+        points: (h, w, 3) mm, what is seen.
+        before: (h, w, 3) unit normals of the untouched surface.
+    """
+
+    number: int
+    place: FloatArray
+    inward: FloatArray
+    east: FloatArray
+    north: FloatArray
+    centre: FloatArray
+    mask: NDArray[np.bool_]
+    response: NDArray[np.float32]
+    normals: NDArray[np.float32]
+    points: NDArray[np.float32]
+    before: NDArray[np.float32]
+
+    def direction(self, angle: float) -> FloatArray:
+        """(3,) unit: `angle` degrees from east towards north."""
+        a = np.radians(angle)
+        along: FloatArray = np.cos(a) * self.east + np.sin(a) * self.north
+        return along
+
+    @cached_property
+    def box(self) -> tuple[slice, slice]:
+        """Rows and columns around the contact."""
+        rows, columns = (np.flatnonzero(self.mask.any(axis=axis)) for axis in (1, 0))
+        return slice(rows[0], rows[-1] + 1), slice(columns[0], columns[-1] + 1)
+
+    def colours(self, where: NDArray[np.bool_], kind: str = "picture") -> FloatArray:
+        """(n, 3), 0 to 1: the colours of the pixels of a mask (h, w).
+
+        Args:
+            where: the mask.
+            kind: "picture": sRGB-encoded, as a robot reads it from the camera, before rounding to
+                8 bits; or "response": linear.
+
+        Raises:
+            ObjectiveError: another kind.
+        """
+        from optisense.optics.response import srgb_curve
+
+        chosen = self.response[where].astype(np.float64)
+        if kind == "picture":
+            return srgb_curve(chosen)
+        if kind == "response":
+            return chosen
+        raise ObjectiveError(f"there are no colours '{kind}'", hint="use picture or response")
+
+    @property
+    def name(self) -> str:
+        """How messages call it."""
+        x, y, z = self.place
+        return f"place {self.number} at ({x:.2f}, {y:.2f}, {z:.2f}) mm"
+
+    def check(self) -> None:
+        """Make sure that the press can be judged.
+
+        Raises:
+            ObjectiveError: the camera does not see it, or it is overexposed or black.
+        """
+        if not self.mask.any():
+            raise ObjectiveError(f"the camera does not see {self.name}")
+        brightest = self.colours(self.mask).max(axis=1)
+        clipped = float((brightest >= CLIPPED).mean())
+        if clipped > MOST_CLIPPED:
+            raise ObjectiveError(
+                f"{100 * clipped:.0f} % of {self.name} is overexposed", hint="lower the exposure"
+            )
+        if float(np.median(brightest)) < DARK:
+            raise ObjectiveError(
+                f"{self.name} is black", hint="check the lights, or raise the exposure"
+            )
+
+
+def azimuths(press: Press, normals: NDArray[np.floating]) -> tuple[FloatArray, FloatArray]:
+    """(n,), (n,) degrees: polar angle from the undisturbed normal and azimuth from east, in
+    0..180 and -180..180.
+    """
+    n = np.asarray(normals, dtype=np.float64)
+    x, y, z = n @ press.east, n @ press.north, n @ press.inward
+    return np.degrees(np.arctan2(np.hypot(x, y), z)), np.degrees(np.arctan2(y, x))

@@ -1,0 +1,123 @@
+"""2to3PW: how evenly the pixels share the sensing surface (the OptiSense paper, "2D-to-3D
+projection warping objective function").
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from optisense.errors import ObjectiveError
+from optisense.objectives import figures
+from optisense.objectives.registry import objective
+
+if TYPE_CHECKING:
+    from optisense.objectives.evaluation import Evaluation
+
+JUMP = 4.0
+"""An edge this many times as long as those before and after it in its row or column leaps over a
+fold or a gap. On a smooth surface neighbouring edges differ by at most a factor of 2.4, which they
+reach where the surface is seen edge-on."""
+
+MOST_EVEN = 1e-6
+"""Deviations below this part of the mean are rounding of single-precision points."""
+
+
+class TriangleAreas(NamedTuple):
+    """(h-1, w-1, 2) mm² of each pixel quad's two triangles, NaN where one is left out; and how
+    many were left out, because a corner sees no surface or because an edge leaps.
+    """
+
+    areas: NDArray[np.float32]
+    missed: int
+    leaping: int
+
+
+@objective("2to3pw", title="2to3PW", draw=figures.draw_projection_warping)
+def projection_warping(
+    evaluation: Evaluation, *, jump: float = JUMP
+) -> tuple[float, dict[str, Any], dict[str, Any]]:
+    """How evenly the pixels share the sensing surface: mean area over standard deviation.
+
+    Each quad of neighbouring pixels is two triangles on the surface.
+
+    Args:
+        evaluation: the sensor.
+        jump: an edge so many times as long as its neighbours leaps over a fold or a gap, and its
+            triangles are left out.
+    """
+    rays = evaluation.chief_rays
+    found = triangle_areas(rays.points, rays.hit, jump)
+    areas = found.areas[np.isfinite(found.areas)].astype(np.float64)
+    if len(areas) < 2:
+        raise ObjectiveError(
+            "the camera sees too little of the sensing surface: no two triangles of pixels",
+            hint="check the camera's position, direction and field of view",
+        )
+    mean = float(areas.mean())
+    deviation = float(areas.std())
+    parts = {
+        "mean_area": mean,
+        "standard_deviation": deviation,
+        "triangles": len(areas),
+        "triangles_that_miss_the_surface": found.missed,
+        "triangles_that_leap": found.leaping,
+        "pixels_that_see_the_surface": float(rays.hit.mean()),
+    }
+    return mean / max(deviation, MOST_EVEN * mean), parts, {"areas": found.areas}
+
+
+def triangle_areas(
+    points: NDArray[np.float32], hit: NDArray[np.bool_], jump: float = JUMP
+) -> TriangleAreas:
+    """The areas of pixel triangles on the surface, by half the cross product of two edges.
+
+    Args:
+        points: (h, w, 3) mm, what each pixel sees.
+        hit: (h, w), whether it sees the surface.
+        jump: see `JUMP`.
+    """
+    x, y, z = (np.ascontiguousarray(points[..., axis]) for axis in range(3))
+    right = [c[:, 1:] - c[:, :-1] for c in (x, y, z)]
+    down = [c[1:] - c[:-1] for c in (x, y, z)]
+    upper = _half_cross([c[:-1] for c in right], [c[:, :-1] for c in down])
+    lower = _half_cross([c[1:] for c in right], [c[:, 1:] for c in down])
+    areas = np.stack([upper, lower], axis=-1)
+
+    corner = hit[:-1, :-1], hit[:-1, 1:], hit[1:, :-1], hit[1:, 1:]
+    whole = np.stack(
+        [corner[0] & corner[1] & corner[2], corner[1] & corner[2] & corner[3]], axis=-1
+    )
+    leap_right = _leaps(right, hit[:, 1:] & hit[:, :-1], 1, jump)
+    leap_down = _leaps(down, hit[1:] & hit[:-1], 0, jump)
+    leaps = whole & np.stack(
+        [leap_right[:-1] | leap_down[:, :-1], leap_right[1:] | leap_down[:, 1:]], axis=-1
+    )
+    areas[~whole | leaps] = np.nan
+    return TriangleAreas(areas, int((~whole).sum()), int(leaps.sum()))
+
+
+def _half_cross(a: list[NDArray[np.float32]], b: list[NDArray[np.float32]]) -> NDArray[np.float32]:
+    cross = (
+        a[1] * b[2] - a[2] * b[1],
+        a[2] * b[0] - a[0] * b[2],
+        a[0] * b[1] - a[1] * b[0],
+    )
+    half: NDArray[np.float32] = 0.5 * np.sqrt(cross[0] ** 2 + cross[1] ** 2 + cross[2] ** 2)
+    return half
+
+
+def _leaps(
+    edges: list[NDArray[np.float32]], there: NDArray[np.bool_], axis: int, jump: float
+) -> NDArray[np.bool_]:
+    """Edges much longer than both their neighbours along an axis (those that exist)."""
+    square = edges[0] ** 2 + edges[1] ** 2 + edges[2] ** 2
+    square[~there] = np.nan
+    lines = np.moveaxis(square, axis, 0)
+    longest = np.full_like(lines, np.nan)
+    longest[1:] = lines[:-1]
+    longest[:-1] = np.fmax(longest[:-1], lines[1:])
+    leaps: NDArray[np.bool_] = np.moveaxis(lines > jump**2 * longest, 0, axis)
+    return leaps

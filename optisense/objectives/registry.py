@@ -1,0 +1,233 @@
+"""The one registry of objectives: those of the package, of other packages, and a user's own."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from importlib import import_module
+from importlib.metadata import entry_points
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeVar
+
+from optisense.design.near import suggestion
+from optisense.errors import ObjectiveError
+from optisense.objectives.score import Drawing
+
+if TYPE_CHECKING:
+    from optisense.objectives.evaluation import Evaluation
+
+    Function = Callable[..., Any]
+
+ENTRY_POINTS = "optisense.objectives"
+"""Installed packages add objectives under this group: name = "module:function"."""
+
+BUILT_IN = ("rgb2normal", "normdiff", "aoap", "2to3pw")
+
+_F = TypeVar("_F", bound="Callable[..., Any]")
+
+
+@dataclass(frozen=True)
+class Objective:
+    """A way to score a sensor.
+
+    Attributes:
+        name: on the command line and in files; lower case.
+        function: takes an `Evaluation` and its own settings as keyword arguments; returns a
+            number, or a number and its parts, or a `Score`.
+        title: how people write the name.
+        draw: makes the figure of a score, or None.
+    """
+
+    name: str
+    function: Callable[..., Any]
+    title: str
+    draw: Drawing | None = None
+
+    def __call__(self, evaluation: Evaluation, **settings: Any) -> Any:
+        """Call the function itself, without any checks of what it returns."""
+        return self.function(evaluation, **settings)
+
+    @property
+    def settings(self) -> dict[str, Any]:
+        """The objective's own settings and their defaults: its keyword arguments."""
+        parameters = list(inspect.signature(self.function).parameters.values())
+        return {
+            parameter.name: parameter.default
+            for parameter in parameters[1:]
+            if parameter.default is not parameter.empty
+        }
+
+    @property
+    def summary(self) -> str:
+        """The first sentence of the function's description."""
+        text = inspect.getdoc(self.function) or ""
+        return " ".join(text.split("\n\n")[0].split()).rstrip(".")
+
+
+_registry: dict[str, Objective] = {}
+
+
+def objective(
+    name: str, *, title: str | None = None, draw: Drawing | None = None
+) -> Callable[[_F], _F]:
+    """Register a function as an objective; higher values must be better.
+
+    Args:
+        name: lower case; may not be taken.
+        title: how people write the name; the name itself if left out.
+        draw: makes a figure of the score; a plain one if left out.
+
+    Raises:
+        ObjectiveError: the name is taken or malformed, or the function takes no evaluation.
+    """
+
+    def register(function: _F) -> _F:
+        _register(Objective(name, function, title or name, draw))
+        return function
+
+    return register
+
+
+def find(name: str) -> Objective:
+    """An objective by its name, or by ``file.py:function``.
+
+    Raises:
+        ObjectiveError: there is none (the near match is named), or it can't be loaded.
+    """
+    file, separator, function = name.rpartition(":")
+    if separator and file.endswith(".py"):
+        return from_file(Path(file), function)
+    if name.endswith(".py"):
+        return from_file(Path(name))
+    _load_built_in()
+    key = name.strip().lower()
+    if key in _registry:
+        return _registry[key]
+    offered = {point.name: point for point in entry_points(group=ENTRY_POINTS)}
+    if key in offered:
+        return _from_entry_point(key, offered[key])
+    known = [*_registry, *offered]
+    raise ObjectiveError(f"there is no objective '{name}'", hint=suggestion(key, known))
+
+
+def names() -> list[str]:
+    """All objectives that can be named: built-in ones first, then others."""
+    _load_built_in()
+    offered = [point.name for point in entry_points(group=ENTRY_POINTS)]
+    return [*BUILT_IN, *sorted({*_registry, *offered} - set(BUILT_IN))]
+
+
+def from_file(path: Path, function: str | None = None) -> Objective:
+    """Load a user's objective from a Python file, which is run.
+
+    Args:
+        path: the file.
+        function: its name in the file; may be left out where the file registers one objective.
+
+    Raises:
+        ObjectiveError: the file is missing, fails, or has no such function.
+    """
+    from optisense.objectives.files import run_file
+
+    before = dict(_registry)
+    content = run_file(path)
+    added = [each for key, each in _registry.items() if before.get(key) is not each]
+    if function is None:
+        if len(added) != 1:
+            found = ", ".join(each.function.__name__ for each in added) or "none"
+            raise ObjectiveError(
+                f"the file registers {len(added)} objectives ({found})",
+                where=str(path),
+                hint="Decorate one function with @optisense.objective(name), or name it: "
+                f"{path.name}:FUNCTION",
+            )
+        return added[0]
+    chosen = content.get(function)
+    for each in added:
+        if each.function is chosen:
+            return each
+    if not callable(chosen):
+        known = [name for name, each in content.items() if inspect.isfunction(each)]
+        raise ObjectiveError(
+            f"the file has no function '{function}'",
+            where=str(path),
+            hint=suggestion(function, known),
+        )
+    return _register(Objective(function.lower(), chosen, function))
+
+
+def _from_entry_point(name: str, point: Any) -> Objective:
+    try:
+        loaded = point.load()
+    except Exception as error:
+        raise ObjectiveError(
+            f"the objective '{name}' can't be loaded: {type(error).__name__}: {error}",
+            where=f"{point.value}, of {point.dist.name if point.dist else 'an installed package'}",
+            hint="Repair or remove the package that brings it",
+        ) from error
+    if name in _registry:  # its module was decorated, and importing it registered it
+        return _registry[name]
+    if not callable(loaded):
+        raise ObjectiveError(f"the objective '{name}' is not a function", where=point.value)
+    return _register(Objective(name, loaded, name))
+
+
+def _register(new: Objective) -> Objective:
+    if new.name != new.name.strip().lower() or not new.name or ":" in new.name:
+        raise ObjectiveError(
+            f"'{new.name}' can't be the name of an objective",
+            hint="Use lower case, without colons or spaces around it",
+        )
+    try:
+        parameters = list(inspect.signature(new.function).parameters.values())
+    except (TypeError, ValueError):
+        parameters = []
+    required = [each for each in parameters[1:] if each.default is each.empty]
+    if not parameters or any(
+        each.kind not in (each.VAR_KEYWORD, each.VAR_POSITIONAL) for each in required
+    ):
+        raise ObjectiveError(
+            f"the objective '{new.name}' must take an evaluation, and settings with defaults",
+            where=_home(new.function),
+            hint="Write: def score(evaluation): ...",
+        )
+    old = _registry.get(new.name)
+    # The same function again is a cell or file that was run once more, and replaces itself.
+    if (old is not None and _home(old.function) != _home(new.function)) or (
+        old is None and new.name in BUILT_IN and not new.function.__module__.startswith(__package__)
+    ):
+        raise ObjectiveError(
+            f"there is already an objective '{new.name}'",
+            where=_home(new.function),
+            hint="Give it another name",
+        )
+    _registry[new.name] = new
+    return new
+
+
+def _home(function: Callable[..., Any]) -> str:
+    code = getattr(function, "__code__", None)
+    file = f"{code.co_filename}: " if code is not None else ""
+    return f"{file}{getattr(function, '__qualname__', repr(function))}"
+
+
+def _load_built_in() -> None:
+    for module in ("rgb2normal", "normdiff", "aoap", "projection_warping"):
+        import_module(f"optisense.objectives.{module}")
+
+
+def resolve(wanted: str | Objective | Iterable[str | Objective]) -> list[Objective]:
+    """Objectives by name, keeping those that are objectives already.
+
+    Raises:
+        ObjectiveError: one is unknown, or named twice.
+    """
+    several = [wanted] if isinstance(wanted, str | Objective) else list(wanted)
+    found = [each if isinstance(each, Objective) else find(each) for each in several]
+    seen: set[str] = set()
+    for each in found:
+        if each.name in seen:
+            raise ObjectiveError(f"the objective '{each.name}' is named twice")
+        seen.add(each.name)
+    return found

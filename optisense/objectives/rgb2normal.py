@@ -1,0 +1,190 @@
+"""RGB2Normal: how linearly the colour follows the surface normal, on balls pressed in at nine
+places (the OptiSense paper, "RGB2Normal mapping objective function").
+"""
+
+from __future__ import annotations
+
+import warnings
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from optisense.errors import ObjectiveError
+from optisense.objectives import figures
+from optisense.objectives.press import FloatArray, Press
+from optisense.objectives.registry import objective
+
+if TYPE_CHECKING:
+    from optisense.objectives.evaluation import Evaluation
+
+DIRECTIONS = 8
+"""Cardinal and ordinal (the paper)."""
+
+COLOURS = "picture"
+"""What a robot reads."""
+
+LEAST_PIXELS = 8
+"""On a line; a straight fit through fewer says little."""
+
+
+@dataclass(frozen=True)
+class Fit:
+    """A straight line through (angle, dominant colour) points.
+
+    Attributes:
+        angles: (m,) degrees, signed.
+        colours: (m,) the dominant colour.
+        slope, intercept: of colour over angle; the slope is 0 or positive.
+        linearity: R^2.
+    """
+
+    angles: FloatArray
+    colours: FloatArray
+    slope: float
+    intercept: float
+    linearity: float
+
+
+@objective("rgb2normal", title="RGB2Normal", draw=figures.draw_rgb2normal)
+def rgb2normal(
+    evaluation: Evaluation,
+    *,
+    directions: int = DIRECTIONS,
+    half_lines: bool = False,
+    colours: str = COLOURS,
+    least_pixels: int = LEAST_PIXELS,
+) -> tuple[float, dict[str, Any], dict[str, Any]]:
+    """How linearly the colour follows the surface normal on pressed balls: the mean R².
+
+    1 is a perfect line, 0 none. Mean over compass directions of the R² of dominant colour against
+    signed angle along a line through the ball's centre, and over places.
+
+    Args:
+        evaluation: the sensor.
+        directions: how many compass directions. Two opposite ones share a diameter.
+        half_lines: fit each direction's radius, from the centre outward, by itself.
+        colours: what is read, "picture" or "response" (see `Press.colours`).
+        least_pixels: that a line must have.
+    """
+    if directions < 1 or (directions % 2 and not half_lines):
+        raise ObjectiveError(
+            f"{directions} directions have no opposite ones", hint="use an even number"
+        )
+    angles = np.arange(directions) * 360.0 / directions
+    places: list[dict[str, Any]] = []
+    lines = []
+    for press in evaluation.presses:
+        fits = {}
+        for angle in angles if half_lines else angles[: directions // 2]:
+            chosen = line(press, float(angle), half_lines)
+            count = int(chosen.sum())
+            if count < least_pixels:
+                raise ObjectiveError(
+                    f"only {count} pixels of {press.name} lie on the line at {angle:g} degrees, "
+                    f"{least_pixels} are needed",
+                    hint="use a higher resolution",
+                )
+            fits[float(angle)] = fit(
+                signed_angles(press, float(angle), press.normals[chosen]),
+                press.colours(chosen, colours),
+            )
+        scores = {f"{angle:g}": fits[_line_of(angle, fits)].linearity for angle in angles}
+        places.append(
+            {
+                "place": press.place,
+                "score": float(np.mean(list(scores.values()))),
+                "pixels": int(press.mask.sum()),
+                "directions": scores,
+            }
+        )
+        lines.append(fits)
+    value = float(np.mean([place["score"] for place in places]))
+    by_direction = {
+        f"{angle:g}": float(np.mean([place["directions"][f"{angle:g}"] for place in places]))
+        for angle in angles
+    }
+    worst = float(min(min(place["directions"].values()) for place in places))
+    parts = {"worst_line": worst, "directions": by_direction, "places": places}
+    return value, parts, {"lines": lines}
+
+
+def line(press: Press, angle: float, half: bool = False) -> NDArray[np.bool_]:
+    """(h, w): the pixels of a contact that lie on a line through the ball's centre.
+
+    The line is where the plane through the centre, spanned by the direction and the undisturbed
+    normal, cuts the surface. A pixel belongs to it if the true point that it sees is within half a
+    pixel's footprint of that plane, so the line is one pixel wide in any camera, on any surface.
+
+    Args:
+        press: the press.
+        angle: degrees from east towards north.
+        half: only the radius in that direction, not the diameter.
+    """
+    box = press.box
+    along = press.direction(angle)
+    across = np.cross(press.inward, along)
+    offset = press.points[box].astype(np.float64) - press.centre
+    inside = press.mask[box]
+    distance = np.where(inside, offset @ across, np.nan)
+    footprint = np.fmax(_step(distance, 0), _step(distance, 1))
+    near = inside & (np.abs(np.nan_to_num(distance, nan=np.inf)) <= footprint / 2)
+    if half:
+        near &= offset @ along >= 0.0
+    chosen = np.zeros_like(press.mask)
+    chosen[box] = near
+    return chosen
+
+
+def signed_angles(press: Press, angle: float, normals: ArrayLike) -> FloatArray:
+    """(m,) degrees of tilt towards the direction at `angle`, from the undisturbed normal.
+
+    Signed, so that a line through the ball has normals from one side to the other: along a whole
+    diameter even a perfect sensor's colour does not follow the unsigned angle.
+    """
+    n = np.asarray(normals, dtype=np.float64)
+    tilt: FloatArray = np.degrees(np.arctan2(n @ press.direction(angle), n @ press.inward))
+    return tilt
+
+
+def fit(angles: ArrayLike, colours: ArrayLike) -> Fit:
+    """Fit the first principal component of colours (m, 3) to angles (m,) in degrees."""
+    from scipy.stats import linregress
+
+    x, y = np.asarray(angles, dtype=np.float64), dominant_colour(colours)
+    if np.ptp(x) == 0.0 or np.ptp(y) == 0.0:  # nothing follows anything
+        return Fit(x, y, 0.0, float(y.mean()), 0.0)
+    found = linregress(x, y)
+    if found.slope < 0:
+        y = -y
+    return Fit(
+        x, y, abs(float(found.slope)), float(y.mean() - abs(found.slope) * x.mean()),
+        float(found.rvalue**2),
+    )  # fmt: skip
+
+
+def dominant_colour(colours: ArrayLike) -> FloatArray:
+    """(m,): colours (m, 3) along their first principal component (PCA), about their mean."""
+    c = np.asarray(colours, dtype=np.float64)
+    centred = c - c.mean(axis=0)
+    return centred @ np.linalg.svd(centred, full_matrices=False)[2][0]
+
+
+def _line_of(angle: float, fits: dict[float, Fit]) -> float:
+    """The line on which a direction lies: its own radius, or the diameter it is one end of."""
+    return float(angle) if float(angle) in fits else float(angle) - 180.0
+
+
+def _step(values: FloatArray, axis: int) -> FloatArray:
+    """How much values change from pixel to pixel along an axis: the mean of both neighbours."""
+    change = np.abs(np.diff(values, axis=axis))
+    pad = [(0, 0), (0, 0)]
+    pad[axis] = (1, 1)
+    around = np.pad(change, pad, constant_values=np.nan)
+    length = values.shape[axis]
+    pair = np.stack([around.take(range(length), axis), around.take(range(1, length + 1), axis)])
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", RuntimeWarning)  # pixels without neighbours
+        step: FloatArray = np.nanmean(pair, axis=0)
+    return step

@@ -1,0 +1,177 @@
+"""Scoring a sensor by objectives: what goes wrong with one is told, and the rest goes on."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Iterable, Mapping
+from dataclasses import fields, replace
+from typing import TYPE_CHECKING, Any, overload
+
+import numpy as np
+
+from optisense.design import SensorDesign
+from optisense.design.near import suggestion
+from optisense.errors import ObjectiveError, OptiSenseError, SetupError
+from optisense.objectives.evaluation import Evaluation, Tell
+from optisense.objectives.files import place_of
+from optisense.objectives.registry import Objective, resolve
+from optisense.objectives.score import Score, json_ready
+from optisense.objectives.settings import Settings
+
+if TYPE_CHECKING:
+    from optisense.optics import OpticalModel
+
+RETURNS = "a number, a number and a dict of its parts, or a Score"
+
+
+@overload
+def evaluate(
+    sensor: OpticalModel | SensorDesign | Evaluation,
+    objectives: str | Objective,
+    *,
+    tell: Tell | None = None,
+    **settings: Any,
+) -> Score: ...
+
+
+@overload
+def evaluate(
+    sensor: OpticalModel | SensorDesign | Evaluation,
+    objectives: Iterable[str | Objective],
+    *,
+    tell: Tell | None = None,
+    **settings: Any,
+) -> dict[str, Score]: ...
+
+
+def evaluate(
+    sensor: OpticalModel | SensorDesign | Evaluation,
+    objectives: str | Objective | Iterable[str | Objective],
+    *,
+    tell: Tell | None = None,
+    **settings: Any,
+) -> Score | dict[str, Score]:
+    """Score a sensor.
+
+    Several objectives share images and rays. An objective that fails gives a score with its
+    `failure` set; the others are not touched by it.
+
+    Args:
+        sensor: a model, a design, or what an earlier call shared.
+        objectives: a name or several; a user's own as "file.py:function".
+        tell: called while images are rendered.
+        settings: fields of `Settings`, and keyword arguments of the objectives.
+
+    Returns:
+        The score, or scores by name if several objectives were asked for.
+
+    Raises:
+        ObjectiveError: an objective or a setting is unknown or makes no sense.
+        SetupError: the renderer can't run on this machine.
+        OptiSenseError: the design can't be built.
+    """
+    wanted = resolve(objectives)
+    shared, own = split_settings(settings, wanted)
+    if isinstance(sensor, Evaluation):
+        if shared:
+            raise ObjectiveError(
+                "images and rays of an evaluation are settled: " + ", ".join(shared),
+                hint="Make a new evaluation with these settings",
+            )
+        evaluation = sensor
+    else:
+        evaluation = Evaluation(_model(sensor), replace(Settings(), **shared), tell)
+    scores = {each.name: run_objective(each, evaluation, own[each.name]) for each in wanted}
+    if isinstance(objectives, str | Objective):
+        return scores[wanted[0].name]
+    return scores
+
+
+def run_objective(
+    objective: Objective, evaluation: Evaluation, settings: Mapping[str, Any] | None = None
+) -> Score:
+    """Score a sensor by one objective; any failure of it becomes the score's `failure`.
+
+    Raises:
+        SetupError: the renderer can't run on this machine.
+    """
+    began = time.perf_counter()
+
+    def failed(reason: str) -> Score:
+        seconds = time.perf_counter() - began
+        return Score(objective.name, math.nan, reason, {}, seconds, objective.title)
+
+    try:
+        result = objective(evaluation, **(settings or {}))
+        value, parts, arrays, draw = _read(result)
+        parts = json_ready(parts)
+    except SetupError:
+        raise
+    except OptiSenseError as error:
+        return failed(str(error))
+    except Exception as error:
+        return failed(f"{type(error).__name__}: {error} ({place_of(error)})")
+    if not math.isfinite(value):
+        return failed(f"the objective returned {value}, which is no score")
+    return Score(
+        objective=objective.name,
+        value=value,
+        parts=parts,
+        seconds=time.perf_counter() - began,
+        title=objective.title,
+        arrays=arrays,
+        draw=draw or objective.draw,
+    )
+
+
+def split_settings(
+    settings: Mapping[str, Any], objectives: Iterable[Objective]
+) -> tuple[dict[str, Any], dict[str, dict[str, Any]]]:
+    """Settings of images and rays, and those of each objective, by objective.
+
+    Raises:
+        ObjectiveError: nobody knows a setting; names the near match.
+    """
+    known = {field.name for field in fields(Settings)}
+    wanted = list(objectives)
+    shared = {key: value for key, value in settings.items() if key in known}
+    own = {
+        each.name: {key: value for key, value in settings.items() if key in each.settings}
+        for each in wanted
+    }
+    taken = known.union(*(each.settings for each in wanted))
+    for key in settings:
+        if key not in taken:
+            hint = suggestion(key, taken, limit=30)
+            raise ObjectiveError(f"there is no setting '{key}'", hint=hint)
+    return shared, own
+
+
+def _model(sensor: OpticalModel | SensorDesign) -> OpticalModel:
+    if isinstance(sensor, SensorDesign):
+        from optisense.optics import OpticalModel
+
+        return OpticalModel(sensor)
+    return sensor
+
+
+def _read(result: Any) -> tuple[float, Mapping[str, Any], Mapping[str, Any], Any]:
+    """Value, parts, figure data and drawing of what an objective returned."""
+    if isinstance(result, Score):
+        if result.failure is not None:
+            raise ObjectiveError(result.failure)
+        return _number(result.value), result.parts, result.arrays, result.draw
+    if isinstance(result, tuple) and len(result) in (2, 3):
+        value, *rest = result
+        if all(isinstance(each, Mapping) for each in rest):
+            return _number(value), rest[0], rest[1] if len(rest) == 2 else {}, None
+    return _number(result), {}, {}, None
+
+
+def _number(value: Any) -> float:
+    if isinstance(value, int | float | np.integer | np.floating) and not isinstance(value, bool):
+        return float(value)
+    raise ObjectiveError(
+        f"the objective returned a {type(value).__name__}", hint=f"return {RETURNS}"
+    )

@@ -1,0 +1,105 @@
+"""A score: how good a sensor is by one objective, what it is made of, and how to look at it."""
+
+from __future__ import annotations
+
+import html
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+Drawing = Callable[["Score"], "Figure"]
+"""Makes the figure of a score."""
+
+
+@dataclass(frozen=True)
+class Score:
+    """The result of one objective; higher is better.
+
+    Attributes:
+        objective: name in the registry.
+        value: the score; NaN if it failed.
+        failure: why there is no value, as a sentence without its full stop, or None.
+        parts: what the value is made of, ready for JSON (see each objective).
+        seconds: wall time, work shared with other objectives included where this one came first.
+        title: how people write the objective's name.
+        arrays: what the figure is drawn from; not part of `to_dict`.
+        draw: makes the figure.
+    """
+
+    objective: str
+    value: float
+    failure: str | None = None
+    parts: Mapping[str, Any] = field(default_factory=dict)
+    seconds: float = 0.0
+    title: str = ""
+    arrays: Mapping[str, Any] = field(default_factory=dict, repr=False, compare=False)
+    draw: Drawing | None = field(default=None, repr=False, compare=False)
+
+    @property
+    def name(self) -> str:
+        """The title, or the registry's name where there is none."""
+        return self.title or self.objective
+
+    def figure(self) -> Figure:
+        """A drawing of the parts; a plain one for objectives that bring none of their own."""
+        from optisense.objectives.figures import draw_failure, draw_parts
+
+        if self.failure is not None:
+            return draw_failure(self)
+        return (self.draw or draw_parts)(self)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Everything but figure data, ready for JSON (no NaN: a missing number is None)."""
+        return {
+            "objective": self.objective,
+            "title": self.name,
+            "value": json_ready(self.value),
+            "failure": self.failure,
+            "seconds": round(self.seconds, 4),
+            "parts": json_ready(self.parts),
+        }
+
+    def _repr_html_(self) -> str:
+        """A table for notebooks: the value and all single numbers among the parts."""
+        shown = self.failure if self.failure is not None else f"<b>{self.value:.4g}</b>"
+        rows = [(self.name, shown if self.failure is None else html.escape(str(shown)))]
+        for key, value in self.parts.items():
+            if isinstance(value, bool | int | float | str):
+                rows.append((html.escape(key.replace("_", " ")), html.escape(_number(value))))
+        body = "".join(f"<tr><th>{key}</th><td>{value}</td></tr>" for key, value in rows)
+        return f"<table>{body}</table>"
+
+
+def json_ready(value: Any) -> Any:
+    """Plain dicts, lists, strings and finite numbers; numpy's are converted, NaN becomes None.
+
+    Raises:
+        TypeError: something that JSON can't hold.
+    """
+    if value is None or isinstance(value, bool | str):
+        return value
+    if isinstance(value, np.generic):
+        value = value.item()
+    if isinstance(value, int) and not isinstance(value, bool):
+        return value
+    if isinstance(value, bool | str):
+        return value
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    if isinstance(value, Mapping):
+        return {str(key): json_ready(inner) for key, inner in value.items()}
+    if isinstance(value, np.ndarray):
+        return json_ready(value.tolist())
+    if isinstance(value, list | tuple):
+        return [json_ready(inner) for inner in value]
+    raise TypeError(f"{type(value).__name__} can't be written as JSON")
+
+
+def _number(value: float | str) -> str:
+    return f"{value:.4g}" if isinstance(value, float) else str(value)

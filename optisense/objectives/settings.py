@@ -1,0 +1,74 @@
+"""What all objectives share: which images and rays a sensor is judged by."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+from optisense.errors import ObjectiveError
+
+BALL_RADIUS = 1.5
+"""mm, of the ball that presses (the OptiSense paper, "RGB2Normal")."""
+
+PRESS_DEPTH = 0.3
+"""mm. The paper gives none. A ball of 1.5 mm is then touched up to 37 degrees; published presses
+of balls on real GelSight Minis reach 25 to 40."""
+
+PLACES = 9
+"""Contacts that cover the visible sensing surface evenly (the paper)."""
+
+IMAGE_WIDTH = 320
+"""Pixels across the images, as GelSight's own software has; the height follows the camera's."""
+
+RAY_WIDTH = 640
+"""Pixels across the chief rays."""
+
+
+@dataclass(frozen=True)
+class Settings:
+    """Images and rays that objectives share. Lengths in mm.
+
+    Attributes:
+        resolution: (width, height) of the images; 320 wide, in the camera's shape, if None.
+        ray_resolution: (width, height) of the chief rays; 640 wide if None.
+        photons: to trace for the light; the model's default if None.
+        seed: of the photons and camera samples.
+        radius: of the ball that presses.
+        depth: to which it presses.
+        places: (u, v) on the sensing surface; nine that cover it evenly if None.
+        together: press at all places in one image, where contacts do not overlap.
+        exposure: factor on the radiance; "auto" exposes the untouched sensor well and keeps that.
+    """
+
+    resolution: tuple[int, int] | None = None
+    ray_resolution: tuple[int, int] | None = None
+    photons: int | None = None
+    seed: int = 0
+    radius: float = BALL_RADIUS
+    depth: float = PRESS_DEPTH
+    places: tuple[tuple[float, float], ...] | None = None
+    together: bool = False
+    exposure: float | Literal["auto"] = "auto"
+
+    def __post_init__(self) -> None:
+        if self.exposure != "auto" and not (
+            isinstance(self.exposure, int | float) and 0.0 < self.exposure < float("inf")
+        ):
+            raise ObjectiveError(
+                f"the exposure is {self.exposure!r}", hint='give "auto" or a factor above 0'
+            )
+        if not 0.0 < self.depth < self.radius:
+            raise ObjectiveError(
+                f"a ball of radius {self.radius:g} mm can't be judged {self.depth:g} mm deep",
+                hint="press deeper than 0 and less deep than the radius",
+            )
+        if self.places is not None:
+            if not self.places or any(len(place) != 2 for place in self.places):
+                raise ObjectiveError("places are (u, v) pairs in mm, one or more")
+            object.__setattr__(self, "places", tuple((float(u), float(v)) for u, v in self.places))
+
+
+def size_for(camera: tuple[int, int], width: int) -> tuple[int, int]:
+    """(width, height) in a camera's shape, no larger than the camera's own pixels."""
+    across = min(width, camera[0])
+    return across, max(1, round(across * camera[1] / camera[0]))
