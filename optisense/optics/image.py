@@ -4,17 +4,17 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Callable
-from dataclasses import dataclass, field
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 import mitsuba as mi
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-from optisense.errors import OutputError
+from optisense.errors import OutputError, RenderError
 from optisense.optics.response import auto_exposure, picture
 
 
@@ -27,7 +27,8 @@ class TactileImage:
     normals: unit, of the coating as it is seen, in the design's frame, towards the camera's
         side; NaN where the camera sees none. contact_mask: where an indenter is seen. depth: mm
         that the coating is pushed in along the inward normal, 0 outside contacts. settings:
-        what was asked and what was reached, ready for JSON.
+        what was asked and what was reached, ready for JSON. unit_layers: each group's layer for
+        lights of 1 mW in every channel, from which others follow (see ``relit``).
     """
 
     layers: dict[str, NDArray[np.float32]]
@@ -36,6 +37,29 @@ class TactileImage:
     points: NDArray[np.float32]
     settings: dict[str, Any] = field(default_factory=dict)
     interrupted: bool = False
+    unit_layers: dict[str, NDArray[np.float32]] = field(default_factory=dict)
+
+    def relit(self, flux: Mapping[str, ArrayLike]) -> TactileImage:
+        """The same image under lights of other colours and powers; exact, with no new rendering.
+
+        Args:
+            flux: (3,) mW of R, G, B of each light, by light group; a group that is not named
+                keeps its light. ``LightGroup.channel_flux()`` gives a design's own.
+
+        Raises:
+            RenderError: there is no such light group.
+        """
+        for name in flux:
+            if name not in self.unit_layers:
+                raise RenderError(
+                    f"the image has no light group '{name}'",
+                    hint="It has: " + ", ".join(self.unit_layers),
+                )
+        changed = {
+            name: self.unit_layers[name] * np.asarray(values, dtype=np.float32)
+            for name, values in flux.items()
+        }
+        return replace(self, layers=self.layers | changed, settings=dict(self.settings))
 
     @property
     def radiance(self) -> NDArray[np.float32]:

@@ -349,8 +349,13 @@ class OpticalModel:
             layers.light_seconds = lit - built
         ended = time.perf_counter()
         tell(1.0, layers.photons, layers.noise)
+        units = dict(zip(self.groups, layers.radiance, strict=True))
         image = TactileImage(
-            layers=self._coloured_layers(layers),
+            layers={
+                name: layer * self.design.lights[name].channel_flux().astype(np.float32)
+                for name, layer in units.items()
+            },
+            unit_layers=units,
             normals=layers.normals,
             contact_mask=layers.contact_mask,
             points=layers.points,
@@ -410,13 +415,6 @@ class OpticalModel:
             stop=stop,
         )
         return ImageLayers.from_sppm(result, rays, began)
-
-    def _coloured_layers(self, layers: ImageLayers) -> dict[str, Any]:
-        out = {}
-        for number, name in enumerate(self.groups):
-            flux = self.design.lights[name].channel_flux().astype(np.float32)
-            out[name] = layers.radiance[number] * flux
-        return out
 
 
 def _ball(mesh: TriangleMesh) -> np.ndarray:

@@ -9,6 +9,7 @@ import pytest
 
 from optisense import Contact, OpticalModel, SensorDesign, Sphere
 from optisense.design import set_value
+from optisense.errors import RenderError
 from optisense.optics import TactileImage
 from optisense.sensors import BUILDERS
 
@@ -99,6 +100,17 @@ def test_a_flux_scales_its_layer_and_no_other() -> None:
         TactileImage({k: after.layers[k] for k in ("green", "blue")}, *[np.zeros(1)] * 3),
         TactileImage({k: before.layers[k] for k in ("green", "blue")}, *[np.zeros(1)] * 3),
     )
+
+
+def test_an_image_relit_is_the_image_of_the_design_with_those_lights() -> None:
+    plain = model().render([BALL], PIXELS, PHOTONS)
+    other = set_value(set_value(design(), "lights.red.flux", 25.0), "lights.blue.colour.g", 0.4)
+    expected = OpticalModel(other, "llvm").render([BALL], PIXELS, PHOTONS)
+    relit = plain.relit({name: other.lights[name].channel_flux() for name in ("red", "blue")})
+    for name in expected.layers:
+        assert relit.layers[name] == pytest.approx(expected.layers[name], rel=1e-4, abs=1e-7)
+    with pytest.raises(RenderError, match="no light group 'rde'"):
+        plain.relit({"rde": (1, 1, 1)})
 
 
 def test_an_updated_coating_renders_as_a_new_model_of_the_changed_design() -> None:
