@@ -5,12 +5,15 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated, Literal
 
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
 from pydantic import Field, PrivateAttr, model_validator
 
 from optisense.design.fields import Model, Number, Positive, RelativePath
 from optisense.design.ies import IesProfile, read_ies
 from optisense.errors import LibraryError
 
+FloatArray = NDArray[np.float64]
 HalfAngle = Annotated[Number, Field(gt=0.0, le=90.0)]
 
 
@@ -29,6 +32,11 @@ class AreaEmitter(Model):
         if self.shape == "disc" and self.size[0] != self.size[1]:
             raise ValueError("a disc has its diameter twice in size")
         return self
+
+    def relative_intensity(self, polar: ArrayLike, azimuth: ArrayLike = 0.0) -> FloatArray:
+        """Radiant intensity over its peak: the cosine (Lambert's law); see `LightModel`."""
+        cosine = np.cos(np.radians(np.asarray(polar, dtype=np.float64)))
+        return np.maximum(cosine, 0.0) + 0.0 * np.asarray(azimuth)
 
 
 class IesEmitter(Model):
@@ -66,6 +74,23 @@ class IesEmitter(Model):
         """
         return read_ies(self.path())
 
+    def relative_intensity(self, polar: ArrayLike, azimuth: ArrayLike = 0.0) -> FloatArray:
+        """Radiant intensity over its peak, linear between the file's angles; see `LightModel`.
+
+        Raises:
+            LibraryError: the file is missing or malformed.
+        """
+        table = self.intensity_table()
+        polar, turn = np.broadcast_arrays(np.asarray(polar, np.float64), np.mod(azimuth, 360.0))
+        planes = np.array(
+            [np.interp(polar, table.vertical_angles, row, 0.0, 0.0) for row in table.candela]
+        )
+        place = np.interp(turn, table.horizontal_angles, np.arange(len(planes)))
+        low = np.minimum(place.astype(int), len(planes) - 2)[None]
+        below = np.take_along_axis(planes, low, axis=0)[0]
+        above = np.take_along_axis(planes, low + 1, axis=0)[0]
+        return np.asarray((below + (place - low[0]) * (above - below)) / table.candela.max())
+
 
 class SpotEmitter(Model):
     """A point whose light is even up to `beam` and falls to nothing at `cutoff`."""
@@ -80,6 +105,20 @@ class SpotEmitter(Model):
             raise ValueError("beam can't be wider than cutoff")
         return self
 
+    def relative_intensity(self, polar: ArrayLike, azimuth: ArrayLike = 0.0) -> FloatArray:
+        """Radiant intensity over its peak: a smooth step, 3 t^2 - 2 t^3 with t running from 0 at
+        the cut-off to 1 at the beam; see `LightModel`."""
+        angle = np.asarray(polar, dtype=np.float64)
+        if self.cutoff > self.beam:
+            t = np.clip((self.cutoff - angle) / (self.cutoff - self.beam), 0.0, 1.0)
+        else:
+            t = (angle <= self.cutoff).astype(np.float64)
+        return t * t * (3.0 - 2.0 * t) + 0.0 * np.asarray(azimuth)
+
 
 LightModel = Annotated[AreaEmitter | IesEmitter | SpotEmitter, Field(discriminator="kind")]
-"""Any kind of lamp; `kind` tells which."""
+"""Any kind of lamp; `kind` tells which.
+
+Each has `relative_intensity(polar, azimuth)`: its radiant intensity over the largest one, for
+angles in degrees (polar from the light's direction, 0 to 180; azimuth about it), of any shape.
+"""

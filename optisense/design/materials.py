@@ -16,12 +16,22 @@ from optisense.design.fields import (
     PositiveRGB,
 )
 
+Index = Annotated[Number, Field(ge=1.0, le=4.0)]
+"""A refractive index."""
+
 
 class Dielectric(Model):
-    """A transparent medium such as silicone or acrylic."""
+    """A transparent medium such as silicone or acrylic.
+
+    Light of all colours is refracted by `ior`. `dispersion` is kept as data about the material;
+    nothing is computed from it yet.
+    """
 
     kind: Literal["dielectric"] = "dielectric"
-    ior: Annotated[Number, Field(ge=1.0, le=4.0)] = Field(description="refractive index")
+    ior: Index = Field(description="refractive index, at 589 nm where it depends on wavelength")
+    dispersion: tuple[Index, Index, Index] | None = Field(
+        default=None, description="index at R, G, B; not used by the simulation yet"
+    )
     roughness: Fraction = Field(default=0.0, description="GGX alpha of its surface, 0 is smooth")
 
 

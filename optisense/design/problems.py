@@ -55,7 +55,12 @@ def raise_problems(problems: list[Problem], source: str) -> None:
 
 
 def design_error(
-    error: ValidationError, data: Any, *, where: str, lines: Lines | None = None
+    error: ValidationError,
+    data: Any,
+    *,
+    where: str,
+    lines: Lines | None = None,
+    model: type[BaseModel] = SensorDesign,
 ) -> DesignError:
     """The DesignError for what pydantic found.
 
@@ -63,8 +68,9 @@ def design_error(
         data: what was validated.
         where: the file, or the dotted path that was being set.
         lines: the line of each path in the file, when there is one.
+        model: what the data were meant to be.
     """
-    problems = _problems(error, data, where, lines or {})
+    problems = _problems(error, data, where, lines or {}, model)
     try:
         raise_problems(problems, where)
     except DesignError as found:
@@ -72,14 +78,16 @@ def design_error(
     raise AssertionError("pydantic reported no problem")  # it always reports one
 
 
-def _problems(error: ValidationError, data: Any, where: str, lines: Lines) -> list[Problem]:
+def _problems(
+    error: ValidationError, data: Any, where: str, lines: Lines, model: type[BaseModel]
+) -> list[Problem]:
     reports = error.errors(include_url=False)
     found: list[Problem] = []
     explained: set[Path] = set()  # missing fields that a misspelt one stands for
     for report in reports:
         if report["type"] == "extra_forbidden":
             path = _path_in(data, report["loc"])
-            fields = _fields_at(report["loc"][:-1])
+            fields = _fields_at(model, report["loc"][:-1])
             match = near_match(str(path[-1]), fields)
             if match is not None:
                 explained.add((*path[:-1], match))
@@ -155,9 +163,9 @@ def _place(path: Path, where: str, lines: Lines) -> str:
     return where
 
 
-def _fields_at(location: tuple[str | int, ...]) -> list[str]:
-    """The fields of the model at a location of the design."""
-    kind: Any = SensorDesign
+def _fields_at(model: type[BaseModel], location: tuple[str | int, ...]) -> list[str]:
+    """The fields of the model at a location inside `model`."""
+    kind: Any = model
     for step in location:
         kind = _step_into(kind, step)
     kind = _bare(kind)

@@ -4,21 +4,29 @@ from __future__ import annotations
 
 from typing import Annotated, Generic, Literal, TypeVar
 
-from pydantic import Field
+import numpy as np
+from pydantic import Field, model_validator
 
+from optisense.design.camera import Pixels
 from optisense.design.emitters import LightModel
-from optisense.design.fields import Colour, Count, Model, Number, Positive
+from optisense.design.fields import Colour, MisfitError, Model, Name, Number, Positive
 from optisense.design.materials import Coating, Material
+from optisense.design.near import suggestion
 from optisense.design.sensor_design import Status
 
-Value = TypeVar("Value")
+Value = TypeVar("Value", bound=Model)
+
+Text = Annotated[str, Field(min_length=1, max_length=2000)]
+
+NOT_NUMBERS = frozenset({"kind", "shape", "library", "colour", "part", "maker"})
+"""Fields that need no source: words, and the names of colours."""
 
 
 class Source(Model):
     """Where one number, or several, come from."""
 
     status: Status
-    source: Annotated[str, Field(min_length=1)]
+    source: Text
     date: Annotated[str, Field(pattern=r"^\d{4}(-\d{2}(-\d{2})?)?$")] | None = None
     """When the source was published, or else read (year, year-month or full)."""
 
@@ -28,39 +36,99 @@ class Entry(Model, Generic[Value]):
 
     Attributes:
         description: what it is, in a line.
+        maker: who makes or sells it.
         value: the material, coating, light or camera.
-        sources: for each field of `value` (and of `typical`), where it comes from.
+        sources: for each field with a number, where it comes from.
     """
 
-    description: Annotated[str, Field(min_length=1)]
+    description: Text
+    maker: Text | None = None
     value: Value
     sources: Annotated[dict[str, Source], Field(min_length=1)]
 
+    def numbers(self) -> list[str]:
+        """The fields that need a source."""
+        given = self.value.model_dump(exclude_none=True)
+        return [field for field in given if field not in NOT_NUMBERS]
+
+    def source_names(self) -> list[str]:
+        """What `sources` may speak of."""
+        return [*type(self.value).model_fields, "maker"]
+
+    def source(self, field: str) -> Source | None:
+        """Where a number of `numbers` comes from, or None when it is not told."""
+        return self.sources.get(field)
+
+    def unsourced(self) -> list[str]:
+        """The numbers whose source is not told."""
+        return [field for field in self.numbers() if self.source(field) is None]
+
+    @model_validator(mode="after")
+    def _sources_speak_of_fields(self) -> Entry[Value]:
+        known = self.source_names()
+        for name in self.sources:
+            if name not in known:
+                raise MisfitError(
+                    f"there is a source for '{name}', which this entry does not have",
+                    ("sources", name),
+                    suggestion(name, known),
+                )
+        return self
+
 
 class TypicalLight(Model):
-    """What one colour of a light usually gives.
+    """What one colour of a light gives at its nominal current.
 
     Attributes:
         colour: R, G, B for a design's light group.
+        part: order number at the maker.
         wavelength: nm, dominant.
-        flux: mW, radiant, at its usual current.
+        current: mA, nominal.
+        flux: mW, radiant, at this current.
     """
 
     colour: Colour
+    part: Text | None = None
     wavelength: Positive | None = None
+    current: Positive | None = None
     flux: Positive | None = None
 
 
 class LightEntry(Entry[LightModel]):
     """A light with its package and its colours.
 
+    A source for `flux` speaks of all colours, one for `flux.red` of one of them.
+
     Attributes:
         package: mm, width, length and height of its body.
+        window: mm, width and height of the opening of a light that is simulated as a point.
         typical: its colours, by name.
     """
 
     package: tuple[Positive, Positive, Positive] | None = None
-    typical: dict[str, TypicalLight] = Field(default_factory=dict)
+    window: tuple[Positive, Positive] | None = None
+    typical: dict[Name, TypicalLight] = Field(default_factory=dict)
+
+    def numbers(self) -> list[str]:
+        """The fields that need a source; those of a colour as `flux.red`."""
+        own = [name for name in ("package", "window") if getattr(self, name) is not None]
+        colours = [
+            f"{field}.{colour}"
+            for colour, light in self.typical.items()
+            for field in light.model_dump(exclude_none=True)
+            if field not in NOT_NUMBERS
+        ]
+        return [*super().numbers(), *own, *colours]
+
+    def source_names(self) -> list[str]:
+        """What `sources` may speak of."""
+        fields = [field for field in TypicalLight.model_fields if field != "colour"]
+        each = [f"{field}.{colour}" for colour in self.typical for field in fields]
+        return [*super().source_names(), "package", "window", *fields, *each]
+
+    def source(self, field: str) -> Source | None:
+        """Where a number of `numbers` comes from, or None when it is not told."""
+        return self.sources.get(field) or self.sources.get(field.split(".")[0])
 
 
 class CameraModel(Model):
@@ -76,11 +144,32 @@ class CameraModel(Model):
 
     projection: Literal["perspective", "equidistant"] = "perspective"
     fov: Annotated[Number, Field(gt=0.0, le=360.0)]
-    resolution: tuple[Count, Count]
+    resolution: tuple[Pixels, Pixels]
     pixel_size: Positive | None = None
     focal_length: Positive | None = None
+
+    @model_validator(mode="after")
+    def _makes_sense(self) -> CameraModel:
+        if self.projection == "perspective" and self.fov >= 180.0:
+            raise MisfitError(
+                "a perspective camera sees less than 180 degrees", ("fov",), "Use equidistant"
+            )
+        return self
+
+    def angles(self) -> tuple[float, float, float]:
+        """Degrees seen across the image's width, its height and its diagonal."""
+        width, height = self.resolution
+        across = np.array([width, height, np.hypot(width, height)]) / width
+        if self.projection == "equidistant":
+            wide, high, diagonal = self.fov * across
+        else:
+            half = np.tan(np.radians(self.fov / 2.0)) * across
+            wide, high, diagonal = 2.0 * np.degrees(np.arctan(half))
+        return float(wide), float(high), float(diagonal)
 
 
 MaterialEntry = Entry[Material]
 CoatingEntry = Entry[Coating]
 CameraEntry = Entry[CameraModel]
+
+AnyEntry = MaterialEntry | CoatingEntry | LightEntry | CameraEntry

@@ -1,4 +1,4 @@
-"""Finding and reading the entries of the library."""
+"""Finding the entries of the library: the built-in ones, and the user's own."""
 
 from __future__ import annotations
 
@@ -6,53 +6,60 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from pydantic import TypeAdapter, ValidationError
-
-from optisense.design.emitters import IesEmitter, LightModel
+from optisense.design.emitters import LightModel
 from optisense.design.lights import LightGroup
 from optisense.design.materials import Coating, Material
 from optisense.design.near import suggestion
 from optisense.design.yaml_reader import read_yaml
 from optisense.errors import LibraryError
-from optisense.library.entries import (
-    CameraEntry,
-    CameraModel,
-    CoatingEntry,
-    Entry,
-    LightEntry,
-    MaterialEntry,
-)
+from optisense.library.entries import AnyEntry, CameraModel
+from optisense.library.own_parts import own_files
+from optisense.library.reading import KINDS, Kind, inside, make_entry, read_entry
 
 FOLDER = Path(__file__).parent
-KINDS: dict[str, Any] = {
-    "material": MaterialEntry,
-    "coating": CoatingEntry,
-    "light": LightEntry,
-    "camera": CameraEntry,
-}
 
 
 def names(kind: str) -> list[str]:
     """The names of all entries of a kind: material, coating, light or camera (or its plural).
 
+    The user's own are among them; nothing is read but the names of their files.
+
     Raises:
         LibraryError: there is no such kind.
     """
-    return sorted(_entries(_kind(kind)))
+    singular = kind_named(kind)
+    return sorted({*_built_in(singular), *own_files(singular)})
 
 
-def entry(kind: str, name: str) -> Entry[Any]:
+def is_own(kind: str, name: str) -> bool:
+    """Whether an entry is one of the user's own parts.
+
+    Raises:
+        LibraryError: there is no such kind.
+    """
+    return name in own_files(kind_named(kind))
+
+
+def entry(kind: str, name: str) -> AnyEntry:
     """An entry with its description and the sources of its numbers.
 
     Raises:
-        LibraryError: there is no such kind or entry; names the near match.
+        LibraryError: there is no such kind or entry (names the near match), the user's own file
+            of it can't be read, or it has the name of a built-in one.
     """
-    kind = _kind(kind)
-    entries = _entries(kind)
+    singular = kind_named(kind)
+    entries, own = _built_in(singular), own_files(singular)
+    if name in own:
+        if name in entries:
+            raise LibraryError(
+                f"{singular} '{name}' is built in, and also one of your own parts",
+                where=str(own[name]),
+                hint="Give your file another name",
+            )
+        return read_entry(singular, own[name])
     if name not in entries:
-        raise LibraryError(
-            f"the library has no {kind} '{name}'", hint=suggestion(name, entries, limit=20)
-        )
+        hint = suggestion(name, names(singular), limit=25)
+        raise LibraryError(f"the library has no {singular} '{name}'", hint=hint)
     return entries[name].model_copy(deep=True)
 
 
@@ -62,7 +69,7 @@ def material(name: str) -> Material:
     Raises:
         LibraryError: there is none; names the near match.
     """
-    value: Material = entry("material", name).value
+    value: Any = entry("material", name).value
     return value
 
 
@@ -72,7 +79,7 @@ def coating(name: str) -> Coating:
     Raises:
         LibraryError: there is none; names the near match.
     """
-    value: Coating = entry("coating", name).value
+    value: Any = entry("coating", name).value
     value.library = name
     return value
 
@@ -83,7 +90,7 @@ def light(name: str) -> LightModel:
     Raises:
         LibraryError: there is none; names the near match.
     """
-    value: LightModel = entry("light", name).value
+    value: Any = entry("light", name).value
     return value
 
 
@@ -93,7 +100,7 @@ def camera(name: str) -> CameraModel:
     Raises:
         LibraryError: there is none; names the near match.
     """
-    value: CameraModel = entry("camera", name).value
+    value: Any = entry("camera", name).value
     return value
 
 
@@ -106,36 +113,27 @@ def emitter(group: LightGroup) -> LightModel:
     return group.emitter if group.emitter is not None else light(group.model)
 
 
-def _kind(kind: str) -> str:
-    singular = "camera" if kind == "cameras" else kind.removesuffix("s")
-    if singular not in KINDS:
-        raise LibraryError(f"the library has no kind '{kind}'", hint=suggestion(kind, KINDS))
-    return singular
+def kind_named(text: str) -> Kind:
+    """The kind that a word names, singular or plural.
+
+    Raises:
+        LibraryError: there is no such kind; names the near match.
+    """
+    for kind in KINDS:
+        if text in (kind, f"{kind}s"):
+            return kind
+    raise LibraryError(f"the library has no kind '{text}'", hint=suggestion(text, KINDS))
 
 
 @cache
-def _entries(kind: str) -> dict[str, Entry[Any]]:
-    """All entries of a kind by name; lights have a file each, other kinds share one."""
-    adapter: TypeAdapter[Any] = TypeAdapter(KINDS[kind])
-    found: dict[str, Entry[Any]] = {}
-    for name, data, where in _raw(kind):
-        try:
-            found[name] = adapter.validate_python(data)
-        except ValidationError as error:
-            first = error.errors()[0]
-            field = ".".join(str(step) for step in first["loc"])
-            raise LibraryError(f"{kind} '{name}', {field}: {first['msg']}", where=where) from None
-        value = found[name].value
-        if isinstance(value, IesEmitter):
-            value._folder = FOLDER / "lights"
-    return found
-
-
-def _raw(kind: str) -> list[tuple[str, Any, str]]:
-    """(name, data, file and line) of each entry of a kind."""
+def _built_in(kind: Kind) -> dict[str, AnyEntry]:
+    """All built-in entries of a kind by name; lights have a file each, other kinds share one."""
     if kind == "light":
         files = sorted((FOLDER / "lights").glob("*.yaml"))
-        return [(file.stem, read_yaml(file, LibraryError)[0], str(file)) for file in files]
+        return {file.stem: read_entry(kind, file) for file in files}
     file = FOLDER / f"{kind}s.yaml"
     data, lines = read_yaml(file, LibraryError)
-    return [(name, value, f"{file}:{lines[(name,)]}") for name, value in data.items()]
+    return {
+        name: make_entry(kind, name, value, inside(lines, name), str(file))
+        for name, value in data.items()
+    }

@@ -42,7 +42,10 @@ def full_data() -> dict[str, object]:
             "specularity": 0.25,
         },
         "materials": {
-            "gel": {"kind": "dielectric", "ior": 1.41, "roughness": 0.125},
+            "gel": {
+                "kind": "dielectric", "ior": 1.41, "dispersion": [1.40, 1.41, 1.43],
+                "roughness": 0.125,
+            },
             "silver": {"kind": "conductor", "eta": [0.1] * 3, "k": [3] * 3, "roughness": 0.01},
             "white": {"kind": "diffuse", "reflectance": [0.8, 0.7, 0.6]},
             "black": {"kind": "absorber"},

@@ -1,0 +1,82 @@
+"""The user's own parts: a folder with a file for each entry, read together with the built-in ones.
+
+`materials/NAME.yaml`, `coatings/`, `lights/` (with their .ies files) and `cameras/` lie in the
+folder that the environment variable OPTISENSE_LIBRARY names, or else in `optisense/library` of
+the user's configuration folder ($XDG_CONFIG_HOME, or ~/.config).
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+from pathlib import Path
+from uuid import uuid4
+
+from optisense.design.yaml_writer import to_yaml
+from optisense.errors import OutputError
+from optisense.library.entries import AnyEntry
+from optisense.library.reading import Kind
+
+HEADS: dict[Kind, str] = {
+    "material": "Optical material. Indices at 630, 528 and 465 nm for R, G, B.",
+    "coating": "Coating. eta and k are those of the metal flake at 630, 528, 465 nm.",
+    "light": "Light. Lengths in mm, angles in degrees, flux in mW, current in mA.",
+    "camera": "Camera. fov in degrees across the width, pixel_size in micrometres, focal_length "
+    "in mm.",
+}
+
+
+def own_folder() -> Path:
+    """Where the user's own parts are kept; the folder need not exist."""
+    named = os.environ.get("OPTISENSE_LIBRARY")
+    if named:
+        return Path(named).expanduser()
+    config = os.environ.get("XDG_CONFIG_HOME")
+    base = Path(config) if config else Path.home() / ".config"
+    return base / "optisense" / "library"
+
+
+def own_files(kind: Kind) -> dict[str, Path]:
+    """The user's own entries of a kind: their files, by name."""
+    folder = own_folder() / f"{kind}s"
+    files = sorted(folder.glob("*.yaml")) if folder.is_dir() else []
+    return {file.stem: file for file in files if not file.name.startswith(".")}
+
+
+def write_own(kind: Kind, name: str, entry: AnyEntry, ies: bytes | None = None) -> Path:
+    """Write an entry into the user's folder, whole or not at all.
+
+    Args:
+        ies: the bytes of the IES file of a light; it is written beside the entry first, under
+            the name that the entry gives it.
+
+    Returns:
+        The file of the entry.
+
+    Raises:
+        OutputError: the folder can't be written.
+    """
+    file = own_folder() / f"{kind}s" / f"{name}.yaml"
+    try:
+        file.parent.mkdir(parents=True, exist_ok=True)
+        if ies is not None:
+            _write_whole(file.with_suffix(".ies"), ies)
+        _write_whole(file, to_yaml(entry, HEADS[kind]).encode())
+    except OSError as error:
+        raise OutputError(
+            f"can't write into your library: {error.strerror or error}",
+            where=str(error.filename or file.parent),
+            hint="Name a folder that you may write to in the environment variable "
+            "OPTISENSE_LIBRARY",
+        ) from error
+    return file
+
+
+def _write_whole(file: Path, data: bytes) -> None:
+    temporary = file.with_name(f".{file.name}.{os.getpid()}-{uuid4().hex[:8]}.tmp")
+    try:
+        temporary.write_bytes(data)
+        temporary.replace(file)
+    finally:
+        with contextlib.suppress(OSError):
+            temporary.unlink(missing_ok=True)

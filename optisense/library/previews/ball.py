@@ -1,0 +1,224 @@
+"""A ball of a material on a chequered floor, by a small ray tracer of its own.
+
+It follows the laws of the simulation (Fresnel, GGX facets, the blend of a coating), but draws in
+about a second and without the renderer. Light that is reflected within a clear ball is left out.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from optisense.design.materials import Absorber, Coating, Conductor, Dielectric, Material
+from optisense.library.previews.reflection import (
+    fresnel_dielectric,
+    fresnel_metal,
+    ggx_density,
+    sample_facets,
+    smith_shadowing,
+)
+from optisense.library.previews.studio import Studio, coloured_studio, white_studio
+from optisense.library.scattering import specularity_to_roughness
+
+FloatArray = NDArray[np.float64]
+
+GEL_INDEX = 1.41
+"""A coating is seen from inside the gel, as in a sensor."""
+
+SMOOTH = 1e-3
+"""Below this roughness a face is a plain mirror."""
+
+SHARP = 0.25
+"""Below this roughness lamps are found by sampled rays, above it they are points."""
+
+SAMPLES_SMOOTH, SAMPLES_ROUGH = 6, 20
+
+STEPS = np.array([0.7548776662466927, 0.5698402909980532])
+"""Added again and again, modulo 1, these fill the unit square evenly (Roberts, R2 sequence)."""
+
+
+def picture_of_ball(
+    material: Material | Coating, size: int = 280, seed: int = 0
+) -> NDArray[np.uint8]:
+    """(size, size, 3) sRGB picture of a ball of the material."""
+    offsets = np.random.default_rng(seed).random((size * size, 4))
+    studio = white_studio(0.3 if isinstance(material, Dielectric) else 1.0)
+    if isinstance(material, Coating):
+        studio = coloured_studio()
+    pixels = np.arange(size * size)
+    light = np.zeros((size * size, 3))
+    start, towards = _camera_rays(pixels, size, offsets)
+    near_ball = _passing(start, towards) < 1.06
+    beside, ball = pixels[~near_ball], pixels[near_ball]
+    for number in range(4):
+        place = _even(offsets[beside, :2], number)
+        light[beside] += studio.radiance(*_camera_rays(beside, size, place)) / 4
+    samples = _samples(material)
+    for number in range(samples):
+        start, towards = _camera_rays(ball, size, _even(offsets[ball, :2], number))
+        passing = _passing(start, towards)
+        hit = passing < 1.0
+        shone = np.empty((len(ball), 3))
+        shone[~hit] = studio.radiance(start[~hit], towards[~hit])
+        distance = -np.einsum("ij,ij->i", start[hit], towards[hit]) - np.sqrt(1 - passing[hit])
+        place = start[hit] + distance[:, None] * towards[hit]
+        u = _even(offsets[ball, 2:], number)[hit]
+        shone[hit] = _from_ball(place, towards[hit], material, studio, u)
+        light[ball] += np.minimum(shone, 4.0) / samples
+    return _coded(light).reshape(size, size, 3)
+
+
+def _even(offset: FloatArray, number: int) -> FloatArray:
+    """(n, 2) the points of a sample's number in the unit square, shifted by (n, 2) offsets."""
+    return np.asarray((offset + number * STEPS) % 1.0)
+
+
+def _coded(linear: FloatArray) -> NDArray[np.uint8]:
+    """Linear light as sRGB bytes."""
+    light = np.clip(linear, 0.0, 1.0)
+    coded = np.where(light <= 0.0031308, 12.92 * light, 1.055 * light ** (1 / 2.4) - 0.055)
+    return np.asarray(np.round(255.0 * coded), dtype=np.uint8)
+
+
+def _camera_rays(
+    pixels: NDArray[np.intp], size: int, within: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Starts and unit directions of a ray through each pixel, (n, 3) each; `within` is where."""
+    start = np.array([0.0, -6.0, 1.6])
+    forward = -start / np.linalg.norm(start)
+    right = np.array([1.0, 0.0, 0.0])
+    up = np.cross(right, forward)
+    row, column = np.divmod(pixels, size)
+    x = 0.215 * (2.0 * (column + within[:, 0]) / size - 1.0)
+    y = 0.215 * (1.0 - 2.0 * (row + within[:, 1]) / size) - 0.012
+    towards = forward + x[:, None] * right + y[:, None] * up
+    towards /= np.linalg.norm(towards, axis=1, keepdims=True)
+    return np.broadcast_to(start, towards.shape), towards
+
+
+def _passing(start: FloatArray, towards: FloatArray) -> FloatArray:
+    """(n,) squared distance at which rays pass the middle of the ball."""
+    along = np.einsum("ij,ij->i", start, towards)
+    return np.asarray(np.einsum("ij,ij->i", start, start) - along**2)
+
+
+def _samples(material: Material | Coating) -> int:
+    """How many rays a pixel needs: more where rays are scattered and lamps found by chance."""
+    if isinstance(material, Coating):
+        alpha = specularity_to_roughness(material.specularity)
+    else:
+        alpha = material.roughness if isinstance(material, Dielectric | Conductor) else 0.0
+    by_chance = alpha < SHARP or isinstance(material, Dielectric)
+    return SAMPLES_ROUGH if alpha >= SMOOTH and by_chance else SAMPLES_SMOOTH
+
+
+def _from_ball(
+    place: FloatArray,
+    towards: FloatArray,
+    material: Material | Coating,
+    studio: Studio,
+    u: FloatArray,
+) -> FloatArray:
+    """(n, 3) radiance that leaves the ball's surface towards the camera."""
+    if isinstance(material, Absorber):
+        return np.zeros((len(place), 3))
+    if isinstance(material, Dielectric):
+        return _through(place, towards, material, studio, u)
+    if isinstance(material, Conductor):
+        eta, k = np.array(material.eta), np.array(material.k)
+        return _metal(place, towards, eta, k, material.roughness, studio, u)
+    share = material.specularity if isinstance(material, Coating) else 0.0
+    light = studio.irradiance(place) * np.array(material.reflectance) * (1.0 - share) / np.pi
+    if isinstance(material, Coating) and share > 0.0:
+        eta, k = np.array(material.eta) / GEL_INDEX, np.array(material.k) / GEL_INDEX
+        alpha = specularity_to_roughness(share)
+        light += share * _metal(place, towards, eta, k, alpha, studio, u)
+    return light
+
+
+def _metal(
+    place: FloatArray,
+    towards: FloatArray,
+    eta: FloatArray,
+    k: FloatArray,
+    alpha: float,
+    studio: Studio,
+    u: FloatArray,
+) -> FloatArray:
+    """Reflected by metal facets; the lamps by their angle where the facets are rough."""
+    view = _to_local(-towards, place)
+    facet = _facets(view, alpha, u)
+    cosine = np.einsum("ij,ij->i", view, facet)
+    leaving = 2.0 * cosine[:, None] * facet - view
+    kept = (leaving[:, 2] > 0.0) * (smith_shadowing(leaving[:, 2], alpha) if alpha > SMOOTH else 1)
+    weight = fresnel_metal(np.clip(cosine, 0.0, 1.0), eta, k) * kept[:, None]
+    rough = alpha >= SHARP
+    light = weight * studio.radiance(place, _to_world(leaving, place), lamps=not rough)
+    for lamp in studio.lamps if rough else ():
+        arriving = _to_local(np.broadcast_to(lamp.direction, place.shape), place)
+        half = view + arriving
+        half /= np.linalg.norm(half, axis=1, keepdims=True)
+        strength = ggx_density(half[:, 2], alpha) / (4.0 * view[:, 2])
+        strength *= smith_shadowing(view[:, 2], alpha) * smith_shadowing(arriving[:, 2], alpha)
+        strength *= (place @ lamp.direction > 0.0) * lamp.solid_angle
+        facing = np.clip(np.einsum("ij,ij->i", view, half), 0.0, 1.0)
+        light += fresnel_metal(facing, eta, k) * strength[:, None] * lamp.radiance
+    return light
+
+
+def _through(
+    place: FloatArray, towards: FloatArray, glass: Dielectric, studio: Studio, u: FloatArray
+) -> FloatArray:
+    """Mirrored by the front of a clear ball, and refracted through it."""
+    alpha = glass.roughness
+    view = _to_local(-towards, place)
+    facet = _facets(view, alpha, u)
+    cosine = np.clip(np.einsum("ij,ij->i", view, facet), 0.0, 1.0)
+    mirrored = fresnel_dielectric(cosine, glass.ior)
+    away = _to_world(2.0 * cosine[:, None] * facet - view, place)
+    light = mirrored[:, None] * studio.radiance(place, away)
+
+    inward = _to_world(_refracted(view, facet, cosine, glass.ior), place)
+    back = place - 2.0 * np.einsum("ij,ij->i", place, inward)[:, None] * inward
+    back /= np.linalg.norm(back, axis=1, keepdims=True)
+    view = _to_local(-inward, -back)
+    facet = _facets(view, alpha, (u[:, ::-1] + 0.5) % 1.0)
+    cosine = np.clip(np.einsum("ij,ij->i", view, facet), 0.0, 1.0)
+    passed = (1.0 - mirrored) * (1.0 - fresnel_dielectric(cosine, 1.0 / glass.ior))
+    outward = _to_world(_refracted(view, facet, cosine, 1.0 / glass.ior), -back)
+    return light + passed[:, None] * studio.radiance(back, outward)
+
+
+def _refracted(view: FloatArray, facet: FloatArray, cosine: FloatArray, eta: float) -> FloatArray:
+    """(n, 3) directions behind facets, by Snell's law; grazing where there is none."""
+    sine2 = np.minimum((1.0 - cosine**2) / eta**2, 1.0)
+    bent: FloatArray = (cosine / eta - np.sqrt(1.0 - sine2))[:, None] * facet - view / eta
+    return bent / np.linalg.norm(bent, axis=1, keepdims=True)
+
+
+def _facets(view: FloatArray, alpha: float, u: FloatArray) -> FloatArray:
+    if alpha < SMOOTH:
+        return np.broadcast_to([0.0, 0.0, 1.0], view.shape)
+    return sample_facets(view, alpha, u)
+
+
+def _axes(normal: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Two unit directions along the surface (Duff et al., JCGT 6, 2017)."""
+    x, y, z = normal.T
+    sign = np.where(z < 0.0, -1.0, 1.0)
+    a = -1.0 / (sign + z)
+    b = x * y * a
+    first = np.column_stack([1.0 + sign * x * x * a, sign * b, -sign * x])
+    return first, np.column_stack([b, sign + y * y * a, -y])
+
+
+def _to_local(direction: FloatArray, normal: FloatArray) -> FloatArray:
+    first, second = _axes(normal)
+    parts = [np.einsum("ij,ij->i", direction, axis) for axis in (first, second, normal)]
+    parts[2] = np.maximum(parts[2], 1e-6)
+    return np.column_stack(parts)
+
+
+def _to_world(local: FloatArray, normal: FloatArray) -> FloatArray:
+    first, second = _axes(normal)
+    return local[:, :1] * first + local[:, 1:2] * second + local[:, 2:] * normal

@@ -1,0 +1,109 @@
+"""The picture of a camera: the angles it sees, and what it covers of a plane at a distance."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from optisense.library.entries import CameraModel
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+FloatArray = NDArray[np.float64]
+
+DISTANCES = (40.0, 20.0, 10.0)
+"""mm in front of the pupil."""
+
+STEEPEST = 80.0
+"""Degrees from the axis up to which a footprint is drawn."""
+
+
+def border_directions(camera: CameraModel, points: int = 64) -> FloatArray:
+    """(4 points, 3) unit directions of the image's border: x right, y up, z ahead.
+
+    An equidistant camera's angle from the axis is proportional to the distance from the
+    picture's middle; both projections see `fov` across the width.
+    """
+    width, height = camera.resolution
+    t = np.linspace(-1.0, 1.0, points, endpoint=False)
+    one = np.ones(points)
+    u = np.concatenate([t, one, -t, -one])
+    v = np.concatenate([-one, t, one, -t]) * height / width
+    half = np.radians(camera.fov / 2.0)
+    if camera.projection == "equidistant":
+        radius = np.hypot(u, v)
+        angle = radius * half
+        scale = np.sin(angle) / np.maximum(radius, 1e-12)
+        return np.column_stack([u * scale, v * scale, np.cos(angle)])
+    tangent = np.tan(half)
+    directions = np.column_stack([u * tangent, v * tangent, np.ones(len(u))])
+    return np.asarray(directions / np.linalg.norm(directions, axis=1, keepdims=True))
+
+
+def footprint(camera: CameraModel, distance: float) -> FloatArray:
+    """(n, 2) mm: the border of what is seen of a plane across the axis, no refraction.
+
+    Beyond `STEEPEST` degrees from the axis the border is cut, as it runs away to infinity.
+    """
+    directions = border_directions(camera)
+    side = np.hypot(directions[:, 0], directions[:, 1])
+    angle = np.minimum(np.arctan2(side, directions[:, 2]), np.radians(STEEPEST))
+    return directions[:, :2] / side[:, None] * (distance * np.tan(angle))[:, None]
+
+
+def footprint_size(camera: CameraModel, distance: float) -> tuple[float, float]:
+    """mm: width and height of what is seen of a plane across the axis, through its middle."""
+    wide, high, _ = camera.angles()
+    angles = np.minimum(np.array([wide, high]) / 2.0, STEEPEST)
+    width, height = 2.0 * distance * np.tan(np.radians(angles))
+    return float(width), float(height)
+
+
+def draw_camera(figure: Figure, camera: CameraModel) -> None:
+    """Draw both pictures into a figure."""
+    _angles(figure.add_axes((0.04, 0.10, 0.42, 0.68)), camera)
+    _footprints(figure.add_axes((0.55, 0.22, 0.42, 0.58)), camera)
+
+
+def _angles(axes: Axes, camera: CameraModel) -> None:
+    """Wedges of the angles across, from above: the diagonal, the width and the height."""
+    from matplotlib.patches import Wedge
+
+    wide, high, diagonal = camera.angles()
+    for angle, reach, shade, label in (
+        (diagonal, 1.0, "#dbe7f7", f"diagonal {diagonal:.1f}°"),
+        (wide, 0.8, "#a9c6ec", f"width {wide:.1f}°"),
+        (high, 0.6, "#6f9fdc", f"height {high:.1f}°"),
+    ):
+        start, end = 90.0 - angle / 2.0, 90.0 + angle / 2.0
+        axes.add_patch(Wedge((0, 0), reach, start, end, fc=shade, ec="white", label=label))
+    axes.plot([0], [0], marker="o", color="0.15", ms=5)
+    lowest = min(0.0, float(np.cos(np.radians(min(diagonal, 360.0) / 2.0)))) - 0.08
+    axes.set(xlim=(-1.05, 1.05), ylim=(lowest - 0.35, 1.05), aspect="equal")
+    axes.set_axis_off()
+    pixels = "{} x {} pixels".format(*camera.resolution)
+    axes.set_title(f"{camera.projection}, {pixels}", fontsize=9)
+    axes.legend(frameon=False, fontsize=9, loc="lower center", ncols=3, handlelength=1.0,
+                columnspacing=1.0)  # fmt: skip
+
+
+def _footprints(axes: Axes, camera: CameraModel) -> None:
+    shades = ("#dbe7f7", "#a9c6ec", "#6f9fdc")
+    for distance, shade in zip(DISTANCES, shades, strict=True):
+        border = footprint(camera, distance)
+        width, height = footprint_size(camera, distance)
+        label = f"{distance:g} mm: {width:.3g} x {height:.3g}"
+        axes.fill(border[:, 0], border[:, 1], fc=shade, ec="0.3", lw=0.8, label=label)
+    axes.set_aspect("equal", adjustable="datalim")
+    axes.set_xlabel("mm")
+    axes.tick_params(labelsize=8)
+    axes.spines[["top", "right"]].set_visible(False)
+    cut = max(camera.angles()) / 2.0 > STEEPEST
+    title = "width x height seen of a plane, by its distance"
+    axes.set_title(title + (f" (up to {STEEPEST:g}°)" if cut else ""), fontsize=9)
+    axes.legend(frameon=False, fontsize=8, loc="upper center", bbox_to_anchor=(0.48, -0.17),
+                ncols=3, handlelength=1.0, handletextpad=0.4, columnspacing=0.9)  # fmt: skip

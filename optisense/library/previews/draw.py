@@ -1,0 +1,62 @@
+"""One picture for each kind of entry."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+from uuid import uuid4
+
+from optisense.errors import OutputError
+from optisense.library.entries import AnyEntry, LightEntry
+from optisense.library.previews.camera import draw_camera
+from optisense.library.previews.light import draw_light
+from optisense.library.previews.material import draw_material
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+DOTS_PER_INCH = 110
+
+
+def draw(name: str, entry: AnyEntry) -> Figure:
+    """The preview picture of an entry: 990 x 450 pixels when saved by `save`.
+
+    Raises:
+        LibraryError: the IES file of a light is missing or malformed.
+    """
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(9.0, 4.1), dpi=DOTS_PER_INCH)
+    figure.subplots_adjust(left=0.05, right=0.97, top=0.84, bottom=0.13, wspace=0.22)
+    figure.suptitle(name, x=0.03, y=0.98, ha="left", va="top", fontsize=14, weight="bold")
+    figure.text(0.03, 0.905, entry.description, ha="left", va="top", fontsize=9, color="0.35")
+    value: Any = entry.value
+    if isinstance(entry, LightEntry):
+        draw_light(figure, entry)
+    elif hasattr(value, "fov"):
+        draw_camera(figure, value)
+    else:
+        draw_material(figure, value)
+    return figure
+
+
+def save(figure: Figure, path: Path) -> None:
+    """Write a figure as PNG, whole or not at all.
+
+    Raises:
+        OutputError: it can't be written.
+    """
+    temporary = path.with_name(f".{path.name}.{os.getpid()}-{uuid4().hex[:8]}.tmp")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        figure.savefig(temporary, format="png", dpi=DOTS_PER_INCH)
+        temporary.replace(path)
+    except OSError as error:
+        raise OutputError(
+            f"can't write the picture: {error.strerror or error}",
+            where=str(path),
+            hint="Choose another file after --out",
+        ) from error
+    finally:
+        temporary.unlink(missing_ok=True)

@@ -1,0 +1,154 @@
+"""The picture of a material or coating: a ball of it, and what it does to light by angle."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from optisense.design.materials import Absorber, Coating, Conductor, Dielectric, Diffuse, Material
+from optisense.library.previews.ball import GEL_INDEX, picture_of_ball
+from optisense.library.previews.reflection import (
+    fresnel_dielectric,
+    fresnel_metal,
+    ggx_density,
+    smith_shadowing,
+)
+from optisense.library.scattering import specularity_to_roughness
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+FloatArray = NDArray[np.float64]
+
+RGB = (("red", "#d62728"), ("green", "#2ca02c"), ("blue", "#1f5fd0"))
+INCIDENCE = 45.0
+"""Degrees from the normal at which the light comes in the picture of a lobe."""
+
+
+def draw_material(figure: Figure, material: Material | Coating) -> None:
+    """Draw both pictures into a figure."""
+    left = figure.add_axes((0.03, 0.06, 0.36, 0.79))
+    left.imshow(picture_of_ball(material), interpolation="none")
+    left.set_axis_off()
+    place = (0.49, 0.15, 0.47, 0.66)
+    if isinstance(material, Dielectric):
+        _reflectance_of_glass(figure.add_axes(place), material)
+    elif isinstance(material, Conductor):
+        _reflectance_of_metal(figure.add_axes(place), material)
+    else:
+        axes: Any = figure.add_axes((0.43, -0.17, 0.54, 1.08), projection="polar")
+        figure.text(0.70, 0.85, _lobes(axes, material), fontsize=9, ha="center", va="top")
+
+
+def critical_angle(ior: float) -> float | None:
+    """Degrees from the normal beyond which light inside is reflected wholly; None for air."""
+    return float(np.degrees(np.arcsin(1.0 / ior))) if ior > 1.0 else None
+
+
+def _reflectance_of_glass(axes: Axes, glass: Dielectric) -> None:
+    angle = np.linspace(0.0, 90.0, 361)
+    cosine = np.cos(np.radians(angle))
+    axes.plot(angle, 100 * fresnel_dielectric(cosine, glass.ior), color="0.15", label="from air")
+    inside = 100 * fresnel_dielectric(cosine, 1.0 / glass.ior)
+    axes.plot(angle, inside, color="#1f5fd0", ls="--", label="from inside")
+    limit = critical_angle(glass.ior)
+    if limit is not None:
+        axes.annotate(
+            f"total beyond {limit:.1f}°",
+            (limit, 100.0),
+            (limit + 5.0, 72.0),
+            fontsize=9,
+            arrowprops={"arrowstyle": "-", "color": "0.5"},
+        )
+    facts = f"index {glass.ior:g}"
+    if glass.dispersion is not None:
+        facts += "  (R, G, B: " + ", ".join(f"{n:.3f}" for n in glass.dispersion) + ")"
+    facts += f"\nroughness {glass.roughness:g}" + (" (smooth)" if glass.roughness == 0 else "")
+    axes.set_title(facts, fontsize=9, loc="left")
+    axes.set(xlim=(0, 90), ylim=(0, 103), ylabel="reflected by a smooth face (%)")
+    axes.set_xlabel("angle of incidence (degrees)")
+    axes.legend(frameon=False, fontsize=9, loc="center left")
+    _tidy(axes)
+
+
+def _reflectance_of_metal(axes: Axes, metal: Conductor) -> None:
+    angle = np.linspace(0.0, 90.0, 361)
+    share = 100 * fresnel_metal(np.cos(np.radians(angle)), metal.eta, metal.k)
+    for channel, (colour, shade) in enumerate(RGB):
+        label = f"{colour}: {share[0, channel]:.1f} % head on"
+        axes.plot(angle, share[:, channel], color=shade, label=label)
+    axes.set_title(f"roughness {metal.roughness:g}", fontsize=9, loc="left")
+    axes.set(xlim=(0, 90), ylim=(min(60.0, share.min() - 5.0), 100.5))
+    axes.set(xlabel="angle of incidence (degrees)", ylabel="reflected, in air (%)")
+    axes.legend(frameon=False, fontsize=9, loc="lower left")
+    _tidy(axes)
+
+
+def lobes(material: Coating | Diffuse, angle: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Light scattered in the plane of incidence, per steradian: reflectance times cosine.
+
+    Args:
+        angle: (n,) degrees from the normal, positive beyond it from where the light comes.
+
+    Returns:
+        The diffuse part and the metallic part, (n, 3) each, for R, G, B.
+    """
+    cosine = np.cos(np.radians(angle))
+    diffuse = cosine[:, None] / np.pi * np.array(material.reflectance)
+    if isinstance(material, Diffuse):
+        return diffuse, np.zeros_like(diffuse)
+    share, alpha = material.specularity, specularity_to_roughness(material.specularity)
+    half = np.radians(0.5 * (angle - INCIDENCE))
+    at_facet = np.cos(np.radians(0.5 * (angle + INCIDENCE)))
+    eta, k = np.array(material.eta) / GEL_INDEX, np.array(material.k) / GEL_INDEX
+    incoming = np.cos(np.radians(INCIDENCE))
+    strength = ggx_density(np.cos(half), alpha) / (4.0 * incoming)
+    strength *= smith_shadowing(incoming, alpha) * smith_shadowing(cosine, alpha)
+    metal = fresnel_metal(at_facet, eta, k) * strength[:, None]
+    return (1.0 - share) * diffuse, share * metal
+
+
+def _lobes(axes: Any, material: Coating | Diffuse | Absorber) -> str:
+    """Draw where light goes, and return the text above it."""
+    axes.set_theta_zero_location("N")
+    axes.set_theta_direction(-1)
+    axes.set(thetamin=-90, thetamax=90)
+    axes.tick_params(labelsize=8)
+    axes.set_yticklabels([])
+    if isinstance(material, Absorber):
+        return "absorbs all light"
+    angle = np.linspace(-90.0, 90.0, 721)
+    parts = lobes(material, angle)
+    names = ("diffuse paint", "metal flake")
+    total = np.zeros(len(angle))
+    for part, name, shade in zip(parts, names, ("0.75", "#e0a030"), strict=True):
+        if part.max() > 0.0:
+            above = total + part.mean(axis=1)
+            axes.fill_between(np.radians(angle), total, above, color=shade, label=name, lw=0)
+            total = above
+    axes.plot(np.radians(angle), total, color="0.15", lw=1.2)
+    axes.set_rmax(1.15 * total.max())
+    axes.annotate(
+        "",
+        (np.radians(-INCIDENCE), 0.45 * total.max()),
+        (np.radians(-INCIDENCE), 1.1 * total.max()),
+        arrowprops={"arrowstyle": "-|>", "color": "#d62728", "lw": 1.6},
+    )
+    axes.legend(frameon=False, fontsize=9, loc="lower center", bbox_to_anchor=(0.5, 0.155), ncols=2)
+    facts = "scattered light for one ray at 45°"
+    if isinstance(material, Coating):
+        facts += f", seen in silicone\nspecularity {material.specularity:g}"
+        if material.specularity > 0.0:
+            facts += (
+                f", roughness of the flake {specularity_to_roughness(material.specularity):.2g}"
+            )
+    return facts
+
+
+def _tidy(axes: Axes) -> None:
+    axes.spines[["top", "right"]].set_visible(False)
+    axes.grid(True, color="0.9", lw=0.6)
+    axes.set_axisbelow(True)

@@ -1,0 +1,84 @@
+"""How much light a surface reflects, and where a rough one sends it, as NumPy functions."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+FloatArray = NDArray[np.float64]
+
+
+def fresnel_dielectric(cosine: ArrayLike, eta: float) -> FloatArray:
+    """The share of unpolarised light that a smooth face between transparent media reflects.
+
+    Args:
+        cosine: of the angle of incidence, 0 to 1.
+        eta: index behind the face over the index in front of it.
+    """
+    ci = np.asarray(cosine, dtype=np.float64)
+    sine2 = (1.0 - ci * ci) / (eta * eta)
+    ct = np.sqrt(np.maximum(0.0, 1.0 - sine2))
+    across = ((ci - eta * ct) / (ci + eta * ct)) ** 2
+    along = ((eta * ci - ct) / (eta * ci + ct)) ** 2
+    return np.where(sine2 >= 1.0, 1.0, 0.5 * (across + along))
+
+
+def fresnel_metal(cosine: ArrayLike, eta: ArrayLike, k: ArrayLike) -> FloatArray:
+    """The share of unpolarised light that a smooth metal reflects (Born and Wolf, 13.2).
+
+    Args:
+        cosine: of the angle of incidence, of any shape.
+        eta: (c,) real part of the metal's index over the index in front of it, of each channel.
+        k: (c,) imaginary part, likewise.
+
+    Returns:
+        The shape of `cosine` with (c,) added.
+    """
+    ci = np.asarray(cosine, dtype=np.float64)[..., None]
+    index = np.asarray(eta, dtype=np.float64) + 1j * np.asarray(k, dtype=np.float64)
+    ct = np.sqrt(1.0 - (1.0 - ci * ci) / (index * index))
+    across = np.abs((ci - index * ct) / (ci + index * ct)) ** 2
+    along = np.abs((index * ci - ct) / (index * ci + ct)) ** 2
+    return np.asarray(0.5 * (across + along))
+
+
+def ggx_density(cosine: ArrayLike, alpha: float) -> FloatArray:
+    """GGX distribution of facet normals, by the cosine to the mean normal (Walter et al. 2007)."""
+    cos2 = np.square(np.asarray(cosine, dtype=np.float64))
+    return np.asarray(alpha**2 / (np.pi * np.square(cos2 * (alpha**2 - 1.0) + 1.0)))
+
+
+def smith_shadowing(cosine: ArrayLike, alpha: float) -> FloatArray:
+    """Share of the facets that is seen from a direction, by its cosine to the mean normal."""
+    cos2 = np.maximum(np.square(np.asarray(cosine, dtype=np.float64)), 1e-12)
+    tan2 = (1.0 - cos2) / cos2
+    return np.asarray(2.0 / (1.0 + np.sqrt(1.0 + alpha**2 * tan2)))
+
+
+def sample_facets(view: FloatArray, alpha: float, u: FloatArray) -> FloatArray:
+    """Normals of the facets that a direction sees, in the frame where +z is the mean normal.
+
+    Heitz, "Sampling the GGX distribution of visible normals", JCGT 7 (2018).
+
+    Args:
+        view: (n, 3) unit directions, z above 0.
+        u: (n, 2) numbers from 0 to 1.
+
+    Returns:
+        (n, 3) unit normals.
+    """
+    stretched = view * [alpha, alpha, 1.0]
+    stretched /= np.linalg.norm(stretched, axis=1, keepdims=True)
+    first = np.column_stack([-stretched[:, 1], stretched[:, 0], np.zeros(len(view))])
+    length = np.linalg.norm(first, axis=1, keepdims=True)
+    first = np.where(length > 1e-9, first / np.maximum(length, 1e-9), [1.0, 0.0, 0.0])
+    second = np.cross(stretched, first)
+    radius, turn = np.sqrt(u[:, 0]), 2.0 * np.pi * u[:, 1]
+    a, b = radius * np.cos(turn), radius * np.sin(turn)
+    lean = 0.5 * (1.0 + stretched[:, 2])
+    b = (1.0 - lean) * np.sqrt(np.maximum(0.0, 1.0 - a * a)) + lean * b
+    c = np.sqrt(np.maximum(0.0, 1.0 - a * a - b * b))
+    normal = a[:, None] * first + b[:, None] * second + c[:, None] * stretched
+    normal *= [alpha, alpha, 1.0]
+    normal[:, 2] = np.maximum(normal[:, 2], 1e-9)
+    return np.asarray(normal / np.linalg.norm(normal, axis=1, keepdims=True))

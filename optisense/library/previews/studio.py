@@ -1,0 +1,106 @@
+"""Where the preview ball lies: a chequered floor, an even sky and soft lamps."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+
+FLOOR = -1.0
+SQUARE = 0.6
+DARK, BRIGHT = 0.16, 0.62
+
+
+@dataclass(frozen=True)
+class Lamp:
+    """A round, far lamp.
+
+    Attributes:
+        direction: (3,) unit vector towards it.
+        radiance: (3,) of R, G, B.
+        radius: degrees, where it has faded to half.
+    """
+
+    direction: FloatArray
+    radiance: FloatArray
+    radius: float
+
+    @property
+    def solid_angle(self) -> float:
+        """Steradians."""
+        return float(2.0 * np.pi * (1.0 - np.cos(np.radians(self.radius))))
+
+    def seen(self, towards: FloatArray) -> FloatArray:
+        """(n, 3) radiance along (n, 3) unit directions."""
+        angle = np.degrees(np.arccos(np.clip(towards @ self.direction, -1.0, 1.0)))
+        t = np.clip((1.15 * self.radius - angle) / (0.3 * self.radius), 0.0, 1.0)
+        return np.asarray((t * t * (3.0 - 2.0 * t))[:, None] * self.radiance)
+
+
+@dataclass(frozen=True)
+class Studio:
+    """The surroundings of the ball, which has radius 1 and sits at the origin.
+
+    Attributes:
+        lamps: the lamps.
+        sky: radiance straight up; half of it on the horizon.
+        floor: how much the floor is dimmed.
+        solid: how dark the ball's shadow is, 0 to 1.
+    """
+
+    lamps: list[Lamp]
+    sky: float
+    floor: float
+    solid: float
+
+    def radiance(self, start: FloatArray, towards: FloatArray, lamps: bool = True) -> FloatArray:
+        """(n, 3) radiance that arrives at (n, 3) points from (n, 3) unit directions."""
+        height = towards[:, 2]
+        light = np.repeat((self.sky * (0.5 + 0.5 * np.clip(height, 0, 1)))[:, None], 3, axis=1)
+        if lamps:
+            for lamp in self.lamps:
+                light += lamp.seen(towards)
+        down = height < -1e-6
+        reach = (FLOOR - start[down, 2]) / height[down]
+        place = start[down] + reach[:, None] * towards[down]
+        squares = np.floor(place[:, 0] / SQUARE) + np.floor(place[:, 1] / SQUARE)
+        shade = self.floor * np.where(squares % 2 == 0, DARK, BRIGHT)
+        far = np.clip(reach / 30.0, 0.0, 1.0)
+        hidden = np.clip(1.0 / np.linalg.norm(place, axis=1) ** 3, 0.0, 1.0)
+        near = shade * (1.0 - 0.85 * self.solid * hidden)
+        light[down] = ((1.0 - far) * near + far * 0.5 * self.sky)[:, None]
+        return light
+
+    def irradiance(self, normal: FloatArray) -> FloatArray:
+        """(n, 3) light on a face of each (n, 3) unit normal; lamps as points of their size."""
+        up = 0.5 * (1.0 + normal[:, 2])  # the share of the sky that the face sees
+        floor = 0.5 * (DARK + BRIGHT) * self.floor * (1.0 - 0.5 * self.solid)
+        even = np.pi * (up * 0.8 * self.sky + (1.0 - up) * floor)
+        light = np.repeat(even[:, None], 3, axis=1)
+        for lamp in self.lamps:
+            facing = np.maximum(normal @ lamp.direction, 0.0) * lamp.solid_angle
+            light += facing[:, None] * lamp.radiance
+        return light
+
+
+def _lamp(direction: tuple[float, float, float], radiance: list[float], radius: float) -> Lamp:
+    vector = np.array(direction)
+    return Lamp(vector / np.linalg.norm(vector), np.array(radiance), radius)
+
+
+def white_studio(solid: float) -> Studio:
+    """One white lamp, for materials."""
+    return Studio([_lamp((-0.5, -0.6, 0.62), [3.2] * 3, 17.0)], sky=0.62, floor=1.0, solid=solid)
+
+
+def coloured_studio() -> Studio:
+    """A red, a green and a blue lamp around the view, for coatings: as in a sensor."""
+    lamps = [
+        _lamp((-0.86, -0.45, 0.20), [5.0, 0.1, 0.1], 19.0),
+        _lamp((0.86, -0.45, 0.20), [0.1, 4.0, 0.1], 19.0),
+        _lamp((0.0, -0.50, 0.86), [0.1, 0.1, 5.5], 19.0),
+    ]
+    return Studio(lamps, sky=0.10, floor=0.35, solid=1.0)

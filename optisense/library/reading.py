@@ -1,0 +1,86 @@
+"""From the text of an entry to the entry; what is wrong is told with file and line."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any, Literal
+
+from pydantic import TypeAdapter, ValidationError
+
+from optisense.design.emitters import IesEmitter
+from optisense.design.problems import design_error
+from optisense.design.yaml_reader import Lines, Steps, read_yaml
+from optisense.errors import LibraryError
+from optisense.library.entries import (
+    AnyEntry,
+    CameraEntry,
+    CoatingEntry,
+    LightEntry,
+    MaterialEntry,
+)
+
+Kind = Literal["material", "coating", "light", "camera"]
+
+KINDS: dict[Kind, Any] = {
+    "material": MaterialEntry,
+    "coating": CoatingEntry,
+    "light": LightEntry,
+    "camera": CameraEntry,
+}
+
+
+def read_entry(kind: Kind, file: Path) -> AnyEntry:
+    """Read a file that holds one entry, and the IES file it may name.
+
+    Raises:
+        LibraryError: a file can't be read, or is no entry of this kind; says the line.
+    """
+    data, lines = read_yaml(file, LibraryError)
+    entry = make_entry(kind, file.stem, data, lines, str(file))
+    if isinstance(entry.value, IesEmitter):
+        entry.value._folder = file.parent
+        entry.value.intensity_table()
+    return entry
+
+
+def make_entry(kind: Kind, name: str, data: Any, lines: Lines, source: str) -> AnyEntry:
+    """Check the data of an entry.
+
+    Args:
+        data: what YAML gave for it.
+        lines: the line of each value in it; the first line of all is under ().
+        source: the file, for messages.
+
+    Raises:
+        LibraryError: it is no entry of this kind; says the line.
+    """
+    adapter: TypeAdapter[AnyEntry] = TypeAdapter(KINDS[kind])
+    try:
+        return adapter.validate_python(data)
+    except ValidationError as error:
+        found = design_error(error, data, where=source, lines=lines, model=KINDS[kind])
+        message = f"{kind} '{name}': {found.message}"
+        raise LibraryError(message, where=found.where, hint=found.hint) from None
+
+
+def inside(lines: Lines, key: str) -> Lines:
+    """The lines of what is under a key, by their paths from there."""
+    rest: dict[Steps, int] = {}
+    for path, line in lines.items():
+        if path[:1] == (key,):
+            rest[path[1:]] = line
+    return rest
+
+
+def kind_of(data: dict[str, Any]) -> Kind | None:
+    """What kind of entry the data of a file are meant to be, or None when that can't be told."""
+    value = data.get("value")
+    if not isinstance(value, dict):
+        return None
+    if value.get("kind") in ("area", "ies", "spot"):
+        return "light"
+    if value.get("kind") in ("dielectric", "conductor", "diffuse", "absorber"):
+        return "material"
+    if "specularity" in value:
+        return "coating"
+    return "camera" if "fov" in value or "projection" in value else None
