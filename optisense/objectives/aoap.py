@@ -19,7 +19,7 @@ COVERAGE_WEIGHT = 0.01
 """k1 of the paper. Coverage hardly counts at this weight: look at it beside the value."""
 
 
-@objective("aoap", title="AOAP", draw=figures.draw_aoap)
+@objective("aoap", title="AOAP", draw=figures.draw_aoap, beside=("coverage",))
 def aoap(
     evaluation: Evaluation, *, coverage_weight: float = COVERAGE_WEIGHT
 ) -> tuple[float, dict[str, Any], dict[str, Any]]:

@@ -94,6 +94,7 @@ def draw_normdiff(score: Score) -> Figure:
         )
         axes.set_title(title, fontsize=10)
         axes.set_ylim(0, float(table["theta"].max()) + 2)
+        axes.set_rticks(np.arange(20, float(table["theta"].max()), 20))
         axes.tick_params(labelsize=8)
         figure.colorbar(shown, ax=axes, shrink=0.7)
     figure.suptitle("by true normal: polar angle outward, azimuth from east", fontsize=10)
@@ -106,9 +107,10 @@ def draw_aoap(score: Score) -> Figure:
     figure = _figure(9, 4.2)
     picture, histogram = figure.subplots(1, 2, width_ratios=[2, 1])
     degrees = np.degrees(np.arccos(np.clip(cosine, -1, 1)))
-    _map(figure, picture, degrees, "angle of incidence (°)", 0.0, 90.0)
     seen = degrees[np.isfinite(degrees)]
-    histogram.hist(seen, bins=45, range=(0, 90), weights=np.full(len(seen), 100 / degrees.size))
+    most = 10.0 * float(np.ceil(seen.max() / 10))
+    _map(figure, picture, degrees, "angle of incidence (°)", 0.0, most)
+    histogram.hist(seen, bins=40, range=(0, most), weights=np.full(len(seen), 100 / degrees.size))
     histogram.set_xlabel("angle of incidence (°)")
     histogram.set_ylabel("pixels (%)")
     histogram.set_title(f"coverage {100 * score.parts['coverage']:.1f} %", fontsize=10)
@@ -125,11 +127,10 @@ def draw_projection_warping(score: Score) -> Figure:
     relative = mean / score.parts["mean_area"]
     figure = _figure(9, 4.2)
     picture, histogram = figure.subplots(1, 2, width_ratios=[2, 1])
-    largest = float(np.nanpercentile(relative, 99))
-    _map(figure, picture, relative, "area over mean", 0.0, max(2.0, largest))
-    histogram.hist(
-        areas[known] / score.parts["mean_area"], bins=50, range=(0, max(2.0, largest)), color=DOT
-    )
+    low, high = (float(x) for x in np.nanpercentile(relative, (1, 99)))
+    limits = min(low, 0.9), max(high, 1.1)
+    _map(figure, picture, relative, "area over mean", *limits)
+    histogram.hist(areas[known] / score.parts["mean_area"], bins=50, range=limits, color=DOT)
     histogram.set_xlabel("area over mean")
     histogram.set_ylabel("triangles")
     return figure
@@ -142,5 +143,6 @@ def _map(
     shown = axes.imshow(values, cmap="viridis", vmin=lowest, vmax=highest)
     axes.set_xticks([])
     axes.set_yticks([])
-    axes.set_xlabel("grey: the surface is not seen", fontsize=9)
+    if not np.isfinite(values).all():
+        axes.set_xlabel("grey: left out, or the surface is not seen", fontsize=9)
     figure.colorbar(shown, ax=axes, label=label, shrink=0.8)

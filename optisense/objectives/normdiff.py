@@ -67,7 +67,9 @@ class Confusion(NamedTuple):
     cells: NDArray[np.int64]
 
 
-@objective("normdiff", title="NormDiff", draw=figures.draw_normdiff)
+@objective(
+    "normdiff", title="NormDiff", draw=figures.draw_normdiff, beside=("theta_range", "phi_range")
+)
 def normdiff(
     evaluation: Evaluation,
     *,

@@ -35,7 +35,7 @@ class TriangleAreas(NamedTuple):
     leaping: int
 
 
-@objective("2to3pw", title="2to3PW", draw=figures.draw_projection_warping)
+@objective("2to3pw", title="2to3PW", draw=figures.draw_projection_warping, beside=("mean_area",))
 def projection_warping(
     evaluation: Evaluation, *, jump: float = JUMP
 ) -> tuple[float, dict[str, Any], dict[str, Any]]:

@@ -37,12 +37,14 @@ class Objective:
             number, or a number and its parts, or a `Score`.
         title: how people write the name.
         draw: makes the figure of a score, or None.
+        beside: names of parts to show beside the value wherever it stands.
     """
 
     name: str
     function: Callable[..., Any]
     title: str
     draw: Drawing | None = None
+    beside: tuple[str, ...] = ()
 
     def __call__(self, evaluation: Evaluation, **settings: Any) -> Any:
         """Call the function itself, without any checks of what it returns."""
@@ -69,7 +71,11 @@ _registry: dict[str, Objective] = {}
 
 
 def objective(
-    name: str, *, title: str | None = None, draw: Drawing | None = None
+    name: str,
+    *,
+    title: str | None = None,
+    draw: Drawing | None = None,
+    beside: tuple[str, ...] = (),
 ) -> Callable[[_F], _F]:
     """Register a function as an objective; higher values must be better.
 
@@ -77,13 +83,14 @@ def objective(
         name: lower case; may not be taken.
         title: how people write the name; the name itself if left out.
         draw: makes a figure of the score; a plain one if left out.
+        beside: names of parts to show beside the value wherever it stands.
 
     Raises:
         ObjectiveError: the name is taken or malformed, or the function takes no evaluation.
     """
 
     def register(function: _F) -> _F:
-        _register(Objective(name, function, title or name, draw))
+        _register(Objective(name, function, title or name, draw, beside))
         return function
 
     return register

@@ -47,7 +47,7 @@ class Fit:
     linearity: float
 
 
-@objective("rgb2normal", title="RGB2Normal", draw=figures.draw_rgb2normal)
+@objective("rgb2normal", title="RGB2Normal", draw=figures.draw_rgb2normal, beside=("worst_line",))
 def rgb2normal(
     evaluation: Evaluation,
     *,

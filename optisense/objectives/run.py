@@ -17,7 +17,7 @@ from optisense.objectives.evaluation import Evaluation, Tell
 from optisense.objectives.files import place_of
 from optisense.objectives.registry import Objective, resolve
 from optisense.objectives.score import Score, json_ready
-from optisense.objectives.settings import Settings
+from optisense.objectives.settings import Settings, is_number
 
 if TYPE_CHECKING:
     from optisense.optics import OpticalModel
@@ -122,6 +122,7 @@ def run_objective(
         title=objective.title,
         arrays=arrays,
         draw=draw or objective.draw,
+        shown=objective.beside,
     )
 
 
@@ -145,7 +146,26 @@ def split_settings(
         if key not in taken:
             hint = suggestion(key, taken, limit=30)
             raise ObjectiveError(f"there is no setting '{key}'", hint=hint)
+    for each in wanted:
+        for key, value in own[each.name].items():
+            _check_kind(key, value, each.settings[key])
     return shared, own
+
+
+def _check_kind(name: str, value: Any, default: Any) -> None:
+    """Settings of objectives keep the kind of their default: number, truth value or text."""
+    if isinstance(default, bool):
+        kind, fits = "true or false", isinstance(value, bool)
+    elif isinstance(default, int):
+        kind, fits = "a whole number", is_number(value) and value == int(value)
+    elif isinstance(default, float):
+        kind, fits = "a number", is_number(value)
+    elif isinstance(default, str):
+        kind, fits = "a word", isinstance(value, str)
+    else:
+        return
+    if not fits:
+        raise ObjectiveError(f"the setting '{name}' is {value!r}", hint=f"give {kind}")
 
 
 def _model(sensor: OpticalModel | SensorDesign) -> OpticalModel:

@@ -30,6 +30,7 @@ class Score:
         title: how people write the objective's name.
         arrays: what the figure is drawn from; not part of `to_dict`.
         draw: makes the figure.
+        shown: names of parts to show beside the value wherever it stands.
     """
 
     objective: str
@@ -40,11 +41,21 @@ class Score:
     title: str = ""
     arrays: Mapping[str, Any] = field(default_factory=dict, repr=False, compare=False)
     draw: Drawing | None = field(default=None, repr=False, compare=False)
+    shown: tuple[str, ...] = ()
 
     @property
     def name(self) -> str:
         """The title, or the registry's name where there is none."""
         return self.title or self.objective
+
+    @property
+    def beside(self) -> str:
+        """The parts to show beside the value, as text: ``coverage 0.53``."""
+        return ", ".join(
+            f"{key.replace('_', ' ')} {_number(self.parts[key])}"
+            for key in self.shown
+            if key in self.parts
+        )
 
     def figure(self) -> Figure:
         """A drawing of the parts; a plain one for objectives that bring none of their own."""

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
 from optisense.errors import ObjectiveError
 
@@ -51,21 +52,65 @@ class Settings:
     exposure: float | Literal["auto"] = "auto"
 
     def __post_init__(self) -> None:
+        for name in ("resolution", "ray_resolution"):
+            size = getattr(self, name)
+            if size is not None:
+                object.__setattr__(self, name, _size(name, size))
+        if self.photons is not None and not (_is_whole(self.photons) and self.photons > 0):
+            raise ObjectiveError(
+                f"photons are {self.photons!r}", hint="give a whole number above 0"
+            )
+        if not (_is_whole(self.seed) and 0 <= self.seed < 2**32):
+            raise ObjectiveError(f"the seed is {self.seed!r}", hint="give a whole number from 0")
         if self.exposure != "auto" and not (
-            isinstance(self.exposure, int | float) and 0.0 < self.exposure < float("inf")
+            is_number(self.exposure) and 0.0 < self.exposure < float("inf")
         ):
             raise ObjectiveError(
                 f"the exposure is {self.exposure!r}", hint='give "auto" or a factor above 0'
             )
-        if not 0.0 < self.depth < self.radius:
+        if not (is_number(self.depth) and is_number(self.radius) and 0 < self.depth < self.radius):
             raise ObjectiveError(
-                f"a ball of radius {self.radius:g} mm can't be judged {self.depth:g} mm deep",
+                f"a ball of radius {self.radius!r} mm can't be judged {self.depth!r} mm deep",
                 hint="press deeper than 0 and less deep than the radius",
             )
         if self.places is not None:
-            if not self.places or any(len(place) != 2 for place in self.places):
-                raise ObjectiveError("places are (u, v) pairs in mm, one or more")
-            object.__setattr__(self, "places", tuple((float(u), float(v)) for u, v in self.places))
+            object.__setattr__(self, "places", _pairs(self.places))
+
+
+def is_number(value: Any) -> bool:
+    """Whether a value is a finite real number, and not a truth value."""
+    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
+
+
+def _is_whole(value: Any) -> bool:
+    return is_number(value) and value == int(value)
+
+
+def _size(name: str, size: Any) -> tuple[int, int]:
+    if (
+        not isinstance(size, tuple | list)
+        or len(size) != 2
+        or not all(_is_whole(side) and side > 0 for side in size)
+    ):
+        raise ObjectiveError(
+            f"the {name.replace('_', ' ')} is {size!r}", hint="give width and height in pixels"
+        )
+    return int(size[0]), int(size[1])
+
+
+def _pairs(places: Any) -> tuple[tuple[float, float], ...]:
+    if (
+        not isinstance(places, tuple | list)
+        or not places
+        or not all(
+            isinstance(place, tuple | list) and len(place) == 2 and all(map(is_number, place))
+            for place in places
+        )
+    ):
+        raise ObjectiveError(
+            f"places are {places!r}", hint="give one or more (u, v) in mm, such as ((0, 0), (2, 1))"
+        )
+    return tuple((float(u), float(v)) for u, v in places)
 
 
 def size_for(camera: tuple[int, int], width: int) -> tuple[int, int]:

@@ -3,10 +3,7 @@
 from __future__ import annotations
 
 import json
-import os
-import tempfile
 from collections.abc import Mapping, Sequence
-from importlib.resources import files
 from pathlib import Path
 from typing import Any, Literal, Protocol
 
@@ -17,10 +14,10 @@ from numpy.typing import NDArray
 
 from optisense import __version__
 from optisense.design import LightGroup, SensorDesign
-from optisense.errors import OutputError
 from optisense.geometry import Contact, TriangleMesh
 from optisense.optics.response import auto_exposure, encode
 from optisense.report import tables
+from optisense.report.files import template, write_whole
 from optisense.report.pictures import data_uri, mask_overlay, normal_colours
 from optisense.report.scene_view import scene_data
 
@@ -83,14 +80,7 @@ def write_report(
     """
     path = Path(path)
     page = render_page(design, image, contacts, exposure=exposure, indenters=indenters)
-    try:
-        _write_whole(path, page)
-    except OSError as error:
-        raise OutputError(
-            f"the report can't be written: {error.strerror or error}",
-            where=str(path),
-            hint="Free space on this disk or choose another folder",
-        ) from error
+    write_whole(path, page)
     return path
 
 
@@ -106,7 +96,7 @@ def render_page(
     height, width = image.contact_mask.shape
     assumed, sourced = tables.provenance_rows(design)
     environment = Environment(
-        loader=DictLoader({"report": _template("report.html.j2")}),
+        loader=DictLoader({"report": template("report.html.j2")}),
         autoescape=True,
         undefined=StrictUndefined,
         trim_blocks=True,
@@ -127,10 +117,10 @@ def render_page(
         assumed=assumed,
         sourced=sourced,
         version=__version__,
-        css=Markup(_template("report.css")),
+        css=Markup(template("report.css")),
         scene=_json(scene_data(design, dict(indenters or {}))),
-        picture_script=Markup(_template("picture.js")),
-        viewer_script=Markup(_template("viewer.js")),
+        picture_script=Markup(template("picture.js")),
+        viewer_script=Markup(template("viewer.js")),
     )
 
 
@@ -178,24 +168,7 @@ def _group(name: str, group: LightGroup) -> dict[str, Any]:
     }
 
 
-def _template(name: str) -> str:
-    return (files("optisense.report") / "templates" / name).read_text(encoding="utf-8")
-
-
 def _json(value: Any) -> Markup:
     """JSON that can't end the script element it stands in."""
     text = json.dumps(value, separators=(",", ":"), allow_nan=False)
     return Markup(text.replace("<", "\\u003c"))
-
-
-def _write_whole(path: Path, text: str) -> None:
-    """Write to a temporary file beside the wanted one, then rename it."""
-    handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
-    try:
-        with os.fdopen(handle, "w", encoding="utf-8") as file:
-            file.write(text)
-        Path(temporary).chmod(0o644)
-        Path(temporary).replace(path)
-    except BaseException:
-        Path(temporary).unlink(missing_ok=True)
-        raise
