@@ -10,6 +10,7 @@ from optisense.design import Problem, SensorDesign, check_design, load_design
 from optisense.design.near import suggestion
 from optisense.design.problems import raise_problems
 from optisense.errors import DesignError
+from optisense.sensors.gelsight360 import gelsight360
 from optisense.sensors.gelsight_mini import (
     gelsight_mini,
     gelsight_mini_cylindrical,
@@ -17,6 +18,7 @@ from optisense.sensors.gelsight_mini import (
 )
 
 BUILDERS: dict[str, Callable[[], SensorDesign]] = {
+    "gelsight360": gelsight360,
     "gelsight-mini": gelsight_mini,
     "gelsight-mini-cylindrical": gelsight_mini_cylindrical,
     "gelsight-mini-spherical": gelsight_mini_spherical,

@@ -23,6 +23,12 @@ Vector = tuple[float, float, float]
 ON_AXIS = 1e-12
 """mm: a profile point nearer to the axis is a pole."""
 
+TWIST = 0.31
+"""Of a segment, by which turned shapes are rotated."""
+
+ASIDE = 0.01
+"""Of the radius of the ring next to it, by which a pole is moved off the axis."""
+
 
 def revolve(profile: ArrayLike, segments: int) -> TriangleMesh:
     """A profile turned about the z axis.
@@ -32,20 +38,26 @@ def revolve(profile: ArrayLike, segments: int) -> TriangleMesh:
 
     Args:
         profile: (n, 2) r and z, mm, r >= 0; an outline of a ring ends on its first point.
-        segments: corners of a full turn, the first one on the x axis.
+        segments: corners of a full turn.
 
     Returns:
         n rings of `segments` vertices, one vertex where r is 0; welded, so closed outlines and
-        outlines from axis to axis make closed meshes.
+        outlines from axis to axis make closed meshes. No edge lies in the xz or yz plane and no
+        corner on the axis, where a camera's rays would run exactly along edges: a ray tracer
+        may miss both faces there.
     """
     points = np.asarray(profile, dtype=np.float64)
-    turn = 2.0 * np.pi * np.arange(segments) / segments
+    turn = 2.0 * np.pi * (np.arange(segments) + TWIST) / segments
     circle = np.column_stack([np.cos(turn), np.sin(turn)])
     vertices, rings = [], []
     start = 0
-    for radius, height in points:
+    for index, (radius, height) in enumerate(points):
         pole = radius < ON_AXIS
-        ring = np.zeros((1, 3)) if pole else np.column_stack([radius * circle, np.zeros(segments)])
+        if pole:
+            beside = points[[max(index - 1, 0), min(index + 1, len(points) - 1)], 0].max()
+            ring = np.array([[*ASIDE * beside * circle[segments // 7], 0.0]])
+        else:
+            ring = np.column_stack([radius * circle, np.zeros(segments)])
         ring[:, 2] = height
         vertices.append(ring)
         rings.append(np.full(segments, start) if pole else start + np.arange(segments))

@@ -1,0 +1,336 @@
+"""GelSight360: a round fingertip that senses all around, lit from inside its own wall.
+
+Frame: the camera's pupil is the origin, +z runs along the axis to the tip, +x through the first
+LED board. From the camera out: air, a rigid shell of clear epoxy, a soft gel, the coating. Four
+LED boards stand upright in the wall of the shell; each carries LEDs on both faces, which makes
+eight light groups. A ring of LEDs lights the wall from below.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from optisense import library
+from optisense.design import (
+    Absorber,
+    Camera,
+    Dielectric,
+    Part,
+    Provenance,
+    Role,
+    SensorDesign,
+    Status,
+)
+from optisense.geometry import TriangleMesh
+from optisense.sensors.dimensions import require, require_positive
+from optisense.sensors.led_boards import BOARDS, COLOURS, LED, WALL_MARGIN, LedBoards, ring
+from optisense.sensors.shapes import revolve
+from optisense.sensors.tip_shape import TipShape
+
+SENSOR = "gelsight360"
+GEL, EPOXY, BLACK = "silicone-xp565", "epoxy", "black-absorber"
+GROUPS = 2 * BOARDS
+DESIGNS = 10.0
+"""The last number of both shape families; the first is 0."""
+
+BOARD_CLEARANCE = 0.05
+"""mm between boards and the gel, and between the ring's LEDs and the boards."""
+
+
+def gelsight360(
+    *,
+    light_colours: str = "GRRGGRRG",
+    base_ring: str = "B",
+    tip_design: float = 5.0,
+    resin_design: float = 0.0,
+    radius: float = 14.0,
+    height: float = 34.0,
+    gel_thickness: float = 3.0,
+    shell_thickness: float = 2.5,
+    edge_radius: float = 7.0,
+    cone_height: float = 12.0,
+    flattest: float = 0.1,
+    board_bottom: float = 2.0,
+    board_height: float = 12.0,
+    board_thickness: float = 1.0,
+    leds_per_group: int = 4,
+    base_leds: int = 12,
+    led_flux: float = 5.0,
+    fov: float = 128.0,
+    resolution: tuple[int, int] = (320, 240),
+    coating: str = "semi-specular",
+    tessellation: float = 1.0,
+) -> SensorDesign:
+    """A GelSight360.
+
+    Args:
+        light_colours: the colours (R, G, B) of the eight light groups, anticlockwise as seen
+            when looking at the tip. Group 1 is on the first board (on +x) and shines
+            anticlockwise, group 2 faces it from the second board (on +y), group 3 is on that
+            board's other face, and so on; group 8 is on the first board again.
+        base_ring: the colour of the ring of LEDs at the foot of the shell; "" for no ring.
+        tip_design: 0 (flat with a rounded edge) over 5 (hemisphere) to 10 (cone with a rounded
+            nose).
+        resin_design: 0 (shell of uniform thickness) to 10 (innermost surface almost flat): the
+            innermost dome gets lower, from its full height to `flattest` of it.
+        radius: mm, of the coated outside.
+        height: mm, of the coated outside, from the camera's pupil to the tip; the straight wall
+            takes what the tip leaves of it.
+        gel_thickness: mm.
+        shell_thickness: mm, of the wall (and of the tip, in resin design 0).
+        edge_radius: mm, outside, of the rounded edge in tip designs 0 and 10 and of the nose in
+            10; in between the rounding is larger, up to `radius`.
+        cone_height: mm, how much higher the nose of tip design 10 is than its edge is round.
+        flattest: what is left of the height of the innermost dome in resin design 10.
+        board_bottom: mm, z of the boards' lower edge.
+        board_height: mm.
+        board_thickness: mm, without LEDs.
+        leds_per_group: LEDs on each face of a board.
+        base_leds: LEDs of the ring; a multiple of 4.
+        led_flux: mW, radiant, of each LED.
+        fov: degrees, across the image width (equidistant fisheye).
+        resolution: pixels, width and height.
+        coating: a coating of the library.
+        tessellation: mm, about the edge length of the largest triangles.
+
+    Raises:
+        DesignError: dimensions that contradict one another, or colours that are not eight
+            letters R, G, B; says which.
+        LibraryError: there is no such coating.
+    """
+    _check_colours(light_colours, base_ring)
+    require_positive(
+        SENSOR,
+        radius=radius,
+        height=height,
+        gel_thickness=gel_thickness,
+        shell_thickness=shell_thickness,
+        edge_radius=edge_radius,
+        cone_height=cone_height,
+        flattest=flattest,
+        board_height=board_height,
+        board_thickness=board_thickness,
+        leds_per_group=leds_per_group,
+        base_leds=base_leds,
+        tessellation=tessellation,
+    )
+    for name, number in (("tip_design", tip_design), ("resin_design", resin_design)):
+        require(
+            0.0 <= number <= DESIGNS, SENSOR, f"{name} is {number:g}", "Give a number from 0 to 10"
+        )
+    _check_layers(radius, edge_radius, gel_thickness, shell_thickness)
+    shape = TipShape.of_family(tip_design / DESIGNS, radius, height, edge_radius, cone_height)
+    require(
+        shape.shoulder > 0.0,
+        SENSOR,
+        f"the tip is {height - shape.shoulder:g} mm high, the whole sensor only {height:g} mm",
+        "Make height larger, or cone_height or tip_design smaller",
+    )
+    boards = LedBoards(
+        radius=radius - gel_thickness - 0.5 * shell_thickness,
+        depth=shell_thickness,
+        bottom=board_bottom,
+        height=board_height,
+        thickness=board_thickness,
+        leds=leds_per_group,
+    )
+    _check_boards(boards, shape, radius - gel_thickness, base_leds)
+
+    lights = boards.light_groups(light_colours, led_flux)
+    if base_ring:
+        lights["base"] = ring(base_ring, boards.radius, base_leds, led_flux)
+    epoxy = library.material("epoxy-rough")
+    assert isinstance(epoxy, Dielectric)
+    design = SensorDesign(
+        name=SENSOR,
+        description=f"GelSight360, lights {light_colours}, tip design {tip_design:g}, "
+        f"resin design {resin_design:g}",
+        coating=library.coating(coating),
+        materials={
+            GEL: library.material(GEL),
+            EPOXY: epoxy.model_copy(update={"roughness": 0.0}),
+            BLACK: Absorber(),
+        },
+        parts={
+            "skin": Part(role=Role.SENSING_SURFACE, mesh="meshes/skin.obj"),
+            "gel": Part(role=Role.ELASTOMER, mesh="meshes/gel.obj", material=GEL),
+            "shell": Part(role=Role.SUPPORT, mesh="meshes/shell.obj", material=EPOXY),
+            "boards": Part(role=Role.BLOCKER, mesh="meshes/boards.obj", material=BLACK),
+            "base": Part(role=Role.BLOCKER, mesh="meshes/base.obj", material=BLACK),
+        },
+        lights=lights,
+        camera=Camera(
+            model="ov5647-fisheye-160",
+            projection="equidistant",
+            fov=fov,
+            resolution=resolution,
+            position=(0.0, 0.0, 0.0),
+            direction=(0.0, 0.0, 1.0),
+            up=(0.0, 1.0, 0.0),
+        ),
+        provenance=_provenance(base_ring),
+    )
+    dome = 1.0 - (1.0 - flattest) * resin_design / DESIGNS
+    design.meshes.update(
+        _solids(shape, (gel_thickness, shell_thickness), dome, tessellation),
+        boards=boards.mesh(),
+    )
+    return design
+
+
+def _solids(
+    shape: TipShape, layers: tuple[float, float], dome: float, tessellation: float
+) -> dict[str, TriangleMesh]:
+    """Coating, gel, shell and the black bottom, on common points.
+
+    Args:
+        layers: mm, thickness of gel and shell.
+        dome: of the height of the innermost dome, what is left.
+    """
+    gel, shell = layers
+    outer = shape.profile(shape.edge, tessellation)
+    middle = shape.profile(shape.edge - gel, tessellation)
+    inner = shape.profile(shape.edge - gel - shell, tessellation)
+    raised = np.maximum(inner[:, 1] - shape.shoulder, 0.0)
+    inner[:, 1] -= (1.0 - dome) * raised
+    quarter = max(8, math.ceil(0.5 * math.pi * outer[0, 0] / tessellation))
+    return {
+        "skin": revolve(outer[::-1], 4 * quarter),
+        "gel": revolve(np.concatenate([outer, middle[::-1], outer[:1]]), 4 * quarter),
+        "shell": revolve(np.concatenate([middle, inner[::-1], middle[:1]]), 4 * quarter),
+        "base": revolve([outer[0], middle[0], inner[0]], 4 * quarter),
+    }
+
+
+def _check_colours(light_colours: str, base_ring: str) -> None:
+    hint = f"Give {GROUPS} letters out of R, G and B, such as GRRGGRRG"
+    require(
+        len(light_colours) == GROUPS,
+        SENSOR,
+        f"light_colours '{light_colours}' has {len(light_colours)} letters, {GROUPS} are needed",
+        hint,
+    )
+    for place, letter in enumerate(light_colours, start=1):
+        require(
+            letter in COLOURS,
+            SENSOR,
+            f"light_colours '{light_colours}' has an unknown colour '{letter}' at place {place}",
+            hint,
+        )
+    require(
+        base_ring in ("", *COLOURS),
+        SENSOR,
+        f"base_ring '{base_ring}' is no colour",
+        "Give R, G or B, or an empty text for no ring",
+    )
+
+
+def _check_layers(radius: float, edge_radius: float, gel: float, shell: float) -> None:
+    """Gel and shell must be thinner than the rounded edge, or the innermost surface folds."""
+    layers = f"gel_thickness {gel:g} mm and shell_thickness {shell:g} mm"
+    require(
+        gel + shell < radius,
+        SENSOR,
+        f"{layers} are together not thinner than the body, whose radius is {radius:g} mm",
+        "Make the shell or the gel thinner, or the radius larger",
+    )
+    require(
+        edge_radius < radius,
+        SENSOR,
+        f"edge_radius {edge_radius:g} mm is not smaller than the radius {radius:g} mm",
+        "Make edge_radius smaller or the radius larger",
+    )
+    require(
+        gel + shell < edge_radius,
+        SENSOR,
+        f"{layers} are together not thinner than edge_radius {edge_radius:g} mm, so that the "
+        "innermost surface can't follow the rounded edge",
+        "Make the shell or the gel thinner, or edge_radius larger",
+    )
+
+
+def _check_boards(boards: LedBoards, shape: TipShape, wall: float, base_leds: int) -> None:
+    """The boards must fit into the straight wall, whose outer radius is `wall` mm."""
+    narrowest = LED[0] + 2.0 * WALL_MARGIN
+    require(
+        boards.depth >= narrowest and boards.outermost <= wall - BOARD_CLEARANCE,
+        SENSOR,
+        f"the LED boards don't fit into a shell of {boards.depth:g} mm",
+        f"Make shell_thickness at least {narrowest:g} mm, the radius larger, or board_thickness "
+        "smaller",
+    )
+    top = boards.bottom + boards.height
+    require(
+        boards.bottom >= 0.5 and top <= shape.shoulder,
+        SENSOR,
+        f"the LED boards reach from z = {boards.bottom:g} to {top:g} mm, the straight wall from "
+        f"0 to {shape.shoulder:g} mm",
+        "Keep them 0.5 mm above its foot and below its end with board_bottom and board_height",
+    )
+    require(
+        boards.leds * LED[1] <= boards.height,
+        SENSOR,
+        f"{boards.leds} LEDs of {LED[1]:g} mm don't fit on a board of {boards.height:g} mm",
+        "Use fewer leds_per_group or a larger board_height",
+    )
+    pitch = 2.0 * math.pi * boards.radius / base_leds
+    require(
+        base_leds % BOARDS == 0 and pitch >= LED[1] + BOARD_CLEARANCE,
+        SENSOR,
+        f"a ring of {base_leds} LEDs is not possible",
+        "Give a multiple of 4 (so that none is below a board) and at most "
+        f"{int(2.0 * math.pi * boards.radius / (LED[1] + BOARD_CLEARANCE)) // 4 * 4}",
+    )
+
+
+def _provenance(base_ring: str) -> dict[str, Provenance]:
+    assumed, sourced, derived = Status.ASSUMED, Status.SOURCED, Status.DERIVED
+    size = (
+        "28 mm wide and 34 mm high; its own size is not published, sister sensors are 20 to 28 mm"
+    )
+    table: dict[str, tuple[Status, str]] = {
+        "coating": (
+            assumed,
+            "semi-specular with aluminium flake, as on the sister sensor RainbowSight (Tippur and "
+            "Adelson 2024); not stated for GelSight360",
+        ),
+        "materials.silicone-xp565.ior": (assumed, "the gel's silicone is not published"),
+        "materials.epoxy.ior": (
+            sourced,
+            "calibrated epoxy core of a round sensor (published code of arXiv 2012.13184)",
+        ),
+        "materials.epoxy.roughness": (assumed, "polished or clear-coated: smooth"),
+        "parts.skin": (assumed, size),
+        "parts.gel": (assumed, "3 mm; round sister sensors have 1 to 3 mm"),
+        "parts.shell": (
+            assumed,
+            "2.5 mm, room for LED boards; round sister sensors have 1 to 3 mm",
+        ),
+        "parts.boards": (
+            derived,
+            "four boards with LEDs on both faces, from eight groups whose original colours come in "
+            "equal pairs (GRRGGRRG); 12 x 1 mm and their place in the wall are assumed",
+        ),
+        "parts.base": (assumed, "black where shell and gel end"),
+        "camera.position": (assumed, "pupil in the plane where shell and gel end"),
+        "camera.projection": (assumed, "equidistant, usual for fisheye lenses"),
+        "camera.fov": (
+            derived,
+            "4/5 of the 160 degree diagonal of the camera of a sister sensor (RainbowSight)",
+        ),
+        "camera.resolution": (assumed, "half of 640 x 480, as sister sensors use"),
+    }
+    for number in range(1, GROUPS + 1):
+        table[f"lights.lg{number}"] = (
+            assumed,
+            "4 LEDs of 2 x 1.25 mm; number and order of the groups are from the OptiSense paper",
+        )
+    if base_ring:
+        table["lights.base"] = (
+            assumed,
+            "12 LEDs that shine into the shell; that there is such a ring, coupled to the shell, "
+            "is from the RainbowSight paper. Blue, because the eight groups hold red and green",
+        )
+    return {path: Provenance(status=s, source=text) for path, (s, text) in table.items()}
