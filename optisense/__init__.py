@@ -11,10 +11,10 @@ from importlib.metadata import PackageNotFoundError, version
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from optisense.design import SensorDesign, get_value, load_design, save_design, set_value
+    from optisense.design import SensorDesign, get_value, load_design, set_value
     from optisense.geometry import Contact, Cylinder, MeshIndenter, Plane, Sphere
     from optisense.optics import OpticalModel
-    from optisense.sensors import check, load
+    from optisense.sensors import check, load, save_design
 
 _HOMES = {
     "Contact": "optisense.geometry",
@@ -28,7 +28,7 @@ _HOMES = {
     "get_value": "optisense.design",
     "load": "optisense.sensors",
     "load_design": "optisense.design",
-    "save_design": "optisense.design",
+    "save_design": "optisense.sensors",
     "set_value": "optisense.design",
 }
 

@@ -23,8 +23,7 @@ def new(
     ],
 ) -> None:
     """Start a design of your own from a built-in sensor."""
-    from optisense.design import save_design
-    from optisense.sensors import build
+    from optisense.sensors import build, save_design
 
     design = build(name)
     if folder.is_file():

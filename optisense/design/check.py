@@ -106,11 +106,19 @@ def _check_lights(design: SensorDesign, light_names: Collection[str] | None) -> 
                 Problem(
                     f"light group '{name}' has an unknown model '{group.model}'",
                     design.where("lights", name, "model"),
-                    suggestion(group.model, light_names)
-                    or "Name a light of the library, or describe it under 'emitter'",
+                    unknown_light_hint(group.model, light_names),
                 )
             )
     return problems
+
+
+def unknown_light_hint(model: str, light_names: Collection[str]) -> str:
+    """What to do about a light that the library lacks; it may be known on another machine."""
+    near = suggestion(model, light_names) or "Name a light of the library"
+    return (
+        f"{near}{' ' if near.endswith('?') else '. '}If it is of somebody's own library, add it "
+        "here with `optisense library add`, or describe it in the design under 'emitter'"
+    )
 
 
 def _check_poses(design: SensorDesign, meshes: dict[str, TriangleMesh]) -> list[Problem]:

@@ -69,7 +69,8 @@ def save_design(design: SensorDesign, folder: str | Path) -> None:
     into place, design.yaml last. Other files in the folder are left alone.
 
     Raises:
-        DesignError: a part has no mesh, or two parts with different meshes share a file.
+        DesignError: a part has no mesh, or two parts with different meshes (or two light groups
+            with different IES files) share a file.
         OutputError: the folder can't be written.
     """
     folder = Path(folder)
@@ -86,11 +87,8 @@ def save_design(design: SensorDesign, folder: str | Path) -> None:
             if file not in written:
                 written.add(file)
                 design.meshes[name].save_obj(_stage(folder, file, staged))
-        for group in design.lights.values():
-            emitter = group.emitter
-            if isinstance(emitter, IesEmitter) and emitter.file not in written:
-                written.add(emitter.file)
-                _stage(folder, emitter.file, staged).write_bytes(emitter.path().read_bytes())
+        for file, data in _ies_files(design).items():
+            _stage(folder, file, staged).write_bytes(data)
         text = to_yaml(saved, HEAD)
         _stage(folder, DESIGN_FILE, staged).write_text(text, encoding="utf-8")
         for temporary, final in staged:
@@ -177,6 +175,24 @@ def _check_saveable(design: SensorDesign, files: dict[str, str]) -> None:
                 where=f"parts.{name}.mesh",
                 hint="Give each its own file",
             )
+
+
+def _ies_files(design: SensorDesign) -> dict[str, bytes]:
+    """What is in the IES files of the lights, by their paths inside the design folder."""
+    files: dict[str, bytes] = {}
+    owner: dict[str, str] = {}
+    for name, group in design.lights.items():
+        if isinstance(group.emitter, IesEmitter):
+            file, data = group.emitter.file, group.emitter.path().read_bytes()
+            first = owner.setdefault(file, name)
+            if files.setdefault(file, data) != data:
+                raise DesignError(
+                    f"light groups '{first}' and '{name}' have different lights but one file "
+                    f"'{file}'",
+                    where=f"lights.{name}.emitter.file",
+                    hint="Give each its own file",
+                )
+    return files
 
 
 def _same(one: TriangleMesh, other: TriangleMesh) -> bool:

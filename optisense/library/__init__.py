@@ -1,30 +1,43 @@
 """Materials, coatings, lights and cameras that designs can name, each number with its source."""
 
 from optisense.library import ies
-from optisense.library.entries import CameraModel, Entry, LightEntry, Source
+from optisense.library.adding import Added, add_file, add_ies, parse_colour
+from optisense.library.entries import AnyEntry, CameraModel, Entry, LightEntry, Source, TypicalLight
 from optisense.library.loader import (
     camera,
     coating,
     emitter,
     entry,
+    is_own,
     light,
     material,
     names,
 )
+from optisense.library.own_parts import own_folder
+from optisense.library.portable import with_own_lights
 from optisense.library.scattering import specularity_to_roughness
 
 __all__ = [
+    "Added",
+    "AnyEntry",
     "CameraModel",
     "Entry",
     "LightEntry",
     "Source",
+    "TypicalLight",
+    "add_file",
+    "add_ies",
     "camera",
     "coating",
     "emitter",
     "entry",
     "ies",
+    "is_own",
     "light",
     "material",
     "names",
+    "own_folder",
+    "parse_colour",
     "specularity_to_roughness",
+    "with_own_lights",
 ]

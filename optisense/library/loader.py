@@ -6,6 +6,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+from optisense.design.check import unknown_light_hint
 from optisense.design.emitters import LightModel
 from optisense.design.lights import LightGroup
 from optisense.design.materials import Coating, Material
@@ -110,7 +111,15 @@ def emitter(group: LightGroup) -> LightModel:
     Raises:
         LibraryError: the group has neither.
     """
-    return group.emitter if group.emitter is not None else light(group.model)
+    if group.emitter is not None:
+        return group.emitter
+    known = names("light")
+    if group.model not in known:
+        raise LibraryError(
+            f"a light group names the light '{group.model}', which this library lacks",
+            hint=unknown_light_hint(group.model, known),
+        )
+    return light(group.model)
 
 
 def kind_named(text: str) -> Kind:

@@ -6,7 +6,7 @@ from optisense.sensors.gelsight_mini import (
     gelsight_mini_cylindrical,
     gelsight_mini_spherical,
 )
-from optisense.sensors.registry import BUILDERS, build, check, load
+from optisense.sensors.registry import BUILDERS, build, check, load, save_design
 
 __all__ = [
     "BUILDERS",
@@ -17,4 +17,5 @@ __all__ = [
     "gelsight_mini_cylindrical",
     "gelsight_mini_spherical",
     "load",
+    "save_design",
 ]

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from optisense import library
-from optisense.design import Problem, SensorDesign, check_design, load_design
+from optisense.design import Problem, SensorDesign, check_design, load_design, storage
 from optisense.design.near import suggestion
 from optisense.design.problems import raise_problems
 from optisense.errors import DesignError
@@ -65,6 +65,18 @@ def load(name_or_folder: str | Path) -> SensorDesign:
         hint = suggestion(text, BUILDERS, limit=20)
         raise DesignError(f"there is no built-in sensor and no folder '{text}'", hint=hint)
     return load_design(path)
+
+
+def save_design(design: SensorDesign, folder: str | Path) -> None:
+    """Write a design folder that opens on any machine; see `optisense.design.save_design`.
+
+    Lights that are the user's own parts are described in the design itself, since other machines
+    don't have them.
+
+    Raises:
+        OptiSenseError: the design can't be saved, or an own part not be read.
+    """
+    storage.save_design(library.with_own_lights(design), folder)
 
 
 def check(design: SensorDesign) -> list[Problem]:

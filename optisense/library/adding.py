@@ -1,0 +1,212 @@
+"""Checking a user's own part and storing it in the user's library folder."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from pathlib import Path
+
+from optisense.design.emitters import IesEmitter
+from optisense.design.fields import Colour
+from optisense.design.ies import parse_ies
+from optisense.design.near import suggestion
+from optisense.design.sensor_design import Status
+from optisense.design.yaml_reader import read_yaml
+from optisense.errors import LibraryError
+from optisense.library.entries import AnyEntry, LightEntry, Source, TypicalLight
+from optisense.library.loader import is_own, kind_named, names
+from optisense.library.own_parts import write_own
+from optisense.library.reading import KINDS, Kind, kind_of, read_entry
+
+NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,63}")
+
+COLOURS: dict[str, Colour] = {
+    "red": (1.0, 0.0, 0.0),
+    "green": (0.0, 1.0, 0.0),
+    "blue": (0.0, 0.0, 1.0),
+    "white": (1.0, 1.0, 1.0),
+}
+"""Colours that have a name."""
+
+
+@dataclass(frozen=True)
+class Added:
+    """A part that was stored.
+
+    Attributes:
+        kind: what kind of part.
+        name: what designs call it.
+        entry: the entry.
+        file: its file in the user's folder.
+    """
+
+    kind: Kind
+    name: str
+    entry: AnyEntry
+    file: Path
+
+
+def add_file(file: str | Path, kind: str | None = None, name: str | None = None) -> Added:
+    """Add an entry from a YAML file; the IES file that it may name comes along.
+
+    Args:
+        kind: material, coating, light or camera; None finds out from the file.
+        name: what designs call it; None takes the name of the file.
+
+    Raises:
+        LibraryError: the file can't be read or is no entry (says the line), its kind can't be
+            told, or the name is taken.
+        OutputError: the user's folder can't be written.
+    """
+    file = Path(file)
+    name = file.stem if name is None else name
+    check_new_name(name)
+    data, lines = read_yaml(file, LibraryError)
+    if kind is None:
+        found = kind_of(data)
+        if found is None:
+            raise LibraryError(
+                "can't tell what kind of part this is",
+                where=f"{file}:{lines.get(('value',), 1)}",
+                hint="Name it: --kind material, coating, light or camera; a file holds one entry "
+                "with 'description', 'value' and 'sources'",
+            )
+        kind = found
+    singular = kind_named(kind)
+    entry = read_entry(singular, file)
+    ies = None
+    if isinstance(entry.value, IesEmitter):
+        ies = entry.value.path().read_bytes()
+        entry.value.file = f"{name}.ies"
+    return Added(singular, name, entry, write_own(singular, name, entry, ies))
+
+
+def add_ies(
+    file: str | Path,
+    *,
+    flux: float,
+    colour: Colour,
+    colour_name: str,
+    name: str | None = None,
+    description: str | None = None,
+    wavelength: float | None = None,
+    current: float | None = None,
+    window: tuple[float, float] | None = None,
+    package: tuple[float, float, float] | None = None,
+    source: str = "given when the light was added",
+    status: Status = Status.ASSUMED,
+    date: str | None = None,
+) -> Added:
+    """Add a light from its IES file, and what that file does not tell.
+
+    Args:
+        flux: mW, radiant.
+        colour: R, G, B, 0 to 1.
+        colour_name: what the colour is called in the entry.
+        name: what designs call the light; None takes the name of the file.
+        wavelength: nm.
+        current: mA at which the light gives its flux.
+        window: mm, width and height of its opening; it is simulated as a point all the same.
+        package: mm, width, length and height.
+        source, status, date: where these numbers are from.
+
+    Raises:
+        LibraryError: the file can't be read or is damaged (says the line), a number makes no
+            sense, or the name is taken.
+        OutputError: the user's folder can't be written.
+    """
+    file = Path(file)
+    name = file.stem if name is None else name
+    check_new_name(name)
+    data = _bytes_of(file)
+    parse_ies(data.decode("latin-1"), str(file))
+    given = Source(status=status, source=source, date=date)
+    sources = {
+        "file": Source(status=Status.SOURCED, source=_about(data) or file.name, date=date),
+        **{field: given for field, value in (("window", window), ("package", package)) if value},
+        **{
+            field: given
+            for field, value in (("wavelength", wavelength), ("current", current), ("flux", flux))
+            if value is not None
+        },
+    }
+    if flux <= 0.0 or max(colour) <= 0.0:
+        raise LibraryError("the flux and at least one value of the colour must be above 0")
+    entry = LightEntry(
+        description=description or f"Light with the IES file {file.name}",
+        value=IesEmitter(file=f"{name}.ies"),
+        package=package,
+        window=window,
+        typical={
+            colour_name: TypicalLight(
+                colour=colour, wavelength=wavelength, current=current, flux=flux
+            )
+        },
+        sources=sources,
+    )
+    return Added("light", name, entry, write_own("light", name, entry, data))
+
+
+def check_new_name(name: str) -> None:
+    """Check that a part can be given this name.
+
+    Raises:
+        LibraryError: it has other characters than letters, digits, '-' and '_', or is taken.
+    """
+    if NAME.fullmatch(name) is None:
+        raise LibraryError(
+            f"'{name}' can't be a name",
+            hint="Give one of letters, digits, '-' and '_' with --name",
+        )
+    for kind in KINDS:
+        if name in names(kind):
+            whose = "one of your own parts" if is_own(kind, name) else "built in"
+            raise LibraryError(
+                f"the library already has a {kind} '{name}' ({whose})",
+                hint="Choose another name with --name"
+                + (", or delete the old file" if is_own(kind, name) else ""),
+            )
+
+
+def parse_colour(text: str) -> tuple[str, Colour]:
+    """The name and R, G, B of a colour given as 'red', 'green', 'blue', 'white' or '1,0.5,0'.
+
+    Raises:
+        LibraryError: it is neither.
+    """
+    if text in COLOURS:
+        return text, COLOURS[text]
+    try:
+        red, green, blue = (float(word) for word in text.split(","))
+    except ValueError:
+        raise LibraryError(
+            f"'{text}' is no colour",
+            hint=suggestion(text, COLOURS) or "Give red, green, blue, white or R,G,B from 0 to 1",
+        ) from None
+    if not all(0.0 <= value <= 1.0 for value in (red, green, blue)) or red + green + blue <= 0.0:
+        raise LibraryError(
+            f"'{text}' is no colour", hint="Each value is from 0 to 1, and not all are 0"
+        )
+    return "own", (red, green, blue)
+
+
+def _bytes_of(file: Path) -> bytes:
+    try:
+        return file.read_bytes()
+    except OSError as error:
+        raise LibraryError(
+            f"can't read the IES file: {error.strerror or error}",
+            where=str(file),
+            hint="Check the path",
+        ) from error
+
+
+def _about(ies: bytes) -> str:
+    """What the header of an IES file says of where it comes from."""
+    header = ies.decode("latin-1").split("TILT=")[0]
+    words = [
+        match[1].strip()
+        for key in ("MANUFAC", "LUMCAT", "LUMINAIRE", "TEST", "TESTLAB")
+        if (match := re.search(rf"^\[{key}\](.*)$", header, re.MULTILINE))
+    ]
+    return ", ".join(word for word in words if word)[:500]

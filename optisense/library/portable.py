@@ -1,0 +1,38 @@
+"""Designs that open on any machine, though they use lights of the user's own library."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from optisense.design.emitters import IesEmitter
+from optisense.design.sensor_design import SensorDesign
+from optisense.library.loader import entry, is_own
+
+
+def with_own_lights(design: SensorDesign) -> SensorDesign:
+    """The design, or a copy of it that describes the user's own lights itself.
+
+    Materials and coatings are always copied into a design, and a camera's numbers too. A light
+    is only named; other machines know the built-in ones. So each group whose light is one of the
+    user's own gets it as its `emitter`, and saving the design copies the IES file.
+
+    Raises:
+        LibraryError: one of these lights can't be read.
+    """
+    groups = [
+        name
+        for name, group in design.lights.items()
+        if group.emitter is None and is_own("light", group.model)
+    ]
+    if not groups:
+        return design
+    result = design.copy()
+    for name in groups:
+        emitter: Any = entry("light", result.lights[name].model).value
+        if isinstance(emitter, IesEmitter):
+            # In the design it lies as in the library: lights/NAME.ies.
+            path = emitter.path()
+            emitter.file = f"{path.parent.name}/{path.name}"
+            emitter._folder = path.parent.parent
+        result.lights[name].emitter = emitter
+    return result
