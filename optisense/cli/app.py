@@ -9,6 +9,7 @@ import typer
 from optisense import __version__
 from optisense.cli import console
 from optisense.cli.check import check
+from optisense.cli.dataset import dataset
 from optisense.cli.doctor import doctor
 from optisense.cli.library import library_app
 from optisense.cli.new import new
@@ -27,6 +28,7 @@ app = typer.Typer(
 app.command()(new)
 app.command()(check)
 app.command()(render)
+app.command()(dataset)
 app.command()(doctor)
 app.add_typer(library_app, name="library")
 

@@ -1,0 +1,157 @@
+"""``optisense dataset``: labelled pictures of random contacts."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from optisense.cli.console import ends_well, messages, output
+from optisense.cli.options import DesignArgument, parse_exposure, parse_resolution, parse_variant
+from optisense.cli.progress import counting_bar
+from optisense.cli.render import ensure_writable
+
+if TYPE_CHECKING:
+    from optisense.tasks import Dataset
+
+
+@ends_well
+def dataset(
+    design: DesignArgument,
+    out: Annotated[
+        Path,
+        typer.Option(
+            "--out", "-o", metavar="DIR", help="Folder of the dataset; a new one, or one to go on."
+        ),
+    ],
+    count: Annotated[
+        int, typer.Option("--count", "-n", min=1, metavar="N", help="Samples in all.")
+    ] = 100,
+    indenter: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="KIND:SIZE",
+            help="What presses: sphere:1.5, cylinder:2,6, plane or mesh:FILE. Given several times, "
+            "each is as likely as the others.  [default: sphere:1.5]",
+            show_default=False,
+        ),
+    ] = None,
+    depth: Annotated[
+        str, typer.Option(metavar="LOW:HIGH", help="How deep, mm; drawn evenly in between.")
+    ] = "0.3:1",
+    rotation: Annotated[
+        str, typer.Option(metavar="LOW:HIGH", help="Degrees about the surface normal.")
+    ] = "0:360",
+    tilt: Annotated[
+        float,
+        typer.Option(min=0.0, max=89.0, metavar="DEGREES", help="The most it tilts, about 2 axes."),
+    ] = 0.0,
+    resolution: Annotated[
+        str | None,
+        typer.Option(
+            metavar="WIDTHxHEIGHT",
+            help="Pixels of the pictures. The camera's own when left out.",
+            show_default=False,
+        ),
+    ] = None,
+    photons: Annotated[
+        int, typer.Option(min=1, metavar="N", help="Photons of the light that all samples share.")
+    ] = 5_000_000,
+    seed: Annotated[
+        int, typer.Option(min=0, max=2**32 - 1, metavar="N", help="Of places, depths and noise.")
+    ] = 0,
+    exposure: Annotated[
+        str,
+        typer.Option(
+            metavar="auto|VALUE", help="One for all pictures; auto suits the untouched sensor."
+        ),
+    ] = "auto",
+    camera_noise: Annotated[
+        float,
+        typer.Option(
+            min=0.0,
+            max=255.0,
+            metavar="LEVELS",
+            help="Noise to add, of 255. A real GelSight Mini shows about 1.5; 0 leaves it to you.",
+        ),
+    ] = 0.0,
+    radiance: Annotated[
+        bool, typer.Option("--radiance", help="Also write linear radiance as EXR files.")
+    ] = False,
+    estimator: Annotated[
+        str,
+        typer.Option(
+            metavar="field|sppm", help="sppm is slow, and exact where plates cover the gel."
+        ),
+    ] = "field",
+    variant: Annotated[
+        str, typer.Option(metavar="auto|llvm|cuda", help="Processor (llvm) or GPU (cuda).")
+    ] = "auto",
+) -> None:
+    """Make a dataset of random contacts: pictures, depth, normals, masks and labels.
+
+    Stopped at any moment, the same command continues it. A folder that was begun with other
+    settings is left alone.
+    """
+    brightness = parse_exposure(exposure)
+    parse_variant(variant)
+    size = None if resolution is None else parse_resolution(resolution)
+    depths = parse_range(depth, "--depth")
+    rotations = parse_range(rotation, "--rotation")
+
+    from optisense.sensors import load
+    from optisense.tasks import ContactDraw, DatasetSettings, generate
+    from optisense.tasks.dataset import LABELS, Dataset
+
+    settings = DatasetSettings(
+        contacts=ContactDraw(tuple(indenter or ("sphere:1.5",)), depths, rotations, tilt),
+        resolution=size,
+        photons=photons,
+        seed=seed,
+        exposure=brightness,
+        camera_noise=camera_noise,
+        radiance=radiance,
+        estimator=estimator,
+    )
+    settings.contacts.parsed()
+    sensor = load(design)
+    ensure_writable(out)
+
+    from optisense.optics import OpticalModel
+
+    try:
+        with counting_bar("samples") as show:
+            made = generate(OpticalModel(sensor, variant), out, count, settings, show)
+    except KeyboardInterrupt:
+        if (out / LABELS).exists():
+            finished = len(Dataset.load(out))
+            messages.print(f"{finished} of {count} samples are there; the same command continues")
+        raise
+    _say_what_came(made, count)
+
+
+def parse_range(text: str, option: str) -> tuple[float, float]:
+    """Read ``LOW:HIGH`` or one number.
+
+    Raises:
+        typer.BadParameter: anything else.
+    """
+    low, _, high = text.partition(":")
+    try:
+        return float(low), float(high or low)
+    except ValueError:
+        raise typer.BadParameter(
+            f"'{text}' is not LOW:HIGH, such as 0.3:1", param_hint=option
+        ) from None
+
+
+def _say_what_came(made: Dataset, count: int) -> None:
+    failed = sum(int(row["index"]) < count for row in made.failures)
+    output.print(f"dataset: {made.folder}, {len(made)} samples", markup=False)
+    if failed:
+        output.print(
+            f"{failed} contacts could not be made; {made.folder / 'failures.csv'} says why",
+            markup=False,
+            style="yellow",
+        )

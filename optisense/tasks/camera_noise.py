@@ -1,0 +1,28 @@
+"""The noise of a sensor's camera, on the picture that it stores."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+MEASURED_NOISE = 1.5
+"""Standard deviation, in levels of 255: published ball presses of a real GelSight Mini show 1.1 to
+1.9 between frames of one press."""
+
+ByteArray = NDArray[np.uint8]
+
+
+def add_camera_noise(picture: ByteArray, noise: float, seed: int | list[int]) -> ByteArray:
+    """A picture (h, w, 3) with independent Gaussian noise on each pixel and channel.
+
+    Args:
+        picture: uint8. noise: standard deviation in levels of 255, on the encoded picture; 0 for
+            none. seed: of NumPy's default generator.
+
+    Returns:
+        uint8, rounded and clipped.
+    """
+    if noise <= 0:
+        return picture
+    change = np.random.default_rng(seed).normal(0.0, noise, picture.shape)
+    return np.clip(np.round(picture + change), 0, 255).astype(np.uint8)

@@ -1,0 +1,173 @@
+"""Random contacts: which indenter, where, how deep, and turned how."""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from optisense.errors import ContactError, TaskError
+from optisense.geometry import Contact, Indenter, Plane, Sphere, TriangleMesh, parse_contact
+from optisense.geometry.indenters import FACET_ERROR
+
+if TYPE_CHECKING:
+    from optisense.optics import ChiefRays, OpticalModel
+
+PLACES_SEEN = 320, 240
+"""Places are drawn among the points that this many rays of the camera meet."""
+
+INDENTER_FORM = "Write sphere:RADIUS, cylinder:RADIUS[,LENGTH], plane or mesh:FILE[,SCALE]"
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Tilted:
+    """An indenter turned about two axes; its lowest point then lies on the contact place.
+
+    Attributes:
+        indenter: what is turned; it must end somewhere, as all of `optisense.geometry` do.
+        tilt_x, tilt_y: degrees, about its x axis and then about its y axis.
+    """
+
+    indenter: Indenter
+    tilt_x: float
+    tilt_y: float
+
+    def mesh(self, reach: float, facet_error: float = FACET_ERROR) -> TriangleMesh:
+        """See `optisense.geometry.Indenter`: the whole indenter, turned."""
+        whole = self.indenter.mesh(np.inf, facet_error)
+        turned = whole.transformed(turn_about_x_and_y(self.tilt_x, self.tilt_y))
+        size = np.ptp(turned.bounds, axis=0).max()
+        lowest = turned.vertices[turned.vertices[:, 2] <= turned.bounds[0, 2] + 1e-6 * size]
+        place = 0.5 * (lowest.min(axis=0) + lowest.max(axis=0))
+        return TriangleMesh(turned.vertices - place, turned.faces, turned.normals)
+
+
+def tilted(indenter: Indenter, tilt_x: float, tilt_y: float) -> Indenter:
+    """An indenter turned by degrees about its x and then its y axis."""
+    if isinstance(indenter, Sphere):
+        return indenter
+    if isinstance(indenter, Plane):  # knows how to tilt: its middle stays above the place
+        return dataclasses.replace(
+            indenter, tilt_x=indenter.tilt_x + tilt_x, tilt_y=indenter.tilt_y + tilt_y
+        )
+    return Tilted(indenter, tilt_x, tilt_y)
+
+
+def turn_about_x_and_y(angle_x: float, angle_y: float) -> FloatArray:
+    """(3, 3): turns by degrees, about x and then about y."""
+    x, y = np.radians([angle_x, angle_y])
+    about_x = [[1, 0, 0], [0, np.cos(x), -np.sin(x)], [0, np.sin(x), np.cos(x)]]
+    about_y = [[np.cos(y), 0, np.sin(y)], [0, 1, 0], [-np.sin(y), 0, np.cos(y)]]
+    return np.array(about_y) @ np.array(about_x)
+
+
+def parse_indenter(text: str) -> Indenter:
+    """Read an indenter as in a contact's text, such as `sphere:1.5` or `mesh:screw.stl`.
+
+    Raises:
+        ContactError: it is none, or its numbers make no sense.
+    """
+    try:
+        return parse_contact(f"{text}@0,0:1").indenter
+    except ContactError as error:
+        hint = error.hint if error.hint and "@" not in error.hint else INDENTER_FORM
+        raise ContactError(error.message, where=f"indenter '{text}'", hint=hint) from error
+
+
+class Places:
+    """The places of a sensing surface that the camera sees, to draw from evenly by area."""
+
+    def __init__(self, rays: ChiefRays, areas: FloatArray) -> None:
+        """Args: rays: without contacts. areas: (h, w) mm^2 of surface behind each pixel."""
+        weights = np.where(rays.hit, areas, 0.0)
+        rows, columns = np.nonzero(weights > 0)
+        if not len(rows):
+            raise TaskError("the camera sees nothing of the sensing surface")
+        self._points = rays.points[rows, columns].astype(np.float64)
+        # As parts of the image's width and height, measured to the middles of pixels.
+        height, width = rays.hit.shape
+        self._spots = np.column_stack([(columns + 0.5) / width, (rows + 0.5) / height])
+        self._share = np.cumsum(weights[rows, columns])
+
+    @classmethod
+    def of(cls, model: OpticalModel) -> Places:
+        """The places that a model's camera sees."""
+        from optisense.optics.chief_rays import pixel_areas
+
+        rays = model.chief_rays(PLACES_SEEN)
+        return cls(rays, pixel_areas(rays))
+
+    def draw(self, rng: np.random.Generator) -> tuple[FloatArray, FloatArray]:
+        """A place: its point (3,) mm, and where the image shows it, (2,) parts of its size."""
+        chosen = int(np.searchsorted(self._share, rng.uniform(0.0, self._share[-1])))
+        return self._points[chosen], self._spots[chosen]
+
+
+@dataclass(frozen=True)
+class DrawnContact:
+    """A random contact and the numbers it was made from (mm, degrees)."""
+
+    contact: Contact
+    indenter: str
+    spot: tuple[float, float]
+    tilt_x: float
+    tilt_y: float
+
+
+@dataclass(frozen=True)
+class ContactDraw:
+    """What random contacts are drawn from, each quantity evenly.
+
+    Attributes:
+        indenters: texts of `parse_indenter`, each as likely as the others.
+        depth: mm, least and most.
+        rotation: degrees about the outward normal, least and most.
+        tilt: degrees; turns about two axes in the surface are drawn from -tilt to tilt.
+    """
+
+    indenters: tuple[str, ...] = ("sphere:1.5",)
+    depth: tuple[float, float] = (0.3, 1.0)
+    rotation: tuple[float, float] = (0.0, 360.0)
+    tilt: float = 0.0
+
+    def __post_init__(self) -> None:
+        if not self.indenters:
+            raise TaskError("no indenter is given", hint=INDENTER_FORM)
+        for name, (low, high) in (("depth", self.depth), ("rotation", self.rotation)):
+            if not (np.isfinite([low, high]).all() and low <= high):
+                raise TaskError(f"the {name} goes from {low:g} to {high:g}", hint="Give LOW:HIGH")
+        if self.depth[0] <= 0:
+            raise TaskError(f"the least depth is {self.depth[0]:g}", hint="Give mm above 0")
+        if not 0 <= self.tilt < 90:
+            raise TaskError(f"the tilt is {self.tilt:g}", hint="Give 0 to less than 90 degrees")
+
+    def parsed(self) -> dict[str, Indenter]:
+        """The indenters by their texts.
+
+        Raises:
+            ContactError: one can't be read.
+        """
+        return {text: parse_indenter(text) for text in self.indenters}
+
+    def draw(
+        self, indenters: dict[str, Indenter], places: Places, rng: np.random.Generator
+    ) -> DrawnContact:
+        """One contact. All numbers are drawn whether they are used or not, so that changing one
+        range leaves the others' draws alone.
+        """
+        text = self.indenters[int(rng.integers(len(self.indenters)))]
+        point, spot = places.draw(rng)
+        depth = float(rng.uniform(*self.depth))
+        rotation = float(rng.uniform(*self.rotation))
+        tilt_x, tilt_y = (float(tilt) for tilt in rng.uniform(-1.0, 1.0, 2) * self.tilt)
+        indenter = indenters[text]
+        if self.tilt:
+            indenter = tilted(indenter, tilt_x, tilt_y)
+        x, y, z = point.tolist()
+        contact = Contact(indenter, point=(x, y, z), depth=depth, rotation=rotation)
+        return DrawnContact(contact, text, (float(spot[0]), float(spot[1])), tilt_x, tilt_y)

@@ -1,0 +1,329 @@
+"""Make a dataset: random contacts, rendered and labelled, sample by sample."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable
+from contextlib import closing
+from dataclasses import asdict, dataclass, field
+from functools import partial
+from pathlib import Path
+from shutil import rmtree
+from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from optisense.design import SensorDesign, load_design, save_design
+from optisense.errors import ContactError, TaskError
+from optisense.tasks.camera_noise import add_camera_noise
+from optisense.tasks.dataset import (
+    BACKGROUND,
+    COLUMNS,
+    DESIGN,
+    FAILURES,
+    INFO,
+    LABELS,
+    NUMBER_COLUMNS,
+    SCHEMA_VERSION,
+    Dataset,
+    write_picture,
+)
+from optisense.tasks.draws import ContactDraw, DrawnContact, Places
+from optisense.tasks.records import Table, read_json, refuse_differences, write_json, write_whole
+from optisense.tasks.untouched import UntouchedSurface
+
+if TYPE_CHECKING:
+    from optisense.optics import OpticalModel, TactileImage
+
+ATTEMPTS = 20
+"""Contacts drawn for one sample before it is recorded as failed."""
+
+LEAST_PIXELS = 4
+"""A contact that shows fewer pixels counts as unseen."""
+
+FOLDERS = ("images", "arrays", "radiance", DESIGN)
+
+_CONTACT, _CAMERA = 1, 2  # what a seed is for
+
+
+@dataclass(frozen=True)
+class DatasetSettings:
+    """How samples are made. Another number of samples does not change the first ones.
+
+    Attributes:
+        contacts: what contacts are drawn from.
+        resolution: (width, height) pixels; None for the camera's own.
+        photons: of the light field that all samples share.
+        seed: of everything; sample i depends on it and on i only.
+        exposure: a factor on the radiance, or "auto": what suits the untouched sensor. One for
+            all samples, as a camera with a fixed exposure.
+        camera_noise: standard deviation in levels of 255 (see `camera_noise`); 0 leaves pictures
+            clean, so that noise can be added when they are used.
+        radiance: also write linear radiance as EXR.
+        estimator: of the light, "field" or "sppm" (see the documentation of the simulation).
+    """
+
+    contacts: ContactDraw = field(default_factory=ContactDraw)
+    resolution: tuple[int, int] | None = None
+    photons: int = 5_000_000
+    seed: int = 0
+    exposure: float | str = "auto"
+    camera_noise: float = 0.0
+    radiance: bool = False
+    estimator: str = "field"
+
+    def __post_init__(self) -> None:
+        if not 0 <= self.camera_noise < 256:
+            raise TaskError(f"the camera noise is {self.camera_noise}", hint="Give 0 to 255")
+        if self.seed < 0:
+            raise TaskError(f"the seed is {self.seed}", hint="Give 0 or more")
+
+
+def generate(
+    model: OpticalModel,
+    folder: str | Path,
+    count: int,
+    settings: DatasetSettings | None = None,
+    progress: Callable[[int, int], None] | None = None,
+) -> Dataset:
+    """Make a dataset of `count` samples, or continue one until it has that many.
+
+    Args:
+        model: the sensor.
+        folder: made if need be; nothing is written outside it.
+        count: samples in all.
+        settings: the defaults when None.
+        progress: called with the number of samples done and `count`, first with those found.
+
+    Returns:
+        The dataset. Contacts that could not be made are among its failures.
+
+    Raises:
+        TaskError: the folder holds something else, or a dataset made otherwise.
+        ContactError, MeshError: an indenter can't be read.
+        OutputError: a file can't be written.
+        KeyboardInterrupt: Ctrl-C; what is finished is kept, and calling again continues.
+    """
+    if count < 1:
+        raise TaskError(f"{count} samples are asked for", hint="Ask for 1 or more")
+    with closing(_Maker(model, Path(folder), settings or DatasetSettings())) as maker:
+        missing = [index for index in range(count) if index not in maker.done()]
+        for number, index in enumerate(missing):
+            if progress is not None:
+                progress(count - len(missing) + number, count)
+            maker.make(index)
+        if progress is not None:
+            progress(count, count)
+    return Dataset.load(folder)
+
+
+class _Maker:
+    """One dataset being made."""
+
+    def __init__(self, model: OpticalModel, folder: Path, settings: DatasetSettings) -> None:
+        self._model = model
+        self._folder = folder
+        self._settings = settings
+        self._indenters = settings.contacts.parsed()
+        for indenter in self._indenters.values():
+            indenter.mesh(1.0)  # reads mesh files, so that a wrong one is told before any work
+        width, height = settings.resolution or model.design.camera.resolution
+        self._resolution = int(width), int(height)
+        self._exposure = self._begin()
+        self._untouched = UntouchedSurface.of(model.chief_rays(self._resolution))
+        self._places = Places.of(model)
+        self._labels = Table(folder / LABELS, COLUMNS)
+        self._failures = Table(folder / FAILURES, ("index", "reason"))
+        self._sweep()
+
+    def done(self) -> set[int]:
+        """The indices that need no more work."""
+        rows = (*self._labels.rows, *self._failures.rows)
+        return {int(row["index"]) for row in rows}
+
+    def close(self) -> None:
+        """Let another process continue."""
+        self._labels.close()
+        self._failures.close()
+
+    def make(self, index: int) -> None:
+        """Make one sample, or record why it can't be made."""
+        reason = ""
+        for attempt in range(ATTEMPTS):
+            rng = np.random.default_rng([self._settings.seed, index, _CONTACT, attempt])
+            drawn = self._settings.contacts.draw(self._indenters, self._places, rng)
+            try:
+                image = self._render(drawn)
+            except ContactError as error:
+                reason = error.message
+                continue
+            if image.contact_mask.sum() >= LEAST_PIXELS:
+                self._write(index, attempt, drawn, image)
+                return
+            reason = "the camera does not see the contact"
+        self._failures.add({"index": index, "reason": reason})
+
+    def _sweep(self) -> None:
+        """Remove what a killed run left half written."""
+        for name in FOLDERS:
+            for path in (self._folder / name).glob(".*"):
+                path.unlink(missing_ok=True)
+        for path in self._folder.glob(".radiance-*"):
+            rmtree(path, ignore_errors=True)
+
+    def _begin(self) -> float:
+        """Check or write what is common to all samples; returns the exposure."""
+        common = self._common()
+        info_file = self._folder / INFO
+        if info_file.exists():
+            before = read_json(info_file)
+            known = {key: before.get(key) for key in common}
+            known["design"] = _design_values(load_design(self._folder / DESIGN))
+            now = common | {"design": _design_values(self._model.design)}
+            refuse_differences("a dataset", self._folder, known, now)
+            return float(before["exposure"])
+        if self._folder.is_dir() and any(self._folder.iterdir()):
+            # A run that ended before its first sample leaves some of these.
+            strange = {path.name for path in self._folder.iterdir()} - {*FOLDERS, BACKGROUND}
+            if any(not name.startswith(".") for name in strange):
+                raise TaskError(
+                    "the folder is not empty and holds no dataset",
+                    where=str(self._folder),
+                    hint="Name a folder that doesn't exist",
+                )
+        image = self._model.render(
+            resolution=self._resolution,
+            photons=self._settings.photons,
+            seed=self._settings.seed,
+            estimator=self._settings.estimator,
+        )
+        if image.interrupted:
+            raise KeyboardInterrupt
+        from optisense.optics.response import auto_exposure
+
+        asked = self._settings.exposure
+        exposure = float(auto_exposure(image.radiance) if asked == "auto" else asked)
+        for name in FOLDERS:
+            if name != "radiance" or self._settings.radiance:
+                (self._folder / name).mkdir(parents=True, exist_ok=True)
+        save_design(self._model.design, self._folder / DESIGN)
+        arrays = {
+            "image": image.picture(exposure),
+            "points": image.points,
+            "normals": image.normals,
+        }
+        write_whole(self._folder / BACKGROUND, partial(_save_arrays, arrays))
+        info = {
+            "schema_version": SCHEMA_VERSION,
+            **common,
+            "exposure": exposure,
+            "versions": image.settings["versions"],
+            "units": {"length": "mm", "angle": "degrees", "radiance": "mW/(mm^2 sr)"},
+            "columns": NUMBER_COLUMNS,
+        }
+        write_json(info_file, info)
+        return exposure
+
+    def _common(self) -> dict[str, Any]:
+        """What all samples share and a continued dataset must agree with."""
+        from optisense.optics.versions import versions
+
+        values = asdict(self._settings)
+        values["resolution"] = self._resolution
+        made_with = versions(self._model.variant)
+        return {
+            "design_name": self._model.design.name,
+            "made_with": {name: made_with[name] for name in ("optisense", "mitsuba")},
+            "settings": values,
+            "mesh_files": {
+                text: _file_digest(Path(str(indenter.source)))
+                for text, indenter in self._indenters.items()
+                if hasattr(indenter, "source")
+            },
+            "meshes": {
+                name: _digest(mesh.vertices.tobytes(), mesh.faces.tobytes())
+                for name, mesh in self._model.design.meshes.items()
+            },
+        }
+
+    def _render(self, drawn: DrawnContact) -> TactileImage:
+        image = self._model.render(
+            [drawn.contact],
+            resolution=self._resolution,
+            photons=self._settings.photons,
+            seed=self._settings.seed,
+            estimator=self._settings.estimator,
+        )
+        if image.interrupted:
+            raise KeyboardInterrupt
+        return image
+
+    def _write(self, index: int, attempt: int, drawn: DrawnContact, image: TactileImage) -> None:
+        settings = self._settings
+        name = f"{index:06d}"
+        picture = add_camera_noise(
+            image.picture(self._exposure), settings.camera_noise, [settings.seed, index, _CAMERA]
+        )
+        depth = self._untouched.image_depth(image)
+        arrays = {"depth": depth, "normals": image.normals, "mask": image.contact_mask}
+        write_whole(self._folder / f"images/{name}.png", lambda p: write_picture(p, picture))
+        write_whole(self._folder / f"arrays/{name}.npz", partial(_save_arrays, arrays))
+        if settings.radiance:
+            with TemporaryDirectory(prefix=".radiance-", dir=self._folder) as temporary:
+                image.save(temporary, self._exposure)
+                made = Path(temporary) / "radiance.exr"
+                made.replace(self._folder / f"radiance/{name}.exr")
+        width, height = self._resolution
+        contact = drawn.contact
+        assert contact.point is not None
+        x, y, z = contact.point
+        radius = getattr(self._indenters[drawn.indenter], "radius", None)
+        self._labels.add(
+            {
+                "file_name": f"images/{name}.png",
+                "index": index,
+                "indenter": drawn.indenter,
+                "radius": "" if radius is None else float(radius),
+                "x": x,
+                "y": y,
+                "z": z,
+                "column": drawn.spot[0] * width,
+                "row": drawn.spot[1] * height,
+                "depth": contact.depth,
+                "rotation": contact.rotation,
+                "tilt_x": drawn.tilt_x,
+                "tilt_y": drawn.tilt_y,
+                "deepest": float(np.nanmax(depth)),
+                "contact_pixels": int(image.contact_mask.sum()),
+                "attempt": attempt,
+                "arrays": f"arrays/{name}.npz",
+                "radiance": f"radiance/{name}.exr" if settings.radiance else "",
+            }
+        )
+
+
+def _save_arrays(arrays: dict[str, Any], path: Path) -> None:
+    np.savez_compressed(path, **arrays)
+
+
+def _design_values(design: SensorDesign) -> dict[str, Any]:
+    """What makes a design's pictures, without names of files and where numbers come from."""
+    values = design.model_dump(mode="json", exclude={"provenance", "description", "name"})
+    for part in values["parts"].values():
+        part.pop("mesh", None)
+    return values
+
+
+def _digest(*contents: bytes) -> str:
+    total = hashlib.sha256()
+    for content in contents:
+        total.update(content)
+    return total.hexdigest()
+
+
+def _file_digest(path: Path) -> str:
+    try:
+        return _digest(path.read_bytes())
+    except OSError as error:
+        raise TaskError(f"can't read the mesh: {error.strerror}", where=str(path)) from error

@@ -1,0 +1,201 @@
+"""Folders that grow sample by sample and survive being killed at any moment.
+
+Two rules make that so: a file is written under a temporary name and renamed when it is whole, and
+a sample exists once its row does, which is written last. `generation` and the
+samples of perception tasks both keep to them.
+"""
+
+from __future__ import annotations
+
+import csv
+import fcntl
+import io
+import json
+import os
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from optisense.errors import OutputError, TaskError
+
+MOST_SHOWN = 5
+"""Differences between settings that a message lists."""
+
+
+def write_whole(path: Path, writer: Callable[[Path], object]) -> None:
+    """Let `writer` make a file under a temporary name beside `path`, then rename it.
+
+    Raises:
+        OutputError: it can't be written.
+    """
+    temporary = path.with_name(f".{path.stem}.{os.getpid()}{path.suffix}")
+    try:
+        writer(temporary)
+        temporary.replace(path)
+    except OSError as error:
+        raise _cannot_write(path, error) from error
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+def write_json(path: Path, values: Mapping[str, Any]) -> None:
+    """Write a JSON file, whole or not at all."""
+    text = json.dumps(values, indent=2, ensure_ascii=False) + "\n"
+    write_whole(path, lambda file: file.write_text(text, encoding="utf-8"))
+
+
+def read_json(path: Path) -> dict[str, Any]:
+    """Read a JSON file that holds an object.
+
+    Raises:
+        TaskError: it is missing or no such file.
+    """
+    try:
+        values = json.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise TaskError(f"can't read it: {error.strerror}", where=str(path)) from error
+    except ValueError as error:
+        raise TaskError(f"this is not JSON: {error}", where=str(path)) from error
+    if not isinstance(values, dict):
+        raise TaskError("this JSON file holds no object", where=str(path))
+    return values
+
+
+class Table:
+    """A CSV file with named columns that grows row by row, by one process at a time."""
+
+    def __init__(self, path: Path, columns: Sequence[str]) -> None:
+        """Open it, or start it with its heading. A last row that was cut off is dropped.
+
+        Raises:
+            TaskError: the file has other columns, or another process is adding to it.
+            OutputError: it can't be written.
+        """
+        self.path = path
+        self.columns = list(columns)
+        heading = _line(self.columns)
+        try:
+            if not path.exists():
+                write_whole(path, lambda file: file.write_text(heading, "utf-8"))
+            self._file = path.open("r+b")
+            # The lock goes with the process, however that ends.
+            fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            content = self._file.read()
+            whole = content[: content.rfind(b"\n") + 1]
+            self._file.truncate(len(whole))
+            self._file.seek(len(whole))
+        except BlockingIOError as error:
+            raise TaskError(
+                "another process is adding to this folder",
+                where=str(path.parent),
+                hint="Wait for it, or name another folder",
+            ) from error
+        except OSError as error:
+            raise _cannot_write(path, error) from error
+        if not whole.startswith(heading.encode("utf-8")):
+            raise TaskError(
+                "the table has other columns than expected",
+                where=str(path),
+                hint="Another release may have written it; name another folder",
+            )
+        self.rows = read_rows(path)
+
+    def add(self, row: Mapping[str, object]) -> None:
+        """Append a row, all of it or nothing.
+
+        Raises:
+            OutputError: it can't be written.
+        """
+        text = {name: _text(row[name]) for name in self.columns}
+        before = self._file.tell()
+        try:
+            self._file.write(_line([text[name] for name in self.columns]).encode("utf-8"))
+            self._file.flush()
+            os.fsync(self._file.fileno())
+        except OSError as error:
+            self._file.truncate(before)
+            raise _cannot_write(self.path, error) from error
+        self.rows.append(text)
+
+    def close(self) -> None:
+        """Let others add to it."""
+        self._file.close()
+
+
+def read_rows(path: Path) -> list[dict[str, str]]:
+    """The rows of a CSV file as text, by column.
+
+    Raises:
+        TaskError: it can't be read.
+    """
+    try:
+        with path.open(encoding="utf-8", newline="") as file:
+            return list(csv.DictReader(file))
+    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        raise TaskError(f"can't read the table: {error}", where=str(path)) from error
+
+
+def differences(before: Mapping[str, Any], now: Mapping[str, Any], prefix: str = "") -> list[str]:
+    """What differs between two nested mappings, as "path: was A, is B", in the order of `now`."""
+    found: list[str] = []
+    for key in [*now, *(key for key in before if key not in now)]:
+        path = f"{prefix}{key}"
+        old, new = before.get(key, _NOTHING), now.get(key, _NOTHING)
+        if isinstance(old, Mapping) and isinstance(new, Mapping):
+            found += differences(old, new, path + ".")
+        elif _plain(old) != _plain(new):
+            found.append(f"{path} was {_shown(old)}, is {_shown(new)}")
+    return found
+
+
+def refuse_differences(
+    what: str, folder: Path, before: Mapping[str, Any], now: Mapping[str, Any]
+) -> None:
+    """Raise if a folder was begun with other settings.
+
+    Raises:
+        TaskError: says what differs.
+    """
+    found = differences(before, now)
+    if not found:
+        return
+    more = f" and {len(found) - MOST_SHOWN} more" if len(found) > MOST_SHOWN else ""
+    raise TaskError(
+        f"the folder holds {what} made otherwise: " + "; ".join(found[:MOST_SHOWN]) + more,
+        where=str(folder),
+        hint="Name another folder, or give the settings it was begun with to continue it",
+    )
+
+
+_NOTHING = object()
+
+
+def _plain(value: object) -> object:
+    """As JSON would give it back, so that tuples equal lists."""
+    return value if value is _NOTHING else json.loads(json.dumps(value))
+
+
+def _shown(value: object) -> str:
+    if value is _NOTHING:
+        return "nothing"
+    text = json.dumps(value, ensure_ascii=False)
+    return text if len(text) <= 60 else text[:57] + "..."
+
+
+def _text(value: object) -> str:
+    # repr gives the shortest digits that read back as the same float.
+    return repr(float(value)) if isinstance(value, float) else str(value)
+
+
+def _line(values: Sequence[str]) -> str:
+    buffer = io.StringIO()
+    csv.writer(buffer, lineterminator="\n").writerow(values)
+    return buffer.getvalue()
+
+
+def _cannot_write(path: Path, error: OSError) -> OutputError:
+    return OutputError(
+        f"can't write the results: {error.strerror or error}",
+        where=str(path),
+        hint="Free space on this disk or choose another folder; finished samples are kept",
+    )

@@ -1,0 +1,100 @@
+"""`optisense dataset`: what it makes, continues, and refuses."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from optisense.cli import app
+from optisense.tasks import Dataset
+
+SMALL = ("--resolution", "48x36", "--photons", "60000", "--seed", "5")
+
+
+def run(*arguments: str) -> tuple[int, str]:
+    result = CliRunner().invoke(app, ["dataset", *arguments])
+    assert "Traceback" not in result.output
+    return result.exit_code, result.output
+
+
+def test_a_dataset_is_made_and_continued(tmp_path: Path) -> None:
+    folder = tmp_path / "not" / "yet"
+    options = (*SMALL, "--indenter", "sphere:2", "--indenter", "cylinder:1,3", "--depth", "0.5")
+    code, text = run("gelsight-mini", "--out", str(folder), "--count", "2", *options)
+    assert code == 0, text
+    assert "2 samples" in text
+    code, text = run("gelsight-mini", "--out", str(folder), "--count", "3", *options)
+    assert code == 0, text
+    made = Dataset.load(folder)
+    assert [labels["index"] for labels in made.labels] == [0, 1, 2]
+    assert {labels["depth"] for labels in made.labels} == {0.5}
+    assert made[2].image.shape == (36, 48, 3)
+    code, text = run("gelsight-mini", "--out", str(folder), "--count", "3", *SMALL)
+    assert code == 2
+    assert "settings.contacts.indenters was" in text
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ("--count", "0"),
+        ("--depth", "deep"),
+        ("--depth", "1:0.5"),
+        ("--depth", "0:1"),
+        ("--tilt", "90"),
+        ("--indenter", "ball:1"),
+        ("--indenter", "mesh:nothing-here.stl"),
+        ("--camera-noise", "-1"),
+        ("--estimator", "guess"),
+        ("--resolution", "tall"),
+    ],
+    ids=" ".join,
+)
+def test_bad_input_exits_with_2(arguments: tuple[str, ...], tmp_path: Path) -> None:
+    code, text = run("gelsight-mini", "--out", str(tmp_path / "d"), *arguments)
+    assert code == 2, text
+    assert len(text) > 20
+
+
+COMMAND = (sys.executable, "-m", "optisense.cli", "dataset", "gelsight-mini", *SMALL)
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A dataset made in one go."""
+    folder = tmp_path_factory.mktemp("whole")
+    assert run("gelsight-mini", *SMALL, "--out", str(folder), "--count", "4")[0] == 0
+    return folder
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGKILL])
+def test_stopped_at_any_moment_it_continues_to_the_same(
+    number: int, whole: Path, tmp_path: Path
+) -> None:
+    stopped = tmp_path / "stopped"
+    command = (*COMMAND, "--out", str(stopped), "--count", "4")
+    child = subprocess.Popen(command, stderr=subprocess.PIPE, text=True, env=os.environ)
+    rows = stopped / "metadata.csv"
+    while child.poll() is None and (not rows.exists() or rows.read_bytes().count(b"\n") < 3):
+        time.sleep(0.01)  # until two samples are there
+    child.send_signal(number)
+    _, said = child.communicate(timeout=120)
+    if number == signal.SIGINT:
+        assert child.returncode == 130
+        assert "the same command continues" in said
+    assert 2 <= len(Dataset.load(stopped)) < 4
+    subprocess.run(command, check=True, capture_output=True, timeout=300)
+    assert rows.read_bytes() == (whole / "metadata.csv").read_bytes()
+    for one, other in zip(Dataset.load(stopped), Dataset.load(whole), strict=True):
+        assert np.abs(one.image.astype(int) - other.image).max() <= 1
+        assert np.array_equal(one.depth, other.depth, equal_nan=True)
+    assert not [path for path in stopped.rglob(".*") if path.is_file()]

@@ -1,0 +1,72 @@
+"""Random contacts: drawn evenly, from the seed alone, and tilted about the right axes."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from optisense import OpticalModel
+from optisense.errors import TaskError
+from optisense.geometry import Cylinder, Plane, Sphere
+from optisense.tasks.draws import ContactDraw, Places, tilted, turn_about_x_and_y
+
+
+def test_places_are_even_by_area(cylindrical_mini: OpticalModel) -> None:
+    places = Places.of(cylindrical_mini)
+    rng = np.random.default_rng(1)
+    points = np.array([places.draw(rng)[0] for _ in range(20_000)])
+    # The skin is z = 3 (1 - (x / a)^2) with a half width a; its area goes with the arc length.
+    half = 25.25 / 2
+    x = np.linspace(points[:, 0].min(), points[:, 0].max(), 2001)
+    density = np.sqrt(1 + (6 * x / half**2) ** 2)
+    share = np.cumsum(density) / density.sum()
+    drawn = np.searchsorted(np.sort(points[:, 0]), x) / len(points)
+    # Kolmogorov's bound at one in ten thousand, and the rays' spacing of 0.06 mm.
+    assert np.abs(drawn - share).max() < 2.2 / np.sqrt(len(points)) + 0.06 / 18
+    assert points[:, 1].mean() == pytest.approx(0, abs=0.15)
+
+
+def test_a_range_leaves_the_draws_of_others_alone(mini: OpticalModel) -> None:
+    places = Places.of(mini)
+    plain, tilting = ContactDraw(), ContactDraw(tilt=20, depth=(0.3, 0.6))
+    one, other = (
+        draw.draw(draw.parsed(), places, np.random.default_rng([5, 0])) for draw in (plain, tilting)
+    )
+    assert one.contact.point == other.contact.point
+    assert one.contact.rotation == other.contact.rotation
+    # The same fraction of another range.
+    assert (one.contact.depth - 0.3) / 0.7 == pytest.approx((other.contact.depth - 0.3) / 0.3)
+
+
+def test_a_tilted_cylinder_touches_with_its_end() -> None:
+    mesh = tilted(Cylinder(2.0, 6.0), 0.0, 10.0).mesh(1.0)
+    assert mesh.bounds[0, 2] == pytest.approx(0, abs=1e-9)
+    lowest = mesh.vertices[mesh.vertices[:, 2] < 1e-6]
+    assert lowest[:, :2] == pytest.approx(np.zeros_like(lowest[:, :2]), abs=1e-9)
+    # The other end of the lowest line is higher by the length times the sine.
+    along = np.array([np.cos(np.radians(10)), 0, -np.sin(np.radians(10))])
+    ends = mesh.vertices @ along
+    assert np.ptp(ends) == pytest.approx(6.0)
+    assert mesh.bounds[1, 2] == pytest.approx(
+        6 * np.sin(np.radians(10)) + 4 * np.cos(np.radians(10)), abs=0.01
+    )
+
+
+def test_balls_stay_and_plates_add_their_tilts() -> None:
+    assert tilted(Sphere(1.0), 5, 5) == Sphere(1.0)
+    assert tilted(Plane(1.0, 2.0, 8.0), 3.0, 4.0) == Plane(4.0, 6.0, 8.0)
+
+
+def test_turns_are_about_x_then_y() -> None:
+    turned = turn_about_x_and_y(90, 90) @ [0, 0, 1]
+    assert turned == pytest.approx([0, -1, 0], abs=1e-12)
+
+
+@pytest.mark.parametrize(
+    "settings",
+    [{"indenters": ()}, {"depth": (0.0, 1.0)}, {"depth": (1.0, 0.5)}, {"tilt": 90.0}],
+    ids=str,
+)
+def test_senseless_ranges_are_refused(settings: dict) -> None:
+    with pytest.raises(TaskError):
+        ContactDraw(**settings)

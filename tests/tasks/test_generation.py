@@ -1,0 +1,172 @@
+"""Datasets: what is in them is true, and however they are made they are the same."""
+
+from __future__ import annotations
+
+import shutil
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from optisense import OpticalModel, SensorDesign, load
+from optisense.errors import ContactError, TaskError
+from optisense.tasks import ContactDraw, Dataset, DatasetSettings, generate
+
+COUNT = 4
+SETTINGS = DatasetSettings(
+    contacts=ContactDraw(("sphere:1.5", "sphere:3"), depth=(0.3, 0.9)),
+    resolution=(60, 45),
+    photons=60_000,
+    seed=3,
+    camera_noise=1.5,
+    radiance=True,
+)
+
+
+@pytest.fixture(scope="module")
+def made(mini: OpticalModel, tmp_path_factory: pytest.TempPathFactory) -> Dataset:
+    """A dataset made in one go."""
+    return generate(mini, tmp_path_factory.mktemp("data") / "new", COUNT, SETTINGS)
+
+
+def files(folder: Path) -> set[str]:
+    return {str(path.relative_to(folder)) for path in folder.rglob("*") if path.is_file()}
+
+
+def assert_same(one: Dataset, other: Dataset) -> None:
+    assert files(one.folder) == files(other.folder)
+    for name in ("metadata.csv", "failures.csv"):
+        assert (one.folder / name).read_bytes() == (other.folder / name).read_bytes()
+    for a, b in zip(one, other, strict=True):
+        # The renderer adds up millions of numbers in any order: a level may round otherwise.
+        assert np.abs(a.image.astype(int) - b.image).max() <= 1
+        assert (a.image != b.image).mean() < 0.01
+        for name in ("depth", "normals", "mask"):
+            assert np.array_equal(getattr(a, name), getattr(b, name), equal_nan=True)
+
+
+def test_labels_are_true(made: Dataset, mini: OpticalModel) -> None:
+    assert len(made) == COUNT
+    rays = mini.chief_rays((60, 45))
+    for sample in made:
+        labels = sample.labels
+        # The deepest point of a ball is its tip, at the place that was drawn.
+        assert labels["indenter"] == f"sphere:{labels['radius']:g}"
+        assert 0.3 <= labels["depth"] <= 0.9
+        assert labels["deepest"] <= labels["depth"] + 1e-3
+        row, column = int(labels["row"]), int(labels["column"])
+        place = np.array([labels["x"], labels["y"], labels["z"]])
+        # A pixel of these pictures is 0.31 mm.
+        assert np.linalg.norm(rays.points[row, column] - place) < 0.31
+        assert labels["contact_pixels"] == sample.mask.sum()
+
+
+def test_depth_normals_and_mask_describe_the_ball(made: Dataset) -> None:
+    points = made.background()["points"]
+    for sample in made:
+        radius, depth = sample.labels["radius"], sample.labels["depth"]
+        assert (sample.depth[~sample.mask] == 0).all()
+        assert (sample.depth[sample.mask] > 0).all()
+        # On a flat gel (z = 0, out is +z) a ball's depth follows from its normal.
+        height = -sample.normals[..., 2][sample.mask]
+        expected = depth - radius * (1 - height)
+        assert sample.depth[sample.mask] == pytest.approx(expected, abs=4e-3)
+        assert sample.normals[~sample.mask] == pytest.approx(
+            np.broadcast_to([0, 0, -1], points.shape)[~sample.mask], abs=1e-5
+        )
+
+
+def test_noise_of_the_camera_is_all_that_it_changes(
+    made: Dataset, mini: OpticalModel, tmp_path: Path
+) -> None:
+    clean = generate(mini, tmp_path / "clean", 1, replace(SETTINGS, camera_noise=0.0))[0]
+    change = made[0].image.astype(float) - clean.image
+    inside = (clean.image > 10) & (clean.image < 245)
+    # Rounding adds 1 / sqrt(12).
+    assert change[inside].std() == pytest.approx(np.hypot(1.5, 12**-0.5), rel=0.05)
+    assert np.array_equal(made[0].depth, clean.depth)
+    assert (made.folder / "radiance" / "000000.exr").stat().st_size > 1000
+
+
+def test_an_interrupted_dataset_continues_to_the_same(
+    made: Dataset, mini: OpticalModel, tmp_path: Path
+) -> None:
+    def press(done: int, count: int) -> None:
+        if done == 2:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        generate(mini, tmp_path / "a", COUNT, SETTINGS, press)
+    assert len(Dataset.load(tmp_path / "a")) == 2
+    # As if killed while the next sample was being written.
+    (tmp_path / "a" / "images" / "000002.png").write_bytes(b"half a pict")
+    with (tmp_path / "a" / "metadata.csv").open("a") as file:
+        file.write("images/000002.png,2,sphe")
+    # Another model, as a new process would have.
+    assert_same(
+        generate(OpticalModel(load("gelsight-mini")), tmp_path / "a", COUNT, SETTINGS), made
+    )
+
+
+def test_a_smaller_dataset_is_the_beginning_of_a_larger_one(
+    made: Dataset, mini: OpticalModel, tmp_path: Path
+) -> None:
+    small = generate(mini, tmp_path / "b", 1, SETTINGS)
+    assert small.labels == made.labels[:1]
+    shutil.copytree(small.folder, tmp_path / "c")
+    assert_same(generate(mini, tmp_path / "c", COUNT, SETTINGS), made)
+
+
+def test_other_settings_and_other_designs_are_refused(made: Dataset, mini: OpticalModel) -> None:
+    with pytest.raises(TaskError, match=r"settings\.seed was 3, is 4"):
+        generate(mini, made.folder, COUNT, replace(SETTINGS, seed=4))
+    with pytest.raises(TaskError, match=r"settings\.contacts\.tilt was 0\.0, is 5"):
+        contacts = replace(SETTINGS.contacts, tilt=5)
+        generate(mini, made.folder, COUNT, replace(SETTINGS, contacts=contacts))
+    shiny = load("gelsight-mini")
+    shiny.coating.specularity = 0.4
+    with pytest.raises(TaskError, match=r"coating\.specularity was 0\.0, is 0\.4"):
+        generate(OpticalModel(shiny), made.folder, COUNT, SETTINGS)
+    assert len(Dataset.load(made.folder)) == COUNT
+
+
+def test_where_numbers_come_from_does_not_matter(made: Dataset) -> None:
+    same: SensorDesign = load("gelsight-mini")
+    same.provenance.clear()
+    assert len(generate(OpticalModel(same), made.folder, COUNT, SETTINGS)) == COUNT
+
+
+def test_the_design_lies_beside_its_pictures(made: Dataset) -> None:
+    assert load(made.folder / "design").coating == load("gelsight-mini").coating
+
+
+def test_a_folder_with_other_things_in_it_is_left_alone(mini: OpticalModel, tmp_path: Path) -> None:
+    (tmp_path / "thesis.txt").write_text("mine")
+    with pytest.raises(TaskError, match="not empty"):
+        generate(mini, tmp_path, 1, SETTINGS)
+    assert files(tmp_path) == {"thesis.txt"}
+
+
+def test_contacts_that_cannot_be_made_are_recorded(mini: OpticalModel, tmp_path: Path) -> None:
+    deep = replace(SETTINGS, contacts=ContactDraw(("sphere:9",), depth=(5, 6)), radiance=False)
+    dataset = generate(mini, tmp_path / "d", 2, deep)
+    assert len(dataset) == 0
+    assert [row["index"] for row in dataset.failures] == ["0", "1"]
+    assert "mm thick" in dataset.failures[0]["reason"]
+
+
+def test_a_missing_mesh_is_told_before_anything_is_written(
+    mini: OpticalModel, tmp_path: Path
+) -> None:
+    settings = replace(SETTINGS, contacts=ContactDraw((f"mesh:{tmp_path / 'no.stl'}",)))
+    with pytest.raises(Exception, match=r"no\.stl"):
+        generate(mini, tmp_path / "e", 1, settings)
+    with pytest.raises(ContactError, match="kind of indenter"):
+        generate(mini, tmp_path / "e", 1, replace(SETTINGS, contacts=ContactDraw(("ball",))))
+    assert not (tmp_path / "e").exists()
+
+
+def test_a_folder_without_a_dataset_is_an_error(tmp_path: Path) -> None:
+    with pytest.raises(TaskError, match="no dataset"):
+        Dataset.load(tmp_path)

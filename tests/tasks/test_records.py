@@ -1,0 +1,74 @@
+"""Tables that are killed at any byte, and settings that are compared."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from optisense.errors import TaskError
+from optisense.tasks.records import Table, differences, read_json, refuse_differences
+
+COLUMNS = ("name", "value")
+ROWS = [{"name": 'a, "quoted" word', "value": 0.1}, {"name": "b", "value": 1 / 3}]
+
+
+def filled(path: Path) -> Table:
+    table = Table(path, COLUMNS)
+    for row in ROWS:
+        table.add(row)
+    table.close()
+    return table
+
+
+def test_numbers_and_words_come_back(tmp_path: Path) -> None:
+    filled(tmp_path / "t.csv")
+    rows = Table(tmp_path / "t.csv", COLUMNS).rows
+    assert [(row["name"], float(row["value"])) for row in rows] == [
+        (row["name"], row["value"]) for row in ROWS
+    ]
+
+
+def test_cut_off_anywhere_it_continues_to_the_same_file(tmp_path: Path) -> None:
+    filled(tmp_path / "whole.csv")
+    content = (tmp_path / "whole.csv").read_bytes()
+    for length in range(len("name,value\n"), len(content)):
+        path = tmp_path / "cut.csv"
+        path.write_bytes(content[:length])
+        table = Table(path, COLUMNS)
+        for row in ROWS[len(table.rows) :]:
+            table.add(row)
+        table.close()
+        assert path.read_bytes() == content
+
+
+def test_two_writers_are_refused(tmp_path: Path) -> None:
+    first = Table(tmp_path / "t.csv", COLUMNS)
+    with pytest.raises(TaskError, match="another process"):
+        Table(tmp_path / "t.csv", COLUMNS)
+    first.close()
+    Table(tmp_path / "t.csv", COLUMNS).close()
+
+
+def test_other_columns_are_refused(tmp_path: Path) -> None:
+    filled(tmp_path / "t.csv")
+    with pytest.raises(TaskError, match="other columns"):
+        Table(tmp_path / "t.csv", ("name",))
+
+
+def test_differences_name_the_path_and_both_values() -> None:
+    before = {"a": 1, "b": {"c": [1, 2], "d": "x"}, "gone": True}
+    now = {"a": 1, "b": {"c": (1, 2), "d": "y"}, "new": None}
+    assert differences(before, now) == [
+        'b.d was "x", is "y"',
+        "new was nothing, is null",
+        "gone was true, is nothing",
+    ]
+    with pytest.raises(TaskError, match="and 2 more"):
+        refuse_differences("things", Path(), {}, {str(n): n for n in range(7)})
+
+
+def test_json_that_is_none_is_told(tmp_path: Path) -> None:
+    (tmp_path / "a.json").write_text("{")
+    with pytest.raises(TaskError, match="not JSON"):
+        read_json(tmp_path / "a.json")
