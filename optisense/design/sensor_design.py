@@ -189,6 +189,18 @@ class SensorDesign(Model):
         """An independent design; the meshes, which never change, are shared."""
         return self._replaced(self.model_dump(mode="json"))
 
+    def _repr_html_(self) -> str:
+        """A labelled section, for notebooks."""
+        from html import escape
+
+        from optisense.design.section_drawing import section_svg
+
+        try:
+            drawing = section_svg(self)
+        except (DesignError, KeyError, ValueError):  # half-made: parts without meshes
+            drawing = escape(", ".join(f"{n} ({p.role.value})" for n, p in self.parts.items()))
+        return f"<div><b>{escape(self.name)}</b><br>{drawing}</div>"
+
     def where(self, *path: str | int) -> str:
         """File and line of a value when the design was read from a file, else its dotted path."""
         if self._source is None:

@@ -71,6 +71,12 @@ class TactileImage:
         """(h, w, 3) uint8: exposed, saturated and sRGB-encoded."""
         return picture(self.radiance, exposure)
 
+    def _repr_png_(self) -> bytes:
+        """The exposed picture as a PNG file, for notebooks."""
+        stream = mi.MemoryStream()
+        mi.Bitmap(self.picture()).write(stream, mi.Bitmap.FileFormat.PNG)
+        return bytes(stream.raw_buffer())
+
     def save(self, folder: str | Path, exposure: float | str = "auto") -> None:
         """Write image.png, radiance.exr, normals.npy, contact_mask.npy, layers/*.exr and run.json.
 

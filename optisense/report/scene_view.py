@@ -9,23 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from optisense.design import LightGroup, SensorDesign
+from optisense.design.looks import ROLE_LOOKS
 from optisense.errors import OptiSenseError
 from optisense.geometry import TriangleMesh
 from optisense.report.edges import feature_edges
 
 CREASE = 35.0
 """Edges sharper than this (degrees) are drawn and not shaded smoothly."""
-
-ROLE_LOOKS: dict[str, tuple[str, float]] = {
-    "sensing_surface": ("#8d99a6", 0.55),
-    "elastomer": ("#f2a65a", 0.28),
-    "support": ("#6fb7e9", 0.24),
-    "mirror": ("#cfd8e3", 0.75),
-    "blocker": ("#3b3f46", 1.0),
-    "interface": ("#b7a6f2", 0.3),
-    "indenter": ("#b9a44c", 1.0),
-}
-"""Colour and opacity of each role, shown in the legend."""
 
 MAX_TRIANGLES = 400_000
 """More are not put into a page: a browser would stall on them."""

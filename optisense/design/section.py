@@ -1,0 +1,164 @@
+"""A section through a design: the outlines of its parts in a plane through the camera."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from optisense.design.parts import Role
+from optisense.geometry import TriangleMesh
+
+if TYPE_CHECKING:
+    from optisense.design.sensor_design import SensorDesign
+
+FloatArray = NDArray[np.float64]
+
+OFF_VERTICES = 1e-7
+"""mm: vertices that lie in the plane are taken to lie this far above it."""
+
+
+class Outline(NamedTuple):
+    """A part cut by the plane.
+
+    Attributes:
+        name: of the part.
+        role: of the part.
+        lines: polylines (n, 2), mm; of a solid, closed ones whose last point is the first.
+    """
+
+    name: str
+    role: Role
+    lines: list[FloatArray]
+
+
+@dataclass(frozen=True)
+class Section:
+    """What a plane through the camera cuts, in coordinates (across, along the view) in mm.
+
+    Attributes:
+        outlines: parts that the plane meets, in the design's order.
+        missed: names of parts that it does not meet.
+        lights: (k, 2) places of each light group, moved into the plane.
+        colours: of the light groups, channels 0..1.
+        camera: (2,) place of the pupil.
+        half_angle: degrees between the view and its border in the plane.
+        across, along: (3,) unit vectors of the plane in the design's frame.
+    """
+
+    outlines: list[Outline]
+    missed: list[str]
+    lights: dict[str, FloatArray]
+    colours: dict[str, tuple[float, float, float]]
+    camera: FloatArray
+    half_angle: float
+    across: FloatArray
+    along: FloatArray
+
+    @property
+    def bounds(self) -> FloatArray:
+        """(2, 2) mm: lowest and highest coordinates of parts, lights and camera."""
+        points = [line for outline in self.outlines for line in outline.lines]
+        points += [*self.lights.values(), self.camera[None]]
+        every = np.concatenate(points)
+        return np.array([every.min(axis=0), every.max(axis=0)])
+
+
+def section(design: SensorDesign) -> Section:
+    """Cut a design by the plane through the camera's axis along which more of it is sensed.
+
+    The plane holds the viewing direction, and image right or image up: the one in which the
+    sensing surface is longer.
+    """
+    camera = design.camera
+    right, up, forward = camera.axes()
+    origin = np.asarray(camera.position, dtype=np.float64)
+    meshes = design.deformed_meshes()
+    sensed = [meshes[name].vertices for name in design.parts_of(Role.SENSING_SURFACE)]
+    points = np.concatenate(sensed) if sensed else design.bounds()
+    across = right if np.ptp(points @ right) >= np.ptp(points @ up) else up
+    normal = np.cross(across, forward)
+    width, height = camera.resolution
+    share = 1.0 if across is right else height / width
+    half = np.radians(camera.fov / 2)
+    if camera.projection == "equidistant":
+        half_angle = share * half
+    else:
+        half_angle = np.arctan(share * np.tan(half))
+
+    def flat(places: FloatArray) -> FloatArray:
+        return np.stack([places @ across, places @ forward], axis=-1)
+
+    outlines, missed = [], []
+    for name, mesh in meshes.items():
+        lines = [flat(line) for line in cut(mesh, origin, normal)]
+        if lines:
+            outlines.append(Outline(name, design.parts[name].role, lines))
+        else:
+            missed.append(name)
+    lights = {
+        name: flat(np.array([light.position for light in group.lights], dtype=np.float64))
+        for name, group in design.lights.items()
+        if group.lights
+    }
+    return Section(
+        outlines=outlines,
+        missed=missed,
+        lights=lights,
+        colours={name: design.lights[name].colour for name in lights},
+        camera=flat(origin),
+        half_angle=float(np.degrees(half_angle)),
+        across=across,
+        along=forward,
+    )
+
+
+def cut(mesh: TriangleMesh, origin: FloatArray, normal: FloatArray) -> list[FloatArray]:
+    """Where a plane cuts a mesh.
+
+    Args:
+        mesh: open or closed.
+        origin: (3,) mm, a point of the plane.
+        normal: (3,) of the plane.
+
+    Returns:
+        Polylines (n, 3) mm; closed ones repeat their first point at the end.
+    """
+    welded = mesh.welded()
+    height = (welded.vertices - origin) @ normal
+    height = np.where(np.abs(height) < OFF_VERTICES, OFF_VERTICES, height)
+    faces = welded.faces.astype(np.int64)
+    above = height[faces] > 0
+    crossed = np.flatnonzero(above.any(axis=1) & ~above.all(axis=1))
+    edges = faces[crossed][:, [[0, 1], [1, 2], [2, 0]]]
+    splits = above[crossed] != np.roll(above[crossed], -1, axis=1)
+    pairs = np.sort(edges[splits].reshape(-1, 2, 2), axis=2)  # the two crossed edges of each face
+    if not len(pairs):
+        return []
+    unique, numbers = np.unique(pairs.reshape(-1, 2), axis=0, return_inverse=True)
+    a, b = unique.T
+    share = (height[a] / (height[a] - height[b]))[:, None]
+    points = welded.vertices[a] + share * (welded.vertices[b] - welded.vertices[a])
+    return [points[chain] for chain in _chains(numbers.reshape(-1, 2))]
+
+
+def _chains(links: NDArray[np.int64]) -> list[list[int]]:
+    """Join links (k, 2) between numbered points into chains; ends of open ones come first."""
+    beside: dict[int, list[int]] = {}
+    for one, other in links.tolist():
+        beside.setdefault(one, []).append(other)
+        beside.setdefault(other, []).append(one)
+    starts = [point for point, others in beside.items() if len(others) == 1]
+    chains = []
+    for start in [*starts, *list(beside)]:
+        while beside[start]:
+            chain = [start]
+            while beside[chain[-1]]:
+                here = chain[-1]
+                there = beside[here].pop()
+                beside[there].remove(here)
+                chain.append(there)
+            chains.append(chain)
+    return chains

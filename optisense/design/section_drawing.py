@@ -1,0 +1,174 @@
+"""A section as a labelled drawing: SVG text, for notebooks and reports."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from html import escape
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from optisense.design.looks import ROLE_LOOKS
+from optisense.design.parts import Role
+from optisense.design.section import Section, section
+
+if TYPE_CHECKING:
+    from optisense.design.sensor_design import SensorDesign
+
+FloatArray = NDArray[np.float64]
+
+WIDTH, LABELS, MARGIN, LINE = 440.0, 190.0, 24.0, 17.0
+"""Pixels: of the drawing and the labels beside it, around both, and between labels."""
+
+TALLEST = 520.0
+INK = "#1c232b"
+
+
+class _Label(NamedTuple):
+    text: str
+    x: float
+    y: float
+
+
+def section_svg(design: SensorDesign) -> str:
+    """A labelled section through a design as an SVG element.
+
+    The camera's view runs upward. Lights are moved into the plane of the section.
+    """
+    found = section(design)
+    low, high = found.bounds
+    size = np.maximum(high - low, 1e-6)
+    scale = float(min(WIDTH / size[0], TALLEST / size[1]))
+    width, height = scale * size
+
+    def place(points: FloatArray) -> FloatArray:
+        shifted = (points - low) * scale
+        return np.stack(
+            [MARGIN + shifted[..., 0], MARGIN + height - shifted[..., 1]], axis=-1
+        )  # fmt: skip
+
+    shapes, labels = [], []
+    for outline in found.outlines:
+        colour, alpha = ROLE_LOOKS.get(outline.role.value, ("#999999", 1.0))
+        lines = [place(line) for line in outline.lines]
+        solid = outline.role is not Role.SENSING_SURFACE and all(
+            np.array_equal(line[0], line[-1]) for line in lines
+        )
+        path = " ".join(_path(line) for line in lines)
+        if solid:
+            shapes.append(
+                f'<path d="{path}" fill="{colour}" fill-opacity="{max(alpha, 0.35)}" '
+                f'fill-rule="evenodd" stroke="{INK}" stroke-width="0.7"/>'
+            )
+        else:
+            shapes.append(f'<path d="{path}" fill="none" stroke="{INK}" stroke-width="2.2"/>')
+        x, y = _anchor(lines, solid)
+        labels.append(_Label(outline.name.replace("_", " "), x, y))
+    shapes += _camera(found, place, scale)
+    x, y = place(found.camera)
+    labels.append(_Label(f"camera, {design.camera.fov:.3g}° across", x, y))
+    for name, spots in found.lights.items():
+        middles = place(spots)
+        r, g, b = (round(255 * min(1.0, value)) for value in found.colours[name])
+        shapes += [
+            f'<circle cx="{x:.1f}" cy="{y:.1f}" r="3.2" fill="rgb({r},{g},{b})" '
+            f'stroke="{INK}" stroke-width="0.7"/>'
+            for x, y in middles
+        ]
+        x, y = middles[middles[:, 0].argmax()]
+        labels.append(_Label(f"{name} lights", x, y))
+
+    column = 2 * MARGIN + width
+    tall = max(height + 2 * MARGIN, LINE * len(labels) + 2 * MARGIN) + 16
+    shapes += _labels(labels, column, tall - 16)
+    shapes.append(_scale_bar(scale, width, tall))
+    whole = column + LABELS
+    return (
+        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {whole:.0f} {tall:.0f}" '
+        f'width="{whole:.0f}" height="{tall:.0f}" role="img" '
+        f'aria-label="section through {escape(design.name, quote=True)}" '
+        'style="background:#fff;max-width:100%;height:auto;font:12px sans-serif">'
+        + "".join(shapes)
+        + "</svg>"
+    )
+
+
+def _path(line: FloatArray) -> str:
+    """SVG path data of a polyline, closed if its last point is its first."""
+    closed = len(line) > 2 and np.array_equal(line[0], line[-1])
+    points = line[:-1] if closed else line
+    return "M" + "L".join(f"{x:.1f} {y:.1f}" for x, y in points) + ("Z" if closed else "")
+
+
+def _anchor(lines: list[FloatArray], solid: bool) -> tuple[float, float]:
+    """Where a label's line ends: well inside a solid, on its right; else on the outline."""
+    points = np.concatenate(lines)
+    if not solid:
+        x, y = points[points[:, 0].argmax()]
+        return float(x), float(y)
+    best = 0.0
+    x, y = points.mean(axis=0)
+    low, high = points[:, 1].min(), points[:, 1].max()
+    for level in np.linspace(low, high, 9)[1:-1] + 1e-6:
+        ends: list[float] = []
+        for line in lines:
+            one, other = line[:-1], line[1:]
+            crosses = (one[:, 1] > level) != (other[:, 1] > level)
+            a, b = one[crosses], other[crosses]
+            ends += list(a[:, 0] + (level - a[:, 1]) / (b[:, 1] - a[:, 1]) * (b[:, 0] - a[:, 0]))
+        ends.sort()
+        for left, right in zip(ends[::2], ends[1::2], strict=False):
+            if right - left > best:
+                best, x, y = right - left, right - 0.12 * (right - left), level
+    return float(x), float(y)
+
+
+def _labels(labels: list[_Label], column: float, tall: float) -> list[str]:
+    """Labels in a column, in the order of their anchors and near them, with lines to these."""
+    ordered = sorted(labels, key=lambda label: (label.y, -label.x))
+    wanted = np.array([label.y for label in ordered])
+    spots = np.maximum.accumulate(wanted - LINE * np.arange(len(wanted)))
+    spots = spots + LINE * np.arange(len(wanted))
+    over = max(0.0, float(spots[-1]) - (tall - MARGIN))
+    # Push up from the bottom whatever would run out of the drawing.
+    limit = spots[-1] - over - LINE * np.arange(len(spots))[::-1]
+    spots = np.minimum(spots, limit)
+    shapes = []
+    for label, y in zip(ordered, spots, strict=True):
+        shapes.append(
+            f'<path d="M{label.x:.1f} {label.y:.1f}L{column - 6:.1f} {y:.1f}" fill="none" '
+            f'stroke="{INK}" stroke-width="0.5" stroke-opacity="0.7"/>'
+            f'<circle cx="{label.x:.1f}" cy="{label.y:.1f}" r="1.5" fill="{INK}"/>'
+            f'<text x="{column:.1f}" y="{y + 4:.1f}" fill="{INK}">{escape(label.text)}</text>'
+        )
+    return shapes
+
+
+def _camera(
+    found: Section, place: Callable[[FloatArray], FloatArray], scale: float
+) -> list[str]:
+    """The pupil and the borders of the view, a few millimetres long."""
+    x, y = place(found.camera)
+    angle = np.radians(min(found.half_angle, 120.0))
+    length = 0.25 * scale * float(np.ptp(found.bounds[:, 1]))
+    shapes = [
+        f'<path d="M{x:.1f} {y:.1f}l{side * length * np.sin(angle):.1f} '
+        f'{-length * np.cos(angle):.1f}" stroke="{INK}" stroke-width="0.8" '
+        'stroke-dasharray="4 3" fill="none"/>'
+        for side in (-1, 1)
+    ]
+    shapes.append(f'<circle cx="{x:.1f}" cy="{y:.1f}" r="4" fill="{INK}"/>')
+    return shapes
+
+
+def _scale_bar(scale: float, width: float, tall: float) -> str:
+    """A bar of a round length near a fifth of the drawing's width."""
+    ideal = width / scale / 5
+    power = 10.0 ** np.floor(np.log10(ideal))
+    length = max(step * power for step in (1, 2, 5) if step * power <= ideal)
+    x, y = MARGIN, tall - 12
+    return (
+        f'<path d="M{x:.1f} {y:.1f}h{length * scale:.1f}" stroke="{INK}" stroke-width="2"/>'
+        f'<text x="{x + length * scale + 6:.1f}" y="{y + 4:.1f}" fill="{INK}">{length:g} mm</text>'
+    )
