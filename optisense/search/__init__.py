@@ -1,1 +1,1 @@
-"""Find a better design: spaces of parameters, methods that search them, studies that keep it all."""
+"""Find a better design: spaces of parameters, methods that search them, studies that keep all."""
