@@ -6,6 +6,7 @@ from optisense.sensors.gelsight_mini import (
     gelsight_mini_cylindrical,
     gelsight_mini_spherical,
 )
+from optisense.sensors.gelsight_svelte import gelsight_svelte
 from optisense.sensors.registry import BUILDERS, build, check, load, save_design
 
 __all__ = [
@@ -16,6 +17,7 @@ __all__ = [
     "gelsight_mini",
     "gelsight_mini_cylindrical",
     "gelsight_mini_spherical",
+    "gelsight_svelte",
     "load",
     "save_design",
 ]

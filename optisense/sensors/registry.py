@@ -16,12 +16,14 @@ from optisense.sensors.gelsight_mini import (
     gelsight_mini_cylindrical,
     gelsight_mini_spherical,
 )
+from optisense.sensors.gelsight_svelte import gelsight_svelte
 
 BUILDERS: dict[str, Callable[[], SensorDesign]] = {
     "gelsight360": gelsight360,
     "gelsight-mini": gelsight_mini,
     "gelsight-mini-cylindrical": gelsight_mini_cylindrical,
     "gelsight-mini-spherical": gelsight_mini_spherical,
+    "gelsight-svelte": gelsight_svelte,
 }
 """Built-in sensors: a function that makes each with its default dimensions."""
 

@@ -1,0 +1,256 @@
+"""GelSight Svelte: a finger whose one camera sees the whole palm over a flat and a curved mirror.
+
+Frame: origin at the camera's entrance pupil, x from the back of the finger to its palm, z from the
+base to the tip, y across. Light from the palm goes to the curved mirror M1 on the back, to the
+flat mirror M2 under the palm, and into the camera.
+
+No drawing of the sensor is published. The side view was measured from an animation on its first
+author's web site, to about a pixel, at an assumed scale of 0.70 mm a pixel. What is derived from
+it, and what is assumed, is marked in the design.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from optisense import library
+from optisense.design import (
+    Cage,
+    Camera,
+    LightGroup,
+    Part,
+    Role,
+    SensorDesign,
+    Share,
+)
+from optisense.design.cage import as_points
+from optisense.errors import DesignError
+from optisense.geometry import TriangleMesh
+from optisense.geometry.cage import cage_points
+from optisense.sensors.dimensions import require, require_positive
+from optisense.sensors.shapes import ribbon, row_of_lights, strip
+from optisense.sensors.svelte_body import check_mirrors, housing
+from optisense.sensors.svelte_profile import (
+    CurvedMirror,
+    FlatMirror,
+    Palm,
+    Points,
+)
+from optisense.sensors.svelte_sources import provenance
+
+NAME = "gelsight-svelte"
+GEL, MIRROR = "silicone-xp565", "mirror-silver"
+
+PALM_OUTLINE = (
+    (25.6, 22.0), (22.6, 32.6), (20.3, 41.7), (18.4, 49.3), (17.5, 54.6), (17.4, 59.2),
+    (18.1, 67.6), (19.2, 76.6), (20.3, 84.6), (19.2, 89.5), (15.3, 92.4),
+)  # fmt: skip
+"""(x, z) mm: the palm from base to tip."""
+
+BACK_OUTLINE = (
+    (-9.0, -7.7), (-9.0, 5.0), (-1.7, 10.2), (-2.9, 14.4), (-4.8, 26.5), (-5.7, 35.6),
+    (-5.7, 43.3), (-4.1, 56.9), (-1.3, 72.9), (2.9, 85.0), (6.6, 93.0),
+)  # fmt: skip
+"""(x, z) mm: the back from the bottom of the base to the tip."""
+
+
+def gelsight_svelte(
+    *,
+    palm_outline: Points = PALM_OUTLINE,
+    back_outline: Points = BACK_OUTLINE,
+    gel_thickness: float = 3.5,
+    gel_width: float = 20.0,
+    m1_ends: Points = ((5.8, 13.3), (10.4, 88.2)),
+    m1_sagitta: float = 5.5,
+    m1_width: float = 22.0,
+    m1_grid: tuple[int, int] = (168, 45),
+    clearance: float = 0.5,
+    m2_bottom: tuple[float, float] = (16.7, -2.8),
+    m2_tilt: float = 22.4,
+    m2_length: float | None = None,
+    m2_width: float = 18.0,
+    fov: float | None = None,
+    resolution: tuple[int, int] = (320, 240),
+    leds_per_side: int = 8,
+    led_pitch: float = 8.0,
+    led_gap: float = 0.2,
+    led_flux: float = 10.0,
+    tip_leds: int = 0,
+    coating: str = "diffuse-grey",
+    tessellation: float = 0.5,
+) -> SensorDesign:
+    """A GelSight Svelte.
+
+    The mirror M1 is stored flat. Its cage of 27 points takes it from flat (`c_min`) to the
+    largest curvature that keeps `clearance` from the skin (`c_max`, found from the shapes), with
+    its middle at rest; `blend` is set so that it has the measured curvature, `m1_sagitta`.
+
+    Args:
+        palm_outline: (x, z) mm, points of the coated face of the skin, from base to tip.
+        back_outline: (x, z) mm, corners of the body's back, from base to tip.
+        gel_thickness: mm.
+        gel_width: mm, of gel and skin.
+        m1_ends: (x, z) mm, ends of M1 at the base and at the tip, when bent by `m1_sagitta`.
+        m1_sagitta: mm, how far the middle of M1 lies behind the chord between its ends.
+        m1_width: mm.
+        m1_grid: vertices of M1 along and across the finger.
+        clearance: mm, between the most curved M1 and the skin.
+        m2_bottom: (x, z) mm, the end of M2 at the base.
+        m2_tilt: degrees, of M2 from the z axis, its upper end towards the palm.
+        m2_length: mm; None takes 24.3 mm or as much of it as can see M1 past the gel.
+        m2_width: mm.
+        fov: degrees, across the image width, which runs along the finger; None takes what just
+            shows the length of M2.
+        resolution: pixels, width and height.
+        leds_per_side: LEDs in each of the two rows along the finger.
+        led_pitch: mm, between LEDs of a row.
+        led_gap: mm of air between an LED's window and the gel; must be above 0.
+        led_flux: mW, radiant, of each LED.
+        tip_leds: blue LEDs behind the gel's end at the tip.
+        coating: a coating of the library.
+        tessellation: mm, edge length of the triangles of the skin.
+
+    Raises:
+        DesignError: the dimensions contradict each other (a mirror through the skin, a gel
+            thicker than the palm's bends, ...); says which one and what to change.
+        LibraryError: there is no such coating.
+    """
+    optional = {name: v for name, v in (("m2_length", m2_length), ("fov", fov)) if v is not None}
+    require_positive(
+        NAME,
+        gel_thickness=gel_thickness,
+        gel_width=gel_width,
+        m1_sagitta=m1_sagitta,
+        m1_width=m1_width,
+        clearance=clearance,
+        m2_width=m2_width,
+        led_pitch=led_pitch,
+        led_gap=led_gap,
+        tessellation=tessellation,
+        **optional,
+    )
+    require(
+        min(m1_grid) >= 2 and leds_per_side >= 1 and tip_leds >= 0,
+        NAME,
+        f"m1_grid {m1_grid}, leds_per_side {leds_per_side} or tip_leds {tip_leds} is too small",
+        "M1 needs 2 x 2 vertices or more, each side one LED or more",
+    )
+    palm = Palm.through(palm_outline, tessellation)
+    inner = palm.offset(gel_thickness)
+    gel_outline = np.concatenate([palm.points, inner[::-1]])
+    m1 = CurvedMirror.from_arc(m1_ends[0], m1_ends[1], m1_sagitta)
+    most = m1.largest_sagitta(gel_outline, clearance)
+    if m1_sagitta > most:
+        raise DesignError(
+            f"mirror M1 bent by {m1_sagitta:g} mm comes nearer than {clearance:g} mm to the skin",
+            where="m1_sagitta",
+            hint=f"With these ends it can be {most:.2f} mm at most; lower it, move m1_ends away "
+            "from the palm, or make gel_thickness smaller",
+        )
+    m2 = FlatMirror.facing(m2_bottom, m2_tilt, m2_length, inner)
+    check_mirrors(m1, m1_sagitta, m2, gel_outline)
+    widths = (gel_width, max(m1_width, m2_width))
+    body = housing(palm, inner, back_outline, m1, most, m2, widths, led_gap)
+    low, high = m2.seen_between()
+    rows = max(1, round(gel_width / tessellation))
+
+    design = SensorDesign(
+        name=NAME,
+        description="GelSight Svelte: a finger seen over a flat and a curved mirror",
+        coating=library.coating(coating),
+        materials={GEL: library.material(GEL), MIRROR: library.material(MIRROR)},
+        parts={
+            "skin": Part(role=Role.SENSING_SURFACE, mesh="meshes/skin.obj"),
+            "gel": Part(role=Role.ELASTOMER, mesh="meshes/gel.obj", material=GEL, priority=1),
+            "M1": Part(role=Role.MIRROR, mesh="meshes/M1.obj", material=MIRROR),
+            "M2": Part(role=Role.MIRROR, mesh="meshes/M2.obj", material=MIRROR),
+            "body": Part(role=Role.BLOCKER, mesh="meshes/body.obj"),
+        },
+        lights=_lights(
+            palm, gel_thickness, gel_width, leds_per_side, led_pitch, led_gap, led_flux, tip_leds
+        ),
+        camera=Camera(
+            model="pi-v1",
+            fov=round(math.degrees(high - low), 3) if fov is None else fov,
+            resolution=resolution,
+            position=(0.0, 0.0, 0.0),
+            direction=(math.cos(0.5 * (low + high)), 0.0, math.sin(0.5 * (low + high))),
+            up=(0.0, 1.0, 0.0),
+        ),
+    )
+    design.meshes.update(
+        skin=ribbon(palm.points, 0.5 * gel_width, rows),
+        gel=strip(palm.points, inner, 0.5 * gel_width, rows),
+        M1=ribbon(m1.curve(0.0, m1_grid[0]), 0.5 * m1_width, m1_grid[1] - 1).flipped(),
+        M2=ribbon(m2.ends()[::-1], 0.5 * m2_width, 1).flipped(),
+        body=body,
+    )
+    design.cages = {"M1": _mirror_cage(design.meshes["M1"], m1, most, m1_sagitta / most)}
+    design.provenance = provenance(tip_leds > 0)
+    return design
+
+
+def _mirror_cage(mesh: TriangleMesh, mirror: CurvedMirror, most: float, blend: float) -> Cage:
+    """27 points over the flat mirror, from there to a sagitta of `most` mm.
+
+    Three points in a row give a parabola of degree 2 along z: with its ends `s` forward and its
+    middle point `s` back, the middle of the mirror stays where it is.
+    """
+    cage = Cage.around(["M1"], mesh.bounds)
+    flat = cage_points(mesh.bounds, (3, 3, 3)).reshape(3, 3, 3, 3)
+    bent = flat.copy()
+    forward = most * np.array([mirror.forward[0], 0.0, mirror.forward[1]])
+    bent[:, :, [0, 2]] += forward
+    bent[:, :, 1] -= forward
+    return Cage(
+        parts=cage.parts,
+        resolution=cage.resolution,
+        box=cage.box,
+        c_min=as_points(flat.reshape(-1, 3)),
+        c_max=as_points(bent.reshape(-1, 3)),
+        blend=[Share(x=blend, y=blend, z=blend)] * 27,
+    )
+
+
+def _lights(
+    palm: Palm,
+    thickness: float,
+    width: float,
+    count: int,
+    pitch: float,
+    gap: float,
+    flux: float,
+    tip_count: int,
+) -> dict[str, LightGroup]:
+    """Rows along both sides of the gel, in the middle of its thickness, that shine across it."""
+    shares = 0.5 + (np.arange(count) - 0.5 * (count - 1)) * pitch / palm.length
+    if shares[0] < 0.0:
+        raise DesignError(
+            f"{count} LEDs {pitch:g} mm apart are longer than the palm, {palm.length:.1f} mm",
+            where="leds_per_side, led_pitch",
+            hint="Take fewer LEDs or a smaller pitch",
+        )
+    groups = {}
+    for name, colour, side in (("red", (1.0, 0.0, 0.0), 1.0), ("green", (0.0, 1.0, 0.0), -1.0)):
+        lights = []
+        for share in shares:
+            point, along = palm.at(float(share), 0.5 * thickness)
+            place = (float(point[0]), side * (0.5 * width + gap), float(point[1]))
+            up = (float(along[0]), 0.0, float(along[1]))
+            lights += row_of_lights(place, up, 1, pitch, (0.0, -side, 0.0))
+        groups[name] = LightGroup(model="smd-3528", colour=colour, flux=flux, lights=lights)
+    if tip_count:
+        point, along = palm.at(1.0, 0.5 * thickness)
+        point = point + gap * along
+        towards = (-float(along[0]), 0.0, -float(along[1]))
+        row = row_of_lights(
+            (float(point[0]), 0.0, float(point[1])),
+            (0.0, 1.0, 0.0),
+            tip_count,
+            min(4.0, width / tip_count),
+            towards,
+        )
+        groups["blue"] = LightGroup(model="smd-3528", colour=(0.0, 0.0, 1.0), flux=flux, lights=row)
+    return groups

@@ -1,0 +1,142 @@
+"""The dark body of GelSight Svelte around its mirrors, open where the skin is."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import manifold3d
+import numpy as np
+import shapely
+
+from optisense.errors import DesignError
+from optisense.geometry import TriangleMesh
+from optisense.sensors.shapes import ribbon
+from optisense.sensors.svelte_profile import CurvedMirror, FlatMirror, FloatArray, Palm, Points
+
+LED_HEIGHT = 1.9
+"""mm behind an LED's window: the height of its package."""
+
+BEHIND_M2 = 1.0
+"""mm between M2 and the body behind it."""
+
+BESIDE_MIRROR = 0.5
+"""mm between the edges of the mirrors and the side walls."""
+
+
+def check_mirrors(
+    m1: CurvedMirror, sagitta: float, m2: FlatMirror, gel_outline: FloatArray
+) -> None:
+    """M2 must be clear of the gel, and M1 of M2 and of what the camera sees of it.
+
+    Args:
+        m1, sagitta: the curved mirror as it is, mm.
+        m2: the flat mirror.
+        gel_outline: (n, 2) mm, closed.
+
+    Raises:
+        DesignError: says which is in the way, and where.
+    """
+    flat, curved = shapely.LineString(m2.ends()), shapely.LineString(m1.curve(sagitta))
+    crossed = flat.intersection(shapely.Polygon(gel_outline))
+    if not crossed.is_empty:
+        raise DesignError(
+            f"mirror M2 goes through the gel near {_place(crossed)}",
+            where="m2_bottom, m2_tilt, m2_length",
+            hint="Make m2_length smaller or tilt M2 more, or let palm_outline begin higher",
+        )
+    sight = shapely.Polygon([(0.0, 0.0), *m2.ends()])
+    crossed = curved.intersection(sight)
+    if not crossed.is_empty:
+        raise DesignError(
+            f"mirror M1 stands between the camera and M2 near {_place(crossed)}",
+            where="m1_ends",
+            hint="Move the lower end of M1 towards the tip, or towards the back",
+        )
+
+
+def housing(
+    palm: Palm,
+    inner: FloatArray,
+    back_outline: Points,
+    m1: CurvedMirror,
+    most: float,
+    m2: FlatMirror,
+    widths: tuple[float, float],
+    led_gap: float,
+) -> TriangleMesh:
+    """Walls around everything but the palm, and a frame along both sides of the gel that hides
+    the LEDs beside it from the camera; a sheet that absorbs light.
+
+    Args:
+        palm: the coated face.
+        inner: (n, 2) mm, the inner face of the gel.
+        back_outline: (x, z) mm from base to tip.
+        m1, most: the curved mirror and its largest sagitta, mm.
+        m2: the flat mirror.
+        widths: mm, of the gel and of the widest mirror.
+        led_gap: mm; the walls leave room for the LEDs beside the gel.
+
+    Raises:
+        DesignError: the outline crosses itself, or a mirror or the camera is not inside.
+    """
+    back = np.asarray(back_outline, dtype=np.float64).reshape(-1, 2)
+    behind = m2.ends() + BEHIND_M2 * np.array([m2.along[1], -m2.along[0]])
+    bottom = np.array([[behind[0, 0], min(back[0, 1], behind[0, 1])]])
+    rest = np.concatenate([back, palm.points[-1:]])
+    base = np.concatenate([palm.points[:1], behind[::-1], bottom, back[:1]])
+    outline = np.concatenate([palm.points, rest[-2::-1], base[-2:0:-1]])
+    _check_inside(outline, m1, most, m2)
+    gel_half = 0.5 * widths[0]
+    half = max(gel_half + led_gap + LED_HEIGHT, 0.5 * widths[1] + BESIDE_MIRROR)
+    frame = np.concatenate([palm.points, inner[::-1], palm.points[:1]])
+    rim = ribbon(frame, 0.5 * (half - gel_half), 1)
+    beside = np.array([0.0, 0.5 * (half + gel_half), 0.0])
+    return TriangleMesh.joined(
+        [
+            ribbon(rest, half, 1),
+            ribbon(base, half, 1),
+            rim.with_vertices(rim.vertices + beside),
+            rim.with_vertices(rim.vertices - beside),
+            _wall(outline, half),
+            _wall(outline, -half),
+        ]
+    ).welded()
+
+
+def _check_inside(outline: FloatArray, m1: CurvedMirror, most: float, m2: FlatMirror) -> None:
+    polygon = shapely.Polygon(outline)
+    if not polygon.is_valid:
+        raise DesignError(
+            f"the outline of the body crosses itself ({shapely.is_valid_reason(polygon)})",
+            where="palm_outline, back_outline",
+            hint="Give both from base to tip, the back at smaller x",
+        )
+    things = {
+        "m1_ends, m1_sagitta": ("the flat mirror M1", shapely.LineString(m1.curve(0.0))),
+        "clearance": ("the most curved mirror M1", shapely.LineString(m1.curve(most))),
+        "m2_bottom, m2_tilt, m2_length": ("mirror M2", shapely.LineString(m2.ends())),
+        "back_outline": ("the camera's pupil", shapely.Point(0.0, 0.0)),
+    }
+    for where, (label, thing) in things.items():
+        if not polygon.contains(thing):
+            outside = thing.difference(polygon)
+            raise DesignError(
+                f"{label} is not inside the body near "
+                f"{_place(thing if outside.is_empty else outside)}",
+                where=where,
+                hint="Move it inside, or move back_outline or palm_outline outward",
+            )
+
+
+def _wall(outline: FloatArray, y: float) -> TriangleMesh:
+    """The outline's flat inside at one y."""
+    turned = outline if shapely.LinearRing(outline).is_ccw else outline[::-1]
+    faces = np.asarray(manifold3d.triangulate([turned]))
+    return TriangleMesh(
+        np.column_stack([turned[:, 0], np.full(len(turned), y), turned[:, 1]]), faces
+    )
+
+
+def _place(shape: Any) -> str:
+    x, z = shapely.get_coordinates(shape)[0]
+    return f"x {x:.1f}, z {z:.1f} mm"

@@ -1,0 +1,240 @@
+"""The side view of a finger with two mirrors: curves in the plane y = 0, as (x, z) in mm.
+
+x runs from the back of the finger to its palm, z from the base to the tip, and the origin is the
+camera's entrance pupil.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import shapely
+from numpy.typing import ArrayLike, NDArray
+from scipy.interpolate import CubicSpline
+
+from optisense.errors import DesignError
+
+FloatArray = NDArray[np.float64]
+Points = Sequence[tuple[float, float]]
+
+SAGITTA_STEP = 0.05
+"""mm: the bent mirror is tried against the skin in steps of this sagitta, then by halving."""
+
+PROFILE_SAMPLES = 400
+
+LONGEST_M2 = 24.3
+"""mm: the length of M2 as measured in the animation of the sensor."""
+
+SIGHT_MARGIN = 0.2
+"""mm at the end of M2: no line of sight grazes the gel."""
+
+
+@dataclass(frozen=True)
+class Palm:
+    """The coated face of the skin in side view, from the base to the tip.
+
+    Attributes:
+        points: (n, 2) mm, evenly spaced.
+        inward: (n, 2) unit normals, into the gel.
+        length: mm, along the curve.
+    """
+
+    points: FloatArray
+    inward: FloatArray
+    length: float
+
+    @staticmethod
+    def through(outline: Points, spacing: float) -> Palm:
+        """A smooth curve (cubic spline over chord length) through points from base to tip.
+
+        Raises:
+            DesignError: fewer than three points, or two neighbours in one place.
+        """
+        corners = np.asarray(outline, dtype=np.float64).reshape(-1, 2)
+        steps = np.linalg.norm(np.diff(corners, axis=0), axis=1)
+        if len(corners) < 3 or not (steps > 0.0).all():
+            raise DesignError(
+                "the palm's outline needs three or more different points, from base to tip",
+                where="palm_outline",
+                hint="Give (x, z) in mm, x towards the palm, z towards the tip",
+            )
+        spline = CubicSpline(np.append(0.0, np.cumsum(steps)), corners)
+        fine = np.linspace(0.0, steps.sum(), 8 * PROFILE_SAMPLES)
+        walked = np.linalg.norm(np.diff(spline(fine), axis=0), axis=1)
+        along = np.append(0.0, np.cumsum(walked))
+        count = max(2, round(along[-1] / spacing)) + 1
+        at = np.interp(np.linspace(0.0, along[-1], count), along, fine)
+        tangent = spline(at, 1)
+        tangent /= np.linalg.norm(tangent, axis=1, keepdims=True)
+        inward = np.column_stack([-tangent[:, 1], tangent[:, 0]])
+        return Palm(spline(at), inward, float(along[-1]))
+
+    def offset(self, depth: float) -> FloatArray:
+        """(n, 2) mm: the curve `depth` mm inside the skin.
+
+        Raises:
+            DesignError: the skin is thicker than a bend of the palm is wide.
+        """
+        inner = self.points + depth * self.inward
+        forward = np.einsum("ij,ij->i", np.diff(inner, axis=0), np.diff(self.points, axis=0))
+        if (forward <= 0.0).any():
+            x, z = self.points[int(np.argmin(forward))]
+            raise DesignError(
+                f"a gel of {depth:g} mm does not fit: the palm bends more sharply than that",
+                where=f"palm_outline near x {x:.1f}, z {z:.1f} mm",
+                hint="Make gel_thickness smaller, or round palm_outline there",
+            )
+        return inner
+
+    def at(self, share: float, depth: float) -> tuple[FloatArray, FloatArray]:
+        """The point `depth` mm inside at a share (0..1) of the length, and the tangent there."""
+        rows = np.arange(len(self.points)) / (len(self.points) - 1)
+        middle = self.points + depth * self.inward
+        point = np.array([np.interp(share, rows, middle[:, k]) for k in (0, 1)])
+        normal = np.array([np.interp(share, rows, self.inward[:, k]) for k in (0, 1)])
+        normal /= np.linalg.norm(normal)
+        return point, np.array([normal[1], -normal[0]])
+
+
+@dataclass(frozen=True)
+class CurvedMirror:
+    """M1 in side view: a parabola through a fixed middle, whose ends come forward as it bends.
+
+    Attributes:
+        middle: (2,) mm.
+        along: (2,) unit vector from the base's end to the tip's.
+        forward: (2,) unit normal, towards the palm.
+        length: mm, of the chord.
+    """
+
+    middle: FloatArray
+    along: FloatArray
+    forward: FloatArray
+    length: float
+
+    @staticmethod
+    def from_arc(lower: ArrayLike, upper: ArrayLike, sagitta: float) -> CurvedMirror:
+        """From the ends of an arc (2,) mm and how far (mm) its middle lies behind the chord."""
+        first, last = np.asarray(lower, dtype=float), np.asarray(upper, dtype=float)
+        along = (last - first) / np.linalg.norm(last - first)
+        forward = np.array([along[1], -along[0]])
+        middle = 0.5 * (first + last) - sagitta * forward
+        return CurvedMirror(middle, along, forward, float(np.linalg.norm(last - first)))
+
+    def curve(self, sagitta: float, count: int = PROFILE_SAMPLES) -> FloatArray:
+        """(count, 2) mm: the mirror with its ends `sagitta` mm before its middle."""
+        t = np.linspace(-1.0, 1.0, count)[:, None]
+        straight = self.middle + 0.5 * self.length * t * self.along
+        return np.asarray(straight + sagitta * t * t * self.forward)
+
+    def largest_sagitta(self, obstacle: FloatArray, clearance: float) -> float:
+        """How far (mm) it can bend before it comes closer than `clearance` to a closed outline.
+
+        Args:
+            obstacle: (n, 2) mm, the outline of the skin.
+
+        Raises:
+            DesignError: even the flat mirror is closer.
+        """
+        skin = shapely.Polygon(obstacle)
+
+        def clear(sagitta: float) -> bool:
+            return bool(shapely.LineString(self.curve(sagitta)).distance(skin) >= clearance)
+
+        if not clear(0.0):
+            gap = shapely.LineString(self.curve(0.0)).distance(skin)
+            raise DesignError(
+                f"the flat mirror M1 comes as near as {gap:.2f} mm to the skin; "
+                f"{clearance:g} mm must stay free",
+                where="m1_ends",
+                hint="Move m1_ends away from the palm, or make gel_thickness or clearance smaller",
+            )
+        low = 0.0
+        while clear(low + SAGITTA_STEP) and low < self.length:
+            low += SAGITTA_STEP
+        high = low + SAGITTA_STEP
+        for _ in range(30):
+            middle = 0.5 * (low + high)
+            low, high = (middle, high) if clear(middle) else (low, middle)
+        return low
+
+
+def mirrored(point: ArrayLike, on: ArrayLike, direction: ArrayLike) -> FloatArray:
+    """(2,) mm: a point mirrored in the line through `on` along a unit `direction`."""
+    away = np.asarray(point, dtype=float) - np.asarray(on, dtype=float)
+    way = np.asarray(direction, dtype=float)
+    return np.asarray(np.asarray(on, dtype=float) + 2.0 * (away @ way) * way - away)
+
+
+def crossing(
+    start: FloatArray, ends: FloatArray, on: FloatArray, direction: FloatArray
+) -> FloatArray:
+    """(n,) mm along a line where the lines from `start` (2,) to `ends` (n, 2) cross it."""
+    way = ends - start
+    normal = np.array([-direction[1], direction[0]])
+    step = ((on - start) @ normal) / (way @ normal)
+    return np.asarray((start + step[:, None] * way - on) @ direction)
+
+
+@dataclass(frozen=True)
+class FlatMirror:
+    """M2 in side view, seen from the pupil at the origin.
+
+    Attributes:
+        bottom: (2,) mm, its end at the base.
+        along: (2,) unit vector towards its upper end.
+        length: mm.
+    """
+
+    bottom: FloatArray
+    along: FloatArray
+    length: float
+
+    @staticmethod
+    def facing(
+        bottom: ArrayLike, tilt: float, length: float | None, inner: FloatArray
+    ) -> FlatMirror:
+        """A mirror that ends where lines of sight over it would meet the gel before M1.
+
+        Args:
+            bottom: (2,) mm.
+            tilt: degrees from the z axis.
+            length: mm; None for LONGEST_M2 or as much of it as sees past the gel.
+            inner: (n, 2) mm, the inner face of the gel from base to tip.
+
+        Raises:
+            DesignError: it has its back to the camera, or its sight past the gel is blocked.
+        """
+        start = np.asarray(bottom, dtype=np.float64)
+        along = np.array([np.sin(np.radians(tilt)), np.cos(np.radians(tilt))])
+        if start[0] * along[1] - start[1] * along[0] <= 0.0:
+            raise DesignError(
+                "mirror M2 does not face the camera at (0, 0)",
+                where="m2_bottom, m2_tilt",
+                hint="Put m2_bottom on the palm's side of the camera (x above 0), and tilt less",
+            )
+        pupil = mirrored((0.0, 0.0), start, along)
+        free = float(crossing(pupil, inner, start, along).min())
+        wanted = LONGEST_M2 if length is None else length
+        if length is None and free > 0.0:
+            wanted = min(wanted, free - SIGHT_MARGIN)
+        if wanted > free:
+            raise DesignError(
+                f"only the lower {max(free, 0.0):.1f} mm of mirror M2 ({wanted:.1f} mm long) see "
+                "M1 past the gel",
+                where="m2_length",
+                hint="Make m2_length smaller, tilt M2 more (m2_tilt), or move m2_bottom towards "
+                "the camera",
+            )
+        return FlatMirror(start, along, wanted)
+
+    def ends(self) -> FloatArray:
+        """(2, 2) mm: lower and upper end."""
+        return np.array([self.bottom, self.bottom + self.length * self.along])
+
+    def seen_between(self) -> tuple[float, float]:
+        """Radians from the x axis towards the tip, from the pupil to its ends."""
+        low, high = np.arctan2(self.ends()[:, 1], self.ends()[:, 0])
+        return float(low), float(high)

@@ -1,0 +1,64 @@
+"""Where the numbers of GelSight Svelte come from."""
+
+from __future__ import annotations
+
+from optisense.design import Provenance, Status
+
+ANIMATION = (
+    "side view in an animation on the first author's web site, digitised to about 1 pixel at an "
+    "assumed scale of 0.70 mm a pixel (0.6 to 0.8 would fit a finger)"
+)
+
+
+def provenance(tip: bool) -> dict[str, Provenance]:
+    """By dotted path; `tip` says whether there is a blue light group."""
+    assumed, derived, sourced = Status.ASSUMED, Status.DERIVED, Status.SOURCED
+    table: dict[str, tuple[Status, str]] = {
+        "coating": (assumed, "opaque grey; the coating of the sensor is not published"),
+        "materials.silicone-xp565.ior": (assumed, "the silicone of the skin is not published"),
+        "materials.mirror-silver": (assumed, "the mirrors' metal is not published"),
+        "parts.skin": (
+            derived,
+            f"outline of the palm: {ANIMATION}; drawn straight across, 20 mm wide (assumed)",
+        ),
+        "parts.gel": (assumed, "3.5 mm thick, 20 mm wide; neither is published"),
+        "parts.M1": (
+            derived,
+            f"ends (5.8, 13.3) and (10.4, 88.2), arc of radius 130.5 mm: {ANIMATION}; stored "
+            "flat, drawn straight across; 22 mm wide, nearly as wide as the body (assumed)",
+        ),
+        "parts.M2": (
+            derived,
+            f"lower end (16.7, -2.8), 22.4 degrees from the z axis: {ANIMATION}; as much of its "
+            "24.3 mm as sees M1 past the gel; 18 mm wide (assumed)",
+        ),
+        "parts.body": (
+            derived,
+            f"outline of the back: {ANIMATION}; base and side walls assumed; a sheet that "
+            "absorbs all light",
+        ),
+        "cages.M1.c_min": (derived, "flat (OptiSense paper), through the middle of the arc"),
+        "cages.M1.c_max": (
+            derived,
+            "the largest curvature that stays clear of the skin (OptiSense paper): a parabola "
+            "with its middle at rest, its ends forward until 0.5 mm are left",
+        ),
+        "cages.M1.blend": (
+            derived,
+            f"sagitta 5.5 mm, that of the arc in the {ANIMATION}, over the largest one; the "
+            "parabola departs from the arc by less than 0.06 mm",
+        ),
+        "lights.red": (assumed, "red and green rows on the two sides: from memory of a press "
+                       "report; 8 a side at 8 mm pitch, facing the sides of the gel: assumed"),
+        "lights.green": (assumed, "as red"),
+        "lights.red.flux": (assumed, "10 mW each; only ratios matter to an auto-exposed picture"),
+        "lights.green.flux": (assumed, "as red"),
+        "camera.model": (assumed, "an OV5647 in a small housing fits; the camera is not published"),
+        "camera.position": (derived, f"the origin: {ANIMATION}"),
+        "camera.direction": (derived, "the middle of the angles to both ends of M2"),
+        "camera.fov": (derived, "the angle between both ends of M2, seen from the pupil"),
+        "camera.resolution": (sourced, "what the benchmarks of this project render"),
+    }  # fmt: skip
+    if tip:
+        table["lights.blue"] = (assumed, "an option; not known to be in the sensor")
+    return {path: Provenance(status=s, source=text) for path, (s, text) in table.items()}
