@@ -71,3 +71,7 @@ class OutputError(OptiSenseError):
 
 class TaskError(OptiSenseError):
     """A perception task, or a dataset, that can't be made or read as asked."""
+
+
+class SearchError(OptiSenseError):
+    """A search space, a method or a study that makes no sense, or can't go on."""

@@ -1,0 +1,88 @@
+"""Setting many numbers of a design at once.
+
+`set_value` checks the whole design for each value; a cage of 27 control points has 81. Here the
+places of all values are looked up once, and then only what lies on the way to them is rebuilt.
+Nothing is checked: the caller has tried the bounds, or checks the result.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from pydantic import BaseModel
+
+from optisense.design import SensorDesign, get_value, parse_path
+
+_LETTERS = {"x": 0, "y": 1, "z": 2, "r": 0, "g": 1, "b": 2}
+
+Node = dict[str | int, "Node | int"]
+"""A step down the design; a leaf is the position of a value in the given sequence."""
+
+
+class Edit:
+    """Where some values of a design are, so that they can be set together."""
+
+    def __init__(self, design: SensorDesign, paths: Sequence[str]) -> None:
+        """Look up all paths.
+
+        Raises:
+            DesignError: one leads nowhere; names the near match.
+        """
+        self.paths = tuple(paths)
+        self._root: Node = {}
+        for number, path in enumerate(paths):
+            get_value(design, path)
+            node, value = self._root, design
+            *way, last = parse_path(path)
+            for step in way:
+                key = _key(value, step)
+                value = _child(value, key)
+                below = node.setdefault(key, {})
+                assert isinstance(below, dict), f"'{path}' lies inside another path"
+                node = below
+            node[_key(value, last)] = number
+
+    def apply(self, design: SensorDesign, values: Sequence[Any]) -> SensorDesign:
+        """A design with these values, one for each path; unchecked, the rest shared.
+
+        Args:
+            design: of the same structure as the one that the paths were looked up in.
+            values: plain Python values (no NumPy scalars).
+        """
+        if not self._root:
+            return design
+        edited: SensorDesign = _rebuilt(design, self._root, values)
+        return edited
+
+
+def _rebuilt(value: Any, node: Node, values: Sequence[Any]) -> Any:
+    """A copy of the containers on the way; everything else is shared."""
+    if isinstance(value, BaseModel):
+        held = value.__dict__
+        return value.model_copy(
+            update={str(step): _below(held[str(step)], node[step], values) for step in node}
+        )
+    if isinstance(value, dict):
+        return {**value, **{step: _below(value[step], node[step], values) for step in node}}
+    items = list(value)
+    for step, below in node.items():
+        items[int(step)] = _below(items[int(step)], below, values)
+    return tuple(items) if isinstance(value, tuple) else items
+
+
+def _below(value: Any, node: Node | int, values: Sequence[Any]) -> Any:
+    return values[node] if isinstance(node, int) else _rebuilt(value, node, values)
+
+
+def _key(container: Any, step: str | int) -> str | int:
+    """x, y, z and r, g, b stand for 0, 1, 2 in three numbers."""
+    if isinstance(container, list | tuple) and step in _LETTERS:
+        return _LETTERS[str(step)]
+    return step
+
+
+def _child(container: Any, step: str | int) -> Any:
+    if isinstance(container, BaseModel):
+        return getattr(container, str(step))
+    return container[step]

@@ -1,0 +1,343 @@
+"""From what a user asks to vary to single parameters: paths looked up, bulk forms spread out."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from pydantic import BaseModel
+
+from optisense.design import Cage, SensorDesign, Share, get_value, parse_path, set_value
+from optisense.design.cage import as_array
+from optisense.errors import SearchError
+from optisense.search.handles import Handle, find_handles
+from optisense.search.parameters import (
+    Around,
+    CagePoints,
+    Choice,
+    Continuous,
+    Integer,
+    Single,
+    Specification,
+)
+
+COLOURS = {
+    "red": (1.0, 0.0, 0.0),
+    "green": (0.0, 1.0, 0.0),
+    "blue": (0.0, 0.0, 1.0),
+    "white": (1.0, 1.0, 1.0),
+}
+"""Names that stand for a light group's colour; R, G, B and W do too."""
+
+RGB_FIELDS = ("colour", "reflectance", "eta", "k", "dispersion")
+
+SYMMETRY_TOLERANCE = 1e-4
+"""A cage whose mirror images differ by more (of its box, or of a share) is not symmetric."""
+
+
+@dataclass(frozen=True)
+class Target:
+    """A value that follows a parameter: `scale` times it plus `offset` (choices: as it is)."""
+
+    path: str
+    scale: float = 1.0
+    offset: float = 0.0
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One number or name that a search may change.
+
+    Attributes:
+        name: its dotted path; unique in a space.
+        kind: bounds or options.
+        start: what it is in the design, as a coordinate (see `BoundSpace`), within the bounds.
+        targets: the values of the design that follow it; empty where a handle acts.
+        handle: what it changes when that is more than values.
+        asked: the path as the user gave it.
+    """
+
+    name: str
+    kind: Single
+    start: float
+    targets: tuple[Target, ...] = ()
+    handle: Handle | None = None
+    asked: str = ""
+
+
+def expand(
+    design: SensorDesign, path: str, spec: Specification
+) -> tuple[SensorDesign, list[Parameter]]:
+    """The single parameters behind one path.
+
+    Returns:
+        The design, made ready where its form has to change (a cage given by its points gets a
+        blend when that is what varies; the shape stays), and the parameters.
+
+    Raises:
+        DesignError: the path leads nowhere; names the near match.
+        SearchError: it can't be varied like this.
+    """
+    try:
+        handles = find_handles(design, path)
+        if handles:
+            return design, [_of_handle(design, handle, spec, path) for handle in handles]
+        steps = parse_path(path)
+        if len(steps) == 3 and steps[0] == "cages" and steps[2] in ("points", "blend"):
+            return _of_cage(design, str(steps[1]), str(steps[2]), path, spec)
+        if isinstance(spec, CagePoints):
+            raise SearchError("these are no control points", hint="Vary cages.NAME.points")
+        return design, _of_value(path, get_value(design, path), spec)
+    except SearchError as error:
+        raise SearchError(error.message, where=error.where or path, hint=error.hint) from None
+
+
+def _of_handle(
+    design: SensorDesign, handle: Handle, spec: Specification, asked: str
+) -> Parameter:
+    now = handle.start(design)
+    if handle.numeric:
+        if isinstance(spec, Around):
+            spec = spec.about(0.0)
+        if not isinstance(spec, Continuous):
+            raise SearchError("this takes a range of numbers", hint="Give LOW:HIGH")
+        assert isinstance(now, float)
+        return Parameter(handle.path, spec, _within(now, spec), handle=handle, asked=asked)
+    if not isinstance(spec, Choice):
+        raise SearchError("this takes names to choose from", hint="Give them as NAME,NAME,...")
+    return Parameter(handle.path, spec, _number_of(now, spec), handle=handle, asked=asked)
+
+
+def _of_value(path: str, value: Any, spec: Specification) -> list[Parameter]:
+    """An ordinary path: one value, or the two or three numbers of a vector."""
+    if isinstance(spec, Choice):
+        spec = _colours_read(path, spec)
+        return [Parameter(path, spec, _number_of(value, spec), (Target(path),), asked=path)]
+    if isinstance(value, bool | str) or value is None:
+        raise SearchError(
+            f"the value there, {value!r}, is no number", hint="Give options: NAME,NAME,..."
+        )
+    if isinstance(value, tuple):
+        letters = _letters(path, len(value))
+        return [
+            each
+            for letter, item in zip(letters, value, strict=True)
+            for each in _of_value(f"{path}{letter}", item, spec)
+        ]
+    if isinstance(value, BaseModel | list | dict):
+        raise SearchError(
+            "this is a section, not a number",
+            hint=f"Name a number in it, such as {_example(path, value)}",
+        )
+    kind = _bounds(value, spec)
+    start = _within(float(value), kind)
+    return [Parameter(path, kind, start, (Target(path),), asked=path)]
+
+
+def _bounds(value: float, spec: Specification) -> Continuous | Integer:
+    """Bounds for a number; whole ones for a whole number."""
+    assert not isinstance(spec, Choice | CagePoints)
+    whole = isinstance(value, int)
+    if isinstance(spec, Around):
+        spec = spec.about(float(value))
+    if isinstance(spec, Continuous) and whole:
+        if spec.low != round(spec.low) or spec.high != round(spec.high):
+            raise SearchError(
+                f"the value there is a whole number, {spec.low:g} and {spec.high:g} are not both"
+            )
+        return Integer(round(spec.low), round(spec.high))
+    return spec
+
+
+def _of_cage(
+    design: SensorDesign, name: str, field: str, path: str, spec: Specification
+) -> tuple[SensorDesign, list[Parameter]]:
+    cage: Cage = get_value(design, f"cages.{name}")
+    if isinstance(spec, Choice | Integer):
+        raise SearchError("control points take a range of numbers", hint="Give LOW:HIGH")
+    if field == "blend":
+        if cage.c_min is None or cage.c_max is None:
+            raise SearchError(
+                f"the cage '{name}' has no c_min and c_max to blend",
+                hint=f"Add both to the design, or vary cages.{name}.points",
+            )
+        gridded = isinstance(spec, Continuous) and spec.steps is not None
+        if not isinstance(spec, CagePoints) and (isinstance(cage.blend, float) or gridded):
+            share = cage.blend if isinstance(cage.blend, float) else _mean_share(cage)
+            ready = _with_blend(design, name, share)
+            return ready, _of_value(path, share, spec)
+        shares = _shares(cage)
+        ready = _with_blend(design, name, [Share(x=x, y=y, z=z) for x, y, z in shares.tolist()])
+        return ready, _points(cage, path, shares, as_points(spec), free=_span(cage) != 0.0)
+    if cage.blend is not None:
+        points = cage.current_points()
+        change = {"blend": None, "points": _as_dicts(points)}
+        design = set_value(design, f"cages.{name}", {**cage.model_dump(mode="json"), **change})
+    points = as_array(design.cages[name].points)
+    return design, _points(cage, path, points, as_points(spec), mirror=np.array(cage.box))
+
+
+def as_points(spec: Specification) -> CagePoints:
+    """Bounds or a reach for all control points, unless points are named already."""
+    if isinstance(spec, CagePoints):
+        return spec
+    assert isinstance(spec, Continuous | Around)
+    return CagePoints(spec)
+
+
+def _points(
+    cage: Cage,
+    path: str,
+    now: np.ndarray,
+    spec: CagePoints,
+    mirror: np.ndarray | None = None,
+    free: np.ndarray | None = None,
+) -> list[Parameter]:
+    """Parameters for the numbers of control points (N, 3).
+
+    Args:
+        mirror: (2, 3) mm, the box across whose middle coordinates are mirrored; shares are not.
+        free: (N, 3), which numbers make a difference.
+    """
+    count = len(now)
+    chosen = range(count) if spec.points is None else spec.points
+    for index in chosen:
+        if not 0 <= index < count:
+            raise SearchError(f"there is no point {index}", hint=f"0 to {count - 1} are there")
+    free = np.ones((count, 3), dtype=bool) if free is None else free
+    images = _images(cage, spec.symmetry)
+    plane = "xyz".index(spec.symmetry) if spec.symmetry else -1
+    if spec.symmetry:
+        _check_symmetric(cage, now, images, plane, mirror, spec.symmetry)
+    found = []
+    for index in dict.fromkeys(min(index, int(images[index])) for index in chosen):
+        image = int(images[index])
+        for axis in (k for k in range(3) if "xyz"[k] in spec.axes):
+            mirrored = axis == plane and mirror is not None
+            if not free[index, axis] or (axis == plane and image == index):
+                continue  # a point in the plane of symmetry stays in it
+            target = f"{path}[{index}].{'xyz'[axis]}"
+            targets = [Target(target)]
+            if image != index:
+                offset = float(mirror[:, axis].sum()) if mirrored and mirror is not None else 0.0
+                other = f"{path}[{image}].{'xyz'[axis]}"
+                targets.append(Target(other, -1.0 if mirrored else 1.0, offset))
+            value = float(now[index, axis])
+            bounds = spec.range.about(value) if isinstance(spec.range, Around) else spec.range
+            if isinstance(spec.range, Around) and mirror is None:
+                bounds = Continuous(max(0.0, bounds.low), min(1.0, bounds.high), bounds.steps)
+            start = _within(value, bounds)
+            found.append(Parameter(target, bounds, start, tuple(targets), asked=path))
+    if not found:
+        raise SearchError("nothing is left to vary here", hint="Name other points or axes")
+    return found
+
+
+def _images(cage: Cage, symmetry: str | None) -> np.ndarray:
+    """(N,): the index of each control point's mirror image, or its own without symmetry."""
+    lattice = np.arange(int(np.prod(cage.resolution))).reshape(cage.resolution)
+    return (np.flip(lattice, "xyz".index(symmetry)) if symmetry else lattice).reshape(-1)
+
+
+def _check_symmetric(
+    cage: Cage,
+    now: np.ndarray,
+    images: np.ndarray,
+    plane: int,
+    mirror: np.ndarray | None,
+    name: str,
+) -> None:
+    box = np.array(cage.box)
+    checked = [("points", now, float(np.ptp(box, axis=0).max()))]
+    if mirror is None:  # then the ends of the blend must be mirror images too
+        assert cage.c_min is not None and cage.c_max is not None
+        size = checked.pop()[2]
+        checked = [("c_min", as_array(cage.c_min), size), ("c_max", as_array(cage.c_max), size)]
+    for label, points, size in checked:
+        image = points[images].copy()
+        image[:, plane] = box[:, plane].sum() - image[:, plane]
+        apart = np.abs(image - points).max(axis=1)
+        if apart.max() > SYMMETRY_TOLERANCE * size:
+            worst = int(apart.argmax())
+            raise SearchError(
+                f"the cage's {label} are not symmetric along {name}: points {worst} and "
+                f"{images[worst]} are {apart.max():.3g} mm from being mirror images",
+                hint="Search without symmetry, or make the shape symmetric first",
+            )
+
+
+def _shares(cage: Cage) -> np.ndarray:
+    """(N, 3): how far each coordinate is from c_min to c_max now, 0 where both are the same."""
+    if isinstance(cage.blend, list):
+        return as_array(cage.blend)
+    if cage.blend is not None:
+        return np.full((len(cage.c_min or []), 3), float(cage.blend))
+    span = _span(cage)
+    way = as_array(cage.points) - as_array(cage.c_min or [])
+    shares = np.divide(way, span, out=np.zeros_like(way), where=span != 0.0)
+    return np.asarray(np.clip(shares, 0.0, 1.0))
+
+
+def _mean_share(cage: Cage) -> float:
+    moving = _span(cage) != 0.0
+    return float(_shares(cage)[moving].mean()) if moving.any() else 0.0
+
+
+def _span(cage: Cage) -> np.ndarray:
+    return as_array(cage.c_max or []) - as_array(cage.c_min or [])
+
+
+def _with_blend(design: SensorDesign, name: str, blend: float | list[Share]) -> SensorDesign:
+    """The design with its cage given by `blend`, and its points left out."""
+    plain = blend if isinstance(blend, float) else [share.model_dump() for share in blend]
+    cage = design.cages[name].model_dump(mode="json")
+    return set_value(design, f"cages.{name}", {**cage, "points": [], "blend": plain})
+
+
+def _as_dicts(points: np.ndarray) -> list[dict[str, float]]:
+    return [{"x": x, "y": y, "z": z} for x, y, z in points.tolist()]
+
+
+def _colours_read(path: str, spec: Choice) -> Choice:
+    """Names of colours as values, where the path is that of a colour."""
+    if not path.endswith(".colour"):
+        return spec
+    initials = {name[0]: name for name in COLOURS}
+    options = []
+    for option in spec.options:
+        if isinstance(option, str):
+            name = initials.get(option.lower(), option.lower())
+            if name not in COLOURS:
+                raise SearchError(
+                    f"there is no colour '{option}'", hint="Known: " + ", ".join(COLOURS)
+                )
+            options.append(COLOURS[name])
+        else:
+            options.append(option)
+    return Choice(options, spec.labels)
+
+
+def _within(value: float, kind: Single) -> float:
+    assert not isinstance(kind, Choice)
+    return min(max(value, float(kind.low)), float(kind.high))
+
+
+def _number_of(value: object, spec: Choice) -> float:
+    """The coordinate of a value among the options; 0 when it is not one of them."""
+    return float(spec.options.index(value)) if value in spec.options else 0.0
+
+
+def _letters(path: str, count: int) -> list[str]:
+    if count == 3:
+        name = path.rsplit(".", 1)[-1]
+        return [f".{letter}" for letter in ("rgb" if name in RGB_FIELDS else "xyz")]
+    return [f"[{index}]" for index in range(count)]
+
+
+def _example(path: str, value: Any) -> str:
+    """The path of something inside a section."""
+    if isinstance(value, list):
+        return f"{path}[0]"
+    names = list(type(value).model_fields) if isinstance(value, BaseModel) else list(value)
+    return f"{path}.{names[-1]}" if names else path

@@ -1,0 +1,250 @@
+"""What a single parameter can be: a number between bounds, a whole number, or one of several."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from optisense.errors import SearchError
+
+MOST_STEPS = 1_000_000
+"""A grid of more steps along one parameter is a slip."""
+
+
+@dataclass(frozen=True)
+class Continuous:
+    """A number between two bounds.
+
+    Attributes:
+        low, high: bounds, both included, in the unit of the value.
+        steps: for grids, the number of values from `low` to `high`; None where no grid is meant.
+    """
+
+    low: float
+    high: float
+    steps: int | None = None
+
+    def __post_init__(self) -> None:
+        check_bounds(self.low, self.high)
+        if self.steps is not None:
+            if isinstance(self.steps, bool) or not isinstance(self.steps, int) or self.steps < 2:
+                raise SearchError(
+                    f"a grid can't have {self.steps} steps from {self.low:g} to {self.high:g}",
+                    hint="Give 2 or more; a value that does not change needs no parameter",
+                )
+            if self.steps > MOST_STEPS:
+                raise SearchError(f"{self.steps:,} steps are more than {MOST_STEPS:,}")
+
+    @property
+    def levels(self) -> tuple[float, ...] | None:
+        """The values of a grid, or None."""
+        if self.steps is None:
+            return None
+        span = self.high - self.low
+        last = self.steps - 1
+        inner = [self.low + span * k / last for k in range(last)]
+        return (*inner, self.high)
+
+
+@dataclass(frozen=True)
+class Integer:
+    """A whole number between two bounds, both included."""
+
+    low: int
+    high: int
+
+    def __post_init__(self) -> None:
+        for bound in (self.low, self.high):
+            if isinstance(bound, bool) or not isinstance(bound, int):
+                raise SearchError(f"the bound {bound!r} of an integer is not a whole number")
+        check_bounds(self.low, self.high)
+
+    @property
+    def levels(self) -> tuple[float, ...]:
+        """All values."""
+        return tuple(float(value) for value in range(self.low, self.high + 1))
+
+
+@dataclass(frozen=True)
+class Choice:
+    """One of several values: names of materials or lights, colours, whatever the path takes.
+
+    Attributes:
+        options: the values; no two are alike.
+        labels: how to call each; made from the values when left out.
+    """
+
+    options: tuple[Any, ...]
+    labels: tuple[str, ...] = ()
+
+    def __init__(self, options: Iterable[Any], labels: Iterable[str] = ()) -> None:
+        frozen = tuple(tuple(o) if isinstance(o, list) else o for o in options)
+        names = tuple(labels) or tuple(_label(option) for option in frozen)
+        object.__setattr__(self, "options", frozen)
+        object.__setattr__(self, "labels", names)
+        if len(frozen) < 2:
+            raise SearchError(
+                "a choice needs two options or more",
+                hint="A value that does not change needs no parameter",
+            )
+        if len(names) != len(frozen):
+            raise SearchError(f"{len(frozen)} options have {len(names)} labels")
+        for number, name in enumerate(names):
+            if name in names[:number]:
+                raise SearchError(f"the option '{name}' is there twice")
+
+    @property
+    def levels(self) -> tuple[float, ...]:
+        """The numbers of the options."""
+        return tuple(float(number) for number in range(len(self.options)))
+
+
+@dataclass(frozen=True)
+class Around:
+    """A number that may move from what it is in the design, by so much to either side.
+
+    Attributes:
+        reach: in the unit of the value; above 0.
+        steps: as of `Continuous`.
+    """
+
+    reach: float
+    steps: int | None = None
+
+    def __post_init__(self) -> None:
+        if not (math.isfinite(self.reach) and self.reach > 0.0):
+            raise SearchError(f"a reach of {self.reach} is not a number above 0")
+
+    def about(self, value: float) -> Continuous:
+        """The bounds around a value."""
+        return Continuous(value - self.reach, value + self.reach, self.steps)
+
+
+@dataclass(frozen=True)
+class CagePoints:
+    """Control points of a cage: all of them, or some, or only some of their coordinates.
+
+    For the path `cages.NAME.points` (mm) or `cages.NAME.blend` (the matrix A of the OptiSense
+    paper, 0 to 1).
+
+    Attributes:
+        range: bounds of each coordinate, or how far it may move.
+        points: indices of control points; None takes all.
+        axes: which coordinates move.
+        symmetry: "x", "y" or "z": mirror images across the middle of the cage's box along this
+            axis move together, which halves the parameters. None leaves every point free.
+    """
+
+    range: Continuous | Around
+    points: tuple[int, ...] | None = None
+    axes: str = "xyz"
+    symmetry: str | None = None
+
+    def __post_init__(self) -> None:
+        if self.points is not None:
+            object.__setattr__(self, "points", tuple(self.points))
+        if not self.axes or any(axis not in "xyz" for axis in self.axes):
+            raise SearchError(f"'{self.axes}' are not axes", hint="Give some of x, y, z: 'xz'")
+        if self.symmetry is not None and self.symmetry not in ("x", "y", "z"):
+            raise SearchError(f"there is no symmetry '{self.symmetry}'", hint="Give x, y or z")
+
+
+Single = Continuous | Integer | Choice
+"""What one parameter of a bound space is."""
+
+Specification = Single | Around | CagePoints
+"""What a user can ask for at one path; some stand for many parameters."""
+
+
+def as_specification(value: object) -> Specification:
+    """Read the short forms: (low, high), (low, high, steps), or a list of options.
+
+    Raises:
+        SearchError: anything else, or bounds that make no sense.
+    """
+    if isinstance(value, Continuous | Integer | Choice | Around | CagePoints):
+        return value
+    if isinstance(value, tuple) and len(value) in (2, 3) and all(map(_is_number, value)):
+        return Continuous(float(value[0]), float(value[1]), *value[2:])
+    if isinstance(value, list):
+        return Choice(value)
+    raise SearchError(
+        f"{value!r} does not say what may change",
+        hint="Give (low, high), Integer(low, high), Choice([...]), Around(reach) or CagePoints",
+    )
+
+
+def check_bounds(low: float, high: float) -> None:
+    """Refuse bounds that are not finite, empty or reversed.
+
+    Raises:
+        SearchError: says which.
+    """
+    if not (math.isfinite(low) and math.isfinite(high)):
+        raise SearchError(f"the bounds {low:g} to {high:g} are not finite")
+    if low > high:
+        raise SearchError(
+            f"the bounds are reversed: {low:g} is above {high:g}", hint=f"Write {high:g}:{low:g}"
+        )
+    if low == high:
+        raise SearchError(
+            f"the bounds {low:g} to {high:g} are empty",
+            hint="Widen them; a value that does not change needs no parameter",
+        )
+
+
+def to_plain(spec: Specification) -> dict[str, Any]:
+    """A specification as JSON-ready values."""
+    if isinstance(spec, Choice):
+        plain = [list(o) if isinstance(o, tuple) else o for o in spec.options]
+        return {"kind": "choice", "options": plain, "labels": list(spec.labels)}
+    if isinstance(spec, Integer):
+        return {"kind": "integer", "low": spec.low, "high": spec.high}
+    if isinstance(spec, Around):
+        return {"kind": "around", "reach": spec.reach, "steps": spec.steps}
+    if isinstance(spec, Continuous):
+        return {"kind": "continuous", "low": spec.low, "high": spec.high, "steps": spec.steps}
+    points = None if spec.points is None else list(spec.points)
+    return {
+        "kind": "cage-points",
+        "range": to_plain(spec.range),
+        "points": points,
+        "axes": spec.axes,
+        "symmetry": spec.symmetry,
+    }
+
+
+def from_plain(data: Mapping[str, Any]) -> Specification:
+    """The specification of `to_plain`'s values.
+
+    Raises:
+        SearchError: they are not what `to_plain` writes.
+    """
+    try:
+        fields = dict(data)
+        kind = fields.pop("kind")
+        if kind == "cage-points":
+            inner = from_plain(fields.pop("range"))
+            if not isinstance(inner, Continuous | Around):
+                raise SearchError("cage points need bounds or a reach")
+            return CagePoints(inner, **fields)
+        return {
+            "choice": Choice,
+            "integer": Integer,
+            "around": Around,
+            "continuous": Continuous,
+        }[kind](**fields)
+    except (KeyError, TypeError, ValueError, AttributeError) as error:
+        raise SearchError(f"a parameter can't be read: {error}", where=str(data)[:80]) from None
+
+
+def _is_number(value: object) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool)
+
+
+def _label(option: object) -> str:
+    if isinstance(option, tuple):
+        return ",".join(_label(item) for item in option)
+    return f"{option:g}" if isinstance(option, float) else str(option)

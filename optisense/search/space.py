@@ -1,0 +1,359 @@
+"""Search spaces: what may change in a design, and between which bounds."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from pydantic import ValidationError
+
+from optisense.design import SensorDesign
+from optisense.design.problems import design_error
+from optisense.errors import DesignError, OptiSenseError, SearchError
+from optisense.search.edit import Edit
+from optisense.search.expand import Parameter, expand
+from optisense.search.handles import LightType, with_light_types
+from optisense.search.parameters import (
+    Choice,
+    Continuous,
+    Integer,
+    Specification,
+    as_specification,
+    from_plain,
+    to_plain,
+)
+
+FloatArray = NDArray[np.float64]
+
+Constraint = Callable[[SensorDesign], bool | str | None]
+"""A user's own: False, or a text that says why, for a design that must not be."""
+
+SURE_SECTIONS = ("coating", "cages", "materials")
+"""Sections whose numbers only have bounds: what lies between two good values is good."""
+
+
+class SearchSpace:
+    """What may change, by dotted path; not tied to a design yet.
+
+    A value is (low, high), (low, high, steps), `Integer`, `Choice` or a list of options,
+    `Around` (so far from what it is now), or `CagePoints`. A path to a vector or to a cage's
+    points stands for all their numbers. See `optisense.search.handles` for paths that move whole
+    groups and parts.
+    """
+
+    def __init__(
+        self, parameters: Mapping[str, object], constraints: Sequence[Constraint] = ()
+    ) -> None:
+        """Read what may change.
+
+        Args:
+            parameters: by dotted path.
+            constraints: designs for which one returns False, or a reason, are not scored.
+
+        Raises:
+            SearchError: there is none, or bounds are empty, reversed or not finite.
+        """
+        self.parameters: dict[str, Specification] = {}
+        for path, value in parameters.items():
+            try:
+                self.parameters[path] = as_specification(value)
+            except SearchError as error:
+                raise SearchError(error.message, where=path, hint=error.hint) from None
+        if not self.parameters:
+            raise SearchError("nothing may change", hint="Name a path and its bounds")
+        self.constraints = tuple(constraints)
+
+    def bind(self, design: SensorDesign) -> BoundSpace:
+        """The space for one design: every path looked up, every bound tried.
+
+        Raises:
+            DesignError: a path leads nowhere (names the near match), or a bound does not fit.
+            SearchError: a path can't be varied like this.
+        """
+        return BoundSpace(self, design)
+
+    def to_plain(self) -> dict[str, Any]:
+        """JSON-ready; constraints, which are functions, are not in it."""
+        return {path: to_plain(spec) for path, spec in self.parameters.items()}
+
+    @staticmethod
+    def from_plain(
+        data: Mapping[str, Any], constraints: Sequence[Constraint] = ()
+    ) -> SearchSpace:
+        """The space of `to_plain`'s values.
+
+        Raises:
+            SearchError: they can't be read.
+        """
+        return SearchSpace(
+            {path: from_plain(value) for path, value in data.items()}, constraints
+        )
+
+    def __repr__(self) -> str:
+        return f"SearchSpace({self.parameters!r})"
+
+
+class BoundSpace:
+    """A search space for one design.
+
+    A point in it is a vector (n,) of coordinates: a number as it is, a choice as the position of
+    its option. Methods that need a scale work in the unit cube (see `to_unit`).
+
+    Attributes:
+        space: what was asked for.
+        design: the design that it was bound to.
+        prepared: the same shape in the form that parameters are set in.
+        parameters: one for each coordinate.
+        lower, upper: (n,) bounds, included.
+        start: (n,) the design as it is, within the bounds.
+        whole: (n,) bool, where only whole numbers are meant (integers and choices).
+        reshapes: whether a parameter moves surfaces.
+    """
+
+    def __init__(self, space: SearchSpace, design: SensorDesign) -> None:
+        """See `SearchSpace.bind`."""
+        self.space = space
+        self.design = design
+        found: list[Parameter] = []
+        prepared = design
+        for path, spec in space.parameters.items():
+            prepared, added = expand(prepared, path, spec)
+            found += added
+        self.prepared = prepared
+        self.parameters = tuple(found)
+        self._check_apart()
+        kinds = [parameter.kind for parameter in found]
+        self.lower = np.array([_low(kind) for kind in kinds])
+        self.upper = np.array([_high(kind) for kind in kinds])
+        self.start = np.array([parameter.start for parameter in found])
+        self.whole = np.array([isinstance(kind, Integer | Choice) for kind in kinds])
+        sections = {parameter.name.split(".")[0] for parameter in found}
+        self.reshapes = "cages" in sections or any(p.handle and p.handle.shapes for p in found)
+        self._sure = sections <= set(SURE_SECTIONS) and not any(p.handle for p in found)
+        self._plan()
+        self._try_bounds()
+
+    @property
+    def size(self) -> int:
+        """The number of parameters, n."""
+        return len(self.parameters)
+
+    @property
+    def names(self) -> list[str]:
+        """The path of each parameter."""
+        return [parameter.name for parameter in self.parameters]
+
+    def values(self, vector: ArrayLike) -> dict[str, float | int | str]:
+        """What a point means, by parameter: numbers, and the labels of options."""
+        return {
+            parameter.name: _meaning(parameter, coordinate)
+            for parameter, coordinate in zip(
+                self.parameters, np.asarray(vector, dtype=float).tolist(), strict=True
+            )
+        }
+
+    def vector(self, values: Mapping[str, object]) -> FloatArray:
+        """(n,): the point of these values; parameters that are not named stay at the start.
+
+        Raises:
+            SearchError: a name is unknown, or a value lies outside its bounds.
+        """
+        point = self.start.copy()
+        names = self.names
+        for name, value in values.items():
+            if name not in names:
+                raise SearchError(f"the space has no parameter '{name}'")
+            number = names.index(name)
+            point[number] = _coordinate(self.parameters[number], value)
+        self.check(point)
+        return point
+
+    def check(self, vector: ArrayLike) -> None:
+        """Refuse a point outside the space.
+
+        Raises:
+            SearchError: names the first parameter that is outside.
+        """
+        point = np.asarray(vector, dtype=float)
+        if point.shape != (self.size,):
+            raise SearchError(f"a point of this space has {self.size} numbers, not {point.shape}")
+        wrong = ~((point >= self.lower) & (point <= self.upper))
+        wrong |= self.whole & (point != np.round(point))
+        if wrong.any():
+            first = int(np.flatnonzero(wrong)[0])
+            low, high = self.lower[first], self.upper[first]
+            raise SearchError(
+                f"{point[first]:g} is not between {low:g} and {high:g}, or not whole",
+                where=self.parameters[first].name,
+            )
+
+    def to_unit(self, vector: ArrayLike) -> FloatArray:
+        """Coordinates (..., n) from 0 at the lower to 1 at the upper bounds."""
+        return np.asarray((np.asarray(vector) - self.lower) / (self.upper - self.lower))
+
+    def from_unit(self, unit: ArrayLike) -> FloatArray:
+        """The point (..., n) of coordinates 0 to 1, clipped, whole where only whole ones are.
+
+        Whole numbers share the unit interval evenly: four options get a quarter each.
+        """
+        share = np.clip(np.asarray(unit, dtype=np.float64), 0.0, 1.0)
+        span = self.upper - self.lower
+        counted = self.lower + np.minimum(np.floor(share * (span + 1.0)), span)
+        smooth = np.clip(self.lower + share * span, self.lower, self.upper)
+        return np.where(self.whole, counted, smooth)
+
+    def unit_of(self, vector: ArrayLike) -> FloatArray:
+        """Coordinates that `from_unit` turns back into this point (whole ones: their middle)."""
+        point = np.asarray(vector, dtype=np.float64)
+        middle = (point - self.lower + 0.5) / (self.upper - self.lower + 1.0)
+        return np.where(self.whole, middle, self.to_unit(point))
+
+    def apply(self, vector: ArrayLike) -> SensorDesign:
+        """The design at a point.
+
+        Raises:
+            OptiSenseError: the values do not fit together.
+        """
+        point = np.asarray(vector, dtype=np.float64)
+        design = self.prepared
+        for number, handle in self._first:
+            design = handle.apply(design, self._option(number, point))
+        design = self._edit.apply(design, self._targets(point))
+        for number, handle in self._moves:
+            design = handle.apply(design, float(point[number]))
+        if self._types:
+            chosen = {
+                (handle.group, handle.index): str(self._option(number, point))
+                for number, handle in self._types
+            }
+            design = with_light_types(design, chosen)
+        return design if self._sure else checked(design)
+
+    def _targets(self, point: FloatArray) -> list[Any]:
+        """The values of all direct targets, in the order of the edit's paths."""
+        numbers: list[Any] = (point[self._source] * self._scale + self._offset).tolist()
+        for position, number in self._named:
+            numbers[position] = self._option(number, point)
+        return numbers
+
+    def _option(self, number: int, point: FloatArray) -> Any:
+        """What is set for a parameter of whole numbers: the option, or an int."""
+        kind, place = self.parameters[number].kind, round(float(point[number]))
+        return kind.options[place] if isinstance(kind, Choice) else place
+
+    def _plan(self) -> None:
+        """Look up all places once, so that applying a point is quick."""
+        paths, source, scale, offset = [], [], [], []
+        self._named: list[tuple[int, int]] = []
+        for number, parameter in enumerate(self.parameters):
+            for target in parameter.targets:
+                if not isinstance(parameter.kind, Continuous):
+                    self._named.append((len(paths), number))
+                paths.append(target.path)
+                source.append(number)
+                scale.append(target.scale)
+                offset.append(target.offset)
+        self._edit = Edit(self.prepared, paths)
+        self._source = np.array(source, dtype=np.int64)
+        self._scale, self._offset = np.array(scale), np.array(offset)
+        handled = [(n, p.handle) for n, p in enumerate(self.parameters) if p.handle is not None]
+        self._first = [(n, h) for n, h in handled if h.stage == 0]
+        self._moves = [(n, h) for n, h in handled if h.stage == 2]
+        self._types = [(n, h) for n, h in handled if isinstance(h, LightType)]
+
+    def _check_apart(self) -> None:
+        """No two parameters may set the same value."""
+        seen: dict[str, str] = {}
+        for parameter in self.parameters:
+            for path in [target.path for target in parameter.targets] or [parameter.name]:
+                if path in seen:
+                    raise SearchError(f"'{path}' is varied twice", where=parameter.asked)
+                seen[path] = parameter.name
+        for path in seen:
+            for other in seen:
+                if other.startswith((f"{path}.", f"{path}[")) and not _may_nest(path):
+                    raise SearchError(
+                        f"'{path}' and '{other}', which is inside it, are both varied"
+                    )
+
+    def _try_bounds(self) -> None:
+        """Set each bound and option once, so that a bad one is told before the search.
+
+        Raises:
+            OptiSenseError: names the parameter.
+        """
+        for number, parameter in enumerate(self.parameters):
+            if parameter.targets and parameter.name.startswith("cages."):
+                continue
+            tried = self._levels_to_try(number)
+            for coordinate in tried:
+                point = self.start.copy()
+                point[number] = coordinate
+                self._try(point, parameter.name)
+        if any(parameter.name.startswith("cages.") for parameter in self.parameters):
+            in_cages = np.array([name.startswith("cages.") for name in self.names])
+            for bound in (self.lower, self.upper):
+                self._try(np.where(in_cages, bound, self.start), "cages")
+
+    def _levels_to_try(self, number: int) -> Sequence[float]:
+        kind = self.parameters[number].kind
+        if isinstance(kind, Choice):
+            return kind.levels
+        return (float(kind.low), float(kind.high))
+
+    def _try(self, point: FloatArray, where: str) -> None:
+        try:
+            checked(self.apply(point))
+        except OptiSenseError as error:
+            raise type(error)(error.message, where=where, hint=error.hint) from None
+
+
+def checked(design: SensorDesign) -> SensorDesign:
+    """A design after all checks of its fields.
+
+    Raises:
+        DesignError: a value does not fit.
+    """
+    try:
+        return design.copy()
+    except ValidationError as error:
+        data = design.model_dump(mode="json")
+        raise design_error(error, data, where="the varied design") from None
+
+
+def _low(kind: Continuous | Integer | Choice) -> float:
+    return 0.0 if isinstance(kind, Choice) else float(kind.low)
+
+
+def _high(kind: Continuous | Integer | Choice) -> float:
+    return float(len(kind.options) - 1) if isinstance(kind, Choice) else float(kind.high)
+
+
+def _meaning(parameter: Parameter, coordinate: float) -> float | int | str:
+    kind = parameter.kind
+    if isinstance(kind, Choice):
+        return kind.labels[round(coordinate)]
+    return round(coordinate) if isinstance(kind, Integer) else coordinate
+
+
+def _coordinate(parameter: Parameter, value: object) -> float:
+    kind = parameter.kind
+    if isinstance(kind, Choice):
+        if value in kind.labels:
+            return float(kind.labels.index(str(value)))
+        option = tuple(value) if isinstance(value, list) else value
+        if option in kind.options:
+            return float(kind.options.index(option))
+    elif isinstance(value, int | float) and not isinstance(value, bool):
+        return float(value)
+    raise SearchError(f"{value!r} is not a value of this parameter", where=parameter.name)
+
+
+def _may_nest(path: str) -> bool:
+    """A whole coating or camera of the library may be refined by single numbers."""
+    return path.endswith((".library", ".model", ".material"))
+
+
+__all__ = ["BoundSpace", "Constraint", "DesignError", "SearchSpace", "checked"]
