@@ -43,7 +43,7 @@ def _closed_and_outward(mesh: TriangleMesh, name: str) -> TriangleMesh:
     welded = mesh.welded()
     edges = unmatched_edges(welded)
     if len(edges) and len(_leaky_edges(welded)) == 0:
-        mesh = welded = _with_consistent_winding(welded)
+        mesh = welded = with_consistent_winding(welded)
         edges = unmatched_edges(welded)
     if len(edges):
         leaky = _leaky_edges(welded)
@@ -87,7 +87,7 @@ def _directed_edges(mesh: TriangleMesh) -> tuple[NDArray[np.int64], int]:
     return starts * size + ends, size
 
 
-def _with_consistent_winding(mesh: TriangleMesh) -> TriangleMesh:
+def with_consistent_winding(mesh: TriangleMesh) -> TriangleMesh:
     """Turn single faces over until neighbours agree, walking from face to face."""
     from scipy import sparse
     from scipy.sparse import csgraph

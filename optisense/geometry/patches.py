@@ -1,0 +1,92 @@
+"""Picking faces of a mesh the way a CAD tool does: by where they look, and along smooth edges."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
+
+from optisense.geometry.mesh import FloatArray, TriangleMesh
+
+Faces = NDArray[np.int64]
+
+SHARP = 30.0
+"""Degrees: neighbouring faces that bend more meet in an edge, not in a curve."""
+
+
+def faces_towards(mesh: TriangleMesh, direction: ArrayLike, within: float) -> Faces:
+    """The faces whose normals are at most `within` degrees off a direction."""
+    way = np.asarray(direction, dtype=np.float64)
+    cosine = mesh.face_normals @ (way / np.linalg.norm(way))
+    return np.flatnonzero((cosine >= np.cos(np.radians(within)) - 1e-12) & (mesh.face_areas > 0))
+
+
+def angle_to_nearest(mesh: TriangleMesh, direction: ArrayLike) -> float:
+    """Degrees between a direction and the face normal that comes nearest to it."""
+    way = np.asarray(direction, dtype=np.float64)
+    cosine = (mesh.face_normals @ (way / np.linalg.norm(way)))[mesh.face_areas > 0]
+    return float(np.degrees(np.arccos(np.clip(cosine.max(), -1.0, 1.0))))
+
+
+def smoothly_joined(mesh: TriangleMesh, start: Faces, sharp: float = SHARP) -> Faces:
+    """The faces `start` and all that go on from them without a sharp edge.
+
+    Args:
+        mesh: welded, so that neighbours share vertices.
+        start: some of its faces.
+        sharp: degrees between the normals of neighbours across a sharp edge.
+    """
+    one, other = neighbours(mesh)
+    cosine = np.einsum("ij,ij->i", mesh.face_normals[one], mesh.face_normals[other])
+    smooth = cosine >= np.cos(np.radians(sharp)) - 1e-12
+    label = _components(len(mesh.faces), one[smooth], other[smooth])
+    return np.flatnonzero(np.isin(label, label[start]))
+
+
+def patches(mesh: TriangleMesh, faces: Faces) -> list[Faces]:
+    """Faces divided into patches that hang together by edges, the largest first.
+
+    Patches of equal area come by where they lie, so that their order is always the same.
+    """
+    one, other = neighbours(mesh)
+    chosen = np.zeros(len(mesh.faces), dtype=bool)
+    chosen[faces] = True
+    both = chosen[one] & chosen[other]
+    label = _components(len(mesh.faces), one[both], other[both])[faces]
+    groups = [faces[label == number] for number in np.unique(label)]
+
+    def order(group: Faces) -> tuple[float, ...]:
+        area = round(float(mesh.face_areas[group].sum()), 3)
+        return -area, *np.round(middle(mesh, group), 3).tolist()
+
+    return sorted(groups, key=order)
+
+
+def neighbours(mesh: TriangleMesh) -> tuple[Faces, Faces]:
+    """Pairs of faces that share an edge: two (k,) int64."""
+    edges = np.sort(mesh.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2).astype(np.int64), axis=1)
+    owner = np.repeat(np.arange(len(mesh.faces)), 3)
+    order = np.lexsort((edges[:, 1], edges[:, 0]))
+    edges, owner = edges[order], owner[order]
+    twin = (edges[1:] == edges[:-1]).all(axis=1)
+    return owner[:-1][twin], owner[1:][twin]
+
+
+def middle(mesh: TriangleMesh, faces: Faces | None = None) -> FloatArray:
+    """(3,) mm: the centre of area of faces, or of all of them."""
+    chosen = np.arange(len(mesh.faces)) if faces is None else faces
+    areas = mesh.face_areas[chosen]
+    centres = mesh.triangles[chosen].mean(axis=1)
+    return np.asarray((areas[:, None] * centres).sum(axis=0) / areas.sum())
+
+
+def mean_normal(mesh: TriangleMesh, faces: Faces | None = None) -> FloatArray:
+    """(3,): the mean of the face normals by area; shorter than 1 on a curved surface."""
+    chosen = np.arange(len(mesh.faces)) if faces is None else faces
+    return np.asarray(mesh.face_vectors[chosen].sum(axis=0) / 2.0 / mesh.face_areas[chosen].sum())
+
+
+def _components(count: int, one: Faces, other: Faces) -> Faces:
+    graph = coo_matrix((np.ones(len(one), dtype=np.int8), (one, other)), shape=(count, count))
+    return np.asarray(connected_components(graph, directed=False)[1], dtype=np.int64)

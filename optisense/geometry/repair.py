@@ -1,0 +1,217 @@
+"""Meshes from CAD files: what can be mended without guessing, and what to mend in the CAD tool.
+
+Mended: vertices that miss each other by a rounding, doubled faces, faces and whole shells that
+are turned inside out. Refused, with the place: holes, edges of more than two faces, faces that
+cut through each other.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
+
+from optisense.errors import MeshError
+from optisense.geometry.containment import inside
+from optisense.geometry.crossings import self_crossings
+from optisense.geometry.mesh import FloatArray, TriangleMesh
+from optisense.geometry.mesh_checks import with_consistent_winding
+from optisense.geometry.welding import merged_vertices
+
+WELDS = (1e-6, 1e-5, 1e-4, 1e-3)
+"""mm: vertices this near each other are tried as one, the smallest first."""
+
+
+def repaired(mesh: TriangleMesh, name: str, closed: bool) -> tuple[TriangleMesh, list[str]]:
+    """Mend the mesh of part `name` where that is safe.
+
+    Args:
+        mesh: as read from a file, mm.
+        name: of the part, for messages.
+        closed: whether it must enclose a volume.
+
+    Returns:
+        The mesh (closed ones look outward; shading normals are kept only by an open mesh that
+        needed nothing) and what was done to it, a sentence each.
+
+    Raises:
+        MeshError: no faces, not finite, holes, edges of more than two faces, faces that cut
+            through each other, or no volume; says where and what to do in the CAD tool.
+    """
+    where = f"part {name}"
+    if not np.isfinite(mesh.vertices).all():
+        raise MeshError(
+            "some coordinates are not finite numbers",
+            where=where,
+            hint="Export the part again from the CAD tool",
+        )
+    if len(mesh.faces) == 0 or not mesh.area > 0.0:
+        raise MeshError(
+            "the file has no faces",
+            where=where,
+            hint="In the CAD tool: show the body, select it, and export a solid or a surface as a "
+            "mesh; sketches, points and hidden bodies have no faces",
+        )
+    notes: list[str] = []
+    mended, doubled = _without_doubles(mesh.welded())
+    if doubled:
+        notes.append(f"{doubled} doubled faces were dropped")
+    if closed:
+        mended = _closed(mended, where, notes)
+        mended = _outward(mended, where, notes)
+        _refuse_crossings(mended, where)
+    else:
+        mended = _consistent(mended, notes)
+    return (mended if notes or closed else mesh), notes
+
+
+def refuse_bad_sheet(mesh: TriangleMesh, name: str) -> None:
+    """Check an open mesh on which places are found by walking from face to face.
+
+    Raises:
+        MeshError: an edge has more than two faces, or faces cut through each other.
+    """
+    _refuse_crowded_edges(mesh.welded(), f"part {name}")
+    _refuse_crossings(mesh.welded(), f"part {name}")
+
+
+def shells(mesh: TriangleMesh) -> NDArray[np.int64]:
+    """(m,) int64: the number of the connected shell that each face belongs to."""
+    count = len(mesh.vertices)
+    ends = mesh.faces[:, [0, 1, 1, 2]].reshape(-1, 2)
+    graph = coo_matrix((np.ones(len(ends)), (ends[:, 0], ends[:, 1])), shape=(count, count))
+    _, group = connected_components(graph, directed=False)
+    _, labels = np.unique(group[mesh.faces[:, 0]], return_inverse=True)
+    return np.asarray(labels.reshape(-1), dtype=np.int64)
+
+
+def _without_doubles(mesh: TriangleMesh) -> tuple[TriangleMesh, int]:
+    """Faces with the same corners in the same turn once only, and how many were dropped."""
+    start = mesh.faces.argmin(axis=1)
+    turned = np.take_along_axis(mesh.faces, (start[:, None] + np.arange(3)) % 3, axis=1)
+    _, first = np.unique(turned, axis=0, return_index=True)
+    dropped = len(mesh.faces) - len(first)
+    return (mesh.with_faces(mesh.faces[np.sort(first)]), dropped) if dropped else (mesh, 0)
+
+
+def _closed(mesh: TriangleMesh, where: str, notes: list[str]) -> TriangleMesh:
+    """Weld as far as needed to close the mesh."""
+    for distance in WELDS:
+        welded = merged_vertices(mesh, distance)
+        edges, count = _edges(welded)
+        if not (count == 1).any():
+            if distance > WELDS[0]:
+                notes.append(f"vertices up to {distance:g} mm apart were joined")
+            _refuse_crowded_edges(welded, where)
+            return welded
+    welded = merged_vertices(mesh, WELDS[0])
+    edges, count = _edges(welded)
+    open_edges = edges[count == 1]
+    raise _hole(welded, open_edges, where)
+
+
+def _hole(mesh: TriangleMesh, edges: NDArray[np.int64], where: str) -> MeshError:
+    """The error for open edges: how many holes, and where the widest one is."""
+    count = len(mesh.vertices)
+    graph = coo_matrix((np.ones(len(edges)), (edges[:, 0], edges[:, 1])), shape=(count, count))
+    _, group = connected_components(graph, directed=False)
+    rims = np.unique(group[edges[:, 0]])
+    sizes, middles = [], []
+    for rim in rims:
+        points = mesh.vertices[np.unique(edges[group[edges[:, 0]] == rim])]
+        sizes.append(float(np.linalg.norm(np.ptp(points, axis=0))))
+        middles.append(points.mean(axis=0))
+    widest = int(np.argmax(sizes))
+    holes = "a hole" if len(rims) == 1 else f"{len(rims)} holes, the widest"
+    return MeshError(
+        f"the solid is not closed: it has {holes} of {sizes[widest]:.3g} mm near "
+        f"{_point(middles[widest])} mm ({len(edges)} edges have a face on one side only)",
+        where=where,
+        hint="In the CAD tool: close the opening (knit or thicken the surfaces into a solid body) "
+        "and export the solid again",
+    )
+
+
+def _refuse_crowded_edges(mesh: TriangleMesh, where: str) -> None:
+    edges, count = _edges(mesh)
+    crowded = edges[count > 2]
+    if len(crowded) == 0:
+        return
+    place = mesh.vertices[crowded[0]].mean(axis=0)
+    raise MeshError(
+        f"the mesh is not manifold: {len(crowded)} edges belong to more than two faces, one of "
+        f"them near {_point(place)} mm",
+        where=where,
+        hint="In the CAD tool: remove faces inside the body, and join bodies that only touch "
+        "along an edge, or export each body to its own file",
+    )
+
+
+def _refuse_crossings(mesh: TriangleMesh, where: str) -> None:
+    found = self_crossings(mesh)
+    if len(found.pairs) == 0:
+        return
+    bodies = shells(mesh)
+    two = bool((bodies[found.pairs[:, 0]] != bodies[found.pairs[:, 1]]).any())
+    raise MeshError(
+        f"the mesh cuts through itself: {len(found.pairs)} pairs of faces cross, one of them near "
+        f"{_point(found.places[0])} mm",
+        where=where,
+        hint="In the CAD tool: combine the overlapping bodies into one (Boolean union), or export "
+        "each to its own file"
+        if two
+        else "In the CAD tool: look for a fillet, offset or loft that folds over itself there, "
+        "make it smaller, and export again",
+    )
+
+
+def _consistent(mesh: TriangleMesh, notes: list[str]) -> TriangleMesh:
+    """An open mesh whose faces agree with their neighbours; in each shell the majority wins."""
+    faces = with_consistent_winding(mesh).faces
+    turned = (faces != mesh.faces).any(axis=1)
+    labels = shells(mesh)
+    area = np.bincount(labels, mesh.face_areas)
+    outvoted = 2.0 * np.bincount(labels, mesh.face_areas * turned) > area
+    turned ^= outvoted[labels]
+    if turned.any():
+        notes.append(f"{turned.sum()} faces were turned over to agree with their neighbours")
+    return mesh.with_faces(np.where(turned[:, None], mesh.faces[:, ::-1], mesh.faces))
+
+
+def _outward(mesh: TriangleMesh, where: str, notes: list[str]) -> TriangleMesh:
+    """Neighbours wound alike, and each shell outward, or inward where it is a cavity."""
+    labels = shells(mesh)
+    faces = with_consistent_winding(mesh).faces.copy()
+    bodies = [mesh.with_faces(faces[labels == label]) for label in range(labels.max() + 1)]
+    for label, body in enumerate(bodies):
+        point = body.triangles[0].mean(axis=0)
+        if not abs(body.volume) > 1e-9 * body.area**1.5:
+            raise MeshError(
+                f"the mesh encloses no volume near {_point(point)} mm",
+                where=where,
+                hint="In the CAD tool: export a solid body, not a flat one",
+            )
+        around = bodies[:label] + bodies[label + 1 :]
+        depth = sum(bool(inside(point, other)[0]) for other in around)
+        if (body.volume > 0.0) != (depth % 2 == 0):
+            faces[labels == label] = faces[labels == label][:, ::-1]
+    turned = (faces != mesh.faces).any(axis=1)
+    if turned.all():
+        notes.append("it was inside out and has been turned over")
+    elif turned.any():
+        notes.append(
+            f"{turned.sum()} of {len(turned)} faces were inside out; they were turned over"
+        )
+    return mesh.with_faces(faces)
+
+
+def _edges(mesh: TriangleMesh) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """(k, 2) undirected edges and (k,) how many faces each has."""
+    ends = mesh.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2).astype(np.int64)
+    edges, count = np.unique(np.sort(ends, axis=1), axis=0, return_counts=True)
+    return edges, count
+
+
+def _point(place: FloatArray) -> str:
+    return "({:.3f}, {:.3f}, {:.3f})".format(*place)

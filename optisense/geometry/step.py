@@ -1,0 +1,200 @@
+"""Reading STEP files, with the extra `step` (Open CASCADE through cadquery-ocp).
+
+A STEP file knows its units and holds exact surfaces, which are cut into triangles here. The
+calls used are the same in the releases of Open CASCADE from 7.8 to 8.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from optisense.errors import MeshError, SetupError
+from optisense.geometry.mesh import TriangleMesh
+from optisense.geometry.welding import merged_vertices
+
+SUFFIXES = (".step", ".stp")
+
+CHORD = 0.003
+"""mm: triangles stay this close to the exact surface."""
+
+BEND = 6.0
+"""Degrees: and neighbouring ones on a curve bend no more than this."""
+
+_WELD = 1e-5  # mm: how well Open CASCADE's triangles of neighbouring faces meet
+
+
+@dataclass(frozen=True)
+class StepBody:
+    """A solid, or a surface that is part of none.
+
+    Attributes:
+        name: of its product in the file, numbered where several share one.
+        mesh: mm, in the frame of the whole file.
+        solid: whether it is a solid.
+    """
+
+    name: str
+    mesh: TriangleMesh
+    solid: bool
+
+
+def read_step(path: str | Path) -> list[StepBody]:
+    """All bodies of a STEP file, in its order, each where its assembly puts it.
+
+    Raises:
+        SetupError: the extra is not installed.
+        MeshError: the file is missing, is not STEP, or holds no faces.
+    """
+    path = Path(path)
+    try:
+        from OCP.STEPCAFControl import STEPCAFControl_Reader
+        from OCP.TCollection import TCollection_ExtendedString
+        from OCP.TDocStd import TDocStd_Document
+        from OCP.XCAFDoc import XCAFDoc_DocumentTool
+    except ImportError as error:
+        raise SetupError(
+            "reading STEP files needs the extra 'step', which is not installed",
+            where=str(path),
+            hint="pip install 'optisense[step]', or export STL files from the CAD tool",
+        ) from error
+    if not path.is_file():
+        raise MeshError("there is no such file", where=str(path), hint="check the path")
+    _quiet()
+    reader = STEPCAFControl_Reader()
+    reader.SetNameMode(True)
+    status = reader.ReadFile(str(path))
+    document = TDocStd_Document(TCollection_ExtendedString("XmlOcaf"))
+    if "RetDone" not in str(status) or not reader.Transfer(document):
+        raise MeshError(
+            "this is not a STEP file that can be read",
+            where=str(path),
+            hint="In the CAD tool: export it again as STEP AP214 or AP242",
+        )
+    tool = XCAFDoc_DocumentTool.ShapeTool_s(document.Main())
+    bodies: list[StepBody] = []
+    count: dict[str, int] = {}
+    for name, shape in _products(tool.Label()):
+        for solid, body in _bodies(shape):
+            mesh = _triangles(body)
+            if len(mesh.faces) == 0:
+                continue
+            count[name] = count.get(name, 0) + 1
+            label = name if count[name] == 1 else f"{name}-{count[name]}"
+            bodies.append(StepBody(label, mesh, solid))
+    if not bodies:
+        raise MeshError(
+            "the STEP file holds no faces",
+            where=str(path),
+            hint="In the CAD tool: show the solid bodies and export them; sketches, points and "
+            "hidden bodies have no faces",
+        )
+    return bodies
+
+
+def _quiet() -> None:
+    """Keep Open CASCADE from printing its own messages on standard output."""
+    from OCP.Message import Message
+
+    messenger: Any = Message.DefaultMessenger_s()
+    for printer in list(messenger.Printers()):
+        messenger.RemovePrinter(printer)
+
+
+def _products(root: Any) -> Iterator[tuple[str, Any]]:
+    """Name and shape, in its place, of each leaf of the tree of assemblies."""
+    from OCP.TDF import TDF_ChildIterator, TDF_Label
+    from OCP.TopLoc import TopLoc_Location
+    from OCP.XCAFDoc import XCAFDoc_ShapeTool
+
+    def below(label: Any) -> list[Any]:
+        found, children = [], TDF_ChildIterator(label)
+        while children.More():
+            found.append(children.Value())
+            children.Next()
+        return found
+
+    def walk(label: Any, place: Any, name: str) -> Iterator[tuple[str, Any]]:
+        if XCAFDoc_ShapeTool.IsReference_s(label):
+            product = TDF_Label()
+            XCAFDoc_ShapeTool.GetReferredShape_s(label, product)
+            here = place.Multiplied(XCAFDoc_ShapeTool.GetLocation_s(label))
+            yield from walk(product, here, _name(product) or _name(label) or name)
+        elif XCAFDoc_ShapeTool.IsAssembly_s(label):
+            for child in below(label):
+                if XCAFDoc_ShapeTool.IsComponent_s(child):
+                    yield from walk(child, place, name)
+        else:
+            yield name, XCAFDoc_ShapeTool.GetShape_s(label).Moved(place, False)
+
+    free = [
+        label
+        for label in below(root)
+        if XCAFDoc_ShapeTool.IsShape_s(label) and XCAFDoc_ShapeTool.IsFree_s(label)
+    ]
+    for label in free:
+        yield from walk(label, TopLoc_Location(), _name(label) or "body")
+
+
+def _name(label: Any) -> str:
+    from OCP.TDataStd import TDataStd_Name
+
+    name = TDataStd_Name()
+    return str(name.Get().ToExtString()) if label.FindAttribute(name.GetID_s(), name) else ""
+
+
+def _bodies(shape: Any) -> Iterator[tuple[bool, Any]]:
+    """Solids, then the faces that are in no solid; the first value says which it is."""
+    from OCP.TopAbs import TopAbs_FACE, TopAbs_SHELL, TopAbs_SOLID
+    from OCP.TopExp import TopExp_Explorer
+
+    for kind, within in (
+        (TopAbs_SOLID, None),
+        (TopAbs_SHELL, TopAbs_SOLID),
+        (TopAbs_FACE, TopAbs_SHELL),
+    ):
+        explorer = TopExp_Explorer()
+        explorer.Init(shape, kind) if within is None else explorer.Init(shape, kind, within)
+        while explorer.More():
+            yield kind == TopAbs_SOLID, explorer.Current()
+            explorer.Next()
+
+
+def _triangles(shape: Any) -> TriangleMesh:
+    """Cut the faces of a shape into triangles, which look out of a solid."""
+    from OCP.BRep import BRep_Tool
+    from OCP.BRepMesh import BRepMesh_IncrementalMesh
+    from OCP.TopAbs import TopAbs_FACE, TopAbs_REVERSED
+    from OCP.TopExp import TopExp_Explorer
+    from OCP.TopLoc import TopLoc_Location
+    from OCP.TopoDS import TopoDS
+
+    cast = getattr(TopoDS, "Face_s", None) or TopoDS.Face
+    BRepMesh_IncrementalMesh(shape, CHORD, False, float(np.radians(BEND)), False)
+    pieces = []
+    explorer = TopExp_Explorer()
+    explorer.Init(shape, TopAbs_FACE)
+    while explorer.More():
+        face, place = cast(explorer.Current()), TopLoc_Location()
+        patch = BRep_Tool.Triangulation_s(face, place)
+        explorer.Next()
+        if patch is None:
+            continue
+        move = place.Transformation()
+        nodes = [patch.Node(i).Transformed(move) for i in range(1, patch.NbNodes() + 1)]
+        corners = [patch.Triangle(i) for i in range(1, patch.NbTriangles() + 1)]
+        faces = np.array([[t.Value(k) - 1 for k in (1, 2, 3)] for t in corners])
+        turned = face.Orientation() == TopAbs_REVERSED
+        pieces.append(
+            TriangleMesh(
+                np.array([(node.X(), node.Y(), node.Z()) for node in nodes]),
+                faces[:, ::-1] if turned else faces,
+            )
+        )
+    if not pieces:
+        return TriangleMesh(np.zeros((0, 3)), np.zeros((0, 3), dtype=np.int32))
+    return merged_vertices(TriangleMesh.joined(pieces), _WELD)

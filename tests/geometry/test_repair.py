@@ -1,0 +1,128 @@
+"""What is mended in a mesh from a CAD file, and what is refused with the place."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from optisense.errors import MeshError
+from optisense.geometry import TriangleMesh
+from optisense.geometry.repair import refuse_bad_sheet, repaired, shells
+
+BLOCK = TriangleMesh.box((0, 0, 0), (10, 8, 4), (3, 3, 3))
+VOLUME = 320.0
+
+
+def with_some_faces_turned(mesh: TriangleMesh, which: slice) -> TriangleMesh:
+    faces = mesh.faces.copy()
+    faces[which] = faces[which][:, ::-1]
+    return mesh.with_faces(faces)
+
+
+@pytest.mark.parametrize("which", [slice(0, None), slice(5, 6), slice(1, None), slice(10, 60)])
+def test_faces_that_look_inward_are_turned_over(which: slice) -> None:
+    mesh, notes = repaired(with_some_faces_turned(BLOCK, which), "gel", closed=True)
+    assert mesh.volume == pytest.approx(VOLUME)
+    assert len(notes) == 1 and "turned over" in notes[0]
+
+
+def test_a_sound_solid_needs_nothing() -> None:
+    mesh, notes = repaired(BLOCK, "gel", closed=True)
+    assert notes == []
+    assert mesh.volume == pytest.approx(VOLUME)
+
+
+def test_a_cavity_looks_into_the_hollow_however_it_was_drawn() -> None:
+    hollow = TriangleMesh.box((2, 2, 1), (4, 4, 2))
+    for drawn in (hollow, hollow.flipped()):
+        mesh, _ = repaired(TriangleMesh.joined([BLOCK, drawn]), "gel", closed=True)
+        assert mesh.volume == pytest.approx(VOLUME - 4.0)
+
+
+def test_two_bodies_in_one_file_both_look_outward() -> None:
+    beside = TriangleMesh.box((20, 0, 0), (21, 1, 1)).flipped()
+    mesh, _ = repaired(TriangleMesh.joined([BLOCK, beside]), "plates", closed=True)
+    assert mesh.volume == pytest.approx(VOLUME + 1.0)
+    assert shells(mesh).max() == 1
+
+
+@pytest.mark.parametrize("noise", [3e-7, 3e-6, 2e-4])
+def test_loose_triangles_are_joined(noise: float) -> None:
+    corners = BLOCK.triangles.reshape(-1, 3)
+    off = np.random.default_rng(7).uniform(-noise, noise, corners.shape)
+    loose = TriangleMesh(corners + off, np.arange(len(corners)).reshape(-1, 3))
+    mesh, notes = repaired(loose, "gel", closed=True)
+    assert mesh.is_closed
+    assert mesh.volume == pytest.approx(VOLUME, abs=1000 * noise)
+    assert ("joined" in " ".join(notes)) == (noise > 1e-6)
+
+
+def test_doubled_faces_are_dropped() -> None:
+    doubled = BLOCK.with_faces(np.concatenate([BLOCK.faces, np.roll(BLOCK.faces[:4], 1, axis=1)]))
+    mesh, notes = repaired(doubled, "gel", closed=True)
+    assert len(mesh.faces) == len(BLOCK.faces)
+    assert "4 doubled faces" in notes[0]
+
+
+def faulty(kind: str) -> TriangleMesh:
+    second = {
+        "wall": TriangleMesh.box((10, 0, 0), (20, 8, 4), (3, 3, 3)),
+        "edge": TriangleMesh.box((10, 8, 0), (20, 18, 4), (3, 3, 3)),
+        "overlap": TriangleMesh.box((5, 1, 1), (20, 9, 9), (3, 3, 3)),
+    }
+    if kind in second:
+        return TriangleMesh.joined([BLOCK, second[kind]])
+    if kind == "hole":
+        return BLOCK.with_faces(BLOCK.faces[1:])
+    if kind == "flat":
+        return TriangleMesh(np.eye(3), np.array([[0, 1, 2], [2, 1, 0]]))
+    if kind == "fold":  # a top pushed down through the bottom
+        vertices = BLOCK.vertices.copy()
+        inner = (vertices[:, 2] == 4) & (np.abs(vertices[:, 0] - 5) < 4)
+        inner &= np.abs(vertices[:, 1] - 4) < 3
+        vertices[inner, 2] = -1.0
+        return BLOCK.with_vertices(vertices)
+    if kind == "nan":
+        return BLOCK.with_vertices(np.where(BLOCK.vertices == 10, np.nan, BLOCK.vertices))
+    return TriangleMesh(np.zeros((0, 3)), np.zeros((0, 3)))
+
+
+@pytest.mark.parametrize(
+    ("kind", "complaint", "place", "advice"),
+    [
+        ("empty", "no faces", "", "export"),
+        ("hole", "not closed: it has a hole of 4.27 mm", "(2.222, 0.889, 4.000)", "close"),
+        ("wall", "not manifold", "(10.000, ", "inside the body"),
+        ("edge", "not manifold: 3 edges", "(10.000, 8.000, ", "own file"),
+        ("overlap", "cuts through itself", "(5.000, ", "union"),
+        ("fold", "cuts through itself", ", 0.000)", "folds"),
+        ("flat", "no volume", "(0.333, 0.333, 0.333)", "solid body"),
+        ("nan", "not finite", "", "again"),
+    ],
+)
+def test_what_can_not_be_mended_is_told_with_part_place_and_remedy(
+    kind: str, complaint: str, place: str, advice: str
+) -> None:
+    with pytest.raises(MeshError) as error:
+        repaired(faulty(kind), "gel", closed=True)
+    assert complaint in error.value.message
+    assert place in error.value.message
+    assert error.value.where == "part gel"
+    assert advice in (error.value.hint or "")
+
+
+def test_in_an_open_sheet_the_majority_decides_where_it_looks() -> None:
+    sheet = TriangleMesh.grid((4, 4), (3, 3))
+    for start in (0, 3):
+        turned = with_some_faces_turned(sheet, slice(start, start + 1))
+        mesh, notes = repaired(turned, "skin", closed=False)
+        assert (mesh.face_normals[:, 2] > 0.99).all()
+        assert notes == ["1 faces were turned over to agree with their neighbours"]
+
+
+def test_a_sheet_to_walk_on_has_at_most_two_faces_at_an_edge() -> None:
+    sheet = TriangleMesh.grid((4, 4), (2, 2))
+    fin = sheet.transformed([[1, 0, 0], [0, 0, -1], [0, 1, 0]])  # stands upright on the middle
+    refuse_bad_sheet(sheet, "skin")
+    with pytest.raises(MeshError, match="more than two faces"):
+        refuse_bad_sheet(TriangleMesh.joined([sheet, fin]), "skin")

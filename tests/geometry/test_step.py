@@ -1,0 +1,129 @@
+"""STEP files: shapes, places, names and units; and what happens without the extra."""
+
+from __future__ import annotations
+
+import importlib.util
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from optisense.errors import MeshError, SetupError
+from optisense.geometry.step import read_step
+
+needs_extra = pytest.mark.skipif(
+    importlib.util.find_spec("OCP") is None, reason="the extra 'step' is not installed"
+)
+
+
+def write_step(path: Path, parts: dict[str, tuple[Any, float]], unit: str = "MM") -> Path:
+    """An assembly of named shapes, each moved along x by some mm."""
+    from OCP.gp import gp_Trsf, gp_Vec
+    from OCP.Interface import Interface_Static
+    from OCP.STEPCAFControl import STEPCAFControl_Writer
+    from OCP.TCollection import TCollection_ExtendedString
+    from OCP.TDataStd import TDataStd_Name
+    from OCP.TDocStd import TDocStd_Document
+    from OCP.TopLoc import TopLoc_Location
+    from OCP.XCAFDoc import XCAFDoc_DocumentTool
+
+    document = TDocStd_Document(TCollection_ExtendedString("XmlOcaf"))
+    tool = XCAFDoc_DocumentTool.ShapeTool_s(document.Main())
+    assembly = tool.NewShape()
+    TDataStd_Name.Set_s(assembly, TCollection_ExtendedString("sensor"))
+    for name, (shape, shift) in parts.items():
+        label = tool.AddShape(shape, False)
+        TDataStd_Name.Set_s(label, TCollection_ExtendedString(name))
+        move = gp_Trsf()
+        move.SetTranslation(gp_Vec(shift, 0, 0))
+        tool.AddComponent(assembly, label, TopLoc_Location(move))
+    tool.UpdateAssemblies()
+    writer = STEPCAFControl_Writer()
+    Interface_Static.SetCVal_s("write.step.unit", unit)
+    writer.SetNameMode(True)
+    writer.Transfer(document)
+    writer.Write(str(path))
+    Interface_Static.SetCVal_s("write.step.unit", "MM")
+    return path
+
+
+def box_and_ball() -> dict[str, tuple[Any, float]]:
+    from OCP.BRepPrimAPI import BRepPrimAPI_MakeBox, BRepPrimAPI_MakeSphere
+
+    return {
+        "gel": (BRepPrimAPI_MakeBox(10.0, 8.0, 4.0).Shape(), 1.0),
+        "ball": (BRepPrimAPI_MakeSphere(3.0).Shape(), 20.0),
+    }
+
+
+@needs_extra
+@pytest.mark.parametrize("unit", ["MM", "INCH", "M"])
+def test_solids_come_in_millimetres_at_their_places(tmp_path: Path, unit: str) -> None:
+    gel, ball = read_step(write_step(tmp_path / "sensor.step", box_and_ball(), unit))
+    assert (gel.name, gel.solid, ball.name, ball.solid) == ("gel", True, "ball", True)
+    assert gel.mesh.is_closed and ball.mesh.is_closed
+    assert gel.mesh.volume == pytest.approx(320.0)
+    assert gel.mesh.bounds == pytest.approx(np.array([[1, 0, 0], [11, 8, 4]]), abs=1e-5)
+    assert ball.mesh.volume == pytest.approx(4 / 3 * np.pi * 27, rel=3e-3)
+    radius = np.linalg.norm(ball.mesh.vertices - [20, 0, 0], axis=1)
+    assert radius == pytest.approx(3.0, abs=1e-5)
+
+
+@needs_extra
+def test_triangles_stay_near_the_exact_surface(tmp_path: Path) -> None:
+    ball = read_step(write_step(tmp_path / "sensor.step", box_and_ball()))[1].mesh
+    depth = 3.0 - np.linalg.norm(ball.triangles.mean(axis=1) - [20, 0, 0], axis=1)
+    assert depth.max() < 0.006
+
+
+@needs_extra
+def test_a_surface_without_a_solid_is_an_open_body(tmp_path: Path) -> None:
+    from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeFace
+    from OCP.gp import gp_Pln
+
+    face = BRepBuilderAPI_MakeFace(gp_Pln(), -2.0, 2.0, -1.0, 1.0).Face()
+    (sheet,) = read_step(write_step(tmp_path / "sheet.stp", {"skin": (face, 0.0)}))
+    assert (sheet.name, sheet.solid) == ("skin", False)
+    assert sheet.mesh.area == pytest.approx(8.0)
+
+
+@needs_extra
+def test_parts_used_twice_get_numbers(tmp_path: Path) -> None:
+    from OCP.BRepPrimAPI import BRepPrimAPI_MakeBox
+
+    led = BRepPrimAPI_MakeBox(1.0, 1.0, 1.0).Shape()
+    other = BRepPrimAPI_MakeBox(1.0, 1.0, 1.0).Shape()
+    bodies = read_step(write_step(tmp_path / "a.step", {"led": (led, 0.0)}))
+    assert [body.name for body in bodies] == ["led"]
+    from OCP.BRep import BRep_Builder
+    from OCP.TopoDS import TopoDS_Compound
+
+    compound, builder = TopoDS_Compound(), BRep_Builder()
+    builder.MakeCompound(compound)
+    builder.Add(compound, led)
+    builder.Add(compound, other)
+    bodies = read_step(write_step(tmp_path / "b.step", {"led": (compound, 0.0)}))
+    assert [body.name for body in bodies] == ["led", "led-2"]
+
+
+@needs_extra
+def test_what_is_no_step_file_is_told(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    file = tmp_path / "bad.step"
+    file.write_text("solid ascii\nendsolid\n")
+    with pytest.raises(MeshError, match="not a STEP file"):
+        read_step(file)
+    with pytest.raises(MeshError, match="no such file"):
+        read_step(tmp_path / "missing.step")
+    assert capfd.readouterr().out == ""
+
+
+def test_without_the_extra_its_name_is_told(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, "OCP", None)
+    monkeypatch.setitem(sys.modules, "OCP.STEPCAFControl", None)
+    with pytest.raises(SetupError) as error:
+        read_step(tmp_path / "sensor.step")
+    assert "optisense[step]" in (error.value.hint or "")
