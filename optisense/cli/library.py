@@ -1,16 +1,26 @@
-"""``optisense library``: the materials, lights and cameras that come with OptiSense."""
+"""``optisense library``: the materials, lights and cameras that designs can name."""
 
 from __future__ import annotations
 
-from typing import Annotated
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 from rich.table import Table
 
-from optisense.cli.console import ends_well, output
+from optisense.cli.console import ends_well, messages, output
 from optisense.errors import LibraryError
 
+if TYPE_CHECKING:
+    from optisense.library import Added, AnyEntry
+
 KINDS = ("material", "coating", "light", "camera")
+PIPED_WIDTH = 240
+
+KindOption = Annotated[
+    str | None,
+    typer.Option("--kind", metavar="KIND", help=f"One of: {', '.join(KINDS)}.", show_default=False),
+]
 
 library_app = typer.Typer(
     help="Materials, coatings, lights and cameras that designs can name.", no_args_is_help=True
@@ -25,54 +35,206 @@ def list_entries(
         typer.Argument(metavar="[KIND]", help=f"One of: {', '.join(KINDS)}.", show_default=False),
     ] = None,
 ) -> None:
-    """List what the library holds."""
+    """List what the library holds, your own parts included."""
     from optisense import library
+    from optisense.library.facts import summary
 
-    table = Table("kind", "name", "description", box=None, pad_edge=False)
+    table = Table(box=None, pad_edge=False)
+    for title in ("kind", "name", "in short", ""):
+        table.add_column(title, no_wrap=True)
+    table.add_column("description")
+    broken: list[LibraryError] = []
     for each in KINDS if kind is None else (kind,):
         for name in library.names(each):
-            entry = library.entry(each, name)
-            table.add_row(each, name, entry.description)
-    output.print(table)
+            try:
+                entry = library.entry(each, name)
+                row = (summary(entry), "yours" if library.is_own(each, name) else "")
+            except LibraryError as error:
+                broken.append(error)
+                continue
+            table.add_row(each, name, *row, entry.description)
+    _print_table(table)
+    for problem in broken:
+        messages.print(f"left out: {problem}", markup=False, style="yellow")
 
 
 @library_app.command("show")
 @ends_well
 def show_entry(
     name: Annotated[str, typer.Argument(metavar="NAME", help="As `library list` shows it.")],
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            "--out",
+            "-o",
+            metavar="FILE.png",
+            help="Draw it: a material's ball, a light's intensity, a camera's field.",
+            show_default=False,
+        ),
+    ] = None,
+    as_yaml: Annotated[
+        bool,
+        typer.Option("--yaml", help="Print the entry as a file to change and `library add`."),
+    ] = False,
 ) -> None:
-    """Show an entry with the sources of its numbers."""
-    from difflib import get_close_matches
-
+    """Show an entry with the sources of its numbers, and draw it."""
     from optisense import library
 
+    if out is not None and out.suffix.lower() != ".png":
+        raise typer.BadParameter(f"'{out}' must end in .png", param_hint="--out")
     kinds = [kind for kind in KINDS if name in library.names(kind)]
     if not kinds:
+        from optisense.design.near import suggestion
+
         known = [known for kind in KINDS for known in library.names(kind)]
-        near = get_close_matches(name, known, n=1)
-        raise LibraryError(
-            f"the library has no '{name}'",
-            hint=f"Did you mean {near[0]}?" if near else "See: optisense library list",
-        )
+        hint = suggestion(name, known, limit=0) or "See: optisense library list"
+        raise LibraryError(f"the library has no '{name}'", hint=hint)
     for kind in kinds:
         entry = library.entry(kind, name)
-        output.print(f"{kind} {name}", style="bold", markup=False)
-        output.print(entry.description, markup=False)
-        content = entry.model_dump(mode="json", exclude_none=True)
-        sources = content.pop("sources")
-        content.pop("description")
-        for field, value in {**content.pop("value"), **content}.items():
-            output.print(f"  {field}: {_short(value)}", markup=False)
-        output.print("where its numbers come from", style="bold")
-        for field, source in sources.items():
-            date = f" ({source['date']})" if "date" in source else ""
-            output.print(f"  {field}: {source['status']}, {source['source']}{date}", markup=False)
+        if as_yaml:
+            from optisense.design.yaml_writer import to_yaml
+            from optisense.library.own_parts import HEADS
+            from optisense.library.reading import KINDS as MODELS
+
+            head = next(HEADS[each] for each in MODELS if each == kind)
+            output.print(to_yaml(entry, head), end="", markup=False)
+        else:
+            _describe(f"{kind} {name}", entry, own=library.is_own(kind, name))
+        if out is not None:
+            from optisense.library import previews
+
+            previews.save(previews.draw(name, entry), out)
+            messages.print(f"picture: {out}", markup=False)
 
 
-def _short(value: object) -> str:
-    """A value on one line, without Python's quotes."""
-    if isinstance(value, dict):
-        return "{" + ", ".join(f"{key}: {_short(inner)}" for key, inner in value.items()) + "}"
-    if isinstance(value, list):
-        return "[" + ", ".join(_short(inner) for inner in value) + "]"
-    return f"{value:g}" if isinstance(value, float) else str(value)
+@library_app.command("add")
+@ends_well
+def add_entry(
+    file: Annotated[
+        Path,
+        typer.Argument(
+            metavar="FILE", help="An entry (.yaml, as `library show --yaml` prints), or an .ies."
+        ),
+    ],
+    kind: KindOption = None,
+    name: Annotated[
+        str | None,
+        typer.Option(metavar="NAME", help="What designs call it; else the file's name."),
+    ] = None,
+    colour: Annotated[
+        str | None,
+        typer.Option(
+            metavar="COLOUR", help="With an .ies: red, green, blue, white, or R,G,B from 0 to 1."
+        ),
+    ] = None,
+    flux: Annotated[
+        float | None, typer.Option(metavar="MW", help="With an .ies: radiant flux in mW.")
+    ] = None,
+    wavelength: Annotated[
+        float | None, typer.Option(metavar="NM", help="With an .ies: dominant wavelength.")
+    ] = None,
+    current: Annotated[
+        float | None, typer.Option(metavar="MA", help="With an .ies: its current at this flux.")
+    ] = None,
+    window: Annotated[
+        str | None,
+        typer.Option(metavar="WxH", help="With an .ies: size of its opening in mm, as 2.4x2.4."),
+    ] = None,
+    package: Annotated[
+        str | None,
+        typer.Option(metavar="WxLxH", help="With an .ies: size of its body in mm, as 2.8x3.5x1.9."),
+    ] = None,
+    description: Annotated[
+        str | None, typer.Option(metavar="TEXT", help="With an .ies: what it is, in a line.")
+    ] = None,
+    source: Annotated[
+        str | None, typer.Option(metavar="TEXT", help="With an .ies: where these numbers are from.")
+    ] = None,
+    status: Annotated[
+        str,
+        typer.Option(
+            metavar="STATUS",
+            help="With an .ies: measured, datasheet, sourced, derived or assumed.",
+        ),
+    ] = "assumed",
+) -> None:
+    """Check a part of your own and store it in your library folder.
+
+    The folder is $OPTISENSE_LIBRARY, or else optisense/library in your configuration folder.
+    """
+    from optisense import library
+
+    given = {
+        "--colour": colour, "--flux": flux, "--wavelength": wavelength, "--current": current,
+        "--window": window, "--package": package, "--description": description,
+        "--source": source,
+    }  # fmt: skip
+    if file.suffix.lower() != ".ies":
+        for option, value in given.items():
+            if value is not None:
+                raise typer.BadParameter("is for .ies files only", param_hint=option)
+        added = library.add_file(file, kind, name)
+    else:
+        if kind not in (None, "light", "lights"):
+            raise typer.BadParameter("an .ies file is a light", param_hint="--kind")
+        from optisense.cli.library_ies import add_ies_file
+
+        added = add_ies_file(
+            file,
+            name=name,
+            colour=colour,
+            flux=flux,
+            wavelength=wavelength,
+            current=current,
+            window=window,
+            package=package,
+            description=description,
+            source=source,
+            status=status,
+        )
+    _say_added(added)
+
+
+def _say_added(added: Added) -> None:
+    output.print(f"{added.kind} {added.name}: {added.file}", markup=False)
+    unsourced = added.entry.unsourced()
+    if unsourced:
+        output.print(f"no source is told for: {', '.join(unsourced)}", markup=False, style="yellow")
+    output.print(f"Look at it:  optisense library show {added.name}", markup=False, style="dim")
+
+
+def _print_table(table: Table) -> None:
+    """Print a table, each row on a line of its own where a program reads along."""
+    from rich.console import Console
+
+    if output.is_terminal:
+        output.print(table, soft_wrap=False)
+    else:
+        Console(file=output.file, width=PIPED_WIDTH, highlight=False).print(table)
+
+
+def _describe(title: str, entry: AnyEntry, own: bool) -> None:
+    """Print what an entry says, and where each number is from."""
+    from optisense.library.facts import consequences, facts
+
+    output.print(title + (" (yours)" if own else ""), style="bold", markup=False)
+    output.print(entry.description, markup=False)
+    if entry.maker:
+        output.print(f"made by {entry.maker}", markup=False)
+    table = Table(box=None, pad_edge=False)
+    for title in ("", "value", "status"):
+        table.add_column(title, no_wrap=True)
+    table.add_column("where it comes from")
+    for fact in facts(entry):
+        status = date = text = ""
+        if fact.source is not None:
+            status, text = fact.source.status.value, fact.source.source
+            date = f" ({fact.source.date})" if fact.source.date else ""
+        table.add_row(fact.name, fact.value, status, text + date)
+    output.print()
+    _print_table(table)
+    lines = consequences(entry)
+    if lines:
+        output.print()
+    for line in lines:
+        output.print(line, markup=False)

@@ -20,11 +20,18 @@ LEGEND_COLOURS = 4
 
 
 def half_angle(emitter: LightModel, azimuth: float = 0.0) -> float:
-    """Degrees from the axis at which the intensity has fallen to half its value there."""
+    """Degrees from the axis at which the intensity has fallen to half its value there.
+
+    180 where it never does, or where the axis is dark.
+    """
     angle = np.linspace(0.0, 180.0, 7201)
     value = emitter.relative_intensity(angle, azimuth)
     below = np.flatnonzero(value < 0.5 * value[0] * (1.0 - 1e-9))
-    return float(angle[below[0]]) if len(below) else 180.0
+    if value[0] <= 0.0 or len(below) == 0:
+        return 180.0
+    last, first = below[0] - 1, below[0]
+    drop = value[last] - value[first]
+    return float(angle[last] + (value[last] - 0.5 * value[0]) / drop * (angle[1] - angle[0]))
 
 
 def equivalent_solid_angle(emitter: LightModel) -> float:
@@ -96,7 +103,7 @@ def _front(axes: Axes, entry: LightEntry) -> None:
 
     emitter: LightModel = entry.value
     package, window = entry.package, entry.window
-    disc = window is not None
+    disc = window is not None and window[0] == window[1]
     if isinstance(emitter, AreaEmitter):
         window, disc = emitter.size, emitter.shape == "disc"
     extent = max([*(package[:2] if package else ()), *(window or ()), 1.0])

@@ -1,0 +1,258 @@
+"""A user's own parts: stored whole, found beside the built-in ones, and carried by designs."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from optisense import library, sensors
+from optisense.design import IesEmitter, LightGroup, SensorDesign, load_design
+from optisense.errors import DesignError, LibraryError, OutputError
+from optisense.library.loader import FOLDER
+
+GEL = """\
+description: Our gel
+value: {kind: dielectric, ior: 1.43, dispersion: [1.42, 1.43, 1.44], roughness: 0.1}
+sources:
+  ior: {status: measured, source: our refractometer, date: "2026-03"}
+"""
+LAMP = "IESNA:LM-63-2002\n[MANUFAC] us\nTILT=NONE\n1 -1 1 3 1 1 2 0 0 0\n1 1 5\n0 45 90\n0\n9 5 0\n"
+
+
+@pytest.fixture
+def own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """An empty library folder of the user."""
+    folder = tmp_path / "own"
+    monkeypatch.setenv("OPTISENSE_LIBRARY", str(folder))
+    return folder
+
+
+@pytest.fixture
+def lamp(tmp_path: Path) -> Path:
+    file = tmp_path / "our-lamp.ies"
+    file.write_text(LAMP)
+    return file
+
+
+def write(folder: Path, name: str, text: str) -> Path:
+    file = folder / name
+    file.write_text(text)
+    return file
+
+
+def add_lamp(file: Path, **changes: object) -> library.Added:
+    given: dict[str, object] = {"flux": 4.0, "colour": (1.0, 0.0, 0.0), "colour_name": "red"}
+    return library.add_ies(file, **{**given, **changes})  # type: ignore[arg-type]
+
+
+class TestFolder:
+    def test_the_variable_names_it(self, own: Path) -> None:
+        assert library.own_folder() == own
+
+    def test_else_it_is_in_the_configuration_folder(
+        self, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+    ) -> None:
+        monkeypatch.delenv("OPTISENSE_LIBRARY")
+        monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path))
+        assert library.own_folder() == tmp_path / "optisense" / "library"
+        monkeypatch.delenv("XDG_CONFIG_HOME")
+        monkeypatch.setenv("HOME", str(tmp_path / "home"))
+        assert library.own_folder() == tmp_path / "home" / ".config" / "optisense" / "library"
+
+
+class TestAdding:
+    def test_a_material_reads_back_with_every_number(self, own: Path, tmp_path: Path) -> None:
+        added = library.add_file(write(tmp_path, "our-gel.yaml", GEL))
+        assert (added.kind, added.name) == ("material", "our-gel")
+        assert added.file == own / "materials" / "our-gel.yaml"
+        assert library.entry("material", "our-gel") == added.entry
+        assert library.material("our-gel") == added.entry.value
+        assert "our-gel" in library.names("material") and library.is_own("material", "our-gel")
+        assert not library.is_own("material", "acrylic")
+        assert added.entry.unsourced() == ["dispersion", "roughness"]
+
+    @pytest.mark.parametrize(
+        ("kind", "name"),
+        [
+            ("material", "mirror-silver"),
+            ("coating", "semi-specular"),
+            ("light", "ws2812b"),
+            ("light", "round-5mm-30"),
+            ("camera", "pi-v3-wide"),
+        ],
+    )
+    def test_every_kind_of_entry_survives_being_written_and_added(
+        self, own: Path, tmp_path: Path, kind: str, name: str
+    ) -> None:
+        from optisense.design.yaml_writer import to_yaml
+
+        original = library.entry(kind, name)
+        if isinstance(original.value, IesEmitter):
+            (tmp_path / original.value.file).write_bytes(original.value.path().read_bytes())
+        file = write(tmp_path, "copy.yaml", to_yaml(original, "mine"))
+        added = library.add_file(file, name="copy")
+        copied = library.entry(kind, "copy")
+        assert added.kind == kind
+        if isinstance(copied.value, IesEmitter) and isinstance(original.value, IesEmitter):
+            assert copied.value.file == "copy.ies"
+            table, before = copied.value.intensity_table(), original.value.intensity_table()
+            np.testing.assert_array_equal(table.candela, before.candela)
+            copied.value.file = original.value.file
+        assert copied.model_dump() == original.model_dump()
+
+    def test_an_ies_file_with_what_it_does_not_tell(self, own: Path, lamp: Path) -> None:
+        added = add_lamp(lamp, wavelength=624.0, window=(2.0, 2.0))
+        assert isinstance(added.entry.value, IesEmitter)
+        assert (own / "lights" / "our-lamp.ies").read_text() == LAMP
+        light = library.light("our-lamp")
+        assert isinstance(light, IesEmitter)
+        assert light.relative_intensity(45.0) == pytest.approx(5 / 9)
+        assert added.entry.unsourced() == []
+        assert added.entry.sources["file"].source == "us"
+
+    def test_no_half_written_file_is_left(self, own: Path, lamp: Path) -> None:
+        add_lamp(lamp)
+        assert {file.name for file in (own / "lights").iterdir()} == {
+            "our-lamp.ies",
+            "our-lamp.yaml",
+        }
+
+
+class TestRefusals:
+    @pytest.mark.parametrize(
+        ("old", "new", "line", "message"),
+        [
+            ("ior: 1.43,", "ior: 0.9,", 2, "1"),
+            ("ior: 1.43, ", "", 2, "'value.ior' is missing"),
+            ("ior: 1.43,", "iro: 1.43,", 2, "Did you mean 'ior'"),
+            ("  ior: {status: measured", "  ior: {status: mesured", 4, "measured"),
+            ("  ior: {", "  iro: {", 4, "Did you mean 'ior'"),
+            ("kind: dielectric", "kind: dielectrik", 2, "dielectric"),
+            ("description: Our gel", "descripton: Our gel", 1, "Did you mean 'description'"),
+        ],
+    )
+    def test_what_is_wrong_is_told_with_its_line(
+        self, own: Path, tmp_path: Path, old: str, new: str, line: int, message: str
+    ) -> None:
+        assert old in GEL
+        file = write(tmp_path, "our-gel.yaml", GEL.replace(old, new))
+        with pytest.raises(LibraryError, match=message) as caught:
+            library.add_file(file, kind="material")
+        assert f"our-gel.yaml:{line}" in str(caught.value)
+        assert not own.exists()
+
+    def test_names_are_taken_once_over_all_kinds(self, own: Path, tmp_path: Path) -> None:
+        file = write(tmp_path, "our-gel.yaml", GEL)
+        with pytest.raises(LibraryError, match=r"already has a light 'smd-3528' \(built in\)"):
+            library.add_file(file, name="smd-3528")
+        library.add_file(file)
+        with pytest.raises(LibraryError, match="one of your own parts"):
+            library.add_file(file)
+        with pytest.raises(LibraryError, match="can't be a name"):
+            library.add_file(file, name="our gel")
+
+    def test_an_own_file_with_a_built_in_name_is_told_not_chosen(self, own: Path) -> None:
+        (own / "materials").mkdir(parents=True)
+        write(own / "materials", "acrylic.yaml", GEL)
+        with pytest.raises(LibraryError, match=r"built in, and also.*acrylic\.yaml"):
+            library.material("acrylic")
+        assert library.material("pdms").kind == "dielectric"
+
+    def test_a_broken_own_file_harms_only_its_own_name(self, own: Path) -> None:
+        (own / "lights").mkdir(parents=True)
+        write(own / "lights", "broken.yaml", "value: {")
+        assert "broken" in library.names("light")
+        assert library.light("smd-3528").kind == "area"
+        with pytest.raises(LibraryError, match=r"broken\.yaml"):
+            library.light("broken")
+
+    def test_a_damaged_ies_file_is_told_with_its_line(self, own: Path, lamp: Path) -> None:
+        lamp.write_text(LAMP.replace("9 5 0", "9 5"))
+        with pytest.raises(LibraryError, match=r"our-lamp\.ies:8.*"):
+            add_lamp(lamp)
+        assert not own.exists()
+
+    def test_an_entry_whose_ies_file_is_not_beside_it(self, own: Path, tmp_path: Path) -> None:
+        text = (FOLDER / "lights" / "round-5mm-30.yaml").read_text()
+        with pytest.raises(LibraryError, match=r"round-5mm-30\.ies"):
+            library.add_file(write(tmp_path, "ours.yaml", text))
+        assert not own.exists()
+
+    def test_what_kind_it_is_must_be_plain(self, own: Path, tmp_path: Path) -> None:
+        file = write(tmp_path, "ours.yaml", "description: x\nvalue: {colour: 1}\n")
+        with pytest.raises(LibraryError, match=r"ours\.yaml:2.*--kind"):
+            library.add_file(file)
+
+    def test_a_folder_that_can_not_be_written(self, own: Path, tmp_path: Path) -> None:
+        own.write_text("a file")
+        with pytest.raises(OutputError, match="OPTISENSE_LIBRARY"):
+            library.add_file(write(tmp_path, "our-gel.yaml", GEL))
+
+    @pytest.mark.parametrize("text", ["purple", "1,2", "1,1,2", "0,0,0", "red,green,blue"])
+    def test_colours_that_are_none(self, text: str) -> None:
+        with pytest.raises(LibraryError, match="no colour"):
+            library.parse_colour(text)
+
+    def test_a_misspelt_colour_gets_the_near_match(self) -> None:
+        with pytest.raises(LibraryError, match="Did you mean 'green'"):
+            library.parse_colour("gren")
+
+
+class TestDesignsOnOtherMachines:
+    @pytest.fixture
+    def design(self, own: Path, lamp: Path) -> SensorDesign:
+        add_lamp(lamp)
+        design = sensors.build("gelsight-mini")
+        red = design.lights["red"].model_dump()
+        design.lights["red"] = LightGroup.model_validate({**red, "model": "our-lamp"})
+        return design
+
+    def test_a_saved_design_carries_its_own_lights(
+        self, design: SensorDesign, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        sensors.save_design(design, tmp_path / "sensor")
+        monkeypatch.setenv("OPTISENSE_LIBRARY", str(tmp_path / "elsewhere"))
+        opened = load_design(tmp_path / "sensor")
+        emitter = library.emitter(opened.lights["red"])
+        assert isinstance(emitter, IesEmitter) and emitter.file == "lights/our-lamp.ies"
+        assert emitter.intensity_table().candela[0].tolist() == [9.0, 5.0, 0.0]
+        assert opened.lights["green"].emitter is None
+        assert sensors.check(opened) == sensors.check(sensors.build("gelsight-mini"))
+
+    def test_the_design_in_memory_is_left_as_it_was(
+        self, design: SensorDesign, tmp_path: Path
+    ) -> None:
+        sensors.save_design(design, tmp_path / "sensor")
+        assert design.lights["red"].emitter is None
+        plain = sensors.build("gelsight-mini")
+        assert library.with_own_lights(plain) is plain
+
+    def test_saving_the_opened_design_again_keeps_it_whole(
+        self, design: SensorDesign, tmp_path: Path
+    ) -> None:
+        sensors.save_design(design, tmp_path / "sensor")
+        sensors.save_design(load_design(tmp_path / "sensor"), tmp_path / "copy")
+        assert (tmp_path / "copy" / "lights" / "our-lamp.ies").read_text() == LAMP
+
+    def test_two_lights_that_claim_one_file(
+        self, design: SensorDesign, own: Path, tmp_path: Path
+    ) -> None:
+        """Saved once, then the library's lamp changed and named by another group."""
+        sensors.save_design(design, tmp_path / "sensor")
+        opened = load_design(tmp_path / "sensor")
+        (own / "lights" / "our-lamp.ies").write_text(LAMP.replace("9 5 0", "9 8 0"))
+        green = opened.lights["green"].model_dump()
+        opened.lights["green"] = LightGroup.model_validate({**green, "model": "our-lamp"})
+        with pytest.raises(DesignError, match=r"'red' and 'green'.*our-lamp\.ies"):
+            sensors.save_design(opened, tmp_path / "copy")
+
+    def test_a_bare_name_from_another_machine_is_told(
+        self, design: SensorDesign, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        monkeypatch.setenv("OPTISENSE_LIBRARY", str(tmp_path / "elsewhere"))
+        with pytest.raises(DesignError, match=r"our-lamp.*library add"):
+            sensors.check(design)
+        with pytest.raises(LibraryError, match=r"our-lamp.*library add"):
+            library.emitter(design.lights["red"])
