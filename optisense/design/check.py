@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from optisense.design.addressing import get_value
+from optisense.design.cage_checks import cage_problems
 from optisense.design.limits import unit_slips
 from optisense.design.near import suggestion
 from optisense.design.parts import TRANSPARENT_SOLIDS, Role
@@ -56,6 +57,7 @@ def check_design(design: SensorDesign, light_names: Collection[str] | None = Non
         else:
             problems += _check_poses(design, meshes)
             problems += _check_sensing_surfaces(design, meshes)
+            problems += cage_problems(design, meshes)
     problems += _check_provenance(design)
     return problems
 

@@ -148,7 +148,7 @@ class SensorDesign(Model):
         Raises:
             DesignError: a vertex of a caged part lies outside the cage's box.
         """
-        from optisense.geometry.cage import cage_weights, deform
+        from optisense.geometry.cage import deformed
 
         result = dict(self._meshes)
         for cage_name, cage in self.cages.items():
@@ -157,12 +157,11 @@ class SensorDesign(Model):
             for name in cage.parts:
                 if name in result:
                     try:
-                        weights = cage_weights(result[name].vertices, box, cage.resolution)
+                        result[name] = deformed(result[name], box, cage.resolution, points)
                     except DesignError as error:
                         message = f"cage '{cage_name}', part '{name}': {error.message}"
                         where = self.where("cages", cage_name, "box")
                         raise DesignError(message, where=where, hint=error.hint) from error
-                    result[name] = result[name].with_vertices(deform(weights, points))
         return result
 
     def parts_of(self, *roles: Role) -> list[str]:

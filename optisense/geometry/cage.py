@@ -10,20 +10,38 @@ middle one has weight 1/2 over itself.
 
 from __future__ import annotations
 
+import hashlib
 import math
+import threading
+import weakref
+from collections import OrderedDict
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from optisense.errors import DesignError
+from optisense.geometry.mesh import TriangleMesh
 
 FloatArray = NDArray[np.float64]
+Resolution = tuple[int, int, int]
 
 OUTSIDE_TOLERANCE = 1e-6
 """A vertex may lie this far (mm) outside of the box: rounding in a mesh file."""
 
+MOST_KEPT_WEIGHTS = 4_000_000
+"""Weights of more vertices times control points are not kept but worked out anew (32 MB)."""
 
-def cage_points(box: ArrayLike, resolution: tuple[int, int, int]) -> FloatArray:
+KEPT_WEIGHTS = 32_000_000
+"""So many weights are kept in all (256 MB); the ones not used for longest go first."""
+
+_VALUES_AT_ONCE = 4_000_000
+
+_digests: weakref.WeakKeyDictionary[TriangleMesh, bytes] = weakref.WeakKeyDictionary()
+_kept: OrderedDict[tuple[bytes, bytes, Resolution], FloatArray] = OrderedDict()
+_lock = threading.Lock()
+
+
+def cage_points(box: ArrayLike, resolution: Resolution) -> FloatArray:
     """The control points of a cage at rest.
 
     Args:
@@ -38,9 +56,7 @@ def cage_points(box: ArrayLike, resolution: tuple[int, int, int]) -> FloatArray:
     return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
 
 
-def cage_weights(
-    vertices: ArrayLike, box: ArrayLike, resolution: tuple[int, int, int]
-) -> FloatArray:
+def cage_weights(vertices: ArrayLike, box: ArrayLike, resolution: Resolution) -> FloatArray:
     """How much each control point moves each vertex.
 
     Args:
@@ -53,6 +69,73 @@ def cage_weights(
 
     Raises:
         DesignError: a vertex lies outside the box, where the polynomials would run away.
+    """
+    along = [
+        bernstein(t, n) for t, n in zip(shares(vertices, box).T, resolution, strict=True)
+    ]  # fmt: skip
+    product = np.einsum("ni,nj,nk->nijk", *along, optimize=True)
+    return product.reshape(len(product), -1)
+
+
+def deform(weights: FloatArray, points: ArrayLike) -> FloatArray:
+    """The deformed vertices (n, 3) mm for `weights` (n, N) and control points (N, 3) mm."""
+    moved: FloatArray = weights @ np.asarray(points, dtype=np.float64).reshape(-1, 3)
+    return moved
+
+
+def deformed(
+    mesh: TriangleMesh, box: ArrayLike, resolution: Resolution, points: ArrayLike
+) -> TriangleMesh:
+    """A mesh as its cage bends it; shading normals are dropped.
+
+    The weights are kept for the next call with a mesh of the same vertices, whichever object
+    that is; of a fine cage around a large mesh they would be too many, and each call works
+    them out. Not for use with `mesh.vertices` changed in place.
+
+    Args:
+        mesh: at rest, mm; all of it inside the box.
+        box: (2, 3) mm, lower and upper corner.
+        resolution: number of points along x, y, z, at least 2 each.
+        points: (nx * ny * nz, 3) mm.
+
+    Raises:
+        DesignError: a vertex lies outside the box.
+    """
+    controls = np.asarray(points, dtype=np.float64).reshape(-1, 3)
+    if len(mesh.vertices) * len(controls) <= MOST_KEPT_WEIGHTS:
+        return mesh.with_vertices(deform(kept_weights(mesh, box, resolution), controls))
+    share = shares(mesh.vertices, box)
+    bases = [bernstein(share[:, k], resolution[k]) for k in range(3)]
+    return mesh.with_vertices(contract(bases, controls, resolution))
+
+
+def kept_weights(mesh: TriangleMesh, box: ArrayLike, resolution: Resolution) -> FloatArray:
+    """`cage_weights` of a mesh's vertices, read-only, found again by their content."""
+    with _lock:
+        digest = _digests.get(mesh)
+    if digest is None:
+        digest = hashlib.blake2b(mesh.vertices.tobytes(), digest_size=16).digest()
+        with _lock:
+            _digests[mesh] = digest
+    key = (digest, np.asarray(box, dtype=np.float64).tobytes(), resolution)
+    with _lock:
+        if key in _kept:
+            _kept.move_to_end(key)
+            return _kept[key]
+    weights = np.asfortranarray(cage_weights(mesh.vertices, box, resolution))
+    weights.flags.writeable = False
+    with _lock:
+        _kept[key] = weights
+        while sum(kept.size for kept in _kept.values()) > KEPT_WEIGHTS and len(_kept) > 1:
+            _kept.popitem(last=False)
+    return weights
+
+
+def shares(vertices: ArrayLike, box: ArrayLike) -> FloatArray:
+    """(n, 3) where vertices (n, 3) mm lie in the box (2, 3) mm, 0 to 1 along each axis.
+
+    Raises:
+        DesignError: a vertex lies outside the box.
     """
     points = np.asarray(vertices, dtype=np.float64).reshape(-1, 3)
     lower, upper = np.asarray(box, dtype=np.float64)
@@ -68,21 +151,33 @@ def cage_weights(
             ),
             hint="let the box enclose every part that the cage deforms",
         )
-    share = ((points - lower) / (upper - lower)).clip(0.0, 1.0)
-    along = [_bernstein(share[:, k], resolution[k]) for k in range(3)]
-    product = np.einsum("ni,nj,nk->nijk", *along, optimize=True)
-    return product.reshape(len(points), -1)
+    return ((points - lower) / (upper - lower)).clip(0.0, 1.0)
 
 
-def deform(weights: FloatArray, points: ArrayLike) -> FloatArray:
-    """The deformed vertices (n, 3) mm for `weights` (n, N) and control points (N, 3) mm."""
-    moved: FloatArray = weights @ np.asarray(points, dtype=np.float64).reshape(-1, 3)
-    return moved
-
-
-def _bernstein(t: FloatArray, count: int) -> FloatArray:
+def bernstein(t: FloatArray, count: int) -> FloatArray:
     """The `count` Bernstein polynomials of degree `count` - 1 at t (n,): (n, count)."""
     i = np.arange(count)
     degree = count - 1
     binomial = np.array([math.comb(degree, k) for k in range(count)], dtype=np.float64)
-    return binomial * t[:, None] ** i * (1.0 - t[:, None]) ** (degree - i)
+    return np.asarray(binomial * t[:, None] ** i * (1.0 - t[:, None]) ** (degree - i))
+
+
+def contract(bases: list[FloatArray], points: FloatArray, resolution: Resolution) -> FloatArray:
+    """Sums over a lattice without the product of its bases: (n, 3).
+
+    Args:
+        bases: (n, nx), (n, ny), (n, nz), of any kind.
+        points: (nx * ny * nz, 3).
+        resolution: nx, ny, nz.
+    """
+    nx, ny, nz = resolution
+    lattice = points.reshape(nx, ny * nz * 3)
+    count = len(bases[0])
+    result = np.empty((count, 3))
+    step = max(1, _VALUES_AT_ONCE // (ny * nz * 3))
+    for start in range(0, count, step):
+        rows = slice(start, min(start + step, count))
+        sheets = (bases[0][rows] @ lattice).reshape(-1, ny, nz * 3)
+        lines = (bases[1][rows][:, None] @ sheets).reshape(-1, nz, 3)
+        result[rows] = (bases[2][rows][:, None] @ lines)[:, 0]
+    return result

@@ -1,0 +1,174 @@
+"""What cages may have done to a design: folded parts, parts pushed into others or off them."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from optisense.design.cage import Cage
+from optisense.design.parts import TRANSPARENT_SOLIDS, Role
+from optisense.design.problems import Problem
+from optisense.design.sensor_design import SensorDesign
+from optisense.geometry import TriangleMesh
+from optisense.geometry.cage import cage_points, cage_weights
+from optisense.geometry.containment import inside
+from optisense.geometry.folds import find_fold
+from optisense.geometry.meeting import CONTACT, find_meeting, resting_on, touching
+
+AT_REST = 1e-9
+"""mm: a control point that is off its place by less has not moved."""
+
+FOLDS = {
+    "inside out": "is turned inside out by cage '{cage}' near {place}: {count} of its vertices",
+    "collapsed": "is squeezed to nothing by cage '{cage}' near {place}: {count} of its triangles",
+    "through itself": "is bent through itself by cage '{cage}' near {place}",
+}
+
+Meshes = dict[str, TriangleMesh]
+Overlap = Literal["no", "odd", "yes"]
+
+
+def cage_problems(design: SensorDesign, meshes: Meshes | None = None) -> list[Problem]:
+    """What is wrong with the shapes that the cages give the parts.
+
+    Found are parts that are folded, collapsed, turned inside out or bent through themselves;
+    bent parts that cut into, or lie inside, a part that they kept clear of before; and bent
+    parts that have come off a part they lay on (a warning). Parts in one cage move together and
+    are not compared. Of overlapping solids with different priorities one is cut out of the other,
+    which is a warning; solids of one refractive index may overlap. Made for searches too: bends
+    of ordinary size take milliseconds.
+
+    Args:
+        design: the design.
+        meshes: its deformed meshes, when they are there already.
+
+    Raises:
+        DesignError: a vertex of a caged part lies outside the cage's box.
+    """
+    moved = {name: cage for name, cage in design.cages.items() if _has_moved(cage)}
+    if not moved:
+        return []
+    bent = design.deformed_meshes() if meshes is None else meshes
+    problems: list[Problem] = []
+    done: set[frozenset[str]] = set()
+    for cage_name, cage in moved.items():
+        parts = [name for name in cage.parts if name in bent and name in design.meshes]
+        for name in parts:
+            problems += _folds(design, cage_name, name, bent[name])
+        for name in parts:
+            for other in bent:
+                pair = frozenset((name, other))
+                if other in cage.parts or pair in done:
+                    continue
+                done.add(pair)
+                problems += _meetings(design, cage_name, name, other, bent)
+    return problems
+
+
+def _has_moved(cage: Cage) -> bool:
+    rest = cage_points(cage.box, cage.resolution)
+    return bool(np.abs(cage.current_points() - rest).max() > AT_REST)
+
+
+def _overlap(design: SensorDesign, name: str, other: str) -> Overlap:
+    """Whether two parts can share space: solids may, where a priority says which one counts."""
+    parts = design.parts[name], design.parts[other]
+    if not all(part.role in TRANSPARENT_SOLIDS for part in parts):
+        return "no"
+    one, two = (design.materials[part.material or ""] for part in parts)
+    if one.kind == two.kind == "dielectric" and one.ior == two.ior:
+        return "yes"
+    return "no" if parts[0].priority == parts[1].priority else "odd"
+
+
+def _folds(design: SensorDesign, cage_name: str, name: str, bent: TriangleMesh) -> list[Problem]:
+    cage = design.cages[cage_name]
+    points = cage.current_points()
+    fold = find_fold(design.meshes[name], bent, cage.box, cage.resolution, points)
+    if fold is None:
+        return []
+    text = FOLDS[fold.kind].format(cage=cage_name, place=_text(fold.place), count=fold.affected)
+    return [
+        Problem(
+            f"part '{name}' {text}",
+            _where(design, cage_name),
+            f"Move {_mover(design, cage_name, name, fold.vertex)} back: control points must not "
+            "pass their neighbours",
+        )
+    ]
+
+
+def _meetings(
+    design: SensorDesign, cage_name: str, name: str, other: str, bent: Meshes
+) -> list[Problem]:
+    """What is wrong between a bent part and one that is not in the same cage."""
+    if Role.INDENTER in (design.parts[name].role, design.parts[other].role):
+        return []
+    overlap = _overlap(design, name, other)
+    meeting = find_meeting(bent[name], bent[other])
+    if meeting is None:
+        return _partings(design, cage_name, name, other, bent, overlap)
+    if overlap == "yes" or find_meeting(design.meshes[name], design.meshes[other]) is not None:
+        return []  # of one index, or they share space at rest: it is meant so
+    distance = np.linalg.norm(bent[name].vertices - meeting.place, axis=1)
+    mover = _mover(design, cage_name, name, int(np.argmin(distance)))
+    return [
+        Problem(
+            f"part '{name}', bent by cage '{cage_name}', {meeting.kind} part '{other}' "
+            f"near {_text(meeting.place)}",
+            _where(design, cage_name),
+            f"Move {mover} back towards its place at rest, or put '{other}' into the cage too",
+            severity="error" if overlap == "no" else "warning",
+        )
+    ]
+
+
+def _partings(
+    design: SensorDesign, cage_name: str, name: str, other: str, bent: Meshes, overlap: Overlap
+) -> list[Problem]:
+    """Where a bent part no longer lies on one that it touched at rest."""
+    mesh, rest = design.meshes[name], design.meshes[other]
+    change = np.linalg.norm(bent[name].vertices - mesh.vertices, axis=1)
+    rows = resting_on(mesh, rest)
+    if bent[other] is rest:
+        rows = rows[change[rows] > CONTACT]
+    off = rows[np.isinf(touching(bent[name], rows, bent[other]))]
+    if len(off) == 0:
+        return []
+    worst = int(off[np.argmax(change[off])])
+    place = bent[name].vertices[worst]
+    mover = _mover(design, cage_name, name, worst)
+    pushed = bent[other].is_closed and bool(inside(place[None], bent[other])[0])
+    if pushed and overlap == "yes":
+        return []
+    what = "is pushed into" if pushed else "has come off"
+    return [
+        Problem(
+            f"part '{name}', bent by cage '{cage_name}', {what} part '{other}', on which it lies "
+            f"at rest, near {_text(place)}",
+            _where(design, cage_name),
+            f"Put '{other}' into the cage too, or move {mover} back",
+            severity="error" if pushed and overlap == "no" else "warning",
+        )
+    ]
+
+
+def _mover(design: SensorDesign, cage_name: str, name: str, vertex: int) -> str:
+    """The control point that moves a vertex the most, in words."""
+    cage = design.cages[cage_name]
+    offsets = cage.current_points() - cage_points(cage.box, cage.resolution)
+    weights = cage_weights(design.meshes[name].vertices[vertex], cage.box, cage.resolution)[0]
+    index = int(np.argmax(weights * np.linalg.norm(offsets, axis=1)))
+    i, j, k = (int(value) for value in np.unravel_index(index, cage.resolution))
+    return f"control point {index} ({i},{j},{k})"
+
+
+def _where(design: SensorDesign, cage_name: str) -> str:
+    field = "points" if design.cages[cage_name].blend is None else "blend"
+    return design.where("cages", cage_name, field)
+
+
+def _text(place: NDArray[np.float64]) -> str:
+    return "({:.2f}, {:.2f}, {:.2f}) mm".format(*place)

@@ -1,0 +1,123 @@
+"""What a cage does to space: how it stretches it, whether it folds it, and refining the cage."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from optisense.geometry.cage import FloatArray, Resolution, bernstein, contract, shares
+
+MOST_COMBINATIONS = 100_000
+"""More combinations of slopes than these are not tried: the answer is then "not known"."""
+
+
+def jacobians(
+    vertices: ArrayLike, box: ArrayLike, resolution: Resolution, points: ArrayLike
+) -> FloatArray:
+    """How space is stretched around each vertex.
+
+    Args:
+        vertices: (n, 3) mm, at rest, inside the box.
+        box: (2, 3) mm.
+        resolution: number of points along x, y, z.
+        points: (nx * ny * nz, 3) mm.
+
+    Returns:
+        (n, 3, 3): derivative of deformed coordinate (row) by coordinate at rest (column). Its
+        determinant is the local change of volume; negative where space is turned inside out.
+
+    Raises:
+        DesignError: a vertex lies outside the box.
+    """
+    share = shares(vertices, box)
+    lower, upper = np.asarray(box, dtype=np.float64)
+    lattice = np.asarray(points, dtype=np.float64).reshape(*resolution, 3)
+    result = np.empty((len(share), 3, 3))
+    for axis in range(3):
+        # The derivative of a Bernstein sum is one of a degree less over the differences.
+        size = upper[axis] - lower[axis]
+        slopes = np.diff(lattice, axis=axis) * (resolution[axis] - 1) / size
+        nx, ny, nz = slopes.shape[:3]
+        bases = [bernstein(share[:, k], slopes.shape[k]) for k in range(3)]
+        result[:, :, axis] = contract(bases, slopes.reshape(-1, 3), (nx, ny, nz))
+    return result
+
+
+def is_one_to_one(box: ArrayLike, resolution: Resolution, points: ArrayLike) -> bool:
+    """Whether it is certain that no two points of the box are sent to the same place.
+
+    A sufficient condition, which bends of ordinary size meet: if the derivative has a positive
+    definite symmetric part all over a convex box, the map is one to one (the way from one image
+    to another never turns back on the way between the points). Each column of the derivative is
+    a mean of the differences of control points along its axis, and positive definite matrices
+    form a convex set, so that combinations of these differences are all that need trying; they
+    are taken relative to the mean derivative, which makes turning the whole lattice harmless.
+
+    Args:
+        box: (2, 3) mm.
+        resolution: number of points along x, y, z.
+        points: (nx * ny * nz, 3) mm.
+
+    Returns:
+        True for certain; False when it may or may not be.
+    """
+    lower, upper = np.asarray(box, dtype=np.float64)
+    lattice = np.asarray(points, dtype=np.float64).reshape(*resolution, 3)
+    columns = []
+    for axis in range(3):
+        slopes = np.diff(lattice, axis=axis) * (resolution[axis] - 1) / (upper - lower)[axis]
+        columns.append(slopes.reshape(-1, 3))
+    mean = np.column_stack([column.mean(axis=0) for column in columns])
+    if not np.isfinite(mean).all() or np.linalg.det(mean) <= 0.0:
+        return False
+    inverse = np.linalg.inv(mean)
+    columns = [np.unique(np.round(column @ inverse.T, 9), axis=0) for column in columns]
+    if math.prod(len(column) for column in columns) > MOST_COMBINATIONS:
+        return False
+    a = columns[0][:, None, None]
+    b = columns[1][None, :, None]
+    c = columns[2][None, None, :]
+    xx, yy, zz = a[..., 0], b[..., 1], c[..., 2]
+    xy, xz, yz = (
+        0.5 * (a[..., 1] + b[..., 0]),
+        0.5 * (a[..., 2] + c[..., 0]),
+        0.5 * (b[..., 2] + c[..., 1]),
+    )
+    minor = xx * yy - xy * xy  # Sylvester: all leading minors above 0
+    whole = minor * zz - xx * yz * yz - yy * xz * xz + 2.0 * xy * xz * yz
+    return bool((xx > 0.0).all() and (minor > 0.0).all() and (whole > 0.0).all())
+
+
+def refined_points(points: ArrayLike, resolution: Resolution, finer: Resolution) -> FloatArray:
+    """Control points of a finer lattice that gives exactly the same deformation.
+
+    Degree elevation of Bernstein polynomials (Farin, "Curves and Surfaces for CAGD", section
+    on degree elevation), axis by axis, one point at a time.
+
+    Args:
+        points: (nx * ny * nz, 3) mm.
+        resolution: nx, ny, nz.
+        finer: at least as many points along each axis.
+
+    Returns:
+        (fx * fy * fz, 3) float64, mm.
+
+    Raises:
+        ValueError: `finer` has fewer points along an axis.
+    """
+    lattice = np.asarray(points, dtype=np.float64).reshape(*resolution, 3)
+    for axis in range(3):
+        if finer[axis] < resolution[axis]:
+            raise ValueError(f"{finer[axis]} points along axis {axis} are fewer than there are")
+        lattice = np.moveaxis(lattice, axis, 0)
+        while len(lattice) < finer[axis]:
+            count = len(lattice)
+            before = (np.arange(count + 1) / count).reshape(-1, 1, 1, 1)
+            zero = np.zeros_like(lattice[:1])
+            lattice = before * np.concatenate([zero, lattice]) + (1.0 - before) * np.concatenate(
+                [lattice, zero]
+            )
+        lattice = np.moveaxis(lattice, 0, axis)
+    return lattice.reshape(-1, 3)

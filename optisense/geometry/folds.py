@@ -1,0 +1,131 @@
+"""Whether bending has folded a mesh, turned it inside out or pushed it through itself."""
+
+from __future__ import annotations
+
+import weakref
+from typing import Literal, NamedTuple
+
+import numpy as np
+import shapely
+from numpy.typing import ArrayLike, NDArray
+
+from optisense.geometry.cage import FloatArray, Resolution
+from optisense.geometry.cage_map import is_one_to_one, jacobians
+from optisense.geometry.crossings import self_crossings
+from optisense.geometry.mesh import TriangleMesh
+
+COLLAPSED = 1e-6
+"""A face with less than this part of its area at rest has collapsed."""
+
+_outlines: weakref.WeakKeyDictionary[TriangleMesh, NDArray[np.int64]] = weakref.WeakKeyDictionary()
+
+
+class Fold(NamedTuple):
+    """What is wrong with a bent mesh.
+
+    Attributes:
+        kind: "inside out" (the cage turns space over), "collapsed" (faces without area left) or
+            "through itself" (faces that cut through each other).
+        place: (3,) mm, where, in the bent shape.
+        vertex: the nearest vertex.
+        affected: how many vertices or faces.
+    """
+
+    kind: Literal["inside out", "collapsed", "through itself"]
+    place: FloatArray
+    vertex: int
+    affected: int
+
+
+def find_fold(
+    mesh: TriangleMesh,
+    bent: TriangleMesh,
+    box: ArrayLike,
+    resolution: Resolution,
+    points: ArrayLike,
+) -> Fold | None:
+    """What is wrong with a mesh as its cage bends it, or None if it is still a fair shape.
+
+    The cheap answers come first. A cage that is certainly one to one (`is_one_to_one`) can't
+    fold anything; a sheet that is still in full view from one side (`is_in_full_view`) is not
+    folded, whatever the cage does to the space beside it. Otherwise a closed mesh must have
+    positive Jacobians at its vertices, and no mesh may cut through itself.
+
+    Args:
+        mesh: at rest, mm.
+        bent: the same faces, bent.
+        box, resolution, points: of the cage.
+    """
+    vanished = bent.face_areas <= COLLAPSED * mesh.face_areas
+    vanished &= mesh.face_areas > 0.0
+    if vanished.any():
+        vertex = int(bent.faces[np.argmax(vanished), 0])
+        return Fold("collapsed", bent.vertices[vertex], vertex, int(vanished.sum()))
+    if is_one_to_one(box, resolution, points):
+        return None
+    if mesh.is_closed:
+        stretch = np.linalg.det(jacobians(mesh.vertices, box, resolution, points))
+        turned = stretch <= 0.0
+        if turned.any():
+            vertex = int(np.argmin(stretch))
+            return Fold("inside out", bent.vertices[vertex], vertex, int(turned.sum()))
+    elif is_in_full_view(mesh, bent):
+        return None
+    crossed = self_crossings(bent.welded())
+    # A part may have been modelled of shells that cut through each other.
+    if len(crossed.pairs) and len(self_crossings(mesh.welded(), limit=1).pairs) == 0:
+        place = crossed.places[0]
+        vertex = int(np.argmin(np.linalg.norm(bent.vertices - place, axis=1)))
+        return Fold("through itself", place, vertex, len(crossed.pairs))
+    return None
+
+
+def is_in_full_view(mesh: TriangleMesh, bent: TriangleMesh) -> bool:
+    """Whether every point of an open sheet without holes can be seen at once from far away.
+
+    Looked at against its mean normal, all faces show the same side and the outline does not
+    cross itself: a flat map with these two properties covers each point once. So the sheet has
+    no folds and does not touch itself. False only means that it can't be told this way.
+
+    Args:
+        mesh: the sheet at rest; its outline is kept for the next call.
+        bent: the same faces over moved vertices.
+    """
+    outline = _outlines.get(mesh)
+    if outline is None:
+        outline = _outlines[mesh] = _single_outline(mesh)
+    if len(outline) == 0:
+        return False
+    normal = bent.face_vectors.sum(axis=0)
+    length = np.linalg.norm(normal)
+    if not length > 0.0 or (bent.face_vectors @ (normal / length) <= 0.0).any():
+        return False
+    across = np.cross(normal, np.eye(3)[np.argmin(np.abs(normal))])
+    frame = np.column_stack([across, np.cross(normal, across)])
+    flat = bent.vertices[outline] @ (frame / np.linalg.norm(frame, axis=0))
+    return bool(shapely.LinearRing(flat).is_simple)
+
+
+def _single_outline(mesh: TriangleMesh) -> NDArray[np.int64]:
+    """The vertices around a sheet that is one disc, in order; empty for any other shape."""
+    none = np.zeros(0, dtype=np.int64)
+    faces = mesh.faces.astype(np.int64)
+    size = len(mesh.vertices)
+    starts, ends = faces.reshape(-1), np.roll(faces, -1, axis=1).reshape(-1)
+    forward = np.sort(starts * size + ends)
+    backward = np.sort(ends * size + starts)
+    open_edges = np.setdiff1d(forward, backward, assume_unique=True)
+    edges = len(np.unique(np.minimum(starts, ends) * size + np.maximum(starts, ends)))
+    corners = len(np.unique(faces))
+    if len(np.unique(forward)) < len(forward) or corners - edges + len(faces) != 1:
+        return none
+    follow = dict(zip((open_edges // size).tolist(), (open_edges % size).tolist(), strict=True))
+    if len(follow) < len(open_edges) or not follow:
+        return none
+    first = here = next(iter(follow))
+    outline = [first]
+    while (here := follow.get(here, first)) != first:
+        outline.append(here)
+        if len(outline) > len(follow):
+            return none
+    return np.array(outline, dtype=np.int64) if len(outline) == len(follow) else none
