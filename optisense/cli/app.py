@@ -8,6 +8,7 @@ import typer
 
 from optisense import __version__
 from optisense.cli import console
+from optisense.cli.cage import cage_app
 from optisense.cli.check import check
 from optisense.cli.dataset import dataset
 from optisense.cli.doctor import doctor
@@ -30,6 +31,7 @@ app.command()(check)
 app.command()(render)
 app.command()(dataset)
 app.command()(doctor)
+app.add_typer(cage_app, name="cage")
 app.add_typer(library_app, name="library")
 
 

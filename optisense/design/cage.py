@@ -12,6 +12,8 @@ from pydantic import Field, model_validator
 from optisense.design.fields import Count, Fraction, Model, Name, Number, Vector
 
 MAX_POINTS = 20_000
+MOST_ALONG = 64
+"""Control points along an axis. Polynomials of so high a degree serve no shape."""
 
 
 class Point(Model):
@@ -30,7 +32,7 @@ class Share(Model):
     z: Fraction
 
 
-LatticeCount = Annotated[Count, Field(ge=2, le=64)]
+LatticeCount = Annotated[Count, Field(ge=2, le=MOST_ALONG)]
 
 
 class Cage(Model):

@@ -1,0 +1,337 @@
+"""``optisense cage``: cages that bend parts; show, add, move, refine, and set a search's range."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Literal, cast
+
+import typer
+from rich.table import Table
+
+from optisense.cli.console import ends_well, messages, output
+from optisense.cli.options import DesignArgument
+from optisense.errors import DesignError, OutputError
+
+if TYPE_CHECKING:
+    from optisense.design import SensorDesign
+
+cage_app = typer.Typer(
+    help="Cages: control points that bend parts of a design.", no_args_is_help=True
+)
+
+CageArgument = Annotated[
+    str, typer.Argument(metavar="CAGE", help="The cage's name, as `cage show` lists it.")
+]
+OutOption = Annotated[
+    Path,
+    typer.Option(
+        "--out",
+        "-o",
+        metavar="DIR",
+        help="Where to write the changed design: a new folder, or the design's own (its "
+        "design.yaml is written anew, with its own comments).",
+    ),
+]
+MoveOption = Annotated[
+    list[str],
+    typer.Option(
+        "--point",
+        "-p",
+        metavar="WHICH=DX,DY,DZ",
+        help="Which points, and by how many mm: 13=0,0,6 or 1,1,2=0,0,6; a * stands for all "
+        "along an axis, as in 1,*,2=0,0,6. May be given several times.",
+    ),
+]
+
+
+@cage_app.command("show")
+@ends_well
+def show(
+    design: DesignArgument,
+    cage: Annotated[
+        str | None,
+        typer.Argument(metavar="[CAGE]", help="One cage, with its points.", show_default=False),
+    ] = None,
+) -> None:
+    """List the cages of a design, or the control points of one."""
+    from optisense.sensors import load
+
+    sensor = load(design)
+    if cage is not None:
+        _show_points(sensor, cage)
+        return
+    table = Table("cage", "parts", "points", "shape", box=None, pad_edge=False)
+    for name, entry in sensor.cages.items():
+        nx, ny, nz = entry.resolution
+        table.add_row(name, ", ".join(entry.parts), f"{nx} x {ny} x {nz}", _shape(sensor, name))
+    output.print(table)
+
+
+@cage_app.command("add")
+@ends_well
+def add(
+    design: DesignArgument,
+    cage: Annotated[str, typer.Argument(metavar="CAGE", help="A name for the cage.")],
+    out: OutOption,
+    part: Annotated[
+        list[str],
+        typer.Option(
+            metavar="PART",
+            help="What it deforms. May be given several times: parts that touch move together.",
+        ),
+    ],
+    resolution: Annotated[
+        str, typer.Option(metavar="NXxNYxNZ", help="Control points along x, y and z.")
+    ] = "3x3x3",
+    margin: Annotated[
+        float, typer.Option(min=0.0, max=100.0, metavar="MM", help="Room around the parts.")
+    ] = 0.0,
+) -> None:
+    """Put a cage at rest around parts; it changes no shape."""
+    from optisense.design.cage_edit import add_cage
+    from optisense.sensors import load
+
+    points = _resolution(resolution)
+    sensor = load(design)
+    _write(design, add_cage(sensor, cage, part, points, margin), cage, out)
+
+
+@cage_app.command("remove")
+@ends_well
+def remove(design: DesignArgument, cage: CageArgument, out: OutOption) -> None:
+    """Take a cage away: its parts are at rest again."""
+    from optisense.design.cage_edit import remove_cage
+    from optisense.sensors import load
+
+    _write(design, remove_cage(load(design), cage), None, out)
+
+
+@cage_app.command("refine")
+@ends_well
+def refine(
+    design: DesignArgument,
+    cage: CageArgument,
+    out: OutOption,
+    resolution: Annotated[
+        str, typer.Option(metavar="NXxNYxNZ", help="Control points along x, y and z.")
+    ],
+) -> None:
+    """Give a cage more control points; the shape stays exactly the same."""
+    from optisense.design.cage_edit import refine_cage
+    from optisense.sensors import load
+
+    points = _resolution(resolution)
+    _write(design, refine_cage(load(design), cage, points), cage, out)
+
+
+@cage_app.command("move")
+@ends_well
+def move(
+    design: DesignArgument,
+    cage: CageArgument,
+    out: OutOption,
+    point: MoveOption,
+    of: Annotated[
+        str,
+        typer.Option(metavar="points|c_min|c_max", help="Move the shape, or an end of its range."),
+    ] = "points",
+) -> None:
+    """Move control points. A shape that folds or cuts into other parts is not written."""
+    from optisense.design.cage_edit import Shape, move_points
+    from optisense.sensors import load
+
+    if of not in ("points", "c_min", "c_max"):
+        raise typer.BadParameter(f"'{of}' is none of points, c_min, c_max", param_hint="--of")
+    moves = _moves(point, "--point")
+    sensor = load(design)
+    for which, way in moves:
+        sensor = move_points(sensor, cage, {which: way}, cast(Shape, of))
+    _write(design, sensor, cage, out)
+
+
+@cage_app.command("range")
+@ends_well
+def set_range(
+    design: DesignArgument,
+    cage: CageArgument,
+    out: OutOption,
+    low: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--min",
+            metavar="WHICH=DX,DY,DZ",
+            help="How c_min differs from the shape as it is now, in mm. May be given several "
+            "times.",
+            show_default=False,
+        ),
+    ] = None,
+    high: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--max",
+            metavar="WHICH=DX,DY,DZ",
+            help="How c_max differs from the shape as it is now.",
+            show_default=False,
+        ),
+    ] = None,
+    blend: Annotated[
+        float,
+        typer.Option(min=0.0, max=1.0, metavar="A", help="The shape: 0 is c_min, 1 is c_max."),
+    ] = 0.0,
+) -> None:
+    """Give a cage two ends, c_min and c_max, between which a search may choose."""
+    from optisense.design import cage_edit
+    from optisense.sensors import load
+
+    moves = {"c_min": _moves(low or [], "--min"), "c_max": _moves(high or [], "--max")}
+    sensor = cage_edit.set_range(load(design), cage, blend=blend)
+    for end, steps in moves.items():
+        for which, way in steps:
+            sensor = cage_edit.move_points(
+                sensor, cage, {which: way}, cast(Literal["c_min", "c_max"], end)
+            )
+    _check_ends(sensor, cage)
+    _write(design, sensor, cage, out)
+
+
+@cage_app.command("blend")
+@ends_well
+def blend(
+    design: DesignArgument,
+    cage: CageArgument,
+    share: Annotated[
+        float, typer.Argument(min=0.0, max=1.0, metavar="A", help="0 is c_min, 1 is c_max.")
+    ],
+    out: OutOption,
+) -> None:
+    """Set a shape between c_min and c_max, the same share for all control points."""
+    from optisense.design import get_value
+    from optisense.design.cage_edit import set_range
+    from optisense.sensors import load
+
+    sensor = load(design)
+    entry = get_value(sensor, f"cages.{cage}")
+    if entry.c_min is None or entry.c_max is None:
+        raise DesignError(
+            f"cage '{cage}' has no c_min and c_max",
+            hint=f"Set them with: optisense cage range {design} {cage} ...",
+        )
+    from optisense.design.cage import as_array
+
+    ends = as_array(entry.c_min), as_array(entry.c_max)
+    _write(design, set_range(sensor, cage, *ends, blend=share), cage, out)
+
+
+@cage_app.command("settle")
+@ends_well
+def settle(design: DesignArgument, cage: CageArgument, out: OutOption) -> None:
+    """Turn a blend of c_min and c_max into points of its own, to move them; the range stays."""
+    from optisense.design.cage_edit import settle_cage
+    from optisense.sensors import load
+
+    _write(design, settle_cage(load(design), cage), cage, out)
+
+
+def _resolution(text: str) -> tuple[int, int, int]:
+    match = re.fullmatch(r"\s*(\d{1,3})\s*[xX×]\s*(\d{1,3})\s*[xX×]\s*(\d{1,3})\s*", text)
+    if match is None:
+        raise typer.BadParameter(f"'{text}' is not like 3x3x3", param_hint="--resolution")
+    return int(match[1]), int(match[2]), int(match[3])
+
+
+def _moves(texts: list[str], option: str) -> list[tuple[str, tuple[float, float, float]]]:
+    moves = []
+    for text in texts:
+        which, sign, way = text.partition("=")
+        try:
+            x, y, z = (float(part) for part in way.split(","))
+        except ValueError:
+            sign = ""
+        if not sign:
+            raise typer.BadParameter(f"'{text}' is not like 1,*,2=0,0,6", param_hint=option)
+        moves.append((which, (x, y, z)))
+    return moves
+
+
+def _shape(design: SensorDesign, name: str) -> str:
+    """One line on where a cage's points are."""
+    import numpy as np
+
+    from optisense.design.cage_edit import offsets_at_rest
+
+    cage = design.cages[name]
+    moved = float(np.linalg.norm(offsets_at_rest(cage), axis=1).max())
+    text = f"moved by up to {moved:.4g} mm" if moved > 1e-9 else "at rest"
+    if isinstance(cage.blend, float):
+        return f"{text}, blend {cage.blend:.4g}"
+    return text if cage.blend is None else f"{text}, a blend for each point"
+
+
+def _show_points(design: SensorDesign, name: str) -> None:
+    import numpy as np
+
+    from optisense.design import get_value
+    from optisense.design.cage import Cage, as_array
+    from optisense.design.cage_edit import offsets_at_rest
+
+    cage: Cage = get_value(design, f"cages.{name}")
+    nx, ny, nz = cage.resolution
+    output.print(f"{name}: {nx} x {ny} x {nz} control points over {', '.join(cage.parts)}; "
+                 f"{_shape(design, name)}", markup=False)  # fmt: skip
+    now, offsets = cage.current_points(), offsets_at_rest(cage)
+    rows = [["point", "i,j,k", "x, y, z (mm)", "moved by"]]
+    ends = None
+    if cage.c_min is not None and cage.c_max is not None:
+        ends = as_array(cage.c_min), as_array(cage.c_max)
+        rows[0] += ["c_min", "c_max"]
+    for row, place in enumerate(np.ndindex(cage.resolution)):
+        cells = [str(row), ",".join(map(str, place)), _numbers(now[row])]
+        cells.append(_numbers(offsets[row]) if np.abs(offsets[row]).max() > 1e-9 else "-")
+        if ends is not None:
+            cells += [_numbers(ends[0][row]), _numbers(ends[1][row])]
+        rows.append(cells)
+    widths = [max(len(cells[k]) for cells in rows) for k in range(len(rows[0]))]
+    for cells in rows:  # not a table of rich's, which would break lines in a narrow terminal
+        line = "  ".join(cell.ljust(width) for cell, width in zip(cells, widths, strict=True))
+        output.print(line.rstrip(), markup=False)
+
+
+def _numbers(values: object) -> str:
+    return ", ".join(f"{value + 0.0:.5g}" for value in cast("list[float]", values))
+
+
+def _check_ends(design: SensorDesign, name: str) -> None:
+    """Say what is wrong with either end of a range; a search may still find good shapes within."""
+    from optisense.design import set_value
+    from optisense.design.cage_checks import cage_problems
+
+    for end, share in (("c_min", 0.0), ("c_max", 1.0)):
+        for problem in cage_problems(set_value(design, f"cages.{name}.blend", share)):
+            messages.print(f"odd at {end}: {problem}", markup=False, style="yellow")
+
+
+def _write(source: str, design: SensorDesign, cage: str | None, out: Path) -> None:
+    """Check the shapes and write the design."""
+    from optisense.design.cage_checks import cage_problems
+    from optisense.design.problems import raise_problems
+    from optisense.sensors import save_design
+
+    own = Path(source)
+    own = own.parent if own.is_file() else own
+    if out.is_file():
+        raise OutputError("this is a file, not a folder", where=str(out))
+    if out.is_dir() and any(out.iterdir()) and not (own.is_dir() and out.samefile(own)):
+        raise OutputError(
+            "the folder is not empty",
+            where=str(out),
+            hint="Name a folder that doesn't exist, or the design's own",
+        )
+    problems = cage_problems(design)
+    raise_problems(problems, f"design '{design.name}'")
+    for problem in problems:
+        messages.print(f"odd: {problem}", markup=False, style="yellow")
+    save_design(design, out)
+    if cage is not None:
+        output.print(f"cage {cage}: {_shape(design, cage)}", markup=False)
+    output.print(f"{out / 'design.yaml'}", markup=False)

@@ -1,0 +1,282 @@
+"""Putting cages around parts, moving and refining them; each function returns a new design."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from pydantic import ValidationError
+
+from optisense.design.cage import MAX_POINTS, MOST_ALONG, Cage, Share, as_array, as_points
+from optisense.design.near import suggestion
+from optisense.design.problems import design_error
+from optisense.design.sensor_design import SensorDesign
+from optisense.errors import DesignError
+from optisense.geometry.cage import cage_points
+from optisense.geometry.cage_map import refined_points
+
+Resolution = tuple[int, int, int]
+Shape = Literal["points", "c_min", "c_max"]
+"""Which control points of a cage: those that set the shape now, or an end of its range."""
+
+THINNEST = 0.5
+"""mm: a box over a flat part is made at least this thick."""
+
+SAME_SHARE = 1e-9
+
+
+def add_cage(
+    design: SensorDesign,
+    name: str,
+    parts: Iterable[str],
+    resolution: Resolution = (3, 3, 3),
+    margin: float = 0.0,
+) -> SensorDesign:
+    """A cage at rest over the box around some parts; it changes no shape.
+
+    Args:
+        design: left as it is.
+        name: of the new cage.
+        parts: what it deforms; parts that touch should move together.
+        resolution: control points along x, y, z.
+        margin: mm, how much larger the box is than the parts, all round. Along an axis in which
+            the parts are flat it is made `THINNEST` thick.
+
+    Raises:
+        DesignError: there is a cage of that name, a part is unknown, has no mesh or is in a cage
+            already, or the resolution is out of range.
+    """
+    chosen = list(parts)
+    if name in design.cages:
+        raise DesignError(
+            f"there is a cage '{name}' already", where=design.where("cages", name),
+            hint="Choose another name",
+        )  # fmt: skip
+    if not chosen:
+        raise DesignError("a cage needs a part to deform", hint=_known(design.parts))
+    for part in chosen:
+        if part not in design.meshes:
+            raise DesignError(
+                f"there is no part '{part}'" if part not in design.parts else
+                f"part '{part}' has no mesh",
+                hint=suggestion(part, design.meshes, limit=20),
+            )  # fmt: skip
+    corners = np.array([design.meshes[part].bounds for part in chosen])
+    lower, upper = corners[:, 0].min(axis=0) - margin, corners[:, 1].max(axis=0) + margin
+    thin = np.maximum(0.0, THINNEST - (upper - lower)) / 2.0
+    if min(resolution) < 2 or max(resolution) > MOST_ALONG or np.prod(resolution) > MAX_POINTS:
+        raise DesignError(
+            f"a cage can't have {_times(resolution)} control points",
+            hint=f"Give 2 to {MOST_ALONG} along each axis, {MAX_POINTS} in all at most",
+        )
+    cage = Cage.around(chosen, [lower - thin, upper + thin], resolution)
+    return _with_cage(design, name, cage.model_dump(mode="json"))
+
+
+def remove_cage(design: SensorDesign, name: str) -> SensorDesign:
+    """The design without a cage: its parts are at rest again.
+
+    Raises:
+        DesignError: there is no such cage.
+    """
+    _cage(design, name)
+    data = design.model_dump(mode="json")
+    del data["cages"][name]
+    return design._replaced(data)
+
+
+def refine_cage(design: SensorDesign, name: str, resolution: Resolution) -> SensorDesign:
+    """More control points, and exactly the same shape and range of shapes.
+
+    Raises:
+        DesignError: there is no such cage, or `resolution` has fewer points along an axis.
+    """
+    cage = _cage(design, name)
+    if any(new < old for new, old in zip(resolution, cage.resolution, strict=True)):
+        raise DesignError(
+            f"cage '{name}' has {_times(cage.resolution)} control points; "
+            f"{_times(resolution)} are fewer",
+            where=design.where("cages", name, "resolution"),
+            hint="A coarser cage can't keep the shape; remove the cage and add a new one",
+        )
+
+    def finer(points: NDArray[np.float64]) -> NDArray[np.float64]:
+        return refined_points(points, cage.resolution, resolution)
+
+    data = cage.model_dump(mode="json") | {"resolution": list(resolution)}
+    for field in ("points", "c_min", "c_max"):
+        if data[field]:
+            data[field] = _plain(finer(as_array(getattr(cage, field))))
+    if isinstance(cage.blend, list):
+        data["blend"] = _shares(
+            finer(cage.current_points()),
+            finer(as_array(cage.c_min or [])),
+            finer(as_array(cage.c_max or [])),
+            finer(as_array(cage.blend)),
+            design.where("cages", name, "blend"),
+        )
+    return _with_cage(design, name, data)
+
+
+def move_points(
+    design: SensorDesign,
+    name: str,
+    moves: Mapping[str, Sequence[float]],
+    of: Shape = "points",
+) -> SensorDesign:
+    """Move control points of a cage.
+
+    Args:
+        design: left as it is.
+        name: the cage.
+        moves: mm along x, y, z, by which points are meant: "13", "1,1,2" or "1,*,2" (a row).
+        of: what is moved: the shape, or an end of its range.
+
+    Raises:
+        DesignError: there is no such cage or point, or the shape is set by a blend.
+    """
+    cage = _cage(design, name)
+    if of == "points" and cage.blend is not None:
+        raise DesignError(
+            f"the shape of cage '{name}' is a blend of c_min and c_max",
+            where=design.where("cages", name, "blend"),
+            hint="Change the blend, move the points of c_min or c_max, or settle the shape first",
+        )
+    current = getattr(cage, of)
+    if not current:
+        raise DesignError(
+            f"cage '{name}' has no {of}",
+            where=design.where("cages", name),
+            hint="Set the ends of its range first",
+        )
+    points = as_array(current)
+    for which, way in moves.items():
+        step = np.asarray(way, dtype=np.float64)
+        if step.shape != (3,) or not np.isfinite(step).all():
+            raise DesignError(
+                f"points '{which}' of cage '{name}' can't be moved by {way}",
+                hint="Give three numbers: mm along x, y and z",
+            )
+        points[select_points(cage.resolution, which)] += step
+    return _with_cage(design, name, cage.model_dump(mode="json") | {of: _plain(points)})
+
+
+def set_range(
+    design: SensorDesign,
+    name: str,
+    c_min: ArrayLike | None = None,
+    c_max: ArrayLike | None = None,
+    blend: float | None = 0.0,
+) -> SensorDesign:
+    """Give a cage two ends, between which a search may choose.
+
+    Args:
+        design: left as it is.
+        name: the cage.
+        c_min, c_max: (N, 3) mm; None takes the shape as it is now.
+        blend: the share of c_max in the shape, for all points; None keeps the points that set
+            the shape now.
+
+    Raises:
+        DesignError: there is no such cage, or the numbers do not fit.
+    """
+    cage = _cage(design, name)
+    now = cage.current_points()
+    data = cage.model_dump(mode="json")
+    for field, given in (("c_min", c_min), ("c_max", c_max)):
+        data[field] = _plain(now if given is None else np.asarray(given, dtype=np.float64))
+    data["blend"] = blend
+    data["points"] = _plain(now) if blend is None else []
+    return _with_cage(design, name, data)
+
+
+def settle_cage(design: SensorDesign, name: str) -> SensorDesign:
+    """The shape that the blend gives now as points of its own; the range stays.
+
+    Raises:
+        DesignError: there is no such cage.
+    """
+    cage = _cage(design, name)
+    data = cage.model_dump(mode="json")
+    return _with_cage(design, name, data | {"points": _plain(cage.current_points()), "blend": None})
+
+
+def select_points(resolution: Resolution, which: str) -> list[int]:
+    """The positions of "13", "1,1,2" or, with stars for all of an axis, "1,*,2".
+
+    Raises:
+        DesignError: it can't be read, or there is no such point.
+    """
+    count = int(np.prod(resolution))
+    hint = (
+        f"Write a number below {count}, or i,j,k below {','.join(map(str, resolution))}, with * "
+        "for all of an axis"
+    )
+    text = which.replace(" ", "")
+    if re.fullmatch(r"\d+", text) and int(text) < count:
+        return [int(text)]
+    if re.fullmatch(r"(\d+|\*),(\d+|\*),(\d+|\*)", text):
+        axes = [
+            range(size) if step == "*" else [int(step)]
+            for step, size in zip(text.split(","), resolution, strict=True)
+        ]
+        if all(max(axis) < size for axis, size in zip(axes, resolution, strict=True)):
+            _, ny, nz = resolution
+            return [(i * ny + j) * nz + k for i in axes[0] for j in axes[1] for k in axes[2]]
+    raise DesignError(f"there is no control point '{which}'", hint=hint)
+
+
+def offsets_at_rest(cage: Cage) -> NDArray[np.float64]:
+    """(N, 3) mm, how far each control point is from where it is at rest."""
+    return np.asarray(cage.current_points() - cage_points(cage.box, cage.resolution))
+
+
+def _shares(
+    now: NDArray[np.float64],
+    c_min: NDArray[np.float64],
+    c_max: NDArray[np.float64],
+    elsewhere: NDArray[np.float64],
+    where: str,
+) -> list[dict[str, float]]:
+    """The blend of a refined cage; `elsewhere` counts where both ends are the same."""
+    span = c_max - c_min
+    wide = np.abs(span) > SAME_SHARE
+    share = np.where(wide, (now - c_min) / np.where(wide, span, 1.0), elsewhere)
+    if (share < -1e-6).any() or (share > 1.0 + 1e-6).any():
+        raise DesignError(
+            "a finer cage can't hold this shape between its c_min and c_max",
+            where=where,
+            hint="Settle the shape first, or set the range anew",
+        )
+    return [Share(x=x, y=y, z=z).model_dump() for x, y, z in share.clip(0.0, 1.0).tolist()]
+
+
+def _cage(design: SensorDesign, name: str) -> Cage:
+    if name not in design.cages:
+        raise DesignError(f"there is no cage '{name}'", hint=_known(design.cages, name))
+    return design.cages[name]
+
+
+def _known(names: Iterable[str], wanted: str = "") -> str:
+    known = list(names)
+    return suggestion(wanted, known, limit=20) or "The design has none"
+
+
+def _with_cage(design: SensorDesign, name: str, cage: dict[str, Any]) -> SensorDesign:
+    data = design.model_dump(mode="json")
+    data["cages"][name] = cage
+    try:
+        return design._replaced(data)
+    except ValidationError as error:
+        raise design_error(error, data, where=f"cage '{name}'") from None
+
+
+def _plain(points: NDArray[np.float64]) -> list[dict[str, float]]:
+    return [point.model_dump() for point in as_points(points)]
+
+
+def _times(resolution: Resolution) -> str:
+    return " x ".join(map(str, resolution))
