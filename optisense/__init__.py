@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from optisense.design import SensorDesign, get_value, load_design, set_value
     from optisense.geometry import Contact, Cylinder, MeshIndenter, Plane, Sphere
+    from optisense.objectives import Score, evaluate, objective
     from optisense.optics import OpticalModel
     from optisense.sensors import check, load, save_design
 
@@ -22,12 +23,15 @@ _HOMES = {
     "MeshIndenter": "optisense.geometry",
     "OpticalModel": "optisense.optics",
     "Plane": "optisense.geometry",
+    "Score": "optisense.objectives",
     "SensorDesign": "optisense.design",
     "Sphere": "optisense.geometry",
     "check": "optisense.sensors",
+    "evaluate": "optisense.objectives",
     "get_value": "optisense.design",
     "load": "optisense.sensors",
     "load_design": "optisense.design",
+    "objective": "optisense.objectives",
     "save_design": "optisense.sensors",
     "set_value": "optisense.design",
 }
@@ -43,13 +47,16 @@ __all__ = [
     "MeshIndenter",
     "OpticalModel",
     "Plane",
+    "Score",
     "SensorDesign",
     "Sphere",
     "__version__",
     "check",
+    "evaluate",
     "get_value",
     "load",
     "load_design",
+    "objective",
     "save_design",
     "set_value",
 ]

@@ -12,6 +12,7 @@ from optisense.cli.cage import cage_app
 from optisense.cli.check import check
 from optisense.cli.dataset import dataset
 from optisense.cli.doctor import doctor
+from optisense.cli.evaluate import evaluate
 from optisense.cli.library import library_app
 from optisense.cli.new import new
 from optisense.cli.render import render
@@ -30,6 +31,7 @@ app.command()(new)
 app.command()(check)
 app.command()(render)
 app.command()(dataset)
+app.command()(evaluate)
 app.command()(doctor)
 app.add_typer(cage_app, name="cage")
 app.add_typer(library_app, name="library")

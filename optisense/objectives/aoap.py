@@ -37,7 +37,7 @@ def aoap(
     if not hit.any():
         raise ObjectiveError(
             "the camera sees nothing of the sensing surface",
-            hint="check the camera's position, direction and field of view",
+            hint="Check the camera's position, direction and field of view",
         )
     faces = evaluation.sensing_faces
     seen = np.bincount(rays.face[hit], minlength=faces)[:faces] > 0

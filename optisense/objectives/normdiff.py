@@ -101,7 +101,7 @@ def normdiff(
         if count < least_pixels:
             raise ObjectiveError(
                 f"only {count} pixels of {press.name} are indented, {least_pixels} are needed",
-                hint="use a higher resolution",
+                hint="Use a higher resolution",
             )
         theta, phi = azimuths(press, press.normals[indented])
         found = confusion(

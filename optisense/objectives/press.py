@@ -82,7 +82,7 @@ class Press:
             return srgb_curve(chosen)
         if kind == "response":
             return chosen
-        raise ObjectiveError(f"there are no colours '{kind}'", hint="use picture or response")
+        raise ObjectiveError(f"there are no colours '{kind}'", hint="Use picture or response")
 
     @property
     def name(self) -> str:
@@ -102,11 +102,11 @@ class Press:
         clipped = float((brightest >= CLIPPED).mean())
         if clipped > MOST_CLIPPED:
             raise ObjectiveError(
-                f"{100 * clipped:.0f} % of {self.name} is overexposed", hint="lower the exposure"
+                f"{100 * clipped:.0f} % of {self.name} is overexposed", hint="Lower the exposure"
             )
         if float(np.median(brightest)) < DARK:
             raise ObjectiveError(
-                f"{self.name} is black", hint="check the lights, or raise the exposure"
+                f"{self.name} is black", hint="Check the lights, or raise the exposure"
             )
 
 

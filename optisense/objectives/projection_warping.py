@@ -54,7 +54,7 @@ def projection_warping(
     if len(areas) < 2:
         raise ObjectiveError(
             "the camera sees too little of the sensing surface: no two triangles of pixels",
-            hint="check the camera's position, direction and field of view",
+            hint="Check the camera's position, direction and field of view",
         )
     mean = float(areas.mean())
     deviation = float(areas.std())

@@ -70,7 +70,7 @@ def rgb2normal(
     """
     if directions < 1 or (directions % 2 and not half_lines):
         raise ObjectiveError(
-            f"{directions} directions have no opposite ones", hint="use an even number"
+            f"{directions} directions have no opposite ones", hint="Use an even number"
         )
     angles = np.arange(directions) * 360.0 / directions
     places: list[dict[str, Any]] = []
@@ -84,7 +84,7 @@ def rgb2normal(
                 raise ObjectiveError(
                     f"only {count} pixels of {press.name} lie on the line at {angle:g} degrees, "
                     f"{least_pixels} are needed",
-                    hint="use a higher resolution",
+                    hint="Use a higher resolution",
                 )
             fits[float(angle)] = fit(
                 signed_angles(press, float(angle), press.normals[chosen]),

@@ -165,7 +165,7 @@ def _check_kind(name: str, value: Any, default: Any) -> None:
     else:
         return
     if not fits:
-        raise ObjectiveError(f"the setting '{name}' is {value!r}", hint=f"give {kind}")
+        raise ObjectiveError(f"the setting '{name}' is {value!r}", hint=f"Give {kind}")
 
 
 def _model(sensor: OpticalModel | SensorDesign) -> OpticalModel:
@@ -193,5 +193,5 @@ def _number(value: Any) -> float:
     if isinstance(value, int | float | np.integer | np.floating) and not isinstance(value, bool):
         return float(value)
     raise ObjectiveError(
-        f"the objective returned a {type(value).__name__}", hint=f"return {RETURNS}"
+        f"the objective returned a {type(value).__name__}", hint=f"Return {RETURNS}"
     )

@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from optisense.errors import ObjectiveError
+
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
@@ -52,7 +54,7 @@ class Score:
     def beside(self) -> str:
         """The parts to show beside the value, as text: ``coverage 0.53``."""
         return ", ".join(
-            f"{key.replace('_', ' ')} {_number(self.parts[key])}"
+            f"{key.replace('_', ' ')} {shown_number(self.parts[key])}"
             for key in self.shown
             if key in self.parts
         )
@@ -82,7 +84,7 @@ class Score:
         rows = [(self.name, shown if self.failure is None else html.escape(str(shown)))]
         for key, value in self.parts.items():
             if isinstance(value, bool | int | float | str):
-                rows.append((html.escape(key.replace("_", " ")), html.escape(_number(value))))
+                rows.append((html.escape(key.replace("_", " ")), html.escape(shown_number(value))))
         body = "".join(f"<tr><th>{key}</th><td>{value}</td></tr>" for key, value in rows)
         return f"<table>{body}</table>"
 
@@ -91,15 +93,11 @@ def json_ready(value: Any) -> Any:
     """Plain dicts, lists, strings and finite numbers; numpy's are converted, NaN becomes None.
 
     Raises:
-        TypeError: something that JSON can't hold.
+        ObjectiveError: something that JSON can't hold.
     """
-    if value is None or isinstance(value, bool | str):
-        return value
     if isinstance(value, np.generic):
         value = value.item()
-    if isinstance(value, int) and not isinstance(value, bool):
-        return value
-    if isinstance(value, bool | str):
+    if value is None or isinstance(value, bool | str | int):
         return value
     if isinstance(value, float):
         return value if math.isfinite(value) else None
@@ -109,8 +107,12 @@ def json_ready(value: Any) -> Any:
         return json_ready(value.tolist())
     if isinstance(value, list | tuple):
         return [json_ready(inner) for inner in value]
-    raise TypeError(f"{type(value).__name__} can't be written as JSON")
+    raise ObjectiveError(
+        f"a {type(value).__name__} among its parts can't be written as JSON",
+        hint="Use numbers, texts, lists and dicts",
+    )
 
 
-def _number(value: float | str) -> str:
+def shown_number(value: float | str) -> str:
+    """A number with four digits that count; anything else as it is."""
     return f"{value:.4g}" if isinstance(value, float) else str(value)

@@ -58,20 +58,20 @@ class Settings:
                 object.__setattr__(self, name, _size(name, size))
         if self.photons is not None and not (_is_whole(self.photons) and self.photons > 0):
             raise ObjectiveError(
-                f"photons are {self.photons!r}", hint="give a whole number above 0"
+                f"photons are {self.photons!r}", hint="Give a whole number above 0"
             )
         if not (_is_whole(self.seed) and 0 <= self.seed < 2**32):
-            raise ObjectiveError(f"the seed is {self.seed!r}", hint="give a whole number from 0")
+            raise ObjectiveError(f"the seed is {self.seed!r}", hint="Give a whole number from 0")
         if self.exposure != "auto" and not (
             is_number(self.exposure) and 0.0 < self.exposure < float("inf")
         ):
             raise ObjectiveError(
-                f"the exposure is {self.exposure!r}", hint='give "auto" or a factor above 0'
+                f"the exposure is {self.exposure!r}", hint='Give "auto" or a factor above 0'
             )
         if not (is_number(self.depth) and is_number(self.radius) and 0 < self.depth < self.radius):
             raise ObjectiveError(
                 f"a ball of radius {self.radius!r} mm can't be judged {self.depth!r} mm deep",
-                hint="press deeper than 0 and less deep than the radius",
+                hint="Press deeper than 0 and less deep than the radius",
             )
         if self.places is not None:
             object.__setattr__(self, "places", _pairs(self.places))
@@ -93,7 +93,7 @@ def _size(name: str, size: Any) -> tuple[int, int]:
         or not all(_is_whole(side) and side > 0 for side in size)
     ):
         raise ObjectiveError(
-            f"the {name.replace('_', ' ')} is {size!r}", hint="give width and height in pixels"
+            f"the {name.replace('_', ' ')} is {size!r}", hint="Give width and height in pixels"
         )
     return int(size[0]), int(size[1])
 
@@ -108,7 +108,7 @@ def _pairs(places: Any) -> tuple[tuple[float, float], ...]:
         )
     ):
         raise ObjectiveError(
-            f"places are {places!r}", hint="give one or more (u, v) in mm, such as ((0, 0), (2, 1))"
+            f"places are {places!r}", hint="Give one or more (u, v) in mm, such as ((0, 0), (2, 1))"
         )
     return tuple((float(u), float(v)) for u, v in places)
 

@@ -1,0 +1,125 @@
+"""What every objective must do, as tests: for this package's objectives, and for your own.
+
+In a test file of yours, to be run by pytest::
+
+    from optisense.objectives.testing import ObjectiveContract
+
+    class TestMine(ObjectiveContract):
+        objective = "mine"  # or "path/to/file.py:function"
+"""
+
+from __future__ import annotations
+
+import io
+import json
+import math
+from functools import cache
+from typing import TYPE_CHECKING, Any
+
+from optisense.objectives.evaluation import Evaluation
+from optisense.objectives.registry import Objective, find
+from optisense.objectives.run import evaluate
+from optisense.objectives.score import Score
+from optisense.objectives.settings import Settings
+
+if TYPE_CHECKING:
+    from optisense.optics import OpticalModel
+
+PIXELS = (160, 120)
+PHOTONS = 300_000
+
+
+@cache
+def gelsight_mini() -> OpticalModel:
+    """A GelSight Mini, which all contract tests share."""
+    from optisense.optics import OpticalModel
+    from optisense.sensors import load
+
+    return OpticalModel(load("gelsight-mini"))
+
+
+@cache
+def evaluation(seed: int = 0) -> Evaluation:
+    """Small images of it."""
+    settings = Settings(resolution=PIXELS, ray_resolution=PIXELS, photons=PHOTONS, seed=seed)
+    return Evaluation(gelsight_mini(), settings)
+
+
+@cache
+def unlit_evaluation() -> Evaluation:
+    """The same sensor with its lights off."""
+    from optisense.design import set_value
+    from optisense.optics import OpticalModel
+    from optisense.sensors import load
+
+    design = load("gelsight-mini")
+    for name in design.lights:
+        design = set_value(design, f"lights.{name}.flux", 1e-12)
+    settings = Settings(resolution=(40, 30), ray_resolution=(40, 30), photons=10_000)
+    return Evaluation(OpticalModel(design), settings)
+
+
+class ObjectiveContract:
+    """The contract; a subclass names the objective.
+
+    Attributes:
+        objective: name, or ``file.py:function``.
+        settings: of its own, to test it with.
+    """
+
+    objective: str
+    settings: dict[str, Any] = {}  # noqa: RUF012
+
+    def found(self) -> Objective:
+        """The objective under test."""
+        return find(self.objective)
+
+    def score(self) -> Score:
+        """Its score of a GelSight Mini."""
+        return evaluate(evaluation(), self.found(), **self.settings)
+
+    def test_it_is_found_by_its_name(self) -> None:
+        found = self.found()
+        assert find(found.name) is found
+
+    def test_its_settings_have_defaults(self) -> None:
+        assert all(isinstance(name, str) for name in self.found().settings)
+
+    def test_it_says_what_it_measures(self) -> None:
+        assert self.found().title
+        assert len(self.found().summary) > 10
+
+    def test_it_scores_a_gelsight_mini(self) -> None:
+        score = self.score()
+        assert score.failure is None
+        assert isinstance(score.value, float)
+        assert math.isfinite(score.value)
+        assert score.seconds >= 0.0
+
+    def test_the_same_images_give_the_same_score(self) -> None:
+        assert self.score().value == self.score().value
+
+    def test_its_parts_can_be_written_as_json(self) -> None:
+        score = self.score()
+        text = json.dumps(score.to_dict(), allow_nan=False)
+        assert json.loads(text)["value"] == score.value
+
+    def test_it_can_be_drawn_and_shown(self) -> None:
+        score = self.score()
+        buffer = io.BytesIO()
+        score.figure().savefig(buffer, format="png", dpi=30)
+        assert buffer.getvalue().startswith(b"\x89PNG")
+        assert score.name in score._repr_html_()
+
+    def test_it_leaves_the_sensor_as_it_was(self) -> None:
+        before = gelsight_mini().design.model_dump_json()
+        self.score()
+        assert gelsight_mini().design.model_dump_json() == before
+
+    def test_a_sensor_without_light_gives_a_score_or_a_reason(self) -> None:
+        score = evaluate(unlit_evaluation(), self.found(), **self.settings)
+        if score.failure is None:
+            assert math.isfinite(score.value)
+        else:
+            assert math.isnan(score.value)
+            assert len(score.failure) > 10

@@ -1,0 +1,148 @@
+"""The page of a sensor's scores: a table, its section, and the figure and parts of each score."""
+
+from __future__ import annotations
+
+import base64
+import io
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from jinja2 import DictLoader, Environment, StrictUndefined
+from markupsafe import Markup
+
+from optisense import __version__
+from optisense.design.section_drawing import section_svg
+from optisense.objectives.registry import Objective
+from optisense.objectives.score import Score, shown_number
+from optisense.objectives.scored import Scored
+from optisense.report.files import template, write_whole
+
+DOTS_PER_INCH = 110
+
+Table = tuple[list[str], list[list[str]]]
+"""Column heads and rows."""
+
+
+def write_score_report(path: str | Path, scored: Scored, objectives: list[Objective]) -> Path:
+    """Write scores as one self-contained HTML page.
+
+    Args:
+        path: the file to write; it is written whole or not at all.
+        scored: the scores.
+        objectives: what they were scored by.
+
+    Returns:
+        The path.
+
+    Raises:
+        OutputError: the file can't be written.
+    """
+    write_whole(Path(path), render_scores(scored, objectives))
+    return Path(path)
+
+
+def render_scores(scored: Scored, objectives: list[Objective]) -> str:
+    """The page of `write_score_report` as text."""
+    summaries = {each.name: each.summary for each in objectives}
+    environment = Environment(
+        loader=DictLoader({"scores": template("scores.html.j2")}),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    return environment.get_template("scores").render(
+        title=scored.design.name,
+        description=scored.design.description,
+        headline=_headline(scored),
+        section=Markup(section_svg(scored.design)),
+        rows=[_row(scored, name, score) for name, score in scored.scores.items()],
+        seeds=len(scored.runs),
+        scores=[_score(score, summaries.get(name, "")) for name, score in scored.scores.items()],
+        settings=[
+            (key.replace("_", " "), _text(value))
+            for key, value in scored.to_dict().get("settings", {}).items()
+        ],
+        version=__version__,
+        css=Markup(template("report.css")),
+    )
+
+
+def _headline(scored: Scored) -> list[tuple[str, str]]:
+    if not scored.runs:
+        return []
+    first = scored.runs[0].evaluation
+    facts = [
+        ("images", "{} × {}".format(*first.resolution)),
+        ("rays", "{} × {}".format(*first.ray_resolution)),
+        ("seeds", str(len(scored.runs))),
+    ]
+    return facts
+
+
+def _row(scored: Scored, name: str, score: Score) -> dict[str, str]:
+    spread = scored.spread(name)
+    failed = score.failure is not None
+    return {
+        "name": score.name,
+        "value": "failed" if failed else f"{scored.mean(name):.4g}",
+        "spread": "" if spread is None else f"± {spread:.2g}",
+        "seconds": f"{score.seconds:.2f} s",
+        "note": score.failure or score.beside,
+    }
+
+
+def _score(score: Score, summary: str) -> dict[str, Any]:
+    numbers = [
+        (key.replace("_", " "), _text(value))
+        for key, value in score.parts.items()
+        if not isinstance(value, list | Mapping)
+    ]
+    tables = []
+    for key, value in score.parts.items():
+        table = _table(value)
+        if table is not None:
+            tables.append({"name": key.replace("_", " "), "heads": table[0], "rows": table[1]})
+    return {
+        "name": score.name,
+        "value": "" if score.failure is not None else f"{score.value:.4g}",
+        "failure": score.failure,
+        "summary": summary,
+        "figure": "" if score.failure is not None else _figure(score),
+        "numbers": numbers,
+        "tables": tables,
+    }
+
+
+def _figure(score: Score) -> str:
+    """The score's figure as the address of an ``<img>``; empty if a user's drawing fails."""
+    buffer = io.BytesIO()
+    try:
+        score.figure().savefig(buffer, format="png", dpi=DOTS_PER_INCH)
+    except Exception:  # the figure of a user's objective is a user's code; the score stands
+        return ""
+    return "data:image/png;base64," + base64.b64encode(buffer.getvalue()).decode("ascii")
+
+
+def _table(value: Any) -> Table | None:
+    """Lists of dicts become tables; dicts of single values rows; what else is nested stays out."""
+    if isinstance(value, Mapping):
+        flat = {k: v for k, v in value.items() if not isinstance(v, list | Mapping)}
+        return ([str(k) for k in flat], [[_text(v) for v in flat.values()]]) if flat else None
+    if not isinstance(value, list) or not value or not isinstance(value[0], Mapping):
+        return None
+    heads = list(value[0])
+    rows = [[_text(row.get(head)) for head in heads] for row in value]
+    return [head.replace("_", " ") for head in heads], rows
+
+
+def _text(value: Any) -> str:
+    """A value on one line."""
+    if isinstance(value, Mapping):
+        return ", ".join(f"{key}: {_text(inner)}" for key, inner in value.items())
+    if isinstance(value, list):
+        return ", ".join(_text(inner) for inner in value)
+    if value is None:
+        return "default"
+    return shown_number(value) if isinstance(value, int | float) else str(value)

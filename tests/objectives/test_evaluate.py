@@ -1,0 +1,257 @@
+"""Scoring a sensor: what is shared, what fails and how, and settings at the door."""
+
+from __future__ import annotations
+
+import html
+import math
+import pickle
+import re
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+from optisense import OpticalModel, Score, evaluate, load
+from optisense.design import set_value
+from optisense.errors import ObjectiveError
+from optisense.objectives import BUILT_IN, Evaluation, Objective, Settings
+
+SMALL: dict[str, Any] = {
+    "resolution": (160, 120),
+    "ray_resolution": (80, 60),
+    "photons": 300_000,
+    "places": ((0.0, 0.0), (4.0, 3.0)),
+}
+
+
+@pytest.fixture(scope="module")
+def model() -> OpticalModel:
+    return OpticalModel(load("gelsight-mini"), "llvm")
+
+
+@pytest.fixture(scope="module")
+def evaluation(model: OpticalModel) -> Evaluation:
+    return Evaluation(model, Settings(**SMALL))
+
+
+def own(function: Callable[..., Any]) -> Objective:
+    return Objective("own", function, "Own")
+
+
+def test_all_four_score_a_gelsight_mini(evaluation: Evaluation) -> None:
+    scores = evaluate(evaluation, BUILT_IN)
+    assert list(scores) == list(BUILT_IN)
+    assert all(score.failure is None for score in scores.values())
+    assert 0.8 < scores["rgb2normal"].value < 1.0
+    assert -90 < scores["normdiff"].value < 0
+    # Seen through glass and gel, within 26 degrees of upright at the picture's sides.
+    assert np.cos(np.radians(26)) < scores["aoap"].value < 1.01
+    assert scores["2to3pw"].value > 10
+
+
+def test_images_are_rendered_once_for_all_objectives(
+    model: OpticalModel, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    rendered, traced = [], []
+    render, chief_rays = OpticalModel.render, OpticalModel.chief_rays
+
+    def counted(self: OpticalModel, contacts: Any = (), **options: Any) -> Any:
+        rendered.append(len(contacts))
+        return render(self, contacts, **options)
+
+    def counted_rays(self: OpticalModel, resolution: Any = None, contacts: Any = ()) -> Any:
+        traced.append(resolution)
+        return chief_rays(self, resolution, contacts)
+
+    monkeypatch.setattr(OpticalModel, "render", counted)
+    monkeypatch.setattr(OpticalModel, "chief_rays", counted_rays)
+    shared = Evaluation(model, Settings(**SMALL))
+    evaluate(shared, ["aoap", "2to3pw"])
+    assert rendered == []
+    assert traced == [SMALL["ray_resolution"]]
+    evaluate(shared, ["rgb2normal", "normdiff"])
+    evaluate(shared, "normdiff", noise=0.1)
+    assert sorted(rendered) == [0, 1, 1]
+
+
+def test_places_in_one_image_score_as_one_by_one(
+    model: OpticalModel, evaluation: Evaluation
+) -> None:
+    together = evaluate(Evaluation(model, Settings(**SMALL, together=True)), "rgb2normal")
+    alone = evaluate(evaluation, "rgb2normal")
+    for one, other in zip(together.parts["places"], alone.parts["places"], strict=True):
+        assert one["pixels"] == other["pixels"]
+        assert one["score"] == pytest.approx(other["score"], abs=0.02)
+
+
+def test_contacts_that_overlap_are_not_put_in_one_image(model: OpticalModel) -> None:
+    near = {**SMALL, "places": ((0.0, 0.0), (1.5, 0.0))}
+    presses = Evaluation(model, Settings(**near, together=True)).presses
+    # Each press is whole.
+    assert presses[0].mask.sum() == pytest.approx(presses[1].mask.sum(), rel=0.1)
+
+
+def test_presses_know_where_they_are(evaluation: Evaluation) -> None:
+    middle, aside = evaluation.presses
+    right, up, _ = evaluation.design.camera.axes()
+    assert middle.east == pytest.approx(right, abs=1e-6)
+    assert middle.north == pytest.approx(up, abs=1e-6)
+    assert (aside.place - middle.place) @ right == pytest.approx(4.0, abs=1e-3)
+    for press in (middle, aside):
+        seen = press.points[press.mask] - press.centre
+        assert np.linalg.norm(seen, axis=1) == pytest.approx(1.5, abs=0.01)
+        normals = press.normals[press.mask]
+        assert (seen / 1.5 * normals).sum(axis=1).min() > 0.99
+
+
+def test_one_objective_gives_a_score_and_several_a_dict(evaluation: Evaluation) -> None:
+    assert isinstance(evaluate(evaluation, "aoap"), Score)
+    assert set(evaluate(evaluation, ["aoap"])) == {"aoap"}
+
+
+def test_a_design_can_be_scored_without_a_model() -> None:
+    score = evaluate(load("gelsight-mini"), "aoap", ray_resolution=(40, 30), coverage_weight=0.0)
+    assert score.value == score.parts["mean_cosine"]
+
+
+def raises(evaluation: Evaluation) -> float:
+    raise KeyError("gel")
+
+
+@pytest.mark.parametrize(
+    ("function", "reason"),
+    [
+        (raises, r"KeyError: 'gel' .*test_evaluate.py:\d+"),
+        (lambda evaluation: float("nan"), "returned nan"),
+        (lambda evaluation: math.inf, "returned inf"),
+        (lambda evaluation: "good", "returned a str"),
+        (lambda evaluation: None, "returned a NoneType"),
+        (lambda evaluation: True, "returned a bool"),
+        (lambda evaluation: np.ones(3), "returned a ndarray"),
+        (lambda evaluation: (1.0, [2.0]), "returned a tuple"),
+        (lambda evaluation: (1.0, {"model": object()}), "can't be written as JSON"),
+        (lambda evaluation: Score("own", math.nan, "no light"), "no light"),
+    ],
+)
+def test_an_objective_that_fails_says_why_and_the_others_go_on(
+    evaluation: Evaluation, function: Callable[..., Any], reason: str
+) -> None:
+    scores = evaluate(evaluation, [own(function), "aoap"])
+    failed = scores["own"]
+    assert math.isnan(failed.value)
+    assert failed.failure is not None
+    assert re.search(reason, failed.failure), failed.failure
+    assert failed.to_dict()["value"] is None
+    assert html.escape(failed.failure) in failed._repr_html_()
+    assert failed.figure() is not None
+    assert scores["aoap"].failure is None
+
+
+@pytest.mark.parametrize(
+    "result",
+    [2.0, 2, np.float32(2), np.int64(2), (2.0, {"a": 1}), Score("other", 2.0)],
+    ids=repr,
+)
+def test_what_an_objective_may_return(evaluation: Evaluation, result: Any) -> None:
+    score = evaluate(evaluation, own(lambda evaluation: result))
+    assert score.value == 2.0
+    assert score.objective == "own"
+
+
+def test_ctrl_c_is_not_a_failure(evaluation: Evaluation) -> None:
+    def stopped(evaluation: Evaluation) -> float:
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        evaluate(evaluation, own(stopped))
+
+
+@pytest.mark.parametrize(
+    ("settings", "reason"),
+    [
+        ({"places": ((11.0, 9.0),)}, "does not see place 1"),
+        ({"places": ((0.0, 0.0), (90.0, 0.0))}, "off the sensing surface"),
+        ({"resolution": (16, 12)}, "needed"),
+        ({"exposure": 1e6}, "overexposed"),
+        ({"exposure": 1e-9}, "black"),
+    ],
+    ids=str,
+)
+@pytest.mark.parametrize("name", ["rgb2normal", "normdiff"])
+def test_presses_that_can_not_be_judged_have_a_reason(
+    model: OpticalModel, name: str, settings: dict[str, Any], reason: str
+) -> None:
+    small = {**SMALL, "resolution": (80, 60), "photons": 100_000, **settings}
+    score = evaluate(model, name, **small)
+    assert score.failure is not None
+    assert reason in score.failure
+
+
+@pytest.mark.parametrize("name", ["aoap", "2to3pw"])
+def test_a_camera_that_looks_away_has_a_reason(name: str) -> None:
+    design = set_value(load("gelsight-mini"), "camera.direction", [0, 0, -1])
+    score = evaluate(OpticalModel(design, "llvm"), name, ray_resolution=(20, 16))
+    assert score.failure is not None
+    assert "sees" in score.failure
+
+
+@pytest.mark.parametrize(
+    "settings",
+    [
+        {"depth": 0},
+        {"depth": 2.0},
+        {"depth": "deep"},
+        {"depth": True},
+        {"radius": -1},
+        {"seed": -1},
+        {"seed": 1.5},
+        {"photons": 0},
+        {"resolution": 320},
+        {"resolution": (0, 10)},
+        {"places": ()},
+        {"places": ((1, 2, 3),)},
+        {"exposure": "bright"},
+        {"exposure": 0},
+        {"noise": "much"},
+        {"half_lines": 1},
+        {"directions": 4.5},
+        {"colours": 3},
+        {"dept": 0.3},
+    ],
+    ids=str,
+)
+def test_settings_that_make_no_sense_are_refused(
+    model: OpticalModel, settings: dict[str, Any]
+) -> None:
+    with pytest.raises(ObjectiveError):
+        evaluate(model, ["rgb2normal", "normdiff"], **settings)
+
+
+def test_a_misspelt_setting_gets_the_near_match(model: OpticalModel) -> None:
+    with pytest.raises(ObjectiveError, match="Did you mean 'half_lines'"):
+        evaluate(model, "rgb2normal", half_line=True)
+
+
+def test_settings_of_a_settled_evaluation_can_not_change(evaluation: Evaluation) -> None:
+    with pytest.raises(ObjectiveError, match="settled: depth"):
+        evaluate(evaluation, "aoap", depth=0.2)
+
+
+def test_scores_travel_to_other_processes(evaluation: Evaluation) -> None:
+    for score in evaluate(evaluation, BUILT_IN).values():
+        back = pickle.loads(pickle.dumps(score))
+        assert back == score
+        assert back.to_dict() == score.to_dict()
+        assert back.figure() is not None
+
+
+def test_a_sensor_with_one_colour_confuses_more_than_one_with_three(
+    model: OpticalModel, evaluation: Evaluation
+) -> None:
+    design = model.design
+    for name in design.lights:
+        design = set_value(design, f"lights.{name}.colour", [1, 1, 1])
+    grey = evaluate(OpticalModel(design, "llvm"), "normdiff", **SMALL)
+    coloured = evaluate(evaluation, "normdiff")
+    assert grey.value < 1.2 * coloured.value < 0

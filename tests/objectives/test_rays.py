@@ -1,0 +1,206 @@
+"""AOAP and 2to3PW of pinholes and planes against integrals."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.integrate import dblquad
+
+from optisense.errors import ObjectiveError
+from optisense.geometry import TriangleMesh
+from optisense.objectives import Evaluation
+from optisense.objectives.aoap import aoap
+from optisense.objectives.projection_warping import projection_warping, triangle_areas
+from optisense.optics.camera import RayCamera
+from optisense.optics.chief_rays import ChiefRays, Outcome, trace_chief_rays
+from optisense.optics.ray_scene import Piece, RayScene
+from optisense.optics.reference_scenes import diffuse_coating
+from optisense.optics.surfaces import Region, Surface
+
+DISTANCE, FOV = 10.0, 60.0
+SLOPE = np.tan(np.radians(FOV) / 2)
+PIXELS = (160, 120)
+
+PIXEL_MIDDLES = 2e-4
+"""Relative: a mean over pixel middles against the integral over the picture."""
+
+
+class PlateModel:
+    """A pinhole over a plate of triangles; only what objectives of rays look at."""
+
+    def __init__(self, plate: TriangleMesh) -> None:
+        self.sensing = plate
+
+    def chief_rays(self, resolution: tuple[int, int]) -> ChiefRays:
+        camera = RayCamera((0, 0, DISTANCE), (0, 0, -1), (0, 1, 0), FOV, *resolution, False)
+        coating = Surface(**{**diffuse_coating(0.5).__dict__, "region": Region.SENSING})
+        piece = Piece("plate", self.sensing.vertices, self.sensing.faces, coating)
+        return trace_chief_rays(RayScene([piece]), camera, np.arange(len(self.sensing.faces)))
+
+
+class RaysOf:
+    """Stands for an evaluation whose rays are given or traced."""
+
+    def __init__(self, plate: TriangleMesh, rays: ChiefRays | None = None) -> None:
+        self.model = PlateModel(plate)
+        self.chief_rays = rays or self.model.chief_rays(PIXELS)
+        self.sensing_faces = len(plate.faces)
+
+
+def evaluation(plate: TriangleMesh, rays: ChiefRays | None = None) -> Any:
+    stand_in: Any = RaysOf(plate, rays)
+    assert hasattr(Evaluation, "chief_rays")
+    assert hasattr(Evaluation, "sensing_faces")
+    return stand_in
+
+
+def plate(size: float = 40.0, divisions: int = 20, tilt: float = 0.0) -> TriangleMesh:
+    """A square plate, turned by `tilt` degrees about the y axis."""
+    a = np.radians(tilt)
+    turn = np.array([[np.cos(a), 0, np.sin(a)], [0, 1, 0], [-np.sin(a), 0, np.cos(a)]])
+    return TriangleMesh.grid((size, size), (divisions, divisions)).transformed(turn)
+
+
+def test_aoap_of_a_flat_plate_under_a_pinhole_is_the_integral() -> None:
+    value, parts, _ = aoap(evaluation(plate(size=20)), coverage_weight=0.01)
+    tall = SLOPE * PIXELS[1] / PIXELS[0]
+    integral, _ = dblquad(lambda y, x: 1 / np.sqrt(1 + x * x + y * y), -SLOPE, SLOPE, -tall, tall)
+    mean = integral / (4 * SLOPE * tall)
+    assert parts["mean_cosine"] == pytest.approx(mean, rel=PIXEL_MIDDLES)
+    # Of 20 rows of quads (1 mm) those within 5.77 and 4.33 mm of the middle are seen.
+    seen = 12 * 10 * 2
+    assert parts["triangles"] == 800
+    assert parts["coverage"] == pytest.approx(seen / 800, abs=0.01)
+    assert value == pytest.approx(mean + 0.01 * parts["coverage"], rel=PIXEL_MIDDLES)
+
+
+def test_rays_that_miss_count_as_nothing() -> None:
+    narrow = TriangleMesh.grid((100.0, 100.0), (1, 1))
+    half = TriangleMesh(narrow.vertices + [50.0, 0, 0], narrow.faces)
+    whole = aoap(evaluation(plate()))[1]
+    missed = aoap(evaluation(half))[1]
+    assert missed["pixels_that_see_the_surface"] == pytest.approx(0.5)
+    assert missed["mean_cosine"] == pytest.approx(whole["mean_cosine"] / 2, rel=1e-3)
+    assert missed["mean_cosine_of_rays_that_arrive"] == pytest.approx(
+        whole["mean_cosine"], rel=1e-3
+    )
+
+
+def test_coverage_weighs_as_much_as_asked() -> None:
+    seen = evaluation(plate())
+    low, parts, _ = aoap(seen, coverage_weight=0.0)
+    high, _, _ = aoap(seen, coverage_weight=2.0)
+    assert high - low == pytest.approx(2 * parts["coverage"])
+
+
+def test_coverage_of_a_finely_cut_surface_is_the_area_seen() -> None:
+    tall = PIXELS[1] / PIXELS[0]
+    area = (2 * DISTANCE * SLOPE) ** 2 * tall / 20**2
+    off = [aoap(evaluation(plate(20, n)))[1]["coverage_by_area"] - area for n in (10, 20, 80)]
+    # A triangle counts when a corner of it is seen, so the border is counted in.
+    assert off[0] > off[1] > off[2] > 0
+    assert off[2] < 0.01
+
+
+@pytest.mark.parametrize("tilt", [10.0, 30.0])
+def test_warping_of_a_tilted_plane_is_the_closed_form(tilt: float) -> None:
+    value, parts, _ = projection_warping(evaluation(plate(size=400, divisions=1, tilt=tilt)))
+    # A pixel of solid angle dx dy / |d|^3 covers an area of (n . d)^-3, d = (x, y, 1): its powers
+    # integrate in closed form along x.
+    c, s = np.cos(np.radians(tilt)), np.sin(np.radians(tilt))
+
+    def mean_of_power(p: int) -> float:
+        near, far = (c - s * SLOPE) ** (1 - p), (c + s * SLOPE) ** (1 - p)
+        return float((near - far) / ((p - 1) * 2 * s * SLOPE))
+
+    first, second = mean_of_power(3), mean_of_power(6)
+    assert value == pytest.approx(first / np.sqrt(second - first**2), rel=0.02)
+    assert parts["triangles"] == 2 * 159 * 119
+
+
+def test_the_finer_the_picture_the_nearer_the_closed_form() -> None:
+    model = PlateModel(plate(size=400, divisions=1, tilt=20.0))
+    c, s = np.cos(np.radians(20)), np.sin(np.radians(20))
+    powers = [
+        ((c - s * SLOPE) ** (1 - p) - (c + s * SLOPE) ** (1 - p)) / ((p - 1) * 2 * s * SLOPE)
+        for p in (3, 6)
+    ]
+    exact = powers[0] / np.sqrt(powers[1] - powers[0] ** 2)
+    off = []
+    for pixels in ((40, 30), (160, 120), (640, 480)):
+        rays = model.chief_rays(pixels)
+        areas = triangle_areas(rays.points, rays.hit).areas.astype(np.float64)
+        off.append(abs(areas.mean() / areas.std() / exact - 1))
+    assert off[0] > off[1] > off[2]
+    assert off[2] < 0.005
+
+
+def test_a_plane_parallel_to_the_picture_is_even_up_to_rounding() -> None:
+    value, _, _ = projection_warping(evaluation(plate(400, 1)))
+    assert value > 1e3
+
+
+@pytest.mark.parametrize("scale", [0.01, 7.0])
+def test_warping_does_not_depend_on_the_scale(scale: float) -> None:
+    plane = plate(400, 1, 25.0)
+    rays = PlateModel(plane).chief_rays(PIXELS)
+    larger = ChiefRays(**{**rays.__dict__, "points": (scale * rays.points).astype(np.float32)})
+    one, other = (projection_warping(evaluation(plane, each))[0] for each in (rays, larger))
+    assert one == pytest.approx(other, rel=1e-3)
+
+
+def test_areas_add_up_to_the_surface_seen() -> None:
+    rays = PlateModel(plate()).chief_rays((41, 31))
+    found = triangle_areas(rays.points, rays.hit)
+    corners = rays.points[0, 0], rays.points[-1, -1]
+    assert np.nansum(found.areas) == pytest.approx(
+        abs(corners[0][0] - corners[1][0]) * abs(corners[0][1] - corners[1][1]), rel=1e-4
+    )
+
+
+def test_triangles_next_to_missed_pixels_are_left_out() -> None:
+    rays = PlateModel(plate()).chief_rays((10, 8))
+    hit = rays.hit.copy()
+    hit[3, 4] = False
+    found = triangle_areas(rays.points, hit)
+    # A corner inside the picture belongs to six triangles.
+    assert found.missed == 6
+    assert np.isnan(found.areas).sum() == 6
+    assert found.leaping == 0
+
+
+def test_triangles_that_leap_over_a_step_are_left_out() -> None:
+    low = TriangleMesh.grid((20.0, 40.0)).transformed(np.eye(3))
+    left = TriangleMesh(low.vertices + [-10.0, 0, 0], low.faces)
+    right = TriangleMesh(low.vertices + [10.0, 0, 5.0], low.faces)
+    step = TriangleMesh.joined([left, right])
+    rays = PlateModel(step).chief_rays((40, 30))
+    assert rays.hit.all()
+    found = triangle_areas(rays.points, rays.hit)
+    # One column of quads lies across the step.
+    assert found.leaping == 2 * 29
+    areas = found.areas[np.isfinite(found.areas)]
+    # Both sides are parallel to the picture: at distances of 10 and 5 each is even.
+    assert len(np.unique(areas.round(4))) == 2
+    assert areas.max() / areas.min() == pytest.approx(4.0, rel=1e-3)
+
+
+def test_a_surface_seen_edge_on_does_not_leap() -> None:
+    # Along a row, points run to the horizon of a ball as the square root of the distance to it.
+    x = np.sqrt(np.arange(12.0, 0.0, -1.0))
+    across, along = np.meshgrid(x, np.arange(5.0))
+    points = np.stack([across, along, np.zeros((5, 12))], axis=-1)
+    found = triangle_areas(points.astype(np.float32), np.ones((5, 12), dtype=bool))
+    assert found.leaping == 0
+
+
+def test_a_sensor_that_sees_nothing_has_a_reason() -> None:
+    rays = PlateModel(plate()).chief_rays((10, 8))
+    nothing = ChiefRays(
+        **{**rays.__dict__, "outcome": np.full_like(rays.outcome, int(Outcome.ESCAPED))}
+    )
+    for objective in (aoap, projection_warping):
+        with pytest.raises(ObjectiveError, match="sees"):
+            objective(evaluation(plate(), nothing))

@@ -1,0 +1,168 @@
+"""Finding objectives: by name, from a file, from an installed package; and refusing bad ones."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import optisense
+from optisense.errors import ObjectiveError
+from optisense.objectives import BUILT_IN, find, names, registry
+
+OWN = '''
+import optisense
+
+@optisense.objective("own-depth", title="Own depth")
+def own_depth(evaluation, *, factor=2.0):
+    """How deep, times a factor."""
+    return factor * evaluation.settings.depth
+
+def plain(evaluation):
+    return 1.0
+'''
+
+
+@pytest.fixture(autouse=True)
+def registry_as_before() -> Iterator[None]:
+    names()
+    before = dict(registry._registry)
+    yield
+    registry._registry.clear()
+    registry._registry.update(before)
+
+
+@pytest.fixture
+def own_file(tmp_path: Path) -> Path:
+    path = tmp_path / "own.py"
+    path.write_text(OWN)
+    return path
+
+
+@pytest.mark.parametrize("name", BUILT_IN)
+def test_built_in_objectives_are_found(name: str) -> None:
+    assert find(name).name == name
+    assert find(name.upper()) is find(name)
+    assert name in names()
+
+
+def test_names_begin_with_the_four_of_the_paper() -> None:
+    assert names()[:4] == ["rgb2normal", "normdiff", "aoap", "2to3pw"]
+
+
+@pytest.mark.parametrize(
+    ("wrong", "right"), [("aopa", "aoap"), ("rgb2norm", "rgb2normal"), ("2d3pw", "2to3pw")]
+)
+def test_a_misspelt_name_gets_the_near_match(wrong: str, right: str) -> None:
+    with pytest.raises(ObjectiveError, match=f"Did you mean '{right}'"):
+        find(wrong)
+
+
+def test_a_file_with_one_objective_needs_no_function_name(own_file: Path) -> None:
+    found = find(str(own_file))
+    assert found.name == "own-depth"
+    assert found.title == "Own depth"
+    assert found.settings == {"factor": 2.0}
+    assert found.summary == "How deep, times a factor"
+    assert find("own-depth") is found
+
+
+def test_a_function_of_a_file_can_be_named(own_file: Path) -> None:
+    assert find(f"{own_file}:own_depth").name == "own-depth"
+    assert find(f"{own_file}:plain").name == "plain"
+
+
+def test_a_file_may_be_loaded_again(own_file: Path) -> None:
+    find(str(own_file))
+    own_file.write_text(OWN.replace("factor=2.0", "factor=3.0"))
+    assert find(str(own_file)).settings == {"factor": 3.0}
+
+
+@pytest.mark.parametrize(
+    ("content", "function", "complaint"),
+    [
+        (None, "", "there is no file"),
+        ("def f(:", "", r"not Python.*\.py:1"),
+        ("x = 1\nraise ValueError('no')", "", r"ValueError: no.*\.py:2"),
+        ("import nowhere_to_be_found", "", "ModuleNotFoundError"),
+        ("def contrast(evaluation): return 1", "", "registers 0 objectives"),
+        (OWN + OWN.replace("own", "two"), "", "registers 2 objectives"),
+        ("def contrast(evaluation): return 1", ":contrats", "Did you mean 'contrast'"),
+        ("f = 3", ":f", "no function 'f'"),
+        ("def f(): return 1", ":f", "must take an evaluation"),
+        ("def f(evaluation, other): return 1", ":f", "must take an evaluation"),
+        ("def aoap(evaluation): return 1", ":aoap", "already an objective 'aoap'"),
+    ],
+)
+def test_a_bad_file_says_what_is_wrong(
+    content: str | None, function: str, complaint: str, tmp_path: Path
+) -> None:
+    path = tmp_path / "bad.py"
+    if content is not None:
+        path.write_text(content)
+    with pytest.raises(ObjectiveError, match=complaint):
+        find(f"{path}{function}")
+
+
+def test_a_name_is_given_once() -> None:
+    @optisense.objective("taken")
+    def first(evaluation: Any) -> float:
+        return 1.0
+
+    with pytest.raises(ObjectiveError, match="already an objective 'taken'"):
+
+        @optisense.objective("taken")
+        def second(evaluation: Any) -> float:
+            return 2.0
+
+    assert find("taken").function is first
+
+
+def test_running_a_cell_again_replaces_its_own_objective() -> None:
+    def cell(value: float) -> Callable[..., float]:
+        @optisense.objective("again")
+        def again(evaluation: Any) -> float:
+            return value
+
+        return again
+
+    cell(1.0)
+    second = cell(2.0)
+    assert find("again").function is second
+
+
+@pytest.mark.parametrize("name", ["", "Upper", " space", "a:b"])
+def test_names_are_lower_case_words(name: str) -> None:
+    with pytest.raises(ObjectiveError, match="can't be the name"):
+        optisense.objective(name)(lambda evaluation: 1.0)
+
+
+@pytest.fixture
+def installed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A package with entry points, as an installer leaves it on the path."""
+    (tmp_path / "sensor_scores.py").write_text(OWN)
+    info = tmp_path / "sensor_scores-1.0.dist-info"
+    info.mkdir()
+    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: sensor-scores\nVersion: 1.0\n")
+    (info / "entry_points.txt").write_text(
+        "[optisense.objectives]\n"
+        "own-depth = sensor_scores:own_depth\n"
+        "plain-one = sensor_scores:plain\n"
+        "broken-one = sensor_scores:missing\n"
+    )
+    monkeypatch.syspath_prepend(str(tmp_path))
+    return tmp_path
+
+
+def test_an_installed_package_brings_its_objectives(installed: Path) -> None:
+    assert {"own-depth", "plain-one", "broken-one"} <= set(names())
+    assert find("own-depth").title == "Own depth"
+    assert find("plain-one").function.__name__ == "plain"
+
+
+def test_a_broken_package_breaks_only_its_own_objective(installed: Path) -> None:
+    with pytest.raises(ObjectiveError, match=r"broken-one.*sensor-scores"):
+        find("broken-one")
+    assert find("aoap").name == "aoap"

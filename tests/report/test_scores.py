@@ -1,0 +1,74 @@
+"""The page of scores: nothing in a design or an objective gets out of its place on it."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import pytest
+
+from optisense.objectives import Evaluation, Objective, Score, Settings
+from optisense.objectives.scored import Scored
+from optisense.optics import OpticalModel
+from optisense.report.scores import render_scores
+from optisense.sensors import gelsight_mini
+
+EVIL = "</svg></table><img src=x onerror=alert(1)>"
+
+
+@pytest.fixture(scope="module")
+def evaluation() -> Evaluation:
+    return Evaluation(OpticalModel(gelsight_mini()), Settings(ray_resolution=(20, 16)))
+
+
+def page(evaluation: Evaluation, *scores: Score) -> str:
+    scored = Scored(evaluation.design)
+    scored.add(evaluation).update({score.objective: score for score in scores})
+
+    def explained(evaluation: Any) -> float:
+        """What <b>it</b> is."""
+        return 0.0
+
+    return render_scores(scored, [Objective(s.objective, explained, s.name) for s in scores])
+
+
+def test_values_parts_and_summary_are_on_the_page(evaluation: Evaluation) -> None:
+    parts = {"spread": 0.125, "places": [{"place": [1.0, 2.0], "score": 0.75}], "deep": {"a": {}}}
+    text = page(evaluation, Score("mine", 0.1234567, parts=parts, title="Mine"))
+    for words in (
+        "Mine",
+        "0.1235",
+        "spread",
+        "0.125",
+        "1, 2",
+        "0.75",
+        "What &lt;b&gt;it&lt;/b&gt;",
+    ):
+        assert words in text, words
+
+
+def test_a_failure_is_shown_as_text(evaluation: Evaluation) -> None:
+    text = page(evaluation, Score(EVIL, math.nan, EVIL, {EVIL: EVIL}))
+    assert "<img src=x" not in text
+    assert "onerror" in text
+
+
+def test_a_drawing_that_fails_leaves_the_score(evaluation: Evaluation) -> None:
+    def draw(score: Score) -> Any:
+        raise ValueError("no ink")
+
+    text = page(evaluation, Score("mine", 0.5, title="Mine", draw=draw))
+    assert "0.5" in text
+    assert "data:image/png" not in text
+
+
+def test_spread_is_that_of_a_sample(evaluation: Evaluation) -> None:
+    scored = Scored(evaluation.design)
+    for value in (1.0, 2.0, math.nan, 3.0):
+        failure = "no light" if math.isnan(value) else None
+        scored.add(evaluation)["mine"] = Score("mine", value, failure)
+    assert scored.mean("mine") == 2.0
+    assert scored.spread("mine") == 1.0
+    assert scored.failed()
+    assert scored.spread("other") is None
+    assert math.isnan(scored.mean("other"))
