@@ -23,6 +23,9 @@ _T = TypeVar("_T")
 Tell = Callable[[float, str], None]
 """Called with a fraction 0..1 of the rendering that is done, and with what is being done."""
 
+FIRST_IMAGE = 0.4
+"""How much of all rendering the first image is, since light is traced for it."""
+
 GAP = 0.5
 """mm that must be free between contacts which share an image."""
 
@@ -74,7 +77,7 @@ class Evaluation:
     @property
     def untouched(self) -> TactileImage:
         """The image of the untouched sensor."""
-        return self._once("untouched image", lambda: self._render((), 0.0))
+        return self._once("untouched image", lambda: self._render((), 0.0, FIRST_IMAGE))
 
     @property
     def exposure(self) -> float:
@@ -123,11 +126,15 @@ class Evaluation:
 
     def _presses(self) -> list[Press]:
         contacts, surface = self.contacts, self.model.surface
+        untouched = self.untouched.radiance
         before = self.model.chief_rays(self.resolution).normals
         frames = [_frame(contact, surface) for contact in contacts]
         together = self.settings.together and self._are_apart([each["place"] for each in frames])
         groups = [contacts] if together else [[contact] for contact in contacts]
-        images = [self._render(group, n / len(groups)) for n, group in enumerate(groups)]
+        part = (1.0 - FIRST_IMAGE) / len(groups)
+        images = [
+            self._render(group, FIRST_IMAGE + n * part, part) for n, group in enumerate(groups)
+        ]
         presses = []
         for number, frame in enumerate(frames):
             image = images[0] if together else images[number]
@@ -137,7 +144,7 @@ class Evaluation:
             press = Press(
                 number=number + 1,
                 mask=mask,
-                response=self._response(image),
+                response=self._response(image, untouched),
                 normals=image.normals,
                 points=image.points,
                 before=before,
@@ -147,12 +154,12 @@ class Evaluation:
             presses.append(press)
         return presses
 
-    def _response(self, image: TactileImage) -> NDArray[np.float32]:
+    def _response(self, image: TactileImage, untouched: NDArray[np.float32]) -> NDArray[np.float32]:
         """(h, w, 3): the camera sensor's response, 0 to 1; the untouched one outside contacts."""
         from optisense.optics.response import saturate
 
         touched = image.contact_mask[..., None]
-        return saturate(np.where(touched, image.radiance, self.untouched.radiance) * self.exposure)
+        return saturate(np.where(touched, image.radiance, untouched) * self.exposure)
 
     def _are_apart(self, places: Sequence[NDArray[np.float64]]) -> bool:
         radius, depth = self.settings.radius, self.settings.depth
@@ -161,16 +168,25 @@ class Evaluation:
         distances = np.linalg.norm(points[:, None] - points, axis=2)
         return bool((distances + np.eye(len(points)) * 2 * width > width).all())
 
-    def _render(self, contacts: Sequence[Contact], fraction: float) -> TactileImage:
-        what = "the untouched sensor" if not contacts else "presses"
-        self._tell(fraction, what)
-        return self.model.render(
+    def _render(self, contacts: Sequence[Contact], done: float, part: float) -> TactileImage:
+        """One image, which takes the progress from `done` by `part`.
+
+        Raises:
+            KeyboardInterrupt: Ctrl-C ended it early; a score of half the light would mislead.
+        """
+        what = "pressing" if contacts else "tracing light"
+        self._tell(done, what)
+        image = self.model.render(
             contacts,
             resolution=self.resolution,
             photons=self.settings.photons,
             seed=self.settings.seed,
+            progress=lambda progress: self._tell(done + part * progress.fraction, what),
             only_contacts=bool(contacts),
         )
+        if image.interrupted:
+            raise KeyboardInterrupt
+        return image
 
 
 def _frame(contact: Contact, surface: SensingSurface) -> dict[str, NDArray[np.float64]]:

@@ -167,6 +167,29 @@ def test_ctrl_c_is_not_a_failure(evaluation: Evaluation) -> None:
         evaluate(evaluation, own(stopped))
 
 
+def test_light_cut_short_by_ctrl_c_gives_no_score(
+    model: OpticalModel, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    render = OpticalModel.render
+
+    def cut_short(self: OpticalModel, *arguments: Any, **options: Any) -> Any:
+        image = render(self, *arguments, **options)
+        image.interrupted = True
+        return image
+
+    monkeypatch.setattr(OpticalModel, "render", cut_short)
+    with pytest.raises(KeyboardInterrupt):
+        evaluate(model, "rgb2normal", **SMALL)
+
+
+def test_progress_only_grows(model: OpticalModel) -> None:
+    told: list[float] = []
+    evaluate(model, "rgb2normal", tell=lambda done, text: told.append(done), **SMALL)
+    assert told[0] == 0.0
+    assert told[-1] == pytest.approx(1.0)
+    assert all(np.diff(told) >= -1e-9)
+
+
 @pytest.mark.parametrize(
     ("settings", "reason"),
     [
