@@ -13,6 +13,7 @@ from optisense.cli.check import check
 from optisense.cli.dataset import dataset
 from optisense.cli.doctor import doctor
 from optisense.cli.evaluate import evaluate
+from optisense.cli.export import export
 from optisense.cli.library import library_app
 from optisense.cli.new import new
 from optisense.cli.render import render
@@ -32,6 +33,7 @@ app.command()(check)
 app.command()(render)
 app.command()(dataset)
 app.command()(evaluate)
+app.command()(export)
 app.command()(doctor)
 app.add_typer(cage_app, name="cage")
 app.add_typer(library_app, name="library")

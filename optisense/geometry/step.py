@@ -64,7 +64,7 @@ def read_step(path: str | Path) -> list[StepBody]:
         ) from error
     if not path.is_file():
         raise MeshError("there is no such file", where=str(path), hint="check the path")
-    _quiet()
+    quiet()
     reader = STEPCAFControl_Reader()
     reader.SetNameMode(True)
     status = reader.ReadFile(str(path))
@@ -96,7 +96,7 @@ def read_step(path: str | Path) -> list[StepBody]:
     return bodies
 
 
-def _quiet() -> None:
+def quiet() -> None:
     """Keep Open CASCADE from printing its own messages on standard output."""
     from OCP.Message import Message
 

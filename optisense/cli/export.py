@@ -1,0 +1,69 @@
+"""``optisense export``: shapes to make, where the LEDs go, and what to buy."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from optisense.cli.console import ends_well, messages, output
+from optisense.cli.options import DesignArgument
+from optisense.cli.render import ensure_writable
+
+FORMATS = ("stl", "obj", "3mf", "step")
+
+
+@ends_well
+def export(
+    design: DesignArgument,
+    out: Annotated[Path, typer.Option("--out", "-o", metavar="DIR", help="Folder for the files.")],
+    formats: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--format",
+            "-f",
+            metavar="|".join(FORMATS),
+            help="Of the parts' shapes; may be given several times. STL when left out. STEP needs "
+            "the extra 'step'.",
+            show_default=False,
+        ),
+    ] = None,
+) -> None:
+    """Export a design to the workshop: its parts in mm, its LEDs and a bill of materials.
+
+    Writes each part as it is deformed by its cages, pick-and-place.csv with the place of each
+    LED, and bill-of-materials.csv and .md into the folder.
+    """
+    wanted = [name.lower() for name in formats or ["stl"]]
+    for name in wanted:
+        if name not in FORMATS:
+            raise typer.BadParameter(
+                f"'{name}' is none of {', '.join(FORMATS)}", param_hint="--format"
+            )
+
+    from optisense.sensors import load
+
+    sensor = load(design)
+    if "step" in wanted:
+        from optisense.workshop.step_format import require_step
+
+        require_step()
+    ensure_writable(out)
+
+    from optisense.workshop import export as write
+    from optisense.workshop.shapes import shapes
+
+    if "step" in wanted:
+        messages.print("writing STEP; a finely cut curved part takes half a minute", style="dim")
+    files = write(sensor, out, wanted)
+    sheets = [shape.name for shape in shapes(sensor) if not shape.is_solid]
+    for file in files:
+        output.print(str(file), markup=False)
+    if sheets:
+        output.print(
+            f"sheets without thickness, not to be printed: {', '.join(sheets)}",
+            markup=False,
+            style="dim",
+        )
+    output.print("Lengths are in mm.", style="dim")

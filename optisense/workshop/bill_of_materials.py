@@ -1,0 +1,235 @@
+"""What a sensor is made of: lights, camera, materials by volume, and the coated area."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from optisense import library
+from optisense.design import Dielectric, Role, SensorDesign
+from optisense.errors import LibraryError
+from optisense.library import AnyEntry
+from optisense.library.facts import light_in_words, summary
+from optisense.workshop.placement import light_entry, typical_colour
+from optisense.workshop.shapes import Shape, shapes
+
+MM2_PER_CM2, MM3_PER_CM3 = 100.0, 1000.0
+
+OVERDRIVEN = 1.05
+"""A light that must give this many times its nominal flux is remarked on."""
+
+
+@dataclass(frozen=True)
+class Item:
+    """A line of the bill.
+
+    Attributes:
+        kind: light, camera, material or coating.
+        name: what the design calls it.
+        quantity: how much of it.
+        unit: pieces, cm^3 or cm^2.
+        used_for: the light group, or the part.
+        description: what it is.
+        maker: who sells it, "" where unknown.
+        part: the maker's order number, "" where unknown.
+        package: mm, width x length x height of a light, "" where unknown.
+        note: what to mind.
+    """
+
+    kind: str
+    name: str
+    quantity: float
+    unit: str
+    used_for: str
+    description: str = ""
+    maker: str = ""
+    part: str = ""
+    package: str = ""
+    note: str = ""
+
+
+@dataclass(frozen=True)
+class Bill:
+    """A bill of materials.
+
+    Attributes:
+        title: the name of the design.
+        items: its lines.
+    """
+
+    title: str
+    items: list[Item]
+
+    def csv(self) -> str:
+        """The bill as a table (RFC 4180)."""
+        text = io.StringIO()
+        writer = csv.writer(text)
+        writer.writerow(
+            ("kind", "name", "quantity", "unit", "used for", "description", "maker", "part",
+             "package_mm", "note")
+        )  # fmt: skip
+        for item in self.items:
+            writer.writerow(
+                (item.kind, item.name, f"{item.quantity:.4g}", item.unit, item.used_for,
+                 item.description, item.maker, item.part, item.package, item.note)
+            )  # fmt: skip
+        return text.getvalue()
+
+    def markdown(self) -> str:
+        """The bill to read, a table for each kind."""
+        lines = [f"# Bill of materials: {_plain(self.title)}", ""]
+        for kind, heading in HEADINGS.items():
+            items = [item for item in self.items if item.kind == kind]
+            if items:
+                lines += [f"## {heading}", "", *_table(items), ""]
+        return "\n".join(lines)
+
+
+HEADINGS = {
+    "light": "Lights",
+    "camera": "Camera",
+    "material": "Materials",
+    "coating": "Coating",
+}
+
+
+def bill_of_materials(design: SensorDesign) -> Bill:
+    """What a design is made of.
+
+    Volumes are those of the parts as drawn: where parts overlap, the overlap counts in each.
+
+    Raises:
+        DesignError: a part has no mesh, or lies outside of the cage that deforms it.
+    """
+    made = shapes(design)
+    items = [*_lights(design), _camera(design)]
+    items += [_material(design, shape) for shape in made if shape.role is not Role.SENSING_SURFACE]
+    items += _coating(design, [s for s in made if s.role is Role.SENSING_SURFACE])
+    return Bill(design.name, items)
+
+
+def _lights(design: SensorDesign) -> list[Item]:
+    items = []
+    for name, group in design.lights.items():
+        entry, colour = light_entry(group), typical_colour(group)
+        description = entry.description if entry is not None else "described in the design"
+        if entry is None and group.emitter is not None:
+            description += f": {light_in_words(group.emitter)}"
+        package = entry.package if entry is not None else None
+        note = f"{group.flux:g} mW each"
+        if colour is not None:
+            note = f"{colour[0]}, {note}"
+            if colour[1].flux is not None:
+                at = f" at {colour[1].current:g} mA" if colour[1].current else ""
+                note += f"; nominal {colour[1].flux:g} mW{at}"
+                times = group.flux / colour[1].flux
+                if times > OVERDRIVEN:
+                    note += f": {times:.2g} times its nominal flux is asked of it"
+        items.append(
+            Item(
+                kind="light",
+                name=group.model,
+                quantity=len(group.lights),
+                unit="pieces",
+                used_for=name,
+                description=description,
+                maker=(entry.maker or "") if entry is not None else "",
+                part=(colour[1].part or "") if colour is not None else "",
+                package=" x ".join(f"{length:g}" for length in package) if package else "",
+                note=note,
+            )
+        )
+    return items
+
+
+def _camera(design: SensorDesign) -> Item:
+    camera = design.camera
+    entry = _entry("camera", camera.model)
+    note = f"{camera.fov:g} degrees across, {camera.projection}, used at "
+    note += "{} x {} pixels".format(*camera.resolution)
+    return Item(
+        kind="camera",
+        name=camera.model,
+        quantity=1,
+        unit="pieces",
+        used_for="camera",
+        description=entry.description if entry is not None else "described in the design",
+        maker=(entry.maker or "") if entry is not None else "",
+        note=note,
+    )
+
+
+def _material(design: SensorDesign, shape: Shape) -> Item:
+    name = shape.material or "any black"
+    description, maker, note = "absorbs all light" if shape.material is None else "", "", ""
+    if shape.material is not None:
+        value = design.materials[shape.material]
+        entry = _entry("material", shape.material)
+        description = f"described in the design, {value.kind}"
+        if entry is not None:
+            description, maker = entry.description, entry.maker or ""
+            if entry.value != value:
+                note = f"as changed in the design; the library has {summary(entry)}"
+        if isinstance(value, Dielectric):
+            note = "; ".join(filter(None, [f"index {value.ior:g}", note]))
+    volume = shape.volume
+    return Item(
+        kind="material",
+        name=name,
+        quantity=shape.mesh.area / MM2_PER_CM2 if volume is None else volume / MM3_PER_CM3,
+        unit="cm^2" if volume is None else "cm^3",
+        used_for=f"{shape.name} ({shape.role.value})",
+        description=description,
+        maker=maker,
+        note=note,
+    )
+
+
+def _coating(design: SensorDesign, coated: Sequence[Shape]) -> list[Item]:
+    coating = design.coating
+    entry = _entry("coating", coating.library) if coating.library else None
+    return [
+        Item(
+            kind="coating",
+            name=coating.library or "coating",
+            quantity=shape.mesh.area / MM2_PER_CM2,
+            unit="cm^2",
+            used_for=f"{shape.name} ({shape.role.value})",
+            description=entry.description if entry is not None else "described in the design",
+            maker=(entry.maker or "") if entry is not None else "",
+            note=f"specularity {coating.specularity:g}",
+        )
+        for shape in coated
+    ]
+
+
+def _entry(kind: str, name: str) -> AnyEntry | None:
+    """An entry of the library, None where there is none that can be read."""
+    try:
+        return library.entry(kind, name)
+    except LibraryError:
+        return None
+
+
+def _table(items: Sequence[Item]) -> list[str]:
+    """A Markdown table without the columns that are empty."""
+    columns = {
+        "name": [item.name for item in items],
+        "quantity": [f"{item.quantity:.3g} {item.unit}" for item in items],
+        "for": [item.used_for for item in items],
+        "what it is": [item.description for item in items],
+        "maker": [item.maker for item in items],
+        "part": [item.part for item in items],
+        "package (mm)": [item.package for item in items],
+        "note": [item.note for item in items],
+    }
+    kept = {title: cells for title, cells in columns.items() if any(cells)}
+    rows = [list(kept), ["---"] * len(kept), *zip(*kept.values(), strict=True)]
+    return ["| " + " | ".join(_plain(cell) for cell in row) + " |" for row in rows]
+
+
+def _plain(text: str) -> str:
+    """Text within a Markdown table."""
+    return " ".join(text.split()).replace("|", "\\|")

@@ -1,0 +1,109 @@
+"""Shapes as STL, OBJ and 3MF files; lengths in mm."""
+
+from __future__ import annotations
+
+import io
+import zipfile
+from collections.abc import Iterator, Sequence
+from xml.sax.saxutils import quoteattr
+
+import numpy as np
+
+from optisense.geometry import TriangleMesh
+from optisense.workshop.shapes import Shape
+
+LONG_AGO = (1980, 1, 1, 0, 0, 0)
+"""The date of files within a 3MF file, so that the same shapes give the same bytes."""
+
+CONTENT_TYPES = (
+    '<?xml version="1.0" encoding="UTF-8"?>\n'
+    '<Types xmlns="http://schemas.openxmlformats.org/package/2006/content-types">'
+    '<Default Extension="rels" '
+    'ContentType="application/vnd.openxmlformats-package.relationships+xml"/>'
+    '<Default Extension="model" '
+    'ContentType="application/vnd.ms-package.3dmanufacturing-3dmodel+xml"/></Types>\n'
+)
+RELATIONSHIPS = (
+    '<?xml version="1.0" encoding="UTF-8"?>\n'
+    '<Relationships xmlns="http://schemas.openxmlformats.org/package/2006/relationships">'
+    '<Relationship Target="/3D/3dmodel.model" Id="rel0" '
+    'Type="http://schemas.microsoft.com/3dmanufacturing/2013/01/3dmodel"/></Relationships>\n'
+)
+NAMESPACE = "http://schemas.microsoft.com/3dmanufacturing/core/2015/02"
+
+
+def stl_bytes(shape: Shape) -> bytes:
+    """A binary STL file. Its corners are single precision: exact to about 1e-6 of their size."""
+    mesh = shape.mesh
+    # The header must not begin with "solid", the mark of a text file.
+    header = f"OptiSense part {shape.name}, millimetres".encode("ascii", "replace")[:80]
+    records = np.zeros(
+        len(mesh.faces),
+        dtype=[("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")],
+    )
+    records["normal"] = mesh.face_normals
+    records["corners"] = mesh.triangles
+    count = np.uint32(len(records)).astype("<u4").tobytes()
+    return header.ljust(80, b"\0") + count + records.tobytes()
+
+
+def obj_bytes(shape: Shape) -> bytes:
+    """An OBJ file with one object; every coordinate keeps all its digits."""
+    lines = ["# millimetres", f"o {shape.name}"]
+    lines += [f"v {x!r} {y!r} {z!r}" for x, y, z in shape.mesh.vertices.tolist()]
+    lines += [f"f {a} {b} {c}" for a, b, c in (shape.mesh.faces + 1).tolist()]
+    return ("\n".join(lines) + "\n").encode("ascii")
+
+
+def three_mf_bytes(title: str, shapes: Sequence[Shape]) -> bytes:
+    """A 3MF file (core specification 1.3) with an object for each shape, all in their places.
+
+    Solids are of type `model`; sheets, which no printer can make, of type `surface`.
+    """
+    packed = io.BytesIO()
+    with zipfile.ZipFile(packed, "w", zipfile.ZIP_DEFLATED) as archive:
+        for name, text in (
+            ("[Content_Types].xml", CONTENT_TYPES),
+            ("_rels/.rels", RELATIONSHIPS),
+            ("3D/3dmodel.model", "\n".join(_model(title, shapes)) + "\n"),
+        ):
+            info = zipfile.ZipInfo(name, LONG_AGO)
+            info.compress_type = zipfile.ZIP_DEFLATED
+            archive.writestr(info, text.encode("utf-8"))
+    return packed.getvalue()
+
+
+def _model(title: str, shapes: Sequence[Shape]) -> Iterator[str]:
+    yield '<?xml version="1.0" encoding="UTF-8"?>'
+    yield f'<model unit="millimeter" xml:lang="en-US" xmlns="{NAMESPACE}">'
+    yield f"<metadata name={quoteattr('Title')}>{_text(title)}</metadata>"
+    yield '<metadata name="Application">OptiSense Studio</metadata>'
+    yield "<resources>"
+    for number, shape in enumerate(shapes, start=1):
+        kind = "model" if shape.is_solid else "surface"
+        yield f'<object id="{number}" type="{kind}" name={quoteattr(shape.name)}>'
+        yield from _mesh(shape.mesh)
+        yield "</object>"
+    yield "</resources>"
+    yield "<build>"
+    for number in range(1, len(shapes) + 1):
+        yield f'<item objectid="{number}"/>'
+    yield "</build>"
+    yield "</model>"
+
+
+def _mesh(mesh: TriangleMesh) -> Iterator[str]:
+    yield "<mesh><vertices>"
+    for x, y, z in mesh.vertices.tolist():
+        yield f'<vertex x="{x!r}" y="{y!r}" z="{z!r}"/>'
+    yield "</vertices><triangles>"
+    for a, b, c in mesh.faces.tolist():
+        yield f'<triangle v1="{a}" v2="{b}" v3="{c}"/>'
+    yield "</triangles></mesh>"
+
+
+def _text(text: str) -> str:
+    """Text between XML tags, without what XML can't hold."""
+    from xml.sax.saxutils import escape
+
+    return escape("".join(letter for letter in text if letter.isprintable()))

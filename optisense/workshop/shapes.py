@@ -1,0 +1,60 @@
+"""The shapes of a design as they are made: deformed by their cages, in one piece, facing out."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from optisense.design import Role, SensorDesign
+from optisense.errors import DesignError
+from optisense.geometry import TriangleMesh
+
+
+@dataclass(frozen=True)
+class Shape:
+    """A part to make.
+
+    Attributes:
+        name: of the part.
+        role: what it is for.
+        material: the design's name of its material, None for a coated or an absorbing part.
+        mesh: mm, in the frame of the design; corners that coincide are one vertex.
+    """
+
+    name: str
+    role: Role
+    material: str | None
+    mesh: TriangleMesh
+
+    @property
+    def is_solid(self) -> bool:
+        """Whether the mesh encloses a volume; else it is a sheet."""
+        return self.mesh.is_closed
+
+    @property
+    def volume(self) -> float | None:
+        """mm^3 of a solid, None of a sheet."""
+        return abs(self.mesh.volume) if self.is_solid else None
+
+
+def shapes(design: SensorDesign) -> list[Shape]:
+    """All parts of a design but its indenters, in their current shape.
+
+    Raises:
+        DesignError: a part has no mesh, or lies outside of the cage that deforms it.
+    """
+    meshes = design.deformed_meshes()
+    found = []
+    for name, part in design.parts.items():
+        if part.role is Role.INDENTER:
+            continue
+        if name not in meshes:
+            raise DesignError(
+                f"part '{name}' has no mesh",
+                where=design.where("parts", name, "mesh"),
+                hint="Set design.meshes[name]",
+            )
+        mesh = meshes[name].welded()
+        if mesh.is_closed and mesh.volume < 0.0:
+            mesh = mesh.flipped()
+        found.append(Shape(name, part.role, part.material, mesh))
+    return found

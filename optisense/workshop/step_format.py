@@ -1,0 +1,147 @@
+"""Shapes as a STEP file, with the extra `step` (Open CASCADE through cadquery-ocp).
+
+The faces are the triangles of the meshes; those that lie in one plane become one face. A curved
+surface stays faceted, as its exact shape is not known.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from optisense.errors import OutputError, SetupError
+from optisense.geometry import TriangleMesh
+from optisense.geometry.containment import inside
+from optisense.geometry.patches import patches
+from optisense.workshop.shapes import Shape
+
+
+def require_step() -> None:
+    """Find out whether STEP files can be written.
+
+    Raises:
+        SetupError: the extra is not installed.
+    """
+    try:
+        import OCP.STEPCAFControl  # noqa: F401
+    except ImportError as error:
+        raise SetupError(
+            "writing STEP files needs the extra 'step', which is not installed",
+            hint="pip install 'optisense[step]', or export STL, OBJ or 3MF files",
+        ) from error
+
+
+def write_step(path: Path, shapes: Sequence[Shape]) -> None:
+    """Write a STEP file (AP214, mm) with a product for each shape, all in their places.
+
+    Raises:
+        SetupError: the extra is not installed.
+        OutputError: it can't be written.
+    """
+    require_step()
+    from OCP.STEPCAFControl import STEPCAFControl_Writer
+    from OCP.STEPControl import STEPControl_AsIs
+    from OCP.TCollection import TCollection_ExtendedString
+    from OCP.TDataStd import TDataStd_Name
+    from OCP.TDocStd import TDocStd_Document
+    from OCP.XCAFDoc import XCAFDoc_DocumentTool
+
+    from optisense.geometry.step import quiet
+
+    quiet()
+    document = TDocStd_Document(TCollection_ExtendedString("XmlOcaf"))
+    tool = XCAFDoc_DocumentTool.ShapeTool_s(document.Main())
+    for shape in shapes:
+        label = tool.AddShape(_boundary(shape), False)
+        TDataStd_Name.Set_s(label, TCollection_ExtendedString(shape.name))
+    writer = STEPCAFControl_Writer()
+    writer.SetNameMode(True)
+    transferred = writer.Transfer(document, STEPControl_AsIs)
+    if not transferred or "RetDone" not in str(writer.Write(str(path))):
+        raise OutputError(
+            "the STEP file can't be written",
+            where=str(path),
+            hint="Check that the folder can be written and the disk is not full",
+        )
+
+
+def bodies(mesh: TriangleMesh) -> list[list[TriangleMesh]]:
+    """The bodies of a closed mesh that holds several: each its outside first, then its cavities.
+
+    A cavity faces inward, so that the volume it encloses counts against its body's; it belongs to
+    the smallest body around it.
+    """
+    everything = np.arange(len(mesh.faces))
+    pieces = [mesh.with_faces(mesh.faces[faces]).compacted() for faces in patches(mesh, everything)]
+    found = [[piece] for piece in sorted(pieces, key=lambda p: p.volume) if piece.volume > 0.0]
+    for cavity in (piece for piece in pieces if piece.volume <= 0.0):
+        for body in found:
+            if inside(cavity.vertices[:1], body[0])[0]:
+                body.append(cavity)
+                break
+    return found
+
+
+def _boundary(shape: Shape) -> Any:
+    """A solid, several of them, or the shell of a sheet."""
+    from OCP.BRep import BRep_Builder
+    from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeSolid
+    from OCP.TopoDS import TopoDS_Compound
+
+    if not shape.is_solid:
+        return _shell(shape.mesh, closed=False)
+    solids = []
+    for outside, *cavities in bodies(shape.mesh):
+        maker = BRepBuilderAPI_MakeSolid(_shell(outside, closed=True))
+        for cavity in cavities:
+            maker.Add(_shell(cavity, closed=True))
+        solids.append(maker.Solid())
+    if len(solids) == 1:
+        return solids[0]
+    builder, compound = BRep_Builder(), TopoDS_Compound()
+    builder.MakeCompound(compound)
+    for solid in solids:
+        builder.Add(compound, solid)
+    return compound
+
+
+def _shell(mesh: TriangleMesh, closed: bool) -> Any:
+    """A shell with a face for each flat piece of a mesh."""
+    from OCP.BRep import BRep_Builder
+    from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeShapeOnMesh
+    from OCP.ShapeUpgrade import ShapeUpgrade_UnifySameDomain
+    from OCP.TopAbs import TopAbs_FACE, TopAbs_SHELL
+    from OCP.TopExp import TopExp_Explorer
+    from OCP.TopoDS import TopoDS, TopoDS_Shell
+
+    on_mesh = BRepBuilderAPI_MakeShapeOnMesh(_triangulation(mesh))
+    on_mesh.Build()
+    builder, shell = BRep_Builder(), TopoDS_Shell()
+    builder.MakeShell(shell)
+    explorer = TopExp_Explorer(on_mesh.Shape(), TopAbs_FACE)
+    while explorer.More():
+        builder.Add(shell, explorer.Current())
+        explorer.Next()
+    shell.Closed(closed)
+    unify = ShapeUpgrade_UnifySameDomain(shell, True, True, False)
+    unify.Build()
+    merged = unify.Shape()
+    if merged.ShapeType() != TopAbs_SHELL:
+        return shell if closed else merged
+    cast = getattr(TopoDS, "Shell_s", None) or TopoDS.Shell
+    return cast(merged)
+
+
+def _triangulation(mesh: TriangleMesh) -> Any:
+    from OCP.gp import gp_Pnt
+    from OCP.Poly import Poly_Triangle, Poly_Triangulation
+
+    result = Poly_Triangulation(len(mesh.vertices), len(mesh.faces), False)
+    for number, vertex in enumerate(mesh.vertices.tolist(), start=1):
+        result.SetNode(number, gp_Pnt(*vertex))
+    for number, corners in enumerate((mesh.faces + 1).tolist(), start=1):
+        result.SetTriangle(number, Poly_Triangle(*corners))
+    return result

@@ -1,0 +1,70 @@
+"""`optisense export`: the files it writes, and what it refuses."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from optisense.cli import app
+from optisense.cli.export import FORMATS
+from optisense.geometry import TriangleMesh
+from optisense.workshop import FORMATS as WRITABLE
+
+
+def run(*arguments: str) -> tuple[int, str]:
+    """Exit code and everything that was printed."""
+    result = CliRunner().invoke(app, ["export", *arguments])
+    assert "Traceback" not in result.output
+    return result.exit_code, result.output
+
+
+def test_all_that_a_workshop_needs(tmp_path: Path) -> None:
+    out = tmp_path / "new" / "workshop"
+    code, text = run("gelsight-mini", "--out", str(out), "--format", "stl", "-f", "3MF")
+    assert code == 0, text
+    assert {file.name for file in out.iterdir()} == {
+        "skin.stl", "gel.stl", "tray.stl", "guide.stl", "gelsight-mini.3mf",
+        "pick-and-place.csv", "bill-of-materials.csv", "bill-of-materials.md",
+    }  # fmt: skip
+    for file in out.iterdir():
+        assert str(file) in text
+    assert "not to be printed: skin" in text
+    assert TriangleMesh.load(out / "guide.stl").volume == pytest.approx(25.25 * 20.75 * 4.0)
+
+
+def test_the_command_offers_what_can_be_written() -> None:
+    assert FORMATS == WRITABLE
+
+
+@pytest.mark.parametrize(
+    ("arguments", "complaint"),
+    [
+        (("gelsight-mini", "--format", "dxf"), "none of stl, obj, 3mf, step"),
+        (("gelsight-minni",), "gelsight-mini"),
+    ],
+)
+def test_bad_input_writes_nothing(
+    tmp_path: Path, arguments: tuple[str, ...], complaint: str
+) -> None:
+    code, text = run(*arguments, "--out", str(tmp_path / "new"))
+    assert code == 2
+    assert complaint in text
+    assert not (tmp_path / "new").exists()
+
+
+def test_step_without_its_extra(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "OCP.STEPCAFControl", None)
+    code, text = run("gelsight-mini", "--format", "step", "--out", str(tmp_path / "new"))
+    assert code == 1
+    assert "optisense[step]" in text
+    assert not (tmp_path / "new").exists()
+
+
+def test_an_output_folder_that_is_a_file(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
+    code, text = run("gelsight-mini", "--out", str(tmp_path / "file"))
+    assert code == 1
+    assert "file" in text
