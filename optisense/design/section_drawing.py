@@ -145,9 +145,7 @@ def _labels(labels: list[_Label], column: float, tall: float) -> list[str]:
     return shapes
 
 
-def _camera(
-    found: Section, place: Callable[[FloatArray], FloatArray], scale: float
-) -> list[str]:
+def _camera(found: Section, place: Callable[[FloatArray], FloatArray], scale: float) -> list[str]:
     """The pupil and the borders of the view, a few millimetres long."""
     x, y = place(found.camera)
     angle = np.radians(min(found.half_angle, 120.0))

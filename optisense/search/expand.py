@@ -93,9 +93,7 @@ def expand(
         raise SearchError(error.message, where=error.where or path, hint=error.hint) from None
 
 
-def _of_handle(
-    design: SensorDesign, handle: Handle, spec: Specification, asked: str
-) -> Parameter:
+def _of_handle(design: SensorDesign, handle: Handle, spec: Specification, asked: str) -> Parameter:
     now = handle.start(design)
     if handle.numeric:
         if isinstance(spec, Around):

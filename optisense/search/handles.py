@@ -20,6 +20,7 @@ from __future__ import annotations
 
 import re
 from abc import ABC, abstractmethod
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
@@ -286,7 +287,7 @@ def _moves(
 ) -> list[Handle]:
     if section == "camera" and what == "shift":
         raise SearchError("the camera has a position to move", where=path, hint="camera.position.x")
-    known = {"lights": design.lights, "parts": design.parts, "camera": {}}[section]
+    known: set[str] = {"lights": set(design.lights), "parts": set(design.parts)}.get(section, set())
     if section != "camera" and name not in known:
         raise DesignError(
             f"'{path}' leads nowhere: '{section}' has no '{name}'",
@@ -302,7 +303,7 @@ def _moves(
                     where=path,
                     hint=f"Vary cages.{cage_name}.points",
                 )
-    kind = {
+    kind: Callable[[str, str, int], Handle] = {
         ("lights", "shift"): GroupShift,
         ("lights", "turn"): GroupTurn,
         ("camera", "turn"): CameraTurn,
@@ -331,7 +332,9 @@ def _with_poses(
     return design.model_copy(update={"lights": {**design.lights, group: changed}})
 
 
-def _with_mesh(design: SensorDesign, part: str, turn: FloatArray, shift: FloatArray) -> SensorDesign:
+def _with_mesh(
+    design: SensorDesign, part: str, turn: FloatArray, shift: FloatArray
+) -> SensorDesign:
     mesh: TriangleMesh = design.meshes[part]
     matrix = np.eye(4)
     matrix[:3, :3], matrix[:3, 3] = turn, shift

@@ -79,17 +79,13 @@ class SearchSpace:
         return {path: to_plain(spec) for path, spec in self.parameters.items()}
 
     @staticmethod
-    def from_plain(
-        data: Mapping[str, Any], constraints: Sequence[Constraint] = ()
-    ) -> SearchSpace:
+    def from_plain(data: Mapping[str, Any], constraints: Sequence[Constraint] = ()) -> SearchSpace:
         """The space of `to_plain`'s values.
 
         Raises:
             SearchError: they can't be read.
         """
-        return SearchSpace(
-            {path: from_plain(value) for path, value in data.items()}, constraints
-        )
+        return SearchSpace({path: from_plain(value) for path, value in data.items()}, constraints)
 
     def __repr__(self) -> str:
         return f"SearchSpace({self.parameters!r})"
@@ -245,7 +241,8 @@ class BoundSpace:
 
     def _plan(self) -> None:
         """Look up all places once, so that applying a point is quick."""
-        paths, source, scale, offset = [], [], [], []
+        paths: list[str] = []
+        source, scale, offset = [], [], []
         self._named: list[tuple[int, int]] = []
         for number, parameter in enumerate(self.parameters):
             for target in parameter.targets:
