@@ -5,6 +5,15 @@ A design is a folder with `design.yaml` and `meshes/`. Nothing here renders.
 
 from optisense.design.addressing import get_value, numbers, parse_path, set_value
 from optisense.design.cage import Cage, Point, Share
+from optisense.design.cage_checks import cage_problems
+from optisense.design.cage_edit import (
+    add_cage,
+    move_points,
+    refine_cage,
+    remove_cage,
+    set_range,
+    settle_cage,
+)
 from optisense.design.camera import Camera
 from optisense.design.check import check_design
 from optisense.design.emitters import AreaEmitter, IesEmitter, LightModel, SpotEmitter
@@ -45,11 +54,18 @@ __all__ = [
     "Share",
     "SpotEmitter",
     "Status",
+    "add_cage",
+    "cage_problems",
     "check_design",
     "get_value",
     "load_design",
+    "move_points",
     "numbers",
     "parse_path",
+    "refine_cage",
+    "remove_cage",
     "save_design",
+    "set_range",
     "set_value",
+    "settle_cage",
 ]

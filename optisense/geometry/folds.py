@@ -49,7 +49,8 @@ def find_fold(
     The cheap answers come first. A cage that is certainly one to one (`is_one_to_one`) can't
     fold anything; a sheet that is still in full view from one side (`is_in_full_view`) is not
     folded, whatever the cage does to the space beside it. Otherwise a closed mesh must have
-    positive Jacobians at its vertices, and no mesh may cut through itself.
+    positive Jacobians at its vertices, a sheet must not be mirrored so that it looks to its other
+    side, and no mesh may cut through itself.
 
     Args:
         mesh: at rest, mm.
@@ -70,7 +71,7 @@ def find_fold(
             vertex = int(np.argmin(stretch))
             return Fold("inside out", bent.vertices[vertex], vertex, int(turned.sum()))
     elif is_in_full_view(mesh, bent):
-        return None
+        return _turned_over(mesh, bent, box, resolution, points)
     crossed = self_crossings(bent.welded())
     # A part may have been modelled of shells that cut through each other.
     if len(crossed.pairs) and len(self_crossings(mesh.welded(), limit=1).pairs) == 0:
@@ -78,6 +79,27 @@ def find_fold(
         vertex = int(np.argmin(np.linalg.norm(bent.vertices - place, axis=1)))
         return Fold("through itself", place, vertex, len(crossed.pairs))
     return None
+
+
+def _turned_over(
+    mesh: TriangleMesh,
+    bent: TriangleMesh,
+    box: ArrayLike,
+    resolution: Resolution,
+    points: ArrayLike,
+) -> Fold | None:
+    """Whether a fair sheet has become its mirror image and so looks to the wrong side.
+
+    A turn in space makes it look elsewhere too; then the Jacobians stay positive.
+    """
+    before, after = mesh.face_vectors.sum(axis=0), bent.face_vectors.sum(axis=0)
+    if before @ after >= 0.0:
+        return None
+    stretch = np.linalg.det(jacobians(mesh.vertices, box, resolution, points))
+    if (stretch >= 0.0).any():
+        return None
+    vertex = int(np.argmin(stretch))
+    return Fold("inside out", bent.vertices[vertex], vertex, len(stretch))
 
 
 def is_in_full_view(mesh: TriangleMesh, bent: TriangleMesh) -> bool:

@@ -1,10 +1,14 @@
 """Facts about free-form deformation."""
 
+import time
+
 import numpy as np
 import pytest
 
 from optisense.errors import DesignError
-from optisense.geometry import cage_points, cage_weights, deform
+from optisense.geometry import TriangleMesh, cage_points, cage_weights, deform
+from optisense.geometry.cage import MOST_KEPT_WEIGHTS, deformed, kept_weights
+from optisense.geometry.cage_map import is_one_to_one, jacobians, refined_points
 
 BOX = np.array([[-12.0, -10.0, -4.0], [13.0, 10.0, 0.5]])
 
@@ -62,3 +66,109 @@ def test_a_vertex_outside_the_box_is_refused_with_its_place() -> None:
     cage_weights([[13.0 + 1e-7, 0, 0]], BOX, (3, 3, 3))
     with pytest.raises(DesignError, match=r"\(0.000, 0.000, 2.000\)"):
         cage_weights([[0, 0, 0], [0, 0, 2.0]], BOX, (3, 3, 3))
+
+
+def box_mesh() -> TriangleMesh:
+    return TriangleMesh.box(BOX[0], BOX[1], (6, 5, 3))
+
+
+@pytest.mark.parametrize("resolution", [(3, 3, 3), (2, 5, 4)])
+def test_an_affine_cage_scales_the_volume_by_its_determinant(
+    resolution: tuple[int, int, int],
+) -> None:
+    matrix = np.array([[1.2, 0.3, 0.0], [-0.2, 0.9, 0.1], [0.1, 0.0, 1.5]])
+    points = cage_points(BOX, resolution) @ matrix.T + [3.0, -2.0, 1.0]
+    bent = deformed(box_mesh(), BOX, resolution, points)
+    expected = np.linalg.det(matrix) * np.prod(BOX[1] - BOX[0])
+    assert bent.volume == pytest.approx(expected, rel=1e-12)
+    derivative = jacobians(inside(), BOX, resolution, points)
+    np.testing.assert_allclose(derivative, np.broadcast_to(matrix, (200, 3, 3)), atol=1e-12)
+
+
+def test_jacobians_are_the_derivatives_of_the_map() -> None:
+    rng = np.random.default_rng(3)
+    points = cage_points(BOX, (4, 3, 5)) + rng.normal(scale=0.8, size=(60, 3))
+    places, step = 0.9 * inside(20), 1e-5
+    numeric = np.stack(
+        [
+            (
+                deform(cage_weights(places + step * way, BOX, (4, 3, 5)), points)
+                - deform(cage_weights(places - step * way, BOX, (4, 3, 5)), points)
+            )
+            / (2.0 * step)
+            for way in np.eye(3)
+        ],
+        axis=-1,
+    )
+    np.testing.assert_allclose(jacobians(places, BOX, (4, 3, 5), points), numeric, atol=1e-7)
+
+
+@pytest.mark.parametrize("finer", [(3, 3, 3), (4, 3, 3), (5, 6, 4)])
+def test_a_refined_cage_gives_the_same_shape(finer: tuple[int, int, int]) -> None:
+    points = cage_points(BOX, (3, 3, 3)) + np.random.default_rng(4).normal(size=(27, 3))
+    coarse = deform(cage_weights(inside(), BOX, (3, 3, 3)), points)
+    fine = refined_points(points, (3, 3, 3), finer)
+    np.testing.assert_allclose(deform(cage_weights(inside(), BOX, finer), fine), coarse, atol=1e-12)
+
+
+def test_weights_are_found_again_by_content_and_kept_apart_by_box_and_resolution() -> None:
+    mesh = box_mesh()
+    twin = TriangleMesh(mesh.vertices.copy(), mesh.faces)
+    weights = kept_weights(mesh, BOX, (3, 3, 3))
+    assert kept_weights(twin, BOX, (3, 3, 3)) is weights
+    assert kept_weights(mesh, BOX + [[-1.0], [1.0]], (3, 3, 3)) is not weights
+    assert kept_weights(mesh, BOX, (3, 4, 3)).shape[1] == 36
+    moved = twin.with_vertices(0.5 * mesh.vertices)
+    assert kept_weights(moved, BOX, (3, 3, 3)) is not weights
+    with pytest.raises(ValueError, match="read-only"):
+        weights[0, 0] = 2.0
+
+
+def test_a_fine_cage_without_kept_weights_agrees_with_one_that_keeps_them() -> None:
+    vertices = inside(600)
+    mesh = TriangleMesh(vertices, np.zeros((0, 3)))
+    resolution = (20, 20, 20)
+    assert len(vertices) * 8000 > MOST_KEPT_WEIGHTS
+    points = cage_points(BOX, resolution)
+    points += 0.1 * np.random.default_rng(5).normal(size=points.shape)
+    expected = deform(cage_weights(vertices, BOX, resolution), points)
+    np.testing.assert_allclose(
+        deformed(mesh, BOX, resolution, points).vertices, expected, atol=1e-11
+    )
+
+
+def test_ten_thousand_vertices_take_less_than_a_millisecond() -> None:
+    mesh = TriangleMesh(inside(10_000), np.zeros((0, 3)))
+    points = cage_points(BOX, (3, 3, 3))
+    deformed(mesh, BOX, (3, 3, 3), points)
+    times = []
+    for _ in range(30):
+        began = time.process_time()
+        deformed(mesh, BOX, (3, 3, 3), points)
+        times.append(time.process_time() - began)
+    assert min(times) < 1e-3  # 0.25 ms of processor time on one core of an ordinary server
+
+
+class TestOneToOne:
+    def test_rest_and_any_turn_are_certain(self) -> None:
+        turn = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+        points = cage_points(BOX, (3, 3, 3))
+        assert is_one_to_one(BOX, (3, 3, 3), points)
+        assert is_one_to_one(BOX, (3, 3, 3), points @ turn.T)
+
+    def test_a_mirror_image_and_a_fold_are_not(self) -> None:
+        points = cage_points(BOX, (3, 3, 3))
+        assert not is_one_to_one(BOX, (3, 3, 3), points * [-1, 1, 1])
+        folded = points.reshape(3, 3, 3, 3).copy()
+        folded[[0, 2], :, :, 0] = folded[[2, 0], :, :, 0]
+        assert not is_one_to_one(BOX, (3, 3, 3), folded.reshape(-1, 3))
+
+    def test_where_it_is_certain_jacobians_are_positive(self) -> None:
+        rng = np.random.default_rng(6)
+        certain = 0
+        for scale in np.linspace(0.1, 6.0, 60):
+            points = cage_points(BOX, (3, 3, 3)) + rng.normal(scale=scale, size=(27, 3))
+            if is_one_to_one(BOX, (3, 3, 3), points):
+                certain += 1
+                assert np.linalg.det(jacobians(inside(), BOX, (3, 3, 3), points)).min() > 0.0
+        assert 0 < certain < 60

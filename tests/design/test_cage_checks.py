@@ -1,0 +1,152 @@
+"""What cages do to whole designs, and editing them."""
+
+from __future__ import annotations
+
+import time
+
+import numpy as np
+import pytest
+
+from optisense import sensors
+from optisense.design import (
+    SensorDesign,
+    add_cage,
+    cage_problems,
+    check_design,
+    move_points,
+    refine_cage,
+    remove_cage,
+    set_range,
+    set_value,
+    settle_cage,
+)
+from optisense.design.cage_edit import select_points
+from optisense.errors import DesignError
+
+
+@pytest.fixture(scope="module")
+def mini() -> SensorDesign:
+    return sensors.gelsight_mini()
+
+
+@pytest.fixture(scope="module")
+def svelte() -> SensorDesign:
+    return sensors.gelsight_svelte()
+
+
+def shape(design: SensorDesign, part: str) -> np.ndarray:
+    return design.deformed_meshes()[part].vertices
+
+
+class TestChecks:
+    def test_built_in_bends_are_fine(self) -> None:
+        for build in (sensors.gelsight_mini_cylindrical, sensors.gelsight_mini_spherical):
+            assert cage_problems(build()) == []
+
+    def test_the_whole_range_of_sveltes_mirror_is_fine(self, svelte: SensorDesign) -> None:
+        rng = np.random.default_rng(1)
+        names = ("x", "y", "z")
+        for blend in (0.0, 0.5, 1.0, *rng.uniform(size=(3, 27, 3))):
+            value = blend
+            if isinstance(blend, np.ndarray):
+                value = [dict(zip(names, row, strict=True)) for row in blend.tolist()]
+            problems = cage_problems(set_value(svelte, "cages.M1.blend", value))
+            assert not [p for p in problems if "through" in p.message or "inside" in p.message]
+
+    def test_a_mirror_pushed_into_the_skin(self, svelte: SensorDesign) -> None:
+        pushed = move_points(settle_cage(svelte, "M1"), "M1", {"*,*,2": (12.0, 0.0, 0.0)})
+        problems = cage_problems(pushed)
+        gel = next(p for p in problems if "into part 'gel'" in p.message)
+        assert gel.severity == "error" and gel.where == "cages.M1.points"
+        assert ",2)" in str(gel.hint)  # a control point at the tip moves that place
+        assert any("into part 'gel'" in p.message for p in check_design(pushed))
+
+    def test_a_gel_turned_inside_out(self, mini: SensorDesign) -> None:
+        problem = cage_problems(move_points(mini, "skin", {"1,1,2": (0.0, 0.0, -12.0)}))[0]
+        assert "'gel' is turned inside out" in problem.message
+        assert "control point 14 (1,1,2)" in str(problem.hint)
+
+    def test_a_gel_lifted_off_its_tray(self, mini: SensorDesign) -> None:
+        lifted = cage_problems(move_points(mini, "skin", {"1,1,0": (0.0, 0.0, 2.0)}))
+        assert [p.severity for p in lifted] == ["warning"]
+        # The middle of the gel's bottom, at -4.25 mm, follows by 1/2 * 1/2 of the 2 mm.
+        assert "has come off part 'tray'" in lifted[0].message and "-3.75" in lifted[0].message
+
+    def test_a_gel_pushed_into_its_tray(self, mini: SensorDesign) -> None:
+        """The gel has the larger priority, so the tray gives way: odd, but it can be simulated."""
+        pushed = move_points(mini, "skin", {"1,1,0": (0.0, 0.0, -2.0)})
+        assert [p.severity for p in cage_problems(pushed)] == ["warning"]
+        assert "is pushed into part 'tray'" in cage_problems(pushed)[0].message
+        equal = set_value(pushed, "parts.gel.priority", 0)
+        assert [p.severity for p in cage_problems(equal)] == ["error"]
+
+    def test_parts_in_one_cage_go_together(self, mini: SensorDesign) -> None:
+        bare = remove_cage(mini, "skin")
+        both = add_cage(bare, "stack", ["skin", "gel", "tray", "guide"])
+        assert cage_problems(move_points(both, "stack", {"1,*,*": (0.0, 0.0, 1.0)})) == []
+        alone = add_cage(bare, "skin", ["skin"])
+        problems = cage_problems(move_points(alone, "skin", {"1,1,*": (0.0, 0.0, 1.0)}))
+        assert "part 'gel'" in problems[0].message
+
+    def test_it_is_quick_enough_for_a_search(self, svelte: SensorDesign) -> None:
+        cage_problems(svelte)
+        times = []
+        for _ in range(5):
+            began = time.perf_counter()
+            assert cage_problems(svelte) == []
+            times.append(time.perf_counter() - began)
+        assert min(times) < 0.1  # 0.015 s on an idle machine
+
+
+class TestEditing:
+    def test_a_new_cage_changes_no_shape(self, svelte: SensorDesign) -> None:
+        caged = add_cage(svelte, "finger", ["skin", "gel"], (4, 2, 6), margin=1.0)
+        np.testing.assert_allclose(shape(caged, "gel"), shape(svelte, "gel"), atol=1e-10)
+        assert "finger" not in svelte.cages
+        flat = add_cage(svelte, "plate", ["body"]) if "body" in svelte.parts else svelte
+        assert cage_problems(flat) == cage_problems(svelte)
+
+    def test_the_row_of_the_papers_cylinder(self, mini: SensorDesign) -> None:
+        moved = move_points(mini, "skin", {"1,*,2": (0.0, 0.0, 6.0)})
+        expected = shape(sensors.gelsight_mini_cylindrical(), "skin")
+        np.testing.assert_allclose(shape(moved, "skin"), expected, atol=1e-12)
+
+    def test_refining_and_settling_keep_the_shape(self, svelte: SensorDesign) -> None:
+        for changed in (
+            refine_cage(svelte, "M1", (5, 4, 7)),
+            settle_cage(svelte, "M1"),
+            refine_cage(settle_cage(svelte, "M1"), "M1", (4, 3, 3)),
+        ):
+            np.testing.assert_allclose(shape(changed, "M1"), shape(svelte, "M1"), atol=1e-10)
+
+    def test_a_range_reaches_both_ends(self, mini: SensorDesign) -> None:
+        bent = sensors.gelsight_mini_cylindrical()
+        rest = mini.cages["skin"].current_points()
+        ranged = set_range(bent, "skin", c_min=rest)
+        for blend, expected in ((0.0, mini), (1.0, bent)):
+            at = set_value(ranged, "cages.skin.blend", blend)
+            np.testing.assert_allclose(shape(at, "skin"), shape(expected, "skin"), atol=1e-12)
+
+    def test_which_points_are_meant(self) -> None:
+        assert select_points((3, 3, 3), "13") == [13]
+        assert select_points((3, 4, 5), "1,2,3") == [(1 * 4 + 2) * 5 + 3]
+        assert select_points((3, 3, 3), "1, *, 2") == [11, 14, 17]
+        assert select_points((2, 3, 4), "*,*,*") == list(range(24))
+        for wrong in ("27", "3,0,0", "1,1", "a", "", "-1"):
+            with pytest.raises(DesignError, match="no control point"):
+                select_points((3, 3, 3), wrong)
+
+    def test_what_cannot_be_edited_says_why(self, svelte: SensorDesign) -> None:
+        for edit, message in (
+            (lambda: add_cage(svelte, "M1", ["M2"]), "already"),
+            (lambda: add_cage(svelte, "new", ["M1"]), "two cages"),
+            (lambda: add_cage(svelte, "new", ["M3"]), "no part 'M3'"),
+            (lambda: add_cage(svelte, "new", []), "needs a part"),
+            (lambda: add_cage(svelte, "new", ["M2"], (1, 3, 3)), "1 x 3 x 3"),
+            (lambda: refine_cage(svelte, "M1", (2, 3, 3)), "fewer"),
+            (lambda: remove_cage(svelte, "M"), "no cage 'M'"),
+            (lambda: move_points(svelte, "M1", {"0": (1, 0, 0)}), "is a blend"),
+            (lambda: set_range(svelte, "M1", c_min=np.zeros((8, 3))), "8 entries"),
+        ):
+            with pytest.raises(DesignError, match=message):
+                edit()
