@@ -11,7 +11,8 @@ from pydantic import BaseModel
 from optisense.design import Cage, SensorDesign, Share, get_value, parse_path, set_value
 from optisense.design.cage import as_array
 from optisense.errors import SearchError
-from optisense.search.handles import Handle, find_handles
+from optisense.search.handle_paths import find_handles
+from optisense.search.handles import Handle
 from optisense.search.parameters import (
     Around,
     CagePoints,

@@ -1,39 +1,13 @@
-"""Paths for more than one value: a whole group of lights moved, a part from the library.
-
-They look like other paths but lead to no single number of a design:
-
-| path | what it does |
-|---|---|
-| `lights.GROUP.shift.x` | moves all lights of a group along x, y or z, mm |
-| `lights.GROUP.turn.x` | turns a group about an axis through its middle, degrees |
-| `camera.turn.x` | turns the camera about its own right (x), up (y) or viewing axis (z), degrees |
-| `parts.PART.shift.x` | moves a part, mm |
-| `parts.PART.turn.x` | turns a part about an axis through the middle of its box, degrees |
-| `lights.model` | the type of all lights |
-| `lights.GROUP.model` | the type of the lights of a group |
-| `lights.GROUP.lights[0].model` | the type of one light |
-| `coating.library`, `camera.model` | a whole coating or camera of the library |
-| `parts.PART.material` | a material of the design or of the library |
-"""
+"""What one parameter can change in a design when that is more than single numbers."""
 
 from __future__ import annotations
 
-import re
 from abc import ABC, abstractmethod
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
-import numpy as np
-from numpy.typing import NDArray
-
 from optisense import library
 from optisense.design import SensorDesign
-from optisense.design.near import suggestion
-from optisense.errors import DesignError, SearchError
-from optisense.geometry import TriangleMesh
-
-FloatArray = NDArray[np.float64]
 
 LONGEST_NAME = 64
 
@@ -66,70 +40,6 @@ class Handle(ABC):
         Raises:
             OptiSenseError: the value does not fit.
         """
-
-
-@dataclass(frozen=True)
-class _Move(Handle):
-    """A number of mm or degrees along one axis; 0 leaves all as it is."""
-
-    name: str
-    axis: int
-    stage: ClassVar[int] = 2
-    numeric: ClassVar[bool] = True
-
-    def start(self, design: SensorDesign) -> float:
-        return 0.0
-
-
-class GroupShift(_Move):
-    """Moves all lights of a group along an axis of the design."""
-
-    def apply(self, design: SensorDesign, value: Any) -> SensorDesign:
-        return _with_poses(design, self.name, np.eye(3), _along(self.axis, value))
-
-
-class GroupTurn(_Move):
-    """Turns all lights of a group about an axis of the design through their middle."""
-
-    def apply(self, design: SensorDesign, value: Any) -> SensorDesign:
-        lights = design.lights[self.name].lights
-        middle = np.mean([light.position for light in lights], axis=0)
-        turn = rotation(_along(self.axis, 1.0), value)
-        return _with_poses(design, self.name, turn, middle - turn @ middle)
-
-
-class CameraTurn(_Move):
-    """Turns the camera about one of its own axes: right, up, viewing direction."""
-
-    def apply(self, design: SensorDesign, value: Any) -> SensorDesign:
-        turn = rotation(design.camera.axes()[self.axis], value)
-        camera = design.camera.model_copy(
-            update={
-                "direction": _triple(turn @ np.array(design.camera.direction)),
-                "up": _triple(turn @ np.array(design.camera.up)),
-            }
-        )
-        return design.model_copy(update={"camera": camera})
-
-
-class PartShift(_Move):
-    """Moves a part along an axis of the design."""
-
-    shapes: ClassVar[bool] = True
-
-    def apply(self, design: SensorDesign, value: Any) -> SensorDesign:
-        return _with_mesh(design, self.name, np.eye(3), _along(self.axis, value))
-
-
-class PartTurn(_Move):
-    """Turns a part about an axis of the design through the middle of its box."""
-
-    shapes: ClassVar[bool] = True
-
-    def apply(self, design: SensorDesign, value: Any) -> SensorDesign:
-        middle = design.meshes[self.name].bounds.mean(axis=0)
-        turn = rotation(_along(self.axis, 1.0), value)
-        return _with_mesh(design, self.name, turn, middle - turn @ middle)
 
 
 class LibraryCoating(Handle):
@@ -238,111 +148,6 @@ def with_light_types(design: SensorDesign, types: dict[tuple[str, int], str]) ->
     return design.model_copy(update={"lights": groups})
 
 
-def find_handles(design: SensorDesign, path: str) -> list[Handle]:
-    """The handles that a path names: none for an ordinary path, three for a whole vector.
-
-    Raises:
-        SearchError, DesignError: it looks like a handle but names nothing in the design.
-    """
-    move = re.fullmatch(
-        r"(?:(lights|parts)\.([^.\[\]]+)|(camera))\.(shift|turn)(?:\.([^.]+))?", path
-    )
-    if move is not None:
-        section, name, camera, what, letter = move.groups()
-        return _moves(design, path, section or camera, name or "", what, letter)
-    if path == "coating.library":
-        return [LibraryCoating(path)]
-    if path == "camera.model":
-        return [LibraryCamera(path)]
-    if path == "lights.model":
-        return [GroupType(path, None)]
-    part = re.fullmatch(r"parts\.([^.\[\]]+)\.material", path)
-    if part is not None and part[1] in design.parts:
-        return [PartMaterial(path, part[1])]
-    group = re.fullmatch(r"lights\.([^.\[\]]+)\.model", path)
-    if group is not None and group[1] in design.lights:
-        return [GroupType(path, group[1])]
-    light = re.fullmatch(r"lights\.([^.\[\]]+)\.lights\[(\d+)\]\.model", path)
-    if light is not None and light[1] in design.lights:
-        count = len(design.lights[light[1]].lights)
-        if int(light[2]) >= count:
-            raise DesignError(
-                f"'{path}' leads nowhere: the group has {count} lights",
-                hint=f"Indices run from 0 to {count - 1}",
-            )
-        return [LightType(path, light[1], int(light[2]))]
-    return []
-
-
-def rotation(axis: FloatArray, degrees: float) -> FloatArray:
-    """(3, 3): the right-handed turn about an axis (Rodrigues' formula)."""
-    x, y, z = np.asarray(axis, dtype=np.float64) / np.linalg.norm(axis)
-    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    angle = np.radians(degrees)
-    return np.eye(3) + np.sin(angle) * cross + (1.0 - np.cos(angle)) * cross @ cross
-
-
-def _moves(
-    design: SensorDesign, path: str, section: str, name: str, what: str, letter: str | None
-) -> list[Handle]:
-    if section == "camera" and what == "shift":
-        raise SearchError("the camera has a position to move", where=path, hint="camera.position.x")
-    known: set[str] = {"lights": set(design.lights), "parts": set(design.parts)}.get(section, set())
-    if section != "camera" and name not in known:
-        raise DesignError(
-            f"'{path}' leads nowhere: '{section}' has no '{name}'",
-            hint=suggestion(name, known, limit=20),
-        )
-    if letter is not None and letter not in ("x", "y", "z"):
-        raise DesignError(f"'{path}' leads nowhere: there is no axis '{letter}'", hint="x, y or z")
-    if section == "parts":
-        for cage_name, cage in design.cages.items():
-            if name in cage.parts:
-                raise SearchError(
-                    f"part '{name}' is moved by the cage '{cage_name}'",
-                    where=path,
-                    hint=f"Vary cages.{cage_name}.points",
-                )
-    kind: Callable[[str, str, int], Handle] = {
-        ("lights", "shift"): GroupShift,
-        ("lights", "turn"): GroupTurn,
-        ("camera", "turn"): CameraTurn,
-        ("parts", "shift"): PartShift,
-        ("parts", "turn"): PartTurn,
-    }[section, what]
-    if letter is not None:
-        return [kind(path, name, "xyz".index(letter))]
-    return [kind(f"{path}.{each}", name, axis) for axis, each in enumerate("xyz")]
-
-
-def _with_poses(
-    design: SensorDesign, group: str, turn: FloatArray, shift: FloatArray
-) -> SensorDesign:
-    moved = [
-        light.model_copy(
-            update={
-                "position": _triple(turn @ np.array(light.position) + shift),
-                "direction": _triple(turn @ np.array(light.direction)),
-                "up": None if light.up is None else _triple(turn @ np.array(light.up)),
-            }
-        )
-        for light in design.lights[group].lights
-    ]
-    changed = design.lights[group].model_copy(update={"lights": moved})
-    return design.model_copy(update={"lights": {**design.lights, group: changed}})
-
-
-def _with_mesh(
-    design: SensorDesign, part: str, turn: FloatArray, shift: FloatArray
-) -> SensorDesign:
-    mesh: TriangleMesh = design.meshes[part]
-    matrix = np.eye(4)
-    matrix[:3, :3], matrix[:3, 3] = turn, shift
-    moved = design.copy()
-    moved.meshes[part] = mesh.transformed(matrix)
-    return moved
-
-
 def _free_name(wanted: str, design: SensorDesign, taken: dict[str, Any]) -> str:
     name = wanted[:LONGEST_NAME]
     number = 2
@@ -351,14 +156,3 @@ def _free_name(wanted: str, design: SensorDesign, taken: dict[str, Any]) -> str:
         name = wanted[: LONGEST_NAME - len(tail)] + tail
         number += 1
     return name
-
-
-def _along(axis: int, length: float) -> FloatArray:
-    vector = np.zeros(3)
-    vector[axis] = length
-    return vector
-
-
-def _triple(vector: FloatArray) -> tuple[float, float, float]:
-    x, y, z = vector.tolist()
-    return x, y, z

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -11,7 +11,8 @@ from pydantic import ValidationError
 
 from optisense.design import SensorDesign
 from optisense.design.problems import design_error
-from optisense.errors import DesignError, OptiSenseError, SearchError
+from optisense.errors import OptiSenseError, SearchError
+from optisense.search.constraints import Constraint
 from optisense.search.edit import Edit
 from optisense.search.expand import Parameter, expand
 from optisense.search.handles import LightType, with_light_types
@@ -27,9 +28,6 @@ from optisense.search.parameters import (
 
 FloatArray = NDArray[np.float64]
 
-Constraint = Callable[[SensorDesign], bool | str | None]
-"""A user's own: False, or a text that says why, for a design that must not be."""
-
 SURE_SECTIONS = ("coating", "cages", "materials")
 """Sections whose numbers only have bounds: what lies between two good values is good."""
 
@@ -39,8 +37,8 @@ class SearchSpace:
 
     A value is (low, high), (low, high, steps), `Integer`, `Choice` or a list of options,
     `Around` (so far from what it is now), or `CagePoints`. A path to a vector or to a cage's
-    points stands for all their numbers. See `optisense.search.handles` for paths that move whole
-    groups and parts.
+    points stands for all their numbers. See `optisense.search.handle_paths` for paths that move
+    whole groups and parts.
     """
 
     def __init__(
@@ -65,14 +63,14 @@ class SearchSpace:
             raise SearchError("nothing may change", hint="Name a path and its bounds")
         self.constraints = tuple(constraints)
 
-    def bind(self, design: SensorDesign) -> BoundSpace:
-        """The space for one design: every path looked up, every bound tried.
+    def bind(self, design: SensorDesign, *, tried: bool = True) -> BoundSpace:
+        """The space for one design: every path looked up and, unless not `tried`, every bound.
 
         Raises:
             DesignError: a path leads nowhere (names the near match), or a bound does not fit.
             SearchError: a path can't be varied like this.
         """
-        return BoundSpace(self, design)
+        return BoundSpace(self, design, tried=tried)
 
     def to_plain(self) -> dict[str, Any]:
         """JSON-ready; constraints, which are functions, are not in it."""
@@ -103,12 +101,12 @@ class BoundSpace:
         prepared: the same shape in the form that parameters are set in.
         parameters: one for each coordinate.
         lower, upper: (n,) bounds, included.
-        start: (n,) the design as it is, within the bounds.
+        start: (n,) the design as it is, or the point nearest to it.
         whole: (n,) bool, where only whole numbers are meant (integers and choices).
         reshapes: whether a parameter moves surfaces.
     """
 
-    def __init__(self, space: SearchSpace, design: SensorDesign) -> None:
+    def __init__(self, space: SearchSpace, design: SensorDesign, *, tried: bool = True) -> None:
         """See `SearchSpace.bind`."""
         self.space = space
         self.design = design
@@ -129,7 +127,8 @@ class BoundSpace:
         self.reshapes = "cages" in sections or any(p.handle and p.handle.shapes for p in found)
         self._sure = sections <= set(SURE_SECTIONS) and not any(p.handle for p in found)
         self._plan()
-        self._try_bounds()
+        if tried:
+            self._try_bounds()
 
     @property
     def size(self) -> int:
@@ -242,7 +241,9 @@ class BoundSpace:
     def _plan(self) -> None:
         """Look up all places once, so that applying a point is quick."""
         paths: list[str] = []
-        source, scale, offset = [], [], []
+        source: list[int] = []
+        scale: list[float] = []
+        offset: list[float] = []
         self._named: list[tuple[int, int]] = []
         for number, parameter in enumerate(self.parameters):
             for target in parameter.targets:
@@ -351,6 +352,3 @@ def _coordinate(parameter: Parameter, value: object) -> float:
 def _may_nest(path: str) -> bool:
     """A whole coating or camera of the library may be refined by single numbers."""
     return path.endswith((".library", ".model", ".material"))
-
-
-__all__ = ["BoundSpace", "Constraint", "DesignError", "SearchSpace", "checked"]

@@ -1,0 +1,150 @@
+"""Designs that must not be scored: parts that cut through one another, or a user's own rule."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from itertools import combinations
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from optisense.design import Role, SensorDesign
+from optisense.design.parts import TRANSPARENT_SOLIDS
+from optisense.errors import SearchError
+from optisense.geometry import TriangleMesh
+from optisense.geometry.crossings import crossings
+
+Constraint = Callable[[SensorDesign], bool | str | None]
+"""False, or a text that says why, for a design that must not be."""
+
+
+class PartsApart:
+    """No part may come to cut through another one that it leaves alone in the first design.
+
+    Solids that light passes may overlap where their priorities differ, and a sensing surface lies
+    on its gel: such pairs are not looked at, nor those that do not move.
+    """
+
+    def __init__(self, design: SensorDesign) -> None:
+        """Look at the design that the search starts from."""
+        self._meshes = design.deformed_meshes()
+        self._pairs = [
+            (one, other)
+            for one, other in combinations(self._meshes, 2)
+            if _may_not_meet(design, one, other)
+        ]
+        self._known: dict[tuple[str, str], bool] = {}
+
+    def __call__(self, design: SensorDesign) -> str | None:
+        """Which two parts cut through each other, or None."""
+        meshes = design.deformed_meshes()
+        moved = {name for name, mesh in meshes.items() if not _same(mesh, self._meshes.get(name))}
+        for one, other in self._pairs:
+            if one not in meshes or other not in meshes or not moved & {one, other}:
+                continue
+            if self._crossed_before(one, other):
+                continue
+            place = _crossing(meshes[one], meshes[other])
+            if place is not None:
+                x, y, z = place
+                return (
+                    f"parts '{one}' and '{other}' cut through each other at "
+                    f"({x:.2f}, {y:.2f}, {z:.2f}) mm"
+                )
+        return None
+
+    def _crossed_before(self, one: str, other: str) -> bool:
+        if (one, other) not in self._known:
+            self._known[one, other] = _crossing(self._meshes[one], self._meshes[other]) is not None
+        return self._known[one, other]
+
+
+class UserRule:
+    """A function of a user's Python file, loaded where it is needed."""
+
+    def __init__(self, text: str) -> None:
+        """Read FILE.py:FUNCTION. The file, which may be a stranger's, is not run yet.
+
+        Raises:
+            SearchError: the text is something else.
+        """
+        file, colon, self.function = text.rpartition(":")
+        if not colon or not file.endswith(".py") or not self.function:
+            raise SearchError(f"'{text}' names no rule", hint="Write FILE.py:FUNCTION")
+        self.path = Path(file).resolve()
+        self._loaded: Constraint | None = None
+
+    def __call__(self, design: SensorDesign) -> bool | str | None:
+        """What the user's function says of a design."""
+        return self.load()(design)
+
+    def __getstate__(self) -> dict[str, object]:
+        return {"path": self.path, "function": self.function, "_loaded": None}
+
+    def __str__(self) -> str:
+        return f"{self.path}:{self.function}"
+
+    def load(self) -> Constraint:
+        """Run the file, once.
+
+        Raises:
+            SearchError, ObjectiveError: the file or the function is missing, or the file fails.
+        """
+        if self._loaded is not None:
+            return self._loaded
+        from optisense.objectives.files import run_file
+
+        content = run_file(self.path)
+        found = content.get(self.function)
+        if not callable(found):
+            raise SearchError(f"the file has no function '{self.function}'", where=str(self.path))
+        self._loaded = found
+        return self._loaded
+
+
+def why_forbidden(design: SensorDesign, constraints: Sequence[Constraint]) -> str | None:
+    """Why a design must not be, or None.
+
+    Raises:
+        SearchError: a rule returns something else than a bool, a text or None.
+    """
+    for rule in constraints:
+        said = rule(design)
+        if isinstance(said, str):
+            return said or "a constraint does not hold"
+        if said is None or isinstance(said, bool | np.bool_):
+            if said is None or said:
+                continue
+            name = getattr(rule, "__name__", None) or str(rule)
+            return f"the constraint {name} does not hold"
+        raise SearchError(
+            f"a constraint returned a {type(said).__name__}",
+            hint="Return True where a design is fine, else False or a text that says why",
+        )
+    return None
+
+
+def _may_not_meet(design: SensorDesign, one: str, other: str) -> bool:
+    first, second = design.parts[one], design.parts[other]
+    if Role.INDENTER in (first.role, second.role):
+        return False
+    solids = [part for part in (first, second) if part.role in TRANSPARENT_SOLIDS]
+    if len(solids) == 2:
+        return first.priority == second.priority
+    return not (solids and Role.SENSING_SURFACE in (first.role, second.role))
+
+
+def _crossing(one: TriangleMesh, other: TriangleMesh) -> NDArray[np.float64] | None:
+    low = np.maximum(one.bounds[0], other.bounds[0])
+    high = np.minimum(one.bounds[1], other.bounds[1])
+    if (low > high).any():
+        return None
+    found = crossings(one, other, limit=1)
+    return found.places[0] if len(found.places) else None
+
+
+def _same(mesh: TriangleMesh, before: TriangleMesh | None) -> bool:
+    if before is None or mesh.vertices.shape != before.vertices.shape:
+        return False
+    return mesh is before or bool(np.array_equal(mesh.vertices, before.vertices))

@@ -1,0 +1,195 @@
+"""Scoring one point of a search space: a pure function of the design, the point and a seed."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from optisense.design import SensorDesign
+from optisense.errors import OptiSenseError, SearchError, SetupError
+from optisense.objectives import Objective, Settings, evaluate
+from optisense.objectives.files import place_of
+from optisense.objectives.registry import resolve
+from optisense.objectives.run import split_settings
+from optisense.search.constraints import Constraint, PartsApart, why_forbidden
+from optisense.search.models import RAYS_ONLY, ModelKeeper
+from optisense.search.outcome import Outcome
+from optisense.search.space import BoundSpace
+
+FloatArray = NDArray[np.float64]
+
+DesignFunction = Callable[[SensorDesign], float]
+"""A goal that needs no image, such as a length or a price; higher is better."""
+
+Goal = str | Objective | DesignFunction
+"""What can be searched for."""
+
+
+class Evaluator(Protocol):
+    """What workers call: made once a worker (it must pickle), then asked for many points."""
+
+    def __call__(self, vector: FloatArray, seed: int) -> Outcome:
+        """What comes of a point (n,) of the space. The same for the same point and seed, whatever
+        was asked before. Failures are told in the outcome; errors are for set-ups that can't
+        work.
+        """
+
+
+class DesignEvaluator:
+    """Scores points by objectives: the evaluator of all methods that bring none of their own.
+
+    Attributes:
+        space: with the design.
+        goals: objectives by name, `Objective`s, or functions of the design.
+        settings: of the objectives (see `optisense.evaluate`).
+        constraints: designs that they forbid are not scored.
+        renders: whether the renderer is needed at all.
+    """
+
+    def __init__(
+        self,
+        space: BoundSpace,
+        goals: Sequence[Goal],
+        settings: Mapping[str, Any] | None = None,
+        *,
+        apart: bool | None = None,
+        variant: str = "auto",
+    ) -> None:
+        """Check the goals.
+
+        Args:
+            space: a bound space.
+            goals: one or more; the first is what single-goal methods search for.
+            settings: of the objectives.
+            apart: whether parts must not cut through one another; only looked at where surfaces
+                move, which is also the default.
+            variant: of the renderer.
+
+        Raises:
+            SearchError: there is no goal, or two of one name.
+            ObjectiveError: an objective or a setting is unknown.
+        """
+        self.space = space
+        self.goals = [placed(goal) for goal in goals]
+        self.settings = dict(settings or {})
+        self.names = [goal_name(goal) for goal in self.goals]
+        if not self.goals:
+            raise SearchError("there is nothing to search for", hint="Name an objective")
+        if len(set(self.names)) < len(self.names):
+            raise SearchError(f"an objective is named twice: {', '.join(self.names)}")
+        self._functions: dict[str, DesignFunction] = {}
+        self._objectives: list[str | Objective] = []
+        for name, goal in zip(self.names, self.goals, strict=True):
+            if isinstance(goal, str | Objective):
+                self._objectives.append(goal)
+            else:
+                self._functions[name] = goal
+        self.constraints: list[Constraint] = list(space.space.constraints)
+        if space.reshapes and (apart is None or apart):
+            self.constraints.append(PartsApart(space.design))
+        rays_only = set(self.names) <= RAYS_ONLY | set(self._functions)
+        self._keeper = ModelKeeper(space.prepared, lit=not rays_only, variant=variant)
+        self._resolved: list[Objective] | None = None
+        self.renders = bool(self._objectives)
+        self._check_settings()
+
+    def __call__(self, vector: FloatArray, seed: int) -> Outcome:
+        """See `Evaluator`."""
+        began = time.perf_counter()
+        try:
+            design = self.space.apply(vector)
+        except OptiSenseError as error:
+            return self.failed(str(error), began)
+        return self.judge(design, seed)
+
+    def judge(self, design: SensorDesign, seed: int) -> Outcome:
+        """The outcome of any design: a point of the space, or one with errors of making.
+
+        Raises:
+            SetupError: the renderer can't run on this machine.
+        """
+        began = time.perf_counter()
+        try:
+            reason = why_forbidden(design, self.constraints)
+            if reason is not None:
+                return self.failed(reason, began)
+            scores, parts, failures = self._score(design, seed)
+        except SetupError:
+            raise
+        except OptiSenseError as error:
+            return self.failed(str(error), began)
+        except Exception as error:
+            return self.failed(f"{type(error).__name__}: {error} ({place_of(error)})", began)
+        failure = "; ".join(failures) or None
+        return Outcome(scores, failure, parts, time.perf_counter() - began)
+
+    def failed(self, reason: str, began: float) -> Outcome:
+        """An outcome without scores; `began` by `time.perf_counter`."""
+        return Outcome.of_failure(self.names, reason, time.perf_counter() - began)
+
+    def _score(
+        self, design: SensorDesign, seed: int
+    ) -> tuple[dict[str, float], dict[str, Mapping[str, Any]], list[str]]:
+        scores = dict.fromkeys(self.names, math.nan)
+        parts: dict[str, Mapping[str, Any]] = {}
+        failures = []
+        for name, function in self._functions.items():
+            value = float(function(design))
+            if not math.isfinite(value):
+                failures.append(f"{name} returned {value}, which is no score")
+                value = math.nan
+            scores[name] = value
+        if self._objectives:
+            model = self._keeper.model(design)
+            found = evaluate(model, self._ready(), seed=seed, **self.settings)
+            for name, score in found.items():
+                scores[name], parts[name] = score.value, score.to_dict()["parts"]
+                if score.failure is not None:
+                    failures.append(f"{name}: {score.failure}" if len(found) > 1 else score.failure)
+        return scores, parts, failures
+
+    def _ready(self) -> list[Objective]:
+        """The objectives; a user's file is run once a process and not once a trial."""
+        if self._resolved is None:
+            self._resolved = resolve(self._objectives)
+        return self._resolved
+
+    def __getstate__(self) -> dict[str, object]:
+        return {**self.__dict__, "_resolved": None}
+
+    def _check_settings(self) -> None:
+        if not self._objectives:
+            if self.settings:
+                raise SearchError("a function of the design takes no settings")
+            return
+        if "seed" in self.settings:
+            raise SearchError("the seed belongs to the study", hint="Give it as --seed")
+        shared, _ = split_settings(self.settings, self._ready())
+        Settings(**shared)
+
+
+def goal_name(goal: Goal) -> str:
+    """What scores of a goal are called.
+
+    Raises:
+        ObjectiveError: there is no such objective; names the near match.
+    """
+    if isinstance(goal, str | Objective):
+        return resolve(goal)[0].name
+    return getattr(goal, "__name__", type(goal).__name__)
+
+
+def placed(goal: Goal) -> Goal:
+    """A goal in a user's file with the file's whole path, which workers can find."""
+    if not isinstance(goal, str):
+        return goal
+    file, colon, function = goal.rpartition(":")
+    if colon and file.endswith(".py"):
+        return f"{Path(file).resolve()}:{function}"
+    return str(Path(goal).resolve()) if goal.endswith(".py") else goal

@@ -1,0 +1,141 @@
+"""Paths for more than one value: a whole group of lights moved, a part from the library.
+
+They look like other paths but lead to no single number of a design:
+
+| path | what it does |
+|---|---|
+| `lights.GROUP.shift.x` | moves all lights of a group along x, y or z, mm |
+| `lights.GROUP.turn.x` | turns a group about an axis through its middle, degrees |
+| `lights.GROUP.lights[0].shift.x`, `.turn.x` | the same for one light |
+| `camera.turn.x` | turns the camera about its own right (x), up (y) or viewing axis (z), degrees |
+| `parts.PART.shift.x` | moves a part, mm |
+| `parts.PART.turn.x` | turns a part about an axis through the middle of its box, degrees |
+| `lights.model` | the type of all lights |
+| `lights.GROUP.model` | the type of the lights of a group |
+| `lights.GROUP.lights[0].model` | the type of one light |
+| `lights.types` | the types of all lights, each by itself |
+| `coating.library`, `camera.model` | a whole coating or camera of the library |
+| `parts.PART.material` | a material of the design or of the library |
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterable
+
+from optisense.design import SensorDesign
+from optisense.design.near import suggestion
+from optisense.errors import DesignError, SearchError
+from optisense.search.handles import (
+    GroupType,
+    Handle,
+    LibraryCamera,
+    LibraryCoating,
+    LightType,
+    PartMaterial,
+)
+from optisense.search.moves import (
+    CameraTurn,
+    GroupShift,
+    GroupTurn,
+    LightShift,
+    LightTurn,
+    PartShift,
+    PartTurn,
+)
+
+MOVES: dict[tuple[str, str], Callable[[str, str, int], Handle]] = {
+    ("lights", "shift"): GroupShift,
+    ("lights", "turn"): GroupTurn,
+    ("camera", "turn"): CameraTurn,
+    ("parts", "shift"): PartShift,
+    ("parts", "turn"): PartTurn,
+}
+
+
+def find_handles(design: SensorDesign, path: str) -> list[Handle]:
+    """The handles that a path names: none for an ordinary path, three for a whole vector.
+
+    Raises:
+        SearchError, DesignError: it looks like a handle but names nothing in the design.
+    """
+    move = re.fullmatch(
+        r"(?:(lights|parts)\.([^.\[\]]+)|(camera))\.(shift|turn)(?:\.([^.]+))?", path
+    )
+    if move is not None:
+        section, name, camera, what, letter = move.groups()
+        return _moves(design, path, section or camera, name or "", what, letter)
+    single = re.fullmatch(
+        r"lights\.([^.\[\]]+)\.lights\[(\d+)\]\.(shift|turn|model)(?:\.([xyz]))?", path
+    )
+    if single is not None:
+        group, index, what, letter = single.groups()
+        return _of_light(design, path, group, int(index), what, letter)
+    if path == "coating.library":
+        return [LibraryCoating(path)]
+    if path == "camera.model":
+        return [LibraryCamera(path)]
+    if path == "lights.model":
+        return [GroupType(path, None)]
+    if path == "lights.types":
+        return [
+            LightType(f"lights.{name}.lights[{index}].model", name, index)
+            for name, group in design.lights.items()
+            for index in range(len(group.lights))
+        ]
+    part = re.fullmatch(r"parts\.([^.\[\]]+)\.material", path)
+    if part is not None and part[1] in design.parts:
+        return [PartMaterial(path, part[1])]
+    lamps = re.fullmatch(r"lights\.([^.\[\]]+)\.model", path)
+    if lamps is not None and lamps[1] in design.lights:
+        return [GroupType(path, lamps[1])]
+    return []
+
+
+def _of_light(
+    design: SensorDesign, path: str, group: str, index: int, what: str, letter: str | None
+) -> list[Handle]:
+    if group not in design.lights:
+        raise DesignError(
+            f"'{path}' leads nowhere: 'lights' has no '{group}'",
+            hint=suggestion(group, design.lights, limit=20),
+        )
+    count = len(design.lights[group].lights)
+    if index >= count:
+        raise DesignError(
+            f"'{path}' leads nowhere: the group has {count} lights",
+            hint=f"Indices run from 0 to {count - 1}",
+        )
+    if what == "model":
+        return [LightType(path, group, index)]
+    kind = LightShift if what == "shift" else LightTurn
+    if letter is not None:
+        return [kind(path, group, "xyz".index(letter), index)]
+    return [kind(f"{path}.{each}", group, axis, index) for axis, each in enumerate("xyz")]
+
+
+def _moves(
+    design: SensorDesign, path: str, section: str, name: str, what: str, letter: str | None
+) -> list[Handle]:
+    if section == "camera" and what == "shift":
+        raise SearchError("the camera has a position to move", where=path, hint="camera.position.x")
+    known: Iterable[str] = design.parts if section == "parts" else design.lights
+    if section != "camera" and name not in known:
+        raise DesignError(
+            f"'{path}' leads nowhere: '{section}' has no '{name}'",
+            hint=suggestion(name, known, limit=20),
+        )
+    if letter is not None and letter not in ("x", "y", "z"):
+        raise DesignError(f"'{path}' leads nowhere: there is no axis '{letter}'", hint="x, y or z")
+    if section == "parts":
+        for cage_name, cage in design.cages.items():
+            if name in cage.parts:
+                raise SearchError(
+                    f"part '{name}' is moved by the cage '{cage_name}'",
+                    where=path,
+                    hint=f"Vary cages.{cage_name}.points",
+                )
+    kind = MOVES[section, what]
+    if letter is not None:
+        return [kind(path, name, "xyz".index(letter))]
+    return [kind(f"{path}.{each}", name, axis) for axis, each in enumerate("xyz")]

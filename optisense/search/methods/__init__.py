@@ -1,0 +1,6 @@
+"""Ways to search, by name: each proposes points and is told their scores."""
+
+from optisense.search.methods.base import Method, Problem, values_to_maximise
+from optisense.search.methods.registry import find, make, names, register
+
+__all__ = ["Method", "Problem", "find", "make", "names", "register", "values_to_maximise"]

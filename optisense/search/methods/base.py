@@ -1,0 +1,107 @@
+"""What a search method is: it proposes points generation by generation and is told the scores.
+
+A method must be a function of its problem, its options and what it was told, and of nothing else:
+a study that was killed is resumed by telling a new instance again what the old one knew. So no
+state has to be saved (and none from a stranger has to be unpickled), and a resumed study goes on
+with exactly the generation that the other would have had.
+"""
+
+from __future__ import annotations
+
+import zlib
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from optisense.errors import SearchError
+from optisense.search.evaluation import DesignEvaluator, Evaluator
+from optisense.search.outcome import Outcome
+from optisense.search.space import BoundSpace
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Problem:
+    """What a method searches.
+
+    Attributes:
+        space: the points it may propose.
+        objectives: names of the goals; methods for one goal maximise the first.
+        budget: how many trials there may be; a method need not use them all.
+        seed: of its random numbers.
+    """
+
+    space: BoundSpace
+    objectives: tuple[str, ...]
+    budget: int
+    seed: int = 0
+
+    def random(self, name: str) -> np.random.Generator:
+        """Random numbers of a method's own."""
+        return np.random.default_rng([self.seed, zlib.crc32(name.encode())])
+
+
+class Method(ABC):
+    """A way to search. Options are keyword arguments of the constructor.
+
+    Class attributes:
+        name: on the command line.
+        summary: what it does, in one line.
+        several: whether it looks for the best trade-offs between several goals.
+    """
+
+    name: ClassVar[str]
+    summary: ClassVar[str]
+    several: ClassVar[bool] = False
+
+    def __init__(self, problem: Problem) -> None:
+        self.problem = problem
+        self.space = problem.space
+        if self.several and len(problem.objectives) < 2:
+            raise SearchError(
+                f"{self.name} weighs several objectives against each other",
+                hint="Name two or more, or use a method for one",
+            )
+
+    @classmethod
+    def usual_budget(cls, space: BoundSpace) -> int:
+        """How many trials there are when the user names no number.
+
+        Raises:
+            SearchError: the space does not fit the method.
+        """
+        return max(100, 20 * space.size)
+
+    @abstractmethod
+    def ask(self) -> FloatArray:
+        """The next generation: (k, n) points of the space. None at all ends the search."""
+
+    @abstractmethod
+    def tell(self, vectors: FloatArray, outcomes: Sequence[Outcome]) -> None:
+        """What came of the whole generation (k, n), in the order of its points."""
+
+    def evaluator(self, usual: DesignEvaluator) -> Evaluator:
+        """What scores the points; a method that knows a quicker or richer way returns its own."""
+        return usual
+
+    def describe(self) -> dict[str, Any]:
+        """Facts about the state for progress and reports, ready for JSON."""
+        return {}
+
+
+def values_to_maximise(outcomes: Sequence[Outcome], objective: str) -> FloatArray:
+    """(k,) scores; failed trials count a little less than the worst that did not fail.
+
+    NaN for all if all failed.
+    """
+    values = np.array([outcome.scores.get(objective, np.nan) for outcome in outcomes])
+    failed = ~np.isfinite(values)
+    if failed.any() and not failed.all():
+        worst, best = values[~failed].min(), values[~failed].max()
+        values[failed] = worst - max(best - worst, 1e-3 * abs(worst), 1e-9)
+    return values

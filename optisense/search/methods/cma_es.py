@@ -1,0 +1,162 @@
+"""CMA-ES: evolution with a normal distribution that learns the shape of the problem.
+
+Hansen and Ostermeier, "Completely derandomized self-adaptation in evolution strategies", 2001;
+the method of the OptiSense paper's shape search. The work is done by pycma.
+"""
+
+from __future__ import annotations
+
+import math
+import warnings
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from typing import Any
+
+import numpy as np
+from threadpoolctl import ThreadpoolController
+
+from optisense.errors import SearchError
+from optisense.search.methods.base import FloatArray, Method, Problem, values_to_maximise
+from optisense.search.outcome import Outcome
+
+MOST_POPULATION = 100_000
+
+
+class CmaEs(Method):
+    """CMA-ES from the design as it is, with restarts from elsewhere when it has converged.
+
+    Numbers are searched in the unit cube of their bounds. Integers keep their own steps; pycma
+    holds their spread wide enough to reach the next one. A choice is treated as the integer of
+    its option, in the order given: with more than two options that are not in any order, a grid
+    over the choices is the better search.
+    """
+
+    name = "cma-es"
+    summary = "evolution that learns the shape of the problem; for numbers, up to hundreds"
+
+    def __init__(
+        self,
+        problem: Problem,
+        *,
+        population: int | None = None,
+        sigma: float = 0.2,
+        restarts: int | None = None,
+    ) -> None:
+        """Set up.
+
+        Args:
+            problem: what to search.
+            population: points a generation; 4 + 3 ln n if None (Hansen's default), made even, so
+                that two workers finish together.
+            sigma: how far the first generation spreads, as a part of each parameter's range.
+            restarts: how often to begin anew elsewhere, each time with twice the population
+                (Auger and Hansen, "A restart CMA evolution strategy with increasing population
+                size", 2005); None goes on until the budget is spent.
+
+        Raises:
+            SearchError: an option makes no sense.
+        """
+        super().__init__(problem)
+        if not 0.0 < sigma <= 1.0:
+            raise SearchError(f"sigma is {sigma}", hint="Give a part of the range: 0 < sigma <= 1")
+        if population is not None and not 2 <= population <= MOST_POPULATION:
+            raise SearchError(f"the population is {population}", hint="Give 4 or more")
+        if restarts is not None and restarts < 0:
+            raise SearchError(f"{restarts} restarts make no sense")
+        self.sigma = float(sigma)
+        size = problem.space.size
+        natural = 4 + math.floor(3 * math.log(size))
+        self.population = population or natural + natural % 2
+        self.restarts = restarts
+        self.restarted = 0
+        self._random = problem.random(self.name)
+        # pycma draws from NumPy's one global generator: it gets a state of its own while it runs.
+        self._state = np.random.RandomState(int(self._random.integers(2**32))).get_state()
+        whole = problem.space.whole
+        self._unit = np.where(whole, 1.0, problem.space.upper - problem.space.lower)
+        self._origin = np.where(whole, 0.0, problem.space.lower)
+        # Its matrices are small: threads only wait for each other, and round differently.
+        self._linear_algebra = ThreadpoolController().select(user_api="blas")
+        self._asked: list[FloatArray] = []
+        self._begin(problem.space.start)
+
+    def ask(self) -> FloatArray:
+        """The next generation, (population, n)."""
+        with self._own_randomness():
+            if self._strategy.stop(ignore_list=("maxiter", "maxfevals", "timeout")):
+                if self.restarts is not None and self.restarted >= self.restarts:
+                    return np.empty((0, self.space.size))
+                self.restarted += 1
+                self.population *= 2
+                self._begin(self.space.from_unit(self._random.random(self.space.size)))
+            self._asked = self._strategy.ask()
+        return self._point(np.array(self._asked))
+
+    def tell(self, vectors: FloatArray, outcomes: Sequence[Outcome]) -> None:
+        """Learn from a generation; one in which all failed teaches nothing."""
+        values = values_to_maximise(outcomes, self.problem.objectives[0])
+        if np.isnan(values).any() or len(values) < len(self._asked):
+            return
+        solutions: Sequence[FloatArray] = self._asked
+        if not np.array_equal(self._point(np.array(self._asked)), vectors):
+            solutions = list(self._inner(vectors))  # a study that another version began
+        with self._own_randomness():
+            self._strategy.tell(solutions, (-values).tolist())
+
+    def describe(self) -> dict[str, Any]:
+        """The spread of the current generation, restarts and population."""
+        return {
+            "sigma": float(self._strategy.sigma),
+            "restarts": self.restarted,
+            "population": self.population,
+        }
+
+    def _begin(self, start: FloatArray) -> None:
+        import cma
+
+        lower, upper = self._inner(self.space.lower), self._inner(self.space.upper)
+        whole = np.flatnonzero(self.space.whole)
+        # Half a step beyond the first and last whole number, so that each has as much room.
+        lower[whole], upper[whole] = lower[whole] - 0.499, upper[whole] + 0.499
+        spread = np.where(self.space.whole, self.space.upper - self.space.lower, 1.0)
+        inner = self._inner(start)
+        options: dict[str, Any] = {
+            "bounds": [lower.tolist(), upper.tolist()],
+            "CMA_stds": spread.tolist(),
+            "popsize": self.population,
+            "integer_variables": whole.tolist(),
+            "seed": 1 + self.restarted,
+            "verbose": -9,
+            "verb_log": 0,
+            "verb_disp": 0,
+            "maxiter": math.inf,
+        }
+        with self._own_randomness(), warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            before = np.random.get_state()
+            self._strategy = cma.CMAEvolutionStrategy(inner.tolist(), self.sigma, options)
+            np.random.set_state(before)
+
+    def _inner(self, vectors: FloatArray) -> FloatArray:
+        """Points (..., n) as pycma sees them: numbers 0 to 1, whole ones as they are."""
+        return np.asarray((np.asarray(vectors) - self._origin) / self._unit)
+
+    def _point(self, inner: FloatArray) -> FloatArray:
+        """(k, n) points of the space for what pycma proposes."""
+        point = self._origin + inner * self._unit
+        point = np.where(self.space.whole, np.round(point), point)
+        return np.clip(point, self.space.lower, self.space.upper)
+
+    @contextmanager
+    def _own_randomness(self) -> Iterator[None]:
+        """NumPy's global generator in this method's state, afterwards as it was before; one
+        thread for linear algebra.
+        """
+        theirs = np.random.get_state()
+        np.random.set_state(self._state)
+        try:
+            with self._linear_algebra.limit(limits=1):
+                yield
+        finally:
+            self._state = np.random.get_state()
+            np.random.set_state(theirs)

@@ -1,0 +1,130 @@
+"""The best trade-offs between several goals: NSGA-II.
+
+Deb, Pratap, Agarwal and Meyarivan, "A fast and elitist multiobjective genetic algorithm: NSGA-II",
+2002; simulated binary crossover and polynomial mutation as there (and Deb and Agrawal, "Simulated
+binary crossover for continuous search space", 1995). Whole numbers are inherited from either
+parent and mutate to any other value.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import qmc
+
+from optisense.errors import SearchError
+from optisense.search.dominance import crowding, ranks
+from optisense.search.methods.base import FloatArray, Method, Problem
+from optisense.search.outcome import Outcome
+
+CROSSOVER_SPREAD = 15.0
+"""Distribution index of the crossover; larger keeps children nearer to their parents."""
+
+MUTATION_SPREAD = 20.0
+"""Distribution index of the mutation (both as is usual with NSGA-II)."""
+
+CROSSOVER_CHANCE = 0.9
+
+
+class Pareto(Method):
+    """NSGA-II over all objectives; failed trials lose against all others."""
+
+    name = "pareto"
+    summary = "the best trade-offs between two or more objectives"
+    several = True
+
+    def __init__(self, problem: Problem, *, population: int | None = None) -> None:
+        """Set up.
+
+        Args:
+            problem: what to search.
+            population: points a generation, even; 20 to 100 by the budget if None.
+
+        Raises:
+            SearchError: there is only one objective, or an option makes no sense.
+        """
+        super().__init__(problem)
+        usual = int(np.clip(problem.budget // 10, 20, 100))
+        self.population = usual + usual % 2 if population is None else population
+        if self.population < 4 or self.population % 2:
+            raise SearchError(f"the population is {population}", hint="Give 4 or more, even")
+        self._random = problem.random(self.name)
+        self._genes = np.empty((0, self.space.size))
+        self._values = np.empty((0, len(problem.objectives)))
+        self._children = np.empty((0, self.space.size))
+
+    def ask(self) -> FloatArray:
+        """The next generation, (population, n)."""
+        if not len(self._genes):
+            cube = qmc.LatinHypercube(self.space.size, seed=self._random)
+            self._children = cube.random(self.population)
+            self._children[0] = self.space.unit_of(self.space.start)
+        else:
+            self._children = self._offspring()
+        return self.space.from_unit(self._children)
+
+    def tell(self, vectors: FloatArray, outcomes: Sequence[Outcome]) -> None:
+        """Keep the best of parents and children."""
+        values = np.array(
+            [
+                [outcome.scores.get(name, np.nan) for name in self.problem.objectives]
+                for outcome in outcomes
+            ]
+        )
+        same = np.array_equal(self.space.from_unit(self._children), vectors)
+        genes = self._children if same else self.space.unit_of(vectors)
+        everyone = np.concatenate([self._genes, genes])
+        scores = np.concatenate([self._values, values])
+        rank = ranks(scores)
+        best = np.lexsort((-crowding(scores, rank), rank))[: self.population]
+        self._genes, self._values = everyone[best], scores[best]
+
+    def describe(self) -> dict[str, Any]:
+        """The size of a generation."""
+        return {"population": self.population}
+
+    def _offspring(self) -> FloatArray:
+        rank = ranks(self._values)
+        room = crowding(self._values, rank)
+        mothers, fathers = self._winners(rank, room), self._winners(rank, room)
+        children = self._crossed(self._genes[mothers], self._genes[fathers])
+        return self._mutated(children)
+
+    def _winners(self, rank: NDArray[np.int64], room: FloatArray) -> NDArray[np.int64]:
+        """(population / 2,): the better one of two drawn at random, each time."""
+        pairs = self._random.integers(len(rank), size=(self.population // 2, 2))
+        one, other = pairs.T
+        first = (rank[one] < rank[other]) | (
+            (rank[one] == rank[other]) & (room[one] >= room[other])
+        )
+        return np.where(first, one, other)
+
+    def _crossed(self, mothers: FloatArray, fathers: FloatArray) -> FloatArray:
+        """(population, n): two children of each couple."""
+        shape = mothers.shape
+        draw = self._random.random(shape)
+        power = 1.0 / (CROSSOVER_SPREAD + 1.0)
+        spread = np.where(draw < 0.5, 2.0 * draw, 1.0 / (2.0 * (1.0 - draw))) ** power
+        middle, half = (mothers + fathers) / 2.0, (fathers - mothers) / 2.0
+        crossed = (self._random.random(shape) < 0.5) & (
+            self._random.random((shape[0], 1)) < CROSSOVER_CHANCE
+        )
+        smooth = crossed & ~self.space.whole
+        swapped = crossed & self.space.whole
+        daughters = np.where(smooth, middle - spread * half, np.where(swapped, fathers, mothers))
+        sons = np.where(smooth, middle + spread * half, np.where(swapped, mothers, fathers))
+        return np.clip(np.concatenate([daughters, sons]), 0.0, 1.0)
+
+    def _mutated(self, genes: FloatArray) -> FloatArray:
+        chosen = self._random.random(genes.shape) < 1.0 / genes.shape[1]
+        draw = self._random.random(genes.shape)
+        power = 1.0 / (MUTATION_SPREAD + 1.0)
+        exponent = MUTATION_SPREAD + 1.0
+        below = (2.0 * draw + (1.0 - 2.0 * draw) * (1.0 - genes) ** exponent) ** power - 1.0
+        above = 1.0 - (2.0 * (1.0 - draw) + 2.0 * (draw - 0.5) * genes**exponent) ** power
+        moved = np.clip(genes + np.where(draw < 0.5, below, above), 0.0, 1.0)
+        anywhere = self._random.random(genes.shape)
+        return np.where(chosen, np.where(self.space.whole, anywhere, moved), genes)

@@ -1,0 +1,32 @@
+"""Points drawn evenly: a baseline, and a way to see how a score depends on everything."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from scipy.stats import qmc
+
+from optisense.search.methods.base import FloatArray, Method, Problem
+from optisense.search.outcome import Outcome
+
+GENERATION = 64
+
+
+class Random(Method):
+    """Scrambled Sobol points: random, and more evenly spread than independent draws
+    (Owen, "Scrambled net variance for integrals of smooth functions", 1997).
+    """
+
+    name = "random"
+    summary = "points spread evenly over the space"
+
+    def __init__(self, problem: Problem) -> None:
+        super().__init__(problem)
+        self._points = qmc.Sobol(problem.space.size, seed=problem.random(self.name))
+
+    def ask(self) -> FloatArray:
+        """The next points, (k, n)."""
+        return self.space.from_unit(self._points.random(GENERATION))
+
+    def tell(self, vectors: FloatArray, outcomes: Sequence[Outcome]) -> None:
+        """Random search learns nothing."""

@@ -1,0 +1,150 @@
+"""Handles that shift and turn lights, parts and the camera."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from optisense.design import SensorDesign
+from optisense.geometry import TriangleMesh
+from optisense.search.handles import Handle
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class _Move(Handle):
+    """A number of mm or degrees along one axis; 0 leaves all as it is."""
+
+    name: str
+    axis: int
+    stage: ClassVar[int] = 2
+    numeric: ClassVar[bool] = True
+
+    def start(self, design: SensorDesign) -> float:
+        return 0.0
+
+
+class GroupShift(_Move):
+    """Moves all lights of a group along an axis of the design."""
+
+    def apply(self, design: SensorDesign, value: Any) -> SensorDesign:
+        return _with_poses(design, self.name, np.eye(3), _along(self.axis, value))
+
+
+class GroupTurn(_Move):
+    """Turns all lights of a group about an axis of the design through their middle."""
+
+    def apply(self, design: SensorDesign, value: Any) -> SensorDesign:
+        lights = design.lights[self.name].lights
+        middle = np.mean([light.position for light in lights], axis=0)
+        turn = rotation(_along(self.axis, 1.0), value)
+        return _with_poses(design, self.name, turn, middle - turn @ middle)
+
+
+@dataclass(frozen=True)
+class LightShift(_Move):
+    """Moves one light along an axis of the design."""
+
+    index: int
+
+    def apply(self, design: SensorDesign, value: Any) -> SensorDesign:
+        shift = _along(self.axis, value)
+        return _with_poses(design, self.name, np.eye(3), shift, only=self.index)
+
+
+@dataclass(frozen=True)
+class LightTurn(_Move):
+    """Turns one light about an axis of the design through its place."""
+
+    index: int
+
+    def apply(self, design: SensorDesign, value: Any) -> SensorDesign:
+        place = np.array(design.lights[self.name].lights[self.index].position)
+        turn = rotation(_along(self.axis, 1.0), value)
+        return _with_poses(design, self.name, turn, place - turn @ place, only=self.index)
+
+
+class CameraTurn(_Move):
+    """Turns the camera about one of its own axes: right, up, viewing direction."""
+
+    def apply(self, design: SensorDesign, value: Any) -> SensorDesign:
+        turn = rotation(design.camera.axes()[self.axis], value)
+        camera = design.camera.model_copy(
+            update={
+                "direction": _triple(turn @ np.array(design.camera.direction)),
+                "up": _triple(turn @ np.array(design.camera.up)),
+            }
+        )
+        return design.model_copy(update={"camera": camera})
+
+
+class PartShift(_Move):
+    """Moves a part along an axis of the design."""
+
+    shapes: ClassVar[bool] = True
+
+    def apply(self, design: SensorDesign, value: Any) -> SensorDesign:
+        return _with_mesh(design, self.name, np.eye(3), _along(self.axis, value))
+
+
+class PartTurn(_Move):
+    """Turns a part about an axis of the design through the middle of its box."""
+
+    shapes: ClassVar[bool] = True
+
+    def apply(self, design: SensorDesign, value: Any) -> SensorDesign:
+        middle = design.meshes[self.name].bounds.mean(axis=0)
+        turn = rotation(_along(self.axis, 1.0), value)
+        return _with_mesh(design, self.name, turn, middle - turn @ middle)
+
+
+def rotation(axis: FloatArray, degrees: float) -> FloatArray:
+    """(3, 3): the right-handed turn about an axis (Rodrigues' formula)."""
+    x, y, z = np.asarray(axis, dtype=np.float64) / np.linalg.norm(axis)
+    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    angle = np.radians(degrees)
+    return np.eye(3) + np.sin(angle) * cross + (1.0 - np.cos(angle)) * cross @ cross
+
+
+def _with_poses(
+    design: SensorDesign, group: str, turn: FloatArray, shift: FloatArray, only: int | None = None
+) -> SensorDesign:
+    """The lights of a group, or one of them, turned about the origin and then shifted."""
+    moved = list(design.lights[group].lights)
+    for index in range(len(moved)) if only is None else (only,):
+        light = moved[index]
+        moved[index] = light.model_copy(
+            update={
+                "position": _triple(turn @ np.array(light.position) + shift),
+                "direction": _triple(turn @ np.array(light.direction)),
+                "up": None if light.up is None else _triple(turn @ np.array(light.up)),
+            }
+        )
+    changed = design.lights[group].model_copy(update={"lights": moved})
+    return design.model_copy(update={"lights": {**design.lights, group: changed}})
+
+
+def _with_mesh(
+    design: SensorDesign, part: str, turn: FloatArray, shift: FloatArray
+) -> SensorDesign:
+    mesh: TriangleMesh = design.meshes[part]
+    matrix = np.eye(4)
+    matrix[:3, :3], matrix[:3, 3] = turn, shift
+    moved = design.copy()
+    moved.meshes[part] = mesh.transformed(matrix)
+    return moved
+
+
+def _along(axis: int, length: float) -> FloatArray:
+    vector = np.zeros(3)
+    vector[axis] = length
+    return vector
+
+
+def _triple(vector: FloatArray) -> tuple[float, float, float]:
+    x, y, z = vector.tolist()
+    return x, y, z

@@ -1,0 +1,260 @@
+"""What every search method keeps, and that each finds what it is meant to find."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from optisense.errors import SearchError
+from optisense.search.dominance import hypervolume
+from optisense.search.methods import Method, Problem, find, make, names, register
+from optisense.search.methods.base import values_to_maximise
+from optisense.search.outcome import Outcome
+from optisense.search.space import BoundSpace, SearchSpace
+
+FloatArray = np.ndarray
+Score = Callable[[FloatArray], float]
+
+GENERAL = ("grid", "random", "cma-es")
+"""Methods for any space and one goal; those for special ones have tests of their own."""
+
+
+def bowl(space: BoundSpace, share: float = 0.3) -> Score:
+    """Highest (0) where every coordinate is at this share of its range."""
+    peak = space.lower + share * (space.upper - space.lower)
+    span = space.upper - space.lower
+    return lambda point: -float((((point - peak) / span) ** 2).sum())
+
+
+def drive(method: Method, score: Score, generations: int) -> list[FloatArray]:
+    """Ask and tell; returns the generations."""
+    asked = []
+    for _ in range(generations):
+        points = method.ask()
+        if not len(points):
+            break
+        asked.append(points)
+        name = method.problem.objectives[0]
+        method.tell(points, [Outcome({name: score(point)}) for point in points])
+    return asked
+
+
+def best_of(asked: list[FloatArray], score: Score) -> float:
+    return max(score(point) for points in asked for point in points)
+
+
+@pytest.mark.parametrize("name", GENERAL)
+class TestContract:
+    def test_points_lie_in_the_space(self, name: str, mixed: BoundSpace) -> None:
+        method = make(name, Problem(mixed, ("score",), 1000, seed=4))
+        for points in drive(method, bowl(mixed), 8):
+            assert points.shape[1] == mixed.size
+            for point in points:
+                mixed.check(point)
+
+    def test_telling_a_new_one_the_same_continues_it(self, name: str, mixed: BoundSpace) -> None:
+        """This is what resuming a study rests on: the same to the last bit."""
+        problem = Problem(mixed, ("score",), 1000, seed=4)
+        score = bowl(mixed)
+        first, second = make(name, problem), make(name, problem)
+        drive(first, score, 5)
+        np.random.seed(1)
+        drive(second, score, 5)
+        assert np.array_equal(first.ask(), second.ask())
+
+    def test_the_global_random_numbers_are_left_alone(self, name: str, mixed: BoundSpace) -> None:
+        np.random.seed(7)
+        expected = np.random.random()
+        np.random.seed(7)
+        drive(make(name, Problem(mixed, ("score",), 1000)), bowl(mixed), 3)
+        assert np.random.random() == expected
+
+    def test_failures_do_not_stop_it(self, name: str, two_numbers: BoundSpace) -> None:
+        method = make(name, Problem(two_numbers, ("score",), 1000))
+        points = method.ask()
+        outcomes = [Outcome.of_failure(["score"], "broken") for _ in points]
+        method.tell(points, outcomes)
+        half = [
+            Outcome({"score": 1.0}) if k % 2 else Outcome.of_failure(["score"], "broken")
+            for k in range(len(points))
+        ]
+        again = method.ask()
+        if len(again):
+            method.tell(again, half[: len(again)])
+
+    def test_another_seed_is_another_search(self, name: str, two_numbers: BoundSpace) -> None:
+        one, other = (
+            make(name, Problem(two_numbers, ("score",), 1000, seed=seed)) for seed in (1, 2)
+        )
+        same = np.array_equal(one.ask(), other.ask())
+        assert same == (name == "grid")
+
+
+def test_grid_has_every_combination_once(mixed: BoundSpace) -> None:
+    kind = find("grid")
+    budget = kind.usual_budget(mixed)
+    assert budget == 3 * 3 * 5
+    asked = drive(make("grid", Problem(mixed, ("score",), budget)), bowl(mixed), 10)
+    points = {tuple(point) for points in asked for point in points}
+    assert len(points) == budget == sum(map(len, asked))
+
+
+def test_grid_needs_steps_and_budget(mini_free: BoundSpace, two_numbers: BoundSpace) -> None:
+    with pytest.raises(SearchError, match="number of steps") as told:
+        find("grid").usual_budget(mini_free)
+    assert told.value.where == "coating.specularity"
+    with pytest.raises(SearchError, match="15 designs, the budget is 3"):
+        make("grid", Problem(two_numbers, ("score",), 3))
+
+
+def test_cma_es_learns_the_shape_of_a_valley(valley: BoundSpace) -> None:
+    """A valley a hundred times longer than wide, at an odd angle in ten dimensions."""
+    turn = np.linalg.qr(np.random.default_rng(5).normal(size=(10, 10)))[0]
+    widths = np.logspace(0, 2, 10)
+
+    def score(point: FloatArray) -> float:
+        return -float(((widths * (turn @ (valley.to_unit(point) - 0.6))) ** 2).sum())
+
+    def best(name: str, generations: int) -> float:
+        method = make(name, Problem(valley, ("s",), 9999, seed=1))
+        return best_of(drive(method, score, generations), score)
+
+    assert best("cma-es", 500) > -1e-6
+    assert best("random", 90) < -1.0
+
+
+def test_cma_es_starts_at_the_design(valley: BoundSpace) -> None:
+    """The first generation surrounds what the design is, at the given part of the range."""
+    problem = Problem(valley, ("s",), 9999, seed=3)
+    points = make("cma-es", problem, {"sigma": 0.01, "population": 400}).ask()
+    away = (points - valley.start) / (valley.upper - valley.lower)
+    assert np.abs(away.mean(axis=0)).max() < 4 * 0.01 / 20
+    assert np.allclose(away.std(axis=0), 0.01, rtol=0.2)
+
+
+def test_cma_es_restarts_with_more(two_numbers: BoundSpace) -> None:
+    method = make("cma-es", Problem(two_numbers, ("s",), 99999), {"restarts": 1})
+    asked = drive(method, bowl(two_numbers), 2000)
+    sizes = [len(points) for points in asked]
+    assert sorted(set(sizes)) == [sizes[0], 2 * sizes[0]]
+    assert len(method.ask()) == 0
+    assert method.describe()["restarts"] == 1
+
+
+def test_cma_es_finds_whole_numbers(mixed: BoundSpace) -> None:
+    """The best option is the last one, the best number in the middle."""
+    peak = mixed.vector(
+        {
+            "coating.specularity": 0.4,
+            mixed.names[1]: (0.0, 0.0, 1.0),
+            "camera.resolution[0]": 102,
+        }
+    )
+
+    def score(point: FloatArray) -> float:
+        return -float(((point - peak) ** 2).sum())
+
+    asked = drive(make("cma-es", Problem(mixed, ("s",), 9999, seed=2)), score, 60)
+    best = max((point for points in asked for point in points), key=score)
+    assert np.array_equal(best[1:], peak[1:])
+    assert abs(best[0] - 0.4) < 1e-3
+
+
+def test_random_points_are_spread_evenly(two_numbers: BoundSpace) -> None:
+    """Of 64 Sobol points, each of 64 equal boxes of an 8 x 8 net holds one."""
+    unit = two_numbers.to_unit(make("random", Problem(two_numbers, ("s",), 99)).ask())
+    boxes = {(int(8 * x), int(8 * y)) for x, y in np.minimum(unit, 1 - 1e-12)}
+    assert len(unit) == len(boxes) == 64
+
+
+def test_pareto_finds_a_known_front(two_numbers: BoundSpace) -> None:
+    """Fonseca and Fleming's problem, 1995: the best trade-offs lie on the line x = y."""
+
+    def goals(point: FloatArray) -> dict[str, float]:
+        x = 8.0 * two_numbers.to_unit(point) - 4.0
+        root = 1.0 / np.sqrt(2.0)
+        return {
+            "a": -float(1.0 - np.exp(-((x - root) ** 2).sum())),
+            "b": -float(1.0 - np.exp(-((x + root) ** 2).sum())),
+        }
+
+    t = np.linspace(-1, 1, 2001) / np.sqrt(2.0)
+    true = np.stack(
+        [
+            np.exp(-2.0 * (t - 1 / np.sqrt(2)) ** 2) - 1.0,
+            np.exp(-2.0 * (t + 1 / np.sqrt(2)) ** 2) - 1.0,
+        ],
+        axis=1,
+    )
+    method = make("pareto", Problem(two_numbers, ("a", "b"), 2000, seed=1), {"population": 60})
+    found = []
+    for _ in range(40):
+        points = method.ask()
+        outcomes = [Outcome(goals(point)) for point in points]
+        method.tell(points, outcomes)
+        found += [list(outcome.scores.values()) for outcome in outcomes]
+    reference = (-1.0, -1.0)
+    assert hypervolume(found, reference) > 0.98 * hypervolume(true, reference)
+
+
+def test_pareto_needs_two_goals(two_numbers: BoundSpace) -> None:
+    with pytest.raises(SearchError, match="several objectives"):
+        make("pareto", Problem(two_numbers, ("a",), 100))
+
+
+def test_failed_trials_count_less_than_the_worst() -> None:
+    outcomes = [Outcome({"s": 2.0}), Outcome.of_failure(["s"], "no"), Outcome({"s": 1.0})]
+    values = values_to_maximise(outcomes, "s")
+    assert values[1] < values[2] < values[0]
+    assert np.isnan(values_to_maximise(outcomes[1:2], "s")).all()
+
+
+def test_bad_names_and_options_are_told(two_numbers: BoundSpace) -> None:
+    problem = Problem(two_numbers, ("s",), 100)
+    with pytest.raises(SearchError) as told:
+        find("cma_es")
+    assert "cma-es" in str(told.value)
+    with pytest.raises(SearchError) as told:
+        make("cma-es", problem, {"sigmas": 1})
+    assert "sigma" in str(told.value)
+    with pytest.raises(SearchError, match="sigma is 2"):
+        make("cma-es", problem, {"sigma": 2})
+    with pytest.raises(SearchError, match="wrong type"):
+        make("cma-es", problem, {"sigma": "wide"})
+
+
+def test_other_packages_bring_methods(two_numbers: BoundSpace) -> None:
+    class Middle(Method):
+        name = "middle-of-the-space"
+        summary = "one point"
+
+        def ask(self) -> FloatArray:
+            return self.space.from_unit(np.full((1, self.space.size), 0.5))
+
+        def tell(self, vectors: FloatArray, outcomes: object) -> None:
+            pass
+
+    register(Middle)
+    assert "middle-of-the-space" in names()
+    points = make("middle-of-the-space", Problem(two_numbers, ("s",), 1)).ask()
+    assert np.allclose(points, [[0.5, 1.0]])
+
+    class Grid(Middle):
+        name = "grid"
+
+    with pytest.raises(SearchError, match="already a method"):
+        register(Grid)
+
+
+@pytest.fixture(scope="module")
+def mini_free(mini: object) -> BoundSpace:
+    return SearchSpace({"coating.specularity": (0.0, 1.0)}).bind(mini)  # type: ignore[arg-type]
+
+
+@pytest.fixture(scope="module")
+def valley(mini: object) -> BoundSpace:
+    """Ten numbers: what they mean does not matter here."""
+    space = {f"lights.red.lights[{k // 3}].shift.{'xyz'[k % 3]}": (-1.0, 3.0) for k in range(10)}
+    return SearchSpace(space).bind(mini)  # type: ignore[arg-type]
