@@ -54,6 +54,8 @@ def find_coincident(
         tolerance: mm.
         facing: only faces that look at each other (solids that touch); else either way.
     """
+    if not boxes_overlap(first, second, -tolerance):
+        return Overlay(first, second, np.zeros((0, 2), dtype=np.int64))
     twins = _twins(first, second, tolerance)
     pairs = np.concatenate([twins, _near_pairs(first, second, tolerance, without=twins)])
     cosine = np.einsum(
@@ -77,6 +79,17 @@ def find_coincident(
     np.maximum.at(apart, patch, _heights(points[:, None], corners[others[patch]])[:, 0])
     whole[others] = _is_shape(patches) & (apart <= tolerance)
     return Overlay(first, second, pairs[whole])
+
+
+def boxes_overlap(first: TriangleMesh, second: TriangleMesh, depth: float) -> bool:
+    """Whether the boxes around two meshes have more than `depth` (mm) in common each way;
+    a negative depth is a gap that still counts.
+    """
+    if len(first.faces) == 0 or len(second.faces) == 0:
+        return False
+    low = np.maximum(first.bounds[0], second.bounds[0])
+    high = np.minimum(first.bounds[1], second.bounds[1])
+    return bool((high - low > depth).all())
 
 
 def cut(mesh: TriangleMesh, overlays: list[Overlay]) -> list[TriangleMesh]:

@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy import sparse
 
 from optisense.errors import MeshError
 
@@ -18,6 +17,9 @@ IntArray = NDArray[np.int32]
 
 WELD_DISTANCE = 1e-6
 """Vertices closer than this (mm) count as one when edges are compared."""
+
+CREASE = 40.0
+"""Degrees; sharper edges than this stay sharp in shading unless something else is asked."""
 
 _BOX_SIDES = (  # (axis across the side, the two axes in it, which end of the axis)
     (2, 0, 1, 1), (2, 1, 0, 0), (0, 1, 2, 1), (0, 2, 1, 0), (1, 2, 0, 1), (1, 0, 2, 0),
@@ -233,46 +235,24 @@ class TriangleMesh:
         wrong = np.einsum("ij,ij->i", shading, self.face_vectors) < 0.0
         return self.with_faces(np.where(wrong[:, None], self.faces[:, ::-1], self.faces))
 
-    def vertex_normals(self, crease: float = 40.0) -> TriangleMesh:
+    def vertex_normals(self, crease: float = CREASE) -> TriangleMesh:
         """Add smooth shading normals, kept apart across edges sharper than `crease` degrees.
 
-        Corner normals are averages over the faces around the vertex, weighted by the corner
-        angle (Thuermer and Wuethrich, J. Graphics Tools 3, 1998); vertices are split where
-        their corners disagree.
+        Vertices are split where their corners disagree; see `shading_normals`.
         """
-        corner_vertex = self.faces.reshape(-1)
-        n_corners = len(corner_vertex)
-        incidence = sparse.csr_matrix(
-            (np.ones(n_corners, np.int8), corner_vertex, np.arange(n_corners + 1)),
-            shape=(n_corners, len(self.vertices)),
-        )
-        pairs = (incidence @ incidence.T).tocoo()
-        normal = np.repeat(self.face_normals, 3, axis=0)
-        agree = np.einsum("ij,ij->i", normal[pairs.row], normal[pairs.col])
-        near = (agree >= np.cos(np.radians(crease))) | (pairs.row == pairs.col)
-        weights = sparse.csr_matrix(
-            (self._corner_angles()[pairs.col[near]], (pairs.row[near], pairs.col[near])),
-            shape=(n_corners, n_corners),
-        )
-        smooth = weights @ normal
-        length = np.linalg.norm(smooth, axis=1, keepdims=True)
-        smooth = np.where(length > 1e-12, smooth / np.maximum(length, 1e-12), normal)
-        key = np.column_stack([corner_vertex, np.round(smooth * 1e6).astype(np.int64)])
-        _, first, inverse = np.unique(key, axis=0, return_index=True, return_inverse=True)
-        return TriangleMesh(
-            self.vertices[corner_vertex[first]],
-            inverse.reshape(-1, 3).astype(np.int32),
-            smooth[first],
-        )
+        return self._smooth if crease == CREASE else self._smoothed(crease)
 
-    def _corner_angles(self) -> FloatArray:
-        """(3 m,) float64, radians: the angle of each face corner."""
-        corners = self.triangles
-        after = np.roll(corners, -1, axis=1) - corners
-        before = np.roll(corners, 1, axis=1) - corners
-        cross = np.linalg.norm(np.cross(after, before), axis=2)
-        angles: Any = np.arctan2(cross, np.einsum("ijk,ijk->ij", after, before))
-        return np.maximum(angles, 1e-9).reshape(-1)
+    @cached_property
+    def _smooth(self) -> TriangleMesh:
+        return self._smoothed(CREASE)
+
+    def _smoothed(self, crease: float) -> TriangleMesh:
+        from optisense.geometry.shading_normals import smooth_corners
+
+        vertex, faces, normals = smooth_corners(
+            self.triangles, self.faces, self.face_normals, crease
+        )
+        return TriangleMesh(self.vertices[vertex], faces, normals)
 
 
 def grid_faces(rows: int, columns: int) -> IntArray:

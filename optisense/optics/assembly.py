@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -15,7 +15,7 @@ from optisense.errors import DesignError
 from optisense.geometry import TriangleMesh
 from optisense.geometry.coplanar import merge_coplanar
 from optisense.optics.emitters import Emitter, Intensity, Shape, spot_intensity
-from optisense.optics.media import Sheet, Solid, resolve_media
+from optisense.optics.media import Media, Sheet, Solid
 from optisense.optics.ray_scene import Piece
 from optisense.optics.surfaces import Region, Surface, SurfaceKind
 
@@ -42,6 +42,8 @@ class Assembly:
         light_areas: mm^2 of the lights' windows, 0 for points.
         fine: for pieces of the sensing surface, by number, the same with all its triangles.
         ior_before: refractive index on the inner side of the (first) sensing surface.
+        media: the resolved boundaries.
+        kept: what else the assembly of a similar design can take over.
     """
 
     pieces: list[Piece]
@@ -52,10 +54,38 @@ class Assembly:
     light_areas: list[float]
     fine: dict[int, Piece]
     ior_before: float
+    media: Media
+    kept: Kept
 
 
-def assemble(design: SensorDesign) -> Assembly:
+@dataclass
+class Kept:
+    """Shapes worked out from meshes, with the meshes, which are recognised by identity."""
+
+    merged: list[tuple[TriangleMesh, TriangleMesh]] = field(default_factory=list)
+    pieces: list[tuple[TriangleMesh, Piece]] = field(default_factory=list)
+
+    def merge(self, mesh: TriangleMesh, before: Kept) -> TriangleMesh:
+        """A part's mesh, its flat faces merged."""
+        known = next((merged for old, merged in before.merged if old is mesh), None)
+        self.merged.append((mesh, _merged(mesh) if known is None else known))
+        return self.merged[-1][1]
+
+    def piece(self, name: str, mesh: TriangleMesh, surface: Surface, before: Kept) -> Piece:
+        """A mesh and its surface, for ray tracing."""
+        known = next((piece for old, piece in before.pieces if old is mesh), None)
+        if known is None or (known.name, known.surface) != (name, surface):
+            known = _piece(name, mesh, surface)
+        self.pieces.append((mesh, known))
+        return known
+
+
+def assemble(design: SensorDesign, before: Assembly | None = None) -> Assembly:
     """Resolve media, and turn parts and lights into surfaces and emitters.
+
+    Args:
+        design: the sensor.
+        before: the assembly of a similar design, from which what is the same is taken.
 
     Raises:
         DesignError: solids overlap without priority, or a light is not in the library.
@@ -63,11 +93,12 @@ def assemble(design: SensorDesign) -> Assembly:
     """
     meshes = design.deformed_meshes()
     solids, sheets, pieces, fine = [], [], [], {}
-    before: list[float] = []
+    indices: list[float] = []
+    kept, old = Kept(), Kept() if before is None else before.kept
     for name, part in design.parts.items():
         if name not in meshes:
             raise DesignError(f"part '{name}' has no mesh", where=design.where("parts", name))
-        mesh = _merged(meshes[name])
+        mesh = kept.merge(meshes[name], old)
         material = design.materials.get(part.material) if part.material else None
         if part.role in TRANSPARENT_SOLIDS:
             assert isinstance(material, Dielectric) and part.material is not None
@@ -77,24 +108,29 @@ def assemble(design: SensorDesign) -> Assembly:
         elif part.role is Role.INTERFACE:
             assert isinstance(material, Dielectric)
             surface = Surface(SurfaceKind.DIELECTRIC, eta=material.ior, alpha=material.roughness)
-            pieces.append(_piece(name, mesh, surface))
+            pieces.append(kept.piece(name, mesh, surface, old))
         elif part.role is not Role.INDENTER:
             sheets.append(Sheet(name, mesh, part.role.value))
-    for face in resolve_media(solids, sheets):
+    if before is not None and before.media.holds_for(solids, sheets):
+        media = before.media
+    else:
+        media = Media(solids, sheets)
+    for face in media.interfaces:
         surface = Surface(
             SurfaceKind.DIELECTRIC, eta=face.ior_inside / face.ior_outside, alpha=face.roughness
         )
-        pieces.append(_piece("/".join(face.names) + "|" + face.outside, face.mesh, surface))
+        name = "/".join(face.names) + "|" + face.outside
+        pieces.append(kept.piece(name, face.mesh, surface, old))
     for sheet in sheets:
         part = design.parts[sheet.name]
         ior = _index_before(sheet.mesh, solids)
         if part.role is Role.SENSING_SURFACE:
-            before.append(ior)
+            indices.append(ior)
             surface = coating_surface(design.coating, ior, Region.SENSING)
-            fine[len(pieces)] = _piece(sheet.name, meshes[sheet.name], surface)
+            fine[len(pieces)] = kept.piece(sheet.name, meshes[sheet.name], surface, old)
         else:
             surface = _opaque(design.materials.get(part.material or ""), ior)
-        pieces.append(_piece(sheet.name, sheet.mesh, surface))
+        pieces.append(kept.piece(sheet.name, sheet.mesh, surface, old))
     sensing = [meshes[name] for name in design.parts_of(Role.SENSING_SURFACE)]
     emitters, areas = _emitters(design)
     for number, emitter in enumerate(emitters):
@@ -108,7 +144,9 @@ def assemble(design: SensorDesign) -> Assembly:
         groups=list(design.lights),
         light_areas=areas,
         fine=fine,
-        ior_before=before[0],
+        ior_before=indices[0],
+        media=media,
+        kept=kept,
     )
 
 

@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 
 from optisense.errors import DesignError, MeshError
-from optisense.geometry.coincidence import Overlay, cut, find_coincident
+from optisense.geometry.coincidence import Overlay, boxes_overlap, cut, find_coincident
 from optisense.geometry.mesh import TriangleMesh
 
 COINCIDENCE_TOLERANCE = 0.002
@@ -114,23 +114,71 @@ def resolve_media(
         MeshError: a mesh is not closed or cuts through itself.
         DesignError: solids of different index overlap and have the same priority.
     """
-    solids = [replace(s, mesh=s.mesh.validate(s.name, closed=True)) for s in solids]
-    solids = _disjoint(solids, tolerance)
-    contacts = _contacts(solids, tolerance)
-    interfaces = []
-    for i, solid in enumerate(solids):
-        overlays = [
-            find_coincident(solid.mesh, sheet.mesh, tolerance, facing=False) for sheet in sheets
-        ]
-        partners = [j for j in range(len(solids)) if (i, j) in contacts]
-        overlays += [contacts[i, j] for j in partners]
-        pieces = cut(solid.mesh, overlays)[len(sheets) :]
-        neighbours = [solids[j] if j > i else None for j in partners]
-        for piece, neighbour in zip(pieces[:-1], neighbours, strict=True):
-            if neighbour is not None:  # each contact once, from the solid that comes first
-                interfaces.append(_interface(piece, solid, neighbour))
-        interfaces.append(_interface(pieces[-1], solid, None))
-    return [face for face in interfaces if _refracts(face)]
+    return Media(solids, sheets, tolerance).interfaces
+
+
+class Media:
+    """The resolved boundaries of solids and sheets, which knows whether others give the same.
+
+    Attributes:
+        interfaces: as `resolve_media` returns them.
+    """
+
+    def __init__(
+        self,
+        solids: Sequence[Solid],
+        sheets: Sequence[Sheet] = (),
+        tolerance: float = COINCIDENCE_TOLERANCE,
+    ) -> None:
+        """Resolve; arguments and errors are those of `resolve_media`."""
+        self._solids = list(solids)
+        self._tolerance = tolerance
+        closed = [replace(s, mesh=s.mesh.validate(s.name, closed=True)) for s in solids]
+        self._parted = _disjoint(closed, tolerance)
+        self._lying: list[Sheet] = []
+        self._loose: list[Sheet] = []
+        interfaces = self._resolve(list(sheets))
+        self.interfaces = [face for face in interfaces if _refracts(face)]
+
+    def _resolve(self, sheets: list[Sheet]) -> list[Interface]:
+        solids, tolerance = self._parted, self._tolerance
+        contacts = _contacts(solids, tolerance)
+        interfaces = []
+        lying = np.zeros(len(sheets), dtype=bool)
+        for i, solid in enumerate(solids):
+            overlays = [
+                find_coincident(solid.mesh, sheet.mesh, tolerance, facing=False) for sheet in sheets
+            ]
+            lying |= np.array([len(overlay.pairs) > 0 for overlay in overlays], dtype=bool)
+            partners = [j for j in range(len(solids)) if (i, j) in contacts]
+            overlays += [contacts[i, j] for j in partners]
+            pieces = cut(solid.mesh, overlays)[len(sheets) :]
+            neighbours = [solids[j] if j > i else None for j in partners]
+            for piece, neighbour in zip(pieces[:-1], neighbours, strict=True):
+                if neighbour is not None:  # each contact once, from the solid that comes first
+                    interfaces.append(_interface(piece, solid, neighbour))
+            interfaces.append(_interface(pieces[-1], solid, None))
+        self._lying = [sheet for sheet, lies in zip(sheets, lying, strict=True) if lies]
+        self._loose = [sheet for sheet, lies in zip(sheets, lying, strict=True) if not lies]
+        return interfaces
+
+    def holds_for(self, solids: Sequence[Solid], sheets: Sequence[Sheet]) -> bool:
+        """Whether these have the same interfaces, as far as can be told without resolving them.
+
+        So it is with the very same solids, when all sheets that lie on one are the same and
+        any others (a mirror in the open, say) touch none.
+        """
+        if list(solids) != self._solids:
+            return False
+        others = [sheet for sheet in sheets if sheet not in self._lying]
+        if len(others) + len(self._lying) != len(sheets):
+            return False
+        return not any(
+            len(find_coincident(solid.mesh, sheet.mesh, self._tolerance, facing=False).pairs)
+            for sheet in others
+            if sheet not in self._loose
+            for solid in self._parted
+        )
 
 
 def _interface(mesh: TriangleMesh, solid: Solid, neighbour: Solid | None) -> Interface:
@@ -167,7 +215,7 @@ def _disjoint(solids: list[Solid], tolerance: float) -> list[Solid]:
     """Cut each solid out of those of lower priority that it overlaps; highest priority first."""
     result = sorted(solids, key=lambda solid: -solid.priority)
     for i, j in combinations(range(len(solids)), 2):
-        if not _boxes_overlap(result[i].mesh, result[j].mesh, tolerance):
+        if not boxes_overlap(result[i].mesh, result[j].mesh, tolerance):
             continue
         one, other = _manifold(result[i]), _manifold(result[j])
         place = _overlap_place(one ^ other, tolerance)
@@ -197,14 +245,6 @@ def _grown(solid: Solid) -> Solid:
     step = np.linalg.solve(sums + 1e-3 * np.eye(3), rights[:, :, None])[:, :, 0]
     step /= np.maximum(1.0, np.linalg.norm(step, axis=1, keepdims=True) / 3.0)
     return replace(solid, mesh=mesh.with_vertices(mesh.vertices + CUT_CLEARANCE * step))
-
-
-def _boxes_overlap(first: TriangleMesh, second: TriangleMesh, tolerance: float) -> bool:
-    if len(first.faces) == 0 or len(second.faces) == 0:
-        return False
-    low = np.maximum(first.bounds[0], second.bounds[0])
-    high = np.minimum(first.bounds[1], second.bounds[1])
-    return bool((high - low > tolerance).all())
 
 
 def _overlap_place(common: Any, tolerance: float) -> tuple[float, ...] | None:

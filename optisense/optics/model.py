@@ -8,14 +8,14 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
 import mitsuba as mi
 import numpy as np
 
 from optisense import geometry
 from optisense.design import SensorDesign, set_value
-from optisense.errors import ContactError, RenderError
+from optisense.errors import ContactError, OptiSenseError, RenderError
 from optisense.geometry import (
     Contact,
     Indenter,
@@ -25,6 +25,7 @@ from optisense.geometry import (
     nine_places,
 )
 from optisense.optics.assembly import (
+    Assembly,
     assemble,
     coating_surface,
     indenter_piece,
@@ -95,29 +96,59 @@ class OpticalModel:
         self.design = design.copy()
         self._assemble()
 
-    def _assemble(self) -> None:
-        parts = assemble(self.design)
-        self.groups = parts.groups
-        self.sensing = parts.sensing
-        self.gels = parts.gels
-        self._light_areas = parts.light_areas
-        self._emitters = parts.emitters
-        self._pieces: list[Piece] = parts.pieces
-        self._ior_before = parts.ior_before
-        self._surfaces = [piece.surface for piece in parts.pieces]
+    def _assemble(self, before: Assembly | None = None) -> None:
+        self._parts = assemble(self.design, before)
+        self._surfaces = [piece.surface for piece in self._parts.pieces]
         self._surfaces.append(self._indenter_surface())
-        self._fields: FieldStore | None = None
         self._refresh_surfaces()
-        self.scene = RayScene(self._pieces, table=self._table)
+        self._forget("surface", "scene", "_fixed", "_fine", "_emitter_table", "_store")
+
+    @property
+    def groups(self) -> list[str]:
+        """The names of the light groups, in the order of layers."""
+        return self._parts.groups
+
+    @property
+    def sensing(self) -> TriangleMesh:
+        """The sensing surface in its current shape, with all its triangles."""
+        return self._parts.sensing
+
+    @property
+    def gels(self) -> list[TriangleMesh]:
+        """The elastomers in their current shape."""
+        return self._parts.gels
+
+    @property
+    def _pieces(self) -> list[Piece]:
+        return self._parts.pieces
+
+    @cached_property
+    def scene(self) -> RayScene:
+        """All that light meets in the sensor, nothing pressed in."""
+        return RayScene(self._pieces, table=self._table)
+
+    @cached_property
+    def _fixed(self) -> RayScene:
         opaque = [i for i, s in enumerate(self._surfaces[:-1]) if s.kind is SurfaceKind.OPAQUE]
-        self._fixed = RayScene([self._pieces[i] for i in opaque], opaque, self._table)
-        self._emitter_table: EmitterTable = emitter_table(parts.emitters, len(parts.groups))
-        self._fine_pieces = [parts.fine.get(i, piece) for i, piece in enumerate(self._pieces)]
-        self._sensing_faces = _sensing_faces(self._fine_pieces)
-        self._fine_scene: RayScene | None = None
+        return RayScene([self._pieces[i] for i in opaque], opaque, self._table)
+
+    @cached_property
+    def _fine(self) -> _FineScene:
+        fine = self._parts.fine
+        pieces = [fine.get(i, piece) for i, piece in enumerate(self._pieces)]
+        return _FineScene(pieces, RayScene(pieces, table=self._table), _sensing_faces(pieces))
+
+    @cached_property
+    def _emitter_table(self) -> EmitterTable:
+        return emitter_table(self._parts.emitters, len(self.groups))
+
+    def _forget(self, *names: str) -> None:
+        """Drop cached properties; they are made again when they are needed."""
+        for name in names:
+            self.__dict__.pop(name, None)
 
     def _indenter_surface(self) -> Surface:
-        return coating_surface(self.design.coating, self._ior_before, Region.INDENTER)
+        return coating_surface(self.design.coating, self._parts.ior_before, Region.INDENTER)
 
     def _refresh_surfaces(self) -> None:
         self._table = surface_table(self._surfaces)
@@ -133,32 +164,47 @@ class OpticalModel:
         Raises:
             DesignError: there is no such value, or it does not fit.
         """
-        changed = set_value(self.design, path, value)
-        section = path.split(".")[0]
-        leaf = path.rsplit(".", 1)[-1]
-        self.design = changed
-        if section in ("name", "description", "provenance"):
+        self.become(set_value(self.design, path, value))
+
+    def become(self, design: SensorDesign) -> None:
+        """Take on another design, redoing only what depends on the values that differ.
+
+        Fluxes and colours cost nothing, a coating or a camera little; a mirror or blocker that
+        touches no transparent part is bent or moved without resolving the media again. A design
+        that can't be built leaves the model as it was.
+
+        Args:
+            design: most useful when it is like the one before and shares its meshes.
+
+        Raises:
+            DesignError, MeshError, LibraryError: the design can't be built.
+        """
+        old = self.design
+        self.design = design.copy()
+        if _shapes(old) != _shapes(design) or old.meshes != design.meshes:
+            try:
+                self._assemble(self._parts)
+            except OptiSenseError:
+                self.design = old
+                raise
             return
-        if section == "lights" and leaf.split("[")[0] in ("flux", "colour", "r", "g", "b"):
-            return
-        if section == "camera":
-            self.__dict__.pop("surface", None)
-            self._fields = None
-            return
-        if section == "coating":
-            coat = coating_surface(changed.coating, self._ior_before, Region.SENSING)
-            self._surfaces = [
-                coat if surface.region is Region.SENSING else surface
-                for surface in self._surfaces[:-1]
-            ] + [self._indenter_surface()]
-            self._refresh_surfaces()
-            self.scene.table = self._fixed.table = self._table
-            self._fine_scene = None
-            if self._fields is not None:
-                self._fields.forget_light(self._coloured, self._metallic)
-            return
-        self.__dict__.pop("surface", None)
-        self._assemble()
+        if old.coating != design.coating:
+            self._recoat()
+        if old.camera != design.camera:
+            self._forget("surface", "_store")
+
+    def _recoat(self) -> None:
+        coat = coating_surface(self.design.coating, self._parts.ior_before, Region.SENSING)
+        self._surfaces = [
+            coat if surface.region is Region.SENSING else surface for surface in self._surfaces[:-1]
+        ] + [self._indenter_surface()]
+        self._refresh_surfaces()
+        for name in ("scene", "_fixed"):
+            if name in self.__dict__:
+                self.__dict__[name].table = self._table
+        self._forget("_fine")
+        if "_store" in self.__dict__:
+            self._store.forget_light(self._coloured, self._metallic)
 
     def camera(self, resolution: tuple[int, int] | None = None) -> RayCamera:
         """The design's camera, at another resolution (width, height) if asked."""
@@ -200,12 +246,10 @@ class OpticalModel:
         """Where each pixel looks, by ideal refraction and reflection; (h, w, ...) arrays."""
         if contacts:
             placed = [self.place(contact) for contact in contacts]
-            scene = self._with_indenters(self._fine_pieces, placed)
+            scene = self._with_indenters(self._fine.pieces, placed)
         else:
-            if self._fine_scene is None:
-                self._fine_scene = RayScene(self._fine_pieces, table=self._table)
-            scene = self._fine_scene
-        return trace_chief_rays(scene, self.camera(resolution), self._sensing_faces)
+            scene = self._fine.scene
+        return trace_chief_rays(scene, self.camera(resolution), self._fine.sensing_faces)
 
     def nine_contacts(self, indenter: Indenter | None = None, depth: float = 0.8) -> list[Contact]:
         """One contact at each of nine places that cover the visible sensing surface evenly.
@@ -261,20 +305,18 @@ class OpticalModel:
         numbers = [*range(number), *[number] * len(pieces)]
         return RayScene([*fixed, *pieces], numbers, self._table)
 
-    @property
+    @cached_property
     def _store(self) -> FieldStore:
-        if self._fields is None:
-            opaque = [p for p in self._pieces if p.surface.kind is SurfaceKind.OPAQUE]
-            rays = self.chief_rays((96, 72))
-            self._fields = FieldStore(
-                self.scene,
-                opaque,
-                self._emitter_table,
-                rays.points[rays.hit],
-                self._coloured,
-                self._metallic,
-            )
-        return self._fields
+        opaque = [p for p in self._pieces if p.surface.kind is SurfaceKind.OPAQUE]
+        rays = self.chief_rays((96, 72))
+        return FieldStore(
+            self.scene,
+            opaque,
+            self._emitter_table,
+            rays.points[rays.hit],
+            self._coloured,
+            self._metallic,
+        )
 
     def guide(self) -> Guide:
         """The photon guide, learned from a pilot pass on first use."""
@@ -344,7 +386,14 @@ class OpticalModel:
             field = self._store.field(seed, wanted, target, seconds, MOST_PHOTONS, began, tell)
             lit = time.perf_counter()
             layers = render_field(
-                field, scenes, camera, rays, self._emitters, self._light_areas, seed, only_contacts
+                field,
+                scenes,
+                camera,
+                rays,
+                self._parts.emitters,
+                self._parts.light_areas,
+                seed,
+                only_contacts,
             )
             layers.light_seconds = lit - built
         ended = time.perf_counter()
@@ -415,6 +464,22 @@ class OpticalModel:
             stop=stop,
         )
         return ImageLayers.from_sppm(result, rays, began)
+
+
+class _FineScene(NamedTuple):
+    """The sensor with every triangle of its sensing surface."""
+
+    pieces: list[Piece]
+    scene: RayScene
+    sensing_faces: np.ndarray
+
+
+def _shapes(design: SensorDesign) -> tuple[Any, ...]:
+    """What of a design its geometry and its lights' places depend on."""
+    lights = {
+        name: (group.model, group.emitter, group.lights) for name, group in design.lights.items()
+    }
+    return design.parts, design.materials, design.cages, lights
 
 
 def _ball(mesh: TriangleMesh) -> np.ndarray:

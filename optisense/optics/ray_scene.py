@@ -9,6 +9,7 @@ indenter never changes a compiled kernel.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import drjit as dr
 import mitsuba as mi
@@ -36,6 +37,28 @@ class Piece:
     faces: NDArray[np.integer]
     surface: Surface
     normals: FloatArray | None = None
+
+    @cached_property
+    def rows(self) -> NDArray[np.float32]:
+        """(m, 4) unit normals, and room for the surface's number."""
+        a, b, c = (self.vertices[self.faces[:, i]] for i in range(3))
+        cross = np.cross(b - a, c - a)
+        length = np.linalg.norm(cross, axis=1)
+        # A triangle without area is never hit; it keeps its place so that numbers stay those of
+        # the piece.
+        rows = np.zeros((len(self.faces), 4), dtype=np.float32)
+        rows[:, :3] = cross / np.where(length > 0, length, 1.0)[:, None]
+        return rows
+
+    @cached_property
+    def corners(self) -> NDArray[np.float32]:
+        """(m, 3, 4) corner normals, on the side of the face normal, and padding."""
+        corners = np.zeros((len(self.faces), 3, 4), dtype=np.float32)
+        if self.normals is not None:
+            corners[:, :, :3] = self.normals[self.faces]
+            against = np.einsum("fck,fk->fc", corners[:, :, :3], self.rows[:, :3]) < 0
+            corners[against] *= -1
+        return corners
 
 
 @dataclass
@@ -144,35 +167,20 @@ def leave(point: mi.Point3f, normal: mi.Vector3f, direction: mi.Vector3f) -> mi.
 def _merge(
     pieces: list[Piece], numbers: list[int]
 ) -> tuple[FloatArray, NDArray[np.uint32], NDArray[np.float32], NDArray[np.float32]]:
-    vertices, faces, rows, corners = [], [], [], []
+    vertices, faces, rows = [], [], []
     start = 0
     for number, piece in zip(numbers, pieces, strict=True):
-        points = np.asarray(piece.vertices, dtype=np.float64)
-        triangles = np.asarray(piece.faces, dtype=np.int64)
-        a, b, c = (points[triangles[:, i]] for i in range(3))
-        cross = np.cross(b - a, c - a)
-        length = np.linalg.norm(cross, axis=1)
-        # A triangle without area is never hit; it keeps its place so that numbers stay those of
-        # the piece.
-        normal = cross / np.where(length > 0, length, 1.0)[:, None]
-        row = np.zeros((len(triangles), 4), dtype=np.float32)
-        row[:, :3] = normal
-        corner = np.zeros((len(triangles), 3, 4), dtype=np.float32)
-        bits = number
-        if piece.normals is not None:
-            bits |= SMOOTH_FACE
-            corner[:, :, :3] = np.asarray(piece.normals)[triangles]
-            against = np.einsum("fck,fk->fc", corner[:, :, :3], normal) < 0
-            corner[against] *= -1
+        bits = number if piece.normals is None else number | SMOOTH_FACE
+        row = piece.rows.copy()
         row[:, 3] = np.array([bits], dtype=np.uint32).view(np.float32)
-        vertices.append(points)
-        faces.append(triangles + start)
+        vertices.append(np.asarray(piece.vertices, dtype=np.float32))
+        faces.append(np.asarray(piece.faces, dtype=np.uint32) + np.uint32(start))
         rows.append(row)
-        corners.append(corner)
-        start += len(points)
+        start += len(piece.vertices)
+    corners = [piece.corners for piece in pieces]
     return (
-        np.concatenate(vertices).astype(np.float32),
-        np.concatenate(faces).astype(np.uint32),
+        np.concatenate(vertices),
+        np.concatenate(faces),
         np.concatenate(rows),
         np.concatenate(corners),
     )

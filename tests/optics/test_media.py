@@ -6,6 +6,7 @@ that belongs there.
 """
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -13,7 +14,7 @@ import pytest
 from optisense.errors import DesignError, MeshError
 from optisense.geometry import TriangleMesh
 from optisense.geometry.rays import ray_hits
-from optisense.optics.media import Interface, Sheet, Solid, resolve_media
+from optisense.optics.media import Interface, Media, Sheet, Solid, resolve_media
 
 GEL, ACRYLIC = 1.41, 1.49
 
@@ -360,6 +361,22 @@ def test_a_mirror_between_two_solids_hides_the_faces_of_both() -> None:
     interfaces = resolve_media([gel, guide], [mirror])
     assert area(interfaces, "gel", "guide") == pytest.approx(36 - 4)
     assert area(interfaces, "gel") == area(interfaces, "guide") == pytest.approx(36 + 48)
+
+
+def test_boundaries_are_known_to_hold_only_while_moving_sheets_touch_no_solid() -> None:
+    gel = Solid("gel", box((-3, -3, 0), (3, 3, 2)), "silicone", GEL)
+    skin = Sheet("skin", TriangleMesh.grid((6, 6), height=2.0))
+
+    def mirror(height: float) -> Sheet:
+        return Sheet("mirror", TriangleMesh.grid((2, 2), height=height), "mirror")
+
+    media = Media([gel], [skin, mirror(-1.0)])
+    assert media.holds_for([gel], [skin, mirror(-0.5)])
+    assert media.holds_for([gel], [mirror(-0.5), skin])
+    assert not media.holds_for([gel], [skin, mirror(0.0)])
+    assert not media.holds_for([gel], [mirror(-0.5)])
+    assert not media.holds_for([replace(gel, ior=1.5)], [skin, mirror(-1.0)])
+    assert not Media([gel], [skin, mirror(0.0)]).holds_for([gel], [skin, mirror(-1.0)])
 
 
 def test_shading_normals_live_on_in_cut_faces() -> None:

@@ -9,7 +9,7 @@ import pytest
 
 from optisense import Contact, OpticalModel, SensorDesign, Sphere
 from optisense.design import set_value
-from optisense.errors import RenderError
+from optisense.errors import LibraryError, RenderError
 from optisense.optics import TactileImage
 from optisense.sensors import BUILDERS
 
@@ -123,6 +123,38 @@ def test_an_updated_coating_renders_as_a_new_model_of_the_changed_design() -> No
     # Noise is a part of what the change makes.
     error = np.sqrt(((got - expected) ** 2).mean())
     assert error < 0.3 * np.sqrt(((plain - expected) ** 2).mean())
+
+
+def test_a_model_that_became_another_design_sees_what_a_new_model_of_it_sees() -> None:
+    start = BUILDERS["gelsight-svelte"]()
+    used = OpticalModel(start, "llvm")
+    used.chief_rays(PIXELS)
+    for path, value, resolved_anew in (
+        ("cages.M1.blend", 0.3, False),
+        ("camera.fov", 50.0, False),
+        ("lights.red.flux", 3.0, False),
+        ("materials.silicone-xp565.ior", 1.5, True),
+        ("coating.specularity", 0.7, False),
+    ):
+        start = set_value(start, path, value)
+        media = used._parts.media
+        used.become(start)
+        assert (used._parts.media is not media) == resolved_anew
+        fresh = OpticalModel(start, "llvm")
+        got, expected = used.chief_rays(PIXELS), fresh.chief_rays(PIXELS)
+        assert np.array_equal(got.outcome, expected.outcome)
+        assert np.array_equal(got.points, expected.points)
+        assert np.array_equal(got.face, expected.face)
+        assert np.array_equal(used.surface.origin, fresh.surface.origin)
+
+
+def test_a_design_that_cannot_be_built_leaves_the_model_as_it_was() -> None:
+    used = OpticalModel(design(), "llvm")
+    before = used.chief_rays(PIXELS).points
+    with pytest.raises(LibraryError):
+        used.update("lights.red.model", "no-such-led")
+    assert used.design.lights["red"].model == design().lights["red"].model
+    assert np.array_equal(used.chief_rays(PIXELS).points, before)
 
 
 def test_a_contact_leaves_no_trace_in_the_next_image() -> None:

@@ -1,0 +1,94 @@
+"""Smooth shading normals of a mesh, kept apart across its sharp edges.
+
+Corner normals are averages over the faces around the vertex, weighted by the corner angle
+(Thuermer and Wuethrich, "Computing vertex normals from polygonal facets", J. Graphics Tools 3,
+1998); vertices are split where their corners disagree.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+FloatArray = NDArray[np.float64]
+
+SAME_NORMAL = 1e-6
+"""Corners of a vertex whose normals differ by less share it."""
+
+
+def smooth_corners(
+    triangles: FloatArray, faces: NDArray[np.integer], normals: FloatArray, crease: float
+) -> tuple[NDArray[np.integer], NDArray[np.int32], FloatArray]:
+    """Corner normals, and the vertices split where they disagree.
+
+    Args:
+        triangles: (m, 3, 3) mm, face, corner, coordinate.
+        faces: (m, 3) vertex numbers.
+        normals: (m, 3) unit face normals.
+        crease: degrees; faces around a vertex that differ by more are not averaged.
+
+    Returns:
+        (k,) the old number of each new vertex; (m, 3) int32 faces over the new ones; (k, 3)
+        their unit normals.
+    """
+    vertex = faces.reshape(-1)
+    count = int(vertex.max()) + 1 if len(vertex) else 0
+    normal = np.repeat(normals, 3, axis=0)
+    weighted = corner_angles(triangles)[:, None] * normal
+    total = np.column_stack([np.bincount(vertex, weighted[:, k], count) for k in range(3)])
+    length = np.linalg.norm(total, axis=1, keepdims=True)
+    mean: FloatArray = total / np.where(length > 0, length, 1.0)
+    # Faces within half the crease of their mean are within the crease of each other: the usual
+    # case by far, which needs no look at pairs.
+    lowest = np.full(count, np.inf)
+    np.minimum.at(lowest, vertex, np.einsum("ij,ij->i", mean[vertex], normal))
+    plain = (lowest >= np.cos(np.radians(crease / 2))) & np.isfinite(lowest)
+
+    new = np.full(count, -1, dtype=np.int64)
+    kept = np.flatnonzero(plain)
+    new[kept] = np.arange(len(kept))
+    corner = new[vertex]
+    others = np.flatnonzero(corner < 0)
+    if not len(others):
+        return kept, corner.reshape(-1, 3).astype(np.int32), mean[kept]
+    split = _averaged(vertex[others], weighted[others], normal[others], crease)
+    key = np.column_stack([vertex[others], np.round(split / SAME_NORMAL).astype(np.int64)])
+    _, first, inverse = np.unique(key, axis=0, return_index=True, return_inverse=True)
+    corner[others] = len(kept) + inverse.reshape(-1)
+    return (
+        np.concatenate([kept, vertex[others][first]]),
+        corner.reshape(-1, 3).astype(np.int32),
+        np.concatenate([mean[kept], split[first]]),
+    )
+
+
+def _averaged(
+    vertex: NDArray[np.integer], weighted: FloatArray, normal: FloatArray, crease: float
+) -> FloatArray:
+    """(c, 3) each corner's mean over those corners of its vertex within the crease."""
+    count = len(vertex)
+    incidence = sparse.csr_matrix(
+        (np.ones(count, np.int8), vertex, np.arange(count + 1)),
+        shape=(count, int(vertex.max()) + 1),
+    )
+    pairs = (incidence @ incidence.T).tocoo()
+    agree = np.einsum("ij,ij->i", normal[pairs.row], normal[pairs.col])
+    near = (agree >= np.cos(np.radians(crease))) | (pairs.row == pairs.col)
+    join = sparse.csr_matrix(
+        (np.ones(int(near.sum())), (pairs.row[near], pairs.col[near])), shape=(count, count)
+    )
+    smooth = join @ weighted
+    length = np.linalg.norm(smooth, axis=1, keepdims=True)
+    return np.asarray(np.where(length > 1e-12, smooth / np.maximum(length, 1e-12), normal))
+
+
+def corner_angles(triangles: FloatArray) -> FloatArray:
+    """(3 m,) float64, radians: the angle of each face corner of triangles (m, 3, 3)."""
+    edges = [triangles[:, (k + 1) % 3] - triangles[:, k] for k in range(3)]
+    twice_area = np.linalg.norm(np.cross(edges[0], edges[1]), axis=1)
+    angles = np.empty((len(triangles), 3))
+    for corner in range(3):  # between the edge that leaves it and the one that arrives
+        along = -np.einsum("ij,ij->i", edges[corner], edges[corner - 1])
+        angles[:, corner] = np.arctan2(twice_area, along)
+    return np.maximum(angles, 1e-9).reshape(-1)
