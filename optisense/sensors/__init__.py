@@ -1,5 +1,6 @@
 """Built-in sensors: functions that build a SensorDesign from a few dimensions."""
 
+from optisense.sensors.gelbelt import gelbelt
 from optisense.sensors.gelsight360 import gelsight360
 from optisense.sensors.gelsight_mini import (
     gelsight_mini,
@@ -13,6 +14,7 @@ __all__ = [
     "BUILDERS",
     "build",
     "check",
+    "gelbelt",
     "gelsight360",
     "gelsight_mini",
     "gelsight_mini_cylindrical",

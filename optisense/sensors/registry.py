@@ -10,6 +10,7 @@ from optisense.design import Problem, SensorDesign, check_design, load_design, s
 from optisense.design.near import suggestion
 from optisense.design.problems import raise_problems
 from optisense.errors import DesignError
+from optisense.sensors.gelbelt import gelbelt
 from optisense.sensors.gelsight360 import gelsight360
 from optisense.sensors.gelsight_mini import (
     gelsight_mini,
@@ -19,6 +20,7 @@ from optisense.sensors.gelsight_mini import (
 from optisense.sensors.gelsight_svelte import gelsight_svelte
 
 BUILDERS: dict[str, Callable[[], SensorDesign]] = {
+    "gelbelt": gelbelt,
     "gelsight360": gelsight360,
     "gelsight-mini": gelsight_mini,
     "gelsight-mini-cylindrical": gelsight_mini_cylindrical,

@@ -1,0 +1,303 @@
+"""GelBelt: a soft belt that runs over two wheels and slides across a fixed acrylic window.
+
+Frame: origin at the centre of the sensing surface, +z out of the sensor, x along the belt's way,
+y along the wheels' axes. From outside in: coating, gel, clear tape, a film of air, acrylic, air,
+camera. The camera sits inside the loop of the belt. The green LEDs are at -x.
+
+The belt is not cast onto the acrylic but slides on it. The film of air between them keeps light
+that was sent into the side of the acrylic from entering the belt: it is totally reflected.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from optisense import library
+from optisense.design import (
+    Absorber,
+    Camera,
+    Dielectric,
+    LightGroup,
+    Part,
+    Role,
+    SensorDesign,
+)
+from optisense.geometry import TriangleMesh
+from optisense.sensors.belt_path import BeltHalf, Bend, Straight, mirrored_and_joined, trace
+from optisense.sensors.dimensions import require_positive
+from optisense.sensors.gelbelt_checks import (
+    LED_LENGTH,
+    SENSOR,
+    check_camera,
+    check_leds,
+    check_numbers,
+    check_wheels,
+)
+from optisense.sensors.gelbelt_sources import gelbelt_sources
+from optisense.sensors.led_flux import nominal_flux
+from optisense.sensors.shapes import ribbon, rod, row_of_lights, strip
+
+GEL, TAPE, FILM, WINDOW, BLACK = (
+    "silicone-xp565",
+    "clear-tape",
+    "air-film",
+    "acrylic",
+    "black-absorber",
+)
+LED = "smd-3528"
+
+RED, GREEN, BLUE = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
+ALONG_X, ALONG_Y = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0)
+TAPE_INDEX = 1.49
+
+ROLLER_CLEARANCE = 1.0
+"""mm between the window and the small roller."""
+WHEEL_GAP = 0.02
+"""mm of air between belt and wheels, at least."""
+BESIDE_WINDOW = 0.5
+"""mm from the edge of the window to where green light is aimed in light design 2."""
+BEHIND_ROLLER = 2.0
+"""mm from the roller to where green light is aimed in light design 3."""
+GREEN_LEAD = 3.0
+"""How many times red and blue green shines: it comes from one end of a longer way."""
+WRAP = 90.0
+"""Degrees by which the belt is turned where it is no longer drawn."""
+
+
+def gelbelt(
+    *,
+    light_design: int = 3,
+    window_size: tuple[float, float] = (50.0, 36.0),
+    window_thickness: float = 6.0,
+    gel_thickness: float = 3.0,
+    tape_thickness: float = 0.05,
+    film_thickness: float = 0.02,
+    wheel_radius: float = 25.0,
+    wheel_distance: float = 90.0,
+    roller_radius: float = 1.0,
+    deflection: float = 35.0,
+    incline: float = 25.0,
+    pupil_distance: float = 42.0,
+    fov: float = 62.2,
+    resolution: tuple[int, int] = (320, 240),
+    leds_per_group: int = 8,
+    led_pitch: float = 4.0,
+    led_gap: float = 0.2,
+    led_flux: tuple[float, float, float] | None = None,
+    green_distance: float = 2.5,
+    green_angle: float = 45.0,
+    reflectance: float = 0.7,
+    specularity: float = 0.2,
+    tessellation: float = 2.0,
+) -> SensorDesign:
+    """A GelBelt.
+
+    Args:
+        light_design: where the LEDs are, as in the OptiSense paper. 1: on the sides of the
+            acrylic. 2: red and blue on the sides of the belt; green next to the acrylic, shining
+            at an angle through the inner face of the belt. 3: as 2, but behind the green LEDs'
+            side of the acrylic a small roller turns the belt down, and green enters behind it.
+        window_size: mm, along x and y, of the acrylic; the belt is as wide as it.
+        window_thickness: mm, of the acrylic.
+        gel_thickness: mm.
+        tape_thickness: mm, of the clear tape on the inner face of the belt.
+        film_thickness: mm of air between tape and acrylic, and between tape and wheels; 0 lets
+            the tape lie on the acrylic in optical contact.
+        wheel_radius: mm.
+        wheel_distance: mm, between the wheels' axes in light designs 1 and 2.
+        roller_radius: mm, of the small roller of light design 3.
+        deflection: degrees by which that roller turns the belt.
+        incline: mm, the straight way of the belt from the roller to its wheel.
+        pupil_distance: mm, from the sensing surface to the camera's entrance pupil.
+        fov: degrees, across the image width.
+        resolution: pixels, width and height.
+        leds_per_group: LEDs in each of the three rows.
+        led_pitch: mm, between LEDs of a row.
+        led_gap: mm of air between an LED's window and what it faces; must be above 0.
+        led_flux: mW, radiant, of each red, green and blue LED; None lets green shine as the
+            library says and dims red and blue to a third of it.
+        green_distance: mm, from the green LEDs to the belt in light designs 2 and 3.
+        green_angle: degrees between green light and the normal of the belt it meets, towards
+            the window.
+        reflectance: of the coating's diffuse part, 0 to 1.
+        specularity: of the coating, 0 to 1.
+        tessellation: mm, about the edge length of the triangles.
+
+    Raises:
+        DesignError: dimensions that contradict one another; says which.
+    """
+    require_positive(
+        SENSOR,
+        window_length=window_size[0],
+        window_width=window_size[1],
+        window_thickness=window_thickness,
+        gel_thickness=gel_thickness,
+        tape_thickness=tape_thickness,
+        wheel_radius=wheel_radius,
+        wheel_distance=wheel_distance,
+        roller_radius=roller_radius,
+        incline=incline,
+        pupil_distance=pupil_distance,
+        leds_per_group=leds_per_group,
+        led_pitch=led_pitch,
+        led_gap=led_gap,
+        green_distance=green_distance,
+        tessellation=tessellation,
+    )
+    if led_flux is None:
+        most = nominal_flux(LED, "green")
+        led_flux = round(most / GREEN_LEAD, 3), most, round(most / GREEN_LEAD, 3)
+    check_numbers(
+        light_design,
+        film_thickness,
+        fov,
+        deflection,
+        green_angle,
+        (reflectance, specularity),
+        led_flux,
+    )
+    level = -gel_thickness - tape_thickness
+    window_top = level - film_thickness
+    window_bottom = window_top - window_thickness
+    half = 0.5 * window_size[0], 0.5 * window_size[1]
+    check_camera(pupil_distance, -window_bottom, 2.0 * wheel_radius - level)
+    check_leds(
+        (leds_per_group - 1) * led_pitch + LED_LENGTH,
+        window_size,
+        window_thickness if light_design == 1 else gel_thickness,
+    )
+    plain = trace([Straight(0.5 * wheel_distance), Bend(wheel_radius, WRAP)], level, tessellation)
+    bent = trace(
+        [
+            Straight(half[0] + ROLLER_CLEARANCE + roller_radius),
+            Bend(roller_radius, deflection),
+            Straight(incline),
+            Bend(wheel_radius, WRAP - deflection),
+        ],
+        level,
+        tessellation,
+    )
+    left = bent if light_design == 3 else plain
+    for half_belt in (left, plain):
+        check_wheels(half_belt, (half[0], window_bottom), pupil_distance, fov)
+
+    middle = 0.5 * (window_top + window_bottom) if light_design == 1 else -0.5 * gel_thickness
+    # As the belt's halves, the green row is worked out on the right and then mirrored.
+    green, shine = np.array([half[0] + led_gap, middle]), np.array([-1.0, 0.0])
+    if light_design == 2:
+        target = np.array([half[0] + BESIDE_WINDOW, level])
+        green, shine = _aimed(target, green_angle, green_distance)
+    elif light_design == 3:
+        start, end = bent.points[bent.starts[2]], bent.points[bent.starts[3]]
+        target = start + BEHIND_ROLLER / incline * (end - start)
+        green, shine = _aimed(target, green_angle - deflection, green_distance)
+    (x, z), (dx, dz) = green.tolist(), shine.tolist()
+    row, side = (leds_per_group, led_pitch), half[1] + led_gap
+    rows = {
+        # The camera looks along +z with +y up, so the picture's right is -x.
+        "red": (RED, row_of_lights((0.0, side, middle), ALONG_X, *row, (0.0, -1.0, 0.0))),
+        "green": (GREEN, row_of_lights((-x, 0.0, z), ALONG_Y, *row, (-dx, 0.0, dz))),
+        "blue": (BLUE, row_of_lights((0.0, -side, middle), ALONG_X, *row, (0.0, 1.0, 0.0))),
+    }
+    coating = library.coating("semi-specular").model_copy(
+        update={"reflectance": (reflectance,) * 3, "specularity": specularity}
+    )
+    design = SensorDesign(
+        name=SENSOR,
+        description=f"GelBelt, light design {light_design}",
+        coating=coating,
+        materials={
+            GEL: library.material(GEL),
+            TAPE: Dielectric(ior=TAPE_INDEX),
+            FILM: Dielectric(ior=1.0),
+            WINDOW: library.material(WINDOW),
+            BLACK: Absorber(),
+        },
+        parts={
+            "skin": Part(role=Role.SENSING_SURFACE, mesh="meshes/skin.obj"),
+            "gel": Part(role=Role.ELASTOMER, mesh="meshes/gel.obj", material=GEL),
+            "tape": Part(role=Role.SUPPORT, mesh="meshes/tape.obj", material=TAPE),
+            "film": Part(role=Role.SUPPORT, mesh="meshes/film.obj", material=FILM),
+            "window": Part(role=Role.SUPPORT, mesh="meshes/window.obj", material=WINDOW),
+            "wheels": Part(role=Role.BLOCKER, mesh="meshes/wheels.obj", material=BLACK),
+            "far-coat": Part(role=Role.BLOCKER, mesh="meshes/far-coat.obj", material=BLACK),
+        },
+        lights={
+            name: LightGroup(model=LED, colour=colour, flux=flux, lights=lights)
+            for (name, (colour, lights)), flux in zip(rows.items(), led_flux, strict=True)
+        },
+        camera=Camera(
+            model="pi-v2",
+            fov=fov,
+            resolution=resolution,
+            position=(0.0, 0.0, -pupil_distance),
+            direction=(0.0, 0.0, 1.0),
+            up=(0.0, 1.0, 0.0),
+        ),
+        provenance=gelbelt_sources(light_design),
+    )
+    design.meshes.update(
+        _belt(left, plain, (tape_thickness, gel_thickness), half[1], tessellation),
+        window=TriangleMesh.box((-half[0], -half[1], window_bottom), (*half, window_top)),
+        wheels=_wheels(left, plain, max(film_thickness, WHEEL_GAP), half[1], tessellation),
+    )
+    if film_thickness > 0.0:
+        design.meshes["film"] = TriangleMesh.box((-half[0], -half[1], window_top), (*half, level))
+    else:
+        del design.parts["film"], design.materials[FILM]
+        del design.provenance["parts.film"], design.provenance[f"materials.{FILM}.ior"]
+    return design
+
+
+def _aimed(
+    target: NDArray[np.float64], angle: float, distance: float
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Where a light must be, and where it shines, to meet `target` at `angle` degrees from +z,
+    coming from +x, `distance` mm away; all (2,) in x and z."""
+    shine = np.array([-math.sin(math.radians(angle)), math.cos(math.radians(angle))])
+    return target - distance * shine, shine
+
+
+def _belt(
+    left: BeltHalf,
+    right: BeltHalf,
+    layers: tuple[float, float],
+    half_width: float,
+    tessellation: float,
+) -> dict[str, TriangleMesh]:
+    """Tape, gel and the coating on common points; the skin is the coat that is on no wheel.
+
+    Args:
+        left: as if it lay on the right.
+        layers: mm, thickness of tape and gel.
+    """
+    tape, gel = layers
+    inner, middle, outer = (
+        mirrored_and_joined(left.raised(height), right.raised(height))
+        for height in (0.0, tape, tape + gel)
+    )
+    rows = math.ceil(2.0 * half_width / tessellation)
+    first = len(left.points) - 1 - left.starts[-2]
+    last = len(left.points) - 1 + right.starts[-2]
+    far = [ribbon(outer[: first + 1], half_width, rows), ribbon(outer[last:], half_width, rows)]
+    return {
+        "skin": ribbon(outer[first : last + 1], half_width, rows).flipped(),
+        "far-coat": TriangleMesh.joined(far).flipped(),
+        "gel": strip(middle, outer, half_width, rows),
+        "tape": strip(inner, middle, half_width, rows),
+    }
+
+
+def _wheels(
+    left: BeltHalf, right: BeltHalf, gap: float, half_width: float, tessellation: float
+) -> TriangleMesh:
+    """Both wheels, and the small roller where there is one."""
+    rods = []
+    for half, side in ((left, -1.0), (right, 1.0)):
+        for number in half.bends:
+            wheel = rod(half.wheel(number, gap, tessellation), half_width)
+            rods.append(wheel.transformed(np.diag([side, 1.0, 1.0])))
+    return TriangleMesh.joined(rods)

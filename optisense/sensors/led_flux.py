@@ -1,0 +1,42 @@
+"""How brightly the LEDs of the built-in sensors shine where no source says it."""
+
+from __future__ import annotations
+
+from optisense import library
+from optisense.errors import DesignError
+from optisense.library import LightEntry
+
+BALANCED = (
+    "what the LED's weakest colour gives at its nominal current (library); the brighter colours "
+    "are taken to be dimmed to it with resistors, as on boards of sister sensors"
+)
+"""The source of a flux from `balanced_flux`."""
+
+
+def balanced_flux(model: str) -> float:
+    """The radiant flux (mW) that an LED gives in each of its colours.
+
+    Boards of GelSight sensors bring their colours to one brightness with resistors (the published
+    board of GraspEveryThing has 45, 400 and 600 ohm for red, green and blue): the weakest colour
+    runs at its nominal current.
+
+    Args:
+        model: a light of the library.
+    """
+    return min(_nominal(model).values())
+
+
+def nominal_flux(model: str, colour: str) -> float:
+    """The radiant flux (mW) of one colour ("red", ...) of an LED at its nominal current."""
+    return _nominal(model)[colour]
+
+
+def _nominal(model: str) -> dict[str, float]:
+    entry = library.entry("light", model)
+    assert isinstance(entry, LightEntry)
+    known = {name: light.flux for name, light in entry.typical.items() if light.flux is not None}
+    if not known:
+        raise DesignError(
+            f"the library knows no flux of the light '{model}'", hint="Give led_flux in mW"
+        )
+    return known
