@@ -1,0 +1,239 @@
+"""Errors of making: how a manufactured sensor may differ from its design."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from optisense.design import SensorDesign, set_value
+from optisense.errors import DesignError, SearchError
+from optisense.search.expand import Parameter, expand
+from optisense.search.parameters import Around, CagePoints, Continuous, Integer
+from optisense.search.space import BoundSpace, SearchSpace
+
+FloatArray = NDArray[np.float64]
+
+CUT = 3.0
+"""A normal error is cut at so many standard deviations: what is farther off is thrown away."""
+
+SAMPLES = 8
+"""Manufactured sensors that are tried for each trial of a search."""
+
+ALL_LIGHTS = {"position": "shift", "angle": "turn"}
+"""`lights.position` and `lights.angle`, and those of a group, speak of each light by itself."""
+
+
+@dataclass(frozen=True)
+class Spread:
+    """How far a value may be off.
+
+    Attributes:
+        size: standard deviation of a normal error, or the limit of an even one, in the value's
+            unit (mm, degrees).
+        kind: "normal" (cut at three standard deviations) or "even" (all errors up to the limit).
+    """
+
+    size: float
+    kind: Literal["normal", "even"] = "normal"
+
+    def __post_init__(self) -> None:
+        if not (np.isfinite(self.size) and self.size > 0.0):
+            raise SearchError(f"an error of {self.size} is not a number above 0")
+        if self.kind not in ("normal", "even"):
+            raise SearchError(f"'{self.kind}' errors are not known", hint="normal or even")
+
+    @property
+    def reach(self) -> float:
+        """The largest error."""
+        return self.size * (CUT if self.kind == "normal" else 1.0)
+
+    def errors(self, share: FloatArray) -> FloatArray:
+        """Errors whose distribution function has the value `share` (0 to 1)."""
+        if self.kind == "even":
+            return np.asarray((2.0 * share - 1.0) * self.size)
+        from scipy.stats import truncnorm  # takes a second to load
+
+        return np.asarray(truncnorm.ppf(share, -CUT, CUT) * self.size)
+
+
+class MakingErrors:
+    """Everything that may come out other than designed, by path.
+
+    A path is one that may be varied (a number, a vector, the points of a cage, the shift or turn
+    of a group, a part or the camera), or `lights.position` and `lights.angle` for each light by
+    itself, of all groups or as `lights.GROUP.position` of one.
+    """
+
+    def __init__(self, spreads: Mapping[str, Spread | float]) -> None:
+        """Name the errors; a plain number is a standard deviation.
+
+        Raises:
+            SearchError: there is none, or a size makes no sense.
+        """
+        self.spreads: dict[str, Spread] = {}
+        for path, given in spreads.items():
+            try:
+                self.spreads[path] = given if isinstance(given, Spread) else Spread(float(given))
+            except SearchError as error:
+                raise SearchError(error.message, where=path, hint=error.hint) from None
+        if not self.spreads:
+            raise SearchError("there are no errors of making", hint="Name one: --error PATH=SIZE")
+
+    @property
+    def sources(self) -> list[str]:
+        """The paths, as given."""
+        return list(self.spreads)
+
+    def bind(self, design: SensorDesign) -> BoundErrors:
+        """The errors of one design.
+
+        Raises:
+            DesignError: a path leads nowhere; names the near match.
+            SearchError: what it names takes no error.
+        """
+        return BoundErrors(self, design)
+
+    def to_plain(self) -> dict[str, Any]:
+        """JSON-ready."""
+        return {path: [each.kind, each.size] for path, each in self.spreads.items()}
+
+    @staticmethod
+    def from_plain(data: Mapping[str, Any]) -> MakingErrors:
+        """The errors of `to_plain`'s values."""
+        return MakingErrors({path: Spread(size, kind) for path, (kind, size) in data.items()})
+
+
+class BoundErrors:
+    """Errors of making for one design.
+
+    Attributes:
+        sources: the paths as given.
+        owner: (d,) for each number that may be off, which source it belongs to.
+    """
+
+    def __init__(self, errors: MakingErrors, design: SensorDesign) -> None:
+        """See `MakingErrors.bind`."""
+        self.sources = errors.sources
+        self._spreads = [errors.spreads[source] for source in self.sources]
+        ranges: dict[str, Any] = {}
+        owner: list[int] = []
+        prepared = design
+        for number, (source, spread) in enumerate(errors.spreads.items()):
+            for path in _paths(design, source):
+                if path in ranges:
+                    raise SearchError(f"'{path}' is off twice", where=source)
+                prepared, found = expand(prepared, path, _all_points(path, spread))
+                ranges |= {each.name: _limits(prepared, each, source) for each in found}
+                owner += [number] * len(found)
+        self.owner = np.array(owner)
+        self._space = _ErrorSpace(SearchSpace(ranges), prepared)
+
+    @property
+    def size(self) -> int:
+        """d: how many numbers may be off."""
+        return len(self.owner)
+
+    def errors(self, shares: FloatArray) -> FloatArray:
+        """(k, d) errors, in the unit of each value, for shares (k, d) from 0 to 1."""
+        columns = [
+            self._spreads[owner].errors(shares[:, k]) for k, owner in enumerate(self.owner.tolist())
+        ]
+        return np.stack(columns, axis=1)
+
+    def apply(self, errors: FloatArray) -> SensorDesign:
+        """The design with these errors (d,); what is impossible is cut off (a negative index).
+
+        Raises:
+            OptiSenseError: the values do not fit together.
+        """
+        space = self._space
+        point = np.clip(space.now + errors, space.lower, space.upper)
+        return space.apply(point)
+
+
+class _ErrorSpace(BoundSpace):
+    """A space whose bounds are those of what is possible.
+
+    Attributes:
+        now: (d,) the values of the design.
+    """
+
+    def __init__(self, space: SearchSpace, design: SensorDesign) -> None:
+        super().__init__(space, design, tried=False)
+        self.now = self.start
+
+
+def even_shares(count: int, size: int, seed: int) -> FloatArray:
+    """(count, size) shares from 0 to 1, each number spread evenly over its range (Latin
+    hypercube: McKay, Beckman and Conover, "A comparison of three methods for selecting values of
+    input variables", 1979).
+    """
+    from scipy.stats import qmc
+
+    shares = qmc.LatinHypercube(size, seed=np.random.default_rng([seed, size])).random(count)
+    return np.clip(shares, 1e-9, 1.0 - 1e-9)
+
+
+def _paths(design: SensorDesign, source: str) -> list[str]:
+    """What a source names: itself, or one path a light."""
+    match = re.fullmatch(r"lights(?:\.([^.\[\]]+))?\.(position|angle)", source)
+    if match is None:
+        return [source]
+    group, what = match.groups()
+    if group is not None and group not in design.lights:
+        raise DesignError(
+            f"'{source}' leads nowhere: there is no light group '{group}'",
+            hint="Known: " + ", ".join(design.lights),
+        )
+    return [
+        f"lights.{name}.lights[{index}].{ALL_LIGHTS[what]}"
+        for name in (design.lights if group is None else [group])
+        for index in range(len(design.lights[name].lights))
+    ]
+
+
+def _all_points(path: str, spread: Spread) -> Around | CagePoints:
+    around = Around(spread.reach)
+    return CagePoints(around) if re.fullmatch(r"cages\.[^.]+\.points", path) else around
+
+
+def _limits(design: SensorDesign, parameter: Parameter, source: str) -> Continuous | Around:
+    """The range of a number with errors, cut where the design refuses it."""
+    kind = parameter.kind
+    if isinstance(kind, Integer) or not isinstance(kind, Continuous):
+        raise SearchError("a whole number or a name has no error of making", where=source)
+    if parameter.handle is not None or parameter.name.startswith("cages."):
+        return kind
+    name, now = parameter.name, parameter.start
+    low = _farthest(design, name, now, kind.low)
+    high = _farthest(design, name, now, kind.high)
+    if low >= high:
+        raise SearchError("this value can't be off", where=source)
+    return Continuous(low, high)
+
+
+def _farthest(design: SensorDesign, path: str, now: float, wanted: float) -> float:
+    """The value nearest to `wanted` that the design takes, by halving."""
+    if _fits(design, path, wanted):
+        return wanted
+    good, bad = now, wanted
+    for _ in range(50):
+        middle = 0.5 * (good + bad)
+        if _fits(design, path, middle):
+            good = middle
+        else:
+            bad = middle
+    return good
+
+
+def _fits(design: SensorDesign, path: str, value: float) -> bool:
+    try:
+        set_value(design, path, value)
+    except DesignError:
+        return False
+    return True
