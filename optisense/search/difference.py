@@ -1,0 +1,99 @@
+"""Whether two designs are the same, and where they differ."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from typing import Any
+
+import numpy as np
+
+from optisense.design import IesEmitter, SensorDesign
+from optisense.design.sensor_design import dotted
+from optisense.geometry import TriangleMesh
+
+SAME_NUMBER = 1e-9
+"""Numbers that differ by less, relative to their size, are the same: rounding in a file."""
+
+SAME_PLACE = 1e-5
+"""mm: vertices that differ by less are the same: mesh files hold a limited number of digits."""
+
+
+def fingerprint(design: SensorDesign) -> str:
+    """A short text that is the same for designs that are simulated the same."""
+    digest = hashlib.sha256(json.dumps(_values(design), sort_keys=True).encode())
+    for name in sorted(design.meshes):
+        mesh = design.meshes[name]
+        digest.update(name.encode())
+        digest.update(np.ascontiguousarray(mesh.vertices, "<f8").tobytes())
+        digest.update(np.ascontiguousarray(mesh.faces, "<i4").tobytes())
+    for group in design.lights.values():
+        if isinstance(group.emitter, IesEmitter):
+            digest.update(group.emitter.path().read_bytes())
+    return digest.hexdigest()
+
+
+def differences(old: SensorDesign, new: SensorDesign) -> list[str]:
+    """What has changed from one design to another, a line each: 'PATH: OLD -> NEW'."""
+    found = plain_differences(_values(old), _values(new))
+    for name in sorted(set(old.meshes) | set(new.meshes)):
+        if name in old.meshes and name in new.meshes:
+            said = _compare_meshes(old.meshes[name], new.meshes[name])
+            if said:
+                found.append(f"mesh of part '{name}': {said}")
+    return found
+
+
+def plain_differences(old: Any, new: Any) -> list[str]:
+    """The same for JSON-ready values."""
+    found: list[str] = []
+    _compare(old, new, (), found)
+    return found
+
+
+def _values(design: SensorDesign) -> dict[str, Any]:
+    """All that is simulated; names of files and where numbers come from are not."""
+    data = design.model_dump(mode="json", exclude={"provenance", "description", "name"})
+    for part in data["parts"].values():
+        del part["mesh"]
+    return data
+
+
+def _compare(old: Any, new: Any, path: tuple[str | int, ...], found: list[str]) -> None:
+    if isinstance(old, dict) and isinstance(new, dict):
+        for key in [*old, *(key for key in new if key not in old)]:
+            if key not in new:
+                found.append(f"{dotted((*path, key))}: removed")
+            elif key not in old:
+                found.append(f"{dotted((*path, key))}: added")
+            else:
+                _compare(old[key], new[key], (*path, key), found)
+    elif isinstance(old, list) and isinstance(new, list) and len(old) == len(new):
+        for index, (one, other) in enumerate(zip(old, new, strict=True)):
+            _compare(one, other, (*path, index), found)
+    elif not _same(old, new):
+        found.append(f"{dotted(path)}: {_short(old)} -> {_short(new)}")
+
+
+def _same(old: Any, new: Any) -> bool:
+    numbers = all(isinstance(v, int | float) and not isinstance(v, bool) for v in (old, new))
+    if not numbers:
+        return bool(old == new)
+    return abs(old - new) <= SAME_NUMBER * max(abs(old), abs(new), 1e-3)
+
+
+def _short(value: Any) -> str:
+    if isinstance(value, list):
+        return f"{len(value)} entries"
+    if isinstance(value, dict):
+        return "a section"
+    return f"{value:.10g}" if isinstance(value, float) else str(value)
+
+
+def _compare_meshes(old: TriangleMesh, new: TriangleMesh) -> str | None:
+    if old.vertices.shape != new.vertices.shape or old.faces.shape != new.faces.shape:
+        return f"{len(old.faces)} triangles -> {len(new.faces)} triangles"
+    if not np.array_equal(old.faces, new.faces):
+        return "triangles over other vertices"
+    moved = float(np.linalg.norm(old.vertices - new.vertices, axis=1).max(initial=0.0))
+    return f"vertices moved by up to {moved:.4g} mm" if moved > SAME_PLACE else None

@@ -1,0 +1,66 @@
+"""Who works out trials: this process, a pool of processes, or a cluster."""
+
+from __future__ import annotations
+
+import pickle
+from abc import ABC, abstractmethod
+from concurrent.futures import Future
+from types import TracebackType
+
+import numpy as np
+from numpy.typing import NDArray
+
+from optisense.errors import SearchError
+from optisense.search.evaluation import Evaluator
+from optisense.search.outcome import Outcome
+
+
+class Runner(ABC):
+    """Works out trials; a context manager. Every submitted trial ends in one outcome.
+
+    Attributes:
+        workers: how many trials are worked on at once, as far as that is known.
+        window: how many trials should be submitted before the first is finished.
+    """
+
+    workers: int = 1
+    window: int = 1
+
+    @abstractmethod
+    def submit(self, vector: NDArray[np.float64], seed: int) -> Future[Outcome]:
+        """Work out a trial; the future's exception is an error that no trial can do without."""
+
+    @abstractmethod
+    def close(self) -> None:
+        """End all work at once; what is not finished is dropped."""
+
+    def __enter__(self) -> Runner:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()
+
+
+def packed(evaluator: Evaluator) -> bytes:
+    """An evaluator as bytes for other processes.
+
+    Raises:
+        SearchError: it holds something that only this process knows.
+    """
+    try:
+        blob = pickle.dumps(evaluator, protocol=pickle.HIGHEST_PROTOCOL)
+    except (pickle.PicklingError, AttributeError, TypeError) as error:
+        raise SearchError(
+            f"workers can't be given an objective or a rule: {error}", hint=HOW
+        ) from None
+    if b"__main__" in blob:
+        raise SearchError("workers can't find functions of the program that starts them", hint=HOW)
+    return blob
+
+
+HOW = "Put the function into a file and name it as FILE.py:FUNCTION, or use one worker"

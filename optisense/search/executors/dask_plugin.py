@@ -1,0 +1,28 @@
+"""What brings an evaluator to every Dask worker, also to one that comes later."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from distributed import WorkerPlugin
+
+from optisense.search.executors.remote import forget, remember
+
+if TYPE_CHECKING:
+    from distributed import Worker
+
+
+class EvaluatorPlugin(WorkerPlugin):
+    """Keeps a packed evaluator in the worker's process."""
+
+    def __init__(self, key: str, blob: bytes) -> None:
+        self.key = key
+        self.blob = blob
+
+    def setup(self, worker: Worker) -> None:
+        """Called when the worker starts, or when the plugin reaches it."""
+        remember(self.key, self.blob)
+
+    def teardown(self, worker: Worker) -> None:
+        """Called when the worker ends, or when the study does."""
+        forget(self.key)

@@ -1,0 +1,255 @@
+"""A pool of processes on this machine.
+
+Python's own pool is lost as a whole when one of its processes dies, and starts them as copies of
+the calling program. Here each worker has a line of its own, so that a death costs the one trial
+that it was at, which another worker takes over.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import subprocess
+import sys
+import tempfile
+import threading
+from collections import deque
+from concurrent.futures import Future
+from dataclasses import dataclass
+from pathlib import Path
+from typing import IO, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from optisense.errors import OptiSenseError, SearchError, SetupError
+from optisense.search.evaluation import Evaluator
+from optisense.search.executors.base import Runner, packed
+from optisense.search.executors.wire import receive, send
+from optisense.search.outcome import Outcome
+
+MOST_DEATHS = 2
+"""A trial whose workers die so often is itself the reason, and fails."""
+
+ONE_THREAD = dict.fromkeys(
+    ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS"), "1"
+)
+"""Linear algebra of small matrices; many threads of many workers would wait for each other."""
+
+LAST_WORDS = 2000
+"""Characters of a dead worker's output that are looked at."""
+
+
+@dataclass
+class _Task:
+    vector: NDArray[np.float64]
+    seed: int
+    future: Future[Outcome]
+    deaths: int = 0
+
+
+@dataclass
+class _Worker:
+    """A process with what is known of it."""
+
+    process: subprocess.Popen[bytes]
+    ready: bool = False
+    task: _Task | None = None
+
+    def ask(self, message: Any) -> Any:
+        """Send it something and wait for the answer.
+
+        Raises:
+            EOFError, OSError: it has died.
+        """
+        assert self.process.stdin is not None and self.process.stdout is not None
+        send(self.process.stdin, message)
+        return receive(self.process.stdout)
+
+
+class ProcessPool(Runner):
+    """Workers on this machine, each with its share of the processor's threads."""
+
+    def __init__(self, evaluator: Evaluator, workers: int) -> None:
+        """Start the workers; they get ready in the background.
+
+        Raises:
+            SearchError: there are less than one, or the evaluator can't be given to them.
+        """
+        if workers < 1:
+            raise SearchError(f"{workers} workers can't do anything", hint="Give 1 or more")
+        self.workers = workers
+        self.window = 4 * workers
+        self._blob = packed(evaluator)
+        self._threads = max(1, processors() // workers)
+        self._waiting: deque[_Task] = deque()
+        self._changed = threading.Condition()
+        self._closed = False
+        self._unfit: Exception | None = None
+        self._processes: dict[int, subprocess.Popen[bytes]] = {}
+        for place in range(workers):
+            threading.Thread(target=self._keep, args=(place,), daemon=True).start()
+
+    def submit(self, vector: NDArray[np.float64], seed: int) -> Future[Outcome]:
+        """See `Runner`."""
+        task = _Task(vector, seed, Future())
+        with self._changed:
+            if self._unfit is not None:
+                task.future.set_exception(self._unfit)
+            else:
+                self._waiting.append(task)
+                self._changed.notify()
+        return task.future
+
+    def close(self) -> None:
+        """End the workers."""
+        with self._changed:
+            self._closed = True
+            self._changed.notify_all()
+            processes = list(self._processes.values())
+        for process in processes:
+            process.kill()
+        for process in processes:
+            process.wait()
+
+    def process_ids(self) -> list[int]:
+        """Those of the workers that are running now."""
+        with self._changed:
+            return [process.pid for process in self._processes.values()]
+
+    def _keep(self, place: int) -> None:
+        """Keep one place filled with a worker: when it dies, another one follows."""
+        stillborn = 0
+        try:
+            while stillborn < MOST_DEATHS:
+                with tempfile.TemporaryFile() as words:
+                    process = self._start(place, words)
+                    if process is None:
+                        return
+                    worker = _Worker(process)
+                    try:
+                        self._attend(worker)
+                        return
+                    except (EOFError, OSError):
+                        code = process.wait()
+                        if self._closed:
+                            return
+                        if not worker.ready and code >= 0:  # it left by itself: so will others
+                            raise _never_ready(code, _tail(words)) from None
+                        stillborn = 0 if worker.ready else stillborn + 1
+                        if worker.task is not None:
+                            self._mourn(worker.task, code, _tail(words))
+                    finally:
+                        self._end(place, process)
+            raise _never_ready(code, "")
+        except OptiSenseError as error:
+            self._give_up(error)
+        except OSError as error:
+            self._give_up(SetupError(f"a worker could not be started: {error}"))
+
+    def _attend(self, worker: _Worker) -> None:
+        """Get a worker ready and keep it busy until the pool is closed.
+
+        Raises:
+            EOFError, OSError: it has died.
+            OptiSenseError: it says that it can't work.
+        """
+        kind, content = worker.ask((self._blob, self._threads))
+        if kind == "unfit":
+            raise content
+        worker.ready = True
+        while (task := self._next()) is not None:
+            worker.task = task
+            kind, content = worker.ask((task.vector, task.seed))
+            worker.task = None
+            if kind == "done":
+                task.future.set_result(content)
+            else:
+                task.future.set_exception(content)
+
+    def _start(self, place: int, words: IO[bytes]) -> subprocess.Popen[bytes] | None:
+        environment = {**os.environ, **ONE_THREAD}
+        environment["PYTHONPATH"] = os.pathsep.join(path or str(Path.cwd()) for path in sys.path)
+        session: dict[str, Any] = {"start_new_session": True}  # Ctrl-C is the pool's business
+        if sys.platform == "win32":
+            session = {"creationflags": subprocess.CREATE_NEW_PROCESS_GROUP}
+        with self._changed:
+            if self._closed or self._unfit is not None:
+                return None
+            process = subprocess.Popen(
+                [sys.executable, "-m", "optisense.search.executors.worker"],
+                stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE,
+                stderr=words,
+                env=environment,
+                **session,
+            )
+            self._processes[place] = process
+            return process
+
+    def _next(self) -> _Task | None:
+        """The next task, or None when the pool is closed."""
+        with self._changed:
+            while not self._waiting and not self._closed and self._unfit is None:
+                self._changed.wait()
+            if self._closed or self._unfit is not None:
+                return None
+            return self._waiting.popleft()
+
+    def _mourn(self, task: _Task, code: int, words: str) -> None:
+        """The worker of a task has died: another one takes it, unless it is the reason."""
+        task.deaths += 1
+        if task.deaths < MOST_DEATHS:
+            with self._changed:
+                self._waiting.appendleft(task)
+                self._changed.notify()
+            return
+        reason = f"its worker died {task.deaths} times ({_exit(code)}{words and ': ' + words})"
+        task.future.set_result(Outcome({}, reason))
+
+    def _give_up(self, error: Exception) -> None:
+        """No worker can work: every task fails with this error."""
+        with self._changed:
+            self._unfit = error
+            tasks = list(self._waiting)
+            self._waiting.clear()
+            self._changed.notify_all()
+        for task in tasks:
+            task.future.set_exception(error)
+
+    def _end(self, place: int, process: subprocess.Popen[bytes]) -> None:
+        process.kill()
+        process.wait()
+        for stream in (process.stdin, process.stdout):
+            with contextlib.suppress(OSError):
+                if stream is not None:
+                    stream.close()
+        with self._changed:
+            if self._processes.get(place) is process:
+                del self._processes[place]
+
+
+def processors() -> int:
+    """How many processors this process may use."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
+def _never_ready(code: int, words: str) -> SetupError:
+    return SetupError(
+        f"a worker could not be started ({_exit(code)}{words and ': ' + words})",
+        hint="`optisense doctor` checks this machine",
+    )
+
+
+def _exit(code: int) -> str:
+    return f"signal {-code}" if code < 0 else f"exit code {code}"
+
+
+def _tail(words: IO[bytes]) -> str:
+    """The last line of what a worker said."""
+    size = words.seek(0, os.SEEK_END)
+    words.seek(max(0, size - LAST_WORDS))
+    lines = words.read().decode("utf-8", "replace").strip().splitlines()
+    return lines[-1].strip() if lines else ""

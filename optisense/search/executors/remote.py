@@ -1,0 +1,190 @@
+"""Trials on any executor with the protocol of `concurrent.futures`, and on a Dask cluster."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import pickle
+import socket
+import threading
+from concurrent.futures import Executor, Future
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from optisense.errors import SetupError
+from optisense.search.evaluation import Evaluator
+from optisense.search.executors.base import Runner, packed
+from optisense.search.outcome import Outcome
+
+CONNECT_SECONDS = 10.0
+WORKER_SECONDS = 60.0
+"""A cluster without any worker is waited for so long."""
+
+MANY = 1000
+"""Trials that wait at an executor, which may have any number of workers."""
+
+HOW_TO_START = (
+    "Start one with `dask scheduler` on one machine and `dask worker ADDRESS --nthreads 1` on each "
+    "that shall work"
+)
+
+_evaluators: dict[str, Evaluator] = {}
+_blobs: dict[str, bytes] = {}
+_one_at_a_time = threading.Lock()
+"""An evaluator keeps one model and serves one trial at a time, whatever threads a worker has."""
+
+
+class ExecutorRunner(Runner):
+    """Trials on an executor that someone else has set up (MPI, a batch system, threads, ...)."""
+
+    def __init__(self, evaluator: Evaluator, executor: Executor, workers: int = 1) -> None:
+        """Take an executor, which is not shut down at the end.
+
+        Raises:
+            SearchError: the evaluator can't be given to other processes.
+        """
+        self._blob = packed(evaluator)
+        self._key = hashlib.sha256(self._blob).hexdigest()
+        self._executor = executor
+        self.workers = workers
+        self.window = MANY
+
+    def submit(self, vector: NDArray[np.float64], seed: int) -> Future[Outcome]:
+        """See `Runner`."""
+        return self._executor.submit(work_out, self._key, self._blob, vector, seed)
+
+    def close(self) -> None:
+        """The executor is not ours to shut down."""
+
+
+class DaskRunner(Runner):
+    """Trials on a Dask cluster, whose workers may come and go while it runs.
+
+    A worker that dies costs the trials that it was at: Dask gives them to others. The evaluator
+    travels once to each worker, also to those that come later.
+    """
+
+    def __init__(self, evaluator: Evaluator, address: str) -> None:
+        """Connect, and hand the evaluator to the workers.
+
+        Raises:
+            SetupError: Dask is not installed, no scheduler answers, or there is no worker.
+            SearchError: the evaluator can't be given to other processes.
+        """
+        blob = packed(evaluator)
+        self._key = hashlib.sha256(blob).hexdigest()
+        self._plugin_name = f"optisense-{self._key[:16]}"
+        self._client = _connect(address)
+        try:
+            _wait_for_a_worker(self._client, address)
+            from optisense.search.executors.dask_plugin import EvaluatorPlugin
+
+            plugin = EvaluatorPlugin(self._key, blob)
+            self._client.register_plugin(plugin, name=self._plugin_name)
+        except BaseException:
+            self._client.close()
+            raise
+        self._executor = self._client.get_executor(pure=False, retries=0)
+        self.workers = sum(self._client.nthreads().values())
+        self.window = MANY
+
+    def submit(self, vector: NDArray[np.float64], seed: int) -> Future[Outcome]:
+        """See `Runner`."""
+        given = self._executor.submit(work_out, self._key, None, vector, seed)
+        future: Future[Outcome] = Future()
+        given.add_done_callback(lambda done: _settle(done, future))
+        return future
+
+    def close(self) -> None:
+        """Drop what is not finished and leave the cluster."""
+        self._executor.shutdown(wait=False, cancel_futures=True)
+        self._client.unregister_worker_plugin(self._plugin_name)
+        self._client.close(timeout=CONNECT_SECONDS)
+
+
+def work_out(key: str, blob: bytes | None, vector: NDArray[np.float64], seed: int) -> Outcome:
+    """Work out a trial in whatever process this is called.
+
+    Args:
+        key: of the evaluator.
+        blob: the evaluator, or None where it came before.
+        vector, seed: the trial.
+    """
+    with _one_at_a_time:
+        if key not in _evaluators:
+            known = blob if blob is not None else _blobs.get(key)
+            if known is None:
+                raise SetupError("a worker has not been given what to work out")
+            evaluator = pickle.loads(known)
+            if getattr(evaluator, "renders", True):
+                from optisense.optics.threads import use_threads
+
+                use_threads(1)
+            _evaluators.clear()
+            _evaluators[key] = evaluator
+        outcome = _evaluators[key](vector, seed)
+    object.__setattr__(outcome, "worker", _own_name())
+    return outcome
+
+
+def remember(key: str, blob: bytes) -> None:
+    """Keep an evaluator for `work_out` in this process."""
+    _blobs[key] = blob
+
+
+def forget(key: str) -> None:
+    """Drop an evaluator again."""
+    _blobs.pop(key, None)
+    _evaluators.pop(key, None)
+
+
+def _connect(address: str) -> Any:
+    try:
+        import distributed
+    except ImportError:
+        raise SetupError(
+            "Dask is not installed", where="--cluster", hint='Type: pip install "optisense[dask]"'
+        ) from None
+    try:
+        client: Any = distributed.Client
+        return client(address, timeout=CONNECT_SECONDS, set_as_default=False)
+    except (OSError, TimeoutError) as error:
+        raise SetupError(
+            f"no Dask scheduler answers at {address}", where="--cluster", hint=HOW_TO_START
+        ) from error
+    except (ValueError, TypeError) as error:
+        raise SetupError(
+            f"'{address}' is not the address of a Dask scheduler: {error}",
+            where="--cluster",
+            hint="Write it like tcp://192.0.2.7:8786",
+        ) from error
+
+
+def _wait_for_a_worker(client: Any, address: str) -> None:
+    try:
+        client.wait_for_workers(1, timeout=WORKER_SECONDS)
+    except TimeoutError:
+        raise SetupError(
+            f"the cluster at {address} has no workers", where="--cluster", hint=HOW_TO_START
+        ) from None
+
+
+def _settle(done: Future[Outcome], future: Future[Outcome]) -> None:
+    """Pass a result on; what Dask says about a trial whose workers keep dying is its failure."""
+    if done.cancelled():
+        future.cancel()
+        return
+    error = done.exception()
+    if error is None:
+        future.set_result(done.result())
+    elif type(error).__name__ == "KilledWorker":
+        future.set_result(Outcome({}, "its workers died again and again"))
+    else:
+        future.set_exception(error)
+
+
+def _own_name() -> str:
+    """The machine and the process that work a trial out."""
+    return f"{socket.gethostname()}:{os.getpid()}"

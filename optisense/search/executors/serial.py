@@ -1,0 +1,79 @@
+"""Trials one after another in this process."""
+
+from __future__ import annotations
+
+import signal
+import threading
+from collections.abc import Callable
+from concurrent.futures import Future
+from types import FrameType, TracebackType
+
+import numpy as np
+from numpy.typing import NDArray
+
+from optisense.search.evaluation import Evaluator
+from optisense.search.executors.base import Runner
+from optisense.search.outcome import Outcome
+
+
+class SerialRunner(Runner):
+    """Works a trial out when it is submitted.
+
+    A render that Ctrl-C ends early still gives an image, and a score that must not count. So the
+    first Ctrl-C waits until the trial is finished; the second drops it.
+    """
+
+    def __init__(self, evaluator: Evaluator, told: Callable[[], None] | None = None) -> None:
+        """Nothing is started.
+
+        Args:
+            evaluator: works out the trials.
+            told: called when Ctrl-C is pressed during a trial.
+        """
+        self._evaluator = evaluator
+        self._told = told
+        self._pressed = 0
+        self._before: Callable[[int, FrameType | None], object] | int | None = None
+
+    def submit(self, vector: NDArray[np.float64], seed: int) -> Future[Outcome]:
+        """The finished trial.
+
+        Raises:
+            KeyboardInterrupt: Ctrl-C was pressed before, or twice since.
+        """
+        if self._pressed:
+            raise KeyboardInterrupt
+        future: Future[Outcome] = Future()
+        try:
+            outcome = self._evaluator(vector, seed)
+        except Exception as error:
+            future.set_exception(error)
+            return future
+        if self._pressed > 1:
+            raise KeyboardInterrupt
+        future.set_result(outcome)
+        return future
+
+    def close(self) -> None:
+        """Nothing is running."""
+
+    def __enter__(self) -> SerialRunner:
+        if threading.current_thread() is threading.main_thread():
+            self._before = signal.signal(signal.SIGINT, self._press)
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        if self._before is not None:
+            signal.signal(signal.SIGINT, self._before)
+
+    def _press(self, number: int, frame: FrameType | None) -> None:
+        self._pressed += 1
+        if self._pressed > 1:
+            raise KeyboardInterrupt
+        if self._told is not None:
+            self._told()

@@ -1,0 +1,40 @@
+"""Messages between a pool and its workers: pickles, each after its length."""
+
+from __future__ import annotations
+
+import pickle
+import struct
+from typing import Any, IO
+
+_LENGTH = struct.Struct("<Q")
+
+
+def send(stream: IO[bytes], message: Any) -> None:
+    """Write a message.
+
+    Raises:
+        OSError: the other end has gone.
+    """
+    blob = pickle.dumps(message, protocol=pickle.HIGHEST_PROTOCOL)
+    stream.write(_LENGTH.pack(len(blob)) + blob)
+    stream.flush()
+
+
+def receive(stream: IO[bytes]) -> Any:
+    """Read a message.
+
+    Raises:
+        EOFError: the other end has gone.
+    """
+    head = _exactly(stream, _LENGTH.size)
+    return pickle.loads(_exactly(stream, _LENGTH.unpack(head)[0]))
+
+
+def _exactly(stream: IO[bytes], count: int) -> bytes:
+    data = b""
+    while len(data) < count:
+        more = stream.read(count - len(data))
+        if not more:
+            raise EOFError
+        data += more
+    return data

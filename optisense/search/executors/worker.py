@@ -1,0 +1,74 @@
+"""A worker of the local pool: a process of its own that is asked over its standard input.
+
+It is started with ``python -m optisense.search.executors.worker`` and not as a copy of the
+program that wants it, so that programs need no guard around their main part.
+"""
+
+from __future__ import annotations
+
+import os
+import pickle
+import queue
+import signal
+import sys
+import threading
+from typing import Any, BinaryIO
+
+from optisense.errors import OptiSenseError, SetupError
+from optisense.search.executors.wire import receive, send
+
+
+def main() -> None:
+    """Work out trials until the other end closes the line."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    answers = os.fdopen(os.dup(1), "wb")
+    os.dup2(2, 1)  # whatever prints must not get between the answers
+    messages: queue.SimpleQueue[Any] = queue.SimpleQueue()
+    threading.Thread(target=_listen, args=(sys.stdin.buffer, messages), daemon=True).start()
+    evaluator = None
+    try:
+        blob, threads = messages.get()
+        evaluator = pickle.loads(blob)
+        if getattr(evaluator, "renders", True):
+            from optisense.optics.threads import use_threads
+
+            use_threads(threads)
+    except OptiSenseError as error:
+        send(answers, ("unfit", error))
+        return
+    except Exception as error:
+        told = SetupError(f"a worker can't be set up: {type(error).__name__}: {error}")
+        send(answers, ("unfit", told))
+        return
+    send(answers, ("ready", os.getpid()))
+    name = str(os.getpid())
+    while True:
+        vector, seed = messages.get()
+        try:
+            outcome = evaluator(vector, seed)
+            object.__setattr__(outcome, "worker", name)
+            send(answers, ("done", outcome))
+        except OSError:
+            return  # nobody is waiting any more
+        except Exception as error:
+            send(answers, ("error", _sendable(error)))
+
+
+def _listen(stream: BinaryIO, messages: queue.SimpleQueue[Any]) -> None:
+    """Pass messages on; when the other end has gone, end this process even amid a trial."""
+    try:
+        while True:
+            messages.put(receive(stream))
+    except (EOFError, OSError):
+        os._exit(0)
+
+
+def _sendable(error: Exception) -> Exception:
+    """The error itself where it survives the way, else what it says."""
+    if isinstance(error, OptiSenseError):
+        return error
+    return RuntimeError(f"{type(error).__name__}: {error}")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,126 @@
+"""What a new study shall do, checked and written down."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from optisense.design import SensorDesign
+from optisense.errors import SearchError
+from optisense.search.constraints import Constraint, UserRule
+from optisense.search.difference import fingerprint
+from optisense.search.evaluation import DesignEvaluator, Goal, goal_name, placed
+from optisense.search.making import SAMPLES, MakingErrors
+from optisense.search.methods import Problem, find, make
+from optisense.search.settings import StudySettings
+from optisense.search.space import SearchSpace
+
+ONLY_HERE = "function:"
+"""Begins the name of a goal or rule that is a function of the program and in no file."""
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What a new study shall do; see `optisense.search.search` for each."""
+
+    space: SearchSpace
+    goals: Sequence[Goal]
+    method: str = "cma-es"
+    options: Mapping[str, Any] | None = None
+    budget: int | None = None
+    seed: int = 0
+    settings: Mapping[str, Any] | None = None
+    apart: bool = True
+    errors: MakingErrors | None = None
+    samples: int = SAMPLES
+
+    def settings_for(self, design: SensorDesign) -> StudySettings:
+        """The plan for a design, with everything that it leaves open decided.
+
+        Raises:
+            SearchError: the plan makes no sense.
+            DesignError: a path leads nowhere.
+            ObjectiveError: an objective or a setting is unknown.
+        """
+        bound = self.space.bind(design)
+        evaluator = DesignEvaluator(bound, self.goals, self.settings, apart=self.apart)
+        if self.errors is not None:
+            self.errors.bind(design)
+        budget = self.budget
+        if budget is None:
+            budget = find(self.method).usual_budget(bound)
+        if budget < 1:
+            raise SearchError(f"a budget of {budget} trials is nothing", hint="Give 1 or more")
+        if not 0 <= self.seed < 2**32:
+            raise SearchError(f"the seed is {self.seed}", hint="Give 0 to 4294967295")
+        options = dict(self.options or {})
+        make(self.method, Problem(bound, tuple(evaluator.names), budget, self.seed), options)
+        objectives = [reference(goal) for goal in self.goals]
+        rules = [rule_reference(rule) for rule in self.space.constraints]
+        return StudySettings(
+            design=design.name,
+            fingerprint=fingerprint(design),
+            space=self.space.to_plain(),
+            objectives=objectives,
+            names=evaluator.names,
+            method=self.method.strip().lower(),
+            options=options,
+            budget=budget,
+            seed=self.seed,
+            settings=dict(self.settings or {}),
+            apart=self.apart,
+            rules=rules,
+            files=file_prints([*objectives, *rules]),
+            errors=None if self.errors is None else self.errors.to_plain(),
+            samples=0 if self.errors is None else self.samples,
+        )
+
+
+def reference(goal: Goal) -> str:
+    """How a stored study names a goal."""
+    return str(placed(goal)) if isinstance(goal, str) else ONLY_HERE + goal_name(goal)
+
+
+def rule_reference(rule: Constraint) -> str:
+    """How a stored study names a constraint."""
+    if isinstance(rule, UserRule):
+        return str(rule)
+    return ONLY_HERE + str(getattr(rule, "__name__", type(rule).__name__))
+
+
+def known_goals(settings: StudySettings, given: Sequence[Goal] | None) -> list[Goal]:
+    """The goals of a stored study; none where one of them is not known here.
+
+    Raises:
+        SearchError: those given are others than the study's.
+    """
+    if given:
+        names = [goal_name(goal) for goal in given]
+        if names != settings.names:
+            raise SearchError(
+                f"the study searches for {', '.join(settings.names)}, not for {', '.join(names)}"
+            )
+        return list(given)
+    if any(goal.startswith(ONLY_HERE) for goal in settings.objectives):
+        return []
+    return list(settings.objectives)
+
+
+def known_rules(settings: StudySettings, given: Sequence[Constraint] | None) -> list[Constraint]:
+    """The constraints of a stored study, without those that are not known here."""
+    if given:
+        return list(given)
+    return [UserRule(rule) for rule in settings.rules if not rule.startswith(ONLY_HERE)]
+
+
+def file_prints(references: Sequence[str]) -> dict[str, str]:
+    """The SHA-256 of each user's Python file that is named, by its path."""
+    paths = [each.rpartition(":")[0] or each for each in references]
+    return {
+        path: hashlib.sha256(Path(path).read_bytes()).hexdigest()
+        for path in paths
+        if path.endswith(".py") and Path(path).is_file()
+    }

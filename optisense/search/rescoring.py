@@ -1,0 +1,88 @@
+"""Scoring the best again with fresh seeds before one is announced.
+
+Of many noisy scores the largest is too large: it won partly by luck. So the best trial is scored
+with seeds that had no part in its choice, and so are the next ones as long as they might really
+be better.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from optisense.search.methods import find
+from optisense.search.outcome import Outcome
+from optisense.search.study import Study
+from optisense.search.trial import Trial
+
+SEEDS = 3
+"""Fresh seeds for each."""
+
+MOST = 5
+"""At most so many trials are scored again."""
+
+_FRESH = 0xF2E5
+
+Work = Callable[[Sequence[tuple[Trial, int]]], list[Outcome]]
+"""Scores trials with seeds."""
+
+
+def fresh_seeds(seed: int, count: int = SEEDS) -> list[int]:
+    """Seeds that have nothing to do with a study's own."""
+    words = np.random.SeedSequence([seed, _FRESH]).generate_state(count + 1).tolist()
+    return [word for word in words if word != seed][:count]
+
+
+def rescore(study: Study, work: Work) -> None:
+    """Score the start and the best again; what was scored before is kept."""
+    seeds = fresh_seeds(study.settings.seed)
+    trials = study.trials
+    fine = [trial for trial in trials if math.isfinite(trial.score)]
+    start = [trial for trial in fine if trial.is_start]
+    ranked = sorted((t for t in fine if not t.is_start), key=lambda t: -t.score)
+    if find(study.settings.method).several:
+        _score([*start, *_spread_out(study)], seeds, work)
+        return
+    best = -math.inf
+    for number, trial in enumerate(ranked[:MOST]):
+        if trial.score <= best:
+            return  # even with its luck it is not better
+        scored = [trial, *start] if number == 0 else [trial]
+        means = _score(scored, seeds, work)
+        if math.isfinite(means[0]):
+            best = max(best, means[0])
+
+
+def _score(trials: Sequence[Trial], seeds: Sequence[int], work: Work) -> list[float]:
+    """The mean over fresh seeds of each trial; one seed suffices where it changes nothing."""
+    first = [(trial, seeds[0]) for trial in trials if seeds[0] not in trial.fresh]
+    outcomes = dict(zip((t.number for t, _ in first), work(first), strict=True)) if first else {}
+    fresh = {t.number: {**t.fresh} for t in trials}
+    for number, outcome in outcomes.items():
+        fresh[number][seeds[0]] = outcome
+    more = [
+        (trial, seed)
+        for trial in trials
+        for seed in seeds[1:]
+        if seed not in fresh[trial.number]
+        and dict(fresh[trial.number][seeds[0]].scores) != dict(trial.scores)
+    ]
+    for (trial, seed), outcome in zip(more, work(more) if more else [], strict=True):
+        fresh[trial.number][seed] = outcome
+    return [
+        float(
+            np.mean([o.scores.get(trial.objective, math.nan) for o in fresh[trial.number].values()])
+        )
+        for trial in trials
+    ]
+
+
+def _spread_out(study: Study) -> list[Trial]:
+    """Some trials of the front, from one end to the other."""
+    front = study.front
+    if len(front) <= MOST:
+        return front
+    places = np.linspace(0, len(front) - 1, MOST).round().astype(int)
+    return [front[place] for place in places]

@@ -1,0 +1,156 @@
+"""Searching for a better design, in one call."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from concurrent.futures import Executor
+from pathlib import Path
+from typing import Any
+
+from optisense.design import SensorDesign
+from optisense.errors import SearchError
+from optisense.search.evaluation import Evaluator, Goal
+from optisense.search.executors import (
+    DaskRunner,
+    ExecutorRunner,
+    ProcessPool,
+    Runner,
+    SerialRunner,
+)
+from optisense.search.making import SAMPLES, MakingErrors, Spread
+from optisense.search.plan import Plan
+from optisense.search.running import Result, Run, Tell
+from optisense.search.space import SearchSpace
+from optisense.search.study import Study
+
+
+def search(
+    design: SensorDesign,
+    space: SearchSpace | Mapping[str, object],
+    objective: Goal | Sequence[Goal],
+    *,
+    method: str = "cma-es",
+    budget: int | None = None,
+    seed: int = 0,
+    workers: int = 1,
+    cluster: str | None = None,
+    executor: Executor | None = None,
+    out: str | Path | None = None,
+    resume: bool = False,
+    options: Mapping[str, Any] | None = None,
+    settings: Mapping[str, Any] | None = None,
+    errors: MakingErrors | Mapping[str, Spread | float] | None = None,
+    samples: int = SAMPLES,
+    apart: bool = True,
+    progress: Tell | None = None,
+) -> Result:
+    """Search a space for the design with the highest score.
+
+    The result's `.best` is a trial, and `.best.design` the better design. Every trial is scored
+    with the same seed; before the best one is named it is scored again with fresh seeds. Ctrl-C
+    ends the search early, and the result holds what was finished.
+
+    Args:
+        design: where the search starts.
+        space: what may change.
+        objective: what to maximise: a name, an `Objective`, or a function of a design that
+            returns a number. Several: the first is maximised and the others are told, or, with
+            the method "pareto", all are weighed against each other.
+        method: "cma-es", "grid", "random", "types", "pareto", ... (see docs/search.md).
+        budget: number of trials; the method's own idea if None.
+        seed: of the method and of every trial.
+        workers: processes on this machine; 1 works in this one.
+        cluster: address of a Dask scheduler, instead of `workers`.
+        executor: any executor with the protocol of `concurrent.futures`, instead of `workers`.
+        out: folder that keeps the study, so that it can be resumed and reported.
+        resume: go on with the study in `out`.
+        options: of the method.
+        settings: of the objectives, as of `optisense.evaluate`.
+        errors: of making: P10 over manufactured sensors is maximised instead of the plain score.
+        samples: manufactured sensors a trial.
+        apart: whether parts must not cut through one another.
+        progress: called now and then.
+
+    Raises:
+        SearchError: something makes no sense, all trials fail, or a study can't be gone on with.
+        DesignError: a path leads nowhere.
+        ObjectiveError: an objective is unknown.
+        SetupError: the renderer or the cluster can't be reached.
+    """
+    goals = as_goals(objective)
+    named = space if isinstance(space, SearchSpace) else SearchSpace(space)
+    making = errors
+    if making is not None and not isinstance(making, MakingErrors):
+        making = MakingErrors(making)
+    plan = Plan(
+        space=named,
+        goals=goals,
+        method=method,
+        options=options,
+        budget=budget,
+        seed=seed,
+        settings=settings,
+        apart=apart,
+        errors=making,
+        samples=samples,
+    )
+    if resume:
+        if out is None:
+            raise SearchError("a study to go on with needs its folder", hint="Give out=FOLDER")
+        study = Study.open(out, design, goals, named.constraints)
+        study.expect(plan.settings_for(design).comparable())
+    else:
+        study = Study.create(out, design, plan)
+    return run_study(
+        study,
+        workers=workers,
+        cluster=cluster,
+        executor=executor,
+        limit=budget if resume else None,
+        progress=progress,
+    )
+
+
+def run_study(
+    study: Study,
+    *,
+    workers: int = 1,
+    cluster: str | None = None,
+    executor: Executor | None = None,
+    own_process: bool = False,
+    limit: int | None = None,
+    progress: Tell | None = None,
+) -> Result:
+    """Run a study, or go on with one.
+
+    Args:
+        study: new or opened again.
+        workers, cluster, executor: as of `search`.
+        own_process: use a process of its own even for one worker.
+        limit: trials in all; the study's budget if None.
+        progress: called now and then.
+
+    Raises:
+        OptiSenseError: as of `search`.
+    """
+    if cluster is not None and executor is not None:
+        raise SearchError("give a cluster or an executor, not both")
+
+    def make_runner(evaluator: Evaluator) -> Runner:
+        if cluster is not None:
+            return DaskRunner(evaluator, cluster)
+        if executor is not None:
+            return ExecutorRunner(evaluator, executor)
+        if workers == 1 and not own_process:
+            return SerialRunner(evaluator)
+        return ProcessPool(evaluator, workers)
+
+    return Run(study, make_runner, progress, limit).go()
+
+
+def as_goals(objective: Goal | Sequence[Goal]) -> list[Goal]:
+    """One objective or several as a list."""
+    if isinstance(objective, list | tuple):
+        return list(objective)
+    single: Any = objective
+    return [single]

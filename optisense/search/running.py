@@ -1,0 +1,359 @@
+"""Running a study: generation by generation, until its budget is spent or someone stops it."""
+
+from __future__ import annotations
+
+import math
+import queue
+import time
+from collections import Counter
+from collections.abc import Callable, Sequence
+from concurrent.futures import Future
+from dataclasses import dataclass, field
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from optisense.errors import OptiSenseError, SearchError
+from optisense.search.evaluation import Evaluator
+from optisense.search.executors import Runner
+from optisense.search.making import MakingErrors
+from optisense.search.methods import Method, Problem, make
+from optisense.search.outcome import Outcome
+from optisense.search.rescoring import rescore
+from optisense.search.settings import package_versions
+from optisense.search.store import START, Row
+from optisense.search.study import Study
+from optisense.search.trial import Trial
+
+ALL_FAIL = 20
+"""A study whose first trials all fail stops after so many, ..."""
+
+ALL_FAIL_WITH_START = 5
+"""... or so many where the design as it is fails too."""
+
+SAME_POINT = 1e-9
+"""Proposals of another release that differ by less, relative to the range, are the same."""
+
+TICK = 0.2
+"""Seconds between looks at the clock while trials are worked out."""
+
+
+@dataclass(frozen=True)
+class Progress:
+    """How far a study is.
+
+    Attributes:
+        stage: "trials", or "fresh seeds" while the best are scored again.
+        done: finished trials, those of earlier runs included; the start is not counted.
+        total: trials that there may be.
+        failed: of the finished ones.
+        best: the best score so far, NaN before there is one.
+        start: score of the start.
+        trials_per_hour: in this run.
+        seconds_left: until the budget is spent; NaN before that can be known.
+        facts: what the method tells of itself.
+    """
+
+    stage: str
+    done: int
+    total: int
+    failed: int
+    best: float
+    start: float
+    trials_per_hour: float
+    seconds_left: float
+    facts: dict[str, Any] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Result:
+    """What came of a study.
+
+    Attributes:
+        study: with all its trials; can be run again to go on.
+        interrupted: whether it was stopped before its end.
+        ended: why it ended.
+        notes: what the user should know.
+    """
+
+    study: Study
+    interrupted: bool
+    ended: str
+    notes: tuple[str, ...] = ()
+
+    @property
+    def best(self) -> Trial:
+        """The best trial, by fresh seeds where they were scored.
+
+        Raises:
+            SearchError: none succeeded.
+        """
+        return self.study.trial("best")
+
+    @property
+    def start(self) -> Trial:
+        """The design as it is, or the nearest to it in the space.
+
+        Raises:
+            SearchError: it has not been scored.
+        """
+        return self.study.trial("start")
+
+    @property
+    def trials(self) -> list[Trial]:
+        """All finished trials, the start first."""
+        return self.study.trials
+
+    @property
+    def front(self) -> list[Trial]:
+        """The trials that no other one beats in all objectives."""
+        return self.study.front
+
+
+Tell = Callable[[Progress], None]
+MakeRunner = Callable[[Evaluator], Runner]
+
+
+class Run:
+    """One go at a study, in this process and on its workers."""
+
+    def __init__(
+        self,
+        study: Study,
+        make_runner: MakeRunner,
+        tell: Tell | None = None,
+        limit: int | None = None,
+    ) -> None:
+        """Get ready; nothing is scored yet.
+
+        Args:
+            study: new, or one that was stopped.
+            make_runner: who works out the trials.
+            tell: called now and then.
+            limit: how many trials there may be; the study's budget if None.
+
+        Raises:
+            OptiSenseError: the study can't be run here.
+        """
+        self.study = study
+        settings = study.settings
+        self.limit = settings.budget if limit is None else limit
+        usual = study.evaluator()
+        problem = Problem(study.space, tuple(settings.names), settings.budget, settings.seed)
+        self.method: Method = make(settings.method, problem, settings.options)
+        self._evaluator: Evaluator = self.method.evaluator(usual)
+        if settings.errors is not None:
+            if self._evaluator is not usual:
+                raise SearchError(f"{settings.method} can't search with errors of making")
+            from optisense.search.robust import RobustEvaluator
+
+            errors = MakingErrors.from_plain(settings.errors)
+            self._evaluator = RobustEvaluator(usual, errors, settings.seed, settings.samples)
+        self._make_runner = make_runner
+        self._tell = tell or (lambda progress: None)
+        self._notes: list[str] = []
+        self._finished: queue.SimpleQueue[tuple[int, Future[Outcome]]] = queue.SimpleQueue()
+        self._done = self._failed = self._new = 0
+        self._reasons: Counter[str] = Counter()
+        self._best = self._start_score = math.nan
+        self._began = self._told = time.monotonic()
+
+    def go(self) -> Result:
+        """Run to the end, or until Ctrl-C.
+
+        Raises:
+            SearchError: another process runs this study, or all trials fail.
+            SetupError, OutputError: nothing can be scored, or written.
+        """
+        study = self.study
+        study.lock()
+        interrupted, ended = False, ""
+        try:
+            self._count_known()
+            with self._make_runner(self._evaluator) as runner:
+                self._began = time.monotonic()
+                try:
+                    self._score_start(runner)
+                    ended = self._search(runner)
+                    self._report("trials", now=True)
+                    self._report("fresh seeds", now=True)
+                    rescore(study, lambda jobs: self._work_fresh(runner, jobs))
+                except KeyboardInterrupt:
+                    interrupted, ended = True, "interrupted"
+        finally:
+            study.unlock()
+        study.store.set_fact("ended", ended)
+        return Result(study, interrupted, ended, tuple(self._notes))
+
+    def _search(self, runner: Runner) -> str:
+        """All generations; returns why the search is over."""
+        known = self.study.store.last_generation()
+        generation = 0
+        while True:
+            asked = self.method.ask()
+            rows = self.study.store.rows(generation) if generation <= known else []
+            self._compare(asked, rows)
+            room = self.limit - self._proposed(generation)
+            missing = asked[len(rows) :][: max(0, room - len(rows))]
+            if len(missing):
+                self.study.store.propose(generation, missing, len(rows))
+                rows = self.study.store.rows(generation)
+            if not rows:
+                return "the method has finished" if not len(asked) else "the budget is spent"
+            self._work(runner, rows)
+            whole = self.study.store.rows(generation)
+            if len(whole) < len(asked):
+                return "the budget is spent"
+            outcomes = [row.outcome for row in whole if row.outcome is not None]
+            self.method.tell(np.array([row.vector for row in whole]), outcomes)
+            generation += 1
+
+    def _proposed(self, generation: int) -> int:
+        """How many trials the generations before this one have."""
+        return self.study.store.proposed_before(generation)
+
+    def _score_start(self, runner: Runner) -> None:
+        store = self.study.store
+        rows = store.rows(START)
+        if not rows:
+            store.propose(START, self.study.space.start[None])
+            rows = store.rows(START)
+        self._work(runner, rows)
+
+    def _work(self, runner: Runner, rows: Sequence[Row]) -> None:
+        """Work out the rows that are not finished, and write each as it finishes."""
+        by_number = {row.number: row for row in rows if row.outcome is None}
+        jobs = [(row.number, row.vector, self.study.settings.seed) for row in by_number.values()]
+
+        def finished(number: int, outcome: Outcome) -> None:
+            self.study.store.finish(number, outcome)
+            self._count(by_number[number], outcome)
+            self._new += 1
+            self._report("trials")
+
+        self._each(runner, jobs, finished)
+
+    def _work_fresh(self, runner: Runner, jobs: Sequence[tuple[Trial, int]]) -> list[Outcome]:
+        """Score trials with other seeds."""
+        found: dict[int, Outcome] = {}
+
+        def finished(number: int, outcome: Outcome) -> None:
+            trial, seed = jobs[number]
+            self.study.store.finish_fresh(trial.number, seed, outcome)
+            found[number] = outcome
+
+        numbered = [(k, trial.vector, seed) for k, (trial, seed) in enumerate(jobs)]
+        self._each(runner, numbered, finished)
+        return [found[number] for number in range(len(jobs))]
+
+    def _each(
+        self,
+        runner: Runner,
+        jobs: Sequence[tuple[int, np.ndarray, int]],
+        finished: Callable[[int, Outcome], None],
+    ) -> None:
+        """Keep the workers busy with jobs (number, point, seed), and pass on what comes back."""
+        waiting = list(reversed(jobs))
+        open_jobs = 0
+        while waiting or open_jobs:
+            while waiting and open_jobs < runner.window:
+                number, vector, seed = waiting.pop()
+                future = runner.submit(vector, seed)
+                open_jobs += 1
+                future.add_done_callback(partial(self._hand_over, number))
+            try:
+                number, done = self._finished.get(timeout=TICK)
+            except queue.Empty:
+                self._report("trials")
+                continue
+            open_jobs -= 1
+            finished(number, _outcome(done))
+
+    def _hand_over(self, number: int, done: Future[Outcome]) -> None:
+        """Called in whatever thread a trial is finished."""
+        self._finished.put((number, done))
+
+    def _count_known(self) -> None:
+        for row in self.study.store.rows():
+            if row.outcome is not None:
+                self._count(row, row.outcome)
+
+    def _count(self, row: Row, outcome: Outcome) -> None:
+        """Keep count, and stop a study in which everything fails.
+
+        Raises:
+            SearchError: the first trials all failed; says why.
+        """
+        score = outcome.scores.get(self.study.objective, math.nan)
+        if row.generation == START:
+            self._start_score = score
+        else:
+            self._done += 1
+            self._failed += outcome.failed
+        if outcome.failure is not None:
+            self._reasons[outcome.failure] += 1
+        if not outcome.failed:
+            self._best = score if math.isnan(self._best) else max(self._best, score)
+        enough = ALL_FAIL_WITH_START if math.isnan(self._start_score) else ALL_FAIL
+        if self._failed == self._done >= min(enough, self.limit):
+            reason, times = self._reasons.most_common(1)[0]
+            raise SearchError(
+                f"all {self._done} trials so far have failed, {times} of them because: {reason}",
+                hint="Change the bounds, or see with `optisense evaluate` whether the design can "
+                "be scored at all",
+            )
+
+    def _compare(self, asked: np.ndarray, rows: Sequence[Row]) -> None:
+        """Whether the method proposes what it did before."""
+        if not rows or self._notes:
+            return
+        stored = np.array([row.vector for row in rows])
+        span = self.study.space.upper - self.study.space.lower
+        fewer = len(asked) < len(stored)
+        if not fewer and (np.abs(asked[: len(stored)] - stored) <= SAME_POINT * span).all():
+            return
+        then, now = self.study.settings.versions, package_versions()
+        changed = [
+            f"{name} {then.get(name)} -> {now[name]}" for name in now if then.get(name) != now[name]
+        ]
+        why = ", ".join(changed) or "another machine computes differently in the last digit"
+        self._notes.append(
+            "the method would have proposed other points than when the study was begun "
+            f"({why}): it goes on from the trials that are there"
+        )
+
+    def _report(self, stage: str, now: bool = False) -> None:
+        clock = time.monotonic()
+        if not now and clock - self._told < TICK / 2:
+            return
+        self._told = clock
+        rate = self._new / max(clock - self._began, 1e-9)
+        left = (self.limit - self._done) / rate if rate > 0 else math.nan
+        self._tell(
+            Progress(
+                stage=stage,
+                done=self._done,
+                total=self.limit,
+                failed=self._failed,
+                best=self._best,
+                start=self._start_score,
+                trials_per_hour=3600.0 * rate,
+                seconds_left=left,
+                facts=self.method.describe(),
+            )
+        )
+
+
+def _outcome(done: Future[Outcome]) -> Outcome:
+    """The outcome of a future.
+
+    Raises:
+        OptiSenseError: no trial can be worked out.
+    """
+    error = done.exception()
+    if error is None:
+        return done.result()
+    if isinstance(error, OptiSenseError):
+        raise error
+    raise SearchError(f"a trial could not be worked out: {error}") from error

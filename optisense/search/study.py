@@ -1,0 +1,351 @@
+"""A study: one search with everything that belongs to it, in a folder or in memory.
+
+```text
+STUDY/
+  study.json       what is searched, how, and with which seed
+  design/          the design that the search starts from
+  trials.sqlite    every trial, written as it finishes
+```
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import shutil
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from optisense.design import SensorDesign, load_design, save_design
+from optisense.errors import OutputError, SearchError
+from optisense.search.constraints import Constraint
+from optisense.search.difference import differences, fingerprint, plain_differences
+from optisense.search.dominance import front as front_of
+from optisense.search.evaluation import DesignEvaluator, Goal
+from optisense.search.plan import ONLY_HERE, Plan, file_prints, known_goals, known_rules
+from optisense.search.settings import STUDY_FILE, StudySettings
+from optisense.search.space import SearchSpace
+from optisense.search.store import Lock, Row, Store
+from optisense.search.trial import Trial
+
+DESIGN_FOLDER = "design"
+STORE_FILE = "trials.sqlite"
+LOCK_FILE = ".lock"
+
+MOST_SHOWN = 8
+
+
+class Study:
+    """One search. Make one with `create` or `open`, and run it with `optisense.search.run_study`.
+
+    Attributes:
+        folder: where it is kept; None in memory.
+        settings: what it is about.
+        space: bound to the design.
+        goals: what it searches for; empty where only the program that began it knows them.
+    """
+
+    def __init__(
+        self,
+        folder: Path | None,
+        settings: StudySettings,
+        design: SensorDesign,
+        goals: Sequence[Goal],
+        rules: Sequence[Constraint],
+        store: Store,
+    ) -> None:
+        """Use `create` or `open`."""
+        self.folder = folder
+        self.settings = settings
+        self.goals = list(goals)
+        self.space = SearchSpace.from_plain(settings.space, rules).bind(design)
+        self.store = store
+        self._lock: Lock | None = None
+
+    @staticmethod
+    def create(folder: str | Path | None, design: SensorDesign, plan: Plan) -> Study:
+        """Begin a study; nothing is scored yet.
+
+        Args:
+            folder: where to keep it; None keeps it in memory.
+            design: where the search starts.
+            plan: what to search and how.
+
+        Raises:
+            SearchError: the plan makes no sense, or there is a study in the folder already.
+            DesignError: a path leads nowhere.
+            ObjectiveError: an objective or a setting is unknown.
+            OutputError: the folder can't be written.
+        """
+        place = None if folder is None else Path(folder)
+        if place is not None:
+            _check_free(place)
+        settings = plan.settings_for(design)
+        if place is None:
+            store = Store(None, settings.names, new=True)
+            return Study(None, settings, design, plan.goals, plan.space.constraints, store)
+        with _only_whole(place):
+            design = _kept(place, design)
+            settings = replace(settings, fingerprint=fingerprint(design))
+            store = Store(place / STORE_FILE, settings.names, new=True)
+            store.set_fact("settings", settings.fingerprint_of_all())
+            study = Study(place, settings, design, plan.goals, plan.space.constraints, store)
+            settings.save(place)  # last: from here on it is a study
+        return study
+
+    @staticmethod
+    def open(
+        folder: str | Path,
+        design: SensorDesign | None = None,
+        goals: Sequence[Goal] | None = None,
+        rules: Sequence[Constraint] | None = None,
+    ) -> Study:
+        """Open a study to look at it or to go on with it.
+
+        Args:
+            folder: of the study.
+            design: the design that the user means; refused where it is not the study's.
+            goals, rules: those that are functions of the program and in no file.
+
+        Raises:
+            SearchError: there is no study, it was changed by hand, it is of a newer version, or
+                the design differs; says where.
+        """
+        place = Path(folder)
+        settings = StudySettings.load(place)
+        own = load_design(place / DESIGN_FOLDER)
+        if fingerprint(own) != settings.fingerprint:
+            raise SearchError(
+                "the study's own copy of the design was edited since its trials were made",
+                where=str(place / DESIGN_FOLDER),
+                hint="Undo the change, or begin a new study of the edited design",
+            )
+        if design is not None:
+            changed = differences(own, design)
+            if changed:
+                raise SearchError(
+                    f"the design is not the one of this study any more:\n{_listed(changed)}",
+                    where=str(place),
+                    hint="Undo the changes, or begin a new study with another --out",
+                )
+        if not (place / STORE_FILE).is_file():
+            raise SearchError(f"the study has no {STORE_FILE}", where=str(place))
+        store = Store(place / STORE_FILE, settings.names, new=False)
+        if store.fact("settings") != settings.fingerprint_of_all():
+            store.close()
+            raise SearchError(
+                f"{STUDY_FILE} was edited since the study was begun",
+                where=str(place / STUDY_FILE),
+                hint="Undo the change, or begin a new study",
+            )
+        known = known_goals(settings, goals)
+        return Study(place, settings, own, known, known_rules(settings, rules), store)
+
+    def expect(self, wanted: Mapping[str, Any]) -> None:
+        """Refuse to go on with other settings than those that the study was begun with.
+
+        Args:
+            wanted: fields of `StudySettings` as JSON-ready values.
+
+        Raises:
+            SearchError: some differ; says how.
+        """
+        here = json.loads(self.settings.to_text())
+        there = json.loads(json.dumps(wanted))
+        changed = plain_differences({key: here[key] for key in there}, there)
+        if changed:
+            raise SearchError(
+                f"the study was begun otherwise:\n{_listed(changed)}",
+                where=str(self.folder or "the study"),
+                hint="Go on with it as it was begun, or begin a new one with another --out",
+            )
+
+    def evaluator(self) -> DesignEvaluator:
+        """What scores its points.
+
+        Raises:
+            SearchError: a goal or rule is known only to the program that began the study.
+        """
+        known = [*self.settings.objectives, *self.settings.rules]
+        unknown = [each.removeprefix(ONLY_HERE) for each in known if each.startswith(ONLY_HERE)]
+        lacks_goals = len(self.goals) < len(self.settings.names)
+        lacks_rules = len(self.space.space.constraints) < len(self.settings.rules)
+        if lacks_goals or lacks_rules:
+            raise SearchError(
+                f"only the program that began this study knows {', '.join(unknown)}",
+                hint="Go on with it from that program",
+            )
+        now = file_prints([*self.settings.objectives, *self.settings.rules])
+        for path, print_before in self.settings.files.items():
+            if now.get(path) != print_before:
+                raise SearchError(
+                    "the file has gone or was edited since the study's trials were made",
+                    where=path,
+                    hint="Undo the change, or begin a new study",
+                )
+        return DesignEvaluator(
+            self.space, self.goals, self.settings.settings, apart=self.settings.apart
+        )
+
+    @property
+    def objective(self) -> str:
+        """The first goal, which methods for one goal maximise."""
+        return self.settings.names[0]
+
+    @property
+    def trials(self) -> list[Trial]:
+        """The finished trials in the order in which they were proposed, the start first."""
+        fresh = self.store.fresh_scores()
+        return [
+            self.trial_of(row, fresh.get(row.number, {}))
+            for row in self.store.rows()
+            if row.outcome is not None
+        ]
+
+    @property
+    def start(self) -> Trial | None:
+        """The design as it is, or the nearest to it in the space."""
+        return next((trial for trial in self.trials if trial.is_start), None)
+
+    @property
+    def best(self) -> Trial | None:
+        """The best trial by the first objective: by fresh seeds where some were scored so."""
+        return best_of(self.trials)
+
+    @property
+    def front(self) -> list[Trial]:
+        """The trials that no other one beats in all objectives, by the first of them."""
+        return front_among(self.trials, self.settings.names)
+
+    def trial(self, which: int | str) -> Trial:
+        """A trial by its number, or "best" or "start".
+
+        Raises:
+            SearchError: there is no such trial.
+        """
+        trials = self.trials
+        if which == "best":
+            found = best_of(trials)
+        elif which == "start":
+            found = next((trial for trial in trials if trial.is_start), None)
+        else:
+            try:
+                number = int(which)
+            except ValueError:
+                hint = "Write best, start, or its number"
+                raise SearchError(f"'{which}' is no trial", hint=hint) from None
+            found = next((trial for trial in trials if trial.number == number), None)
+        if found is None:
+            last = max((trial.number for trial in trials), default=-1)
+            hint = f"Trials 0 to {last} are there" if trials else "No trial is finished yet"
+            if which == "best" and trials:
+                hint = "All trials failed"
+            raise SearchError(f"the study has no trial '{which}'", hint=hint)
+        return found
+
+    def trial_of(self, row: Row, fresh: Mapping[int, Any] | None = None) -> Trial:
+        """A finished row of the store as a trial."""
+        assert row.outcome is not None
+        return Trial(
+            number=row.number,
+            generation=row.generation,
+            vector=row.vector,
+            outcome=row.outcome,
+            space=self.space,
+            objective=self.objective,
+            fresh=fresh or {},
+        )
+
+    def lock(self) -> None:
+        """Keep other processes from running it.
+
+        Raises:
+            SearchError: one does already.
+        """
+        if self.folder is not None and self._lock is None:
+            self._lock = Lock(self.folder / LOCK_FILE)
+
+    def unlock(self) -> None:
+        """Let others run it."""
+        if self._lock is not None:
+            self._lock.release()
+            self._lock = None
+
+    def close(self) -> None:
+        """Close its files; one that is in memory is gone."""
+        self.unlock()
+        self.store.close()
+
+
+def best_of(trials: Sequence[Trial]) -> Trial | None:
+    """The best by fresh seeds where some were scored so, else by the study's seed."""
+    fine = [trial for trial in trials if math.isfinite(trial.score)]
+    again = [trial for trial in fine if math.isfinite(trial.fresh_score())]
+    if again:
+        return max(again, key=lambda trial: (trial.fresh_score(), trial.score))
+    return max(fine, key=lambda trial: trial.score, default=None)
+
+
+def front_among(trials: Sequence[Trial], names: Sequence[str]) -> list[Trial]:
+    """The trials that no other one beats in all objectives, the best in the first one first."""
+    if not trials:
+        return []
+    values = np.array([[trial.scores.get(name, np.nan) for name in names] for trial in trials])
+    chosen = [trials[number] for number in front_of(values)]
+    return sorted(chosen, key=lambda trial: -trial.score)
+
+
+def _check_free(folder: Path) -> None:
+    """Refuse a folder that holds something already.
+
+    Raises:
+        SearchError: it does.
+    """
+    if (folder / STUDY_FILE).exists():
+        raise SearchError(
+            "there is a study in this folder already",
+            where=str(folder),
+            hint="Go on with it by --resume, or name another folder",
+        )
+    if folder.is_dir() and any(folder.iterdir()):
+        raise SearchError(
+            "the folder is not empty", where=str(folder), hint="Name a folder that doesn't exist"
+        )
+
+
+@contextmanager
+def _only_whole(folder: Path) -> Iterator[None]:
+    """Whatever is in a folder that was free before is removed again where the work fails."""
+    existed = folder.exists()
+    try:
+        yield
+    except BaseException:
+        if existed:
+            for each in folder.iterdir():
+                shutil.rmtree(each) if each.is_dir() else each.unlink()
+        else:
+            shutil.rmtree(folder, ignore_errors=True)
+        raise
+
+
+def _kept(folder: Path, design: SensorDesign) -> SensorDesign:
+    """The design as it will be read again, so that a resumed study has the very same one."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise OutputError(
+            f"the study's folder can't be made: {error.strerror or error}", where=str(folder)
+        ) from error
+    save_design(design, folder / DESIGN_FOLDER)
+    return load_design(folder / DESIGN_FOLDER)
+
+
+def _listed(changed: list[str]) -> str:
+    shown = "\n".join(f"  {line}" for line in changed[:MOST_SHOWN])
+    more = len(changed) - MOST_SHOWN
+    return shown + (f"\n  and {more} more" if more > 0 else "")

@@ -1,0 +1,85 @@
+"""A trial of a study: one point of its space and what came of it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from optisense.design import SensorDesign
+from optisense.search.outcome import Outcome
+from optisense.search.space import BoundSpace
+
+
+@dataclass(frozen=True)
+class Trial:
+    """A finished trial.
+
+    Attributes:
+        number: counts from 0, the start.
+        generation: which it was proposed in; -1 for the start.
+        vector: (n,) the point.
+        outcome: scores with the seed of the study.
+        fresh: scores with other seeds, by seed; only of the best trials.
+        space: what the point means.
+        objective: the first goal.
+    """
+
+    number: int
+    generation: int
+    vector: NDArray[np.float64]
+    outcome: Outcome
+    space: BoundSpace = field(repr=False)
+    objective: str = ""
+    fresh: Mapping[int, Outcome] = field(default_factory=dict, repr=False)
+
+    @property
+    def is_start(self) -> bool:
+        """Whether this is the design as it is, or the nearest to it in the space."""
+        return self.generation < 0
+
+    @property
+    def scores(self) -> Mapping[str, float]:
+        """By objective; NaN where it failed."""
+        return self.outcome.scores
+
+    @property
+    def score(self) -> float:
+        """Of the first objective, with the seed of the study."""
+        return self.outcome.scores.get(self.objective, math.nan)
+
+    @property
+    def failure(self) -> str | None:
+        """Why a score is missing."""
+        return self.outcome.failure
+
+    @property
+    def parts(self) -> Mapping[str, Mapping[str, Any]]:
+        """What the scores are made of, by objective."""
+        return self.outcome.parts
+
+    @property
+    def values(self) -> dict[str, float | int | str]:
+        """What it sets, by parameter."""
+        return self.space.values(self.vector)
+
+    @property
+    def design(self) -> SensorDesign:
+        """The design of this trial; a new one each time."""
+        return self.space.apply(self.vector).copy()
+
+    def fresh_score(self, objective: str | None = None) -> float:
+        """Mean over the other seeds; NaN if there is none or one failed."""
+        name = objective or self.objective
+        values = [outcome.scores.get(name, math.nan) for outcome in self.fresh.values()]
+        return float(np.mean(values)) if values else math.nan
+
+    def fresh_spread(self, objective: str | None = None) -> float:
+        """Standard deviation over the other seeds; NaN if there are less than two."""
+        name = objective or self.objective
+        values = [outcome.scores.get(name, math.nan) for outcome in self.fresh.values()]
+        return float(np.std(values, ddof=1)) if len(values) > 1 else math.nan

@@ -1,0 +1,319 @@
+"""Studies from beginning to end, scored by cheap functions of the design."""
+
+from __future__ import annotations
+
+import json
+import math
+import sqlite3
+from pathlib import Path
+from types import ModuleType
+
+import numpy as np
+import pytest
+
+from optisense.design import SensorDesign, save_design, set_value
+from optisense.errors import OutputError, SearchError
+from optisense.search import Progress, SearchSpace, Study, search
+from optisense.search.run import run_study
+from optisense.search.store import START, STORE_VERSION
+
+SPACE = {"coating.specularity": (0.0, 1.0, 5), "camera.position.x": (-1.0, 3.0, 3)}
+
+
+def vectors(study: Study) -> np.ndarray:
+    return np.array([row.vector for row in study.store.rows()])
+
+
+def test_finds_the_best_and_makes_its_design(mini: SensorDesign, goals: ModuleType) -> None:
+    result = search(mini, SPACE, goals.nearness, budget=200, seed=3)
+    assert result.best.score > -1e-6
+    assert result.best.design.coating.specularity == pytest.approx(0.3, abs=1e-3)
+    assert result.start.score == goals.nearness(mini)
+    assert result.ended == "the budget is spent"
+    assert len(result.trials) == 201
+    assert mini.coating.specularity == 0.0
+
+
+def test_grid_scores_every_combination(mini: SensorDesign, goals: ModuleType) -> None:
+    result = search(mini, SPACE, goals.nearness, method="grid")
+    assert result.best.values == {"coating.specularity": 0.25, "camera.position.x": 1.0}
+    assert result.ended == "the method has finished"
+    assert len(result.trials) == 1 + 15
+
+
+def test_progress_tells_of_best_rate_and_time_left(mini: SensorDesign, goals: ModuleType) -> None:
+    seen: list[Progress] = []
+    search(mini, SPACE, goals.told, budget=40, progress=seen.append)
+    last = [each for each in seen if each.stage == "trials"][-1]
+    assert last.total == 40
+    assert 0 < last.done <= 40
+    assert last.trials_per_hour > 0
+    assert last.start <= last.best <= 0.0
+    assert last.seconds_left == pytest.approx((40 - last.done) * 3600.0 / last.trials_per_hour)
+
+
+def test_a_failed_trial_is_kept_with_its_reason(mini: SensorDesign) -> None:
+    def picky(design: SensorDesign) -> float:
+        if design.coating.specularity > 0.4:
+            raise ValueError("too shiny")
+        return design.coating.specularity
+
+    result = search(mini, {"coating.specularity": (0.0, 1.0, 11)}, picky, method="grid")
+    failed = [trial for trial in result.trials if trial.failure]
+    assert len(failed) == 6
+    assert all("too shiny" in str(trial.failure) for trial in failed)
+    assert all(math.isnan(trial.score) for trial in failed)
+    assert result.best.score == pytest.approx(0.4)
+
+
+def test_a_score_that_is_no_number_fails(mini: SensorDesign) -> None:
+    def hole(design: SensorDesign) -> float:
+        return math.nan if design.coating.specularity == 0.5 else 1.0
+
+    result = search(mini, {"coating.specularity": (0.0, 1.0, 3)}, hole, method="grid")
+    assert [trial.failure is not None for trial in result.trials] == [False, False, True, False]
+
+
+def test_stops_early_when_every_trial_fails(
+    mini: SensorDesign, goals: ModuleType, tmp_path: Path
+) -> None:
+    with pytest.raises(SearchError, match="no such sensor can be made") as told:
+        search(mini, SPACE, goals.broken, budget=1000, out=tmp_path / "study")
+    assert "have failed" in told.value.message
+    study = Study.open(tmp_path / "study")
+    assert 1 <= len(study.trials) <= 6
+    with pytest.raises(SearchError, match="'best'"):
+        study.trial("best")
+
+
+def test_a_rule_forbids_designs(mini: SensorDesign, goals: ModuleType) -> None:
+    def modest(design: SensorDesign) -> str | None:
+        return "too shiny" if design.coating.specularity > 0.2 else None
+
+    space = SearchSpace(SPACE, constraints=[modest])
+    result = search(mini, space, goals.brightness, method="grid")
+    assert {trial.failure for trial in result.trials} == {None, "too shiny"}
+    assert result.best.score == 0.0
+
+
+def test_the_same_seed_is_the_same_study(mini: SensorDesign, goals: ModuleType) -> None:
+    one, same, other = (
+        search(mini, SPACE, goals.nearness, budget=60, seed=seed).study for seed in (1, 1, 2)
+    )
+    assert np.array_equal(vectors(one), vectors(same))
+    assert not np.array_equal(vectors(one), vectors(other))
+
+
+def test_the_best_is_scored_again_before_it_is_named(mini: SensorDesign) -> None:
+    """Of noisy scores the luckiest is not the best: fresh seeds tell."""
+    from optisense.search import running
+
+    class Noisy:
+        """Scores the specularity, with luck that depends on the seed and the design."""
+
+        def __init__(self, usual: object) -> None:
+            self.usual = usual
+
+        def __call__(self, vector: np.ndarray, seed: int) -> object:
+            luck = np.random.default_rng([seed, int(1e6 * vector[0])]).normal(0.0, 0.05)
+            return running.Outcome({"brightness": float(vector[0]) + luck})
+
+    def brightness(design: SensorDesign) -> float:
+        raise AssertionError("the method brings an evaluator of its own")
+
+    from optisense.search.methods import Method, register
+
+    class NoisyLine(Method):
+        name = "noisy-line"
+        summary = "a test"
+
+        def ask(self) -> np.ndarray:
+            asked, self.asked = getattr(self, "asked", False), True
+            return np.empty((0, 1)) if asked else np.linspace(0.0, 0.2, 60)[:, None]
+
+        def tell(self, vectors: np.ndarray, outcomes: object) -> None:
+            pass
+
+        def evaluator(self, usual: object) -> Noisy:  # type: ignore[override]
+            return Noisy(usual)
+
+    register(NoisyLine)
+    space = {"coating.specularity": (0.0, 1.0)}
+    result = search(mini, space, brightness, method="noisy-line", budget=60, seed=5)
+    again = [trial for trial in result.trials if trial.fresh and not trial.is_start]
+    luckiest = max(result.trials, key=lambda trial: trial.score)
+    assert luckiest in again
+    assert len(again) > 1
+    assert all(len(trial.fresh) == 3 for trial in again)
+    assert result.study.settings.seed not in {seed for trial in again for seed in trial.fresh}
+    assert result.best.fresh_score() == max(trial.fresh_score() for trial in again)
+    assert result.best.fresh_score() < luckiest.score
+    assert result.start.fresh
+
+
+class TestResume:
+    def test_a_larger_budget_goes_on_where_it_ended(
+        self, mini: SensorDesign, goals: ModuleType, tmp_path: Path
+    ) -> None:
+        """In two goes the same trials as in one, and none twice."""
+        folder = tmp_path / "study"
+        whole = search(mini, SPACE, goals.nearness, budget=60, seed=3)
+        first = search(mini, SPACE, goals.nearness, budget=60, seed=3, out=folder)
+        first.study.close()
+        study = Study.open(folder, goals=[goals.nearness])
+        again = run_study(study, limit=90)
+        assert len(again.trials) == 91
+        assert np.array_equal(vectors(study)[:61], vectors(whole.study))
+        longer = search(mini, SPACE, goals.nearness, budget=60, seed=3)
+        run_study(longer.study, limit=90)
+        assert np.array_equal(vectors(study), vectors(longer.study))
+
+    def test_a_finished_study_has_nothing_left_to_do(
+        self, mini: SensorDesign, goals: ModuleType, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        log = tmp_path / "log"
+        monkeypatch.setenv("TRIAL_LOG", str(log))
+        for resume in (False, True):
+            result = search(
+                mini, SPACE, goals.told, budget=30, out=tmp_path / "study", resume=resume
+            )
+            again = sum(len(trial.fresh) for trial in result.trials)
+            result.study.close()
+        assert len(log.read_text().splitlines()) == 31 + again
+
+    def test_an_edited_design_is_refused_with_the_difference(
+        self, mini: SensorDesign, goals: ModuleType, tmp_path: Path
+    ) -> None:
+        folder = tmp_path / "study"
+        search(mini, SPACE, goals.nearness, budget=5, out=folder).study.close()
+        edited = set_value(mini, "lights.red.flux", 12.0)
+        with pytest.raises(SearchError) as told:
+            search(edited, SPACE, goals.nearness, budget=5, out=folder, resume=True)
+        assert "lights.red.flux: 10 -> 12" in told.value.message
+        save_design(edited, folder / "design")
+        with pytest.raises(SearchError, match="own copy of the design was edited"):
+            Study.open(folder)
+
+    def test_other_settings_are_refused_with_the_difference(
+        self, mini: SensorDesign, goals: ModuleType, tmp_path: Path
+    ) -> None:
+        folder = tmp_path / "study"
+        search(mini, SPACE, goals.nearness, budget=5, out=folder).study.close()
+        wider = {**SPACE, "coating.specularity": (0.0, 0.9, 5)}
+        with pytest.raises(SearchError, match=r"specularity.*high: 1 -> 0\.9"):
+            search(mini, wider, goals.nearness, budget=5, out=folder, resume=True)
+        with pytest.raises(SearchError, match="seed: 0 -> 1"):
+            search(mini, SPACE, goals.nearness, budget=5, out=folder, resume=True, seed=1)
+        with pytest.raises(SearchError, match="searches for nearness, not for brightness"):
+            search(mini, SPACE, goals.brightness, budget=5, out=folder, resume=True)
+
+    def test_only_the_program_knows_its_functions(
+        self, mini: SensorDesign, goals: ModuleType, tmp_path: Path
+    ) -> None:
+        folder = tmp_path / "study"
+        search(mini, SPACE, goals.nearness, budget=5, out=folder).study.close()
+        study = Study.open(folder)
+        assert len(study.trials) == 6
+        with pytest.raises(SearchError, match="knows nearness"):
+            run_study(study)
+
+    def test_an_edited_file_of_a_user_is_refused(self, mini: SensorDesign, tmp_path: Path) -> None:
+        rule = tmp_path / "rule.py"
+        rule.write_text("def fine(design):\n    return True\n")
+        from optisense.search.constraints import UserRule
+
+        space = SearchSpace(SPACE, constraints=[UserRule(f"{rule}:fine")])
+        folder = tmp_path / "study"
+
+        def score(design: SensorDesign) -> float:
+            return 1.0
+
+        search(mini, space, score, budget=5, out=folder).study.close()
+        rule.write_text("def fine(design):\n    return False\n")
+        with pytest.raises(SearchError, match="was edited") as told:
+            run_study(Study.open(folder, goals=[score]))
+        assert told.value.where == str(rule)
+
+
+class TestFolder:
+    @pytest.fixture
+    def folder(self, mini: SensorDesign, goals: ModuleType, tmp_path: Path) -> Path:
+        search(mini, SPACE, goals.nearness, budget=5, out=tmp_path / "study").study.close()
+        return tmp_path / "study"
+
+    def test_holds_all_of_it(self, folder: Path) -> None:
+        study = Study.open(folder)
+        assert study.settings.method == "cma-es"
+        assert [trial.number for trial in study.trials] == list(range(6))
+        assert study.store.rows()[0].generation == START
+        assert study.best is not None
+        assert study.best.fresh
+
+    def test_a_study_is_not_begun_over_another(
+        self, folder: Path, mini: SensorDesign, goals: ModuleType, tmp_path: Path
+    ) -> None:
+        with pytest.raises(SearchError, match="a study in this folder already"):
+            search(mini, SPACE, goals.nearness, budget=5, out=folder)
+        (tmp_path / "mine").mkdir()
+        (tmp_path / "mine" / "design").write_text("something of mine")
+        with pytest.raises(SearchError, match="not empty"):
+            search(mini, SPACE, goals.nearness, budget=5, out=tmp_path / "mine")
+        assert (tmp_path / "mine" / "design").read_text() == "something of mine"
+
+    def test_a_bad_plan_leaves_no_folder(
+        self, mini: SensorDesign, goals: ModuleType, tmp_path: Path
+    ) -> None:
+        with pytest.raises(SearchError):
+            search(mini, SPACE, goals.nearness, method="cma", out=tmp_path / "new")
+        assert not (tmp_path / "new").exists()
+
+    def test_a_store_of_a_newer_version_is_refused(self, folder: Path) -> None:
+        with sqlite3.connect(folder / "trials.sqlite") as file:
+            file.execute(f"pragma user_version = {STORE_VERSION + 1}")
+        with pytest.raises(SearchError, match="version 2; this release reads 1") as told:
+            Study.open(folder)
+        assert "update" in str(told.value.hint)
+
+    def test_a_study_of_a_newer_version_is_refused(self, folder: Path) -> None:
+        path = folder / "study.json"
+        path.write_text(json.dumps({**json.loads(path.read_text()), "study_version": 2}))
+        with pytest.raises(SearchError, match="version 2; this release reads 1"):
+            Study.open(folder)
+
+    def test_an_edited_study_is_refused(self, folder: Path) -> None:
+        path = folder / "study.json"
+        path.write_text(json.dumps({**json.loads(path.read_text()), "seed": 99}))
+        with pytest.raises(SearchError, match="was edited"):
+            Study.open(folder)
+
+    def test_broken_files_are_told(self, folder: Path, tmp_path: Path) -> None:
+        with pytest.raises(SearchError, match="no study here"):
+            Study.open(tmp_path)
+        (folder / "trials.sqlite").write_bytes(b"not a database, certainly not one" * 100)
+        with pytest.raises(SearchError, match="not a study's store"):
+            Study.open(folder)
+        (folder / "study.json").write_text("{")
+        with pytest.raises(SearchError, match="can't be read"):
+            Study.open(folder)
+
+    def test_two_processes_do_not_run_one_study(self, folder: Path, goals: ModuleType) -> None:
+        one, other = (Study.open(folder, goals=[goals.nearness]) for _ in range(2))
+        one.lock()
+        with pytest.raises(SearchError, match="another process is running this study"):
+            run_study(other, limit=10)
+        one.unlock()
+        assert len(run_study(other, limit=10).trials) == 11
+
+    def test_a_full_disk_is_told_and_loses_nothing(self, folder: Path, goals: ModuleType) -> None:
+        """SQLite's own limit on the number of pages stands for the end of the disk."""
+        study = Study.open(folder, goals=[goals.nearness])
+        pages = study.store._db.execute("pragma page_count").fetchone()[0]
+        study.store._db.execute(f"pragma max_page_count = {pages}")
+        with pytest.raises(OutputError, match="disk is full") as told:
+            run_study(study, limit=2000)
+        assert "--resume" in str(told.value.hint)
+        study.close()
+        again = Study.open(folder, goals=[goals.nearness])
+        kept = len(again.trials)
+        assert kept >= 6
+        assert len(run_study(again, limit=kept + 20).trials) == kept + 21
