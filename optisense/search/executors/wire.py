@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pickle
 import struct
-from typing import Any, IO
+from typing import IO, Any
 
 _LENGTH = struct.Struct("<Q")
 
