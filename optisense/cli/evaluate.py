@@ -57,7 +57,7 @@ def evaluate(
         str | None,
         typer.Option(
             metavar="WIDTHxHEIGHT",
-            help="Pixels of images and rays. 320 and 640 across when left out.",
+            help="Pixels of images and rays. 640 across, in the camera's shape, when left out.",
             show_default=False,
         ),
     ] = None,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import TYPE_CHECKING, Any, TypeVar, cast
 
 import numpy as np
@@ -13,7 +13,7 @@ from optisense.design import SensorDesign
 from optisense.errors import OptiSenseError
 from optisense.geometry import Contact, SensingSurface, Sphere, locate
 from optisense.objectives.press import Press
-from optisense.objectives.settings import IMAGE_WIDTH, RAY_WIDTH, Settings, size_for
+from optisense.objectives.settings import Settings, size_for
 
 if TYPE_CHECKING:
     from optisense.optics import ChiefRays, OpticalModel, TactileImage
@@ -57,12 +57,12 @@ class Evaluation:
     @property
     def resolution(self) -> tuple[int, int]:
         """(width, height) of the images."""
-        return self.settings.resolution or size_for(self.design.camera.resolution, IMAGE_WIDTH)
+        return self.settings.resolution or size_for(self.design.camera.resolution)
 
     @property
     def ray_resolution(self) -> tuple[int, int]:
         """(width, height) of the chief rays."""
-        return self.settings.ray_resolution or size_for(self.design.camera.resolution, RAY_WIDTH)
+        return self.settings.ray_resolution or size_for(self.design.camera.resolution)
 
     @property
     def sensing_faces(self) -> int:
@@ -124,7 +124,14 @@ class Evaluation:
             return self.model.nine_contacts(ball, self.settings.depth)
         return [Contact(ball, at=at, depth=self.settings.depth) for at in self.settings.places]
 
-    def _presses(self) -> list[Press]:
+    def each_press(self) -> Iterator[tuple[Press, TactileImage]]:
+        """Each press, not checked yet, with the image that it is seen in; rendered one by one.
+
+        For those who need an image's layers; they are not kept here.
+
+        Raises:
+            ObjectiveError: the camera does not see a place.
+        """
         contacts, surface = self.contacts, self.model.surface
         untouched = self.untouched.radiance
         before = self.model.chief_rays(self.resolution).normals
@@ -132,12 +139,11 @@ class Evaluation:
         together = self.settings.together and self._are_apart([each["place"] for each in frames])
         groups = [contacts] if together else [[contact] for contact in contacts]
         part = (1.0 - FIRST_IMAGE) / len(groups)
-        images = [
-            self._render(group, FIRST_IMAGE + n * part, part) for n, group in enumerate(groups)
-        ]
-        presses = []
+        image: TactileImage | None = None
         for number, frame in enumerate(frames):
-            image = images[0] if together else images[number]
+            if image is None or not together:
+                group = contacts if together else [contacts[number]]
+                image = self._render(group, FIRST_IMAGE + (not together) * number * part, part)
             mask = image.contact_mask
             if together:
                 mask = mask & (_nearest(image.points, mask, frames) == number)
@@ -150,6 +156,12 @@ class Evaluation:
                 before=before,
                 **frame,
             )
+            press.check_seen()
+            yield press, image
+
+    def _presses(self) -> list[Press]:
+        presses = []
+        for press, _ in self.each_press():
             press.check()
             presses.append(press)
         return presses

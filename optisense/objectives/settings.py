@@ -18,11 +18,9 @@ of balls on real GelSight Minis reach 25 to 40."""
 PLACES = 9
 """Contacts that cover the visible sensing surface evenly (the paper)."""
 
-IMAGE_WIDTH = 320
-"""Pixels across the images, as GelSight's own software has; the height follows the camera's."""
-
-RAY_WIDTH = 640
-"""Pixels across the chief rays."""
+ACROSS = 640
+"""Pixels across images and rays, for every sensor. At 320, as many cameras are read, a ball on the
+side of a fingertip is too few pixels to judge; images of 640 cost little more."""
 
 
 @dataclass(frozen=True)
@@ -30,8 +28,8 @@ class Settings:
     """Images and rays that objectives share. Lengths in mm.
 
     Attributes:
-        resolution: (width, height) of the images; 320 wide, in the camera's shape, if None.
-        ray_resolution: (width, height) of the chief rays; 640 wide if None.
+        resolution: (width, height) of the images; 640 wide, in the camera's shape, if None.
+        ray_resolution: (width, height) of the chief rays; likewise.
         photons: to trace for the light; the model's default if None.
         seed: of the photons and camera samples.
         radius: of the ball that presses.
@@ -113,7 +111,6 @@ def _pairs(places: Any) -> tuple[tuple[float, float], ...]:
     return tuple((float(u), float(v)) for u, v in places)
 
 
-def size_for(camera: tuple[int, int], width: int) -> tuple[int, int]:
-    """(width, height) in a camera's shape, no larger than the camera's own pixels."""
-    across = min(width, camera[0])
-    return across, max(1, round(across * camera[1] / camera[0]))
+def size_for(camera: tuple[int, int]) -> tuple[int, int]:
+    """(width, height) of images and rays for a camera of that many pixels."""
+    return ACROSS, max(1, round(ACROSS * camera[1] / camera[0]))
