@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from optisense.errors import ObjectiveError
 from optisense.objectives import figures
 from optisense.objectives.colour_boxes import ranges_in_boxes
-from optisense.objectives.press import FloatArray, azimuths
+from optisense.objectives.press import FloatArray, Press, azimuths
 from optisense.objectives.registry import objective
 
 if TYPE_CHECKING:
@@ -94,15 +94,7 @@ def normdiff(
     places: list[dict[str, Any]] = []
     maps = []
     for press in evaluation.presses:
-        # Step 1: indented pixels, by the normals before and after.
-        turned = (press.normals * press.before).sum(axis=2) < np.cos(np.radians(LEAST_TILT))
-        indented = press.mask & turned
-        count = int(indented.sum())
-        if count < least_pixels:
-            raise ObjectiveError(
-                f"only {count} pixels of {press.name} are indented, {least_pixels} are needed",
-                hint="Use a higher resolution",
-            )
+        indented = indented_pixels(press, least_pixels)
         theta, phi = azimuths(press, press.normals[indented])
         found = confusion(
             press.colours(indented, colours), theta, phi, noise, theta_weight, phi_weight
@@ -114,7 +106,7 @@ def normdiff(
                 "score": -float(found.confusion.mean()),
                 "theta_range": float(found.theta_range.mean()),
                 "phi_range": float(found.phi_range.mean()),
-                "pixels": count,
+                "pixels": int(indented.sum()),
                 "normals": len(found.cells),
             }
         )
@@ -125,6 +117,23 @@ def normdiff(
         "confusion_map": _mean_map(maps),
     }
     return float(np.mean([place["score"] for place in places])), parts, {}
+
+
+def indented_pixels(press: Press, least: int = LEAST_PIXELS) -> NDArray[np.bool_]:
+    """(h, w): step 1, the pixels of a press whose normals have turned.
+
+    Raises:
+        ObjectiveError: there are less than `least`.
+    """
+    turned = (press.normals * press.before).sum(axis=2) < np.cos(np.radians(LEAST_TILT))
+    indented: NDArray[np.bool_] = press.mask & turned
+    count = int(indented.sum())
+    if count < least:
+        raise ObjectiveError(
+            f"only {count} pixels of {press.name} are indented, {least} are needed",
+            hint="Use a higher resolution",
+        )
+    return indented
 
 
 def confusion(

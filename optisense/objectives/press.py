@@ -90,14 +90,22 @@ class Press:
         x, y, z = self.place
         return f"place {self.number} at ({x:.2f}, {y:.2f}, {z:.2f}) mm"
 
+    def check_seen(self) -> None:
+        """Make sure that the camera sees the press.
+
+        Raises:
+            ObjectiveError: it does not.
+        """
+        if not self.mask.any():
+            raise ObjectiveError(f"the camera does not see {self.name}")
+
     def check(self) -> None:
         """Make sure that the press can be judged.
 
         Raises:
             ObjectiveError: the camera does not see it, or it is overexposed or black.
         """
-        if not self.mask.any():
-            raise ObjectiveError(f"the camera does not see {self.name}")
+        self.check_seen()
         brightest = self.colours(self.mask).max(axis=1)
         clipped = float((brightest >= CLIPPED).mean())
         if clipped > MOST_CLIPPED:

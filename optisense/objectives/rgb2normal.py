@@ -68,28 +68,16 @@ def rgb2normal(
         colours: what is read, "picture" or "response" (see `Press.colours`).
         least_pixels: that a line must have.
     """
-    if directions < 1 or (directions % 2 and not half_lines):
-        raise ObjectiveError(
-            f"{directions} directions have no opposite ones", hint="Use an even number"
-        )
     angles = np.arange(directions) * 360.0 / directions
     places: list[dict[str, Any]] = []
     lines = []
     for press in evaluation.presses:
-        fits = {}
-        for angle in angles if half_lines else angles[: directions // 2]:
-            chosen = line(press, float(angle), half_lines)
-            count = int(chosen.sum())
-            if count < least_pixels:
-                raise ObjectiveError(
-                    f"only {count} pixels of {press.name} lie on the line at {angle:g} degrees, "
-                    f"{least_pixels} are needed",
-                    hint="Use a higher resolution",
-                )
-            fits[float(angle)] = fit(
-                signed_angles(press, float(angle), press.normals[chosen]),
-                press.colours(chosen, colours),
+        fits = {
+            angle: fit(
+                signed_angles(press, angle, press.normals[chosen]), press.colours(chosen, colours)
             )
+            for angle, chosen in lines_of(press, directions, half_lines, least_pixels).items()
+        }
         scores = {f"{angle:g}": fits[_line_of(angle, fits)].linearity for angle in angles}
         places.append(
             {
@@ -108,6 +96,36 @@ def rgb2normal(
     worst = float(min(min(place["directions"].values()) for place in places))
     parts = {"worst_line": worst, "directions": by_direction, "places": places}
     return value, parts, {"lines": lines}
+
+
+def lines_of(
+    press: Press,
+    directions: int = DIRECTIONS,
+    half_lines: bool = False,
+    least_pixels: int = LEAST_PIXELS,
+) -> dict[float, NDArray[np.bool_]]:
+    """The lines of a press, by angle in degrees; see `rgb2normal` for the arguments.
+
+    Raises:
+        ObjectiveError: the directions have no opposite ones, or a line has too few pixels.
+    """
+    if directions < 1 or (directions % 2 and not half_lines):
+        raise ObjectiveError(
+            f"{directions} directions have no opposite ones", hint="Use an even number"
+        )
+    angles = np.arange(directions) * 360.0 / directions
+    found = {}
+    for angle in (angles if half_lines else angles[: directions // 2]).tolist():
+        chosen = line(press, angle, half_lines)
+        count = int(chosen.sum())
+        if count < least_pixels:
+            raise ObjectiveError(
+                f"only {count} pixels of {press.name} lie on the line at {angle:g} degrees, "
+                f"{least_pixels} are needed",
+                hint="Use a higher resolution",
+            )
+        found[angle] = chosen
+    return found
 
 
 def line(press: Press, angle: float, half: bool = False) -> NDArray[np.bool_]:

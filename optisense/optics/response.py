@@ -33,12 +33,18 @@ def auto_exposure(radiance: FloatArray) -> float:
     return TARGET / level if level > 0 else 1.0
 
 
-def saturate(exposed: FloatArray) -> NDArray[np.float32]:
-    """Spread overexposure over the channels and clip; (h, w, 3) linear, 1 is full well."""
+def saturate(exposed: FloatArray, width: int | None = None) -> NDArray[np.float32]:
+    """Spread overexposure over the channels and clip; (h, w, 3) linear, 1 is full well.
+
+    Args:
+        exposed: the picture, or a part of it.
+        width: pixels across the whole picture, where this is a part of it.
+    """
     exposed = np.asarray(exposed, dtype=np.float32)
     excess = np.clip(exposed - KNEE, 0.0, MOST_EXCESS).max(axis=2)
     if excess.any():
-        mask = np.clip(gaussian_filter(excess, BLUR_OF_WIDTH * exposed.shape[1]), 0.0, 1.0)
+        blur = BLUR_OF_WIDTH * (width or exposed.shape[1])
+        mask = np.clip(gaussian_filter(excess, blur), 0.0, 1.0)
         exposed = exposed + mask[:, :, None] * (KNEE - np.minimum(exposed, KNEE))
     return np.clip(exposed, 0.0, 1.0).astype(np.float32)
 

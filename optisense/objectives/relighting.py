@@ -1,0 +1,248 @@
+"""The presses of a sensor under lights of any colours and powers, from one rendering.
+
+Light adds up: an image is the sum of what each light group gives, times its flux. So each press
+is rendered once, with a layer for each group, and its pixels under other lights are a weighted
+sum of layers: exact, and thousands of times sooner than a new image.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from optisense.errors import ObjectiveError
+from optisense.objectives.evaluation import Evaluation
+from optisense.objectives.press import Press
+from optisense.optics.response import BLUR_OF_WIDTH, KNEE, auto_exposure, saturate
+
+if TYPE_CHECKING:
+    from optisense.design import SensorDesign
+    from optisense.optics import ChiefRays, TactileImage
+
+ByteMask = NDArray[np.bool_]
+Layers = NDArray[np.float32]
+
+BLUR_REACH = 4.0
+"""Standard deviations after which the blur of overexposure ends (SciPy's own choice), ..."""
+
+SPARE = 2
+"""... and pixels more, to be on the safe side of its rounding."""
+
+
+@dataclass(frozen=True)
+class _Seen:
+    """One press with what is needed to light it again.
+
+    Attributes:
+        press: at full size, but for its response, which is that of `small`.
+        small: cut to the box of its contact, under the lights that it was rendered with.
+        box: rows and columns of that box.
+        around: of the box with all pixels whose overexposure can spread into it.
+        touched: (h', w') within `around`, pixels of the press's own image.
+        layers: (groups, 3, n) radiance for 1 mW a channel of the pixels of `touched`.
+    """
+
+    press: Press
+    small: Press
+    box: tuple[slice, slice]
+    around: tuple[slice, slice]
+    touched: ByteMask
+    layers: Layers
+
+
+class Relighting:
+    """A sensor whose presses can be seen under any lights.
+
+    Attributes:
+        model: of the sensor.
+        settings: of its images.
+        groups: the light groups, in the order of their layers.
+    """
+
+    def __init__(self, evaluation: Evaluation) -> None:
+        """Render each press once. The evaluation is not needed any more afterwards.
+
+        Raises:
+            ObjectiveError: a place is not seen.
+            OptiSenseError: the sensor can't be rendered.
+        """
+        self.model = evaluation.model
+        self.settings = evaluation.settings
+        image = evaluation.untouched
+        self.groups = tuple(image.unit_layers)
+        self._untouched = np.stack([_planes(layer) for layer in image.unit_layers.values()])
+        self._shape = image.contact_mask.shape
+        views = {
+            name: self._as_image(layer)
+            for name, layer in zip(self.groups, self._untouched, strict=True)
+        }
+        self._image = replace(image, layers={}, unit_layers=views)
+        self._seen = [self._keep(press, image) for press, image in evaluation.each_press()]
+
+    @property
+    def cut_presses(self) -> list[Press]:
+        """The presses under the lights that they were rendered with, cut to their boxes."""
+        return [seen.small for seen in self._seen]
+
+    @cached_property
+    def chief_rays(self) -> ChiefRays:
+        """Of the untouched sensor; light does not change them."""
+        return Evaluation(self.model, self.settings).chief_rays
+
+    def flux_of(self, design: SensorDesign) -> NDArray[np.float64]:
+        """(groups, 3) mW of R, G, B of each light, as a design has them.
+
+        Raises:
+            ObjectiveError: the design's light groups are not those that were rendered.
+        """
+        if tuple(design.lights) != self.groups:
+            raise ObjectiveError(
+                "the design has other light groups than were rendered",
+                hint="Only colours and powers can be changed without a new rendering",
+            )
+        return np.array([group.channel_flux() for group in design.lights.values()])
+
+    def untouched(self, flux: ArrayLike) -> NDArray[np.float32]:
+        """(h, w, 3): the radiance of the untouched sensor under lights (groups, 3) mW."""
+        return self._as_image(_mixed(self._untouched, flux))
+
+    def image(self, flux: ArrayLike) -> TactileImage:
+        """The image of the untouched sensor under these lights."""
+        given = np.asarray(flux, dtype=np.float64)
+        return self._image.relit(dict(zip(self.groups, given, strict=True)))
+
+    def exposure(self, flux: ArrayLike) -> float:
+        """The factor from radiance to what the camera reads, under these lights."""
+        return self._exposure(self.untouched(flux))
+
+    def presses(self, flux: ArrayLike, *, whole: bool = False) -> list[Press]:
+        """The presses under lights (groups, 3) mW.
+
+        Args:
+            flux: mW of R, G, B of each light, by group.
+            whole: images of full size, with what lies around the contacts; otherwise they are
+                cut to the box of the contact, which holds all that a contact's pixels tell.
+
+        Raises:
+            ObjectiveError: a press is overexposed or black under these lights.
+        """
+        background = self.untouched(flux)
+        exposure = self._exposure(background)
+        found = []
+        for seen in self._seen:
+            response = self._response(seen, background, exposure, flux, whole)
+            press = replace(seen.press if whole else seen.small, response=response)
+            press.check()
+            found.append(press)
+        return found
+
+    def lit(self, design: SensorDesign, *, whole: bool = True) -> Evaluation:
+        """An evaluation of a design that differs in the colours and powers of its lights only.
+
+        Args:
+            design: as of `flux_of`.
+            whole: as of `presses`.
+        """
+        return _Relit(self, design, whole)
+
+    def _keep(self, press: Press, image: TactileImage) -> _Seen:
+        rows, columns = press.box
+        height, width = press.mask.shape
+        reach = int(BLUR_REACH * BLUR_OF_WIDTH * width) + SPARE
+        around = (
+            slice(max(0, rows.start - reach), min(height, rows.stop + reach)),
+            slice(max(0, columns.start - reach), min(width, columns.stop + reach)),
+        )
+        touched = image.contact_mask[around]
+        layers = np.stack(
+            [layer[around][touched].T for layer in image.unit_layers.values()]
+        )  # fmt: skip
+        box = press.box
+        cut = {
+            name: getattr(press, name)[box].copy()
+            for name in ("mask", "response", "normals", "points", "before")
+        }
+        small = replace(press, **cut)
+        return _Seen(replace(press, response=small.response), small, box, around, touched, layers)
+
+    def _as_image(self, planes: NDArray[np.float32]) -> NDArray[np.float32]:
+        """(h, w, 3), a view of planes (3, h * w)."""
+        return np.moveaxis(planes.reshape(3, *self._shape), 0, -1)
+
+    def _exposure(self, untouched: NDArray[np.float32]) -> float:
+        given = self.settings.exposure
+        return auto_exposure(untouched) if given == "auto" else float(given)
+
+    def _response(
+        self,
+        seen: _Seen,
+        background: NDArray[np.float32],
+        exposure: float,
+        flux: ArrayLike,
+        whole: bool,
+    ) -> NDArray[np.float32]:
+        """The camera's response: of the whole image, or of the box of the contact."""
+        radiance = background[seen.around].copy()
+        radiance[seen.touched] = _mixed(seen.layers, flux).T
+        exposed = radiance * np.float32(exposure)
+        if whole:
+            image = background * np.float32(exposure)
+            image[seen.around] = exposed
+            return saturate(image)
+        inner = tuple(
+            slice(box.start - around.start, box.stop - around.start)
+            for box, around in zip(seen.box, seen.around, strict=True)
+        )
+        if exposed.max() <= KNEE:  # nothing spreads
+            return np.asarray(np.clip(exposed[inner], 0.0, 1.0))
+        return saturate(exposed, self._shape[1])[inner]
+
+
+class _Relit(Evaluation):
+    """An evaluation whose images come from layers."""
+
+    def __init__(self, relighting: Relighting, design: SensorDesign, whole: bool) -> None:
+        super().__init__(relighting.model, relighting.settings)
+        self._relighting = relighting
+        self._lit = design
+        self._flux = relighting.flux_of(design)
+        self._whole = whole
+
+    @property
+    def design(self) -> SensorDesign:
+        """The design with its own lights."""
+        return self._lit
+
+    @property
+    def chief_rays(self) -> ChiefRays:
+        """Of the untouched sensor; light does not change them."""
+        return self._relighting.chief_rays
+
+    @property
+    def untouched(self) -> TactileImage:
+        """The image of the untouched sensor under these lights."""
+        return self._once("untouched image", lambda: self._relighting.image(self._flux))
+
+    def _presses(self) -> list[Press]:
+        return self._relighting.presses(self._flux, whole=self._whole)
+
+
+def _planes(layer: NDArray[np.float32]) -> NDArray[np.float32]:
+    """(3, h * w), each channel by itself, of a layer (h, w, 3)."""
+    return np.ascontiguousarray(np.moveaxis(layer, -1, 0)).reshape(3, -1)
+
+
+def _mixed(layers: Layers, flux: ArrayLike) -> NDArray[np.float32]:
+    """(3, n): the sum of layers (groups, 3, n) times the flux (groups, 3) of each.
+
+    In single precision and in the order of the groups, as the image itself adds them up.
+    """
+    weights = np.asarray(flux, dtype=np.float32)
+    total = np.zeros(layers.shape[1:], dtype=np.float32)
+    for group, channel in zip(*np.nonzero(weights), strict=True):
+        total[channel] += layers[group, channel] * weights[group, channel]
+    return total

@@ -1,0 +1,144 @@
+"""Light adds up: presses under other lights, from layers, are those that a camera would see."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+import optisense as ots
+from optisense.design import SensorDesign, set_value
+from optisense.errors import ObjectiveError
+from optisense.objectives import Evaluation, Press, Settings, evaluate, find
+from optisense.objectives.relighting import Relighting
+from optisense.objectives.relit_scores import has_quick_form, quick_form
+from optisense.optics import OpticalModel
+
+SMALL = Settings(
+    resolution=(200, 150), photons=200_000, places=((0.0, 0.0), (3.0, 2.0)), radius=2.0
+)
+SETTINGS = [
+    ("rgb2normal", {}),
+    ("rgb2normal", {"half_lines": True, "directions": 3, "colours": "response"}),
+    ("normdiff", {}),
+    ("normdiff", {"noise": 0.1, "phi_weight": 0.4, "colours": "picture"}),
+]
+
+
+@pytest.fixture(scope="module")
+def relighting() -> Relighting:
+    return Relighting(Evaluation(OpticalModel(ots.load("gelsight-mini")), SMALL))
+
+
+def recoloured(seed: int, brightness: float = 1.0) -> SensorDesign:
+    """A GelSight Mini whose groups have other colours and powers."""
+    random = np.random.default_rng(seed)
+    design = ots.load("gelsight-mini")
+    for name in design.lights:
+        design = set_value(design, f"lights.{name}.colour", tuple(random.random(3).tolist()))
+        design = set_value(design, f"lights.{name}.flux", brightness * random.uniform(1.0, 9.0))
+    return design
+
+
+def test_presses_are_those_of_a_rendering_under_these_lights(relighting: Relighting) -> None:
+    design = recoloured(1)
+    rendered = Evaluation(OpticalModel(design), SMALL)
+    relit = relighting.lit(design)
+    assert relit.exposure == pytest.approx(rendered.exposure, rel=1e-5)
+    for one, other in zip(relit.presses, rendered.presses, strict=True):
+        assert (one.mask == other.mask).all()
+        np.testing.assert_allclose(one.response, other.response, rtol=1e-4, atol=1e-5)
+
+
+@pytest.mark.parametrize("exposure", ["auto", 500.0, 2500.0])
+def test_cut_presses_hold_the_same_colours(
+    relighting: Relighting, exposure: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Also where overexposure spreads from beside the contact into it."""
+    changed = Settings(**{**vars(SMALL), "exposure": exposure})
+    monkeypatch.setattr(relighting, "settings", changed)
+    monkeypatch.setattr(Press, "check", lambda press: None)
+    flux = relighting.flux_of(recoloured(2))
+    whole = relighting.presses(flux, whole=True)
+    brightest = np.concatenate([each.response[each.mask].max(axis=1) for each in whole])
+    for one, other in zip(relighting.presses(flux), whole, strict=True):
+        assert one.mask.sum() == other.mask.sum()
+        assert (one.response[one.mask] == other.response[other.mask]).all()
+    if exposure == 2500.0:  # else nothing would have spread
+        assert 0.05 < (brightest == 1.0).mean() < 0.95
+
+
+@pytest.mark.parametrize(("name", "own"), SETTINGS)
+def test_quick_scores_are_the_objectives_own(
+    relighting: Relighting, name: str, own: dict[str, Any]
+) -> None:
+    objective = find(name)
+    quick = quick_form(objective, own, relighting.cut_presses)
+    for seed in range(3, 7):
+        design = recoloured(seed)
+        score = evaluate(relighting.lit(design), name, **own)
+        value, parts = quick(relighting.presses(relighting.flux_of(design)))
+        assert score.failure is None
+        assert value == pytest.approx(score.value, rel=1e-12)
+        for key in objective.beside:
+            assert parts[key] == pytest.approx(score.parts[key], rel=1e-12)
+        places = [place["score"] for place in score.parts["places"]]
+        assert parts["places"] == pytest.approx(places, rel=1e-12)
+
+
+def test_brighter_lights_of_the_same_colours_change_nothing(relighting: Relighting) -> None:
+    """Automatic exposure takes it back."""
+    design = recoloured(8)
+    brighter = design
+    for name, group in design.lights.items():
+        brighter = set_value(brighter, f"lights.{name}.flux", 7.0 * group.flux)
+    for name in ("rgb2normal", "normdiff"):
+        one, other = (evaluate(relighting.lit(each), name).value for each in (design, brighter))
+        assert one == pytest.approx(other, rel=1e-4)
+
+
+def test_large_contacts_are_compared_in_parts(
+    make_press: Callable[..., Press], evaluation_of: Callable[..., Any]
+) -> None:
+    """More pixels than fit into one table of pairs."""
+    press = make_press(lambda n: np.clip(0.4 + 0.5 * n, 0.0, 1.0), pixels=61)
+    score = evaluate_presses("normdiff", evaluation_of(press))
+    assert press.mask.sum() ** 2 > 1_500_000
+    value, _ = quick_form(find("normdiff"), {}, [press])([press])
+    assert value == pytest.approx(score, rel=1e-12)
+
+
+def test_one_colour_for_all_pixels_tells_no_normal(make_press: Callable[..., Press]) -> None:
+    press = make_press(lambda n: np.full((len(n), 3), 0.3))
+    value, parts = quick_form(find("rgb2normal"), {}, [press])([press])
+    assert (value, parts["worst_line"]) == (0.0, 0.0)
+
+
+def test_darkness_is_a_failure_and_not_a_score(relighting: Relighting) -> None:
+    design = recoloured(9, brightness=1e-12)
+    relit = relighting.lit(set_value(design, "name", "dark"))
+    assert evaluate(relit, "rgb2normal").failure is None  # the exposure follows
+    flux = np.zeros((len(relighting.groups), 3))
+    with pytest.raises(ObjectiveError, match="is black"):
+        relighting.presses(flux)
+
+
+def test_other_light_groups_are_refused(relighting: Relighting) -> None:
+    design = ots.load("gelsight-mini")
+    del design.lights[next(iter(design.lights))]
+    with pytest.raises(ObjectiveError, match="other light groups"):
+        relighting.lit(design)
+
+
+def test_objectives_of_users_have_no_quick_form() -> None:
+    assert has_quick_form(find("normdiff"))
+    assert not has_quick_form(find("aoap"))
+
+
+def evaluate_presses(name: str, evaluation: Any) -> float:
+    """A built-in objective's value of given presses."""
+    value = find(name)(evaluation)[0]
+    assert isinstance(value, float)
+    return value
