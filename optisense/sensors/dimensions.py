@@ -1,9 +1,13 @@
-"""Refusing dimensions that no sensor can have, before anything is built from them."""
+"""The dimensions of a sensor: refusing those that none can have, naming those that were changed."""
 
 from __future__ import annotations
 
+import inspect
 import math
+from collections.abc import Callable, Mapping
+from typing import Any
 
+from optisense.design import SensorDesign
 from optisense.errors import DesignError
 
 
@@ -26,3 +30,29 @@ def require(condition: bool, sensor: str, message: str, hint: str) -> None:
     """
     if not condition:
         raise DesignError(message, where=sensor, hint=hint)
+
+
+def describe_changes(
+    design: SensorDesign,
+    builder: Callable[..., SensorDesign],
+    given: Mapping[str, Any],
+    said: tuple[str, ...] = (),
+) -> None:
+    """Name in a design's description which arguments were not the builder's defaults.
+
+    The provenance speaks of the defaults; so a reader sees for which numbers it no longer holds.
+
+    Args:
+        design: what was built.
+        builder: the function.
+        given: its arguments, by name.
+        said: those that the description names already.
+    """
+    defaults = {name: p.default for name, p in inspect.signature(builder).parameters.items()}
+    changed = [
+        f"{name} {value:g}" if isinstance(value, float) else f"{name} {value}"
+        for name, value in given.items()
+        if name in defaults and name not in said and value != defaults[name]
+    ]
+    if changed:
+        design.description += f"; chosen: {', '.join(changed)}"

@@ -27,7 +27,7 @@ from optisense.design import (
 )
 from optisense.geometry import TriangleMesh
 from optisense.sensors.belt_path import BeltHalf, Bend, Straight, mirrored_and_joined, trace
-from optisense.sensors.dimensions import require_positive
+from optisense.sensors.dimensions import describe_changes, require_positive
 from optisense.sensors.gelbelt_checks import (
     LED_LENGTH,
     SENSOR,
@@ -129,6 +129,7 @@ def gelbelt(
     Raises:
         DesignError: dimensions that contradict one another; says which.
     """
+    given = dict(locals())
     require_positive(
         SENSOR,
         window_length=window_size[0],
@@ -249,6 +250,7 @@ def gelbelt(
     else:
         del design.parts["film"], design.materials[FILM]
         del design.provenance["parts.film"], design.provenance[f"materials.{FILM}.ior"]
+    describe_changes(design, gelbelt, given, said=("light_design",))
     return design
 
 

@@ -24,8 +24,17 @@ from optisense.design import (
     Status,
 )
 from optisense.geometry import TriangleMesh
-from optisense.sensors.dimensions import require, require_positive
-from optisense.sensors.led_boards import BOARDS, COLOURS, LED, WALL_MARGIN, LedBoards, ring
+from optisense.sensors.dimensions import describe_changes, require, require_positive
+from optisense.sensors.led_boards import (
+    BOARDS,
+    COLOURS,
+    LED,
+    LED_MODEL,
+    WALL_MARGIN,
+    LedBoards,
+    ring,
+)
+from optisense.sensors.led_flux import BALANCED, balanced_flux
 from optisense.sensors.shapes import revolve
 from optisense.sensors.tip_shape import TipShape
 
@@ -57,7 +66,7 @@ def gelsight360(
     board_thickness: float = 1.0,
     leds_per_group: int = 4,
     base_leds: int = 12,
-    led_flux: float = 5.0,
+    led_flux: float | None = None,
     fov: float = 128.0,
     resolution: tuple[int, int] = (320, 240),
     coating: str = "semi-specular",
@@ -89,7 +98,7 @@ def gelsight360(
         board_thickness: mm, without LEDs.
         leds_per_group: LEDs on each face of a board.
         base_leds: LEDs of the ring; a multiple of 4.
-        led_flux: mW, radiant, of each LED.
+        led_flux: mW, radiant, of each LED; None takes what its weakest colour gives (library).
         fov: degrees, across the image width (equidistant fisheye).
         resolution: pixels, width and height.
         coating: a coating of the library.
@@ -100,6 +109,7 @@ def gelsight360(
             letters R, G, B; says which.
         LibraryError: there is no such coating.
     """
+    given = dict(locals())
     _check_colours(light_colours, base_ring)
     require_positive(
         SENSOR,
@@ -138,9 +148,10 @@ def gelsight360(
     )
     _check_boards(boards, shape, radius - gel_thickness, base_leds)
 
-    lights = boards.light_groups(light_colours, led_flux)
+    flux = balanced_flux(LED_MODEL) if led_flux is None else led_flux
+    lights = boards.light_groups(light_colours, flux)
     if base_ring:
-        lights["base"] = ring(base_ring, boards.radius, base_leds, led_flux)
+        lights["base"] = ring(base_ring, boards.radius, base_leds, flux)
     epoxy = library.material("epoxy-rough")
     assert isinstance(epoxy, Dielectric)
     design = SensorDesign(
@@ -177,6 +188,8 @@ def gelsight360(
         _solids(shape, (gel_thickness, shell_thickness), dome, tessellation),
         boards=boards.mesh(),
     )
+    said = ("light_colours", "tip_design", "resin_design")
+    describe_changes(design, gelsight360, given, said)
     return design
 
 
@@ -327,7 +340,9 @@ def _provenance(base_ring: str) -> dict[str, Provenance]:
             assumed,
             "4 LEDs of 2 x 1.25 mm; number and order of the groups are from the OptiSense paper",
         )
+        table[f"lights.lg{number}.flux"] = derived, BALANCED
     if base_ring:
+        table["lights.base.flux"] = derived, BALANCED
         table["lights.base"] = (
             assumed,
             "12 LEDs that shine into the shell; that there is such a ring, coupled to the shell, "

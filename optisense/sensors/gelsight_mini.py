@@ -8,6 +8,7 @@ neither the light guide, the LEDs nor the camera's place: these are marked as as
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 
@@ -27,8 +28,18 @@ from optisense.design import (
     Status,
 )
 from optisense.geometry import TriangleMesh
+from optisense.sensors.dimensions import describe_changes, require, require_positive
+from optisense.sensors.led_flux import BALANCED, balanced_flux
 
+NAME = "gelsight-mini"
 GEL, GUIDE = "silicone-xp565", "acrylic"
+LED = "smd-3528"
+
+PAPERS_RISE = {"cylindrical": 6.0, "spherical": 9.0}
+"""mm, by which the OptiSense paper moves the control points of each variant along z."""
+
+WIDEST_FIELD = 150.0
+"""Degrees: a field derived from `view_width` beyond this is a mistake."""
 
 
 def gelsight_mini(
@@ -45,7 +56,7 @@ def gelsight_mini(
     leds_per_group: int = 5,
     led_pitch: float = 4.0,
     led_gap: float = 0.2,
-    led_flux: float = 10.0,
+    led_flux: float | None = None,
     coating: str = "diffuse-grey",
     tessellation: float = 0.5,
 ) -> SensorDesign:
@@ -64,22 +75,34 @@ def gelsight_mini(
         leds_per_group: LEDs in each of the three rows.
         led_pitch: mm, between LEDs of a row.
         led_gap: mm of air between an LED's window and the guide's edge; must be above 0.
-        led_flux: mW, radiant, of each LED.
+        led_flux: mW, radiant, of each LED; None takes what its weakest colour gives (library).
         coating: a coating of the library.
         tessellation: mm, edge length of the triangles on top of the gel.
 
     Raises:
-        ValueError: a size, led_gap or tessellation is not above 0, or the pupil is in the guide.
+        DesignError: dimensions that contradict one another; says which.
         LibraryError: there is no such coating.
     """
-    lengths = (*gel_size, gel_thickness, *tray_size, tray_thickness, guide_thickness)
-    if min(*lengths, pupil_distance, led_gap, tessellation, view_width) <= 0.0:
-        raise ValueError("all sizes, led_gap and tessellation must be above 0")
+    given = dict(locals())
+    require_positive(
+        NAME,
+        gel_length=gel_size[0],
+        gel_width=gel_size[1],
+        gel_thickness=gel_thickness,
+        tray_length=tray_size[0],
+        tray_width=tray_size[1],
+        tray_thickness=tray_thickness,
+        guide_thickness=guide_thickness,
+        pupil_distance=pupil_distance,
+        leds_per_group=leds_per_group,
+        led_pitch=led_pitch,
+        led_gap=led_gap,
+        tessellation=tessellation,
+    )
+    _check(gel_size, tray_size, guide_thickness, pupil_distance, (leds_per_group, led_pitch))
     tray_top = -gel_thickness
     guide_top = tray_top - tray_thickness
     guide_bottom = guide_top - guide_thickness
-    if pupil_distance <= guide_thickness:
-        raise ValueError("pupil_distance must be larger than guide_thickness")
     lamp_z = 0.5 * (guide_top + guide_bottom)
     half_x, half_y = 0.5 * gel_size[0], 0.5 * gel_size[1]
 
@@ -89,11 +112,12 @@ def gelsight_mini(
         (guide_thickness + tray_thickness, _index(support)),
         (gel_thickness, _index(gel_index)),
     ]
-    leds = (leds_per_group, led_pitch, led_flux)
+    flux = balanced_flux(LED) if led_flux is None else led_flux
+    leds = (leds_per_group, led_pitch, flux)
 
     gel = _gel(gel_size, gel_thickness, tessellation)
     design = SensorDesign(
-        name="gelsight-mini",
+        name=NAME,
         description="GelSight Mini, flat gel",
         coating=library.coating(coating),
         materials={GEL: library.material(GEL), GUIDE: library.material(GUIDE)},
@@ -126,44 +150,103 @@ def gelsight_mini(
         guide=_plate(gel_size, guide_bottom, guide_top),
     )
     design.cages = {"skin": Cage.around(["skin", "gel"], gel.bounds)}
+    describe_changes(design, gelsight_mini, given)
     return design
 
 
-def gelsight_mini_cylindrical(rise: float = 6.0) -> SensorDesign:
+def gelsight_mini_cylindrical(rise: float = 6.0, **dimensions: Any) -> SensorDesign:
     """A GelSight Mini whose gel is bent to a cylinder along the short side (y).
 
     Args:
         rise: mm, how far the three top control points at middle x are moved along +z (the
             OptiSense paper moves the middle row by 6 mm). The gel rises by half of it.
+        dimensions: arguments of `gelsight_mini`.
+
+    Raises:
+        DesignError: as `gelsight_mini`, or a rise that presses the gel through its tray.
     """
-    design = gelsight_mini()
-    cage = design.cages["skin"]
-    for j in range(3):
-        _raise(cage, cage.index(1, j, 2), rise)
-    design.name = "gelsight-mini-cylindrical"
-    design.description = "GelSight Mini, gel bent to a cylinder"
-    design.provenance["cages.skin.points"] = Provenance(
-        status=Status.SOURCED, source="OptiSense paper: middle row of the cage +6 mm along z"
-    )
-    return design
+    return _bent("cylindrical", "cylinder", [(1, j, 2) for j in range(3)], (rise, 0.5), dimensions)
 
 
-def gelsight_mini_spherical(rise: float = 9.0) -> SensorDesign:
+def gelsight_mini_spherical(rise: float = 9.0, **dimensions: Any) -> SensorDesign:
     """A GelSight Mini whose gel is bent to a dome.
 
     Args:
         rise: mm, how far the top centre control point is moved along +z (the OptiSense paper
             moves it by 9 mm). The gel rises by a quarter of it.
+        dimensions: arguments of `gelsight_mini`.
+
+    Raises:
+        DesignError: as `gelsight_mini`, or a rise that presses the gel through its tray.
     """
-    design = gelsight_mini()
+    return _bent("spherical", "dome", [(1, 1, 2)], (rise, 0.25), dimensions)
+
+
+def _bent(
+    variant: str,
+    shape: str,
+    moved: list[tuple[int, int, int]],
+    rise: tuple[float, float],
+    dimensions: dict[str, Any],
+) -> SensorDesign:
+    """A flat sensor with some control points raised.
+
+    Args:
+        rise: mm of the control points, and what share of it the gel rises in the middle.
+    """
+    design = gelsight_mini(**dimensions)
+    height, share = rise
     cage = design.cages["skin"]
-    _raise(cage, cage.index(1, 1, 2), rise)
-    design.name = "gelsight-mini-spherical"
-    design.description = "GelSight Mini, gel bent to a dome"
-    design.provenance["cages.skin.points"] = Provenance(
-        status=Status.SOURCED, source="OptiSense paper: centre point of the cage +9 mm along z"
+    thickness = float(-design.meshes["gel"].bounds[0, 2])
+    require(
+        math.isfinite(height) and share * height > -thickness,
+        NAME,
+        f"a rise of {height:g} mm presses the gel, {thickness:g} mm thick, through its tray",
+        f"Give more than {-thickness / share:g} mm",
     )
+    for place in moved:
+        index = cage.index(*place)
+        point = cage.points[index]
+        cage.points[index] = Point(x=point.x, y=point.y, z=point.z + height)
+    design.name = f"{NAME}-{variant}"
+    design.description = design.description.replace("flat gel", f"gel bent to a {shape}")
+    status, source = Status.ASSUMED, f"{height:g} mm along z"
+    if height == PAPERS_RISE[variant]:
+        status, source = Status.SOURCED, f"OptiSense paper: {height:+g} mm along z"
+    design.provenance["cages.skin.points"] = Provenance(status=status, source=source)
     return design
+
+
+def _check(
+    gel_size: tuple[float, float],
+    tray_size: tuple[float, float],
+    guide_thickness: float,
+    pupil_distance: float,
+    row: tuple[int, float],
+) -> None:
+    """All lengths in mm; `row` is the number of LEDs and their pitch."""
+    require(
+        gel_size[0] <= tray_size[0] and gel_size[1] <= tray_size[1],
+        NAME,
+        f"the gel, {gel_size[0]:g} x {gel_size[1]:g} mm, is larger than its tray, "
+        f"{tray_size[0]:g} x {tray_size[1]:g} mm",
+        "Make gel_size smaller or tray_size larger",
+    )
+    require(
+        pupil_distance > guide_thickness,
+        NAME,
+        f"the camera's pupil, {pupil_distance:g} mm behind the tray, is inside the light guide, "
+        f"{guide_thickness:g} mm thick",
+        "Make pupil_distance larger than guide_thickness",
+    )
+    count, pitch = row
+    require(
+        (count - 1) * pitch <= min(gel_size),
+        NAME,
+        f"a row of {count} LEDs {pitch:g} mm apart is longer than the guide's shorter side, "
+        f"{min(gel_size):g} mm",
+        "Use fewer leds_per_group or a smaller led_pitch",
+    )
 
 
 def _index(material: Material) -> float:
@@ -182,6 +265,14 @@ def _field_of_view(view_width: float, layers: list[tuple[float, float]]) -> floa
         offsets = (t * sine / math.sqrt(n * n - sine * sine) for t, n in layers)
         return 2.0 * sum(offsets) > view_width
 
+    require(
+        math.isfinite(view_width)
+        and view_width > 0.0
+        and too_wide(math.sin(math.radians(0.5 * WIDEST_FIELD))),
+        NAME,
+        f"no camera at this pupil_distance shows view_width {view_width:g} mm",
+        "Give a view_width above 0, smaller, or a larger pupil_distance",
+    )
     low, high = 0.0, 1.0 - 1e-12
     for _ in range(60):
         middle = 0.5 * (low + high)
@@ -232,12 +323,7 @@ def _row(
         )
         for offset in offsets
     ]
-    return LightGroup(model="smd-3528", colour=colour, flux=flux, lights=lights)
-
-
-def _raise(cage: Cage, index: int, rise: float) -> None:
-    point = cage.points[index]
-    cage.points[index] = Point(x=point.x, y=point.y, z=point.z + rise)
+    return LightGroup(model=LED, colour=colour, flux=flux, lights=lights)
 
 
 def _provenance() -> dict[str, Provenance]:
@@ -264,7 +350,7 @@ def _provenance() -> dict[str, Provenance]:
         "lights.red": (assumed, order),
         "lights.green": (assumed, order),
         "lights.blue": (assumed, order),
-        "lights.red.flux": (assumed, "10 mW each; only ratios matter to an auto-exposed picture"),
+        "lights.red.flux": (Status.DERIVED, BALANCED),
         "lights.green.flux": (assumed, "as red"),
         "lights.blue.flux": (assumed, "as red"),
         "camera.position": (assumed, "pupil 17 mm behind the back of the tray"),

@@ -29,7 +29,8 @@ from optisense.design.cage import as_points
 from optisense.errors import DesignError
 from optisense.geometry import TriangleMesh
 from optisense.geometry.cage import cage_points
-from optisense.sensors.dimensions import require, require_positive
+from optisense.sensors.dimensions import describe_changes, require, require_positive
+from optisense.sensors.led_flux import balanced_flux
 from optisense.sensors.shapes import ribbon, row_of_lights, strip
 from optisense.sensors.svelte_body import check_mirrors, housing
 from optisense.sensors.svelte_profile import (
@@ -42,6 +43,9 @@ from optisense.sensors.svelte_sources import provenance
 
 NAME = "gelsight-svelte"
 GEL, MIRROR = "silicone-xp565", "mirror-silver"
+LED = "smd-3528"
+
+VIEWS = ("m2", "palm")
 
 PALM_OUTLINE = (
     (25.6, 22.0), (22.6, 32.6), (20.3, 41.7), (18.4, 49.3), (17.5, 54.6), (17.4, 59.2),
@@ -71,12 +75,13 @@ def gelsight_svelte(
     m2_tilt: float = 22.4,
     m2_length: float | None = None,
     m2_width: float = 18.0,
+    view: str = "m2",
     fov: float | None = None,
     resolution: tuple[int, int] = (320, 240),
     leds_per_side: int = 8,
     led_pitch: float = 8.0,
     led_gap: float = 0.2,
-    led_flux: float = 10.0,
+    led_flux: float | None = None,
     tip_leds: int = 0,
     coating: str = "diffuse-grey",
     tessellation: float = 0.5,
@@ -101,13 +106,15 @@ def gelsight_svelte(
         m2_tilt: degrees, of M2 from the z axis, its upper end towards the palm.
         m2_length: mm; None takes 24.3 mm or as much of it as can see M1 past the gel.
         m2_width: mm.
-        fov: degrees, across the image width, which runs along the finger; None takes what just
-            shows the length of M2.
+        view: "m2" aims the camera at the whole length of M2, of which the lowest part looks past
+            M1; "palm" only at what M1 shows of the palm, as a picture cropped to the finger.
+        fov: degrees, across the image width, which runs along the finger; None takes what `view`
+            needs.
         resolution: pixels, width and height.
         leds_per_side: LEDs in each of the two rows along the finger.
         led_pitch: mm, between LEDs of a row.
         led_gap: mm of air between an LED's window and the gel; must be above 0.
-        led_flux: mW, radiant, of each LED.
+        led_flux: mW, radiant, of each LED; None takes what its weakest colour gives (library).
         tip_leds: blue LEDs behind the gel's end at the tip.
         coating: a coating of the library.
         tessellation: mm, edge length of the triangles of the skin.
@@ -117,7 +124,9 @@ def gelsight_svelte(
             thicker than the palm's bends, ...); says which one and what to change.
         LibraryError: there is no such coating.
     """
+    given = dict(locals())
     optional = {name: v for name, v in (("m2_length", m2_length), ("fov", fov)) if v is not None}
+    led_flux = balanced_flux(LED) if led_flux is None else led_flux
     require_positive(
         NAME,
         gel_thickness=gel_thickness,
@@ -137,6 +146,7 @@ def gelsight_svelte(
         f"m1_grid {m1_grid}, leds_per_side {leds_per_side} or tip_leds {tip_leds} is too small",
         "M1 needs 2 x 2 vertices or more, each side one LED or more",
     )
+    require(view in VIEWS, NAME, f"there is no view '{view}'", f"Give {' or '.join(VIEWS)}")
     palm = Palm.through(palm_outline, tessellation)
     inner = palm.offset(gel_thickness)
     gel_outline = np.concatenate([palm.points, inner[::-1]])
@@ -154,6 +164,8 @@ def gelsight_svelte(
     widths = (gel_width, max(m1_width, m2_width))
     body = housing(palm, inner, back_outline, m1, most, m2, widths, led_gap)
     low, high = m2.seen_between()
+    if view == "palm":
+        low = m2.angle_of(m1.curve(m1_sagitta)[0])
     rows = max(1, round(gel_width / tessellation))
 
     design = SensorDesign(
@@ -189,6 +201,7 @@ def gelsight_svelte(
     )
     design.cages = {"M1": _mirror_cage(design.meshes["M1"], m1, most, m1_sagitta / most)}
     design.provenance = provenance(tip_leds > 0)
+    describe_changes(design, gelsight_svelte, given)
     return design
 
 
@@ -240,7 +253,7 @@ def _lights(
             place = (float(point[0]), side * (0.5 * width + gap), float(point[1]))
             up = (float(along[0]), 0.0, float(along[1]))
             lights += row_of_lights(place, up, 1, pitch, (0.0, -side, 0.0))
-        groups[name] = LightGroup(model="smd-3528", colour=colour, flux=flux, lights=lights)
+        groups[name] = LightGroup(model=LED, colour=colour, flux=flux, lights=lights)
     if tip_count:
         point, along = palm.at(1.0, 0.5 * thickness)
         point = point + gap * along
@@ -252,5 +265,5 @@ def _lights(
             min(4.0, width / tip_count),
             towards,
         )
-        groups["blue"] = LightGroup(model="smd-3528", colour=(0.0, 0.0, 1.0), flux=flux, lights=row)
+        groups["blue"] = LightGroup(model=LED, colour=(0.0, 0.0, 1.0), flux=flux, lights=row)
     return groups

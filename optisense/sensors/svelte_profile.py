@@ -12,17 +12,16 @@ from dataclasses import dataclass
 import numpy as np
 import shapely
 from numpy.typing import ArrayLike, NDArray
-from scipy.interpolate import CubicSpline
 
 from optisense.errors import DesignError
 
 FloatArray = NDArray[np.float64]
 Points = Sequence[tuple[float, float]]
 
-SAGITTA_STEP = 0.05
+SAGITTA_STEP = 0.1
 """mm: the bent mirror is tried against the skin in steps of this sagitta, then by halving."""
 
-PROFILE_SAMPLES = 400
+PROFILE_SAMPLES = 200
 
 LONGEST_M2 = 24.3
 """mm: the length of M2 as measured in the animation of the sensor."""
@@ -60,16 +59,17 @@ class Palm:
                 where="palm_outline",
                 hint="Give (x, z) in mm, x towards the palm, z towards the tip",
             )
-        spline = CubicSpline(np.append(0.0, np.cumsum(steps)), corners)
-        fine = np.linspace(0.0, steps.sum(), 8 * PROFILE_SAMPLES)
-        walked = np.linalg.norm(np.diff(spline(fine), axis=0), axis=1)
+        knots = np.append(0.0, np.cumsum(steps))
+        slopes = _spline_slopes(knots, corners)
+        fine = np.linspace(0.0, knots[-1], 8 * PROFILE_SAMPLES)
+        walked = np.linalg.norm(np.diff(_hermite(fine, knots, corners, slopes)[0], axis=0), axis=1)
         along = np.append(0.0, np.cumsum(walked))
         count = max(2, round(along[-1] / spacing)) + 1
         at = np.interp(np.linspace(0.0, along[-1], count), along, fine)
-        tangent = spline(at, 1)
+        points, tangent = _hermite(at, knots, corners, slopes)
         tangent /= np.linalg.norm(tangent, axis=1, keepdims=True)
         inward = np.column_stack([-tangent[:, 1], tangent[:, 0]])
-        return Palm(spline(at), inward, float(along[-1]))
+        return Palm(points, inward, float(along[-1]))
 
     def offset(self, depth: float) -> FloatArray:
         """(n, 2) mm: the curve `depth` mm inside the skin.
@@ -140,10 +140,11 @@ class CurvedMirror:
         """
         skin = shapely.Polygon(obstacle)
 
-        def clear(sagitta: float) -> bool:
-            return bool(shapely.LineString(self.curve(sagitta)).distance(skin) >= clearance)
+        def too_near(sagittas: FloatArray) -> NDArray[np.bool_]:
+            curves = shapely.linestrings([self.curve(sagitta) for sagitta in sagittas])
+            return np.asarray(shapely.dwithin(curves, skin, clearance))
 
-        if not clear(0.0):
+        if too_near(np.zeros(1))[0]:
             gap = shapely.LineString(self.curve(0.0)).distance(skin)
             raise DesignError(
                 f"the flat mirror M1 comes as near as {gap:.2f} mm to the skin; "
@@ -151,14 +152,56 @@ class CurvedMirror:
                 where="m1_ends",
                 hint="Move m1_ends away from the palm, or make gel_thickness or clearance smaller",
             )
-        low = 0.0
-        while clear(low + SAGITTA_STEP) and low < self.length:
-            low += SAGITTA_STEP
-        high = low + SAGITTA_STEP
-        for _ in range(30):
+        tried = np.arange(0.0, 0.5 * self.length, SAGITTA_STEP)
+        found = too_near(tried)
+        if not found.any():
+            return float(tried[-1])
+        high = float(tried[np.argmax(found)])
+        low = high - SAGITTA_STEP
+        for _ in range(20):
             middle = 0.5 * (low + high)
-            low, high = (middle, high) if clear(middle) else (low, middle)
+            low, high = (low, middle) if too_near(np.array([middle]))[0] else (middle, high)
         return low
+
+
+def _spline_slopes(knots: FloatArray, values: FloatArray) -> FloatArray:
+    """Slopes at the knots (n,) of the cubic spline through values (n, 2), with continuous
+    curvature; its first and its last two pieces are one cubic each (three knots: one parabola).
+
+    As `scipy.interpolate.CubicSpline`, whose import takes longer than building the sensor.
+    """
+    count, width = len(knots), np.diff(knots)
+    rise = np.diff(values, axis=0) / width[:, None]
+    matrix, right = np.zeros((count, count)), np.zeros_like(values)
+    for k in range(1, count - 1):
+        matrix[k, k - 1 : k + 2] = width[k], 2.0 * (width[k - 1] + width[k]), width[k - 1]
+        right[k] = 3.0 * (width[k] * rise[k - 1] + width[k - 1] * rise[k])
+    for row, (a, b), (near, far) in (
+        (0, width[:2], (0, 1)),
+        (count - 1, width[:-3:-1], (count - 2, count - 3)),
+    ):
+        inner = 1 if row == 0 else count - 2
+        if count == 3:
+            matrix[row, row], matrix[row, inner] = 1.0, 1.0
+            right[row] = 2.0 * rise[near]
+        else:
+            matrix[row, row], matrix[row, inner] = b, a + b
+            right[row] = ((2.0 * b + 3.0 * a) * b * rise[near] + a * a * rise[far]) / (a + b)
+    return np.asarray(np.linalg.solve(matrix, right))
+
+
+def _hermite(
+    at: FloatArray, knots: FloatArray, values: FloatArray, slopes: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Points and slopes (n, 2) of the piecewise cubic with these values and slopes at the knots."""
+    piece = np.clip(np.searchsorted(knots, at, side="right") - 1, 0, len(knots) - 2)
+    width = np.diff(knots)[piece, None]
+    t = (at[:, None] - knots[piece, None]) / width
+    start, end = values[piece], values[piece + 1]
+    out, into = width * slopes[piece], width * slopes[piece + 1]
+    cubic, square = 2.0 * (start - end) + out + into, 3.0 * (end - start) - 2.0 * out - into
+    points = ((cubic * t + square) * t + out) * t + start
+    return points, ((3.0 * cubic * t + 2.0 * square) * t + out) / width
 
 
 def mirrored(point: ArrayLike, on: ArrayLike, direction: ArrayLike) -> FloatArray:
@@ -238,3 +281,9 @@ class FlatMirror:
         """Radians from the x axis towards the tip, from the pupil to its ends."""
         low, high = np.arctan2(self.ends()[:, 1], self.ends()[:, 0])
         return float(low), float(high)
+
+    def angle_of(self, point: FloatArray) -> float:
+        """Radians from the x axis towards the tip, where the camera sees a point (2,) in it."""
+        pupil = mirrored((0.0, 0.0), self.bottom, self.along)
+        at = self.bottom + crossing(pupil, point[None], self.bottom, self.along)[0] * self.along
+        return float(np.arctan2(at[1], at[0]))

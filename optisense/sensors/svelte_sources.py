@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from optisense.design import Provenance, Status
+from optisense.sensors.led_flux import BALANCED
 
 ANIMATION = (
     "side view in an animation on the first author's web site, digitised to about 1 pixel at an "
@@ -51,12 +52,16 @@ def provenance(tip: bool) -> dict[str, Provenance]:
         "lights.red": (assumed, "red and green rows on the two sides: from memory of a press "
                        "report; 8 a side at 8 mm pitch, facing the sides of the gel: assumed"),
         "lights.green": (assumed, "as red"),
-        "lights.red.flux": (assumed, "10 mW each; only ratios matter to an auto-exposed picture"),
+        "lights.red.flux": (derived, BALANCED),
         "lights.green.flux": (assumed, "as red"),
         "camera.model": (assumed, "an OV5647 in a small housing fits; the camera is not published"),
         "camera.position": (derived, f"the origin: {ANIMATION}"),
-        "camera.direction": (derived, "the middle of the angles to both ends of M2"),
-        "camera.fov": (derived, "the angle between both ends of M2, seen from the pupil"),
+        "camera.direction": (derived, "the middle of the angles that camera.fov spans"),
+        "camera.fov": (
+            derived,
+            "the angle between both ends of M2 (with view='palm': from its upper end to where it "
+            "shows the lower end of M1), seen from the pupil",
+        ),
         "camera.resolution": (sourced, "what the benchmarks of this project render"),
     }  # fmt: skip
     if tip:

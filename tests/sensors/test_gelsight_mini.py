@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 import optisense
-from optisense import sensors
+from optisense import library, sensors
 from optisense.design import SensorDesign, save_design
 from optisense.errors import DesignError
+from optisense.library import LightEntry
 
 FIELD_OF_VIEW = (18.6, 14.3)
 """mm on the gel, by the maker's datasheet."""
@@ -98,8 +100,50 @@ def test_dimensions_can_be_chosen() -> None:
     assert design.camera.position[2] == -3.0 - 1.0 - 17.0
     assert len(design.lights["blue"].lights) == 8
     assert sensors.check(design) == []
-    with pytest.raises(ValueError, match="above 0"):
-        sensors.gelsight_mini(led_gap=0.0)
+    assert design.description.endswith("chosen: gel_thickness 3, leds_per_group 8, led_pitch 2.5")
+
+
+def test_a_bent_sensor_takes_dimensions_too() -> None:
+    design = sensors.gelsight_mini_spherical(4.0, gel_thickness=3.0)
+    skin = design.deformed_meshes()["skin"].bounds
+    assert skin[1, 2] == pytest.approx(1.0, abs=0.01)  # a quarter of the rise
+    assert design.meshes["gel"].bounds[0, 2] == -3.0
+    assert design.provenance["cages.skin.points"].status == "assumed"
+    assert "bent to a dome; chosen: gel_thickness 3" in design.description
+    assert sensors.check(design) == []
+
+
+@pytest.mark.parametrize(
+    ("change", "message", "hint"),
+    [
+        ({"led_gap": 0.0}, "led_gap is 0", "above 0"),
+        ({"gel_thickness": math.nan}, "gel_thickness is nan", "above 0"),
+        ({"gel_size": (30.0, 20.0)}, "larger than its tray", "tray_size larger"),
+        ({"pupil_distance": 3.0}, "inside the light guide", "larger than guide_thickness"),
+        ({"leds_per_group": 9}, "9 LEDs 4 mm apart", "fewer"),
+        ({"view_width": 500.0}, "view_width 500", "smaller"),
+        ({"view_width": 0.0}, "view_width 0", "above 0"),
+    ],
+)
+def test_what_cannot_be_is_refused(change: dict[str, Any], message: str, hint: str) -> None:
+    with pytest.raises(DesignError, match=message) as caught:
+        sensors.gelsight_mini(**change)
+    assert hint in str(caught.value.hint)
+    assert caught.value.where == "gelsight-mini"
+
+
+def test_a_gel_is_not_pressed_through_its_tray() -> None:
+    with pytest.raises(DesignError, match="through its tray") as caught:
+        sensors.gelsight_mini_cylindrical(-9.0)
+    assert "more than -8.5 mm" in str(caught.value.hint)
+
+
+@pytest.mark.parametrize("name", ["gelsight-mini", "gelsight-svelte", "gelsight360"])
+def test_leds_are_as_bright_as_their_weakest_colour_can_be(name: str) -> None:
+    for group in sensors.build(name).lights.values():
+        known = library.entry("light", group.model)
+        assert isinstance(known, LightEntry)
+        assert group.flux == min(light.flux or 0.0 for light in known.typical.values())
 
 
 class TestLoad:

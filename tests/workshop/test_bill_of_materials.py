@@ -30,7 +30,11 @@ def test_lights_are_counted_by_model_and_group(flat: SensorDesign) -> None:
 
 
 def test_a_light_that_must_give_more_than_it_can_is_remarked_on(flat: SensorDesign) -> None:
-    lights = items(flat, "light")
+    assert "times" not in "".join(item.note for item in items(flat, "light").values())
+    bright = flat.copy()
+    for group in bright.lights.values():
+        group.flux = 10.0
+    lights = items(bright, "light")
     assert "4.8 times its nominal flux" in lights["red"].note  # 10 mW of 2.1
     assert "times" not in lights["blue"].note  # 10 mW of 18
     assert "nominal 18 mW at 20 mA" in lights["blue"].note
