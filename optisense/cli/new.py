@@ -1,38 +1,213 @@
-"""``optisense new``: a built-in sensor as a design folder of one's own."""
+"""``optisense new``: a design folder of one's own, from a built-in sensor or from CAD files."""
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, cast
 
 import typer
 
-from optisense.cli.console import ends_well, output
-from optisense.errors import OutputError
+from optisense.cli.console import ends_well, messages, output
+from optisense.errors import DesignError, OptiSenseError, OutputError
+
+if TYPE_CHECKING:
+    from optisense.sensors.from_meshes import Recipe
+    from optisense.sensors.from_meshes.recipe import Units
+
+UNITS = ("mm", "cm", "m", "inch", "um")
 
 
 @ends_well
 def new(
     name: Annotated[
         str,
-        typer.Argument(metavar="NAME", help="A built-in sensor, such as gelsight-mini."),
+        typer.Argument(
+            metavar="[NAME]",
+            help="A built-in sensor, such as gelsight-mini; left out with --from-meshes.",
+            show_default=False,
+        ),
     ],
     folder: Annotated[
-        Path,
-        typer.Argument(metavar="DIR", help="The folder to make; it must not exist or be empty."),
-    ],
+        Path | None,
+        typer.Argument(
+            metavar="DIR",
+            help="The folder to make; it must not exist or be empty.",
+            show_default=False,
+        ),
+    ] = None,
+    from_meshes: Annotated[
+        Path | None,
+        typer.Option(
+            "--from-meshes",
+            metavar="RECIPE|FOLDER|FILE",
+            help="Make the sensor of CAD files (STL, OBJ, PLY; STEP with the extra 'step'): a "
+            "recipe that says which file is what (.yaml), or the files themselves, about which "
+            "questions are asked.",
+            show_default=False,
+        ),
+    ] = None,
+    units: Annotated[
+        str | None,
+        typer.Option(
+            metavar="|".join(UNITS),
+            help="With --from-meshes: of files that don't know their units; mm when left out.",
+            show_default=False,
+        ),
+    ] = None,
+    yes: Annotated[
+        bool,
+        typer.Option(
+            "--yes",
+            "-y",
+            help="With --from-meshes: ask nothing, and guess from the names and sizes of the "
+            "files; look the recipe over afterwards.",
+        ),
+    ] = False,
+    overwrite: Annotated[
+        bool,
+        typer.Option(
+            "--overwrite",
+            help="Write a design that is in DIR anew: design.yaml, its meshes and recipe.",
+        ),
+    ] = False,
 ) -> None:
-    """Start a design of your own from a built-in sensor."""
+    """Start a design of your own from a built-in sensor, or from CAD files."""
+    if from_meshes is None:
+        if units is not None or yes:
+            raise typer.BadParameter("goes with --from-meshes", param_hint="--units, --yes")
+        if folder is None:
+            raise typer.BadParameter(
+                "give the name of a built-in sensor and the folder to make, or --from-meshes",
+                param_hint="NAME DIR",
+            )
+        _from_built_in(name, folder, overwrite)
+        return
+    if folder is not None:
+        raise typer.BadParameter(
+            "with --from-meshes, give only the folder to make", param_hint="DIR"
+        )
+    if units is not None and units not in UNITS:
+        raise typer.BadParameter(f"'{units}' is none of {', '.join(UNITS)}", param_hint="--units")
+    _from_cad(from_meshes, Path(name), units, yes, overwrite)
+
+
+def _from_built_in(name: str, folder: Path, overwrite: bool) -> None:
     from optisense.sensors import build, save_design
 
     design = build(name)
+    _check_folder(folder, overwrite)
+    save_design(design, folder)
+    _say_what_next(folder)
+
+
+def _from_cad(source: Path, folder: Path, units: str | None, yes: bool, overwrite: bool) -> None:
+    from optisense.sensors import check, save_design
+    from optisense.sensors.from_meshes import (
+        RECIPE_FILE,
+        design_from_meshes,
+        guess_recipe,
+        read_recipe,
+        save_recipe,
+    )
+
+    _check_folder(folder, overwrite)
+    if not source.exists():
+        raise DesignError(
+            "there is no such recipe, folder or CAD file",
+            where=str(source),
+            hint="Name a recipe (.yaml), a CAD file, or a folder of CAD files",
+        )
+    asked = False
+    if source.suffix.lower() in (".yaml", ".yml"):
+        recipe = read_recipe(source)
+    elif yes:
+        recipe = guess_recipe(source, _units(units))
+    elif _at_terminal():
+        from optisense.cli.new_questions import ask_recipe
+
+        recipe, asked = ask_recipe(source, _units(units)), True
+    else:
+        raise typer.BadParameter(
+            f"nobody can be asked what is in '{source}': give a recipe (.yaml), or --yes to guess",
+            param_hint="--from-meshes",
+        )
+    if units is not None:
+        recipe.units = _units(units)
+    try:
+        made = design_from_meshes(recipe)
+        problems = check(made.design)
+    except OptiSenseError:
+        if asked:  # nobody likes to answer twice
+            save_recipe(recipe, folder / RECIPE_FILE)
+            messages.print(
+                f"Your answers are kept in {folder / RECIPE_FILE}. When it or the CAD files are "
+                f"mended:\n  optisense new --from-meshes {folder / RECIPE_FILE} {folder} "
+                "--overwrite",
+                markup=False,
+            )
+        raise
+    save_design(made.design, folder)
+    save_recipe(recipe, folder / RECIPE_FILE)
+    for note in made.notes:
+        messages.print(f"note: {note}", markup=False, style="yellow")
+    for problem in problems:
+        messages.print(f"odd: {problem}", markup=False, style="yellow")
+    _say_guesses(recipe, yes)
+    _say_what_next(folder, folder / RECIPE_FILE)
+
+
+def _at_terminal() -> bool:
+    return sys.stdin.isatty()
+
+
+def _units(text: str | None) -> Units | None:
+    """Checked before; the type says so."""
+    return cast("Units | None", text)
+
+
+def _check_folder(folder: Path, overwrite: bool) -> None:
     if folder.is_file():
         raise OutputError("this is a file, not a folder", where=str(folder))
-    if folder.is_dir() and any(folder.iterdir()):
+    if not folder.is_dir() or not any(folder.iterdir()):
+        return
+    if not overwrite:
         raise OutputError(
-            "the folder is not empty", where=str(folder), hint="Name a folder that doesn't exist"
+            "the folder is not empty",
+            where=str(folder),
+            hint="Name a folder that doesn't exist, or write the design in it anew with "
+            "--overwrite",
         )
-    save_design(design, folder)
+    if not any((folder / name).is_file() for name in ("design.yaml", "recipe.yaml")):
+        raise OutputError(
+            "there is no design in this folder, and it is not empty",
+            where=str(folder),
+            hint="Name a folder that doesn't exist",
+        )
+
+
+def _say_guesses(recipe: Recipe, guessed: bool) -> None:
+    """What was guessed without asking, to be looked over."""
+    if not guessed:
+        return
+    for name, part in recipe.parts.items():
+        source = part.file or f"faces of {part.faces_of} that look to {part.towards}"
+        messages.print(f"guessed: {name} is {part.role.value} ({source})", markup=False)
+    groups = ", ".join(recipe.lights)
+    messages.print(f"guessed: lights {groups}; camera {recipe.camera.model}", markup=False)
+
+
+def _say_what_next(folder: Path, recipe: Path | None = None) -> None:
     output.print(f"{folder / 'design.yaml'}", markup=False)
-    output.print(f"Look at it:  optisense check {folder}", markup=False, style="dim")
-    output.print(f"Render it:   optisense render {folder} --out picture", markup=False, style="dim")
+    if recipe is not None:
+        output.print(f"{recipe}", markup=False)
+        messages.print(
+            f"Change it:   edit the recipe, then optisense new --from-meshes {recipe} {folder} "
+            "--overwrite",
+            markup=False,
+            style="dim",
+        )
+    messages.print(f"Look at it:  optisense check {folder}", markup=False, style="dim")
+    messages.print(
+        f"Render it:   optisense render {folder} --out picture", markup=False, style="dim"
+    )

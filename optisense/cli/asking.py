@@ -1,0 +1,128 @@
+"""Questions at a terminal: each has an answer that Enter takes, and is asked until it is fit."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from typing import TypeVar
+
+import typer
+
+from optisense.cli.console import messages
+from optisense.errors import OptiSenseError
+
+T = TypeVar("T")
+
+_NONE = ("", "-", "none")
+
+
+def ask(question: str, read: Callable[[str], T], default: str | None = None) -> T:
+    """Ask until `read` takes the answer.
+
+    Args:
+        question: what is asked, without a mark at its end.
+        read: the answer's meaning; raises ValueError, or an OptiSenseError, with what is wrong.
+        default: taken by Enter; None insists on an answer.
+
+    Raises:
+        KeyboardInterrupt: the user has had enough.
+    """
+    while True:
+        try:
+            answer = typer.prompt(question, default=default, err=True)
+        except typer.Abort:
+            raise KeyboardInterrupt from None
+        try:
+            return read(str(answer).strip())
+        except OptiSenseError as error:
+            hint = f". {error.hint}" if error.hint else ""
+            messages.print(f"  {error.message}{hint}", markup=False, style="yellow")
+        except ValueError as error:
+            messages.print(f"  {error}", markup=False, style="yellow")
+
+
+def ask_word(question: str, words: Iterable[str], default: str) -> str:
+    """One of some words; the beginning of one is enough where it is the only one."""
+    known = list(words)
+
+    def read(answer: str) -> str:
+        if answer in known:
+            return answer
+        begun = [word for word in known if answer and word.startswith(answer.lower())]
+        if len(begun) == 1:
+            return begun[0]
+        raise ValueError("one of: " + ", ".join(begun or known))
+
+    return ask(question, read, default)
+
+
+def ask_name(question: str, default: str, taken: Iterable[str] = ()) -> str:
+    """A name for something in the design; empty or '-' for none."""
+    import re
+
+    used = set(taken)
+
+    def read(answer: str) -> str:
+        if answer.lower() in _NONE:
+            return ""
+        if not re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9_-]{0,63}", answer):
+            raise ValueError("letters, digits, '-' and '_' only, at most 64")
+        if answer in used:
+            raise ValueError(f"'{answer}' is taken")
+        return answer
+
+    return ask(question, read, default)
+
+
+def ask_number(question: str, default: float, least: float = float("-inf")) -> float:
+    """A number."""
+    return ask(question, lambda answer: _number(answer, least), f"{default:g}")
+
+
+def ask_number_or_none(question: str, least: float = float("-inf")) -> float | None:
+    """A number, or None for an empty answer or '-'."""
+
+    def read(answer: str) -> float | None:
+        return None if answer.lower() in _NONE else _number(answer, least)
+
+    return ask(question, read, "-")
+
+
+def ask_count(question: str, default: int) -> int:
+    """A whole number from 1."""
+
+    def read(answer: str) -> int:
+        if not answer.isdecimal() or int(answer) < 1:
+            raise ValueError("a whole number from 1")
+        return int(answer)
+
+    return ask(question, read, str(default))
+
+
+def ask_yes(question: str, default: bool) -> bool:
+    """Yes or no."""
+    return ask_word(f"{question} (yes, no)", ("yes", "no"), "yes" if default else "no") == "yes"
+
+
+def three_numbers(answer: str) -> tuple[float, float, float]:
+    """x,y,z.
+
+    Raises:
+        ValueError: it is something else.
+    """
+    words = answer.replace(",", " ").split()
+    if len(words) != 3:
+        raise ValueError("three numbers: x, y, z")
+    x, y, z = (_number(word) for word in words)
+    return x, y, z
+
+
+def _number(text: str, least: float = float("-inf")) -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        raise ValueError(f"'{text}' is not a number") from None
+    if not abs(value) < float("inf"):
+        raise ValueError("a finite number")
+    if value < least:
+        raise ValueError(f"at least {least:g}")
+    return value

@@ -1,0 +1,289 @@
+"""The questions of ``optisense new --from-meshes``: what each CAD file is, lights and camera.
+
+Imported only when they are asked, so that other commands start fast.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any, cast
+
+import numpy as np
+
+from optisense import library
+from optisense.cli.asking import (
+    ask,
+    ask_count,
+    ask_name,
+    ask_number,
+    ask_number_or_none,
+    ask_word,
+    ask_yes,
+    three_numbers,
+)
+from optisense.cli.console import messages
+from optisense.design import Role
+from optisense.design.sensor_design import KINDS_OF_ROLE, MATERIAL_REQUIRED
+from optisense.errors import DesignError
+from optisense.geometry import TriangleMesh
+from optisense.library.adding import COLOURS
+from optisense.sensors.from_meshes import guessing
+from optisense.sensors.from_meshes.building import USUAL_MATERIAL
+from optisense.sensors.from_meshes.directions import SIDES
+from optisense.sensors.from_meshes.files import largest_dimension, likely_units
+from optisense.sensors.from_meshes.guessing import Found, Use
+from optisense.sensors.from_meshes.recipe import MM_PER, PartChoice, Recipe, Shape, Units
+from optisense.sensors.from_meshes.surfaces import chosen as chosen_faces
+
+Parts = dict[str, PartChoice]
+Meshes = dict[str, TriangleMesh]
+
+USES = {
+    "sensing_surface": "the coated side of the gel, as a surface of its own",
+    "elastomer": "the clear gel, a solid",
+    "support": "rigid and clear, a solid: a window, a plate, a lens",
+    "mirror": "reflects",
+    "blocker": "opaque: a housing, a circuit board",
+    "interface": "a thin refracting sheet",
+    "indenter": "touches the sensor",
+    "lights": "not a part: marks where LEDs are",
+    "camera": "not a part: marks where the camera is",
+    "nothing": "is left out",
+}
+
+
+def ask_recipe(source: Path, units: Units | None) -> Recipe:
+    """Ask for all that a recipe says, with what is guessed from the files as answers.
+
+    Args:
+        source: a CAD file, or a folder of them.
+        units: of the files that don't know theirs; None asks.
+
+    Raises:
+        SetupError, MeshError: the files can't be read.
+        KeyboardInterrupt: the user has had enough.
+    """
+    found = guessing.find_bodies(source)
+    folder = source if source.is_dir() else source.parent
+    say(f"{len(found)} bodies in {source}. Enter takes the answer in brackets.")
+    name = ask("Name of the sensor", _not_empty, folder.resolve().name or "sensor")
+    units = units or _ask_units(found)
+    meshes = {each.name: each.mesh(units) for each in found}
+    uses = _ask_uses(found, meshes)
+    parts = _ask_materials(found, uses)
+    carriers = [each.name for each in found if uses[each.name] != "nothing"]
+    gel = next((n for n, part in parts.items() if part.role is Role.ELASTOMER), carriers[0])
+    outward = guessing.guess_outward({n: meshes[n] for n in carriers}, gel)
+    if not any(part.role is Role.SENSING_SURFACE for part in parts.values()):
+        parts, outward = _ask_skin(parts, meshes, gel, outward)
+    coating = _ask_known("coating", "Coating", "diffuse-grey")
+    lights = _ask_lights(found, uses, parts, meshes, gel, outward)
+    camera = _ask_camera(found, uses, parts)
+    recipe = Recipe.model_validate(
+        {
+            "name": name,
+            "units": units,
+            "coating": coating,
+            "parts": {key: part.model_dump(exclude_none=True) for key, part in parts.items()},
+            "lights": lights,
+            "camera": camera,
+        }
+    )
+    return recipe.relative_to(folder)
+
+
+def say(text: str) -> None:
+    """Tell something between questions."""
+    messages.print(text, markup=False)
+
+
+def _ask_units(found: list[Found]) -> Units | None:
+    without = [each.body.mesh for each in found if not each.body.own_units]
+    if not without:
+        return None
+    size = largest_dimension(without)
+    likely = likely_units(size)
+    said = " or ".join(f"{size * MM_PER[unit]:.3g} mm if they are in {unit}" for unit in likely)
+    say(f"The files' largest dimension is the number {size:.4g}" + (f": {said}" if said else ""))
+    return cast("Units", ask_word("Unit of the files", MM_PER, likely[0] if likely else "mm"))
+
+
+def _ask_uses(found: list[Found], meshes: Meshes) -> dict[str, Use]:
+
+    say("\nWhat is each? The beginning of a word is enough:")
+    for word, meaning in USES.items():
+        say(f"  {word:16} {meaning}")
+    uses: dict[str, Use] = {}
+    for each in found:
+        size = " x ".join(f"{side:.3g}" for side in np.ptp(meshes[each.name].bounds, axis=0))
+        guess = each.use.value if isinstance(each.use, Role) else each.use
+        word = ask_word(f"{each.name} ({size} mm)", USES, guess)
+        uses[each.name] = Role(word) if word in [role.value for role in Role] else cast("Any", word)
+    return uses
+
+
+def _ask_materials(found: list[Found], uses: dict[str, Use]) -> Parts:
+    say("\nMaterials (`optisense library list material` shows them):")
+    parts: Parts = {}
+    for each in found:
+        use = uses[each.name]
+        if not isinstance(use, Role):
+            continue
+        material: str | None = None
+        if use in MATERIAL_REQUIRED or use is Role.BLOCKER:
+            usual = USUAL_MATERIAL.get(use, "black-absorber")
+
+            def fits(answer: str, role: Role = use) -> str:
+                kind = library.material(answer).kind
+                if kind not in KINDS_OF_ROLE[role]:
+                    wanted = " or ".join(KINDS_OF_ROLE[role])
+                    raise ValueError(f"that is a {kind}; a {role.value} is a {wanted}")
+                return answer
+
+            material = ask(f"{each.name} ({use.value}) is made of", fits, usual)
+        parts[each.name] = guessing.part_of(each, use, material)
+    return parts
+
+
+def _ask_skin(parts: Parts, meshes: Meshes, gel: str, outward: str) -> tuple[Parts, str]:
+    """Which faces of which part are coated."""
+    say("\nThe sensing surface is the coated side of the gel.")
+    carrier = ask_word("Coated faces belong to", parts, gel)
+    mesh = meshes[carrier].welded()
+
+    def faces(side: str, tangent: bool) -> float:
+        choice = guessing.insert_skin({carrier: parts[carrier]}, "skin", carrier, side, tangent)
+        return chosen_faces(mesh, choice["skin"], carrier)[0].area
+
+    def side(answer: str) -> str:
+        if answer not in SIDES:
+            raise ValueError("one of: " + ", ".join(SIDES))
+        try:
+            faces(answer, False)
+        except DesignError as error:
+            raise ValueError(error.message) from None
+        return answer
+
+    towards = ask("They look to", side, outward)
+    few, many = faces(towards, False), faces(towards, True)
+    tangent = False
+    if many > 1.01 * few:
+        say(f"{few:.4g} mm2 look there within 30 degrees; with the faces that go on from them "
+            f"without a sharp edge it is {many:.4g} mm2.")  # fmt: skip
+        tangent = ask_yes("Are those coated too", True)
+    else:
+        say(f"These are {few:.4g} mm2.")
+    name = "skin"
+    while name in parts:
+        name += "-2"
+    return guessing.insert_skin(parts, name, carrier, towards, tangent), towards
+
+
+def _ask_lights(
+    found: list[Found],
+    uses: dict[str, Use],
+    parts: Parts,
+    meshes: Meshes,
+    gel: str,
+    outward: str,
+) -> dict[str, dict[str, Any]]:
+    say("\nLights (`optisense library list light` shows models):")
+    groups: dict[str, dict[str, Any]] = {}
+    for each in (each for each in found if uses[each.name] == "lights"):
+        guess = guessing.lights_over(each, meshes[each.name], meshes[gel])
+        assert guess.over is not None
+        group = _ask_group(each.name, str(guess.colour))
+        over = guess.over.model_dump(exclude_none=True)
+        over["towards"] = ask_word(
+            f"{each.name}: one on each face that looks to", SIDES, str(guess.over.towards)
+        )
+        groups[each.name] = {**group, "over": over}
+    window = next((n for n, part in parts.items() if part.role is Role.SUPPORT), gel)
+    usual = guessing.lights_around(window, meshes[window], outward)
+    if groups:
+        usual = {}
+    while True:
+        default = next((name for name in usual if name not in groups), "-")
+        name = ask_name("Name of a light group, or - for no more", default, groups)
+        if not name:
+            return groups
+        guess_row = usual[name].row if name in usual else None
+        group = _ask_group(name, name if name in ("red", "green", "blue") else "white")
+        way = ask_word(f"{name}: in a row, a ring, or one at a place", ("row", "ring", "at"), "row")
+        if way == "at":
+            place = ask("  at x, y, z (mm)", three_numbers)
+            aim = ask("  shines along x, y, z", three_numbers)
+            groups[name] = {**group, "at": [{"position": place, "direction": aim}]}
+            continue
+        part = ask_word(f"  {way} beside the part", parts, window)
+        count = ask_count("  number of lights", guess_row.count if guess_row else 8)
+        chosen: dict[str, Any] = {"part": part, "count": count}
+        if way == "row":
+            chosen["side"] = ask_word("  at its side", SIDES, guess_row.side if guess_row else "+x")
+            chosen["pitch"] = ask_number_or_none("  mm from one to the next (- spreads them)", 1e-6)
+        else:
+            chosen["axis"] = ask_word("  axis of the ring", SIDES, outward)
+        chosen["gap"] = ask_number("  mm from the part to the lights", 0.2)
+        chosen["height"] = ask_number_or_none(
+            "  mm, where on the third axis (- for the part's middle)"
+            if way == "row"
+            else "  mm, where on the axis (- for the part's middle)"
+        )
+        groups[name] = {**group, way: {k: v for k, v in chosen.items() if v is not None}}
+
+
+def _ask_group(name: str, colour: str) -> dict[str, Any]:
+    return {
+        "model": _ask_known("light", f"{name}: model", guessing.LIGHT),
+        "colour": ask_word(f"{name}: colour", COLOURS, colour),
+        "flux": ask_number(f"{name}: mW of each light", 10.0, least=0.0),
+    }
+
+
+def _ask_camera(found: list[Found], uses: dict[str, Use], parts: Parts) -> dict[str, Any]:
+    say("\nCamera (`optisense library list camera` shows models):")
+    camera: dict[str, Any] = {"model": _ask_known("camera", "Model", guessing.CAMERA)}
+    references = {each.name: each.shape for each in found if uses[each.name] == "camera"}
+    words = ["behind", *references]
+
+    def place(answer: str) -> Shape | str | tuple[float, float, float]:
+        if answer in references:
+            return references[answer]
+        if answer == "behind":
+            return answer
+        try:
+            return three_numbers(answer)
+        except ValueError:
+            raise ValueError("x, y, z in mm, or one of: " + ", ".join(words)) from None
+
+    say("Its pupil is in the middle of a body, at a place x, y, z, or behind the sensing surface, "
+        "where that fills the picture.")  # fmt: skip
+    at = ask("Pupil", place, next(iter(references), "behind"))
+    if not isinstance(at, str):
+        camera["at"] = at if isinstance(at, tuple) else at.model_dump(exclude_none=True)
+
+    def target(answer: str) -> str | tuple[float, float, float]:
+        return answer if answer in parts else three_numbers(answer)
+
+    skin = next(name for name, part in parts.items() if part.role is Role.SENSING_SURFACE)
+    aim = ask("It looks at a part, or x, y, z", target, skin)
+    if aim != skin:
+        camera["look_at"] = aim
+    up = ask_word("Upward in the picture (- for +y, or +z where that is ahead)", (*SIDES, "-"), "-")
+    if up != "-":
+        camera["up"] = up
+    return camera
+
+
+def _ask_known(kind: str, question: str, default: str) -> str:
+    def read(answer: str) -> str:
+        library.entry(kind, answer)
+        return answer
+
+    return ask(question, read, default)
+
+
+def _not_empty(answer: str) -> str:
+    if not answer or len(answer) > 200:
+        raise ValueError("1 to 200 letters")
+    return answer

@@ -1,0 +1,71 @@
+"""What the steps from a recipe to a design share."""
+
+from __future__ import annotations
+
+from optisense import library
+from optisense.design import Provenance, Role
+from optisense.errors import LibraryError, MeshError
+from optisense.geometry import TriangleMesh
+from optisense.geometry.repair import repaired
+from optisense.sensors.from_meshes.files import CadFiles
+from optisense.sensors.from_meshes.recipe import Recipe, Shape
+
+
+class Bench:
+    """A recipe, and what has come of it so far.
+
+    Attributes:
+        recipe: what is made.
+        files: its CAD files.
+        meshes: of the parts, mm.
+        provenance: where numbers come from, by dotted path.
+        notes: what was mended, moved, chosen or looks odd, a sentence each.
+    """
+
+    def __init__(self, recipe: Recipe) -> None:
+        self.recipe = recipe
+        self.files = CadFiles(recipe.folder)
+        self.meshes: dict[str, TriangleMesh] = {}
+        self.provenance: dict[str, Provenance] = {}
+        self.notes: list[str] = []
+
+    def load(self, shape: Shape, where: str) -> TriangleMesh:
+        """The mesh of a file, mm; an error also says which shape it is for."""
+        try:
+            return self.files.load(shape, self.recipe.units or "mm", where)
+        except MeshError as error:
+            place = f"{where}: {error.where}" if error.where else where
+            raise MeshError(error.message, where=place, hint=error.hint) from None
+
+    def known(self, kind: str, name: str, *path: str) -> None:
+        """Look an entry of the library up, so that the recipe's line is told if it lacks it."""
+        try:
+            library.entry(kind, name)
+        except LibraryError as error:
+            where = error.where or self.recipe.where(*path)
+            raise LibraryError(error.message, where=where, hint=error.hint) from None
+
+    def label(self, name: str) -> str:
+        """A part in messages: its name and its file."""
+        part = self.recipe.parts[name]
+        return f"part {name} ({part.file or f'faces of {part.faces_of}'})"
+
+    def of(self, role: Role) -> list[str]:
+        """The names of the parts of a role."""
+        return [name for name, part in self.recipe.parts.items() if part.role is role]
+
+    def solids(self) -> dict[str, TriangleMesh]:
+        """The transparent solids by name, rigid ones first."""
+        return {
+            name: self.meshes[name]
+            for role in (Role.SUPPORT, Role.ELASTOMER)
+            for name in self.of(role)
+            if name in self.meshes and self.recipe.parts[name].towards is None
+        }
+
+    def reference(self, shape: Shape, where: str) -> TriangleMesh:
+        """The mesh that lights or the camera refer to, welded."""
+        if shape.faces_of is not None:
+            return self.meshes[shape.faces_of]
+        mesh, _ = repaired(self.load(shape, where), where, closed=False)
+        return TriangleMesh(mesh.vertices, mesh.faces)

@@ -1,0 +1,236 @@
+"""From a recipe to a design: read the files, settle contacts, place lights and camera."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+from pydantic import ValidationError
+
+from optisense import library
+from optisense.design import (
+    Camera,
+    LightGroup,
+    Material,
+    Part,
+    Provenance,
+    Role,
+    SensorDesign,
+    Status,
+)
+from optisense.design.parts import TRANSPARENT_SOLIDS
+from optisense.design.problems import design_error
+from optisense.design.sensor_design import KINDS_OF_ROLE
+from optisense.errors import DesignError, MeshError
+from optisense.geometry import TriangleMesh
+from optisense.geometry.repair import refuse_bad_sheet, repaired
+from optisense.geometry.step import SUFFIXES
+from optisense.sensors.from_meshes.bench import Bench
+from optisense.sensors.from_meshes.files import refuse_odd_units
+from optisense.sensors.from_meshes.posing import check_places, place_camera, place_lights
+from optisense.sensors.from_meshes.recipe import Recipe, read_recipe
+from optisense.sensors.from_meshes.surfaces import chosen
+from optisense.sensors.from_meshes.touching import (
+    lay_on_elastomer,
+    look_inward,
+    settle_contacts,
+)
+
+USUAL_MATERIAL = {
+    Role.ELASTOMER: "silicone-xp565",
+    Role.SUPPORT: "acrylic",
+    Role.MIRROR: "mirror-silver",
+}
+"""What parts are made of where the recipe does not say; marked as assumed."""
+
+
+@dataclass
+class FromMeshes:
+    """A design made of CAD files.
+
+    Attributes:
+        design: ready to be saved and rendered.
+        notes: what was mended, moved, chosen or looks odd, a sentence each.
+    """
+
+    design: SensorDesign
+    notes: list[str] = field(default_factory=list)
+
+
+def design_from_meshes(recipe: Recipe | str | Path) -> FromMeshes:
+    """Make a design of CAD files.
+
+    Args:
+        recipe: a recipe, or the path of a recipe file.
+
+    Raises:
+        SetupError: a STEP file, but the extra for it is missing.
+        MeshError: a file is missing or holds no fit shape; names the part, the place and what
+            to do in the CAD tool.
+        DesignError: the recipe does not fit the shapes.
+        LibraryError: a material, coating, light or camera is not in the library.
+    """
+    if not isinstance(recipe, Recipe):
+        recipe = read_recipe(recipe)
+    builder = _Builder(recipe)
+    return FromMeshes(builder.build(), builder.notes)
+
+
+class _Builder(Bench):
+    """The steps, in their order."""
+
+    def build(self) -> SensorDesign:
+        materials = self._materials()
+        self._read_parts()
+        contacts = settle_contacts(self.recipe, self.solids())
+        self.meshes.update(contacts.meshes)
+        self.notes += contacts.notes
+        self._pick_faces()
+        self._lay_skins()
+        camera = place_camera(self)
+        groups = {
+            name: place_lights(self, name, choice) for name, choice in self.recipe.lights.items()
+        }
+        check_places(self, camera, groups)
+        design = self._design(materials, contacts.priorities, camera, groups)
+        design.meshes.update({name: self.meshes[name] for name in self.recipe.parts})
+        for name in self.of(Role.INDENTER):
+            self.notes.append(
+                f"{name} is kept for reference and touches nothing by itself. Press it with "
+                f"--contact mesh:DIR/meshes/{name}.obj@0,0:DEPTH"
+            )
+        return design
+
+    # ---- shapes
+
+    def _read_parts(self) -> None:
+        """Every part that has a file of its own, mended."""
+        sized: dict[str, TriangleMesh] = {}
+        for name, part in self.recipe.parts.items():
+            if part.file is None:
+                continue
+            where = self.label(name)
+            mesh = self.load(part, where)
+            if not part.file.lower().endswith(SUFFIXES):
+                sized[where] = mesh
+            self.meshes[name] = mesh
+        refuse_odd_units(sized, self.recipe.units)
+        for name, mesh in self.meshes.items():
+            part, where = self.recipe.parts[name], self.label(name)
+            solid = part.role in TRANSPARENT_SOLIDS and part.towards is None
+            try:
+                mended, notes = repaired(mesh, name, closed=solid)
+            except MeshError as error:
+                raise MeshError(error.message, where=where, hint=error.hint) from None
+            self.notes += [f"{name}: {note}" for note in notes]
+            self.meshes[name] = mended if part.towards is None else self._chosen(name, mended)
+            source = f"CAD file {part.file}" + (f", body {part.solid}" if part.solid else "")
+            self.provenance[f"parts.{name}"] = Provenance(status=Status.SOURCED, source=source)
+
+    def _pick_faces(self) -> None:
+        """Parts that are faces of other parts, on the very same vertices."""
+        for name, part in self.recipe.parts.items():
+            if part.faces_of is not None:
+                self.meshes[name] = self._chosen(name, self.meshes[part.faces_of])
+                self.provenance[f"parts.{name}"] = Provenance(
+                    status=Status.DERIVED, source=f"faces of {part.faces_of}"
+                )
+
+    def _chosen(self, name: str, mesh: TriangleMesh) -> TriangleMesh:
+        result, notes = chosen(mesh, self.recipe.parts[name], self.label(name))
+        self.notes += [f"{name}: {note}" for note in notes]
+        return result
+
+    def _lay_skins(self) -> None:
+        """Sensing surfaces on the faces of the gel, looking into it."""
+        gels = {n: self.meshes[n] for n in self.of(Role.ELASTOMER)}
+        eye = self.recipe.camera.at
+        seen_from = np.array(eye) if isinstance(eye, tuple) else None
+        for name in self.of(Role.SENSING_SURFACE):
+            part, skin = self.recipe.parts[name], self.meshes[name]
+            if skin.is_closed:
+                raise DesignError(
+                    f"part '{name}' is a closed solid; a sensing surface is only its coated side",
+                    where=self.label(name),
+                    hint="Say which faces: towards: +z (or another side), perhaps tangent: true",
+                )
+            try:
+                refuse_bad_sheet(skin, name)
+            except MeshError as error:
+                raise MeshError(error.message, where=self.label(name), hint=error.hint) from None
+            notes: list[str] = []
+            if part.faces_of is None and gels:
+                skin, notes = lay_on_elastomer(name, skin, gels, self.recipe.join)
+            if part.faces_of is not None:
+                skin = skin.flipped()  # a solid's faces look out of it
+            else:
+                skin, turned = look_inward(name, skin, self.solids(), seen_from)
+                notes += turned
+            self.meshes[name] = skin
+            self.notes += notes
+        if not gels:
+            self.notes.append(
+                "there is no elastomer: light reaches the sensing surface through air"
+            )
+
+    # ---- the design
+
+    def _materials(self) -> dict[str, Material]:
+        """The materials of all parts, from the library."""
+        used: dict[str, Material] = {}
+        for name, part in self.recipe.parts.items():
+            material = part.material or USUAL_MATERIAL.get(part.role)
+            if material is None:
+                continue
+            self.known("material", material, "parts", name, "material")
+            used[material] = library.material(material)
+            kind, fitting = used[material].kind, KINDS_OF_ROLE.get(part.role, ())
+            if kind not in fitting:
+                raise DesignError(
+                    f"part '{name}' ({part.role.value}) can't be made of '{material}', which is "
+                    f"a {kind}",
+                    where=self.recipe.where("parts", name, "material"),
+                    hint="Choose a material of kind " + " or ".join(fitting)
+                    if fitting
+                    else "Leave its material out: it wears the coating",
+                )
+            if part.material is None:
+                self.provenance[f"parts.{name}.material"] = Provenance(
+                    status=Status.ASSUMED, source="usual for such a part; the recipe names none"
+                )
+        self.known("coating", self.recipe.coating, "coating")
+        return used
+
+    def _design(
+        self,
+        materials: dict[str, Material],
+        priorities: dict[str, int],
+        camera: Camera,
+        groups: dict[str, LightGroup],
+    ) -> SensorDesign:
+        coating = library.coating(self.recipe.coating)
+        if self.recipe.specularity is not None:
+            coating.specularity = self.recipe.specularity
+        parts = {
+            name: Part(
+                role=part.role,
+                mesh=f"meshes/{name}.obj",
+                material=part.material or USUAL_MATERIAL.get(part.role),
+                priority=priorities.get(name, part.priority or 0),
+            )
+            for name, part in self.recipe.parts.items()
+        }
+        try:
+            return SensorDesign(
+                name=self.recipe.name,
+                description=self.recipe.description or "made of CAD files",
+                coating=coating,
+                materials=materials,
+                parts=parts,
+                lights=groups,
+                camera=camera,
+                provenance=self.provenance,
+            )
+        except ValidationError as error:
+            raise design_error(error, {}, where=f"recipe of '{self.recipe.name}'") from None

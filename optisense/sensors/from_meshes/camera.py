@@ -1,0 +1,165 @@
+"""Where the camera goes and what it looks at."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from optisense import library
+from optisense.design import Camera
+from optisense.errors import DesignError
+from optisense.geometry import TriangleMesh
+from optisense.geometry.containment import inside
+from optisense.geometry.patches import mean_normal
+from optisense.library import CameraModel
+from optisense.sensors.from_meshes.directions import vector
+from optisense.sensors.from_meshes.recipe import CameraChoice
+
+FloatArray = NDArray[np.float64]
+
+WIDTH = 320
+"""Pixels across a picture where the recipe gives no resolution; the height follows the camera."""
+
+WIDEST_FIT = 100.0
+"""Degrees: a wider camera is placed as if it saw this much, so that its rim is not needed."""
+
+CLEARANCE = 1.0
+"""mm that a camera placed by itself keeps from the parts behind which it stands."""
+
+LARGEST_STEP_BACK = 200.0
+
+
+def make_camera(
+    choice: CameraChoice,
+    skin: TriangleMesh,
+    place: FloatArray | None,
+    target: FloatArray,
+    parts: dict[str, TriangleMesh],
+) -> Camera:
+    """The camera of a design.
+
+    Args:
+        choice: from the recipe.
+        skin: the sensing surface, looking inward, mm.
+        place: (3,) mm, of the pupil; None puts it behind the skin, which then fills the picture.
+        target: (3,) mm, what it looks at unless the choice has a direction.
+        parts: a camera that is placed by itself stands outside of these.
+
+    Raises:
+        LibraryError: there is no such camera.
+        DesignError: it looks at its own place, or `up` points where it looks.
+    """
+    model = library.camera(choice.model)
+    width, height = choice.resolution or standard_resolution(model)
+    fov = model.fov if choice.fov is None else choice.fov
+    if place is None:
+        way = mean_normal(skin)
+        if choice.direction is not None:
+            way = -vector(choice.direction)
+        if np.linalg.norm(way) < 1e-3:
+            raise DesignError(
+                "the sensing surface looks to all sides, so no place for the camera can be told",
+                where="camera",
+                hint="Give its place: at: [x, y, z]",
+            )
+        way = way / np.linalg.norm(way)
+        up = upward(choice, -way)
+        place = _behind(skin, target, way, up, fov, width / height, parts)
+    look = vector(choice.direction) if choice.direction is not None else target - place
+    distance = float(np.linalg.norm(look))
+    if distance < 1e-6:
+        raise DesignError(
+            "the camera is at the very point that it looks at",
+            where="camera",
+            hint="Give another place after at, or another target after look_at",
+        )
+    look = look / distance
+    up = upward(choice, look)
+    if np.linalg.norm(np.cross(look, up)) < 1e-3:
+        raise DesignError(
+            "the camera looks along its own up",
+            where="camera.up",
+            hint="Choose an up that points to the top of the picture",
+        )
+    x, y, z = (np.round(place, 6) + 0.0).tolist()
+    dx, dy, dz = (np.round(look, 9) + 0.0).tolist()
+    ux, uy, uz = (up + 0.0).tolist()
+    return Camera(
+        model=choice.model,
+        projection=model.projection,
+        fov=fov,
+        resolution=(width, height),
+        position=(x, y, z),
+        direction=(dx, dy, dz),
+        up=(ux, uy, uz),
+    )
+
+
+def standard_resolution(model: CameraModel) -> tuple[int, int]:
+    """WIDTH pixels across, in the camera's own shape of picture."""
+    width, height = model.resolution
+    return WIDTH, max(1, round(WIDTH * height / width))
+
+
+def upward(choice: CameraChoice, look: FloatArray) -> FloatArray:
+    """What points to the top of the picture: as chosen, else +y, or +z where that is ahead."""
+    if choice.up is not None:
+        return vector(choice.up)
+    y, z = np.eye(3)[1], np.eye(3)[2]
+    return y if abs(look @ y) < 0.7 else z
+
+
+def share_seen(camera: Camera, skin: TriangleMesh) -> tuple[float, float]:
+    """How much of a sensing surface a camera would see along straight lines, past all parts.
+
+    Returns:
+        The share of its area that lies in the picture and faces the camera, and the share of the
+        picture's width or height (the larger) over which that spreads.
+    """
+    centres, areas = skin.triangles.mean(axis=1), skin.face_areas
+    right, up, ahead = camera.axes()
+    way = centres - np.array(camera.position)
+    depth = way @ ahead
+    across = np.hypot(way @ right, way @ up)
+    half = np.radians(camera.fov) / 2.0
+    angle = np.arctan2(across, depth)
+    reach = np.tan(half) if camera.projection == "perspective" else half
+    radius = np.tan(np.minimum(angle, 1.55)) if camera.projection == "perspective" else angle
+    turn = np.arctan2(way @ up, way @ right)
+    u, v = radius * np.cos(turn) / reach, radius * np.sin(turn) / reach
+    v *= camera.resolution[0] / camera.resolution[1]
+    facing = np.einsum("ij,ij->i", way, skin.face_normals) < 0.0
+    seen = (np.abs(u) <= 1.0) & (np.abs(v) <= 1.0) & facing
+    seen &= (depth > 0.0) | (camera.projection == "equidistant")
+    if not seen.any():
+        return 0.0, 0.0
+    spread = max(float(np.ptp(u[seen])), float(np.ptp(v[seen]))) / 2.0
+    return float(areas[seen].sum() / areas.sum()), spread
+
+
+def _behind(
+    skin: TriangleMesh,
+    target: FloatArray,
+    way: FloatArray,
+    up: FloatArray,
+    fov: float,
+    aspect: float,
+    parts: dict[str, TriangleMesh],
+) -> FloatArray:
+    """The nearest place along `way` from the target from which all of the skin is in the picture,
+    outside of all parts.
+    """
+    right = np.cross(-way, up)
+    right /= np.linalg.norm(right)
+    top = np.cross(right, -way)
+    wide = np.tan(np.radians(min(fov, WIDEST_FIT)) / 2.0)
+    points = skin.vertices - target
+    ahead = -points @ way
+    needed = np.maximum(np.abs(points @ right) / wide, np.abs(points @ top) * aspect / wide)
+    distance = float((needed - ahead).max())
+    for step in np.arange(0.0, LARGEST_STEP_BACK, 0.5):
+        place = target + (distance + step) * way
+        probes = np.array([place, place + CLEARANCE * way, place - CLEARANCE * way])
+        if not any(m.is_closed and inside(probes, m).any() for m in parts.values()):
+            return place
+    return np.asarray(target + distance * way)

@@ -1,0 +1,200 @@
+"""CAD files as meshes in millimetres, each read once; and whether their units can be right."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from optisense.design.near import near_match
+from optisense.errors import DesignError, MeshError
+from optisense.geometry import TriangleMesh
+from optisense.geometry.mesh_files import FORMATS, load_mesh
+from optisense.geometry.step import SUFFIXES as STEP_FORMATS
+from optisense.geometry.step import read_step
+from optisense.sensors.from_meshes.recipe import MM_PER, Shape
+
+ALL_FORMATS = (*FORMATS, *STEP_FORMATS)
+
+SMALLEST, LARGEST = 4.0, 400.0
+"""mm: the largest dimension of a tactile sensor is between these."""
+
+ODD_PART = 200.0
+"""A part so many times smaller or larger than the others is in another unit."""
+
+
+@dataclass(frozen=True)
+class Body:
+    """What a file holds.
+
+    Attributes:
+        file: as it was named.
+        name: of the body in a STEP file, else None.
+        mesh: in the file's own units; STEP files are in mm.
+        own_units: whether the file knows its units.
+    """
+
+    file: str
+    name: str | None
+    mesh: TriangleMesh
+    own_units: bool
+
+
+class CadFiles:
+    """The CAD files of a recipe."""
+
+    def __init__(self, folder: Path) -> None:
+        """`folder`: what the paths of files start from."""
+        self._folder = folder
+        self._read: dict[Path, list[Body]] = {}
+
+    def bodies(self, file: str) -> list[Body]:
+        """All that is in a file; STEP files may hold several bodies, others hold one.
+
+        Raises:
+            SetupError: a STEP file, but the extra for it is missing.
+            MeshError: the file is missing, of another format, malformed or empty.
+        """
+        path = self._folder / file
+        if path not in self._read:
+            self._check_exists(path, file)
+            if path.suffix.lower() in STEP_FORMATS:
+                self._read[path] = [Body(file, b.name, b.mesh, True) for b in read_step(path)]
+            else:
+                self._read[path] = [Body(file, None, _mesh(path), False)]
+        return self._read[path]
+
+    def load(self, shape: Shape, units: str, where: str) -> TriangleMesh:
+        """The mesh of a shape that comes from a file, mm.
+
+        Args:
+            units: of the files that don't know theirs and for which the shape gives none.
+            where: for messages, such as 'part gel (gel.stl)'.
+
+        Raises:
+            OptiSenseError: see `bodies`; or a STEP file has no such body, or several and none
+                is named.
+        """
+        assert shape.file is not None
+        bodies = self.bodies(shape.file)
+        body = bodies[0]
+        if not body.own_units and shape.solid is not None:
+            raise DesignError(
+                "solid names a body of a STEP file, and this is none",
+                where=where,
+                hint="Leave solid out",
+            )
+        if body.own_units:
+            body = _named(bodies, shape.solid, where)
+            if shape.units is not None:
+                raise DesignError(
+                    "a STEP file knows its units", where=where, hint="Leave units out"
+                )
+            return body.mesh
+        scale = MM_PER[shape.units or units]
+        return body.mesh.with_vertices(scale * body.mesh.vertices) if scale != 1.0 else body.mesh
+
+    def _check_exists(self, path: Path, file: str) -> None:
+        if path.is_file():
+            return
+        siblings = path.parent.iterdir() if path.parent.is_dir() else ()
+        near = near_match(path.name, [sibling.name for sibling in siblings])
+        hint = f"Did you mean '{near}'?" if near else "Correct the path; it starts from the recipe"
+        raise MeshError(f"there is no file '{file}'", where=str(path), hint=hint)
+
+
+def _mesh(path: Path) -> TriangleMesh:
+    if path.suffix.lower() not in FORMATS:
+        raise MeshError(
+            f"a file of type '{path.suffix or 'unknown'}' can't be read",
+            where=str(path),
+            hint="In the CAD tool: export STL, OBJ, PLY or STEP",
+        )
+    try:
+        return load_mesh(path)
+    except MeshError as error:
+        if "no triangles" not in error.message:
+            raise
+        raise MeshError(
+            "the file has no faces",
+            where=error.where,
+            hint="In the CAD tool: show the body, select it, and export a solid or a surface as "
+            "a mesh; sketches, points and hidden bodies have no faces",
+        ) from None
+
+
+def _named(bodies: list[Body], name: str | None, where: str) -> Body:
+    if name is None and len(bodies) == 1:
+        return bodies[0]
+    known = [body.name or "" for body in bodies]
+    if name in known:
+        return bodies[known.index(name)]
+    listed = ", ".join(known[:20])
+    raise DesignError(
+        f"the STEP file has no body '{name}'"
+        if name
+        else f"the STEP file holds {len(bodies)} bodies; it must be said which one is meant",
+        where=where,
+        hint=f"solid: one of {listed}",
+    )
+
+
+def largest_dimension(meshes: Iterable[TriangleMesh]) -> float:
+    """mm: the longest side of the box around all meshes."""
+    corners = np.array([mesh.bounds for mesh in meshes])
+    return float((corners[:, 1].max(axis=0) - corners[:, 0].min(axis=0)).max())
+
+
+def likely_units(size: float) -> list[str]:
+    """The units in which a sensor whose largest dimension is the number `size` has a fair size."""
+    return [unit for unit, scale in MM_PER.items() if SMALLEST <= size * scale <= LARGEST]
+
+
+def refuse_odd_units(meshes: dict[str, TriangleMesh], units: str | None) -> None:
+    """Check whether the sizes of parts can be right.
+
+    Args:
+        meshes: by where each is from, such as 'part gel (gel.stl)', mm; only of files that do
+            not know their units.
+        units: that were given; None where mm was taken for granted.
+
+    Raises:
+        MeshError: the whole is too small or too large for a tactile sensor, or one part is far
+            smaller or larger than the others; says which units would do.
+    """
+    if not meshes:
+        return
+    sizes = {where: float(np.ptp(mesh.bounds, axis=0).max()) for where, mesh in meshes.items()}
+    if len(sizes) > 1:
+        fair = [size for size in sizes.values() if 1.0 <= size <= LARGEST]
+        typical = float(np.median(fair or list(sizes.values())))
+        for where, size in sizes.items():
+            if max(size / typical, typical / size) > ODD_PART:
+                scale = MM_PER[units or "mm"]
+                others = [u for u in MM_PER if 0.1 < size / scale * MM_PER[u] / typical < 10.0]
+                advice = f"units: {others[0]}" if others else "units:"
+                raise MeshError(
+                    f"it is {size:.4g} mm large, the other parts are {typical:.4g} mm: its file "
+                    "is in another unit",
+                    where=where,
+                    hint=f"Export it in the unit of the others, or give this part its own {advice}",
+                )
+    whole = largest_dimension(meshes.values())
+    if SMALLEST <= whole <= LARGEST or (units is not None and 0.5 <= whole <= 1000.0):
+        return
+    given = units or "mm"
+    number = whole / MM_PER[given]
+    fitting = [
+        f"{unit} (then it is {number * MM_PER[unit]:.3g} mm)" for unit in likely_units(number)
+    ]
+    large = f"{whole:.4g} mm" if whole < 1e4 else f"{whole / 1000:.4g} m"
+    raise MeshError(
+        f"the sensor would be {large} large if its files are in {given}",
+        where=", ".join(sizes),
+        hint=("The files look as if they were in " + " or ".join(fitting) + ": say --units "
+              + likely_units(number)[0] + ", or units: in the recipe")
+        if fitting
+        else "Look up the export units in the CAD tool, and say them with --units",
+    )  # fmt: skip

@@ -1,0 +1,280 @@
+"""A first recipe for a folder of CAD files: what each is by its name, and usual lights and camera.
+
+What is guessed here is meant to be asked about or looked over; nothing is measured.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from optisense.design import Role
+from optisense.errors import MeshError
+from optisense.geometry import TriangleMesh
+from optisense.geometry.patches import faces_towards
+from optisense.sensors.from_meshes.directions import SIDES, nearest_side, vector
+from optisense.sensors.from_meshes.files import (
+    ALL_FORMATS,
+    Body,
+    CadFiles,
+    largest_dimension,
+    likely_units,
+)
+from optisense.sensors.from_meshes.recipe import (
+    MM_PER,
+    CameraChoice,
+    LightChoice,
+    Over,
+    PartChoice,
+    Recipe,
+    Row,
+    Shape,
+    Units,
+)
+from optisense.sensors.from_meshes.surfaces import WITHIN
+
+Use = Role | Literal["lights", "camera", "nothing"]
+"""What a body is: a part of some role, a reference for lights or the camera, or left out."""
+
+WORDS: tuple[tuple[Use, tuple[str, ...]], ...] = (
+    ("lights", ("led", "leds", "light", "lights", "lamp", "lamps", "diode")),
+    ("camera", ("camera", "cam", "lens", "pupil", "imager")),
+    (Role.SENSING_SURFACE, ("skin", "coating", "coat", "membrane", "sensing", "paint")),
+    (Role.ELASTOMER, ("gel", "elastomer", "silicone", "pdms", "pad", "rubber")),
+    (Role.MIRROR, ("mirror", "reflector")),
+    (Role.INTERFACE, ("interface", "film", "foil", "tape")),
+    (Role.INDENTER, ("indenter", "probe", "object")),
+    (
+        Role.SUPPORT,
+        ("support", "window", "acrylic", "pmma", "glass", "epoxy", "resin", "guide", "clear",
+         "transparent", "plate"),
+    ),
+    (
+        Role.BLOCKER,
+        ("blocker", "housing", "case", "body", "enclosure", "board", "pcb", "cover", "frame",
+         "wall", "shell", "base", "mount", "holder", "black", "shade", "cap"),
+    ),
+)  # fmt: skip
+"""Words in the names of parts, the ones that count first in front."""
+
+LIGHT, CAMERA = "smd-3528", "pi-v2"
+"""Of the library, where nothing is said."""
+
+LED_PITCH = 4.5
+"""mm between guessed LEDs; a 3528 is 3.5 mm long."""
+
+Bounds = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Found:
+    """A body in the user's CAD files.
+
+    Attributes:
+        name: for a part of the design, made of the body's or file's name.
+        file: its path from the folder of the recipe.
+        body: what was read; its mesh is in the file's own units.
+        use: what it probably is.
+    """
+
+    name: str
+    file: str
+    body: Body
+    use: Use
+
+    @property
+    def shape(self) -> Shape:
+        """How a recipe refers to it."""
+        return Shape(file=self.file, solid=self.body.name)
+
+    def mesh(self, units: Units | None) -> TriangleMesh:
+        """It in mm, where files that don't know their units are in `units` (mm if None)."""
+        if self.body.own_units:
+            return self.body.mesh
+        scale = MM_PER[units or "mm"]
+        return self.body.mesh.with_vertices(scale * self.body.mesh.vertices)
+
+
+def find_bodies(source: Path) -> list[Found]:
+    """All bodies of a CAD file, or of the CAD files in a folder.
+
+    Raises:
+        SetupError: a STEP file, but the extra for it is missing.
+        MeshError: there is no CAD file, or one can't be read.
+    """
+    folder = source if source.is_dir() else source.parent
+    files = sorted(source.iterdir()) if source.is_dir() else [source]
+    files = [file for file in files if file.suffix.lower() in ALL_FORMATS or file == source]
+    if not files:
+        raise MeshError(
+            "there are no CAD files here",
+            where=str(source),
+            hint="In the CAD tool: export each part as STL, OBJ or PLY, or all as one STEP file",
+        )
+    reader, found, taken = CadFiles(folder), [], set[str]()
+    for file in files:
+        for body in reader.bodies(file.name):
+            name = _fresh(_as_name(body.name or file.stem), taken)
+            taken.add(name)
+            found.append(Found(name, file.name, body, guess_use(name)))
+    return found
+
+
+def guess_use(name: str) -> Use:
+    """What a body probably is, by the words in its name; a blocker where they say nothing."""
+    words = set(re.split(r"[^a-z]+", re.sub(r"([a-z])([A-Z])", r"\1 \2", name).lower()))
+    for use, signs in WORDS:
+        if words & set(signs):
+            return use
+    return Role.BLOCKER
+
+
+def guess_units(found: Iterable[Found]) -> Units | None:
+    """The only unit in which the files have a fair size, where mm is plainly not it; else None."""
+    meshes = [each.body.mesh for each in found if not each.body.own_units]
+    if not meshes:
+        return None
+    size = largest_dimension(meshes)
+    fitting = likely_units(size)
+    return cast("Units", fitting[0]) if len(fitting) == 1 and fitting != ["mm"] else None
+
+
+def guess_outward(meshes: dict[str, TriangleMesh], carrier: str) -> str:
+    """Where the sensor is touched, such as +z: away from what lies behind the gel.
+
+    Args:
+        meshes: all bodies, by name, mm.
+        carrier: the one that carries the coating.
+    """
+    own = meshes[carrier]
+    others = [mesh.bounds.mean(axis=0) for name, mesh in meshes.items() if name != carrier]
+    if others:
+        way = own.bounds.mean(axis=0) - np.mean(others, axis=0)
+    else:
+        way = np.eye(3)[int(np.argmin(np.ptp(own.bounds, axis=0)))]
+    sides = sorted(SIDES, key=lambda side: -float(vector(side) @ way))
+    return next((side for side in sides if len(faces_towards(own, vector(side), WITHIN))), sides[0])
+
+
+def guess_recipe(source: str | Path, units: Units | None = None) -> Recipe:
+    """A recipe for a CAD file, or the CAD files in a folder, to look over and change.
+
+    Args:
+        source: the file or folder; the recipe names files from its folder.
+        units: of the files that don't know theirs; None means mm, or the only unit that fits.
+
+    Raises:
+        SetupError, MeshError: see `find_bodies`; or no body can carry the coating.
+    """
+    source = Path(source)
+    found = find_bodies(source)
+    units = units or guess_units(found)
+    folder = source if source.is_dir() else source.parent
+    parts = {each.name: part_of(each, each.use) for each in found if isinstance(each.use, Role)}
+    meshes = {each.name: each.mesh(units) for each in found}
+    skin = next((n for n, part in parts.items() if part.role is Role.SENSING_SURFACE), None)
+    carrier = next(
+        (n for role in (Role.ELASTOMER, Role.SUPPORT) for n, part in parts.items()
+         if part.role is role),
+        skin,
+    )  # fmt: skip
+    if carrier is None:
+        raise MeshError(
+            "no file can be told to be the gel or the sensing surface: "
+            + ", ".join(f"{each.name}: {each.use}" for each in found),
+            where=str(source),
+            hint="Name the files after what they are (gel.stl, window.stl, housing.stl, ...), or "
+            "say what each is in a recipe",
+        )
+    outward = guess_outward(meshes, carrier)
+    if skin is None:
+        name = _fresh("skin", set(parts))
+        parts = insert_skin(parts, name, carrier, outward)
+    lights: dict[str, LightChoice] = {}
+    references = [each for each in found if each.use == "lights"]
+    for each in references:
+        lights[each.name] = lights_over(each, meshes[each.name], meshes[carrier])
+    if not lights:
+        window = next((n for n, part in parts.items() if part.role is Role.SUPPORT), carrier)
+        lights = lights_around(window, meshes[window], outward)
+    lens = next((each for each in found if each.use == "camera"), None)
+    recipe = Recipe(
+        name=folder.resolve().name or "sensor",
+        units=units,
+        parts=parts,
+        lights=lights,
+        camera=CameraChoice(model=CAMERA, at=lens.shape if lens else None),
+    )
+    return recipe.relative_to(folder)
+
+
+def part_of(found: Found, role: Role, material: str | None = None) -> PartChoice:
+    """A body as a part of the recipe."""
+    return PartChoice(file=found.file, solid=found.body.name, role=role, material=material)
+
+
+def insert_skin(
+    parts: dict[str, PartChoice], name: str, carrier: str, outward: str, tangent: bool = False
+) -> dict[str, PartChoice]:
+    """The parts with a sensing surface on the outer faces of one of them, behind it."""
+    skin = PartChoice(
+        faces_of=carrier,
+        towards=outward,
+        tangent=True if tangent else None,
+        role=Role.SENSING_SURFACE,
+    )
+    result: dict[str, PartChoice] = {}
+    for each, part in parts.items():
+        result[each] = part
+        if each == carrier:
+            result[name] = skin
+    return result
+
+
+def lights_over(found: Found, mesh: TriangleMesh, gel: TriangleMesh) -> LightChoice:
+    """A light on each face of a reference that looks to the gel; its colour by its name."""
+    side = nearest_side(gel.bounds.mean(axis=0) - mesh.bounds.mean(axis=0))
+    colour = next(
+        (c for c in ("red", "green", "blue", "white") if c in found.name.lower()), "white"
+    )
+    return LightChoice(
+        model=LIGHT,
+        colour=colour,
+        over=Over(file=found.file, solid=found.body.name, towards=side, patches="all"),
+    )
+
+
+def lights_around(part: str, mesh: TriangleMesh, outward: str) -> dict[str, LightChoice]:
+    """Rows of red, green and blue lights along three sides of a part's box."""
+    across = [axis for axis in "xyz" if axis != outward[-1]]
+    size = dict(zip("xyz", np.ptp(mesh.bounds, axis=0), strict=True))
+    across.sort(key=lambda axis: -size[axis])
+    sides = {"red": "+" + across[1], "green": "-" + across[1], "blue": "+" + across[0]}
+    lights = {}
+    for colour, side in sides.items():
+        along = across[0] if side[-1] == across[1] else across[1]
+        count = max(1, int(size[along] / LED_PITCH))
+        row = {"part": part, "side": side, "along": along, "count": count}
+        lights[colour] = LightChoice(model=LIGHT, colour=colour, row=Row.model_validate(row))
+    return lights
+
+
+def _as_name(text: str) -> str:
+    """Letters, digits, - and _ only, as the parts of a design are named."""
+    name = re.sub(r"[^A-Za-z0-9_-]+", "-", text).strip("-_")[:64]
+    return name or "part"
+
+
+def _fresh(name: str, taken: Iterable[str]) -> str:
+    """The name, numbered where it is taken (names on disk don't tell A from a)."""
+    known = {each.casefold() for each in taken}
+    result, number = name, 2
+    while result.casefold() in known:
+        result, number = f"{name[:60]}-{number}", number + 1
+    return result

@@ -1,0 +1,238 @@
+"""Where the lights of a group go: along a side of a part, around it, or over a surface."""
+
+from __future__ import annotations
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+
+from optisense.design import Light
+from optisense.errors import ContactError, DesignError
+from optisense.geometry import SensingSurface, TriangleMesh
+from optisense.geometry.patches import Faces, mean_normal, middle
+from optisense.sensors.from_meshes.directions import Direction, axis_of, vector
+from optisense.sensors.from_meshes.recipe import Over, Ring, Row
+
+FloatArray = NDArray[np.float64]
+
+FLAT = 1e-4
+"""mm: a reference surface that deviates less from a plane is flat."""
+
+SPREAD = 0.2
+"""Shorter than this, the mean of a surface's normals says nothing about where it looks."""
+
+
+def row(choice: Row, bounds: FloatArray) -> list[Light]:
+    """Lights along one side of a box, their middle over the middle of the side.
+
+    Args:
+        bounds: (2, 3) mm, lower and upper corner.
+    """
+    across, sign = axis_of(choice.side)
+    others = [axis for axis in range(3) if axis != across]
+    size = bounds[1] - bounds[0]
+    if choice.along is not None and "xyz".index(choice.along) != across:
+        along = "xyz".index(choice.along)
+    elif choice.along is None:
+        along = others[0] if size[others[0]] >= size[others[1]] else others[1]
+    else:
+        raise DesignError(
+            f"a row at side {choice.side} can't run along {choice.along}",
+            hint="Along one of " + ", ".join("xyz"[axis] for axis in others),
+        )
+    third = 3 - across - along
+    offsets = evenly(choice.count, choice.pitch, size[along])
+    places = np.tile(bounds.mean(axis=0), (choice.count, 1))
+    places[:, along] += offsets + choice.shift
+    places[:, across] = bounds[1 if sign > 0 else 0, across] + sign * choice.gap
+    if choice.height is not None:
+        places[:, third] = choice.height
+    into = -sign * np.eye(3)[across]
+    way = into if choice.direction is None else vector(choice.direction)
+    return [light(place, way, np.eye(3)[third]) for place in places]
+
+
+def ring(choice: Ring, bounds: FloatArray) -> list[Light]:
+    """Lights in a circle, or evenly over an arc with one at each end.
+
+    Angles count from the axis after the circle's own (x, y, z, x ...), anticlockwise seen from
+    where the axis points to.
+
+    Args:
+        bounds: (2, 3) mm, of the part.
+    """
+    axis, sign = axis_of(choice.axis)
+    first, second = np.eye(3)[(axis + 1) % 3], sign * np.eye(3)[(axis + 2) % 3]
+    size = np.delete(bounds[1] - bounds[0], axis)
+    radius = choice.radius if choice.radius is not None else 0.5 * size.max() + choice.gap
+    centre = bounds.mean(axis=0)
+    if choice.height is not None:
+        centre[axis] = choice.height
+    turn = choice.end - choice.start
+    full = abs(abs(turn) - 360.0) < 1e-9
+    step = turn / (choice.count if full else max(choice.count - 1, 1))
+    lights = []
+    for number in range(choice.count):
+        angle = np.radians(choice.start + number * step)
+        outward = np.cos(angle) * first + np.sin(angle) * second
+        ways = {"inward": -outward, "outward": outward}
+        given = choice.direction
+        way = ways[given] if isinstance(given, str) and given in ways else vector(given)
+        tangent = -np.sin(angle) * first + np.cos(angle) * second
+        upright = tangent if abs(way @ np.eye(3)[axis]) > 0.9 else np.eye(3)[axis]
+        lights.append(light(centre + radius * outward, way, upright))
+    return lights
+
+
+def over(choice: Over, mesh: TriangleMesh, patches: list[Faces], where: str) -> list[Light]:
+    """Lights over a surface: one on the middle of each patch, or a row or grid on the largest.
+
+    A grid follows the longer side of the surface's outline; on a curved surface its pitch is
+    measured along the surface.
+
+    Args:
+        mesh: the reference surface, welded, mm.
+        patches: its chosen faces.
+        where: for messages.
+
+    Raises:
+        DesignError: lights fall off the surface, or it looks everywhere at once.
+    """
+    if choice.count is None:
+        groups = patches if choice.patches != "largest" else patches[:1]
+        spots = [(middle(mesh, patch), _mean_direction(mesh, patch, where)) for patch in groups]
+        sides = [_frame(mesh, patch, where)[1] for patch in groups]
+    else:
+        patch = patches[0]
+        if choice.patches == "all":
+            patch = np.concatenate(patches)
+        spots = _grid(choice, mesh, patch, where)
+        sides = [_frame(mesh, patch, where)[1]] * len(spots)
+    lights = []
+    for (place, normal), side in zip(spots, sides, strict=True):
+        way = _direction(choice.direction, normal)
+        lights.append(light(place + choice.gap * normal, way, side))
+    return lights
+
+
+def evenly(count: int, pitch: float | None, length: float) -> FloatArray:
+    """(count,) mm: places about 0; without a pitch, each in the middle of its share of `length`."""
+    step = pitch if pitch is not None else length / count
+    return np.asarray((np.arange(count) - 0.5 * (count - 1)) * step)
+
+
+def light(place: FloatArray, way: FloatArray, up: FloatArray) -> Light:
+    """A light with rounded numbers, which make a design easier to read."""
+    clean = [np.round(v, 6) + 0.0 for v in (place, way, up)]
+    (px, py, pz), (dx, dy, dz), (ux, uy, uz) = (v.tolist() for v in clean)
+    parallel = np.linalg.norm(np.cross(way, up)) < 1e-6
+    return Light(
+        position=(px, py, pz), direction=(dx, dy, dz), up=None if parallel else (ux, uy, uz)
+    )
+
+
+def _direction(given: Direction, normal: FloatArray) -> FloatArray:
+    if isinstance(given, str) and given in ("normal", "-normal"):
+        return normal if given == "normal" else -normal
+    return vector(given)
+
+
+def _grid(
+    choice: Over, mesh: TriangleMesh, patch: Faces, where: str
+) -> list[tuple[FloatArray, FloatArray]]:
+    """Place and normal of each light of a row or grid."""
+    along, across, normal, outline = _frame(mesh, patch, where)
+    count = choice.count if isinstance(choice.count, tuple) else (choice.count or 1, 1)
+    pitch = choice.pitch if isinstance(choice.pitch, tuple) else (choice.pitch, choice.pitch)
+    centre, size = outline
+    columns, rows = evenly(count[0], pitch[0], size[0]), evenly(count[1], pitch[1], size[1])
+    points = mesh.vertices[np.unique(mesh.faces[patch])]
+    height = (points - centre) @ normal
+    if np.ptp(height) > FLAT:
+        return _on_curve(mesh, patch, centre, along, across, columns, rows, where)
+    flat = shapely.union_all(
+        shapely.polygons(
+            np.stack([(mesh.triangles[patch] - centre) @ axis for axis in (along, across)], axis=2)
+        )
+    )
+    spots = []
+    for v in rows:
+        for u in columns:
+            if flat.distance(shapely.Point(u, v)) > FLAT:
+                raise _off(where, u, v)
+            place = centre + u * along + v * across + height.mean() * normal
+            spots.append((np.asarray(place), normal))
+    return spots
+
+
+def _on_curve(
+    mesh: TriangleMesh,
+    patch: Faces,
+    centre: FloatArray,
+    along: FloatArray,
+    across: FloatArray,
+    columns: FloatArray,
+    rows: FloatArray,
+    where: str,
+) -> list[tuple[FloatArray, FloatArray]]:
+    """As on a flat surface, but with distances that run along the surface."""
+    surface = SensingSurface(mesh.with_faces(mesh.faces[patch]).compacted(), centre, along, across)
+    spots = []
+    for v in rows:
+        for u in columns:
+            try:
+                spot = surface.point_at(float(u), float(v))
+            except ContactError:
+                raise _off(where, u, v) from None
+            spots.append((spot.point, spot.inward))
+    return spots
+
+
+def _off(where: str, u: float, v: float) -> DesignError:
+    return DesignError(
+        f"a light ({u:.2f}, {v:.2f}) mm from the middle of the surface is off it, or in a hole",
+        where=where,
+        hint="Choose a smaller pitch or count, or another surface",
+    )
+
+
+def _mean_direction(mesh: TriangleMesh, patch: Faces, where: str) -> FloatArray:
+    normal = mean_normal(mesh, patch)
+    length = float(np.linalg.norm(normal))
+    if length < SPREAD:
+        raise DesignError(
+            "this surface looks to all sides at once, so where its lights belong can't be told",
+            where=where,
+            hint="Say which faces with towards: (+z, -x, ...), or use a ring",
+        )
+    return normal / length
+
+
+def _frame(
+    mesh: TriangleMesh, patch: Faces, where: str
+) -> tuple[FloatArray, FloatArray, FloatArray, tuple[FloatArray, FloatArray]]:
+    """Unit vectors along the longer and the shorter side of a surface, its normal, and the
+    middle (3,) and the size (2,) mm of its outline.
+    """
+    normal = _mean_direction(mesh, patch, where)
+    points = mesh.vertices[np.unique(mesh.faces[patch])]
+    helper = np.eye(3)[int(np.argmin(np.abs(normal)))]
+    x = np.cross(helper, normal)
+    x /= np.linalg.norm(x)
+    y = np.cross(normal, x)
+    box = shapely.MultiPoint(np.stack([points @ x, points @ y], axis=1)).minimum_rotated_rectangle
+    corners = np.asarray(shapely.get_coordinates(box))
+    sides = np.diff(corners[:3], axis=0)
+    lengths = np.linalg.norm(sides, axis=1)
+    directions = [(s[0] * x + s[1] * y) / n for s, n in zip(sides, lengths, strict=True)]
+    if abs(lengths[0] - lengths[1]) < 1e-3 * lengths.max():  # a square: as x, y, z are named
+        order = sorted((0, 1), key=lambda k: int(np.argmax(np.abs(directions[k]))))
+    else:
+        order = sorted((0, 1), key=lambda k: -lengths[k])
+    along = directions[order[0]]
+    along = along * np.sign(along[int(np.argmax(np.abs(along)))])
+    across = np.cross(normal, along)
+    flat = corners[:4].mean(axis=0)
+    depth = float((points @ normal).mean())
+    centre = np.asarray(flat[0] * x + flat[1] * y + depth * normal)
+    return along, across, normal, (centre, lengths[order])

@@ -1,0 +1,155 @@
+"""The lights and the camera of a recipe, put into place."""
+
+from __future__ import annotations
+
+import numpy as np
+from pydantic import ValidationError
+
+from optisense import library
+from optisense.design import Camera, LightGroup, Provenance, Role, Status
+from optisense.design.problems import design_error
+from optisense.errors import DesignError
+from optisense.geometry import TriangleMesh
+from optisense.geometry.containment import inside
+from optisense.geometry.patches import middle
+from optisense.library.adding import COLOURS
+from optisense.sensors.from_meshes import lights as placing
+from optisense.sensors.from_meshes.bench import Bench
+from optisense.sensors.from_meshes.camera import make_camera, share_seen
+from optisense.sensors.from_meshes.recipe import LightChoice, Shape
+from optisense.sensors.from_meshes.surfaces import chosen, pick
+from optisense.sensors.from_meshes.touching import refuse_contact_with_lamps
+
+LITTLE_SEEN = 0.5
+"""A camera that sees less of the sensing surface is told."""
+
+
+def place_lights(bench: Bench, name: str, choice: LightChoice) -> LightGroup:
+    """A light group, each of its lights in place.
+
+    Raises:
+        DesignError: a light falls off its surface, or a row or ring can't be made.
+        LibraryError: the library lacks its model.
+    """
+    where = bench.recipe.where("lights", name)
+    bench.known("light", choice.model, "lights", name, "model")
+    try:
+        if choice.row is not None:
+            lights = placing.row(choice.row, bench.meshes[choice.row.part].bounds)
+        elif choice.ring is not None:
+            lights = placing.ring(choice.ring, bench.meshes[choice.ring.part].bounds)
+        elif choice.over is not None:
+            mesh = bench.reference(choice.over, f"lights {name}")
+            found = pick(mesh, choice.over, f"lights {name}")
+            lights = placing.over(choice.over, mesh, found, f"lights {name}")
+        else:
+            lights = choice.at or []
+    except DesignError as error:
+        if error.where is None or error.where == f"lights {name}":
+            raise DesignError(error.message, where=where, hint=error.hint) from None
+        raise
+    colour = choice.colour
+    bench.provenance[f"lights.{name}.flux"] = Provenance(
+        status=Status.ASSUMED, source="from the recipe; see the LED's datasheet and current"
+    )
+    try:
+        group = LightGroup(
+            model=choice.model,
+            colour=COLOURS[colour] if isinstance(colour, str) else colour,
+            flux=choice.flux,
+            lights=lights,
+        )
+    except ValidationError as error:
+        raise design_error(error, {}, where=where, model=LightGroup) from None
+    _note_crowded(bench, name, group)
+    return group
+
+
+def _note_crowded(bench: Bench, name: str, group: LightGroup) -> None:
+    """Tell lights that stand closer than their bodies are wide."""
+    package = getattr(library.entry("light", group.model), "package", None)
+    if package is None or len(group.lights) < 2:
+        return
+    places = np.array([light.position for light in group.lights])
+    apart = np.linalg.norm(places[:, None] - places[None], axis=2)
+    nearest = float(apart[np.triu_indices(len(places), 1)].min())
+    if nearest < min(package[:2]) - 1e-6:
+        bench.notes.append(
+            f"lights {name}: they are {nearest:.2f} mm apart, but a {group.model} is "
+            f"{package[0]:g} x {package[1]:g} mm"
+        )
+
+
+def place_camera(bench: Bench) -> Camera:
+    """The camera; tells when it sees little of the sensing surface.
+
+    Raises:
+        DesignError: it can't look there.
+        LibraryError: the library lacks its model.
+    """
+    choice = bench.recipe.camera
+    where = bench.recipe.where("camera")
+    bench.known("camera", choice.model, "camera", "model")
+    skins = [bench.meshes[name] for name in bench.of(Role.SENSING_SURFACE)]
+    skin = TriangleMesh.joined([TriangleMesh(m.vertices, m.faces) for m in skins])
+    target = middle(skin)
+    if isinstance(choice.look_at, str):
+        target = middle(bench.meshes[choice.look_at])
+    elif choice.look_at is not None:
+        target = np.array(choice.look_at)
+    place = None
+    if isinstance(choice.at, Shape):
+        shape = choice.at
+        mesh, _ = chosen(bench.reference(shape, "camera"), shape, "camera")
+        place = middle(mesh)
+        bench.provenance["camera.position"] = Provenance(
+            status=Status.DERIVED, source=f"middle of {shape.file or shape.faces_of}"
+        )
+    elif choice.at is not None:
+        place = np.array(choice.at)
+    else:
+        bench.provenance["camera.position"] = Provenance(
+            status=Status.ASSUMED, source="where the sensing surface fills the picture"
+        )
+    try:
+        camera = make_camera(choice, skin, place, target, bench.meshes)
+    except DesignError as error:
+        raise DesignError(error.message, where=where, hint=error.hint) from None
+    except ValidationError as error:
+        raise design_error(error, {}, where=where, model=Camera) from None
+    if not bench.of(Role.MIRROR):
+        seen, spread = share_seen(camera, skin)
+        if seen < LITTLE_SEEN:
+            bench.notes.append(
+                f"the camera sees about {100 * seen:.0f} % of the sensing surface: check its "
+                "place (at), what it looks at (look_at) and its field of view"
+            )
+        elif spread < 0.3:
+            bench.notes.append(
+                f"the sensing surface fills only {100 * spread:.0f} % of the picture: the "
+                "camera is far away, or its field of view is wide"
+            )
+    return camera
+
+
+def check_places(bench: Bench, camera: Camera, groups: dict[str, LightGroup]) -> None:
+    """No camera and no light may lie in a face; those inside a transparent solid are told.
+
+    Raises:
+        DesignError: one lies in a face.
+    """
+    places = [("the camera", np.array(camera.position))]
+    for name, group in groups.items():
+        for number, light in enumerate(group.lights):
+            places.append((f"light {number} of '{name}'", np.array(light.position)))
+    refuse_contact_with_lamps(places, bench.meshes)
+    for name in bench.solids():
+        buried = [
+            group
+            for group, lights in groups.items()
+            if inside(np.array([li.position for li in lights.lights]), bench.meshes[name]).any()
+        ]
+        if buried:
+            bench.notes.append(f"lights {', '.join(buried)} are inside {name}")
+        if inside(np.array([camera.position]), bench.meshes[name]).any():
+            bench.notes.append(f"the camera is inside {name}")

@@ -1,0 +1,61 @@
+"""Writing a recipe, so that a sensor can be made of its CAD files again."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from uuid import uuid4
+
+from optisense.design.yaml_writer import to_yaml
+from optisense.errors import OutputError
+from optisense.sensors.from_meshes.recipe import Recipe, Shape
+
+RECIPE_FILE = "recipe.yaml"
+"""What the recipe of a design is called in its folder."""
+
+HEAD = "How a sensor is made of CAD files. Lengths in mm, angles in degrees, powers in mW."
+
+
+def save_recipe(recipe: Recipe, path: str | Path) -> None:
+    """Write a recipe with a comment on each line; its files are named from its new place.
+
+    The file is written whole under a temporary name and then renamed.
+
+    Raises:
+        OutputError: it can't be written.
+    """
+    path = Path(path)
+    moved = recipe.model_copy(deep=True)
+    for shape in _shapes(moved):
+        if shape.file is not None:
+            shape.file = _from(recipe.folder / shape.file, path.parent)
+    temporary = path.with_name(f".{path.name}.{os.getpid()}-{uuid4().hex[:8]}.tmp")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        temporary.write_text(to_yaml(moved, HEAD), encoding="utf-8")
+        temporary.replace(path)
+    except OSError as error:
+        raise OutputError(
+            f"can't write the recipe: {error.strerror or error}",
+            where=str(path),
+            hint="Check that the folder can be written and the disk is not full",
+        ) from error
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+def _shapes(recipe: Recipe) -> list[Shape]:
+    """All shapes of a recipe, which may come from files."""
+    shapes: list[Shape] = list(recipe.parts.values())
+    shapes += [group.over for group in recipe.lights.values() if group.over is not None]
+    if isinstance(recipe.camera.at, Shape):
+        shapes.append(recipe.camera.at)
+    return shapes
+
+
+def _from(file: Path, folder: Path) -> str:
+    """A file's path from a folder; in full where no such path leads to it (another drive)."""
+    try:
+        return Path(os.path.relpath(file.resolve(), folder.resolve())).as_posix()
+    except ValueError:
+        return file.resolve().as_posix()

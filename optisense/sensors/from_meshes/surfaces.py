@@ -1,0 +1,73 @@
+"""Reference surfaces: faces picked from the mesh of a file or of another part."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from optisense.errors import DesignError
+from optisense.geometry import TriangleMesh
+from optisense.geometry.patches import (
+    Faces,
+    angle_to_nearest,
+    faces_towards,
+    patches,
+    smoothly_joined,
+)
+from optisense.sensors.from_meshes.directions import said, vector
+from optisense.sensors.from_meshes.recipe import Shape
+
+WITHIN = 30.0
+"""Degrees that faces may look aside where the recipe gives none."""
+
+
+def pick(mesh: TriangleMesh, shape: Shape, where: str) -> list[Faces]:
+    """The faces that a shape chooses, as patches, the largest first.
+
+    Args:
+        mesh: all faces, welded, mm.
+        shape: which of them; without `towards`, all.
+        where: for messages.
+
+    Raises:
+        DesignError: no face looks that way.
+    """
+    if shape.towards is None:
+        return patches(mesh, np.flatnonzero(mesh.face_areas > 0.0))
+    way, within = vector(shape.towards), WITHIN if shape.within is None else shape.within
+    faces = faces_towards(mesh, way, within)
+    if len(faces) == 0:
+        nearest = angle_to_nearest(mesh, way)
+        raise DesignError(
+            f"no face looks to {said(shape.towards)} within {within:g} degrees; the nearest one "
+            f"looks {nearest:.0f} degrees aside",
+            where=where,
+            hint="Choose another direction after towards, or a larger within",
+        )
+    if not shape.tangent:
+        return patches(mesh, faces)
+    # Each patch grows by itself: the largest of what is smoothly joined may look elsewhere.
+    grown: list[Faces] = []
+    for patch in patches(mesh, faces):
+        if not any(np.isin(patch[0], done) for done in grown):
+            grown.append(smoothly_joined(mesh, patch))
+    return sorted(grown, key=lambda group: -float(mesh.face_areas[group].sum()))
+
+
+def chosen(mesh: TriangleMesh, shape: Shape, where: str) -> tuple[TriangleMesh, list[str]]:
+    """The faces that a shape chooses as a mesh of their own, and what was left out, if anything.
+
+    Without `towards` it is the whole mesh; else the largest patch, unless all are wanted.
+    """
+    if shape.towards is None:
+        return mesh, []
+    found = pick(mesh, shape, where)
+    if shape.patches == "all" or len(found) == 1:
+        return mesh.with_faces(mesh.faces[np.concatenate(found)]).compacted(), []
+    left = sum(float(mesh.face_areas[patch].sum()) for patch in found[1:])
+    count = "another patch" if len(found) == 2 else f"{len(found) - 1} smaller patches"
+    taken = float(mesh.face_areas[found[0]].sum())
+    note = (
+        f"{count} of {left:.3g} mm2 beside the {taken:.3g} mm2 chosen "
+        f"also look to {said(shape.towards)}; 'patches: all' takes them in"
+    )
+    return mesh.with_faces(mesh.faces[found[0]]).compacted(), [note]

@@ -1,0 +1,214 @@
+"""Parts that touch: small gaps closed, overlaps settled, the sensing surface laid on the gel."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from itertools import combinations
+
+import numpy as np
+
+from optisense.design import Role
+from optisense.errors import DesignError
+from optisense.geometry import TriangleMesh
+from optisense.geometry.coincidence import cut, find_coincident
+from optisense.geometry.containment import inside
+from optisense.geometry.joining import EXACT, join, touching_area
+from optisense.geometry.meeting import find_meeting
+from optisense.sensors.from_meshes.recipe import Recipe
+
+WIDE_GAP = 0.5
+"""mm: gaps up to this look like a mistake worth telling."""
+
+MUCH = 0.2
+"""A gap under this share of the smaller part's area is not worth telling."""
+
+MOSTLY = 0.95
+"""A sensing surface lies on an elastomer when so much of its area does."""
+
+PROBE = 0.05
+PROBES = 64
+
+
+@dataclass
+class Contacts:
+    """What came of the contacts.
+
+    Attributes:
+        meshes: of the solids, by part.
+        priorities: of all solids, by part; rigid ones above soft ones.
+        notes: what was done, for the user.
+    """
+
+    meshes: dict[str, TriangleMesh]
+    priorities: dict[str, int]
+    notes: list[str] = field(default_factory=list)
+
+
+def settle_contacts(recipe: Recipe, meshes: dict[str, TriangleMesh]) -> Contacts:
+    """Make transparent solids that nearly touch do so, and rank those that overlap.
+
+    Of two solids the softer one is changed, or else the later one of the recipe. Pairs in
+    `air_films` keep their gap.
+
+    Args:
+        meshes: of all parts that are solids of their own, by name, mm, closed, welded.
+    """
+    order = [
+        name
+        for role in (Role.SUPPORT, Role.ELASTOMER)
+        for name, part in recipe.parts.items()
+        if part.role is role and name in meshes
+    ]
+    result = Contacts(dict(meshes), _priorities(recipe, order))
+    films = {frozenset(pair) for pair in recipe.air_films}
+    for fixed, mover in combinations(order, 2):
+        if frozenset((fixed, mover)) not in films:
+            _settle(recipe, result, fixed, mover)
+    return result
+
+
+def _priorities(recipe: Recipe, order: list[str]) -> dict[str, int]:
+    """One number a part, falling along the order, unless the recipe says otherwise."""
+    numbers = {name: len(order) - place for place, name in enumerate(order)}
+    for name in order:
+        given = recipe.parts[name].priority
+        if given is not None:
+            numbers[name] = given
+    return numbers
+
+
+def _settle(recipe: Recipe, result: Contacts, fixed: str, mover: str) -> None:
+    """Close the gap between two solids and tell overlaps."""
+    if result.priorities[mover] > result.priorities[fixed]:
+        fixed, mover = mover, fixed
+    one, other = result.meshes[fixed], result.meshes[mover]
+    if recipe.join > 0.0:
+        joined = join(other, one, recipe.join)
+        if joined.kind != "none":
+            result.meshes[mover] = other = joined.mesh
+            what = "gap" if joined.gap >= 0.0 else "overlap"
+            result.notes.append(
+                f"{mover} and {fixed}: a {what} of up to {abs(joined.gap):.3f} mm was closed by "
+                f"moving {'a flat face' if joined.kind == 'flat' else 'curved faces'} of {mover}"
+            )
+    meeting = find_meeting(other, one)
+    if meeting is not None and not _only_joined(other, one, recipe.join):
+        at = "({:.2f}, {:.2f}, {:.2f})".format(*meeting.place)
+        result.notes.append(
+            f"{mover} and {fixed} overlap near {at} mm: {fixed} keeps the place, since its "
+            f"priority is higher ({result.priorities[fixed]} against {result.priorities[mover]})"
+        )
+        return
+    smaller = min(one.area, other.area)
+    reach = max(recipe.join, EXACT)
+    wide = touching_area(other, one, WIDE_GAP)
+    if wide > MUCH * smaller / 2 and touching_area(other, one, reach) < 0.5 * wide:
+        result.notes.append(
+            f"{mover} and {fixed} face each other over {wide:.3g} mm2 with a gap of less than "
+            f"{WIDE_GAP:g} mm: light finds a film of air there. If they touch, close the gap in "
+            f"the CAD tool or give a larger join; if the air is meant, add [{mover}, {fixed}] to "
+            "air_films"
+        )
+
+
+def _only_joined(mover: TriangleMesh, fixed: TriangleMesh, distance: float) -> bool:
+    """Whether a part reaches into another by no more than joining made it."""
+    import manifold3d
+
+    solids = [
+        manifold3d.Manifold(manifold3d.Mesh64(m.vertices, m.faces.astype(np.uint64)))
+        for m in (mover, fixed)
+    ]
+    if any(solid.status() != manifold3d.Error.NoError for solid in solids):
+        return False
+    common = solids[0] ^ solids[1]
+    return bool(2.0 * common.volume() < 1.5 * distance * common.surface_area())
+
+
+def lay_on_elastomer(
+    name: str, skin: TriangleMesh, elastomers: dict[str, TriangleMesh], distance: float
+) -> tuple[TriangleMesh, list[str]]:
+    """A sensing surface on the very faces of the elastomer that it lies on.
+
+    Args:
+        name: of the sensing surface.
+        skin: as given, mm.
+        elastomers: by name.
+        distance: mm; it must lie this near.
+
+    Returns:
+        The mesh (which looks either way) and what was done.
+    """
+    notes: list[str] = []
+    for gel_name, gel in elastomers.items():
+        overlay = find_coincident(gel, skin, max(distance, EXACT), facing=False)
+        if len(overlay.pairs) == 0:
+            continue
+        bed = cut(gel, [overlay])[0]
+        if bed.area < MOSTLY * skin.area:
+            notes.append(
+                f"only {100 * bed.area / skin.area:.0f} % of {name} lies on {gel_name} "
+                f"(to {distance:g} mm)"
+            )
+            continue
+        near = find_coincident(gel, skin, EXACT, facing=False)
+        if len(near.pairs) and cut(gel, [near])[0].area >= 0.999 * bed.area:
+            return skin, notes
+        notes.append(
+            f"{name} was up to {distance:g} mm off {gel_name}; faces of {gel_name} take its place"
+        )
+        return bed.welded(), notes
+    return skin, notes
+
+
+def look_inward(
+    name: str,
+    skin: TriangleMesh,
+    solids: dict[str, TriangleMesh],
+    eye: np.ndarray | None,
+) -> tuple[TriangleMesh, list[str]]:
+    """Turn a sensing surface so that its normals look into the solid it lies on.
+
+    Where it lies on none, or between two, they look to the camera (`eye`, (3,) mm).
+    """
+    chosen = np.linspace(0, len(skin.faces) - 1, min(PROBES, len(skin.faces))).astype(int)
+    centres, normals = skin.triangles[chosen].mean(axis=1), skin.face_normals[chosen]
+    front, back = np.zeros(len(chosen), dtype=bool), np.zeros(len(chosen), dtype=bool)
+    for solid in solids.values():
+        front |= inside(centres + PROBE * normals, solid)
+        back |= inside(centres - PROBE * normals, solid)
+    ahead, behind = int((front & ~back).sum()), int((back & ~front).sum())
+    if ahead == behind and eye is not None:
+        toward = np.einsum("ij,ij->i", eye - centres, normals)
+        ahead, behind = int((toward > 0).sum()), int((toward <= 0).sum())
+    if behind > ahead:
+        return skin.flipped(), [f"{name} looked outward and was turned over"]
+    return skin, []
+
+
+def refuse_contact_with_lamps(
+    places: list[tuple[str, np.ndarray]], meshes: dict[str, TriangleMesh]
+) -> None:
+    """No light and no camera may lie in a face of a part: on which side would it be?
+
+    Args:
+        places: what it is, for messages, and (3,) mm.
+
+    Raises:
+        DesignError: one does.
+    """
+    from optisense.geometry.surface import closest_points
+
+    for label, place in places:
+        for name, mesh in meshes.items():
+            low, high = mesh.bounds[0] - EXACT, mesh.bounds[1] + EXACT
+            if not ((place >= low) & (place <= high)).all():
+                continue
+            near = np.linalg.norm(closest_points(mesh, place) - place, axis=1).min()
+            if near < EXACT:
+                at = "({:.3f}, {:.3f}, {:.3f})".format(*place)
+                raise DesignError(
+                    f"{label} at {at} mm lies in a face of part '{name}'",
+                    where=f"part {name}",
+                    hint="Move it off the face; 0.05 mm is enough (gap: 0.05 for lights)",
+                )

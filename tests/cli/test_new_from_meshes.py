@@ -1,0 +1,163 @@
+"""`optisense new --from-meshes`: recipes, questions at a terminal, guesses, and what is refused."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+import optisense
+from optisense.cli import app
+from optisense.cli import new as new_module
+from optisense.design import SensorDesign
+from optisense.sensors.from_meshes import read_recipe
+
+CAD = Path(__file__).parents[2] / "docs" / "examples" / "pad-sensor"
+
+runner = CliRunner()
+
+
+def new(*words: object, answers: str | None = None) -> tuple[int, str]:
+    result = runner.invoke(app, ["new", *map(str, words)], input=answers)
+    assert "Traceback" not in result.output
+    return result.exit_code, result.output
+
+
+def places(design: SensorDesign, group: str) -> np.ndarray:
+    return np.array([light.position for light in design.lights[group].lights])
+
+
+@pytest.fixture
+def at_terminal(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(new_module, "_at_terminal", lambda: True)
+
+
+def test_a_recipe_makes_a_design_that_passes_the_check(tmp_path: Path) -> None:
+    code, text = new("--from-meshes", CAD / "sensor.yaml", tmp_path / "pad")
+    assert code == 0, text
+    design = optisense.load(tmp_path / "pad")
+    result = runner.invoke(app, ["check", str(tmp_path / "pad")])
+    assert result.exit_code == 0 and "in order" in result.output
+    # The gel is a block of 20 x 2 x 16 mm with a circular segment on top.
+    angle = np.arcsin(10.0 / 40.0)
+    segment = 40.0**2 * (angle - np.sin(angle) * np.cos(angle))
+    assert design.meshes["gel"].volume == pytest.approx(16 * (40 + segment), rel=1e-3)
+    assert design.meshes["skin"].area == pytest.approx(2 * angle * 40.0 * 16.0, rel=1e-3)
+    np.testing.assert_allclose(places(design, "red")[:, 1], 10.2)
+    np.testing.assert_allclose(places(design, "blue")[:, 0], 12.15, atol=1e-5)
+    assert design.camera.position == pytest.approx((0, 0, -22), abs=1e-5)
+    assert "# mm" in (tmp_path / "pad" / "design.yaml").read_text()
+
+
+def test_the_recipe_beside_the_design_makes_it_again(tmp_path: Path) -> None:
+    folder = tmp_path / "pad"
+    assert new("--from-meshes", CAD / "sensor.yaml", folder)[0] == 0
+    first = (folder / "design.yaml").read_bytes()
+    recipe = folder / "recipe.yaml"
+    recipe.write_text(recipe.read_text().replace("pitch: 4.5", "pitch: 5.0"))
+    code, text = new("--from-meshes", recipe, folder)
+    assert code == 1 and "--overwrite" in text
+    assert (folder / "design.yaml").read_bytes() == first
+    assert new("--from-meshes", recipe, folder, "--overwrite")[0] == 0
+    assert np.diff(places(optisense.load(folder), "red")[:, 0]) == pytest.approx([5.0] * 3)
+
+
+def test_guesses_are_told(tmp_path: Path) -> None:
+    code, text = new("--from-meshes", CAD, tmp_path / "pad", "--yes")
+    assert code == 0, text
+    assert "guessed: housing is blocker (housing.stl)" in text
+    assert set(read_recipe(tmp_path / "pad" / "recipe.yaml").parts) == {
+        "gel", "skin", "window", "housing",
+    }  # fmt: skip
+
+
+@pytest.mark.usefixtures("at_terminal")
+class TestQuestions:
+    def test_enter_takes_what_is_suggested(self, tmp_path: Path) -> None:
+        asked, guessed = tmp_path / "asked", tmp_path / "guessed"
+        code, text = new("--from-meshes", CAD, asked, answers="\n" * 40)
+        assert code == 0, text
+        assert new("--from-meshes", CAD, guessed, "--yes")[0] == 0
+        one, other = optisense.load(asked), optisense.load(guessed)
+        assert one.lights == other.lights and one.camera == other.camera
+        assert list(one.parts) == list(other.parts)
+
+    def test_answers_count_and_bad_ones_are_asked_again(self, tmp_path: Path) -> None:
+        answers = [
+            "My pad", "feet", "mm",
+            "elas", "blocker", "noth", "c", "sup",  # gel, housing, leds, lens, window
+            "glass", "pdms", "black-plastic", "acrylic",
+            "gel", "-x-", "+z", "diffuse-grey",
+            "side", "nope", "smd-0805", "b", "-3", "2.5",
+            "ring", "window", "6", "+z", "0.4", "-1",
+            "-",
+            "pi-v1", "0,0,-30", "skin", "-y",
+        ]  # fmt: skip
+        folder = tmp_path / "pad"
+        code, text = new("--from-meshes", CAD, folder, answers="\n".join(answers) + "\n")
+        assert code == 0, text
+        for complaint in ("one of: mm, cm", "'glass'", "one of: +x, -x", "'nope'", "at least 0"):
+            assert complaint in text
+        design = optisense.load(folder)
+        assert design.name == "My pad"
+        assert design.parts["gel"].material == "pdms"
+        group = design.lights["side"]
+        assert (group.model, group.flux, group.colour) == ("smd-0805", 2.5, (0.0, 0.0, 1.0))
+        around = places(design, "side")
+        np.testing.assert_allclose(np.hypot(around[:, 0], around[:, 1]), 12.4, atol=1e-5)
+        np.testing.assert_allclose(around[:, 2], -1.0)
+        assert design.camera.model == "pi-v1"
+        assert design.camera.position == (0, 0, -30) and design.camera.up == (0, -1, 0)
+
+    def test_answers_are_kept_when_the_files_are_unfit(self, tmp_path: Path) -> None:
+        cad = tmp_path / "cad"
+        cad.mkdir()
+        optisense.load("gelsight-mini").meshes["skin"].save_obj(cad / "gel.obj")  # not closed
+        code, text = new("--from-meshes", cad, tmp_path / "pad", answers="\n" * 60)
+        assert code == 2 and "not closed" in text and "part gel" in text
+        assert "Your answers are kept" in text
+        assert read_recipe(tmp_path / "pad" / "recipe.yaml").parts["gel"].file
+        assert not (tmp_path / "pad" / "design.yaml").exists()
+
+    def test_the_end_of_input_is_the_end(self, tmp_path: Path) -> None:
+        code, _ = new("--from-meshes", CAD, tmp_path / "pad", answers="x\n")
+        assert code == 130
+        assert not (tmp_path / "pad").exists()
+
+
+class TestRefused:
+    def test_nobody_to_ask(self, tmp_path: Path) -> None:
+        code, text = new("--from-meshes", CAD, tmp_path / "pad")
+        assert code == 2 and "--yes" in text
+
+    def test_nothing_there(self, tmp_path: Path) -> None:
+        code, text = new("--from-meshes", tmp_path / "none", tmp_path / "pad")
+        assert code == 2 and "no such recipe" in text
+
+    def test_a_folder_of_something_else_is_never_overwritten(self, tmp_path: Path) -> None:
+        (tmp_path / "notes.txt").write_text("mine")
+        recipe = CAD / "sensor.yaml"
+        code, text = new("--from-meshes", recipe, tmp_path, "--overwrite")
+        assert code == 1 and "no design in this folder" in text
+        assert [path.name for path in tmp_path.iterdir()] == ["notes.txt"]
+
+    def test_units_that_cannot_be(self, tmp_path: Path) -> None:
+        recipe = CAD / "sensor.yaml"
+        code, text = new("--from-meshes", recipe, tmp_path / "pad", "--units", "m")
+        assert code == 2 and "32 m large if its files are in m" in text
+        assert not (tmp_path / "pad").exists()
+
+    @pytest.mark.parametrize(
+        "words",
+        [
+            ("gelsight-mini",),
+            ("gelsight-mini", "a", "--yes"),
+            ("gelsight-mini", "a", "--units", "m"),
+            ("a", "b", "--from-meshes", CAD),
+            ("a", "--from-meshes", CAD, "--units", "feet"),
+        ],
+    )
+    def test_options_that_do_not_fit(self, words: tuple[object, ...]) -> None:
+        assert new(*words)[0] == 2

@@ -1,0 +1,160 @@
+"""What is wrong with a CAD file or a recipe is named: the part, the place, what to do."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+import trimesh
+
+from optisense.errors import DesignError, LibraryError, MeshError, OptiSenseError
+from optisense.sensors.from_meshes import design_from_meshes, guess_recipe
+
+
+def error_of(recipe: Any) -> OptiSenseError:
+    with pytest.raises(OptiSenseError) as caught:
+        design_from_meshes(recipe)
+    return caught.value
+
+
+def holed(cad: Any) -> trimesh.Trimesh:
+    mesh = cad.block((-10, -8, 0), (10, 8, 4))
+    mesh.update_faces(np.arange(len(mesh.faces)) != 0)
+    return mesh
+
+
+def overlapping(cad: Any) -> trimesh.Trimesh:
+    return trimesh.util.concatenate(
+        [cad.block((-10, -8, 0), (2, 8, 4)), cad.block((1, -7, 1), (10, 7, 5))]
+    )
+
+
+def sharing_an_edge(cad: Any) -> trimesh.Trimesh:
+    return trimesh.util.concatenate(
+        [cad.block((-10, -8, 0), (0, 0, 4)), cad.block((0, 0, 0), (10, 8, 4))]
+    )
+
+
+class TestFiles:
+    @pytest.mark.parametrize(
+        ("shape", "message", "advice"),
+        [
+            (holed, "not closed", "close the opening"),
+            (overlapping, "cuts through itself", "Boolean union"),
+            (sharing_an_edge, "not manifold", "only touch along an edge"),
+        ],
+    )
+    def test_unfit_solids(self, cad: Any, shape: Any, message: str, advice: str) -> None:
+        error = error_of(cad.write(gel=shape(cad)))
+        assert isinstance(error, MeshError) and message in error.message
+        assert " mm" in error.message  # the place
+        assert "part gel (gel.stl)" in str(error.where)
+        assert "In the CAD tool" in str(error.hint) and advice in str(error.hint)
+
+    def test_a_file_without_faces(self, cad: Any) -> None:
+        file = cad.write()
+        (cad.folder / "gel.stl").write_text("solid gel\nendsolid gel\n")
+        error = error_of(file)
+        assert "no faces" in error.message
+        assert "part gel" in str(error.where) and "gel.stl" in str(error.where)
+        assert "In the CAD tool: show the body" in str(error.hint)
+
+    def test_a_file_that_is_none(self, cad: Any) -> None:
+        file = cad.write()
+        (cad.folder / "gel.stl").write_bytes(b"\x00\x01 not a mesh")
+        error = error_of(file)
+        assert isinstance(error, MeshError) and "gel.stl" in str(error.where)
+
+    def test_a_missing_file_with_the_near_match(self, cad: Any) -> None:
+        error = error_of(cad.write(cad.recipe.replace("gel.stl", "gell.stl")))
+        assert "there is no file 'gell.stl'" in error.message
+        assert error.hint == "Did you mean 'gel.stl'?"
+
+    def test_another_format(self, cad: Any) -> None:
+        file = cad.write(cad.recipe.replace("gel.stl", "gel.f3d"))
+        (cad.folder / "gel.f3d").write_bytes(b"x")
+        assert "STL, OBJ, PLY or STEP" in str(error_of(file).hint)
+
+    @pytest.mark.parametrize(
+        ("scale", "units"), [(0.001, "units"), (1 / 25.4, "inch"), (1e3, "um")]
+    )
+    def test_units_that_are_plainly_not_mm(self, cad: Any, scale: float, units: str) -> None:
+        error = error_of(cad.write(scale=scale))
+        assert "if its files are in mm" in error.message
+        assert "part gel (gel.stl)" in str(error.where)
+        assert "--units" in str(error.hint) and units in str(error.hint)
+
+    def test_one_part_in_another_unit(self, cad: Any) -> None:
+        error = error_of(cad.write(gel=cad.shapes()["gel"].apply_scale(0.001)))
+        assert "another unit" in error.message and "part gel (gel.stl)" in str(error.where)
+        assert "units: m" in str(error.hint)
+
+    def test_a_folder_without_cad_files(self, cad: Any) -> None:
+        cad.folder.mkdir()
+        with pytest.raises(MeshError, match="no CAD files"):
+            guess_recipe(cad.folder)
+
+    def test_names_that_say_nothing(self, cad: Any) -> None:
+        cad.folder.mkdir()
+        cad.shapes()["gel"].export(cad.folder / "thing.stl")
+        with pytest.raises(MeshError, match="thing: blocker"):
+            guess_recipe(cad.folder)
+
+
+class TestRecipes:
+    @pytest.mark.parametrize(
+        ("old", "new", "line", "message"),
+        [
+            ("file: gel.stl, role", "fiel: gel.stl, role", 3, "unknown field"),
+            ("role: elastomer", "role: elastomr", 3, "elastomr"),
+            ("faces_of: gel", "faces_of: gl", 4, "there is no part 'gl'"),
+            ("towards: +z", "towards: up", 4, "a direction is"),
+            ("towards: +z, ", "", 4, "faces_of needs towards"),
+            ("role: sensing_surface", "role: blocker", 2, "no part is a sensing_surface"),
+            ("part: plate", "part: plat", 7, "there is no part 'plat'"),
+            ("count: 4", "count: 0", 7, "greater than or equal to 1"),
+            ("side: +y", "side: y+", 7, "must be one of +x"),
+            ("colour: red", "colour: pink", 7, "unknown colour"),
+            ("row:", "rows:", 7, "unknown field"),
+            ("model: smd-3528", "model: smd-3529", 7, "smd-3529"),
+            ("model: pi-v2", "model: pi-v9", 8, "pi-v9"),
+            ("pi-v2}", "pi-v2, at: [0, 0]}", 8, "camera.at"),
+            ("pi-v2}", "pi-v2, look_at: gel, direction: +z}", 8, "not both"),
+            ("role: support}", "role: support, material: mirror-silver}", 5, "can't be made of"),
+            ("role: support}", "role: support, material: akrylic}", 5, "akrylic"),
+            ("name: block", "name: block\njoin: 5", 2, "join"),
+            ("name: block", "name: block\nunits: feet", 2, "feet"),
+        ],
+    )
+    def test_mistakes_name_their_line(
+        self, cad: Any, old: str, new: str, line: int, message: str
+    ) -> None:
+        assert old in cad.recipe
+        error = error_of(cad.write(cad.recipe.replace(old, new)))
+        assert isinstance(error, (DesignError, LibraryError))
+        assert message in str(error)
+        assert f"sensor.yaml:{line}" in str(error), str(error)
+
+    def test_no_face_looks_there(self, cad: Any) -> None:
+        error = error_of(cad.write(cad.recipe.replace("+z", "[1, 1, 1]")))
+        assert "no face looks to (1, 1, 1)" in error.message
+        assert "55 degrees aside" in error.message  # arccos(1 / sqrt 3)
+        assert "part skin" in str(error.where)
+
+    def test_a_closed_solid_as_sensing_surface(self, cad: Any) -> None:
+        text = cad.recipe.replace("{faces_of: gel, towards: +z,", "{file: gel.stl,")
+        error = error_of(cad.write(text))
+        assert "closed solid" in error.message and "towards: +z" in str(error.hint)
+
+    def test_a_light_in_a_face(self, cad: Any) -> None:
+        error = error_of(cad.write(cad.recipe.replace("pitch: 4.5", "pitch: 4.5, gap: 0.0")))
+        assert "light 0 of 'red'" in error.message and "lies in a face" in error.message
+        assert "0.05 mm is enough" in str(error.hint)
+
+    def test_an_interface_needs_a_material(self, cad: Any) -> None:
+        text = cad.recipe.replace(
+            "lights:\n", "  film: {faces_of: plate, towards: -z, role: interface}\nlights:\n"
+        )
+        error = error_of(cad.write(text))
+        assert "material" in error.message and "film" in str(error)

@@ -1,0 +1,227 @@
+"""From recipes and CAD files to designs."""
+
+from __future__ import annotations
+
+import importlib.util
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import trimesh
+
+from optisense import load
+from optisense.design import Role, SensorDesign, Status
+from optisense.errors import DesignError
+from optisense.sensors import check, save_design
+from optisense.sensors.from_meshes import (
+    design_from_meshes,
+    guess_recipe,
+    read_recipe,
+    save_recipe,
+)
+from optisense.workshop import export
+
+
+def assert_same(one: SensorDesign, other: SensorDesign) -> None:
+    """Equal but for rounding in the files (STL has single precision)."""
+    places, expected = ([d.camera.position, d.camera.direction] for d in (one, other))
+    assert list(one.lights) == list(other.lights)
+    for name, group in one.lights.items():
+        places += [x for light in group.lights for x in (light.position, light.direction)]
+        twin = other.lights[name].lights
+        expected += [x for light in twin for x in (light.position, light.direction)]
+    np.testing.assert_allclose(places, expected, atol=1e-5)
+    assert one.parts == other.parts
+    for name, mesh in one.meshes.items():
+        assert mesh.area == pytest.approx(other.meshes[name].area, rel=1e-5)
+        np.testing.assert_allclose(mesh.bounds, other.meshes[name].bounds, atol=1e-5)
+
+
+def test_a_design_in_order(cad: Any, tmp_path: Path) -> None:
+    made = design_from_meshes(cad.write())
+    design = made.design
+    assert made.notes == [] and check(design) == []
+    assert design.meshes["gel"].volume == pytest.approx(20 * 16 * 4)
+    skin = design.meshes["skin"]
+    assert skin.area == pytest.approx(20 * 16)
+    np.testing.assert_allclose(skin.face_normals, [[0, 0, -1]] * len(skin.faces), atol=1e-12)
+    assert design.provenance["parts.gel"].status is Status.SOURCED
+    assert design.provenance["parts.gel.material"].status is Status.ASSUMED
+    save_design(design, tmp_path / "saved")
+    assert_same(load(tmp_path / "saved"), design)
+
+
+@pytest.mark.parametrize("suffix", ["obj", "ply", "STL"])
+def test_every_format_gives_the_same_design(cad: Any, suffix: str) -> None:
+    expected = design_from_meshes(cad.write()).design
+    assert_same(design_from_meshes(cad.write(suffix=suffix.lower())).design, expected)
+
+
+@pytest.mark.parametrize(("units", "mm"), [("m", 1000.0), ("inch", 25.4), ("cm", 10.0)])
+def test_every_unit_gives_the_same_design(cad: Any, units: str, mm: float) -> None:
+    expected = design_from_meshes(cad.write()).design
+    recipe = f"units: {units}\n" + cad.recipe
+    assert_same(design_from_meshes(cad.write(recipe, scale=1.0 / mm)).design, expected)
+
+
+def test_a_part_in_a_unit_of_its_own(cad: Any) -> None:
+    expected = design_from_meshes(cad.write()).design
+    gel = cad.shapes()["gel"].apply_scale(1.0 / 25.4)
+    recipe = cad.recipe.replace("{file: gel.stl,", "{file: gel.stl, units: inch,")
+    assert_same(design_from_meshes(cad.write(recipe, gel=gel)).design, expected)
+
+
+def test_a_saved_recipe_gives_the_same_design_from_elsewhere(cad: Any, tmp_path: Path) -> None:
+    text = cad.recipe.replace(
+        "camera: {model: pi-v2}", "camera: {model: pi-v2, at: {file: lens.stl}, up: -y}"
+    )
+    text = text.replace(
+        "lights:\n",
+        "lights:\n  blue: {model: ws2812b, colour: [0, 0.2, 1], "
+        "over: {file: leds.stl, towards: -x, patches: all}}\n"
+        "  one: {model: smd-3528, colour: white, at: [{position: [0, 0, -9], "
+        "direction: [0, 0, 1]}]}\n",
+    )
+    recipe = read_recipe(cad.write(text))
+    save_recipe(recipe, tmp_path / "deep" / "down" / "recipe.yaml")
+    again = read_recipe(tmp_path / "deep" / "down" / "recipe.yaml")
+    assert_same(design_from_meshes(again).design, design_from_meshes(recipe).design)
+    assert again.camera.up == recipe.camera.up and again.lights["one"] == recipe.lights["one"]
+
+
+def test_a_curved_skin_is_taken_whole_along_smooth_faces(cad: Any) -> None:
+    """Half a ball: by direction alone its cap is chosen, with tangent: true all of it."""
+    radius = 10.0
+    ball = trimesh.creation.icosphere(subdivisions=4, radius=radius)
+    half = trimesh.intersections.slice_mesh_plane(ball, (0, 0, 1), (0, 0, 0), cap=True)
+    cap = design_from_meshes(cad.write(gel=half)).design.meshes["skin"]
+    assert cap.area == pytest.approx(2 * np.pi * radius**2 * (1 - np.cos(np.radians(30))), rel=0.02)
+    text = cad.recipe.replace("towards: +z", "towards: +z, tangent: true")
+    made = design_from_meshes(cad.write(text, gel=half))
+    skin = made.design.meshes["skin"]
+    assert skin.area == pytest.approx(2 * np.pi * radius**2, rel=0.01)
+    inward = -skin.triangles.mean(axis=1)
+    assert (np.einsum("ij,ij->i", inward, skin.face_normals) > 0).all()
+
+
+def test_small_gaps_are_closed_and_wide_ones_are_told(cad: Any) -> None:
+    low = cad.block((-12, -10, -3.02), (12, 10, -0.02))
+    made = design_from_meshes(cad.write(plate=low))
+    assert made.design.meshes["gel"].bounds[0, 2] == pytest.approx(-0.02, abs=1e-6)
+    assert any("gap of up to 0.020 mm was closed" in note for note in made.notes)
+
+    film = cad.write(cad.recipe + "air_films: [[gel, plate]]\n", plate=low)
+    made = design_from_meshes(film)
+    assert made.design.meshes["gel"].bounds[0, 2] == 0.0 and made.notes == []
+
+    far = cad.block((-12, -10, -3.2), (12, 10, -0.2))
+    made = design_from_meshes(cad.write(plate=far))
+    assert made.design.meshes["gel"].bounds[0, 2] == 0.0
+    assert any("air_films" in note for note in made.notes)
+
+
+def test_overlapping_solids_are_told_and_the_rigid_one_keeps_its_place(cad: Any) -> None:
+    made = design_from_meshes(cad.write(plate=cad.block((-12, -10, -3), (12, 10, 1))))
+    assert any("plate keeps the place" in note for note in made.notes)
+    parts = made.design.parts
+    assert parts["plate"].priority > parts["gel"].priority
+    assert check(made.design) == []
+
+
+def test_a_skin_of_its_own_is_laid_on_the_gel_and_looks_inward(cad: Any) -> None:
+    sheet = trimesh.Trimesh([[-10, -8, 4.01], [10, -8, 4.01], [10, 8, 4.01], [-10, 8, 4.01]],
+                            [[0, 1, 2], [0, 2, 3]])  # fmt: skip
+    text = cad.recipe.replace("{faces_of: gel, towards: +z,", "{file: skin.stl,")
+    made = design_from_meshes(cad.write(text, skin=sheet))
+    skin = made.design.meshes["skin"]
+    assert (skin.vertices[:, 2] == 4.0).all()
+    assert (skin.face_normals @ [0, 0, -1] > 0.999).all()
+    assert any("faces of gel take its place" in note for note in made.notes)
+
+
+def test_an_inverted_part_is_turned_over(cad: Any) -> None:
+    gel = cad.shapes()["gel"]
+    gel.invert()
+    made = design_from_meshes(cad.write(gel=gel))
+    assert made.design.meshes["gel"].volume > 0
+    assert any("inside out" in note for note in made.notes)
+
+
+def test_what_looks_odd_is_told(cad: Any) -> None:
+    crowded = cad.recipe.replace("pitch: 4.5", "pitch: 1.0")
+    assert any("1.00 mm apart" in note for note in design_from_meshes(cad.write(crowded)).notes)
+    away = cad.recipe.replace("pi-v2}", "pi-v2, at: [0, 0, -20], direction: -z}")
+    assert any("sees about 0 %" in note for note in design_from_meshes(cad.write(away)).notes)
+    far = cad.recipe.replace("pi-v2}", "pi-v2, at: [0, 0, -300]}")
+    assert any("far away" in note for note in design_from_meshes(cad.write(far)).notes)
+
+
+class TestGuessing:
+    def test_names_say_what_is_what(self, cad: Any) -> None:
+        cad.write()
+        recipe = guess_recipe(cad.folder)
+        roles = {name: part.role for name, part in recipe.parts.items()}
+        assert roles == {
+            "gel": Role.ELASTOMER,
+            "skin": Role.SENSING_SURFACE,
+            "plate": Role.SUPPORT,
+        }
+        assert recipe.parts["skin"].towards == "+z"  # away from the lens, LEDs and plate
+        over = recipe.lights["leds"].over
+        assert over is not None and over.towards == "-x"
+        design = design_from_meshes(recipe).design
+        assert len(design.lights["leds"].lights) == 3
+        assert design.camera.position == pytest.approx((0, 0, -20))
+        assert check(design) == []
+
+    def test_a_single_file_gets_lights_and_a_camera(self, cad: Any) -> None:
+        cad.write()
+        design = design_from_meshes(guess_recipe(cad.folder / "gel.stl")).design
+        assert set(design.lights) == {"red", "green", "blue"}
+        assert design.meshes["skin"].area == pytest.approx(20 * 16)
+        assert check(design) == []
+
+    def test_the_only_fair_unit_is_found(self, cad: Any) -> None:
+        cad.write(scale=0.001)
+        recipe = guess_recipe(cad.folder)
+        assert recipe.units == "m"
+        assert design_from_meshes(recipe).design.meshes["gel"].volume == pytest.approx(1280)
+
+
+def test_an_indenter_is_kept_for_reference(cad: Any) -> None:
+    text = cad.recipe.replace("lights:\n", "  screw: {file: lens.stl, role: indenter}\nlights:\n")
+    made = design_from_meshes(cad.write(text))
+    assert made.design.parts["screw"].role is Role.INDENTER
+    assert any("--contact mesh:" in note for note in made.notes)
+
+
+@pytest.mark.skipif(
+    importlib.util.find_spec("OCP") is None, reason="the extra 'step' is not installed"
+)
+class TestStep:
+    """All parts in one STEP file, exact and in millimetres."""
+
+    def step(self, cad: Any) -> tuple[SensorDesign, str]:
+        design = design_from_meshes(cad.write()).design
+        (file,) = export(design, cad.folder / "out", ["step"])[:1]
+        text = cad.recipe
+        for name in ("gel", "plate"):
+            text = text.replace(f"file: {name}.stl,", f"file: out/{file.name}, solid: {name},")
+        return design, text
+
+    def test_bodies_are_named(self, cad: Any) -> None:
+        expected, text = self.step(cad)
+        assert_same(design_from_meshes(cad.write(text)).design, expected)
+        guess = guess_recipe(next((cad.folder / "out").glob("*.step")))
+        assert guess.parts["gel"].role is Role.ELASTOMER and guess.parts["gel"].solid == "gel"
+
+    def test_a_body_that_is_not_there(self, cad: Any) -> None:
+        _, text = self.step(cad)
+        with pytest.raises(DesignError, match="no body 'jelly'") as caught:
+            design_from_meshes(cad.write(text.replace("solid: gel", "solid: jelly")))
+        assert "gel, " in str(caught.value.hint) and "part gel" in str(caught.value.where)
+        with pytest.raises(DesignError, match="which one is meant"):
+            design_from_meshes(cad.write(text.replace(", solid: gel", "")))
+        with pytest.raises(DesignError, match="knows its units"):
+            design_from_meshes(cad.write(text.replace("solid: gel", "solid: gel, units: cm")))

@@ -1,0 +1,148 @@
+"""Where lights and the camera go."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+import trimesh
+
+from optisense.design import Camera
+from optisense.errors import DesignError
+from optisense.geometry import TriangleMesh
+from optisense.sensors.from_meshes.camera import make_camera
+from optisense.sensors.from_meshes.lights import over, ring, row
+from optisense.sensors.from_meshes.recipe import CameraChoice, Over, Ring, Row
+from optisense.sensors.from_meshes.surfaces import pick
+
+BOUNDS = np.array([[-12.0, -10.0, -3.0], [12.0, 10.0, 1.0]])
+
+
+def places(lights: list[Any]) -> np.ndarray:
+    return np.array([light.position for light in lights])
+
+
+def ways(lights: list[Any]) -> np.ndarray:
+    return np.array([light.direction for light in lights])
+
+
+class TestRow:
+    def test_pitch_gap_and_middle(self) -> None:
+        lights = row(Row(part="plate", side="+y", count=4, pitch=5.0, gap=0.3), BOUNDS)
+        np.testing.assert_allclose(
+            places(lights), [[x, 10.3, -1.0] for x in (-7.5, -2.5, 2.5, 7.5)]
+        )
+        np.testing.assert_allclose(ways(lights), [[0, -1, 0]] * 4)
+
+    def test_without_a_pitch_each_is_in_the_middle_of_its_share(self) -> None:
+        lights = row(Row(part="plate", side="-x", count=4, height=-2.5), BOUNDS)
+        np.testing.assert_allclose(
+            places(lights), [[-12.2, y, -2.5] for y in (-7.5, -2.5, 2.5, 7.5)]
+        )
+
+    def test_it_cannot_run_into_its_own_side(self) -> None:
+        with pytest.raises(DesignError, match="can't run along x"):
+            row(Row(part="plate", side="+x", along="x", count=2), BOUNDS)
+
+
+class TestRing:
+    @pytest.mark.parametrize("axis", ["+x", "-y", "+z"])
+    def test_a_full_ring_is_regular_and_looks_to_its_axis(self, axis: str) -> None:
+        lights = ring(Ring(part="p", axis=axis, count=8, radius=5.0), BOUNDS)
+        centre = BOUNDS.mean(axis=0)
+        np.testing.assert_allclose(np.linalg.norm(places(lights) - centre, axis=1), 5.0, atol=1e-6)
+        steps = np.linalg.norm(np.diff(places(lights), axis=0), axis=1)
+        np.testing.assert_allclose(steps, 2 * 5.0 * np.sin(np.pi / 8), atol=1e-5)
+        np.testing.assert_allclose(5.0 * ways(lights), centre - places(lights), atol=1e-5)
+
+    def test_an_arc_has_a_light_at_each_end(self) -> None:
+        lights = ring(Ring(part="p", count=4, radius=2.0, start=0.0, end=90.0, height=7.0), BOUNDS)
+        np.testing.assert_allclose(places(lights)[[0, -1]], [[2, 0, 7], [0, 2, 7]], atol=1e-6)
+
+    def test_outside_of_the_part(self) -> None:
+        lights = ring(Ring(part="p", count=2, gap=0.5), BOUNDS)
+        np.testing.assert_allclose(places(lights)[0], [12.5, 0, -1], atol=1e-6)
+
+
+class TestOver:
+    board = TriangleMesh.box((-20, -5, 0), (20, 5, 1.6))
+
+    def spots(self, mesh: TriangleMesh, **choice: Any) -> list[Any]:
+        shape = Over(file="board.stl", towards="+z", **choice)
+        return over(shape, mesh, pick(mesh, shape, "lights"), "lights")
+
+    def test_a_grid_over_a_board(self) -> None:
+        lights = self.spots(self.board, count=[3, 2], pitch=[10.0, 4.0], gap=0.1)
+        expected = [[x, y, 1.7] for y in (-2, 2) for x in (-10, 0, 10)]
+        np.testing.assert_allclose(sorted(places(lights).tolist()), sorted(expected), atol=1e-6)
+        np.testing.assert_allclose(ways(lights), [[0, 0, 1]] * 6, atol=1e-9)
+
+    def test_spread_evenly(self) -> None:
+        lights = self.spots(self.board, count=4)
+        np.testing.assert_allclose(np.sort(places(lights)[:, 0]), [-15, -5, 5, 15], atol=1e-6)
+
+    def test_one_on_each_patch(self) -> None:
+        two = TriangleMesh.joined([self.board, TriangleMesh.box((0, 20, 0), (2, 22, 3))])
+        lights = self.spots(two, patches="all")
+        np.testing.assert_allclose(places(lights), [[0, 0, 1.65], [1, 21, 3.05]], atol=1e-6)
+
+    def test_off_the_board_is_refused(self) -> None:
+        with pytest.raises(DesignError, match="off it, or in a hole"):
+            self.spots(self.board, count=5, pitch=12.0)
+
+    def test_over_a_ball_the_pitch_runs_along_the_surface(self) -> None:
+        ball = trimesh.creation.icosphere(subdivisions=5, radius=10.0)
+        mesh = TriangleMesh(ball.vertices, ball.faces).welded()
+        shape = Over(file="b.stl", towards="+z", within=60, count=3, pitch=5.0, gap=0.5)
+        lights = over(shape, mesh, pick(mesh, shape, "lights"), "lights")
+        np.testing.assert_allclose(np.linalg.norm(places(lights), axis=1), 10.5, atol=0.01)
+        np.testing.assert_allclose(ways(lights), places(lights) / 10.5, atol=0.02)
+        cosine = np.einsum("ij,ij->i", places(lights)[1:], places(lights)[:-1]) / 10.5**2
+        np.testing.assert_allclose(np.arccos(cosine), 5.0 / 10.0, atol=0.01)
+
+    def test_a_surface_that_looks_everywhere_is_refused(self) -> None:
+        shape = Over(file="b.stl", count=3)
+        with pytest.raises(DesignError, match="to all sides"):
+            over(shape, self.board, pick(self.board, shape, "lights"), "lights")
+
+
+class TestCamera:
+    skin = TriangleMesh.grid((16.0, 12.0), (4, 4)).flipped()  # looks to -z
+
+    def camera(self, **choice: Any) -> Camera:
+        place = choice.pop("place", None)
+        return make_camera(CameraChoice(model="pi-v2", **choice), self.skin, place, np.zeros(3), {})
+
+    def test_behind_the_skin_it_fills_the_picture(self) -> None:
+        camera = self.camera(resolution=(320, 240))
+        right, up, ahead = camera.axes()
+        way = self.skin.vertices - np.array(camera.position)
+        reach = np.tan(np.radians(camera.fov) / 2)
+        u = (way @ right) / (way @ ahead) / reach
+        v = (way @ up) / (way @ ahead) / reach * 320 / 240
+        assert np.abs(u).max() <= 1 + 1e-6 and np.abs(v).max() <= 1 + 1e-6
+        assert max(np.abs(u).max(), np.abs(v).max()) == pytest.approx(1.0, abs=1e-5)
+        assert camera.position[2] < 0 and camera.direction == pytest.approx((0, 0, 1))
+
+    def test_it_stays_out_of_parts(self) -> None:
+        free = np.array(self.camera().position)
+        parts = {"plate": TriangleMesh.box((-9, -9, free[2] - 2), (9, 9, free[2] + 2))}
+        choice = CameraChoice(model="pi-v2")
+        moved = make_camera(choice, self.skin, None, np.zeros(3), parts).position
+        assert moved[2] <= free[2] - 3.0  # a millimetre behind the plate
+
+    def test_it_looks_at_its_target(self) -> None:
+        camera = self.camera(place=np.array([3.0, 4.0, -12.0]))
+        np.testing.assert_allclose(camera.direction, np.array([-3, -4, 12]) / 13, atol=1e-8)
+
+    @pytest.mark.parametrize(
+        ("choice", "message"),
+        [
+            ({"place": np.zeros(3)}, "very point"),
+            ({"place": np.array([0, 0, -9.0]), "up": "+z"}, "its own up"),
+        ],
+    )
+    def test_poses_that_make_no_picture(self, choice: dict[str, Any], message: str) -> None:
+        with pytest.raises(DesignError, match=message):
+            self.camera(**choice)
