@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from optisense.design import SensorDesign
 from optisense.errors import OptiSenseError, SearchError, SetupError
-from optisense.objectives import Objective, Settings, evaluate
+from optisense.objectives import Objective, Score, Settings, evaluate
 from optisense.objectives.files import place_of
 from optisense.objectives.registry import resolve
 from optisense.objectives.run import split_settings
@@ -50,6 +50,7 @@ class DesignEvaluator:
         settings: of the objectives (see `optisense.evaluate`).
         constraints: designs that they forbid are not scored.
         renders: whether the renderer is needed at all.
+        variant: of the renderer.
     """
 
     def __init__(
@@ -94,9 +95,10 @@ class DesignEvaluator:
         if space.reshapes and (apart is None or apart):
             self.constraints.append(PartsApart(space.design))
         rays_only = set(self.names) <= RAYS_ONLY | set(self._functions)
-        self._keeper = ModelKeeper(space.prepared, lit=not rays_only, variant=variant)
+        self.keeper = ModelKeeper(space.prepared, lit=not rays_only, variant=variant)
         self._resolved: list[Objective] | None = None
         self.renders = bool(self._objectives)
+        self.variant = variant
         self._check_settings()
 
     def __call__(self, vector: FloatArray, seed: int) -> Outcome:
@@ -133,6 +135,11 @@ class DesignEvaluator:
         """An outcome without scores; `began` by `time.perf_counter`."""
         return Outcome.of_failure(self.names, reason, time.perf_counter() - began)
 
+    def objective_scores(self, design: SensorDesign, seed: int) -> Mapping[str, Score]:
+        """Scores by the objectives, plain functions left out; a quicker way may stand in here."""
+        model = self.keeper.model(design)
+        return evaluate(model, self._ready(), seed=seed, **self.settings)
+
     def _score(
         self, design: SensorDesign, seed: int
     ) -> tuple[dict[str, float], dict[str, Mapping[str, Any]], list[str]]:
@@ -146,8 +153,7 @@ class DesignEvaluator:
                 value = math.nan
             scores[name] = value
         if self._objectives:
-            model = self._keeper.model(design)
-            found = evaluate(model, self._ready(), seed=seed, **self.settings)
+            found = self.objective_scores(design, seed)
             for name, score in found.items():
                 scores[name], parts[name] = score.value, score.to_dict()["parts"]
                 if score.failure is not None:

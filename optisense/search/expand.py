@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from fnmatch import fnmatchcase
 from typing import Any
 
 import numpy as np
@@ -80,6 +81,12 @@ def expand(
         DesignError: the path leads nowhere; names the near match.
         SearchError: it can't be varied like this.
     """
+    if "*" in path:
+        found: list[Parameter] = []
+        for each in starred(design, path):
+            design, added = expand(design, each, spec)
+            found += [replace(parameter, asked=path) for parameter in added]
+        return design, found
     try:
         handles = find_handles(design, path)
         if handles:
@@ -92,6 +99,36 @@ def expand(
         return design, _of_value(path, get_value(design, path), spec)
     except SearchError as error:
         raise SearchError(error.message, where=error.where or path, hint=error.hint) from None
+
+
+def starred(design: SensorDesign, path: str) -> list[str]:
+    """The paths that one with a star stands for: `lights.*.colour`, `lights.lg*.flux`.
+
+    Raises:
+        SearchError: the star is not in a name, or stands for none.
+    """
+    section, _, rest = path.partition(".")
+    pattern, _, leaf = rest.partition(".")
+    names = {
+        "lights": design.lights,
+        "parts": design.parts,
+        "materials": design.materials,
+        "cages": design.cages,
+    }.get(section)
+    if names is None or "*" in leaf or not leaf:
+        raise SearchError(
+            "a star stands for names of lights, parts, materials or cages",
+            where=path,
+            hint="Write it like lights.*.colour",
+        )
+    chosen = [name for name in names if fnmatchcase(name, pattern)]
+    if not chosen:
+        raise SearchError(
+            f"'{section}' has no name like '{pattern}'",
+            where=path,
+            hint="Known: " + ", ".join(names) if names else None,
+        )
+    return [f"{section}.{name}.{leaf}" for name in chosen]
 
 
 def _of_handle(design: SensorDesign, handle: Handle, spec: Specification, asked: str) -> Parameter:

@@ -19,6 +19,8 @@ HOMES = {
     "random": "optisense.search.methods.random_search:Random",
     "cma-es": "optisense.search.methods.cma_es:CmaEs",
     "pareto": "optisense.search.methods.pareto:Pareto",
+    "light-colours": "optisense.search.methods.light_colours:LightColours",
+    "types": "optisense.search.methods.light_types:LightTypes",
 }
 """The built-in methods, loaded when they are asked for."""
 

@@ -1,0 +1,140 @@
+"""What methods over combinations of a few levels share: never twice the same, and climbing."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from collections.abc import Iterator, Sequence
+from itertools import islice, product
+from typing import Any
+
+import numpy as np
+
+from optisense.search.methods.base import FloatArray, Method, Problem, values_to_maximise
+from optisense.search.outcome import Outcome
+
+Combination = tuple[int, ...]
+"""The position of a level for each parameter."""
+
+GENERATION = 512
+"""Combinations that are proposed together where nothing has to be learned in between."""
+
+Stage = tuple[str, list[Combination]]
+"""What is being done, and combinations to try for it."""
+
+
+class Combinations(Method):
+    """Tries combinations of levels by a plan, each once, until the budget is spent.
+
+    Attributes:
+        levels: the coordinates that each parameter may take.
+        size: how many combinations there are.
+    """
+
+    def __init__(self, problem: Problem, levels: Sequence[Sequence[float]]) -> None:
+        super().__init__(problem)
+        self.levels = [tuple(each) for each in levels]
+        self.size = 1
+        for each in self.levels:
+            self.size *= len(each)
+        self._known: dict[Combination, float] = {}
+        self._asked: list[Combination] = []
+        self._left = problem.budget
+        self._random = problem.random(self.name)
+        self._stages = self.plan()
+        self._stage = ""
+
+    @abstractmethod
+    def plan(self) -> Iterator[Stage]:
+        """The stages; a generator, so that later ones can start from the best so far."""
+
+    def ask(self) -> FloatArray:
+        """Combinations that were not tried yet, (k, n)."""
+        self._asked = []
+        if self._left > 0:
+            for stage, wanted in self._stages:
+                new = [each for each in dict.fromkeys(wanted) if each not in self._known]
+                if new:
+                    self._stage, self._asked = stage, new[: self._left]
+                    self._left -= len(self._asked)
+                    break
+        return np.array(
+            [
+                [levels[k] for levels, k in zip(self.levels, combination, strict=True)]
+                for combination in self._asked
+            ]
+        ).reshape(-1, self.space.size)
+
+    def tell(self, vectors: FloatArray, outcomes: Sequence[Outcome]) -> None:
+        """Remember what each combination gave; failed ones count least."""
+        values = values_to_maximise(outcomes, self.problem.objectives[0])
+        for key, outcome, value in zip(self._asked, outcomes, values, strict=True):
+            self._known[key] = -np.inf if outcome.failed else float(value)
+
+    def describe(self) -> dict[str, Any]:
+        """Which stage it is in."""
+        return {"stage": self._stage}
+
+    def everything(self, stage: str) -> Iterator[Stage]:
+        """All combinations; the last parameter changes fastest."""
+        everyone = product(*(range(len(each)) for each in self.levels))
+        while chunk := list(islice(everyone, GENERATION)):
+            yield stage, chunk
+
+    def climb(
+        self, stage: str, movable: Sequence[Sequence[int]], start: Combination | None = None
+    ) -> Iterator[Stage]:
+        """Change one set of parameters that move together, take the best change, until none helps.
+
+        Args:
+            stage: what it is called.
+            movable: sets of parameters; those of a set have the same levels.
+            start: where to begin; the best so far if None.
+        """
+        here = start if start is not None else self.best()
+        yield stage, [here]
+        while True:
+            near = [
+                changed(here, members, level)
+                for members in movable
+                for level in range(len(self.levels[members[0]]))
+                if level != here[members[0]]
+            ]
+            yield stage, near
+            best = max(near, key=lambda each: self._known.get(each, -np.inf))
+            if self._known.get(best, -np.inf) <= self._known.get(here, -np.inf):
+                return
+            here = best
+
+    def climb_again(self, stage: str, movable: Sequence[Sequence[int]]) -> Iterator[Stage]:
+        """Climb from places near the best, until the budget is spent or all is known."""
+        if self.size <= self.problem.budget:
+            yield from self.everything(stage)
+            return
+        while True:
+            yield from self.climb(stage, movable, self._shaken(self.best()))
+
+    def best(self) -> Combination:
+        """The best combination so far; the one nearest to the design before there is one."""
+        if self._known:
+            return max(self._known, key=lambda each: self._known[each])
+        return tuple(
+            int(np.abs(np.array(levels) - now).argmin())
+            for levels, now in zip(self.levels, self.space.start, strict=True)
+        )
+
+    def _shaken(self, combination: Combination) -> Combination:
+        """Two parameters or more changed at random."""
+        count = len(combination)
+        most = int(self._random.integers(min(2, count), count + 1))
+        shaken = list(combination)
+        for place in self._random.choice(count, size=most, replace=False).tolist():
+            shaken[place] = int(self._random.integers(len(self.levels[place])))
+        return tuple(shaken)
+
+
+def changed(combination: Combination, members: Sequence[int], level: int) -> Combination:
+    """A combination with some parameters at another level."""
+    other = list(combination)
+    for member in members:
+        other[member] = level
+    return tuple(other)

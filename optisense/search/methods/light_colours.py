@@ -1,0 +1,154 @@
+"""Colours and powers of light groups, each scored from the same images.
+
+Light adds up: with a layer for each light group, an image under any colours and powers is a
+weighted sum, with no new rendering. So all 6,561 ways to make eight groups red, green or blue are
+scored in the time of a few hundred renderings, each exactly as a rendering of its own would be.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections import OrderedDict
+from collections.abc import Iterator, Mapping, Sequence
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+from optisense.design import SensorDesign
+from optisense.errors import SearchError
+from optisense.objectives import Evaluation, Objective, Score, Settings
+from optisense.objectives.relighting import Relighting
+from optisense.objectives.relit_scores import RelitScore, has_quick_form, quick_form
+from optisense.objectives.run import run_objective, split_settings
+from optisense.search.evaluation import DesignEvaluator, Evaluator
+from optisense.search.methods.base import Problem
+from optisense.search.methods.combinations import Combinations, Stage
+from optisense.search.space import BoundSpace
+
+if TYPE_CHECKING:
+    from optisense.optics import OpticalModel
+
+MOST_USUAL = 20_000
+"""Colourings that are tried where the user names no number."""
+
+KEPT_SEEDS = 4
+"""Images are kept for so many seeds: the study's, and the fresh ones that the best get."""
+
+
+class LightColours(Combinations):
+    """All colourings if the budget allows it, else one group after another.
+
+    For spaces of colours and powers only: `lights.GROUP.colour=R,G,B` and
+    `lights.GROUP.flux=LOW:HIGH:STEPS`, of any groups.
+    """
+
+    name = "light-colours"
+    summary = "colours and powers of light groups, thousands from one rendering"
+
+    def __init__(self, problem: Problem) -> None:
+        super().__init__(problem, _levels(problem.space))
+
+    @classmethod
+    def usual_budget(cls, space: BoundSpace) -> int:
+        """All colourings, up to a limit."""
+        return min(math.prod(len(levels) for levels in _levels(space)), MOST_USUAL)
+
+    def plan(self) -> Iterator[Stage]:
+        """See `Combinations.plan`."""
+        if self.size <= self.problem.budget:
+            yield from self.everything("all colourings")
+            return
+        singles = [[number] for number in range(self.space.size)]
+        yield from self.climb("one group after another", singles)
+        yield from self.climb_again("one group after another", singles)
+
+    def evaluator(self, usual: DesignEvaluator) -> Evaluator:
+        """An evaluator that renders once a seed."""
+        return RelitEvaluator(usual)
+
+
+class RelitEvaluator(DesignEvaluator):
+    """Scores designs that differ in the colours and powers of their lights only."""
+
+    def __init__(self, usual: DesignEvaluator) -> None:
+        """Take over what the usual evaluator scores; nothing is rendered yet."""
+        super().__init__(usual.space, usual.goals, usual.settings, variant=usual.variant)
+        self._lit: OrderedDict[int, _Lit] = OrderedDict()
+
+    def objective_scores(self, design: SensorDesign, seed: int) -> Mapping[str, Score]:
+        """See `DesignEvaluator.objective_scores`."""
+        if seed not in self._lit:
+            while len(self._lit) >= KEPT_SEEDS:
+                self._lit.popitem(last=False)
+            model = self.keeper.model(self.space.prepared)
+            self._lit[seed] = _Lit(model, self._ready(), self.settings, seed)
+        self._lit.move_to_end(seed)
+        return self._lit[seed].scores(design)
+
+    def __getstate__(self) -> dict[str, object]:
+        return {**super().__getstate__(), "_lit": OrderedDict()}
+
+
+class _Lit:
+    """The images of one seed, and the objectives made ready for them."""
+
+    def __init__(
+        self,
+        model: OpticalModel,
+        objectives: Sequence[Objective],
+        settings: Mapping[str, Any],
+        seed: int,
+    ) -> None:
+        shared, self._own = split_settings(settings, objectives)
+        self._relighting = Relighting(Evaluation(model, Settings(**shared, seed=seed)))
+        self._objectives = objectives
+        self._quick: dict[str, RelitScore] = {}
+
+    def scores(self, design: SensorDesign) -> dict[str, Score]:
+        """One score for each objective."""
+        cut, whole = (self._relighting.lit(design, whole=each) for each in (False, True))
+        found = {}
+        for each in self._objectives:
+            name, own = each.name, self._own[each.name]
+            if has_quick_form(each):
+                quick = Objective(name, partial(self._quickly, each), each.title)
+                found[name] = run_objective(quick, cut)
+            else:
+                found[name] = run_objective(each, whole, own)
+        return found
+
+    def _quickly(self, objective: Objective, evaluation: Evaluation) -> tuple[float, Any]:
+        """An objective's value and its single numbers by its quick form, made on first use."""
+        name = objective.name
+        if name not in self._quick:
+            presses = self._relighting.cut_presses
+            self._quick[name] = quick_form(objective, self._own[name], presses)
+        return self._quick[name](evaluation.presses)
+
+
+def _levels(space: BoundSpace) -> list[tuple[float, ...]]:
+    """The values of each parameter.
+
+    Raises:
+        SearchError: a parameter is no colour or power of a light group, or has no steps.
+    """
+    found = []
+    for parameter in space.parameters:
+        paths = [target.path for target in parameter.targets]
+        if not paths or not all(
+            re.fullmatch(r"lights\.[^.\[\]]+\.(flux|colour(\.[rgb])?)", path) for path in paths
+        ):
+            raise SearchError(
+                "this method searches colours and powers of light groups and nothing else",
+                where=parameter.name,
+                hint="Write --vary 'lights.*.colour=R,G,B' or lights.GROUP.flux=1:5:3",
+            )
+        levels = parameter.kind.levels
+        if levels is None:
+            raise SearchError(
+                "the number of steps is needed",
+                where=parameter.name,
+                hint=f"Write {parameter.asked}=LOW:HIGH:STEPS",
+            )
+        found.append(levels)
+    return found

@@ -1,0 +1,106 @@
+"""Which type of light to take: one for all, one a group, or one a light.
+
+The three kinds of variation of the OptiSense paper (section "Light source"). The first two are
+few and mostly all tried; of the third there are as many as types to the power of lights, and the
+budget decides how many: one light after another is changed, starting from the best of the others.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import islice, product
+
+import numpy as np
+
+from optisense.errors import SearchError
+from optisense.search.handles import LightType
+from optisense.search.methods.base import Problem
+from optisense.search.methods.combinations import GENERATION, Combination, Combinations, Stage
+from optisense.search.parameters import Choice
+from optisense.search.space import BoundSpace
+
+GROUPWISE_SHARE = 0.5
+"""Combinations of groups are all tried where they take no more than this part of the budget."""
+
+MOST_USUAL = 400
+"""Trials where the user names no number: each one traces its light anew."""
+
+FOR_ALL, FOR_GROUPS, FOR_LIGHTS = "one type for all", "one type a group", "one type a light"
+
+
+class LightTypes(Combinations):
+    """All of one type, then all combinations by group, then light by light.
+
+    For spaces of light types only: `lights.types` (every light by itself), or any number of
+    `lights.GROUP.lights[INDEX].model`, all with the same options.
+    """
+
+    name = "types"
+    summary = "types of lights: one for all, one a group, then one a light"
+
+    def __init__(self, problem: Problem) -> None:
+        count = _options(problem.space)
+        self._members = _groups(problem.space)
+        self._options = count
+        super().__init__(problem, [range(count)] * problem.space.size)
+
+    @classmethod
+    def usual_budget(cls, space: BoundSpace) -> int:
+        """All combinations by group, and as much again for single lights, within limits."""
+        options = _options(space)
+        wanted = max(2 * options ** len(_groups(space)), 4 * space.size)
+        return min(wanted, options**space.size, MOST_USUAL)
+
+    def plan(self) -> Iterator[Stage]:
+        """See `Combinations.plan`."""
+        size = self.space.size
+        yield FOR_ALL, [(option,) * size for option in range(self._options)]
+        count = self._options ** len(self._members)
+        if count <= max(GROUPWISE_SHARE * self.problem.budget, 2 * self._options):
+            yield from self._by_group()
+        else:
+            yield from self.climb(FOR_GROUPS, self._members)
+        singles = [[number] for number in range(size)]
+        yield from self.climb(FOR_LIGHTS, singles)
+        yield from self.climb_again(FOR_LIGHTS, singles)
+
+    def _by_group(self) -> Iterator[Stage]:
+        """All combinations of one type a group."""
+        chosen = product(range(self._options), repeat=len(self._members))
+        while chunk := list(islice(chosen, GENERATION)):
+            yield FOR_GROUPS, [self._spread(each) for each in chunk]
+
+    def _spread(self, chosen: Combination) -> Combination:
+        """One type a group as one type a light."""
+        combination = np.zeros(self.space.size, dtype=np.int64)
+        for members, option in zip(self._members, chosen, strict=True):
+            combination[members] = option
+        return tuple(combination.tolist())
+
+
+def _groups(space: BoundSpace) -> list[list[int]]:
+    """The parameters of each light group."""
+    found: dict[str, list[int]] = {}
+    for number, parameter in enumerate(space.parameters):
+        if isinstance(parameter.handle, LightType):
+            found.setdefault(parameter.handle.group, []).append(number)
+    return list(found.values())
+
+
+def _options(space: BoundSpace) -> int:
+    """The number of types, the same for all lights.
+
+    Raises:
+        SearchError: the space holds something else than types of lights.
+    """
+    for parameter in space.parameters:
+        if not isinstance(parameter.handle, LightType):
+            raise SearchError(
+                "this method searches types of lights and nothing else",
+                where=parameter.name,
+                hint="Write --vary lights.types=TYPE,TYPE",
+            )
+    kinds = {p.kind.options for p in space.parameters if isinstance(p.kind, Choice)}
+    if len(kinds) != 1:
+        raise SearchError("all lights must have the same types to choose from")
+    return len(kinds.pop())
