@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from optisense.geometry import Contact, Cylinder, MeshIndenter, Plane, Sphere
     from optisense.objectives import Score, evaluate, objective
     from optisense.optics import OpticalModel
+    from optisense.search import SearchSpace, search
     from optisense.sensors import check, load, save_design
 
 _HOMES = {
@@ -24,6 +25,7 @@ _HOMES = {
     "OpticalModel": "optisense.optics",
     "Plane": "optisense.geometry",
     "Score": "optisense.objectives",
+    "SearchSpace": "optisense.search",
     "SensorDesign": "optisense.design",
     "Sphere": "optisense.geometry",
     "check": "optisense.sensors",
@@ -48,6 +50,7 @@ __all__ = [
     "OpticalModel",
     "Plane",
     "Score",
+    "SearchSpace",
     "SensorDesign",
     "Sphere",
     "__version__",
@@ -58,12 +61,15 @@ __all__ = [
     "load_design",
     "objective",
     "save_design",
+    "search",
     "set_value",
 ]
 
 
 def __getattr__(name: str) -> object:
     """Import a public name on first use (PEP 562)."""
+    if name == "search":  # a package that can be called: see there
+        return import_module("optisense.search")
     if name not in _HOMES:
         raise AttributeError(f"module 'optisense' has no attribute {name!r}")
     value: object = getattr(import_module(_HOMES[name]), name)

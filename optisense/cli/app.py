@@ -8,6 +8,7 @@ import typer
 
 from optisense import __version__
 from optisense.cli import console
+from optisense.cli.apply import apply
 from optisense.cli.cage import cage_app
 from optisense.cli.check import check
 from optisense.cli.dataset import dataset
@@ -17,6 +18,7 @@ from optisense.cli.export import export
 from optisense.cli.library import library_app
 from optisense.cli.new import new
 from optisense.cli.render import render
+from optisense.cli.search import search
 
 app = typer.Typer(
     name="optisense",
@@ -33,6 +35,8 @@ app.command()(check)
 app.command()(render)
 app.command()(dataset)
 app.command()(evaluate)
+app.command()(search)
+app.command()(apply)
 app.command()(export)
 app.command()(doctor)
 app.add_typer(cage_app, name="cage")

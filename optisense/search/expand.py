@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
 from typing import Any
@@ -109,12 +110,13 @@ def starred(design: SensorDesign, path: str) -> list[str]:
     """
     section, _, rest = path.partition(".")
     pattern, _, leaf = rest.partition(".")
-    names = {
+    sections: dict[str, Collection[str]] = {
         "lights": design.lights,
         "parts": design.parts,
         "materials": design.materials,
         "cages": design.cages,
-    }.get(section)
+    }
+    names = sections.get(section)
     if names is None or "*" in leaf or not leaf:
         raise SearchError(
             "a star stands for names of lights, parts, materials or cages",

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Executor
 from pathlib import Path
 from typing import Any
 
 from optisense.design import SensorDesign
-from optisense.errors import SearchError
+from optisense.errors import OptiSenseError, SearchError
 from optisense.search.evaluation import Evaluator, Goal
 from optisense.search.executors import (
     DaskRunner,
@@ -120,6 +120,7 @@ def run_study(
     own_process: bool = False,
     limit: int | None = None,
     progress: Tell | None = None,
+    told: Callable[[], None] | None = None,
 ) -> Result:
     """Run a study, or go on with one.
 
@@ -129,6 +130,7 @@ def run_study(
         own_process: use a process of its own even for one worker.
         limit: trials in all; the study's budget if None.
         progress: called now and then.
+        told: called when Ctrl-C waits for a trial in this process to finish.
 
     Raises:
         OptiSenseError: as of `search`.
@@ -142,10 +144,15 @@ def run_study(
         if executor is not None:
             return ExecutorRunner(evaluator, executor)
         if workers == 1 and not own_process:
-            return SerialRunner(evaluator)
+            return SerialRunner(evaluator, told)
         return ProcessPool(evaluator, workers)
 
-    return Run(study, make_runner, progress, limit).go()
+    try:
+        return Run(study, make_runner, progress, limit).go()
+    except OptiSenseError:
+        if not study.trials:  # no worker could work: there is nothing to go on with
+            study.discard()
+        raise
 
 
 def as_goals(objective: Goal | Sequence[Goal]) -> list[Goal]:

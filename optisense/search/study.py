@@ -23,6 +23,7 @@ import numpy as np
 
 from optisense.design import SensorDesign, load_design, save_design
 from optisense.errors import OutputError, SearchError
+from optisense.library import with_own_lights
 from optisense.search.constraints import Constraint
 from optisense.search.difference import differences, fingerprint, plain_differences
 from optisense.search.dominance import front as front_of
@@ -85,6 +86,7 @@ class Study:
         place = None if folder is None else Path(folder)
         if place is not None:
             _check_free(place)
+        design = with_own_lights(design)
         settings = plan.settings_for(design)
         if place is None:
             store = Store(None, settings.names, new=True)
@@ -126,7 +128,7 @@ class Study:
                 hint="Undo the change, or begin a new study of the edited design",
             )
         if design is not None:
-            changed = differences(own, design)
+            changed = differences(own, with_own_lights(design))
             if changed:
                 raise SearchError(
                     f"the design is not the one of this study any more:\n{_listed(changed)}",
@@ -276,10 +278,32 @@ class Study:
             self._lock.release()
             self._lock = None
 
+    def discard(self) -> None:
+        """Close a study in which nothing was scored, and remove its folder."""
+        self.close()
+        if self.folder is not None:
+            shutil.rmtree(self.folder, ignore_errors=True)
+
     def close(self) -> None:
         """Close its files; one that is in memory is gone."""
         self.unlock()
         self.store.close()
+
+
+def beside(study: Study, trial: Trial) -> dict[str, float]:
+    """What stands beside a trial's score: its other scores, and the parts that an objective wants
+    to be seen with its own, such as the coverage with AOAP.
+    """
+    from optisense.objectives.registry import BUILT_IN, find
+
+    found: dict[str, float] = {}
+    for number, name in enumerate(study.settings.names):
+        if number:
+            found[name] = trial.scores[name]
+        if name in BUILT_IN:
+            parts = trial.parts.get(name, {})
+            found |= {part: float(parts[part]) for part in find(name).beside if part in parts}
+    return found
 
 
 def best_of(trials: Sequence[Trial]) -> Trial | None:

@@ -7,7 +7,8 @@ range = LOW ":" HIGH [ ":" STEPS ]      between two bounds
       | NAME "," NAME [ "," NAME ]...   one of several
 ```
 
-For the points of a cage: `/symmetry=x`, `/axes=xz`, `/points=0,2,6-8`.
+For the points of a cage: `/symmetry=x`, `/axes=xz`, `/points=0,2,6-8`. Errors of making are
+written PATH=SIZE (see `parse_errors`).
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ import yaml
 
 from optisense.design.near import suggestion
 from optisense.errors import SearchError
+from optisense.search.making import MakingErrors, Spread
 from optisense.search.parameters import Around, CagePoints, Choice, Continuous, Specification
 
 EXAMPLE = "Write PATH=LOW:HIGH, such as coating.specularity=0:1, or PATH=NAME,NAME"
@@ -55,6 +57,27 @@ def parse_space(texts: list[str]) -> dict[str, Specification]:
             raise SearchError(f"'{path}' is varied twice")
         found[path] = spec
     return found
+
+
+def parse_errors(texts: list[str]) -> MakingErrors:
+    """Errors of making: PATH=SIZE is a standard deviation, PATH=+-LIMIT any error up to a limit.
+
+    Raises:
+        SearchError: one can't be read, or a path is there twice.
+    """
+    found: dict[str, Spread] = {}
+    for text in texts:
+        path, equals, size = (part.strip() for part in text.partition("="))
+        if not equals or not path or not size:
+            raise SearchError(f"'{text}' is no error of making", hint="Write PATH=SIZE")
+        if path in found:
+            raise SearchError(f"'{path}' is off twice")
+        limit = re.fullmatch(r"(?:\+-|\+/-|±)(.+)", size)
+        try:
+            found[path] = Spread(_number(limit[1]), "even") if limit else Spread(_number(size))
+        except SearchError as error:
+            raise SearchError(error.message, where=path, hint=error.hint) from None
+    return MakingErrors(found)
 
 
 def _range(text: str) -> Specification:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import os
 import pickle
+import re
 import socket
 import threading
 from concurrent.futures import Executor, Future
@@ -24,6 +25,9 @@ WORKER_SECONDS = 60.0
 
 MANY = 1000
 """Trials that wait at an executor, which may have any number of workers."""
+
+ADDRESS = re.compile(r"(?:[a-z]+://)?(?:\[[^\]\s]+\]|[^:/\s\[\]]+):\d{1,5}")
+"""Protocol, host and port."""
 
 HOW_TO_START = (
     "Start one with `dask scheduler` on one machine and `dask worker ADDRESS --nthreads 1` on each "
@@ -141,6 +145,17 @@ def forget(key: str) -> None:
 
 
 def _connect(address: str) -> Any:
+    """A client of the scheduler there.
+
+    Raises:
+        SetupError: Dask is not installed, or no scheduler answers.
+    """
+    if not ADDRESS.fullmatch(address):
+        raise SetupError(
+            f"'{address}' is not the address of a Dask scheduler",
+            where="--cluster",
+            hint="Write it like tcp://192.0.2.7:8786",
+        )
     try:
         import distributed
     except ImportError:
@@ -150,15 +165,9 @@ def _connect(address: str) -> Any:
     try:
         client: Any = distributed.Client
         return client(address, timeout=CONNECT_SECONDS, set_as_default=False)
-    except (OSError, TimeoutError) as error:
+    except (OSError, TimeoutError, ValueError) as error:
         raise SetupError(
             f"no Dask scheduler answers at {address}", where="--cluster", hint=HOW_TO_START
-        ) from error
-    except (ValueError, TypeError) as error:
-        raise SetupError(
-            f"'{address}' is not the address of a Dask scheduler: {error}",
-            where="--cluster",
-            hint="Write it like tcp://192.0.2.7:8786",
         ) from error
 
 

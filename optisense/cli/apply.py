@@ -1,0 +1,48 @@
+"""``optisense apply``: a trial of a study as an ordinary design."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from optisense.cli.console import ends_well, output
+from optisense.errors import OutputError
+
+
+@ends_well
+def apply(
+    study: Annotated[
+        Path,
+        typer.Argument(
+            metavar="STUDY", help="The folder of a search (its --out).", show_default=False
+        ),
+    ],
+    out: Annotated[
+        Path,
+        typer.Option(
+            "--out", "-o", metavar="DIR", help="The folder to make; it must not exist or be empty."
+        ),
+    ],
+    trial: Annotated[str, typer.Option(metavar="best|start|NUMBER", help="Which trial.")] = "best",
+) -> None:
+    """Write the better design that a search has found."""
+    from optisense.search import Study
+    from optisense.search.applied import design_of
+    from optisense.sensors import save_design
+
+    opened = Study.open(study)
+    try:
+        if out.is_file():
+            raise OutputError("this is a file, not a folder", where=str(out))
+        if out.is_dir() and any(out.iterdir()):
+            raise OutputError(
+                "the folder is not empty", where=str(out), hint="Name a folder that doesn't exist"
+            )
+        chosen = opened.trial(trial)
+        save_design(design_of(opened, chosen), out)
+        output.print(f"{out / 'design.yaml'}", markup=False)
+        output.print(f"trial {chosen.number}: {opened.objective} {chosen.score:.4g}", markup=False)
+    finally:
+        opened.close()

@@ -1,0 +1,275 @@
+"""``optisense search``: look for a better design, and keep everything that was tried."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from optisense.cli.console import EXIT_INTERRUPTED, ends_well, messages, output
+from optisense.cli.evaluate import parse_settings
+from optisense.cli.search_result import print_result, summary
+from optisense.cli.searching import search_progress
+
+if TYPE_CHECKING:
+    from optisense.search import Study
+
+
+@ends_well
+def search(
+    design: Annotated[
+        str | None,
+        typer.Argument(
+            metavar="[DESIGN]",
+            help="A built-in sensor's name or the folder of a design. May be left out with "
+            "--resume.",
+            show_default=False,
+        ),
+    ] = None,
+    vary: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--vary",
+            metavar="PATH=LO:HI[:N]",
+            help="What may change: between two bounds (N values of it for a grid), or around what "
+            "it is now as PATH=+-REACH, or one of several as PATH=NAME,NAME. May be given several "
+            "times.",
+            show_default=False,
+        ),
+    ] = None,
+    objective: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--objective",
+            "-b",
+            metavar="NAME",
+            help="What to maximise: rgb2normal, normdiff, aoap, 2to3pw, or your own as "
+            "FILE.py:FUNCTION. Given several times, the first is maximised and the others are "
+            "told, or all are weighed by --method pareto.",
+            show_default=False,
+        ),
+    ] = None,
+    method: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NAME", help="How to search; --methods lists them.", show_default="cma-es"
+        ),
+    ] = None,
+    budget: Annotated[
+        int | None,
+        typer.Option(
+            min=1,
+            metavar="N",
+            help="Trials in all; the method's own idea when left out. With --resume, trials "
+            "including those that are finished.",
+            show_default=False,
+        ),
+    ] = None,
+    workers: Annotated[
+        int, typer.Option(min=1, metavar="N", help="Processes on this machine.")
+    ] = 1,
+    cluster: Annotated[
+        str | None,
+        typer.Option(
+            metavar="ADDRESS",
+            help="A Dask scheduler whose workers do the trials, such as tcp://192.0.2.7:8786.",
+            show_default=False,
+        ),
+    ] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            "--out", "-o", metavar="STUDY", help="The study's folder.", show_default=False
+        ),
+    ] = None,
+    resume: Annotated[
+        bool, typer.Option("--resume", help="Go on with the study in --out.")
+    ] = False,
+    seed: Annotated[
+        int | None,
+        typer.Option(
+            min=0,
+            max=2**32 - 1,
+            metavar="N",
+            help="The same seed gives the same search.",
+            show_default="0",
+        ),
+    ] = None,
+    setting: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--set",
+            metavar="NAME=VALUE",
+            help="A setting of the objectives, such as photons=1000000 or depth=0.5. May be given "
+            "several times.",
+            show_default=False,
+        ),
+    ] = None,
+    option: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--option",
+            metavar="NAME=VALUE",
+            help="An option of the method, such as sigma=0.1 or population=20. May be given "
+            "several times.",
+            show_default=False,
+        ),
+    ] = None,
+    rule: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--rule",
+            metavar="FILE.py:FUNCTION",
+            help="A function of a design that returns False, or why, for one that must not be. "
+            "May be given several times.",
+            show_default=False,
+        ),
+    ] = None,
+    may_cross: Annotated[
+        bool, typer.Option("--may-cross", help="Let parts cut through one another.")
+    ] = False,
+    error: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--error",
+            metavar="PATH=SIZE",
+            help="An error of making (standard deviation). With one or more, what nine of ten "
+            "manufactured sensors reach is maximised.",
+            show_default=False,
+        ),
+    ] = None,
+    samples: Annotated[
+        int | None,
+        typer.Option(
+            min=2, metavar="N", help="Manufactured sensors a trial, with --error.", show_default="8"
+        ),
+    ] = None,
+    as_json: Annotated[
+        bool, typer.Option("--json", help="Print the result as JSON instead of text.")
+    ] = False,
+    methods: Annotated[bool, typer.Option("--methods", help="List the methods and exit.")] = False,
+) -> None:
+    """Search for a better design.
+
+    Every trial is kept in the study's folder as it finishes. A search that was stopped, or killed,
+    goes on with --resume exactly as it would have without.
+    """
+    if methods:
+        _print_methods()
+        return
+    if out is None:
+        raise typer.BadParameter("name a folder for the study", param_hint="--out")
+
+    from optisense.search import run_study
+
+    given = _given(vary, objective, method, seed, setting, option, rule, may_cross, error, samples)
+    study = _resumed(out, design, given) if resume else _begun(out, design, budget, given)
+    try:
+        with search_progress(study.settings.method) as show:
+            result = run_study(
+                study,
+                workers=workers,
+                cluster=cluster,
+                limit=budget,
+                progress=show,
+                told=lambda: messages.print(
+                    "stopping after this trial; Ctrl-C again drops it", style="yellow"
+                ),
+            )
+        if as_json:
+            print(json.dumps(summary(result), indent=2, allow_nan=False))
+        else:
+            print_result(result, out)
+    finally:
+        study.close()
+    if result.interrupted:
+        messages.print(
+            f"interrupted: everything is kept; go on with: optisense search --resume --out {out}",
+            markup=False,
+        )
+        raise typer.Exit(EXIT_INTERRUPTED)
+
+
+def _given(
+    vary: list[str] | None,
+    objective: list[str] | None,
+    method: str | None,
+    seed: int | None,
+    setting: list[str] | None,
+    option: list[str] | None,
+    rule: list[str] | None,
+    may_cross: bool,
+    error: list[str] | None,
+    samples: int | None,
+) -> dict[str, Any]:
+    """What the user gave, read, as arguments of `optisense.search.Plan`."""
+    from optisense.search.constraints import UserRule
+    from optisense.search.text import parse_errors, parse_space
+
+    found: dict[str, Any] = {
+        "space": parse_space(vary) if vary else None,
+        "goals": objective or None,
+        "method": method,
+        "seed": seed,
+        "settings": parse_settings(setting) or None,
+        "options": _options(option) or None,
+        "rules": [UserRule(text) for text in rule] if rule else None,
+        "apart": False if may_cross else None,
+        "errors": parse_errors(error) if error else None,
+        "samples": samples,
+    }
+    return {key: value for key, value in found.items() if value is not None}
+
+
+def _begun(out: Path, design: str | None, budget: int | None, given: dict[str, Any]) -> Study:
+    """A new study of what was given."""
+    from optisense.search import Plan, SearchSpace, Study
+    from optisense.sensors import load
+
+    if design is None:
+        raise typer.BadParameter("name the design to start from", param_hint="DESIGN")
+    for key, name in (("space", "--vary"), ("goals", "--objective")):
+        if key not in given:
+            raise typer.BadParameter("must be given at least once", param_hint=name)
+    space = SearchSpace(given.pop("space"), given.pop("rules", ()))
+    return Study.create(out, load(design), Plan(space=space, budget=budget, **given))
+
+
+def _resumed(out: Path, design: str | None, given: dict[str, Any]) -> Study:
+    """The study in a folder; what was given as well must be what it was begun with."""
+    from optisense.search import SearchSpace, Study
+    from optisense.search.plan import reference, rule_reference
+    from optisense.sensors import load
+
+    study = Study.open(out, None if design is None else load(design))
+    wanted = {key: given[key] for key in given if key in ("method", "seed", "samples", "apart")}
+    for key in ("settings", "options"):
+        if key in given:
+            wanted[key] = given[key]
+    if "space" in given:
+        wanted["space"] = SearchSpace(given["space"]).to_plain()
+    if "goals" in given:
+        wanted["objectives"] = [reference(goal) for goal in given["goals"]]
+    if "rules" in given:
+        wanted["rules"] = [rule_reference(rule) for rule in given["rules"]]
+    if "errors" in given:
+        wanted["errors"] = given["errors"].to_plain()
+    study.expect(wanted)
+    return study
+
+
+def _options(texts: list[str] | None) -> dict[str, Any]:
+    try:
+        return parse_settings(texts)
+    except typer.BadParameter as error:
+        error.param_hint = "--option"
+        raise
+
+
+def _print_methods() -> None:
+    from optisense.search.methods import find, names
+
+    for name in names():
+        output.print(f"{name:<14} {find(name).summary}", markup=False)

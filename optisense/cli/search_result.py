@@ -1,0 +1,113 @@
+"""What came of a search, as text and as JSON."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from optisense.cli.console import messages, output
+
+if TYPE_CHECKING:
+    from optisense.search import Result, Study, Trial
+
+MOST_VALUES = 12
+"""Parameters of the best trial that are printed; all are in the study."""
+
+
+def summary(result: Result) -> dict[str, Any]:
+    """The result, ready for JSON."""
+    trials = result.trials
+    best = result.study.best
+    start = result.study.start
+    return {
+        "study": str(result.study.folder),
+        "trials": sum(not trial.is_start for trial in trials),
+        "failed": sum(trial.failure is not None for trial in trials),
+        "interrupted": result.interrupted,
+        "ended": result.ended,
+        "notes": list(result.notes),
+        "start": None if start is None else _plain(start),
+        "best": None if best is None else _plain(best),
+        "front": [trial.number for trial in result.front] if _several(result) else None,
+    }
+
+
+def _plain(trial: Trial) -> dict[str, Any]:
+    fresh = {name: _or_none(trial.fresh_score(name)) for name in trial.scores}
+    return {
+        "number": trial.number,
+        "scores": {name: _or_none(value) for name, value in trial.scores.items()},
+        "fresh_scores": fresh,
+        "values": trial.values,
+    }
+
+
+def _or_none(value: float) -> float | None:
+    return value if math.isfinite(value) else None
+
+
+def _several(result: Result) -> bool:
+    return len(result.study.settings.names) > 1
+
+
+def print_result(result: Result, out: Path) -> None:
+    """The best trial, what stands beside it, and what to do next."""
+    study = result.study
+    for note in result.notes:
+        messages.print(f"note: {note}", markup=False, style="yellow")
+    best, start = study.best, study.start
+    failed = [trial for trial in result.trials if trial.failure is not None]
+    if failed:
+        output.print(f"{len(failed)} trials failed; the last: {failed[-1].failure}", markup=False)
+    if best is None:
+        output.print("no trial has a score yet")
+        return
+    name = study.objective
+    line = f"best: trial {best.number}, {name} {best.score:.4g}"
+    if start is not None and math.isfinite(start.score):
+        line += f" (start {start.score:.4g})"
+    output.print(line, markup=False)
+    fresh = best.fresh_score()
+    if math.isfinite(fresh) and fresh != best.score:
+        spread = best.fresh_spread()
+        text = f"{fresh:.4g} ± {spread:.2g}" if math.isfinite(spread) else f"{fresh:.4g}"
+        output.print(f"with fresh seeds: {text}")
+    for line in _beside(study, best, start):
+        output.print(line, markup=False)
+    values = list(best.values.items())
+    for path, value in values[:MOST_VALUES]:
+        shown = f"{value:.6g}" if isinstance(value, float) else str(value)
+        output.print(f"  {path} = {shown}", markup=False)
+    if len(values) > MOST_VALUES:
+        output.print(f"  and {len(values) - MOST_VALUES} more")
+    if _several(result):
+        _print_front(result)
+    if not best.is_start and not result.interrupted:
+        output.print(f"Take it:  optisense apply {out} --trial best --out better", style="dim")
+
+
+def _beside(study: Study, best: Trial, start: Trial | None) -> list[str]:
+    """What must be seen with the score: other objectives, and parts such as the coverage."""
+    from optisense.search.study import beside
+
+    before = {} if start is None else beside(study, start)
+    return [
+        f"  {name} {value:.4g}" + (f" (start {before[name]:.4g})" if name in before else "")
+        for name, value in beside(study, best).items()
+    ]
+
+
+def _print_front(result: Result) -> None:
+    """The trials that no other beats in all objectives."""
+    from rich.table import Table
+
+    names = result.study.settings.names
+    table = Table(box=None, pad_edge=False)
+    table.add_column("trial", justify="right")
+    for name in names:
+        table.add_column(name, justify="right")
+    for trial in result.front:
+        table.add_row(str(trial.number), *(f"{trial.scores[name]:.4g}" for name in names))
+    output.print("none of these is beaten in all objectives:")
+    output.print(table)

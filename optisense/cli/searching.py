@@ -1,0 +1,73 @@
+"""How far a search is, on standard error."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import TYPE_CHECKING
+
+from optisense.cli.console import messages
+
+if TYPE_CHECKING:
+    from optisense.search import Progress
+
+LINE_EVERY = 30.0
+"""Seconds between lines where standard error is no terminal, such as a log file."""
+
+
+@contextmanager
+def search_progress(method: str) -> Iterator[Callable[[Progress], None]]:
+    """A bar with the best score so far, trials an hour and the time left; lines now and then
+    where standard error is no terminal.
+    """
+    from rich.progress import BarColumn, MofNCompleteColumn, TextColumn
+    from rich.progress import Progress as Bar
+
+    with Bar(
+        TextColumn(method),
+        BarColumn(bar_width=24),
+        MofNCompleteColumn(),
+        TextColumn("{task.fields[note]}"),
+        console=messages,
+        transient=True,
+        disable=not messages.is_terminal,
+    ) as bar:
+        task = bar.add_task("search", total=None, note="getting ready")
+        last = time.monotonic()
+
+        def show(progress: Progress) -> None:
+            nonlocal last
+            bar.update(task, completed=progress.done, total=progress.total, note=note(progress))
+            if not messages.is_terminal and time.monotonic() - last > LINE_EVERY:
+                last = time.monotonic()
+                line = f"{progress.done}/{progress.total}  {note(progress)}"
+                messages.print(line, markup=False)
+
+        yield show
+
+
+def note(progress: Progress) -> str:
+    """What stands beside the bar."""
+    if progress.stage != "trials":
+        return f"best {_score(progress.best)}; scoring the best again with {progress.stage}"
+    parts = [f"best {_score(progress.best)} (start {_score(progress.start)})"]
+    if progress.trials_per_hour > 0.0:
+        parts.append(f"{progress.trials_per_hour:,.0f} trials/h")
+    if progress.failed:
+        parts.append(f"{progress.failed} failed")
+    if math.isfinite(progress.seconds_left):
+        parts.append(f"{duration(progress.seconds_left)} left")
+    return "  ".join(parts)
+
+
+def duration(seconds: float) -> str:
+    """Hours, minutes and seconds as 1:02:03."""
+    minutes, rest = divmod(round(seconds), 60)
+    hours, minutes = divmod(minutes, 60)
+    return f"{hours}:{minutes:02}:{rest:02}" if hours else f"{minutes}:{rest:02}"
+
+
+def _score(value: float) -> str:
+    return f"{value:.4g}" if math.isfinite(value) else "-"

@@ -1,0 +1,43 @@
+"""A trial's design as one to go on with: its new numbers say where they come from."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from optisense.design import Provenance, SensorDesign, Status, get_value
+from optisense.errors import DesignError
+from optisense.search.study import Study
+from optisense.search.trial import Trial
+
+
+def design_of(study: Study, trial: Trial) -> SensorDesign:
+    """The design of a trial; what differs from the study's design is marked as found by it.
+
+    Raises:
+        OptiSenseError: the values do not fit together.
+    """
+    design = trial.design
+    settings = study.settings
+    if trial.is_start:
+        return design
+    found = Provenance(
+        status=Status.DERIVED,
+        source=f"trial {trial.number} of a {settings.method} search for {settings.names[0]}, "
+        f"which scores {trial.score:.4g}",
+    )
+    before = study.space.design
+    varied = {p.asked for p in study.space.parameters if p.targets}
+    known = {path: each for path, each in design.provenance.items() if _value(design, path)}
+    for path in {**known, **dict.fromkeys(sorted(varied))}:
+        now, then = _value(design, path), _value(before, path)
+        if now and now != then:
+            known[path] = found
+    return design.model_copy(update={"provenance": known})
+
+
+def _value(design: SensorDesign, path: str) -> tuple[Any, ...]:
+    """What is at a path, in a tuple; an empty one where the path leads nowhere."""
+    try:
+        return (get_value(design, path),)
+    except DesignError:
+        return ()
