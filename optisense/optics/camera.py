@@ -3,10 +3,21 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import drjit as dr
 import mitsuba as mi
 import numpy as np
+
+
+class Pose(NamedTuple):
+    """Where a camera is and how it looks: mm, unit axes of the image, degrees across its width."""
+
+    position: mi.Point3f
+    right: mi.Vector3f
+    up: mi.Vector3f
+    forward: mi.Vector3f
+    fov: mi.Float
 
 
 @dataclass(frozen=True)
@@ -34,11 +45,26 @@ class RayCamera:
         right = right / np.linalg.norm(right)
         return np.stack([right, np.cross(right, forward), forward])
 
-    def rays(self, x: mi.Float, y: mi.Float) -> tuple[mi.Point3f, mi.Vector3f]:
-        """Rays through film positions in pixels, (0, 0) the top left corner; unit directions."""
+    def pose(self) -> Pose:
+        """Place, axes and field of view on the device."""
         right, up, forward = (mi.Vector3f(*map(float, row)) for row in self.axes())
-        half = float(np.radians(self.fov) / 2)
-        u = (2 * x / self.width - 1) * 1.0
+        position = mi.Point3f(*map(float, self.position))
+        pose = Pose(position, right, up, forward, mi.Float(self.fov))
+        dr.make_opaque(*pose)  # no part of kernels, which serve every camera
+        return pose
+
+    def rays(
+        self, x: mi.Float, y: mi.Float, pose: Pose | None = None
+    ) -> tuple[mi.Point3f, mi.Vector3f]:
+        """Rays through film positions in pixels, (0, 0) the top left corner; unit directions.
+
+        Args:
+            x, y: pixels.
+            pose: the camera's own if None; another one to differentiate by.
+        """
+        position, right, up, forward, fov = self.pose() if pose is None else pose
+        half = fov * float(np.pi / 360)
+        u = 2 * x / self.width - 1
         v = (self.height - 2 * y) / self.width
         if self.equidistant:
             radius = dr.sqrt(u * u + v * v)
@@ -46,7 +72,7 @@ class RayCamera:
             scale = dr.select(radius > 1e-6, dr.sin(angle) / dr.maximum(radius, 1e-6), half)
             direction = right * (u * scale) + up * (v * scale) + forward * dr.cos(angle)
         else:
-            tangent = float(np.tan(half))
+            tangent = dr.tan(half)
             direction = right * (u * tangent) + up * (v * tangent) + forward
-        origin = mi.Point3f(*map(float, self.position))
-        return origin + dr.zeros(mi.Vector3f, dr.width(direction)), dr.normalize(direction)
+        origin = position + dr.zeros(mi.Vector3f, dr.width(direction))
+        return origin, dr.normalize(direction)

@@ -8,7 +8,7 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import mitsuba as mi
 import numpy as np
@@ -48,6 +48,9 @@ from optisense.optics.shading import ContactScenes
 from optisense.optics.sppm import render_sppm
 from optisense.optics.surfaces import Region, Surface, SurfaceKind
 from optisense.optics.versions import versions
+
+if TYPE_CHECKING:
+    from optisense.optics.ray_gradient import DifferentiableRays
 
 DEFAULT_PHOTONS = 5_000_000
 """Photons of a light field where nothing else is asked; it is kept for the next image."""
@@ -250,6 +253,29 @@ class OpticalModel:
         else:
             scene = self._fine.scene
         return trace_chief_rays(scene, self.camera(resolution), self._fine.sensing_faces)
+
+    def differentiable_rays(
+        self,
+        moving: Sequence[str] = (),
+        resolution: tuple[int, int] | None = None,
+        fade: float = 1.0,
+    ) -> DifferentiableRays:
+        """Chief rays, with derivatives by the shapes of surfaces and by the camera.
+
+        Args:
+            moving: parts whose vertices are asked about: mirrors, blockers, sensing surfaces.
+            resolution: (width, height) pixels; the camera's own by default.
+            fade: mm; within so much of an open edge of a mirror or of the sensing surface a
+                ray's weight falls to 0.
+
+        Raises:
+            RenderError: no ray arrives, or a moving part is no such surface.
+        """
+        from optisense.optics.ray_gradient import DifferentiableRays
+
+        meshes = self.design.deformed_meshes()
+        chosen = {name: meshes[name] for name in moving}
+        return DifferentiableRays(self._fine.scene, self.camera(resolution), chosen, fade)
 
     def nine_contacts(self, indenter: Indenter | None = None, depth: float = 0.8) -> list[Contact]:
         """One contact at each of nine places that cover the visible sensing surface evenly.

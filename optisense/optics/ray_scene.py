@@ -60,6 +60,19 @@ class Piece:
             corners[against] *= -1
         return corners
 
+    @cached_property
+    def open_edges(self) -> NDArray[np.int64]:
+        """(e, 2) vertices of the edges that one triangle only has, whether vertices are split
+        or not.
+        """
+        _, same = np.unique(np.round(self.vertices, 6), axis=0, return_inverse=True)
+        faces = np.asarray(self.faces, dtype=np.int64)
+        edges = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
+        ends = np.sort(same.reshape(-1)[edges], axis=1)
+        key = ends[:, 0] * len(self.vertices) + ends[:, 1]
+        _, first, counts = np.unique(key, return_index=True, return_counts=True)
+        return edges[first[counts == 1]]
+
 
 @dataclass
 class Hit:
@@ -95,6 +108,7 @@ class RayScene:
         Several scenes of one sensor share a ``table`` (see ``surface_table``); ``numbers`` then
         says which of its surfaces each piece has. By default a scene numbers its own.
         """
+        self.pieces = pieces
         surfaces = [piece.surface for piece in pieces]
         numbers = list(range(len(pieces))) if numbers is None else numbers
         vertices, faces, rows, corners = _merge(pieces, numbers)

@@ -18,6 +18,7 @@ HOMES = {
     "grid": "optisense.search.methods.grid:Grid",
     "random": "optisense.search.methods.random_search:Random",
     "cma-es": "optisense.search.methods.cma_es:CmaEs",
+    "gradient": "optisense.search.methods.gradient:Gradient",
     "pareto": "optisense.search.methods.pareto:Pareto",
     "light-colours": "optisense.search.methods.light_colours:LightColours",
     "types": "optisense.search.methods.light_types:LightTypes",

@@ -1,0 +1,116 @@
+"""How shapes and camera follow the coordinates of a search space, for chains of derivatives.
+
+Found by differences: where shapes follow the coordinates linearly, as they do a cage, these are
+exact, and one set of them serves all points.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from optisense.design import Camera, SensorDesign
+from optisense.errors import SearchError
+from optisense.geometry import TriangleMesh
+from optisense.search.space import BoundSpace
+
+FloatArray = NDArray[np.float64]
+
+STEP = 1e-4
+"""Of a parameter's range: differences are taken so far to either side."""
+
+LINEAR = 1e-6
+"""mm. Shapes that are predicted to this, along a random way, follow the coordinates linearly."""
+
+
+@dataclass(frozen=True)
+class Jacobian:
+    """What moves with each coordinate.
+
+    Attributes:
+        point: (n,) where it was taken.
+        parts: by part name (n, v, 3), mm a unit.
+        camera: (n, c) of the camera's numbers (see `camera_numbers`) a unit.
+    """
+
+    point: FloatArray
+    parts: dict[str, FloatArray]
+    camera: FloatArray
+
+
+def moving_parts(space: BoundSpace) -> list[str]:
+    """The parts whose shape a point of the space changes.
+
+    Raises:
+        SearchError: a parameter changes something that chief rays have no derivative by.
+    """
+    start = space.apply(space.start)
+    meshes = start.deformed_meshes()
+    moving: set[str] = set()
+    for number, parameter in enumerate(space.parameters):
+        if space.whole[number]:
+            raise SearchError(
+                "a choice or a whole number has no gradient",
+                where=parameter.name,
+                hint="Search it with --method grid, or vary it with cma-es",
+            )
+        design = space.apply(_beside(space, space.start, number)[0])
+        changed = [n for n, m in design.deformed_meshes().items() if not _same(m, meshes[n])]
+        if not changed and design.camera == start.camera:
+            raise SearchError(
+                "it moves neither a surface nor the camera, so chief rays have no gradient by it",
+                where=parameter.name,
+                hint="Search it with --method cma-es",
+            )
+        moving |= set(changed)
+    return [name for name in meshes if name in moving]
+
+
+def jacobian(space: BoundSpace, point: FloatArray, parts: list[str]) -> Jacobian:
+    """How the parts and the camera follow the coordinates around a point (n,)."""
+    slopes: dict[str, list[FloatArray]] = {name: [] for name in parts}
+    camera = []
+    for number in range(space.size):
+        after, before = _beside(space, point, number)
+        step = after[number] - before[number]
+        there, back = space.apply(after), space.apply(before)
+        moved, stayed = there.deformed_meshes(), back.deformed_meshes()
+        for name in parts:
+            slopes[name].append((moved[name].vertices - stayed[name].vertices) / step)
+        camera.append((camera_numbers(there.camera) - camera_numbers(back.camera)) / step)
+    return Jacobian(point, {n: np.array(s) for n, s in slopes.items()}, np.array(camera))
+
+
+def holds(known: Jacobian, space: BoundSpace, design: SensorDesign, point: FloatArray) -> bool:
+    """Whether the shapes at a point are those that a Jacobian predicts, and so is the camera."""
+    way = point - known.point
+    if not way.any():
+        return True
+    start, meshes = space.apply(known.point), design.deformed_meshes()
+    old = start.deformed_meshes()
+    for name, slope in known.parts.items():
+        predicted = old[name].vertices + np.tensordot(way, slope, axes=1)
+        if np.abs(meshes[name].vertices - predicted).max() > LINEAR:
+            return False
+    camera = camera_numbers(start.camera) + way @ known.camera
+    return bool(np.abs(camera_numbers(design.camera) - camera).max() <= LINEAR)
+
+
+def camera_numbers(camera: Camera) -> FloatArray:
+    """(13,): position (mm), the rows of the camera's axes, and the field of view (degrees)."""
+    return np.concatenate([camera.position, np.ravel(camera.axes()), [camera.fov]])
+
+
+def _beside(space: BoundSpace, point: FloatArray, number: int) -> tuple[FloatArray, FloatArray]:
+    """Two points a little to either side of one, within the bounds."""
+    step = STEP * (space.upper[number] - space.lower[number])
+    after, before = point.copy(), point.copy()
+    after[number] = min(point[number] + step, space.upper[number])
+    before[number] = max(point[number] - step, space.lower[number])
+    return after, before
+
+
+def _same(one: TriangleMesh, other: TriangleMesh) -> bool:
+    return one is other or np.array_equal(one.vertices, other.vertices)
