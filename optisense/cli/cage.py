@@ -298,7 +298,8 @@ def _show_points(design: SensorDesign, name: str) -> None:
 
 
 def _numbers(values: object) -> str:
-    return ", ".join(f"{value + 0.0:.5g}" for value in cast("list[float]", values))
+    # Rounding errors of a refined cage would show as 4e-16.
+    return ", ".join(f"{round(value, 9) + 0.0:.5g}" for value in cast("list[float]", values))
 
 
 def _check_ends(design: SensorDesign, name: str) -> None:
