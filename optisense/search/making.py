@@ -114,6 +114,7 @@ class BoundErrors:
     Attributes:
         sources: the paths as given.
         owner: (d,) for each number that may be off, which source it belongs to.
+        space: of these numbers, within what is possible.
     """
 
     def __init__(self, errors: MakingErrors, design: SensorDesign) -> None:
@@ -131,7 +132,7 @@ class BoundErrors:
                 ranges |= {each.name: _limits(prepared, each, source) for each in found}
                 owner += [number] * len(found)
         self.owner = np.array(owner)
-        self._space = _ErrorSpace(SearchSpace(ranges), prepared)
+        self.space = _ErrorSpace(SearchSpace(ranges), prepared)
 
     @property
     def size(self) -> int:
@@ -151,9 +152,11 @@ class BoundErrors:
         Raises:
             OptiSenseError: the values do not fit together.
         """
-        space = self._space
-        point = np.clip(space.now + errors, space.lower, space.upper)
-        return space.apply(point)
+        return self.space.apply(self.points(errors))
+
+    def points(self, errors: FloatArray) -> FloatArray:
+        """(..., d) points of the space for errors (..., d); what is impossible is cut off."""
+        return np.clip(self.space.now + errors, self.space.lower, self.space.upper)
 
 
 class _ErrorSpace(BoundSpace):

@@ -1,0 +1,96 @@
+"""Scoring a design by what nine of ten manufactured ones reach."""
+
+from __future__ import annotations
+
+import math
+import time
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from optisense.errors import OptiSenseError
+from optisense.search.evaluation import DesignEvaluator
+from optisense.search.making import SAMPLES, BoundErrors, MakingErrors, even_shares
+from optisense.search.outcome import Outcome
+
+FloatArray = NDArray[np.float64]
+
+LOW, MIDDLE, HIGH = 0.1, 0.5, 0.9
+
+
+class RobustEvaluator:
+    """Scores a point by the tenth percentile (P10) over sensors with errors of making.
+
+    All points are tried with the same errors, so that they are compared fairly.
+    """
+
+    def __init__(
+        self, usual: DesignEvaluator, errors: MakingErrors, seed: int, samples: int = SAMPLES
+    ) -> None:
+        """Draw the errors.
+
+        Raises:
+            DesignError, SearchError: an error's path does not fit the design.
+        """
+        self.usual = usual
+        self.errors = errors
+        self.renders = usual.renders
+        self.seed = seed
+        self.samples = samples
+        self._drawn: dict[int, FloatArray] = {}
+        self._errors(errors.bind(usual.space.prepared))
+
+    def __call__(self, vector: FloatArray, seed: int) -> Outcome:
+        """See `optisense.search.evaluation.Evaluator`."""
+        began = time.perf_counter()
+        try:
+            design = self.usual.space.apply(vector)
+            bound = self.errors.bind(design)
+        except OptiSenseError as error:
+            return self.usual.failed(str(error), began)
+        found = []
+        for errors in self._errors(bound):
+            try:
+                found.append(self.usual.judge(bound.apply(errors), seed))
+            except OptiSenseError as error:
+                found.append(self.usual.failed(str(error), began))
+        scores, parts = {}, {}
+        for name in self.usual.names:
+            values = [outcome.scores.get(name, math.nan) for outcome in found]
+            scores[name] = percentile(values, LOW)
+            middle, high = percentile(values, MIDDLE), percentile(values, HIGH)
+            parts[name] = {
+                "p10": _or_none(scores[name]),
+                "p50": _or_none(middle),
+                "p90": _or_none(high),
+                "samples": [_or_none(value) for value in values],
+            }
+        failure = None
+        if any(math.isnan(value) for value in scores.values()):
+            reasons = [outcome.failure for outcome in found if outcome.failure]
+            failure = f"{len(reasons)} of {len(found)} manufactured sensors fail: {reasons[0]}"
+        return Outcome(scores, failure, parts, time.perf_counter() - began)
+
+    def _errors(self, bound: BoundErrors) -> FloatArray:
+        """(samples, d) errors, the same for all designs with as many numbers."""
+        if bound.size not in self._drawn:
+            shares = even_shares(self.samples, bound.size, self.seed)
+            self._drawn[bound.size] = bound.errors(shares)
+        return self._drawn[bound.size]
+
+
+def percentile(values: ArrayLike, share: float) -> float:
+    """The value that a share of all stay below, linear between neighbours.
+
+    Failed ones (NaN) count as worse than any; NaN where the percentile falls among them.
+    """
+    ordered = np.sort(np.nan_to_num(np.asarray(values, dtype=np.float64), nan=-np.inf))
+    place = share * (len(ordered) - 1)
+    low, high = ordered[math.floor(place)], ordered[math.ceil(place)]
+    if not math.isfinite(low):
+        return math.nan
+    return float(low + (place - math.floor(place)) * (high - low))
+
+
+def _or_none(value: float) -> float | None:
+    return value if math.isfinite(value) else None

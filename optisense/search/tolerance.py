@@ -1,0 +1,280 @@
+"""How a design's score spreads when sensors come out a little other than designed."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import FIRST_COMPLETED, Future, wait
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from optisense.design import Dielectric, SensorDesign
+from optisense.errors import SearchError
+from optisense.search.evaluation import DesignEvaluator, Goal
+from optisense.search.executors import ProcessPool, Runner, SerialRunner
+from optisense.search.making import MakingErrors, Spread
+from optisense.search.outcome import Outcome
+from optisense.search.rescoring import fresh_seeds
+from optisense.search.robust import HIGH, LOW, MIDDLE
+from optisense.search.sensitivity import Estimate, paired_errors, percentile_of, total_effect
+
+FloatArray = NDArray[np.float64]
+
+SENSORS = 120
+"""Sensors that are tried where the user names no number."""
+
+LEAST_ROWS = 8
+"""Each row is one sensor, and one more for each source of error."""
+
+NOISE_SEEDS = 3
+"""Seeds with which the design as it is is scored again, to tell noise from tolerance."""
+
+PERCENTILES = {"p10": LOW, "p50": MIDDLE, "p90": HIGH}
+
+POSITION, ANGLE, SPECULARITY, CAGE_POINT, INDEX = 0.1, 2.0, 0.05, 0.05, 0.005
+"""Usual errors, standard deviations: of each light's place (mm) and direction (degrees about each
+axis), of the specularity, of each coordinate of a control point (mm), of a refractive index.
+Assumptions for a sensor that is built by hand: LEDs soldered to a board that is glued in, a printed
+mould, silicone and resin of another batch."""
+
+Tell = Callable[[int, int], None]
+"""Called with the number of finished sensors and of all."""
+
+
+@dataclass(frozen=True)
+class Spreading:
+    """How one objective's score spreads.
+
+    Attributes:
+        nominal: of the design as it is.
+        noise: standard deviation over seeds of the design as it is; 0 where seeds do not matter.
+        scores: (rows, k) of the sensors, NaN where one failed.
+        percentiles: by name ("p10", ...).
+        shares: by source of error, its share in the variance, the largest first; None where
+            too many sensors failed to tell.
+    """
+
+    nominal: float
+    noise: float
+    scores: FloatArray = field(repr=False)
+    percentiles: Mapping[str, Estimate]
+    shares: Mapping[str, Estimate | None]
+
+    @property
+    def deviation(self) -> float:
+        """Standard deviation of the scores, failed sensors left out; NaN for less than two."""
+        known = self.scores[np.isfinite(self.scores)]
+        return float(known.std(ddof=1)) if len(known) > 1 else math.nan
+
+
+@dataclass(frozen=True)
+class Tolerance:
+    """What errors of making do to a design.
+
+    Attributes:
+        design: the design.
+        errors: of making.
+        results: by objective.
+        sensors: how many were tried.
+        failures: why sensors have no score, with how often.
+        interrupted: whether it was stopped early.
+        seconds: wall time.
+        settings: of the objectives.
+        values: (rows, k, d) what the numbers with errors were, for plots.
+        names: of these numbers.
+    """
+
+    design: SensorDesign
+    errors: MakingErrors
+    results: Mapping[str, Spreading]
+    sensors: int
+    failures: Mapping[str, int]
+    interrupted: bool
+    seconds: float
+    settings: Mapping[str, Any]
+    values: FloatArray = field(repr=False)
+    names: Sequence[str] = field(repr=False)
+
+    def to_dict(self) -> dict[str, Any]:
+        """All of it, ready for JSON."""
+        return {
+            "design": self.design.name,
+            "errors": self.errors.to_plain(),
+            "sensors": self.sensors,
+            "interrupted": self.interrupted,
+            "seconds": round(self.seconds, 2),
+            "settings": dict(self.settings),
+            "failures": dict(self.failures),
+            "objectives": {name: _plain(each) for name, each in self.results.items()},
+        }
+
+
+def usual_errors(design: SensorDesign) -> MakingErrors:
+    """Errors that a design may have, of the usual sizes."""
+    found: dict[str, Spread | float] = {}
+    if design.lights:
+        found |= {"lights.position": POSITION, "lights.angle": ANGLE}
+    found["coating.specularity"] = SPECULARITY
+    found |= {f"cages.{name}.points": CAGE_POINT for name in design.cages}
+    used = {part.material for part in design.parts.values()}
+    for name, material in design.materials.items():
+        if isinstance(material, Dielectric) and name in used and material.ior > 1.001:
+            found[f"materials.{name}.ior"] = INDEX
+    return MakingErrors(found)
+
+
+def tolerance(
+    design: SensorDesign,
+    objective: Goal | Sequence[Goal],
+    errors: MakingErrors | Mapping[str, Spread | float] | None = None,
+    *,
+    sensors: int = SENSORS,
+    seed: int = 0,
+    workers: int = 1,
+    settings: Mapping[str, Any] | None = None,
+    progress: Tell | None = None,
+) -> Tolerance:
+    """Try sensors with errors of making, all with the same seed of the light.
+
+    Args:
+        design: the sensor.
+        objective: one or several; see `optisense.search.search`.
+        errors: by path (see `MakingErrors`); usual ones if None.
+        sensors: about how many to try; at least 8 for each source of error and 8 more.
+        seed: of the errors and of the light.
+        workers: processes on this machine; 1 works in this one.
+        settings: of the objectives.
+        progress: called now and then.
+
+    Returns:
+        Percentiles of the scores, and each source's share in their variance. Ctrl-C ends it
+        early with what is finished.
+
+    Raises:
+        SearchError: an error makes no sense, or the design itself has no score.
+        DesignError: a path leads nowhere; names the near match.
+        ObjectiveError: an objective or a setting is unknown.
+    """
+    began = time.perf_counter()
+    if errors is None:
+        making = usual_errors(design)
+    else:
+        making = errors if isinstance(errors, MakingErrors) else MakingErrors(errors)
+    bound = making.bind(design)
+    goals: list[Goal] = list(objective) if isinstance(objective, list | tuple) else [objective]  # type: ignore[list-item]
+    evaluator = DesignEvaluator(bound.space, goals, settings)
+    count = 1 if len(making.sources) == 1 else 1 + len(making.sources)
+    rows = max(LEAST_ROWS, round(sensors / count))
+    points = bound.points(paired_errors(bound, rows, seed))
+    nominal = bound.points(np.zeros(bound.size))
+    jobs = [(nominal, each) for each in (seed, *fresh_seeds(seed, NOISE_SEEDS))]
+    jobs += [(point, seed) for point in points.reshape(-1, bound.size)]
+    with _runner(evaluator, workers) as runner:
+        found, interrupted = _work(runner, jobs, len(jobs), progress or (lambda done, of: None))
+    itself, again, tried = found[:1], found[1 : 1 + NOISE_SEEDS], found[1 + NOISE_SEEDS :]
+    whole = len([each for each in tried if each is not None]) // count
+    if not itself or itself[0] is None or whole < LEAST_PAIRS_TO_TELL:
+        raise KeyboardInterrupt
+    if itself[0].failed:
+        raise SearchError(f"the design itself has no score: {itself[0].failure}")
+    outcomes = [each for each in tried[: whole * count] if each is not None]
+    repeats = [itself[0], *(each for each in again if each is not None)]
+    return Tolerance(
+        design=design,
+        errors=making,
+        results={
+            name: _spreading(name, repeats, outcomes, making.sources, whole)
+            for name in evaluator.names
+        },
+        sensors=len(outcomes),
+        failures=Counter(each.failure for each in outcomes if each.failure is not None),
+        interrupted=interrupted,
+        seconds=time.perf_counter() - began,
+        settings=evaluator.settings,
+        values=points[:whole],
+        names=bound.space.names,
+    )
+
+
+LEAST_PAIRS_TO_TELL = 4
+"""Rows below which an interrupted run tells nothing."""
+
+
+def _spreading(
+    name: str,
+    repeats: Sequence[Outcome],
+    outcomes: Sequence[Outcome],
+    sources: Sequence[str],
+    rows: int,
+) -> Spreading:
+    values = np.array([each.scores.get(name, math.nan) for each in outcomes]).reshape(rows, -1)
+    same = np.array([each.scores.get(name, math.nan) for each in repeats])
+    shares = {source: total_effect(values, number) for number, source in enumerate(sources)}
+    order = sorted(shares, key=lambda source: -_size(shares[source]))
+    return Spreading(
+        nominal=float(same[0]),
+        noise=float(np.nanstd(same, ddof=1)) if np.isfinite(same).sum() > 1 else math.nan,
+        scores=values,
+        percentiles={key: percentile_of(values, share) for key, share in PERCENTILES.items()},
+        shares={source: shares[source] for source in order},
+    )
+
+
+def _runner(evaluator: DesignEvaluator, workers: int) -> Runner:
+    return SerialRunner(evaluator) if workers == 1 else ProcessPool(evaluator, workers)
+
+
+def _work(
+    runner: Runner, jobs: Sequence[tuple[FloatArray, int]], count: int, tell: Tell
+) -> tuple[list[Outcome | None], bool]:
+    """The outcome of each job, None where Ctrl-C came first; and whether it came."""
+    found: list[Outcome | None] = [None] * len(jobs)
+    running: dict[Future[Outcome], int] = {}
+    done = 0
+    try:
+        for number, (point, seed) in enumerate(jobs):
+            running[runner.submit(point, seed)] = number
+            while len(running) >= runner.window:
+                done += _collect(running, found)
+                tell(done, count)
+        while running:
+            done += _collect(running, found)
+            tell(done, count)
+    except KeyboardInterrupt:
+        return found, True
+    return found, False
+
+
+def _collect(running: dict[Future[Outcome], int], found: list[Outcome | None]) -> int:
+    finished, _ = wait(running, return_when=FIRST_COMPLETED)
+    for future in finished:
+        found[running.pop(future)] = future.result()
+    return len(finished)
+
+
+def _size(share: Estimate | None) -> float:
+    return -1.0 if share is None else share.value
+
+
+def _plain(each: Spreading) -> dict[str, Any]:
+    def number(value: float) -> float | None:
+        return value if math.isfinite(value) else None
+
+    def estimate(value: Estimate | None) -> dict[str, float | None] | None:
+        if value is None:
+            return None
+        return {"value": number(value.value), "low": number(value.low), "high": number(value.high)}
+
+    return {
+        "nominal": number(each.nominal),
+        "noise": number(each.noise),
+        "standard_deviation": number(each.deviation),
+        "percentiles": {key: estimate(value) for key, value in each.percentiles.items()},
+        "shares": {source: estimate(value) for source, value in each.shares.items()},
+        "scores": [number(value) for value in each.scores.ravel().tolist()],
+    }
