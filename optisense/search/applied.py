@@ -26,7 +26,12 @@ def design_of(study: Study, trial: Trial) -> SensorDesign:
         f"which scores {trial.score:.4g}",
     )
     before = study.space.design
-    varied = {p.asked for p in study.space.parameters if p.targets}
+    # A cage is marked as a whole, other numbers one by one.
+    varied = {
+        p.asked if p.name.startswith("cages.") else p.name
+        for p in study.space.parameters
+        if p.targets
+    }
     known = {path: each for path, each in design.provenance.items() if _value(design, path)}
     for path in {**known, **dict.fromkeys(sorted(varied))}:
         now, then = _value(design, path), _value(before, path)

@@ -86,7 +86,7 @@ def expand(
         found: list[Parameter] = []
         for each in starred(design, path):
             design, added = expand(design, each, spec)
-            found += [replace(parameter, asked=path) for parameter in added]
+            found += added
         return design, found
     try:
         handles = find_handles(design, path)
@@ -97,7 +97,8 @@ def expand(
             return _of_cage(design, str(steps[1]), str(steps[2]), path, spec)
         if isinstance(spec, CagePoints):
             raise SearchError("these are no control points", hint="Vary cages.NAME.points")
-        return design, _of_value(path, get_value(design, path), spec)
+        single = _of_value(path, get_value(design, path), spec)
+        return design, [replace(each, asked=path) for each in single]
     except SearchError as error:
         raise SearchError(error.message, where=error.where or path, hint=error.hint) from None
 
@@ -151,7 +152,7 @@ def _of_value(path: str, value: Any, spec: Specification) -> list[Parameter]:
     """An ordinary path: one value, or the two or three numbers of a vector."""
     if isinstance(spec, Choice):
         spec = _colours_read(path, spec)
-        return [Parameter(path, spec, _number_of(value, spec), (Target(path),), asked=path)]
+        return [Parameter(path, spec, _number_of(value, spec), (Target(path),))]
     if isinstance(value, bool | str) or value is None:
         raise SearchError(
             f"the value there, {value!r}, is no number", hint="Give options: NAME,NAME,..."
@@ -170,7 +171,7 @@ def _of_value(path: str, value: Any, spec: Specification) -> list[Parameter]:
         )
     kind = _bounds(value, spec)
     start = _within(float(value), kind)
-    return [Parameter(path, kind, start, (Target(path),), asked=path)]
+    return [Parameter(path, kind, start, (Target(path),))]
 
 
 def _bounds(value: float, spec: Specification) -> Continuous | Integer:
@@ -204,7 +205,7 @@ def _of_cage(
         if not isinstance(spec, CagePoints) and (isinstance(cage.blend, float) or gridded):
             share = cage.blend if isinstance(cage.blend, float) else _mean_share(cage)
             ready = _with_blend(design, name, share)
-            return ready, _of_value(path, share, spec)
+            return ready, [replace(each, asked=path) for each in _of_value(path, share, spec)]
         shares = _shares(cage)
         ready = _with_blend(design, name, [Share(x=x, y=y, z=z) for x, y, z in shares.tolist()])
         return ready, _points(cage, path, shares, as_points(spec), free=_span(cage) != 0.0)

@@ -1,0 +1,305 @@
+"""Search spaces: what they may hold, and that a point becomes the design that it means."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from optisense.design import SensorDesign, add_cage, get_value
+from optisense.design.cage import as_array
+from optisense.errors import DesignError, OptiSenseError, SearchError
+from optisense.search import Around, CagePoints, Choice, Integer, SearchSpace
+from optisense.search.expand import expand
+from optisense.search.space import BoundSpace
+
+
+class TestNumbers:
+    def test_set_what_they_name(self, two_numbers: BoundSpace) -> None:
+        design = two_numbers.apply([0.25, 1.5])
+        assert design.coating.specularity == 0.25
+        assert design.camera.position == (1.5, 0.0, two_numbers.design.camera.position[2])
+        assert two_numbers.design.camera.position[0] == 0.0
+
+    def test_start_is_the_design(self, two_numbers: BoundSpace) -> None:
+        assert two_numbers.apply(two_numbers.start) == two_numbers.design
+        far = SearchSpace({"camera.position.x": (2.0, 3.0)}).bind(two_numbers.design)
+        assert far.start == [2.0]  # the nearest to it
+
+    def test_a_vector_is_its_numbers(self, mini: SensorDesign) -> None:
+        space = SearchSpace({"camera.position": Around(0.5)}).bind(mini)
+        assert space.names == [f"camera.position.{axis}" for axis in "xyz"]
+        assert np.allclose(space.lower, np.array(mini.camera.position) - 0.5)
+        assert np.allclose(space.upper, np.array(mini.camera.position) + 0.5)
+
+    def test_unit_cube_and_back(self, mixed: BoundSpace) -> None:
+        rng = np.random.default_rng(3)
+        points = mixed.from_unit(rng.random((200, mixed.size)))
+        for point in points:
+            mixed.check(point)
+        assert np.array_equal(mixed.from_unit(mixed.unit_of(points)), points)
+
+    def test_whole_numbers_share_the_unit_interval(self, mini: SensorDesign) -> None:
+        space = SearchSpace({"camera.resolution[0]": Integer(100, 103)}).bind(mini)
+        points = space.from_unit(np.linspace(0, 1, 4000)[:, None])[:, 0]
+        assert [int((points == value).sum()) for value in range(100, 104)] == [1000] * 4
+
+    def test_outside_is_refused(self, mixed: BoundSpace) -> None:
+        good = mixed.start
+        for index, value in ((0, 1.5), (2, 100.5), (1, 7.0)):
+            bad = good.copy()
+            bad[index] = value
+            with pytest.raises(SearchError) as told:
+                mixed.check(bad)
+            assert told.value.where == mixed.names[index]
+
+    def test_values_and_vectors_are_one_another(self, mixed: BoundSpace) -> None:
+        point = mixed.from_unit([0.3, 0.5, 0.9])
+        assert np.array_equal(mixed.vector(mixed.values(point)), point)
+        with pytest.raises(SearchError, match="no parameter 'flux'"):
+            mixed.vector({"flux": 1.0})
+
+
+class TestCages:
+    def test_all_81_numbers_of_a_cage(self, svelte: SensorDesign) -> None:
+        space = SearchSpace({"cages.M1.points": Around(2.0)}).bind(svelte)
+        assert space.size == 81
+        before = space.prepared.cages["M1"].current_points()
+        moved = space.apply(space.start + 0.5)
+        assert np.allclose(as_array(moved.cages["M1"].points), before + 0.5)
+        shift = moved.deformed_meshes()["M1"].vertices - svelte.deformed_meshes()["M1"].vertices
+        assert np.allclose(shift, 0.5, atol=1e-9)
+
+    def test_the_shape_stays_when_a_cage_changes_its_form(self, svelte: SensorDesign) -> None:
+        for path, spec in (("points", Around(1.0)), ("blend", (0.0, 1.0))):
+            space = SearchSpace({f"cages.M1.{path}": spec}).bind(svelte)
+            ours = space.apply(space.start).deformed_meshes()["M1"].vertices
+            assert np.allclose(ours, svelte.deformed_meshes()["M1"].vertices, atol=1e-9)
+
+    def test_a_subset_of_points_and_axes(self, svelte: SensorDesign) -> None:
+        spec = CagePoints(Around(1.0), points=(4, 13), axes="xz")
+        space = SearchSpace({"cages.M1.points": spec}).bind(svelte)
+        assert space.names == [f"cages.M1.points[{k}].{axis}" for k in (4, 13) for axis in "xz"]
+        with pytest.raises(SearchError, match="no point 27"):
+            SearchSpace({"cages.M1.points": CagePoints(Around(1.0), points=(27,))}).bind(svelte)
+
+    def test_mirrored_points_move_as_mirror_images(self, svelte: SensorDesign) -> None:
+        """Half the parameters; every shape in the space is symmetric."""
+        spec = CagePoints(Around(2.0), symmetry="y")
+        space = SearchSpace({"cages.M1.points": spec}).bind(svelte)
+        assert space.size == 9 * 3 + 9 * 2  # one side free, the middle in its plane
+        shape = space.apply(space.from_unit(np.random.default_rng(1).random(space.size)))
+        points = as_array(shape.cages["M1"].points)
+        low, high = np.array(shape.cages["M1"].box)[:, 1]
+        image = points * [1, -1, 1] + [0, low + high, 0]
+        for point in image:
+            assert np.linalg.norm(points - point, axis=1).min() < 1e-9
+
+    def test_symmetry_of_a_lopsided_shape_is_refused(self, mini: SensorDesign) -> None:
+        design = add_cage(mini, "one", ["gel", "skin"]) if not mini.cages else mini
+        name = next(iter(design.cages))
+        pushed = SearchSpace({f"cages.{name}.points[0].x": Around(1.0)}).bind(design)
+        lopsided = pushed.apply(pushed.upper)
+        with pytest.raises(SearchError, match="not symmetric along x"):
+            SearchSpace({f"cages.{name}.points": CagePoints(Around(1.0), symmetry="x")}).bind(
+                lopsided
+            )
+
+
+class TestPoses:
+    def test_groups_shift_and_turn_as_one(self, mini: SensorDesign) -> None:
+        space = SearchSpace(
+            {"lights.red.shift": Around(1.0), "lights.red.turn": Around(90.0)}
+        ).bind(mini)
+        before = np.array([light.position for light in mini.lights["red"].lights])
+        design = space.apply([0.5, 0.0, 0.0, 0.0, 0.0, 90.0])
+        after = np.array([light.position for light in design.lights["red"].lights])
+        assert np.allclose(after.mean(axis=0), before.mean(axis=0) + [0.5, 0.0, 0.0])
+
+        def between(places: np.ndarray) -> np.ndarray:
+            return np.linalg.norm(places[:, None] - places, axis=2)
+
+        assert np.allclose(between(after), between(before))
+        quarter = (before - before.mean(axis=0)) @ np.array([[0, 1, 0], [-1, 0, 0], [0, 0, 1]])
+        assert np.allclose(after - after.mean(axis=0), quarter)
+        first, same = mini.lights["red"].lights[0], design.lights["red"].lights[0]
+        assert np.allclose(
+            same.direction, [-first.direction[1], first.direction[0], first.direction[2]]
+        )
+        assert design.lights["green"] == mini.lights["green"]
+
+    def test_single_lights_and_the_camera(self, mini: SensorDesign) -> None:
+        space = SearchSpace(
+            {
+                "lights.red.lights[1].shift.z": (-1.0, 1.0),
+                "lights.red.lights[2].turn.x": (-10.0, 10.0),
+                "camera.turn.y": (-5.0, 5.0),
+            }
+        ).bind(mini)
+        design = space.apply([0.7, 10.0, 5.0])
+        old, new = mini.lights["red"].lights, design.lights["red"].lights
+        assert np.allclose(np.subtract(new[1].position, old[1].position), [0, 0, 0.7])
+        assert new[2].position == pytest.approx(old[2].position)
+        assert np.dot(new[2].direction, old[2].direction) <= 1.0
+        turned = np.degrees(np.arccos(np.dot(design.camera.direction, mini.camera.direction)))
+        assert turned == pytest.approx(5.0)
+        assert new[0] == old[0]
+
+    def test_parts_move_unless_a_cage_moves_them(self, svelte: SensorDesign) -> None:
+        space = SearchSpace({"parts.M2.shift.x": (-1.0, 1.0)}).bind(svelte)
+        assert space.reshapes
+        moved = space.apply([0.25]).deformed_meshes()["M2"].vertices
+        assert np.allclose(moved - svelte.deformed_meshes()["M2"].vertices, [0.25, 0, 0])
+        with pytest.raises(SearchError, match="moved by the cage 'M1'") as told:
+            SearchSpace({"parts.M1.shift.x": (-1.0, 1.0)}).bind(svelte)
+        assert told.value.hint == "Vary cages.M1.points"
+
+
+class TestChoices:
+    def test_colours_of_groups(self, mini: SensorDesign) -> None:
+        space = SearchSpace(
+            {"lights.red.colour": ["R", "green", (0.2, 0.3, 0.4)], "lights.red.flux": (1.0, 9.0)}
+        ).bind(mini)
+        assert space.apply([1, 2.0]).lights["red"].colour == (0.0, 1.0, 0.0)
+        design = space.apply([2, 2.0])
+        assert design.lights["red"].colour == (0.2, 0.3, 0.4)
+        assert design.lights["red"].flux == 2.0
+        assert space.start[0] == 0.0
+
+    def test_light_types_of_all_of_a_group_of_one(self, mini: SensorDesign) -> None:
+        kinds = ["smd-3528", "chanzon-5730"]
+        every = SearchSpace({"lights.model": kinds}).bind(mini)
+        assert {g.model for g in every.apply([1]).lights.values()} == {"chanzon-5730"}
+        group = SearchSpace({"lights.red.model": kinds}).bind(mini)
+        assert [g.model for g in group.apply([1]).lights.values()] == [
+            "chanzon-5730",
+            "smd-3528",
+            "smd-3528",
+        ]
+        single = SearchSpace({"lights.types": kinds}).bind(mini)
+        assert single.size == sum(len(group.lights) for group in mini.lights.values())
+        point = np.zeros(single.size)
+        point[3] = 1
+        lights = single.apply(point).lights
+        assert sorted((g.model, len(g.lights)) for g in lights.values()) == [
+            ("chanzon-5730", 1),
+            ("smd-3528", 4),
+            ("smd-3528", 5),
+            ("smd-3528", 5),
+        ]
+        places = {tuple(light.position) for group in lights.values() for light in group.lights}
+        assert places == {tuple(li.position) for g in mini.lights.values() for li in g.lights}
+
+    def test_materials_coatings_and_cameras_of_the_library(self, mini: SensorDesign) -> None:
+        import optisense.library as library
+
+        materials = [name for name in library.names("material") if name != "acrylic"][:2]
+        gel_material = str(mini.parts["gel"].material)
+        other = next(name for name in materials if name != gel_material)
+        space = SearchSpace(
+            {
+                "parts.gel.material": [gel_material, other],
+                "coating.library": list(library.names("coating"))[:2],
+                "camera.model": ["gelsight-mini", "pi-v1"],
+            }
+        ).bind(mini)
+        design = space.apply([1, 1, 1])
+        assert design.parts["gel"].material == other
+        assert design.materials[other] == library.material(other)
+        assert design.coating.library == list(library.names("coating"))[1]
+        assert design.camera.fov == library.camera("pi-v1").fov
+        assert design.camera.position == mini.camera.position
+
+    def test_a_number_may_be_one_of_several(self, mini: SensorDesign) -> None:
+        space = SearchSpace({"coating.specularity": Choice([0.1, 0.7])}).bind(mini)
+        assert space.apply([1]).coating.specularity == 0.7
+        assert space.values([1]) == {"coating.specularity": "0.7"}
+
+
+class TestBadInput:
+    @pytest.mark.parametrize(
+        ("path", "near"),
+        [
+            ("coating.specularty", "specularity"),
+            ("lights.rad.flux", "red"),
+            ("lights.rad.shift.x", "red"),
+            ("parts.gell.shift.x", "gel"),
+        ],
+    )
+    def test_a_wrong_path_names_the_near_match(
+        self, mini: SensorDesign, path: str, near: str
+    ) -> None:
+        with pytest.raises(DesignError) as told:
+            SearchSpace({path: (0.0, 1.0)}).bind(mini)
+        assert path in told.value.message
+        assert near in str(told.value.hint)
+
+    @pytest.mark.parametrize(
+        ("bounds", "said"),
+        [
+            ((1.0, 0.0), "reversed"),
+            ((1.0, 1.0), "empty"),
+            ((0.0, float("inf")), "not finite"),
+            ((float("nan"), 1.0), "not finite"),
+            ((0.0, 1.0, 1), "1 steps"),
+            (["diffuse-grey"], "two options"),
+            ("0:1", "does not say what may change"),
+        ],
+    )
+    def test_bad_bounds_name_the_path(self, bounds: object, said: str) -> None:
+        with pytest.raises(SearchError, match=said) as told:
+            SearchSpace({"coating.specularity": bounds})
+        assert told.value.where == "coating.specularity"
+
+    def test_bounds_that_the_design_refuses(self, mini: SensorDesign) -> None:
+        with pytest.raises(OptiSenseError) as told:
+            SearchSpace({"coating.specularity": (0.0, 2.0)}).bind(mini)
+        assert told.value.where == "coating.specularity"
+
+    @pytest.mark.parametrize(
+        ("space", "said"),
+        [
+            ({"camera.position": (0.0, 1.0), "camera.position.x": (0.0, 1.0)}, "varied twice"),
+            ({"lights.red.colour": ["R", "G"], "lights.red.colour.r": (0.0, 1.0)}, "both varied"),
+            ({"camera.model": (0.0, 1.0)}, "names to choose from"),
+            ({"lights.red.shift.x": ["a", "b"]}, "range of numbers"),
+            ({"camera": (0.0, 1.0)}, "a section"),
+            ({"camera.projection": (0.0, 1.0)}, "no number"),
+            ({"camera.shift.x": (0.0, 1.0)}, "position to move"),
+            ({"lights.red.colour": ["R", "mauve"]}, "no colour 'mauve'"),
+            ({}, "nothing may change"),
+        ],
+    )
+    def test_what_can_not_be_varied(
+        self, mini: SensorDesign, space: dict[str, object], said: str
+    ) -> None:
+        with pytest.raises(SearchError, match=said):
+            SearchSpace(space).bind(mini)
+
+
+def test_plain_values_are_the_same_space(mini: SensorDesign, svelte: SensorDesign) -> None:
+    for design, asked in (
+        (mini, {"coating.specularity": (0.0, 1.0, 11), "lights.red.colour": ["R", "G"]}),
+        (mini, {"camera.resolution[0]": Integer(100, 200), "camera.position": Around(0.5)}),
+        (svelte, {"cages.M1.points": CagePoints(Around(2.0), (0, 1, 5), "xz", "y")}),
+    ):
+        space = SearchSpace(asked)
+        again = SearchSpace.from_plain(space.to_plain())
+        assert again.parameters == space.parameters
+        assert again.bind(design).names == space.bind(design).names
+    with pytest.raises(SearchError, match="can't be read"):
+        SearchSpace.from_plain({"a": {"kind": "dice"}})
+
+
+def test_setting_81_numbers_at_once_is_quick(svelte: SensorDesign) -> None:
+    """The same design as by `set_value` for each, and what did not change is shared."""
+    space = SearchSpace({"cages.M1.points": Around(2.0)}).bind(svelte)
+    point = space.from_unit(np.random.default_rng(0).random(81))
+    design = space.apply(point)
+    assert [get_value(design, path) for path in space.names] == pytest.approx(point.tolist())
+    assert design.lights is space.prepared.lights
+    assert design.meshes["skin"] is svelte.meshes["skin"]
+
+
+def test_expand_tells_what_was_asked(mini: SensorDesign) -> None:
+    _, found = expand(mini, "camera.position", Around(1.0))
+    assert {parameter.asked for parameter in found} == {"camera.position"}
