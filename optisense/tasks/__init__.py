@@ -9,21 +9,58 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from optisense.tasks.calibration import CalibratedSensor, ReconstructionSettings
+    from optisense.tasks.cylinder_radius import CylinderRadius
     from optisense.tasks.dataset import Dataset, Sample
     from optisense.tasks.draws import ContactDraw
     from optisense.tasks.generation import DatasetSettings, generate
+    from optisense.tasks.misalignment import Misalignment
+    from optisense.tasks.perception import (
+        PerceptionResult,
+        PerceptionTask,
+        SampleSettings,
+        perceive,
+    )
+    from optisense.tasks.reconstruction import ReconstructionResult, reconstruct
     from optisense.tasks.snr import signal_to_noise
 
 _HOMES = {
+    "CalibratedSensor": "calibration",
     "ContactDraw": "draws",
+    "CylinderRadius": "cylinder_radius",
     "Dataset": "dataset",
     "DatasetSettings": "generation",
+    "Misalignment": "misalignment",
+    "PerceptionResult": "perception",
+    "PerceptionTask": "perception",
+    "ReconstructionResult": "reconstruction",
+    "ReconstructionSettings": "calibration",
     "Sample": "dataset",
+    "SampleSettings": "perception",
     "generate": "generation",
+    "perceive": "perception",
+    "reconstruct": "reconstruction",
     "signal_to_noise": "snr",
 }
 
-__all__ = ["ContactDraw", "Dataset", "DatasetSettings", "Sample", "generate", "signal_to_noise"]
+__all__ = [
+    "CalibratedSensor",
+    "ContactDraw",
+    "CylinderRadius",
+    "Dataset",
+    "DatasetSettings",
+    "Misalignment",
+    "PerceptionResult",
+    "PerceptionTask",
+    "ReconstructionResult",
+    "ReconstructionSettings",
+    "Sample",
+    "SampleSettings",
+    "generate",
+    "perceive",
+    "reconstruct",
+    "signal_to_noise",
+]
 
 
 def __getattr__(name: str) -> object:

@@ -14,8 +14,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from optisense.design import SensorDesign, load_design, save_design
+from optisense.design import SensorDesign, load_design
 from optisense.errors import ContactError, TaskError
+from optisense.library import with_own_lights
+from optisense.sensors import save_design
 from optisense.tasks.camera_noise import add_camera_noise
 from optisense.tasks.dataset import (
     BACKGROUND,
@@ -179,8 +181,8 @@ class _Maker:
         if info_file.exists():
             before = read_json(info_file)
             known = {key: before.get(key) for key in common}
-            known["design"] = _design_values(load_design(self._folder / DESIGN))
-            now = common | {"design": _design_values(self._model.design)}
+            known["design"] = design_values(load_design(self._folder / DESIGN))
+            now = common | {"design": design_values(with_own_lights(self._model.design))}
             refuse_differences("a dataset", self._folder, known, now)
             return float(before["exposure"])
         if self._folder.is_dir() and any(self._folder.iterdir()):
@@ -241,10 +243,7 @@ class _Maker:
                 for text, indenter in self._indenters.items()
                 if hasattr(indenter, "source")
             },
-            "meshes": {
-                name: _digest(mesh.vertices.tobytes(), mesh.faces.tobytes())
-                for name, mesh in self._model.design.meshes.items()
-            },
+            "meshes": mesh_digests(self._model.design),
         }
 
     def _render(self, drawn: DrawnContact) -> TactileImage:
@@ -307,12 +306,20 @@ def _save_arrays(arrays: dict[str, Any], path: Path) -> None:
     np.savez_compressed(path, **arrays)
 
 
-def _design_values(design: SensorDesign) -> dict[str, Any]:
+def design_values(design: SensorDesign) -> dict[str, Any]:
     """What makes a design's pictures, without names of files and where numbers come from."""
     values = design.model_dump(mode="json", exclude={"provenance", "description", "name"})
     for part in values["parts"].values():
         part.pop("mesh", None)
     return values
+
+
+def mesh_digests(design: SensorDesign) -> dict[str, str]:
+    """What tells meshes of the same name apart."""
+    return {
+        name: _digest(mesh.vertices.tobytes(), mesh.faces.tobytes())
+        for name, mesh in design.meshes.items()
+    }
 
 
 def _digest(*contents: bytes) -> str:

@@ -52,7 +52,7 @@ def read_by_forest(features: FloatArray, targets: FloatArray, seed: int = 0) -> 
     predictions = np.empty_like(targets)
     errors, guesses = [], []
     for fitted, held_out in KFold(FOLDS, shuffle=True, random_state=seed).split(features):
-        forest = RandomForestRegressor(TREES, random_state=seed)
+        forest = RandomForestRegressor(n_estimators=TREES, random_state=seed)
         # One target is a vector to scikit-learn, several are a matrix.
         known = targets[fitted] if targets.shape[1] > 1 else targets[fitted, 0]
         forest.fit(features[fitted], known)

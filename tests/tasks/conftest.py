@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Sequence
+from typing import Any
 
+import numpy as np
 import pytest
 
 from optisense.optics.variant import use_variant
 
 use_variant(os.environ.get("OPTISENSE_TEST_VARIANT", "llvm"))
 
-from optisense import OpticalModel, load  # noqa: E402
+from optisense import Contact, OpticalModel, load  # noqa: E402
+from optisense.optics import TactileImage  # noqa: E402
 
 
 @pytest.fixture(scope="session")
@@ -23,3 +27,43 @@ def mini() -> OpticalModel:
 def cylindrical_mini() -> OpticalModel:
     """A GelSight Mini bent to a cylinder; tests don't change it."""
     return OpticalModel(load("gelsight-mini-cylindrical"))
+
+
+LIGHTS = np.array([[0.8, 0.0, -0.6], [-0.4, 0.69282, -0.6], [-0.4, -0.69282, -0.6]])
+"""Towards red, green and blue light, which come from all sides of a flat Mini, from inside (-z)."""
+
+
+class LambertianSensor:
+    """The geometry of a real model, but colours from algebra: each channel is the cosine between
+    the normal and that channel's light, infinitely far away, with no shadows.
+    """
+
+    def __init__(self, model: OpticalModel) -> None:
+        self._model = model
+        self.pictures = 0
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._model, name)
+
+    def render(
+        self,
+        contacts: Sequence[Contact] = (),
+        resolution: tuple[int, int] = (160, 120),
+        **ignored: object,
+    ) -> TactileImage:
+        """An image without noise."""
+        self.pictures += 1
+        rays = self._model.chief_rays(resolution, contacts)
+        light = np.maximum(rays.normals @ LIGHTS.T, 0).astype(np.float32)
+        return TactileImage(
+            layers={"all": np.where(rays.hit[..., None], light, 0)},
+            normals=rays.normals,
+            contact_mask=rays.hit & (rays.region == 2),
+            points=rays.points,
+        )
+
+
+@pytest.fixture
+def lambertian(mini: OpticalModel) -> Any:
+    """A flat Mini whose colours are algebra."""
+    return LambertianSensor(mini)

@@ -1,0 +1,387 @@
+"""``optisense task``: what a robot would read from a sensor."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from optisense.cli.console import ends_well, messages, output
+from optisense.cli.dataset import parse_range
+from optisense.cli.options import (
+    DesignArgument,
+    parse_contacts,
+    parse_resolution,
+    parse_variant,
+)
+from optisense.cli.progress import counting_bar
+from optisense.cli.render import ensure_writable
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from optisense.tasks import (
+        PerceptionResult,
+        PerceptionTask,
+        ReconstructionResult,
+        SampleSettings,
+    )
+
+RESULT = "result.json"
+FIGURE = "figure.png"
+
+task_app = typer.Typer(
+    help="Press known things into a sensor and see how well its pictures tell them.",
+    no_args_is_help=True,
+)
+
+SamplesOption = Annotated[
+    int, typer.Option("--samples", "-n", min=10, metavar="N", help="Random contacts.")
+]
+SeedOption = Annotated[
+    int, typer.Option(min=0, max=2**32 - 1, metavar="N", help="The same seed, the same contacts.")
+]
+NoiseOption = Annotated[
+    float,
+    typer.Option(
+        min=0.0,
+        max=255.0,
+        metavar="LEVELS",
+        help="Noise of the camera, of 255; a real GelSight Mini shows 1.1 to 1.9.",
+    ),
+]
+NeighboursOption = Annotated[
+    int, typer.Option(min=2, metavar="K", help="Neighbours of the signal-to-noise ratio.")
+]
+ResolutionOption = Annotated[
+    str | None,
+    typer.Option(
+        metavar="WIDTHxHEIGHT",
+        help="Pixels of the pictures; what the task needs when left out.",
+        show_default=False,
+    ),
+]
+PhotonsOption = Annotated[
+    int, typer.Option(min=1, metavar="N", help="Photons of the light that all pictures share.")
+]
+EstimatorOption = Annotated[
+    str,
+    typer.Option(metavar="field|sppm", help="sppm is slow, and exact where plates cover the gel."),
+]
+OutOption = Annotated[
+    Path | None,
+    typer.Option(
+        "--out",
+        "-o",
+        metavar="DIR",
+        help="Folder for result.json and figure.png. Samples are kept there, so that the same "
+        "command continues when it was stopped.",
+        show_default=False,
+    ),
+]
+JsonOption = Annotated[bool, typer.Option("--json", help="Print JSON instead of a table.")]
+VariantOption = Annotated[
+    str, typer.Option(metavar="auto|llvm|cuda", help="Processor (llvm) or GPU (cuda).")
+]
+
+PHOTONS = 5_000_000
+SAMPLES = 200
+NOISE = 1.5
+NEIGHBOURS = 5
+
+
+@task_app.command()
+@ends_well
+def misalignment(
+    design: DesignArgument,
+    samples: SamplesOption = SAMPLES,
+    angle: Annotated[
+        float,
+        typer.Option("--range", min=0.1, max=44.0, metavar="DEGREES", help="The largest angle."),
+    ] = 10.0,
+    depth: Annotated[
+        float, typer.Option(min=0.01, metavar="MM", help="Of the plane, in the middle.")
+    ] = 0.8,
+    crop: Annotated[
+        float,
+        typer.Option(min=0.01, max=1.0, metavar="PART", help="Of the picture that is averaged."),
+    ] = 0.25,
+    seed: SeedOption = 0,
+    camera_noise: NoiseOption = NOISE,
+    neighbours: NeighboursOption = NEIGHBOURS,
+    resolution: ResolutionOption = None,
+    photons: PhotonsOption = PHOTONS,
+    estimator: EstimatorOption = "field",
+    out: OutOption = None,
+    as_json: JsonOption = False,
+    variant: VariantOption = "auto",
+) -> None:
+    """The angle between the sensor and a plane, from the mean colour in the middle."""
+    from optisense.tasks import Misalignment
+
+    settings = _settings(samples, seed, camera_noise, resolution, photons, estimator)
+    task = Misalignment(range=angle, depth=depth, crop=crop)
+    _perceive(design, [task], settings, neighbours, out, as_json, variant)
+
+
+@task_app.command("cylinder-radius")
+@ends_well
+def cylinder_radius(
+    design: DesignArgument,
+    samples: SamplesOption = SAMPLES,
+    radius: Annotated[str, typer.Option(metavar="LOW:HIGH", help="mm.")] = "1:6",
+    depth: Annotated[float, typer.Option(min=0.01, metavar="MM", help="The same for all.")] = 0.5,
+    seed: SeedOption = 0,
+    camera_noise: NoiseOption = NOISE,
+    neighbours: NeighboursOption = NEIGHBOURS,
+    resolution: ResolutionOption = None,
+    photons: PhotonsOption = PHOTONS,
+    estimator: EstimatorOption = "field",
+    out: OutOption = None,
+    as_json: JsonOption = False,
+    variant: VariantOption = "auto",
+) -> None:
+    """The radius of a touching cylinder, from the spread of colours in the contact."""
+    from optisense.tasks import CylinderRadius
+
+    settings = _settings(samples, seed, camera_noise, resolution, photons, estimator)
+    least, most = parse_range(radius, "--radius")
+    task = CylinderRadius(least=least, most=most, depth=depth)
+    _perceive(design, [task], settings, neighbours, out, as_json, variant)
+
+
+@task_app.command()
+@ends_well
+def snr(
+    design: DesignArgument,
+    samples: SamplesOption = SAMPLES,
+    seed: SeedOption = 0,
+    camera_noise: NoiseOption = NOISE,
+    neighbours: NeighboursOption = NEIGHBOURS,
+    resolution: ResolutionOption = None,
+    photons: PhotonsOption = PHOTONS,
+    estimator: EstimatorOption = "field",
+    out: OutOption = None,
+    as_json: JsonOption = False,
+    variant: VariantOption = "auto",
+) -> None:
+    """The signal-to-noise ratio of both tasks' samples: how well colours tell, with no model."""
+    from optisense.tasks import CylinderRadius, Misalignment
+
+    settings = _settings(samples, seed, camera_noise, resolution, photons, estimator)
+    tasks: list[PerceptionTask] = [Misalignment(), CylinderRadius()]
+    _perceive(design, tasks, settings, neighbours, out, as_json, variant)
+
+
+@task_app.command()
+@ends_well
+def reconstruction(
+    design: DesignArgument,
+    thing: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--object",
+            metavar="KIND:SIZE@U,V:DEPTH",
+            help="What is reconstructed, written as a contact. May be given several times.  "
+            "[default: a ball of 3 mm, a cylinder of 2 mm, a pyramid of 30 degrees]",
+            show_default=False,
+        ),
+    ] = None,
+    method: Annotated[
+        str, typer.Option(metavar="network|table", help="What colours are read with.")
+    ] = "network",
+    presses: Annotated[
+        int, typer.Option(min=1, metavar="N", help="Balls that it is fitted to.")
+    ] = 40,
+    radius: Annotated[
+        float, typer.Option(min=0.01, metavar="MM", help="Radius of these balls.")
+    ] = 1.5,
+    depth: Annotated[str, typer.Option(metavar="LOW:HIGH", help="How deep they press, mm.")] = (
+        "0.2:0.6"
+    ),
+    seed: SeedOption = 0,
+    camera_noise: NoiseOption = NOISE,
+    resolution: ResolutionOption = None,
+    photons: PhotonsOption = PHOTONS,
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            "--out",
+            "-o",
+            metavar="DIR",
+            help="Folder for result.json and figure.png.",
+            show_default=False,
+        ),
+    ] = None,
+    as_json: JsonOption = False,
+    variant: VariantOption = "auto",
+) -> None:
+    """Shapes from pictures: errors of normals (degrees) and depth (mm) on unseen objects."""
+    parse_variant(variant)
+    depths = parse_range(depth, "--depth")
+    size = None if resolution is None else parse_resolution(resolution)
+    contacts = dict(zip(thing or [], parse_contacts(thing), strict=True)) or None
+
+    from optisense.sensors import load
+    from optisense.tasks import ReconstructionSettings, reconstruct
+
+    settings = ReconstructionSettings(
+        method=method,
+        presses=presses,
+        radius=radius,
+        depth=depths,
+        seed=seed,
+        camera_noise=camera_noise,
+        resolution=size,
+        photons=photons,
+    )
+    sensor = load(design)
+    if out is not None:
+        ensure_writable(out)
+
+    from optisense.optics import OpticalModel
+    from optisense.tasks.figures import draw_reconstruction
+
+    with counting_bar("pictures") as show:
+        result = reconstruct(OpticalModel(sensor, variant), settings, contacts, show)
+    if out is not None:
+        _write(out, result.to_dict(), draw_reconstruction(result, sensor.camera.axes()))
+    if as_json:
+        _print_json(result.to_dict())
+    else:
+        _print_reconstruction(result)
+        _say_where(out)
+
+
+def _settings(
+    samples: int,
+    seed: int,
+    camera_noise: float,
+    resolution: str | None,
+    photons: int,
+    estimator: str,
+) -> SampleSettings:
+    size = None if resolution is None else parse_resolution(resolution)
+
+    from optisense.tasks import SampleSettings
+
+    return SampleSettings(
+        count=samples,
+        seed=seed,
+        camera_noise=camera_noise,
+        resolution=size,
+        photons=photons,
+        estimator=estimator,
+    )
+
+
+def _perceive(
+    design: str,
+    tasks: list[PerceptionTask],
+    settings: SampleSettings,
+    neighbours: int,
+    out: Path | None,
+    as_json: bool,
+    variant: str,
+) -> None:
+    """Run tasks one after the other; several have a folder each."""
+    parse_variant(variant)
+
+    from optisense.sensors import load
+
+    sensor = load(design)
+    if out is not None:
+        ensure_writable(out)
+
+    from optisense.optics import OpticalModel
+    from optisense.tasks import perceive
+    from optisense.tasks.figures import draw_perception
+
+    results = []
+    with _keeping(out):
+        model = OpticalModel(sensor, variant)
+        for task in tasks:
+            folder = out if out is None or len(tasks) == 1 else out / task.name
+            with counting_bar(task.name) as show:
+                results.append(perceive(task, model, settings, neighbours, folder, show))
+            if folder is not None:
+                _write(folder, results[-1].to_dict(), draw_perception(results[-1]))
+    if as_json:
+        values = [result.to_dict() for result in results]
+        _print_json(values[0] if len(values) == 1 else {"tasks": values})
+    else:
+        _print_perception(results)
+        _say_where(out)
+
+
+@contextmanager
+def _keeping(out: Path | None) -> Iterator[None]:
+    """Say after Ctrl-C what becomes of finished samples."""
+    try:
+        yield
+    except KeyboardInterrupt:
+        if out is not None:
+            messages.print("finished samples are kept; the same command continues")
+        raise
+
+
+def _print_perception(results: Iterable[PerceptionResult]) -> None:
+    from rich.table import Table
+
+    table = Table(box=None, pad_edge=False)
+    table.add_column("task")
+    for heading in ("mean error", "among folds", "of guessing", "signal to noise", "samples"):
+        table.add_column(heading, justify="right")
+    for result in results:
+        reading = result.reading
+        table.add_row(
+            result.task,
+            f"{reading.error:.3g} {result.unit}",
+            f"± {reading.spread:.2g}",
+            f"{reading.guess:.3g} {result.unit}",
+            f"{result.snr:.3g}",
+            f"{len(result.samples.targets)}",
+        )
+    output.print(table)
+
+
+def _print_reconstruction(result: ReconstructionResult) -> None:
+    from rich.table import Table
+
+    table = Table(box=None, pad_edge=False)
+    table.add_column("object")
+    for heading in ("normals off by", "of reading nothing", "depth off by", "deepest", "read"):
+        table.add_column(heading, justify="right")
+    for name, each in result.objects.items():
+        values = each.to_dict()
+        table.add_row(
+            name,
+            f"{values['normal_error']:.1f} degrees",
+            f"{values['normal_error_of_reading_nothing']:.1f} degrees",
+            f"{values['depth_error']:.3f} mm",
+            f"{values['deepest']:.2f} mm",
+            f"{values['deepest_read']:.2f} mm",
+        )
+    means = f"{result.normal_error:.1f} degrees", "", f"{result.depth_error:.3f} mm"
+    table.add_row("mean", *means, "", "", style="bold")
+    output.print(table)
+
+
+def _write(folder: Path, values: dict[str, Any], figure: Figure) -> None:
+    from optisense.tasks.records import write_json, write_whole
+
+    write_json(folder / RESULT, values)
+    write_whole(folder / FIGURE, lambda path: figure.savefig(path, dpi=110))
+
+
+def _print_json(values: dict[str, Any]) -> None:
+    print(json.dumps(values, indent=2, allow_nan=False))
+
+
+def _say_where(out: Path | None) -> None:
+    if out is not None:
+        output.print(f"results: {out}", markup=False)

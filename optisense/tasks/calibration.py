@@ -1,0 +1,217 @@
+"""Calibrate a simulated sensor as users calibrate real ones: press balls at known places, and fit
+what colour means which tilt of the surface.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import distance_transform_edt, gaussian_filter
+
+from optisense.errors import ContactError, TaskError
+from optisense.geometry import Contact, Sphere
+from optisense.tasks.camera_noise import MEASURED_NOISE, add_camera_noise
+from optisense.tasks.colour_to_normal import METHODS, TiltReader, fit_reader, normals_of, tilts_of
+from optisense.tasks.draws import Places
+from optisense.tasks.integration import NormalIntegrator
+from optisense.tasks.untouched import UntouchedSurface
+
+if TYPE_CHECKING:
+    from optisense.optics import OpticalModel, TactileImage
+
+FloatArray = NDArray[np.float64]
+
+WIDTH = 320
+"""Pixels across the pictures, as GelSight's own software has."""
+
+MOST_SAMPLES = 20_000
+"""Pixels that a reader is fitted to."""
+
+ATTEMPTS = 50
+"""Presses tried for each that is wanted."""
+
+LEAST_PIXELS = 20
+"""Of a contact that counts as seen."""
+
+QUIET = 3.0
+QUIET_BLUR = 1.5
+"""Where a picture, blurred by QUIET_BLUR pixels, differs from the untouched one by less than QUIET
+levels in each channel, nothing is read: small errors over a wide, flat surface would add up."""
+
+_PLACE, _CAMERA, _SAMPLES = 5, 6, 7  # what a seed is for
+
+
+@dataclass(frozen=True)
+class ReconstructionSettings:
+    """How a reader is fitted and tried.
+
+    Attributes:
+        method: "network" or "table" (see `colour_to_normal`).
+        presses: balls that it is fitted to.
+        radius: mm, of these balls.
+        depth: mm, least and most; the steepest slope that is learned follows from the deepest.
+        seed: of places, depths, noise and network.
+        camera_noise: standard deviation in levels of 255, on all pictures.
+        resolution: (width, height) pixels; 320 wide, in the camera's shape, if None.
+        photons: of the light that all pictures share.
+    """
+
+    method: str = "network"
+    presses: int = 40
+    radius: float = 1.5
+    depth: tuple[float, float] = (0.2, 0.6)
+    seed: int = 0
+    camera_noise: float = MEASURED_NOISE
+    resolution: tuple[int, int] | None = None
+    photons: int = 5_000_000
+
+    def __post_init__(self) -> None:
+        if self.method not in METHODS:
+            raise TaskError(
+                f"there is no method '{self.method}'", hint="Use one of " + ", ".join(METHODS)
+            )
+        low, high = self.depth
+        if not (self.presses >= 1 and self.radius > 0 and 0 < low <= high <= self.radius):
+            raise TaskError(
+                f"{self.presses} presses of a ball of {self.radius:g} mm, {low:g} to {high:g} mm "
+                "deep, make no sense",
+                hint="Press at least one ball, above 0 mm and not deeper than its radius",
+            )
+        if not 0 <= self.camera_noise < 256:
+            raise TaskError(f"the camera noise is {self.camera_noise:g}", hint="Give 0 to 255")
+
+
+class CalibratedSensor:
+    """A simulated sensor to which a reader of tilts has been fitted by ball presses."""
+
+    def __init__(
+        self,
+        model: OpticalModel,
+        settings: ReconstructionSettings,
+        tell: Callable[[int], None] = lambda done: None,
+    ) -> None:
+        """Press the balls and fit the reader. tell: called with the number of balls pressed."""
+        from optisense.optics.response import auto_exposure
+
+        self._model = model
+        self._settings = settings
+        camera = model.design.camera
+        height = max(1, round(WIDTH * camera.resolution[1] / camera.resolution[0]))
+        self._resolution = settings.resolution or (WIDTH, height)
+        self.untouched = UntouchedSurface.of(model.chief_rays(self._resolution))
+        self._frames = self.untouched.frames(model.surface.u_axis)
+        self._integrator = NormalIntegrator(self.untouched)
+        blank = self._render([])
+        self._exposure = auto_exposure(blank.radiance)
+        # A real one is the mean of many pictures, without noise.
+        self._background = blank.picture(self._exposure).astype(np.float64)
+        samples = [np.hstack(self._press(i)) for i in _told(settings.presses, tell)]
+        chosen = np.concatenate(samples)
+        if len(chosen) > MOST_SAMPLES:
+            rng = np.random.default_rng([settings.seed, _SAMPLES])
+            chosen = chosen[rng.choice(len(chosen), MOST_SAMPLES, replace=False)]
+        self.fitted_pixels = len(chosen)
+        self._reader: TiltReader = fit_reader(
+            settings.method, chosen[:, :3], chosen[:, 3:5], chosen[:, 5:], settings.seed
+        )
+
+    def read(self, picture: NDArray[np.uint8]) -> tuple[FloatArray, FloatArray]:
+        """Normals (h, w, 3) and depth (h, w) mm from a picture (h, w, 3)."""
+        seen = self.untouched.seen
+        colours, places = self._features(picture)
+        tilts = np.zeros((*seen.shape, 2))
+        changed = np.abs(gaussian_filter(colours, (QUIET_BLUR, QUIET_BLUR, 0))).max(axis=2) >= QUIET
+        read = seen & changed
+        if read.any():
+            tilts[read] = self._reader.tilts(colours[read], places[read])
+        normals = normals_of(tilts, *self._frames, self.untouched.normals)
+        return normals, self._integrator.depths(normals)
+
+    def look(self, contact: Contact, number: int = 0) -> tuple[TactileImage, NDArray[np.uint8]]:
+        """An image of something that presses, and the picture (h, w, 3) that the camera stores.
+
+        Args:
+            number: of the picture; each has noise of its own.
+        """
+        image = self._render([contact])
+        seed = [self._settings.seed, self._settings.presses + number, _CAMERA]
+        return image, self._picture(image, seed)
+
+    def _press(self, index: int) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Colours, places and tilts of pixels in, near and far from one ball press."""
+        settings = self._settings
+        image = None
+        for attempt in range(ATTEMPTS):
+            rng = np.random.default_rng([settings.seed, index, _PLACE, attempt])
+            x, y, z = self._places.draw(rng)[0].tolist()
+            ball = Contact(
+                Sphere(settings.radius), point=(x, y, z), depth=float(rng.uniform(*settings.depth))
+            )
+            try:
+                image = self._render([ball])
+            except ContactError:
+                continue
+            if image.contact_mask.sum() >= LEAST_PIXELS:
+                break
+        else:
+            raise TaskError(
+                f"no ball of {settings.radius:g} mm could be pressed where the camera looks",
+                hint="Press less deep, or check where the camera looks",
+            )
+        assert image is not None
+        colours, places = self._features(self._picture(image, [settings.seed, index, _CAMERA]))
+        tilts = tilts_of(image.normals, *self._frames)
+        chosen = _pixels_to_learn(image.contact_mask, self.untouched.seen, rng)
+        return colours[chosen], places[chosen], tilts[chosen]
+
+    @cached_property
+    def _places(self) -> Places:
+        return Places.of(self._model)
+
+    def _render(self, contacts: Sequence[Contact]) -> TactileImage:
+        image = self._model.render(
+            contacts,
+            resolution=self._resolution,
+            photons=self._settings.photons,
+            seed=self._settings.seed,
+        )
+        if image.interrupted:
+            raise KeyboardInterrupt
+        return image
+
+    def _picture(self, image: TactileImage, seed: list[int]) -> NDArray[np.uint8]:
+        return add_camera_noise(image.picture(self._exposure), self._settings.camera_noise, seed)
+
+    def _features(self, picture: NDArray[np.uint8]) -> tuple[FloatArray, FloatArray]:
+        """Colour differences (h, w, 3) and places (h, w, 2)."""
+        height, width = picture.shape[:2]
+        y, x = np.meshgrid(np.linspace(-1, 1, height), np.linspace(-1, 1, width), indexing="ij")
+        return picture - self._background, np.stack([x, y], axis=-1)
+
+
+def _pixels_to_learn(
+    inside: NDArray[np.bool_], seen: NDArray[np.bool_], rng: np.random.Generator
+) -> NDArray[np.bool_]:
+    """(h, w): all of a contact, half as many around it, where its shadow falls, and half as many
+    anywhere else: a reader must learn that nothing is tilted there.
+    """
+    count = int(inside.sum())
+    chosen = inside & seen
+    reach = 2.0 * np.sqrt(count / np.pi)
+    near = distance_transform_edt(~inside) < reach
+    for region in (near & ~inside & seen, ~near & seen):
+        pixels = np.flatnonzero(region)
+        kept = rng.permutation(pixels)[: count // 2]
+        chosen.flat[kept] = True
+    return chosen
+
+
+def _told(count: int, tell: Callable[[int], None]) -> Iterator[int]:
+    for number in range(count):
+        tell(number)
+        yield number

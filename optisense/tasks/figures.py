@@ -1,0 +1,95 @@
+"""Figures of tasks. Matplotlib is loaded when one is drawn; nothing is shown or saved here."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from optisense.tasks.perception import PerceptionResult
+from optisense.tasks.reconstruction import ReconstructionResult
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+DOT = "#1f6fb2"
+LINE = "#c0392b"
+WORST_ANGLE = 30.0
+"""Degrees, where the colours of a normal error end."""
+
+FloatArray = NDArray[np.float64]
+
+
+def _figure(width: float, height: float) -> Figure:
+    from matplotlib.figure import Figure
+
+    return Figure(figsize=(width, height), layout="constrained")
+
+
+def draw_perception(result: PerceptionResult) -> Figure:
+    """Read against true targets, each read by a forest that did not see it."""
+    targets, read = result.samples.targets, result.reading.predictions
+    figure = _figure(1.2 + 4.2 * targets.shape[1], 4.8)
+    for number, axes in enumerate(figure.subplots(1, targets.shape[1], squeeze=False)[0]):
+        ends = [targets[:, number].min(), targets[:, number].max()]
+        axes.plot(ends, ends, color=LINE, lw=1)
+        axes.plot(targets[:, number], read[:, number], "o", ms=3, color=DOT, alpha=0.7)
+        error = np.abs(read - targets)[:, number].mean()
+        name = result.targets[number].replace("_", " ")
+        axes.set_title(f"{name}: off by {error:.2g} {result.unit} on average", fontsize=10)
+        axes.set_xlabel(f"true ({result.unit})")
+        axes.set_ylabel(f"read ({result.unit})")
+        axes.set_aspect("equal")
+    figure.suptitle(
+        f"{result.task} on {result.design}\n{len(targets)} contacts, "
+        f"signal to noise {result.snr:.3g}",
+        fontsize=11,
+    )
+    return figure
+
+
+def draw_reconstruction(result: ReconstructionResult, axes: FloatArray) -> Figure:
+    """Each object: picture, true and read normals, their angle, true and read depth.
+
+    Args:
+        axes: (3, 3) rows: image right, image up and viewing direction, in the design's frame.
+    """
+    rows = len(result.objects)
+    titles = ("picture", "true normals", "read normals", "normal error (°)")
+    figure = _figure(16, 2.15 * rows + 0.6)
+    grid = figure.subplots(rows, 6, squeeze=False)
+    for line, (name, each) in zip(grid, result.objects.items(), strict=True):
+        deepest = float(np.nanmax(each.true_depth[each.mask]))
+        pictures: tuple[tuple[NDArray[Any], dict[str, Any]], ...] = (
+            (each.picture, {}),
+            (_normal_colours(each.true_normals, axes), {}),
+            (_normal_colours(each.normals, axes), {}),
+            (each.angles, {"vmin": 0, "vmax": WORST_ANGLE, "cmap": "magma"}),
+            (each.true_depth, {"vmin": 0, "vmax": deepest, "cmap": "viridis"}),
+            (each.depth, {"vmin": 0, "vmax": deepest, "cmap": "viridis"}),
+        )
+        for cell, (values, colours) in zip(line, pictures, strict=True):
+            shown = cell.imshow(values, **colours)
+            cell.set_xticks([])
+            cell.set_yticks([])
+            if colours:
+                figure.colorbar(shown, ax=cell, shrink=0.8)
+        line[0].set_ylabel(name)
+        line[3].set_xlabel(f"{each.normal_error:.1f}° on average")
+        line[5].set_xlabel(f"off by {each.depth_error:.3f} mm on average")
+    for cell, title in zip(grid[0], (*titles, "true depth (mm)", "read depth (mm)"), strict=True):
+        cell.set_title(title, fontsize=10)
+    figure.suptitle(
+        f"{result.design}, {result.settings.method} fitted to {result.settings.presses} presses "
+        f"of a ball of {result.settings.radius:g} mm",
+        fontsize=11,
+    )
+    return figure
+
+
+def _normal_colours(normals: FloatArray, axes: FloatArray) -> FloatArray:
+    """The usual colours of a normal map, 0..1: red right, green up, blue towards the camera."""
+    seen = np.nan_to_num(normals) @ (axes * np.array([[1.0], [1.0], [-1.0]])).T
+    colours: FloatArray = np.clip(0.5 + 0.5 * seen, 0.0, 1.0)
+    return colours

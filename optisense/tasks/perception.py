@@ -1,0 +1,314 @@
+"""Perception tasks: press something whose angle or size is known, and see how well it is read.
+
+The OptiSense paper ("Why choosing those objective functions?") makes a small set of simulated
+contacts for each task, turns each picture into a few numbers, and lets a random forest read the
+quantity from them. Each task module says what is pressed and which numbers are taken.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from optisense.errors import TaskError
+from optisense.geometry import Contact
+from optisense.objectives.score import json_ready
+from optisense.tasks.camera_noise import MEASURED_NOISE, add_camera_noise
+from optisense.tasks.generation import design_values, mesh_digests
+from optisense.tasks.records import Table, read_json, refuse_differences, write_json
+from optisense.tasks.regression import FOLDS, ForestReading, read_by_forest
+from optisense.tasks.snr import NEIGHBOURS, signal_to_noise
+
+if TYPE_CHECKING:
+    from optisense.optics import OpticalModel, TactileImage
+
+FloatArray = NDArray[np.float64]
+ByteArray = NDArray[np.uint8]
+
+SETTINGS = "task.json"
+SAMPLES = "samples.csv"
+
+_CONTACT, _CAMERA = 3, 4  # what a seed is for
+
+
+class PerceptionTask(Protocol):
+    """A quantity to read from pictures; a frozen dataclass, whose fields are its settings."""
+
+    @property
+    def name(self) -> str:
+        """As on the command line."""
+        ...
+
+    @property
+    def unit(self) -> str:
+        """Of the targets."""
+        ...
+
+    @property
+    def targets(self) -> tuple[str, ...]:
+        """Names of the quantities to read."""
+        ...
+
+    @property
+    def features(self) -> tuple[str, ...]:
+        """Names of the numbers taken from a picture."""
+        ...
+
+    @property
+    def width(self) -> int:
+        """Pixels across the pictures that the features need."""
+        ...
+
+    @property
+    def contact_only(self) -> bool:
+        """Whether the features read nothing outside the contact."""
+        ...
+
+    def check(self, model: OpticalModel) -> None:
+        """Find out before any work whether the sensor can be pressed so.
+
+        Raises:
+            ContactError: it can't.
+        """
+        ...
+
+    def contact(
+        self, model: OpticalModel, rng: np.random.Generator
+    ) -> tuple[Contact, Sequence[float]]:
+        """A random contact and its targets."""
+        ...
+
+    def measure(self, picture: ByteArray, image: TactileImage) -> Sequence[float]:
+        """The features of a picture (h, w, 3), as the camera stored it.
+
+        Raises:
+            TaskError: they can't be taken, for instance because the contact is not seen.
+        """
+        ...
+
+
+@dataclass(frozen=True)
+class SampleSettings:
+    """How samples are made.
+
+    Attributes:
+        count: of samples.
+        seed: of everything; sample i depends on it and on i only.
+        camera_noise: standard deviation in levels of 255 (see `camera_noise`).
+        resolution: (width, height) pixels; what the task needs, in the camera's shape, if None.
+        photons: of the light that all samples share.
+        estimator: of the light, "field" or "sppm".
+    """
+
+    count: int = 200
+    seed: int = 0
+    camera_noise: float = MEASURED_NOISE
+    resolution: tuple[int, int] | None = None
+    photons: int = 5_000_000
+    estimator: str = "field"
+
+
+@dataclass(frozen=True)
+class Samples:
+    """features (n, f) in levels of 255, targets (n, t) in the task's unit."""
+
+    features: FloatArray
+    targets: FloatArray
+
+
+@dataclass(frozen=True)
+class PerceptionResult:
+    """How well a sensor tells a quantity.
+
+    task, unit, targets: of what. samples: what was learned from. reading: of the random forest,
+    cross-validated. snr: the signal-to-noise ratio. settings: of task and samples.
+    """
+
+    task: str
+    design: str
+    unit: str
+    targets: tuple[str, ...]
+    samples: Samples
+    reading: ForestReading
+    snr: float
+    settings: dict[str, Any]
+
+    def to_dict(self) -> dict[str, Any]:
+        """Everything but the samples, ready for JSON."""
+        error = np.abs(self.reading.predictions - self.samples.targets).mean(axis=0)
+        return {
+            "task": self.task,
+            "design": self.design,
+            "unit": self.unit,
+            "mean_absolute_error": self.reading.error,
+            "error_of_target": dict(zip(self.targets, error.tolist(), strict=True)),
+            "spread_among_folds": self.reading.spread,
+            "error_of_guessing": self.reading.guess,
+            "signal_to_noise": json_ready(self.snr),
+            "samples": len(self.samples.targets),
+            "settings": json_ready(self.settings),
+        }
+
+
+def perceive(
+    task: PerceptionTask,
+    model: OpticalModel,
+    settings: SampleSettings | None = None,
+    neighbours: int = NEIGHBOURS,
+    folder: Path | None = None,
+    progress: Callable[[int, int], None] | None = None,
+) -> PerceptionResult:
+    """Make samples of a task and see how well they tell its targets.
+
+    Args:
+        task: what is pressed and read.
+        model: the sensor.
+        settings: of the samples; the defaults when None.
+        neighbours: k of the signal-to-noise ratio.
+        folder: keeps the samples, so that stopped work continues; None keeps them in memory.
+        progress: called with the number of samples done and their count.
+
+    Raises:
+        TaskError: a contact is not seen, there are too few samples, or the folder holds samples
+            made otherwise.
+        ContactError: the sensor can't be pressed so.
+    """
+    settings = settings or SampleSettings()
+    least = max(2 * FOLDS, neighbours + 1)
+    if settings.count < least or neighbours < 2:
+        raise TaskError(
+            f"{settings.count} samples and {neighbours} neighbours make no sense",
+            hint=f"Use 2 neighbours or more, and at least {least} samples",
+        )
+    samples = collect(task, model, settings, folder, progress)
+    return PerceptionResult(
+        task=task.name,
+        design=model.design.name,
+        unit=task.unit,
+        targets=task.targets,
+        samples=samples,
+        reading=read_by_forest(samples.features, samples.targets, settings.seed),
+        snr=signal_to_noise(samples.features, samples.targets, neighbours),
+        settings=_described(task, model, settings) | {"neighbours": neighbours},
+    )
+
+
+def collect(
+    task: PerceptionTask,
+    model: OpticalModel,
+    settings: SampleSettings,
+    folder: Path | None = None,
+    progress: Callable[[int, int], None] | None = None,
+) -> Samples:
+    """Render, measure and label `settings.count` random contacts; see `perceive`."""
+    if settings.count < 1:
+        raise TaskError(f"{settings.count} samples are asked for", hint="Ask for 1 or more")
+    if not (np.isfinite(settings.camera_noise) and settings.camera_noise >= 0):
+        raise TaskError(f"the camera noise is {settings.camera_noise}", hint="Give 0 or more")
+    task.check(model)
+    names = (*task.features, *task.targets)
+    table = None if folder is None else _open_table(folder, task, model, settings, names)
+    try:
+        rows = [] if table is None else [_numbers(row, names) for row in table.rows]
+        camera = None
+        for index in range(len(rows), settings.count):
+            if progress is not None:
+                progress(index, settings.count)
+            camera = camera or _Camera(task, model, settings)
+            row = camera.sample(index)
+            rows.append(row)
+            if table is not None:
+                table.add(dict(zip(names, row, strict=True)))
+        if progress is not None:
+            progress(settings.count, settings.count)
+    finally:
+        if table is not None:
+            table.close()
+    values = np.array(rows[: settings.count], dtype=np.float64)
+    split = len(task.features)
+    return Samples(values[:, :split], values[:, split:])
+
+
+class _Camera:
+    """Takes the pictures of one task with a fixed exposure."""
+
+    def __init__(self, task: PerceptionTask, model: OpticalModel, settings: SampleSettings) -> None:
+        from optisense.optics.response import auto_exposure
+
+        self._task = task
+        self._model = model
+        self._settings = settings
+        self._exposure = auto_exposure(self._render([]).radiance)
+
+    def sample(self, index: int) -> list[float]:
+        """Features and targets of one contact."""
+        seed = self._settings.seed
+        rng = np.random.default_rng([seed, index, _CONTACT])
+        contact, targets = self._task.contact(self._model, rng)
+        image = self._render([contact])
+        picture = add_camera_noise(
+            image.picture(self._exposure), self._settings.camera_noise, [seed, index, _CAMERA]
+        )
+        return [*map(float, self._task.measure(picture, image)), *map(float, targets)]
+
+    def _render(self, contacts: Sequence[Contact]) -> TactileImage:
+        image = self._model.render(
+            contacts,
+            resolution=_resolution(self._task, self._model, self._settings),
+            photons=self._settings.photons,
+            seed=self._settings.seed,
+            estimator=self._settings.estimator,
+            only_contacts=bool(contacts) and self._task.contact_only,
+        )
+        if image.interrupted:
+            raise KeyboardInterrupt
+        return image
+
+
+def _resolution(
+    task: PerceptionTask, model: OpticalModel, settings: SampleSettings
+) -> tuple[int, int]:
+    if settings.resolution is not None:
+        return settings.resolution
+    width, height = model.design.camera.resolution
+    return task.width, max(1, round(task.width * height / width))
+
+
+def _described(
+    task: PerceptionTask, model: OpticalModel, settings: SampleSettings
+) -> dict[str, Any]:
+    """Everything that decides the samples, but how many there are."""
+    values = asdict(settings) | {"resolution": _resolution(task, model, settings)}
+    del values["count"]
+    return {"task": task.name, task.name: asdict(task), "samples": values}  # type: ignore[call-overload]
+
+
+def _open_table(
+    folder: Path,
+    task: PerceptionTask,
+    model: OpticalModel,
+    settings: SampleSettings,
+    names: Sequence[str],
+) -> Table:
+    folder.mkdir(parents=True, exist_ok=True)
+    now = _described(task, model, settings) | {
+        "design": design_values(model.design),
+        "meshes": mesh_digests(model.design),
+    }
+    if (folder / SETTINGS).exists():
+        refuse_differences("samples", folder, read_json(folder / SETTINGS), now)
+    else:
+        write_json(folder / SETTINGS, now)
+    return Table(folder / SAMPLES, names)
+
+
+def _numbers(row: Mapping[str, str], names: Sequence[str]) -> list[float]:
+    try:
+        return [float(row[name]) for name in names]
+    except (TypeError, ValueError) as error:
+        raise TaskError(f"a kept sample can't be read: {error}") from error

@@ -1,0 +1,192 @@
+"""Shape reconstruction: how well a sensor's pictures give back the shape that touched it.
+
+What users do with a real sensor, done with a simulated one: calibrate it with balls, then press
+other things, read their normals and integrate them to depth.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from optisense.errors import TaskError
+from optisense.geometry import Contact, Cylinder, MeshIndenter, Sphere, TriangleMesh
+from optisense.objectives.score import json_ready
+from optisense.tasks.calibration import LEAST_PIXELS, CalibratedSensor, ReconstructionSettings
+
+if TYPE_CHECKING:
+    from optisense.optics import OpticalModel
+
+FloatArray = NDArray[np.float64]
+
+
+def pyramid(slope: float = 30.0, height: float = 2.0) -> TriangleMesh:
+    """A square pyramid standing on its tip, its sides tilted by `slope` degrees, `height` mm."""
+    half = height / np.tan(np.radians(slope))
+    base = [(-half, -half, height), (half, -half, height), (half, half, height)]
+    vertices = np.array([(0.0, 0.0, 0.0), *base, (-half, half, height)])
+    faces = np.array([[0, 2, 1], [0, 3, 2], [0, 4, 3], [0, 1, 4], [1, 2, 3], [1, 3, 4]])
+    corners = vertices[faces].reshape(-1, 3)
+    # Each face has corners of its own, so that edges stay sharp.
+    flat = TriangleMesh(corners, np.arange(len(corners), dtype=np.int32).reshape(-1, 3))
+    return TriangleMesh(corners, flat.faces, np.repeat(flat.face_normals, 3, axis=0))
+
+
+def unseen_objects() -> dict[str, Contact]:
+    """What is reconstructed by default: none of it is a ball of the radius that is fitted to."""
+    return {
+        "ball of 3 mm": Contact(Sphere(3.0), at=(-2.0, 1.5), depth=0.6),
+        "cylinder of 2 mm": Contact(Cylinder(2.0), at=(0.0, 0.0), depth=0.5, rotation=30.0),
+        "pyramid of 30 degrees": Contact(
+            MeshIndenter(pyramid()), at=(2.0, -1.5), depth=0.7, rotation=20.0
+        ),
+    }
+
+
+@dataclass(frozen=True)
+class Reconstruction:
+    """One object as it is and as it was read; arrays are (h, w, ...).
+
+    normals, true_normals, untouched_normals: unit, inward, in the design's frame. depth,
+    true_depth: mm along the inward normal. mask: the contact, whose pixels the errors count.
+    """
+
+    picture: NDArray[np.uint8]
+    normals: FloatArray
+    true_normals: FloatArray
+    untouched_normals: FloatArray
+    depth: FloatArray
+    true_depth: FloatArray
+    mask: NDArray[np.bool_]
+
+    @cached_property
+    def angles(self) -> FloatArray:
+        """(h, w) degrees between read and true normals."""
+        return angles_between(self.normals, self.true_normals)
+
+    @property
+    def normal_error(self) -> float:
+        """Degrees, the mean over the contact."""
+        return float(self.angles[self.mask].mean())
+
+    @property
+    def depth_error(self) -> float:
+        """mm, the mean absolute difference over the contact."""
+        return float(np.abs(self.depth - self.true_depth)[self.mask].mean())
+
+    def to_dict(self) -> dict[str, float]:
+        """The errors, beside those of reading nothing, ready for JSON."""
+        inside = self.mask
+        nothing = angles_between(self.untouched_normals, self.true_normals)
+        return {
+            "normal_error": self.normal_error,
+            "normal_error_median": float(np.median(self.angles[inside])),
+            "normal_error_of_reading_nothing": float(nothing[inside].mean()),
+            "depth_error": self.depth_error,
+            "depth_error_of_reading_nothing": float(self.true_depth[inside].mean()),
+            "deepest": float(self.true_depth[inside].max()),
+            "deepest_read": float(self.depth[inside].max()),
+            "contact_pixels": int(inside.sum()),
+        }
+
+
+@dataclass(frozen=True)
+class ReconstructionResult:
+    """How well shapes come back: each object, and the means over objects."""
+
+    design: str
+    objects: dict[str, Reconstruction]
+    settings: ReconstructionSettings
+    fitted_pixels: int
+
+    @property
+    def normal_error(self) -> float:
+        """Degrees."""
+        return float(np.mean([each.normal_error for each in self.objects.values()]))
+
+    @property
+    def depth_error(self) -> float:
+        """mm."""
+        return float(np.mean([each.depth_error for each in self.objects.values()]))
+
+    def to_dict(self) -> dict[str, Any]:
+        """All errors and settings, ready for JSON."""
+        return {
+            "task": "reconstruction",
+            "design": self.design,
+            "normal_error": self.normal_error,
+            "depth_error": self.depth_error,
+            "units": {"normal_error": "degrees", "depth_error": "mm"},
+            "objects": {name: each.to_dict() for name, each in self.objects.items()},
+            "fitted_pixels": self.fitted_pixels,
+            "settings": json_ready(asdict(self.settings)),
+        }
+
+
+def reconstruct(
+    model: OpticalModel,
+    settings: ReconstructionSettings | None = None,
+    objects: Mapping[str, Contact] | None = None,
+    progress: Callable[[int, int], None] | None = None,
+) -> ReconstructionResult:
+    """Fit a reader to ball presses and try it on objects that it has not seen.
+
+    Args:
+        model: the sensor. settings: the defaults when None. objects: `unseen_objects` when None.
+        progress: called with the number of pictures taken and their count.
+
+    Raises:
+        ContactError: an object is off the surface or deeper than the gel.
+        TaskError: an object or too few presses are seen, or a setting makes no sense.
+    """
+    settings = settings or ReconstructionSettings()
+    wanted = unseen_objects() if objects is None else dict(objects)
+    count = settings.presses + len(wanted)
+
+    def tell(done: int) -> None:
+        if progress is not None:
+            progress(done, count)
+
+    for contact in wanted.values():
+        model.place(contact)  # so that one that does not fit is told before any work
+    sensor = CalibratedSensor(model, settings, tell)
+    read = {}
+    for number, (name, contact) in enumerate(wanted.items()):
+        tell(settings.presses + number)
+        read[name] = reconstruct_one(sensor, contact, number, name)
+    tell(count)
+    return ReconstructionResult(model.design.name, read, settings, sensor.fitted_pixels)
+
+
+def reconstruct_one(
+    sensor: CalibratedSensor, contact: Contact, number: int = 0, name: str = "the object"
+) -> Reconstruction:
+    """Press something and read it. number: of the picture, for its noise.
+
+    Raises:
+        TaskError: the camera does not see it.
+    """
+    image, picture = sensor.look(contact, number)
+    if image.contact_mask.sum() < LEAST_PIXELS:
+        raise TaskError(f"the camera does not see {name}", hint="Place it where it looks")
+    normals, depth = sensor.read(picture)
+    return Reconstruction(
+        picture=picture,
+        normals=normals,
+        true_normals=image.normals.astype(np.float64),
+        untouched_normals=sensor.untouched.normals,
+        depth=depth,
+        true_depth=sensor.untouched.image_depth(image).astype(np.float64),
+        mask=image.contact_mask,
+    )
+
+
+def angles_between(first: FloatArray, second: FloatArray) -> FloatArray:
+    """(...) degrees between unit vectors (..., 3)."""
+    cosine = np.einsum("...i,...i", first, second)
+    return np.degrees(np.arccos(np.clip(cosine, -1.0, 1.0)))

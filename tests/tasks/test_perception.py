@@ -1,0 +1,165 @@
+"""Perception tasks against pictures that algebra makes, and samples that are kept."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from optisense import OpticalModel, load
+from optisense.errors import ContactError, TaskError
+from optisense.geometry import Contact, Cylinder
+from optisense.optics.response import auto_exposure, srgb_curve
+from optisense.tasks import CylinderRadius, Misalignment, SampleSettings, perceive
+from optisense.tasks.misalignment import plane_contact
+from optisense.tasks.perception import collect
+
+QUIET = SampleSettings(count=40, camera_noise=0.0)
+LIGHTS = np.array([[0.8, 0.0, -0.6], [-0.4, 0.69282, -0.6], [-0.4, -0.69282, -0.6]])
+
+
+def levels(normal: np.ndarray, exposure: float) -> np.ndarray:
+    """What the Lambertian sensor's camera stores where the normal is so: (..., 3) of 255."""
+    return 255 * srgb_curve(exposure * np.maximum(normal @ LIGHTS.T, 0))
+
+
+def turned(angle_x: float, angle_y: float) -> np.ndarray:
+    """Inward, turned about the indenter's x and then its y axis, which are -x and -y here."""
+    x, y = np.radians([angle_x, angle_y])
+    about_x = -np.array([0, -np.sin(x), np.cos(x)])
+    return np.array([-np.sin(y) * about_x[2], -about_x[1], np.cos(y) * about_x[2]])
+
+
+@pytest.mark.parametrize("angles", [(0.0, 0.0), (7.0, 0.0), (0.0, 7.0), (-5.0, 9.0)])
+def test_the_mean_colour_of_a_tilted_plane_is_what_lambert_says(
+    angles: tuple[float, float], lambertian: Any
+) -> None:
+    image = lambertian.render([plane_contact(lambertian, *angles, 0.8)], (48, 36))
+    exposure = auto_exposure(lambertian.render([], (48, 36)).radiance)
+    measured = Misalignment().measure(image.picture(exposure), image)
+    assert measured == pytest.approx(levels(turned(*angles), exposure), abs=0.51)
+
+
+def test_the_plane_passes_at_its_depth_below_the_middle(mini: OpticalModel) -> None:
+    for angles in ((0, 0), (8, -6)):
+        contact = plane_contact(mini, *angles, 0.8)
+        rays = mini.chief_rays((41, 31), [contact])
+        # z from x and y of the touched points, at the middle.
+        points = rays.points[rays.region == 2].astype(float)
+        fitted, *_ = np.linalg.lstsq(
+            np.column_stack([points[:, :2], np.ones(len(points))]), points[:, 2], rcond=None
+        )
+        assert fitted[2] == pytest.approx(-0.8, abs=1e-4)
+        normal = turned(*angles)
+        assert fitted[:2] == pytest.approx(-normal[:2] / normal[2], abs=1e-4)
+
+
+@pytest.mark.parametrize("radius", [1.5, 4.0])
+def test_the_spread_of_colours_over_a_cylinder_is_what_lambert_says(
+    radius: float, lambertian: Any
+) -> None:
+    depth = 0.5
+    contact = Contact(Cylinder(radius), at=(0, 0), depth=depth)
+    image = lambertian.render([contact], (320, 240))
+    exposure = auto_exposure(lambertian.render([], (320, 240)).radiance)
+    measured = CylinderRadius().measure(image.picture(exposure), image)
+    # It lies along x: normals turn about x by the angle whose sine is y / radius.
+    half = np.sqrt(2 * radius * depth - depth**2)
+    sine = np.linspace(-half, half, 4001) / radius
+    normals = np.column_stack([np.zeros_like(sine), sine, -np.sqrt(1 - sine**2)])
+    # Perspective shows the flanks a few per cent narrower or wider than they are.
+    assert measured == pytest.approx(levels(normals, exposure).std(axis=0), rel=0.05, abs=0.5)
+
+
+def test_colours_that_tell_the_angle_are_read_and_noise_spoils_them(lambertian: Any) -> None:
+    task = Misalignment()
+    clear = perceive(task, lambertian, QUIET)
+    noisy = perceive(task, lambertian, SampleSettings(count=40, camera_noise=150.0))
+    assert clear.reading.error < 0.3 * clear.reading.guess
+    # Neighbours among 40 samples still differ by some degrees.
+    assert clear.snr > 5
+    assert noisy.reading.error > 1.5 * clear.reading.error
+    assert noisy.snr < 0.5 * clear.snr
+    # Even angles over +-10 degrees lie 5 degrees from their mean on average.
+    assert clear.reading.guess == pytest.approx(5, rel=0.2)
+
+
+def test_a_radius_is_read_from_the_spread(lambertian: Any) -> None:
+    result = perceive(CylinderRadius(), lambertian, QUIET)
+    assert result.reading.error < 0.35 * result.reading.guess
+    values = result.to_dict()
+    assert values["error_of_target"]["radius"] == pytest.approx(values["mean_absolute_error"])
+    assert values["samples"] == 40
+
+
+def test_samples_are_kept_and_work_continues_where_it_stopped(
+    lambertian: Any, tmp_path: Path
+) -> None:
+    task = Misalignment()
+    settings = SampleSettings(count=14)
+
+    def stop(done: int, count: int) -> None:
+        if done == 6:
+            raise KeyboardInterrupt
+
+    whole = collect(task, lambertian, settings, tmp_path / "whole")
+    with pytest.raises(KeyboardInterrupt):
+        collect(task, lambertian, settings, tmp_path / "parts", stop)
+    before = lambertian.pictures
+    parts = collect(task, lambertian, settings, tmp_path / "parts")
+    assert lambertian.pictures - before == 8 + 1  # and the untouched sensor
+    assert np.array_equal(parts.features, whole.features)
+    assert np.array_equal(parts.targets, whole.targets)
+    again = lambertian.pictures
+    fewer = collect(task, lambertian, SampleSettings(count=10), tmp_path / "parts")
+    assert lambertian.pictures == again
+    assert np.array_equal(fewer.features, whole.features[:10])
+
+
+def test_a_folder_of_other_samples_is_left_alone(lambertian: Any, tmp_path: Path) -> None:
+    settings = SampleSettings(count=2)
+    collect(Misalignment(), lambertian, settings, tmp_path)
+    kept = (tmp_path / "samples.csv").read_bytes()
+    with pytest.raises(TaskError, match=r"misalignment\.depth was 0\.8, is 0\.9"):
+        collect(Misalignment(depth=0.9), lambertian, settings, tmp_path)
+    with pytest.raises(TaskError, match="task was"):
+        collect(CylinderRadius(), lambertian, settings, tmp_path)
+    assert (tmp_path / "samples.csv").read_bytes() == kept
+
+
+def test_what_cannot_work_is_told_before_any_picture(lambertian: Any) -> None:
+    with pytest.raises(ContactError, match="mm deep at a corner"):
+        perceive(Misalignment(range=30), lambertian, QUIET)
+    with pytest.raises(ContactError, match="thick"):
+        perceive(CylinderRadius(depth=5), lambertian, QUIET)
+    with pytest.raises(TaskError, match="make no sense"):
+        perceive(Misalignment(), lambertian, SampleSettings(count=8))
+    with pytest.raises(TaskError, match="make no sense"):
+        perceive(Misalignment(), lambertian, QUIET, neighbours=60)
+    with pytest.raises(TaskError, match="camera noise"):
+        perceive(Misalignment(), lambertian, SampleSettings(camera_noise=float("nan")))
+    with pytest.raises(TaskError):
+        Misalignment(range=0)
+    with pytest.raises(TaskError):
+        CylinderRadius(least=3, most=2)
+    assert lambertian.pictures == 0
+
+
+def test_a_crop_beyond_the_contact_is_told(lambertian: Any) -> None:
+    image = lambertian.render([Contact(Cylinder(0.5), at=(0, 0), depth=0.2)], (48, 36))
+    with pytest.raises(TaskError, match="% of the crop"):
+        Misalignment().measure(image.picture(1.0), image)
+    with pytest.raises(TaskError, match="pixels show the contact"):
+        CylinderRadius().measure(image.picture(1.0), lambertian.render([], (48, 36)))
+
+
+@pytest.mark.slow
+def test_a_real_sensor_tells_angles_and_radii() -> None:
+    model = OpticalModel(load("gelsight-mini"))
+    settings = SampleSettings(count=30, resolution=(32, 24), photons=200_000)
+    assert perceive(Misalignment(), model, settings).snr > 2
+    settings = SampleSettings(count=30, resolution=(64, 48), photons=200_000)
+    result = perceive(CylinderRadius(), model, settings)
+    assert result.reading.error < 0.7 * result.reading.guess
