@@ -23,7 +23,7 @@ def new(
     name: Annotated[
         str,
         typer.Argument(
-            metavar="[NAME]",
+            metavar="NAME",
             help="A built-in sensor, such as gelsight-mini; left out with --from-meshes.",
             show_default=False,
         ),

@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
+import re
+import runpy
+import shutil
 from pathlib import Path
 
 import numpy as np
 import pytest
+import yaml
 from typer.testing import CliRunner
 
 import optisense
 from optisense.cli import app
 from optisense.cli import new as new_module
 from optisense.design import SensorDesign
+from optisense.geometry import TriangleMesh
 from optisense.sensors.from_meshes import read_recipe
 
 CAD = Path(__file__).parents[2] / "docs" / "examples" / "pad-sensor"
@@ -161,3 +166,24 @@ class TestRefused:
     )
     def test_options_that_do_not_fit(self, words: tuple[object, ...]) -> None:
         assert new(*words)[0] == 2
+
+
+class TestTheExample:
+    """The guide to one's own CAD files tells what its example holds."""
+
+    def test_the_guide_shows_its_recipe(self) -> None:
+        page = (CAD.parents[1] / "your-sensor.md").read_text(encoding="utf-8")
+        shown = re.search(r"^```yaml\n(.*?)^```", page, re.DOTALL | re.MULTILINE)
+        assert shown is not None
+        assert yaml.safe_load(shown[1]) == yaml.safe_load((CAD / "sensor.yaml").read_text())
+
+    def test_its_files_are_what_its_script_draws(self, tmp_path: Path) -> None:
+        script = tmp_path / "make_meshes.py"
+        shutil.copy(CAD / script.name, script)
+        runpy.run_path(str(script), run_name="__main__")
+        drawn = {file.name for file in tmp_path.glob("*.stl")}
+        assert drawn == {file.name for file in CAD.glob("*.stl")} and len(drawn) == 5
+        for name in drawn:
+            one, other = (TriangleMesh.load(folder / name) for folder in (tmp_path, CAD))
+            assert one.volume == pytest.approx(other.volume, rel=1e-6)
+            np.testing.assert_allclose(one.bounds, other.bounds, atol=1e-6)

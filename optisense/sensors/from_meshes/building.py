@@ -115,7 +115,7 @@ class _Builder(Bench):
             if not part.file.lower().endswith(SUFFIXES):
                 sized[where] = mesh
             self.meshes[name] = mesh
-        refuse_odd_units(sized, self.recipe.units)
+        self.notes += refuse_odd_units(sized, self.recipe.units)
         for name, mesh in self.meshes.items():
             part, where = self.recipe.parts[name], self.label(name)
             solid = part.role in TRANSPARENT_SOLIDS and part.towards is None

@@ -24,6 +24,9 @@ SMALLEST, LARGEST = 4.0, 400.0
 ODD_PART = 200.0
 """A part so many times smaller or larger than the others is in another unit."""
 
+SMALL_PART = 15.0
+"""A part so many times smaller or larger than the others may be."""
+
 
 @dataclass(frozen=True)
 class Body:
@@ -152,7 +155,7 @@ def likely_units(size: float) -> list[str]:
     return [unit for unit, scale in MM_PER.items() if SMALLEST <= size * scale <= LARGEST]
 
 
-def refuse_odd_units(meshes: dict[str, TriangleMesh], units: str | None) -> None:
+def refuse_odd_units(meshes: dict[str, TriangleMesh], units: str | None) -> list[str]:
     """Check whether the sizes of parts can be right.
 
     Args:
@@ -160,30 +163,19 @@ def refuse_odd_units(meshes: dict[str, TriangleMesh], units: str | None) -> None
             not know their units.
         units: that were given; None where mm was taken for granted.
 
+    Returns:
+        What looks odd, a sentence each.
+
     Raises:
         MeshError: the whole is too small or too large for a tactile sensor, or one part is far
             smaller or larger than the others; says which units would do.
     """
     if not meshes:
-        return
-    sizes = {where: float(np.ptp(mesh.bounds, axis=0).max()) for where, mesh in meshes.items()}
-    if len(sizes) > 1:
-        fair = [size for size in sizes.values() if 1.0 <= size <= LARGEST]
-        typical = float(np.median(fair or list(sizes.values())))
-        for where, size in sizes.items():
-            if max(size / typical, typical / size) > ODD_PART:
-                scale = MM_PER[units or "mm"]
-                others = [u for u in MM_PER if 0.1 < size / scale * MM_PER[u] / typical < 10.0]
-                advice = f"units: {others[0]}" if others else "units:"
-                raise MeshError(
-                    f"it is {size:.4g} mm large, the other parts are {typical:.4g} mm: its file "
-                    "is in another unit",
-                    where=where,
-                    hint=f"Export it in the unit of the others, or give this part its own {advice}",
-                )
+        return []
+    notes = _odd_parts(meshes, MM_PER[units or "mm"]) if len(meshes) > 1 else []
     whole = largest_dimension(meshes.values())
     if SMALLEST <= whole <= LARGEST or (units is not None and 0.5 <= whole <= 1000.0):
-        return
+        return notes
     given = units or "mm"
     number = whole / MM_PER[given]
     fitting = [
@@ -192,9 +184,39 @@ def refuse_odd_units(meshes: dict[str, TriangleMesh], units: str | None) -> None
     large = f"{whole:.4g} mm" if whole < 1e4 else f"{whole / 1000:.4g} m"
     raise MeshError(
         f"the sensor would be {large} large if its files are in {given}",
-        where=", ".join(sizes),
+        where=", ".join(meshes),
         hint=("The files look as if they were in " + " or ".join(fitting) + ": say --units "
               + likely_units(number)[0] + ", or units: in the recipe")
         if fitting
         else "Look up the export units in the CAD tool, and say them with --units",
     )  # fmt: skip
+
+
+def _odd_parts(meshes: dict[str, TriangleMesh], scale: float) -> list[str]:
+    """Tell parts that are much smaller or larger than the others, and refuse plain slips.
+
+    Args:
+        scale: mm in the unit of the files.
+    """
+    notes = []
+    sizes = {where: float(np.ptp(mesh.bounds, axis=0).max()) for where, mesh in meshes.items()}
+    fair = [size for size in sizes.values() if 1.0 <= size <= LARGEST]
+    typical = float(np.median(fair or list(sizes.values())))
+    for where, size in sizes.items():
+        ratio = max(size / typical, typical / size)
+        if ratio <= SMALL_PART:
+            continue
+        others = [u for u in MM_PER if 0.1 < size / scale * MM_PER[u] / typical < 10.0]
+        unit = f"units: {others[-1] if ratio <= ODD_PART else others[0]}" if others else "units:"
+        if ratio > ODD_PART:
+            raise MeshError(
+                f"it is {size:.4g} mm large, the other parts are {typical:.4g} mm: its file is in "
+                "another unit",
+                where=where,
+                hint=f"Export it in the unit of the others, or give this part its own {unit}",
+            )
+        notes.append(
+            f"{where} is {size:.3g} mm large, the other parts about {typical:.3g} mm: if its file "
+            f"is in another unit, give it its own {unit}"
+        )
+    return notes

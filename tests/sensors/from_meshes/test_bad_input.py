@@ -90,6 +90,11 @@ class TestFiles:
         assert "another unit" in error.message and "part gel (gel.stl)" in str(error.where)
         assert "units: m" in str(error.hint)
 
+    def test_one_part_that_may_be_in_inches(self, cad: Any) -> None:
+        plate = cad.shapes()["plate"].apply_scale(1 / 25.4)
+        notes = design_from_meshes(cad.write(plate=plate)).notes
+        assert any("part plate (plate.stl) is 0.945 mm" in n and "units: inch" in n for n in notes)
+
     def test_a_folder_without_cad_files(self, cad: Any) -> None:
         cad.folder.mkdir()
         with pytest.raises(MeshError, match="no CAD files"):
