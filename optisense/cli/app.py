@@ -18,6 +18,7 @@ from optisense.cli.export import export
 from optisense.cli.library import library_app
 from optisense.cli.new import new
 from optisense.cli.render import render
+from optisense.cli.report import report
 from optisense.cli.search import search
 from optisense.cli.task import task_app
 
@@ -38,6 +39,7 @@ app.command()(dataset)
 app.command()(evaluate)
 app.command()(search)
 app.command()(apply)
+app.command()(report)
 app.command()(export)
 app.command()(doctor)
 app.add_typer(cage_app, name="cage")

@@ -1,0 +1,77 @@
+"""``optisense report``: a study as a page to look at, keep and send."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from optisense.cli.console import ends_well, messages, output
+
+if TYPE_CHECKING:
+    from optisense.report.before_after import Look
+    from optisense.search import Study
+
+REPORT_FILE = "report.html"
+
+
+@ends_well
+def report(
+    study: Annotated[
+        Path,
+        typer.Argument(
+            metavar="STUDY", help="The folder of a search (its --out).", show_default=False
+        ),
+    ],
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            "--out",
+            "-o",
+            metavar="FILE",
+            help="The page to write.",
+            show_default="STUDY/report.html",
+        ),
+    ] = None,
+    photons: Annotated[
+        int, typer.Option(min=1, metavar="N", help="Photons to trace for each picture.")
+    ] = 1_000_000,
+    pictures: Annotated[
+        bool, typer.Option(help="Render the sensor as it was and as it is best.")
+    ] = True,
+) -> None:
+    """Write a study as one HTML page: how the search went, what it found, and the trials.
+
+    A search may still be running: the page shows the trials so far.
+    """
+    from optisense.cli.render import ensure_writable
+    from optisense.report.study import write_study_report
+    from optisense.search import Study
+
+    page = study / REPORT_FILE if out is None else out
+    opened = Study.open(study)
+    try:
+        if page.is_dir():
+            raise typer.BadParameter(f"'{page}' is a folder", param_hint="--out")
+        ensure_writable(page.parent)
+        looks = _looks(opened, photons) if pictures else {}
+        write_study_report(page, opened, looks)
+    finally:
+        opened.close()
+    output.print(f"report: {page}", markup=False)
+
+
+def _looks(study: Study, photons: int) -> dict[str, Look]:
+    """Pictures of the start and of the best trial."""
+    from optisense.report.before_after import look
+
+    designs = {"before": study.space.design}
+    best = study.best
+    if best is not None:
+        designs["after"] = best.design
+    found = {}
+    for label, design in designs.items():
+        with messages.status(f"rendering the sensor {label} the search"):
+            found[label] = look(design, study.settings.settings, photons=photons)
+    return found

@@ -1,0 +1,29 @@
+"""What figures in a page have in common."""
+
+from __future__ import annotations
+
+import base64
+import io
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+DOTS_PER_INCH = 110
+
+BLUE, RED, GREY, PALE, AMBER = "#1f6fb2", "#c0392b", "#7b8794", "#c6d4e1", "#d98c1f"
+"""Trials, the best, the start, what stands behind, failures."""
+
+
+def new_figure(width: float, height: float) -> Figure:
+    """An empty figure, inches."""
+    from matplotlib.figure import Figure
+
+    return Figure(figsize=(width, height), layout="constrained")
+
+
+def figure_uri(figure: Figure) -> str:
+    """A figure as the address of an ``<img>``, its data inside."""
+    buffer = io.BytesIO()
+    figure.savefig(buffer, format="png", dpi=DOTS_PER_INCH)
+    return "data:image/png;base64," + base64.b64encode(buffer.getvalue()).decode("ascii")

@@ -1,0 +1,135 @@
+"""The page of a study: it tells what its trials say, and nothing in them gets out of its place."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+import optisense as ots
+from optisense.cli import app
+from optisense.design import SensorDesign
+from optisense.report import study_figures
+from optisense.report.before_after import Look
+from optisense.report.study import render_study, write_study_report
+from optisense.search import Result, Study, search
+
+EVIL = "</table><img src=x onerror=alert(1)>"
+SPACE: dict[str, object] = {
+    "coating.specularity": (0.0, 1.0),
+    "coating.reflectance.r": (0.2, 1.0),
+    "lights.*.colour": ["R", "G"],
+}
+
+
+def steep(design: SensorDesign) -> float:
+    """Follows the specularity, hardly the reflectance, and fails at one end."""
+    if design.coating.specularity > 0.9:
+        raise ValueError(EVIL)
+    return design.coating.specularity + 0.01 * design.coating.reflectance[0]
+
+
+def opposite(design: SensorDesign) -> float:
+    return -(design.coating.specularity**2)
+
+
+@pytest.fixture(scope="module")
+def result() -> Result:
+    mini = ots.load("gelsight-mini")
+    return search(mini, SPACE, [steep, opposite], method="pareto", budget=60, seed=2)
+
+
+@pytest.fixture(scope="module")
+def page(result: Result) -> str:
+    picture = np.full((3, 4, 3), 90, dtype=np.uint8)
+    looks = {
+        "before": Look(picture, 0.25, {"upright rays": 0.75}),
+        "after": Look(failure=EVIL),
+    }
+    return render_study(result.study, looks)
+
+
+def test_scores_before_and_after_are_told(result: Result, page: str) -> None:
+    for trial in (result.start, result.best):
+        for name in ("steep", "opposite"):
+            assert f">{trial.scores[name]:.4g}<" in page
+    assert f"<b>trial {result.best.number}</b>" in page
+    assert "coverage</span> <b>25.0 %</b>" in page
+    assert "0.75" in page
+
+
+def test_every_figure_is_there(page: str) -> None:
+    """Convergence, both objectives, parameters, and one picture; all inside the page."""
+    images = re.findall(r'<img [^>]*src="([^"]*)"', page)
+    assert len(images) == 4
+    assert all(image.startswith("data:image/png;base64,") for image in images)
+    assert page.count("<svg") == 2
+    assert not re.search(r'(src|href)="(?!data:)', page)
+
+
+def test_trials_and_failures_are_listed(result: Result, page: str) -> None:
+    failed = [trial for trial in result.trials if trial.failure is not None]
+    assert failed
+    for trial in result.trials:
+        if trial.failure is None:
+            assert f">{trial.scores['steep']:.4g}<" in page
+    assert f'<td class="tight">{len(failed)}</td>' in page
+
+
+def test_nothing_escapes_into_the_page(page: str) -> None:
+    assert "onerror=alert(1)" in page  # it is told, ...
+    assert "<img src=x" not in page  # ... as text
+
+
+def test_a_study_without_scores_has_a_page(tmp_path: Path) -> None:
+    from optisense.search import Plan, SearchSpace
+
+    plan = Plan(space=SearchSpace({"coating.specularity": (0.0, 1.0)}), goals=["aoap"])
+    study = Study.create(tmp_path / "new", ots.load("gelsight-mini"), plan)
+    text = render_study(study)
+    study.close()
+    assert "No trial has a score yet" in text
+
+
+def test_the_command_writes_the_page(tmp_path: Path) -> None:
+    folder = tmp_path / "study"
+    search(ots.load("gelsight-mini"), SPACE, opposite, method="random", budget=5, out=folder)
+    done = CliRunner().invoke(app, ["report", str(folder), "--no-pictures"])
+    assert done.exit_code == 0, done.output
+    assert "search for opposite" in (folder / "report.html").read_text(encoding="utf-8")
+    missing = CliRunner().invoke(app, ["report", str(tmp_path / "nothing")])
+    assert missing.exit_code == 2
+    assert "no study here" in missing.output
+
+
+def test_a_page_is_written_whole_or_not_at_all(result: Result, tmp_path: Path) -> None:
+    path = write_study_report(tmp_path / "page.html", result.study)
+    assert path.read_text(encoding="utf-8").rstrip().endswith("</html>")
+    assert [each.name for each in tmp_path.iterdir()] == ["page.html"]
+
+
+class TestInfluence:
+    def test_the_parameter_that_matters_comes_first(self, result: Result) -> None:
+        found = study_figures.influences(result.trials, "steep")
+        names = result.study.space.names
+        assert names[found[0].number] == "coating.specularity"
+        assert found[0].strength > 0.95
+        assert len(found) == len(names)
+
+    def test_rank_correlation(self) -> None:
+        x = np.array([3.0, 1.0, 2.0, 5.0])
+        assert study_figures.rank_correlation(x, np.exp(x)) == pytest.approx(1.0)
+        assert study_figures.rank_correlation(x, -(x**3)) == pytest.approx(-1.0)
+        assert study_figures.rank_correlation(x, np.ones(4)) == 0.0
+        assert study_figures.rank_correlation([1, 2, 3, 4], [2, 1, 4, 3]) == pytest.approx(0.6)
+
+    def test_correlation_ratio(self) -> None:
+        """By hand: of groups (0, 2) and (4, 6) 16 of 20 lie between them."""
+        assert study_figures.correlation_ratio([0, 0, 1, 1], [0, 2, 4, 6]) == pytest.approx(
+            np.sqrt(16 / 20)
+        )
+        assert study_figures.correlation_ratio([0, 0, 1, 1], [1, 2, 2, 1]) == 0.0
+        assert study_figures.correlation_ratio([0, 1], [3, 3]) == 0.0
