@@ -154,12 +154,13 @@ def evaluate(
 
 
 def parse_settings(texts: list[str] | None) -> dict[str, Any]:
-    """Read the values of ``--set``.
+    """Read the values of ``--set``, as those of a design file are read: 1e-3 is a number.
 
     Raises:
         typer.BadParameter: one of them is not NAME=VALUE.
     """
-    import yaml
+    from optisense.design.yaml_reader import parse_yaml
+    from optisense.errors import OptiSenseError
 
     settings = {}
     for text in texts or []:
@@ -167,8 +168,9 @@ def parse_settings(texts: list[str] | None) -> dict[str, Any]:
         if not equals or not name.strip():
             raise typer.BadParameter(f"'{text}' is not NAME=VALUE", param_hint="--set")
         try:
-            settings[name.strip().replace("-", "_")] = yaml.safe_load(value)
-        except yaml.YAMLError:
+            read, _ = parse_yaml(f"value: {value}", "--set")
+            settings[name.strip().replace("-", "_")] = read["value"]
+        except OptiSenseError:
             raise typer.BadParameter(
                 f"the value in '{text}' can't be read", param_hint="--set"
             ) from None

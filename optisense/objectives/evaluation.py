@@ -26,6 +26,9 @@ Tell = Callable[[float, str], None]
 FIRST_IMAGE = 0.4
 """How much of all rendering the first image is, since light is traced for it."""
 
+BLUR_REACH = 4.0
+"""Standard deviations after which the blur of overexposure ends (SciPy's own choice)."""
+
 GAP = 0.5
 """mm that must be free between contacts which share an image."""
 
@@ -85,7 +88,8 @@ class Evaluation:
         from optisense.optics.response import auto_exposure
 
         if self.settings.exposure == "auto":
-            return auto_exposure(self.untouched.radiance)
+            radiance = self.untouched.radiance
+            return self._once("exposure", lambda: auto_exposure(radiance))
         return float(self.settings.exposure)
 
     @property
@@ -167,11 +171,25 @@ class Evaluation:
         return presses
 
     def _response(self, image: TactileImage, untouched: NDArray[np.float32]) -> NDArray[np.float32]:
-        """(h, w, 3): the camera sensor's response, 0 to 1; the untouched one outside contacts."""
-        from optisense.optics.response import saturate
+        """(h, w, 3): the camera sensor's response, 0 to 1; the untouched one outside contacts.
 
-        touched = image.contact_mask[..., None]
-        return saturate(np.where(touched, image.radiance, untouched) * self.exposure)
+        Overexposure spreads as far as its blur reaches, so only what lies that near to a contact
+        is worked out anew.
+        """
+        from optisense.optics.response import BLUR_OF_WIDTH, saturate
+
+        exposure, touched = np.float32(self.exposure), image.contact_mask
+        response = self._once("untouched response", lambda: saturate(untouched * exposure)).copy()
+        if touched.any():
+            reach = int(BLUR_REACH * BLUR_OF_WIDTH * touched.shape[1]) + 2
+            changed, needed = _around(touched, reach), _around(touched, 2 * reach)
+            part = np.where(touched[needed][..., None], image.radiance[needed], untouched[needed])
+            inner = tuple(
+                slice(small.start - large.start, small.stop - large.start)
+                for small, large in zip(changed, needed, strict=True)
+            )
+            response[changed] = saturate(part * exposure, touched.shape[1])[inner]
+        return response
 
     def _are_apart(self, places: Sequence[NDArray[np.float64]]) -> bool:
         radius, depth = self.settings.radius, self.settings.depth
@@ -216,6 +234,15 @@ def _frame(contact: Contact, surface: SensingSurface) -> dict[str, NDArray[np.fl
         "north": np.cross(spot.inward, east),
         "centre": spot.point + (contact.depth - contact.indenter.radius) * spot.inward,
     }
+
+
+def _around(mask: NDArray[np.bool_], reach: int) -> tuple[slice, slice]:
+    """Rows and columns of a mask's true pixels and of those within `reach` of them."""
+    rows, columns = (np.flatnonzero(mask.any(axis=axis)) for axis in (1, 0))
+    return (
+        slice(max(0, rows[0] - reach), rows[-1] + 1 + reach),
+        slice(max(0, columns[0] - reach), columns[-1] + 1 + reach),
+    )
 
 
 def _nearest(

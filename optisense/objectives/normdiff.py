@@ -130,7 +130,7 @@ def indented_pixels(press: Press, least: int = LEAST_PIXELS) -> NDArray[np.bool_
     count = int(indented.sum())
     if count < least:
         raise ObjectiveError(
-            f"only {count} pixels of {press.name} are indented, {least} are needed",
+            f"{press.name} has {count} of the {least} indented pixels that it needs",
             hint="Use a higher resolution",
         )
     return indented

@@ -120,8 +120,8 @@ def lines_of(
         count = int(chosen.sum())
         if count < least_pixels:
             raise ObjectiveError(
-                f"only {count} pixels of {press.name} lie on the line at {angle:g} degrees, "
-                f"{least_pixels} are needed",
+                f"{press.name} has {count} of the {least_pixels} pixels that the line at "
+                f"{angle:g} degrees needs",
                 hint="Use a higher resolution",
             )
         found[angle] = chosen

@@ -127,6 +127,18 @@ def test_bad_input_exits_with_2(arguments: tuple[str, ...], complaint: str) -> N
     assert complaint in errors
 
 
+def test_settings_are_read_as_numbers_are_written() -> None:
+    from optisense.cli.evaluate import parse_settings
+
+    read = parse_settings(["exposure=1e-9", "half-lines=true", "places=[[0, 1e0]]", "colours=no"])
+    assert read == {
+        "exposure": 1e-9,
+        "half_lines": True,
+        "places": [[0, 1.0]],
+        "colours": "no",
+    }
+
+
 def test_an_unknown_sensor_exits_with_2() -> None:
     code, _, errors = evaluate("-b", "aoap", design="gelsight-minni")
     assert code == 2
