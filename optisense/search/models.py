@@ -40,15 +40,11 @@ class ModelKeeper:
         Raises:
             OptiSenseError: the design can't be built.
         """
-        if not self.lit:
+        if not self.lit or design.coating == self.first.coating:
             return self._becoming(design)
-        like_first = design
-        if design.coating != self.first.coating:
-            like_first = design.model_copy(update={"coating": self.first.coating})
-        model = self._becoming(like_first)
-        model.guide()
-        if like_first is not design:
-            model.become(design)
+        model = self._becoming(design.model_copy(update={"coating": self.first.coating}))
+        model.guide()  # elsewhere it is learned when the first image is rendered
+        model.become(design)
         return model
 
     def _becoming(self, design: SensorDesign) -> OpticalModel:

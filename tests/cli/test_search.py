@@ -1,0 +1,202 @@
+"""`optisense search` and `optisense apply`, by a user's own cheap objective."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+import optisense as ots
+from optisense.cli import app
+from optisense.cli.searching import duration, note
+from optisense.search import Progress, Study
+
+OBJECTIVE = """
+import os
+import signal
+
+def near(evaluation):
+    design = evaluation.design
+    if os.environ.get("PRESS_CTRL_C") and design.coating.specularity > 0.0:
+        os.kill(os.getpid(), signal.SIGINT)
+    return -((design.coating.specularity - 0.3) ** 2)
+
+def shy(evaluation):
+    raise RuntimeError("I have nothing to say")
+
+def dull(design):
+    return design.coating.specularity < 0.5 or "too shiny"
+"""
+
+
+@pytest.fixture(scope="module")
+def mine(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    file = tmp_path_factory.mktemp("mine") / "mine.py"
+    file.write_text(OBJECTIVE)
+    return file
+
+
+@pytest.fixture(scope="module")
+def study(mine: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A finished study of eleven coatings."""
+    folder = tmp_path_factory.mktemp("studies") / "study"
+    result = run("gelsight-mini", "--vary", "coating.specularity=0:1:11", "-b", f"{mine}:near",
+                 "--method", "grid", "--rule", f"{mine}:dull", "--out", folder)  # fmt: skip
+    assert result.exit_code == 0, result.output
+    assert "best: trial 4, near -" in result.output
+    assert "(start -0.09)" in result.output
+    assert "coating.specularity = 0.3" in result.output
+    assert "6 trials failed; the last: too shiny" in result.output
+    assert f"optisense apply {folder} --trial best" in result.output
+    return folder
+
+
+def run(*words: object) -> object:
+    return CliRunner().invoke(app, ["search", *map(str, words)])
+
+
+def test_the_study_holds_all_trials(study: Path) -> None:
+    opened = Study.open(study)
+    assert len(opened.trials) == 12
+    assert opened.settings.rules[0].endswith("mine.py:dull")
+    assert opened.best is not None
+    assert opened.best.values == {"coating.specularity": pytest.approx(0.3)}
+
+
+def test_apply_writes_the_better_design(study: Path, tmp_path: Path) -> None:
+    out = tmp_path / "better"
+    result = CliRunner().invoke(app, ["apply", str(study), "--trial", "best", "--out", str(out)])
+    assert result.exit_code == 0, result.output
+    design = ots.load(out)
+    assert design.coating.specularity == pytest.approx(0.3)
+    assert "trial 4 of a grid search for near" in design.provenance["coating.specularity"].source
+    ots.check(design)
+    again = CliRunner().invoke(app, ["apply", str(study), "--out", str(out)])
+    assert again.exit_code == 1
+    assert "not empty" in again.output
+    other = CliRunner().invoke(
+        app, ["apply", str(study), "--trial", "11", "--out", str(tmp_path / "last")]
+    )
+    assert other.exit_code == 0
+    assert ots.load(tmp_path / "last").coating.specularity == 1.0
+    for which, said in (("99", "Trials 0 to 11"), ("worst", "best, start, or its number")):
+        wrong = CliRunner().invoke(app, ["apply", str(study), "--trial", which, "--out", "x"])
+        assert wrong.exit_code == 2
+        assert said in wrong.output
+
+
+def test_json(study: Path) -> None:
+    result = run("--resume", "--out", study, "--json")
+    found = json.loads(result.stdout)
+    assert found["trials"] == 11
+    assert found["failed"] == 6
+    assert found["best"]["number"] == 4
+    assert found["best"]["values"] == {"coating.specularity": pytest.approx(0.3)}
+    assert found["start"]["scores"]["near"] == pytest.approx(-0.09)
+    assert not found["interrupted"]
+
+
+def test_resume_takes_no_other_settings(study: Path, mine: Path) -> None:
+    for words, said in (
+        (["--seed", "4"], "seed: 0 -> 4"),
+        (["--method", "random"], "method: grid -> random"),
+        (["--vary", "coating.specularity=0:0.9:11"], "high: 1 -> 0.9"),
+        (["-b", "aoap"], "-> aoap"),
+        (["--set", "depth=0.2"], "settings"),
+    ):
+        result = run("--resume", "--out", study, *words)
+        assert result.exit_code == 2, words
+        assert said in result.output
+    same = run(
+        "gelsight-mini", "--resume", "--out", study, "--method", "grid", "-b", f"{mine}:near"
+    )
+    assert same.exit_code == 0, same.output
+
+
+def test_an_edited_design_is_refused(study: Path, tmp_path: Path) -> None:
+    ots.save_design(ots.set_value(ots.load("gelsight-mini"), "lights.red.flux", 12.0), tmp_path)
+    result = run(tmp_path, "--resume", "--out", study)
+    assert result.exit_code == 2
+    assert "-> 12" in result.output
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["gelsight-mini"], "name a folder for the study"),
+        (["--out", "x"], "name the design to start from"),
+        (["gelsight-mini", "--out", "x"], "must be given at least once"),
+        (["gelsight-mini", "--out", "x", "--vary", "a=0:1"], "must be given at least once"),
+        (["gelsight-mini", "--out", "x", "-b", "aoap", "--vary", "coating.speculaity=0:1"],
+         "Did you mean 'specularity'"),
+        (["gelsight-mini", "--out", "x", "-b", "aoap", "--vary", "coating.specularity=1:0"],
+         "reversed"),
+        (["gelsight-mini", "--out", "x", "-b", "aopa", "--vary", "coating.specularity=0:1"],
+         "Did you mean 'aoap'"),
+        (["gelsight-mini", "--out", "x", "-b", "aoap", "--vary", "coating.specularity=0:1",
+          "--method", "gird"], "Did you mean 'grid'"),
+        (["gelsight-mini", "--out", "x", "-b", "aoap", "--vary", "coating.specularity=0:1",
+          "--option", "sigmas=1"], "Did you mean 'sigma'"),
+        (["gelsight-mini", "--out", "x", "-b", "aoap", "--vary", "coating.specularity=0:1",
+          "--cluster", "here"], "is not the address"),
+        (["--resume", "--out", "x"], "no study here"),
+    ],
+)  # fmt: skip
+def test_bad_input_is_told_and_leaves_nothing(
+    words: list[str], said: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    result = run(*words)
+    assert result.exit_code in (1, 2)
+    assert said in result.output
+    assert "Traceback" not in result.output
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_an_objective_that_always_fails(mine: Path, tmp_path: Path) -> None:
+    result = run("gelsight-mini", "--vary", "coating.specularity=0:1", "-b", f"{mine}:shy",
+                 "--out", tmp_path / "study", "--budget", 500)  # fmt: skip
+    assert result.exit_code == 2
+    assert "trials so far have failed" in result.output
+    assert "I have nothing to say" in result.output
+
+
+@pytest.mark.slow
+def test_ctrl_c_keeps_what_is_finished(mine: Path, tmp_path: Path) -> None:
+    """Pressed during the first trial after the start: that trial still counts."""
+    command = ["search", "gelsight-mini", "--vary", "coating.specularity=0.1:1", "-b",
+               f"{mine}:near", "--out", str(tmp_path / "study"), "--budget", "30"]  # fmt: skip
+    child = subprocess.run(
+        [sys.executable, "-m", "optisense.cli", *command],
+        env={**os.environ, "PRESS_CTRL_C": "1"},
+        capture_output=True,
+        text=True,
+        timeout=120,
+    )
+    assert child.returncode == 130, child.stderr
+    assert "optisense search --resume --out" in child.stderr
+    opened = Study.open(tmp_path / "study")
+    assert 1 <= len(opened.trials) <= 2
+    opened.close()
+    result = run("--resume", "--out", tmp_path / "study", "--workers", "2")
+    assert result.exit_code == 0, result.output
+    assert len(Study.open(tmp_path / "study").trials) == 31
+
+
+def test_methods_are_listed() -> None:
+    result = run("--methods")
+    assert result.exit_code == 0
+    for name in ("grid", "random", "cma-es", "pareto"):
+        assert any(line.startswith(name) for line in result.output.splitlines())
+
+
+def test_what_stands_beside_the_bar() -> None:
+    progress = Progress("trials", 30, 100, 2, 0.61234, 0.236, 7200.0, 35.4)
+    assert note(progress) == "best 0.6123 (start 0.236)  7,200 trials/h  2 failed  0:35 left"
+    assert "fresh seeds" in note(Progress("fresh seeds", 9, 9, 0, 0.5, 0.2, 1.0, 0.0))
+    assert duration(3725.0) == "1:02:05"

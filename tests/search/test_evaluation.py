@@ -1,0 +1,168 @@
+"""Scoring a point: rules, failures, and a score that depends on nothing else than the point."""
+
+from __future__ import annotations
+
+import math
+import pickle
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import optisense as ots
+from optisense.design import SensorDesign, set_value
+from optisense.errors import ObjectiveError, SearchError
+from optisense.search import Around, SearchSpace
+from optisense.search.constraints import PartsApart, UserRule, why_forbidden
+from optisense.search.difference import differences, fingerprint
+from optisense.search.evaluation import DesignEvaluator
+
+LOW = {"photons": 200_000, "resolution": (160, 120), "together": True}
+
+
+class TestScores:
+    def test_agree_with_evaluate(self, svelte: SensorDesign) -> None:
+        """A shape after others, in one model, scores as it does in a model of its own."""
+        space = SearchSpace({"cages.M1.points": Around(0.5)}).bind(svelte)
+        evaluator = DesignEvaluator(space, ["aoap"], {"ray_resolution": (96, 72)})
+        rng = np.random.default_rng(2)
+        points = [space.start, *space.from_unit(rng.random((2, space.size)))]
+        found = [evaluator(point, 0).scores["aoap"] for point in points]
+        assert len(set(found)) == 3
+        for point, score in zip(points, found, strict=True):
+            alone = ots.evaluate(space.apply(point), "aoap", ray_resolution=(96, 72))
+            assert score == pytest.approx(alone.value, abs=1e-6)
+        assert evaluator(points[1], 0).scores["aoap"] == found[1]
+
+    @pytest.mark.slow
+    def test_do_not_depend_on_what_came_before(self, mini: SensorDesign) -> None:
+        """Rendered, with coatings, cameras, lights and shapes changed in another order: equal."""
+        space = SearchSpace(
+            {
+                "coating.specularity": (0.0, 1.0),
+                "lights.red.flux": (1.0, 20.0),
+                "lights.red.shift.z": (-0.3, 0.3),
+                "camera.position.z": Around(0.5),
+            }
+        ).bind(mini)
+        points = [space.start + [0.2, 2.0, 0.0, 0.0], space.start + [0.0, 0.0, 0.2, -0.4]]
+        one = DesignEvaluator(space, ["normdiff"], LOW)
+        other = pickle.loads(pickle.dumps(one))
+        forth = [one(point, 3).scores["normdiff"] for point in points]
+        back = [other(point, 3).scores["normdiff"] for point in reversed(points)][::-1]
+        assert all(map(math.isfinite, forth))
+        assert forth == back
+
+    def test_parts_are_kept(self, svelte: SensorDesign) -> None:
+        space = SearchSpace({"camera.turn.x": (-1.0, 1.0)}).bind(svelte)
+        outcome = DesignEvaluator(space, ["aoap"])(space.start, 0)
+        assert 0.0 < outcome.parts["aoap"]["coverage"] <= 1.0
+
+    def test_what_fails_is_told_and_the_rest_scored(self, svelte: SensorDesign) -> None:
+        """A camera that looks away sees nothing: no score, but the plain function has one."""
+        space = SearchSpace({"camera.turn.x": (-180.0, 180.0)}).bind(svelte)
+
+        def width(design: SensorDesign) -> float:
+            return float(design.camera.fov)
+
+        outcome = DesignEvaluator(space, ["aoap", width])(np.array([180.0]), 0)
+        assert outcome.failure
+        assert math.isnan(outcome.scores["aoap"])
+        assert outcome.scores["width"] == svelte.camera.fov
+
+    def test_a_user_objective_in_a_file(self, svelte: SensorDesign, tmp_path: Path) -> None:
+        file = tmp_path / "mine.py"
+        file.write_text(
+            "def seen(evaluation):\n    return float(evaluation.chief_rays.hit.mean())\n"
+        )
+        space = SearchSpace({"camera.turn.x": (-1.0, 1.0)}).bind(svelte)
+        evaluator = DesignEvaluator(space, [f"{file}:seen"])
+        again = pickle.loads(pickle.dumps(evaluator))
+        assert 0.1 < again(space.start, 0).scores["seen"] <= 1.0
+
+
+class TestBadInput:
+    def test_goals(self, mini: SensorDesign) -> None:
+        space = SearchSpace({"coating.specularity": (0.0, 1.0)}).bind(mini)
+        with pytest.raises(ObjectiveError) as told:
+            DesignEvaluator(space, ["aopa"])
+        assert "aoap" in str(told.value.hint)
+        with pytest.raises(SearchError, match="named twice"):
+            DesignEvaluator(space, ["aoap", "aoap"])
+        with pytest.raises(SearchError, match="nothing to search for"):
+            DesignEvaluator(space, [])
+        with pytest.raises(ObjectiveError) as told:
+            DesignEvaluator(space, ["aoap"], {"photns": 3})
+        assert "photons" in str(told.value.hint)
+        with pytest.raises(SearchError, match="seed belongs to the study"):
+            DesignEvaluator(space, ["aoap"], {"seed": 3})
+
+
+class TestConstraints:
+    def test_parts_that_come_to_cross(self, svelte: SensorDesign) -> None:
+        """A mirror pushed forward by ten millimetres is in the skin."""
+        space = SearchSpace({"cages.M1.points": Around(10.0)}).bind(svelte)
+        apart = PartsApart(svelte)
+        assert apart(svelte) is None
+        point = space.start.copy()
+        point[[name.endswith(".x") for name in space.names]] += 9.0
+        said = apart(space.apply(point))
+        assert said is not None
+        assert "'M1'" in said
+        evaluator = DesignEvaluator(space, ["aoap"])
+        assert evaluator(point, 0).failure == said
+        free = DesignEvaluator(space, ["aoap"], apart=False)
+        assert free.constraints == []
+
+    def test_a_rule_from_a_file(self, mini: SensorDesign, tmp_path: Path) -> None:
+        file = tmp_path / "rules.py"
+        file.write_text(
+            "def cheap(design):\n"
+            "    count = sum(len(group.lights) for group in design.lights.values())\n"
+            "    return count < 4 or f'{count} lights cost too much'\n"
+        )
+        rule = pickle.loads(pickle.dumps(UserRule(f"{file}:cheap")))
+        assert why_forbidden(mini, [rule]) == "15 lights cost too much"
+        with pytest.raises(SearchError, match="no function 'dear'"):
+            UserRule(f"{file}:dear")(mini)
+        with pytest.raises(SearchError, match="names no rule"):
+            UserRule("rules.py")
+
+    def test_what_rules_say(self, mini: SensorDesign) -> None:
+        def said(answer: object) -> str | None:
+            return why_forbidden(mini, [lambda design: answer])  # type: ignore[arg-type, return-value]
+
+        assert said(True) is None
+        assert said(None) is None
+        assert said(np.bool_(True)) is None
+        assert "does not hold" in str(said(False))
+        assert said("no") == "no"
+        with pytest.raises(SearchError, match="returned a float"):
+            said(1.0)
+
+
+class TestDifferences:
+    def test_say_what_was_edited(self, mini: SensorDesign) -> None:
+        edited = set_value(set_value(mini, "coating.specularity", 0.2), "camera.position.x", 1.0)
+        assert differences(mini, edited) == [
+            "coating.specularity: 0 -> 0.2",
+            "camera.position[0]: 0 -> 1",
+        ]
+        assert differences(mini, mini.copy()) == []
+
+    def test_meshes_are_compared_by_shape(self, mini: SensorDesign) -> None:
+        moved = mini.copy()
+        moved.meshes["gel"] = mini.meshes["gel"].transformed(
+            np.array([[1, 0, 0, 0.01], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1.0]])
+        )
+        assert differences(mini, moved) == ["mesh of part 'gel': vertices moved by up to 0.01 mm"]
+        assert fingerprint(moved) != fingerprint(mini)
+
+    def test_a_saved_design_is_the_same(self, mini: SensorDesign, tmp_path: Path) -> None:
+        ots.save_design(mini, tmp_path / "design")
+        assert differences(mini, ots.load_design(tmp_path / "design")) == []
+
+    def test_what_is_not_simulated_makes_no_difference(self, mini: SensorDesign) -> None:
+        renamed = mini.model_copy(update={"name": "other", "description": "text"})
+        assert differences(mini, renamed) == []
+        assert fingerprint(renamed) == fingerprint(mini)
