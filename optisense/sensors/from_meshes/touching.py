@@ -82,10 +82,13 @@ def _settle(recipe: Recipe, result: Contacts, fixed: str, mover: str) -> None:
     if result.priorities[mover] > result.priorities[fixed]:
         fixed, mover = mover, fixed
     one, other = result.meshes[fixed], result.meshes[mover]
+    reach = max(recipe.join, EXACT)
     if recipe.join > 0.0:
         joined = join(other, one, recipe.join)
         if joined.kind != "none":
             result.meshes[mover] = other = joined.mesh
+            # Curved faces were moved so far into the other part; chords go a little farther.
+            reach *= 3.0 if joined.kind == "curved" else 1.0
             what = "gap" if joined.gap >= 0.0 else "overlap"
             result.notes.append(
                 f"{mover} and {fixed}: a {what} of up to {abs(joined.gap):.3f} mm was closed by "
@@ -100,7 +103,6 @@ def _settle(recipe: Recipe, result: Contacts, fixed: str, mover: str) -> None:
         )
         return
     smaller = min(one.area, other.area)
-    reach = max(recipe.join, EXACT)
     wide = touching_area(other, one, WIDE_GAP)
     if wide > MUCH * smaller / 2 and touching_area(other, one, reach) < 0.5 * wide:
         result.notes.append(

@@ -13,6 +13,7 @@ import trimesh
 from optisense import load
 from optisense.design import Role, SensorDesign, Status
 from optisense.errors import DesignError
+from optisense.geometry.containment import inside
 from optisense.sensors import check, save_design
 from optisense.sensors.from_meshes import (
     design_from_meshes,
@@ -119,6 +120,35 @@ def test_small_gaps_are_closed_and_wide_ones_are_told(cad: Any) -> None:
     made = design_from_meshes(cad.write(plate=far))
     assert made.design.meshes["gel"].bounds[0, 2] == 0.0
     assert any("air_films" in note for note in made.notes)
+
+
+def test_round_shells_cut_into_other_triangles_have_no_air_between(cad: Any) -> None:
+    """Two half shells meet at a radius of 11 mm, the one cut into 60 segments, the other 47."""
+
+    def shell(outer: float, inner: float, steps: int, segments: int) -> trimesh.Trimesh:
+        turn = np.linspace(0.0, np.pi / 2, steps)
+        arc = np.column_stack([np.cos(turn), np.sin(turn)])
+        arc[-1, 0] = 0.0
+        outline = np.concatenate([outer * arc, inner * arc[::-1], outer * arc[:1]])
+        return trimesh.creation.revolve(outline, sections=segments)
+
+    made = design_from_meshes(
+        cad.write(
+            cad.recipe.replace("towards: +z", "towards: +z, tangent: true"),
+            gel=shell(13.0, 11.0, 24, 60),
+            plate=shell(11.0, 8.0, 17, 47),
+        )
+    )
+    assert [note for note in made.notes if "was closed by moving curved faces of gel" in note]
+    assert not [note for note in made.notes if "film of air" in note]
+    ways = np.random.default_rng(1).normal(size=(300, 3))
+    ways[:, 2] = np.abs(ways[:, 2]) + 0.5
+    ways /= np.linalg.norm(ways, axis=1, keepdims=True)
+    for radius in (10.8, 10.95, 11.0, 11.05, 11.2):
+        points = radius * ways
+        solid = inside(points, made.design.meshes["gel"])
+        solid |= inside(points, made.design.meshes["plate"])
+        assert solid.all(), radius
 
 
 def test_overlapping_solids_are_told_and_the_rigid_one_keeps_its_place(cad: Any) -> None:
