@@ -1,0 +1,333 @@
+"""A sensor design made ready for rays: media, scenes, chief rays, places of contacts."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import mitsuba as mi
+import numpy as np
+
+from optisense import geometry
+from optisense.design import SensorDesign, set_value
+from optisense.errors import ContactError, OptiSenseError, RenderError
+from optisense.geometry import (
+    Contact,
+    Indenter,
+    SensingSurface,
+    Sphere,
+    TriangleMesh,
+    nine_places,
+)
+from optisense.optics.assembly import Assembly, assemble, coating_surface, indenter_piece
+from optisense.optics.camera import RayCamera
+from optisense.optics.chief_rays import ChiefRays, pixel_areas, sees_nothing, trace_chief_rays
+from optisense.optics.emitters import EmitterTable, emitter_table
+from optisense.optics.ray_scene import Piece, RayScene
+from optisense.optics.scattering import surface_table
+from optisense.optics.shading import ContactScenes
+from optisense.optics.surfaces import Region, Surface, SurfaceKind
+
+if TYPE_CHECKING:
+    from optisense.optics.ray_gradient import DifferentiableRays
+
+
+class RayModel:
+    """A sensor that rays can be sent through, whatever its lights give.
+
+    What is made once is kept: the resolved media, the scenes, the surface tables. A changed
+    design redoes only what depends on the change.
+    """
+
+    def __init__(self, design: SensorDesign, variant: str = "auto") -> None:
+        """Resolve media and build the scene.
+
+        Args:
+            design: the sensor; not changed, and later changes of it are not seen (see
+                ``update``). variant: "auto" (what was selected before, else CUDA where there is
+                a GPU), "llvm" or "cuda".
+
+        Raises:
+            SetupError: the variant is not to be had on this machine.
+            DesignError, MeshError, LibraryError: the design can't be built.
+        """
+        from optisense.optics.variant import use_variant
+
+        self.variant = use_variant(variant)
+        self.design = design.copy()
+        self._assemble()
+
+    def _assemble(self, before: Assembly | None = None) -> None:
+        self._parts = assemble(self.design, before)
+        self._surfaces = [piece.surface for piece in self._parts.pieces]
+        self._surfaces.append(self._indenter_surface())
+        self._refresh_surfaces()
+        self._forget("surface", "scene", "_fixed", "_fine", "_emitter_table", "_store")
+
+    @property
+    def groups(self) -> list[str]:
+        """The names of the light groups, in the order of layers."""
+        return self._parts.groups
+
+    @property
+    def sensing(self) -> TriangleMesh:
+        """The sensing surface in its current shape, with all its triangles."""
+        return self._parts.sensing
+
+    @property
+    def gels(self) -> list[TriangleMesh]:
+        """The elastomers in their current shape."""
+        return self._parts.gels
+
+    @property
+    def _pieces(self) -> list[Piece]:
+        return self._parts.pieces
+
+    @cached_property
+    def scene(self) -> RayScene:
+        """All that light meets in the sensor, nothing pressed in."""
+        return RayScene(self._pieces, table=self._table)
+
+    @cached_property
+    def _fixed(self) -> RayScene:
+        opaque = [i for i, s in enumerate(self._surfaces[:-1]) if s.kind is SurfaceKind.OPAQUE]
+        return RayScene([self._pieces[i] for i in opaque], opaque, self._table)
+
+    @cached_property
+    def _fine(self) -> _FineScene:
+        fine = self._parts.fine
+        pieces = [fine.get(i, piece) for i, piece in enumerate(self._pieces)]
+        return _FineScene(pieces, RayScene(pieces, table=self._table), _sensing_faces(pieces))
+
+    @cached_property
+    def _emitter_table(self) -> EmitterTable:
+        return emitter_table(self._parts.emitters, len(self.groups))
+
+    def _forget(self, *names: str) -> None:
+        """Drop cached properties; they are made again when they are needed."""
+        for name in names:
+            self.__dict__.pop(name, None)
+
+    def _indenter_surface(self) -> Surface:
+        return coating_surface(self.design.coating, self._parts.ior_before, Region.INDENTER)
+
+    def _refresh_surfaces(self) -> None:
+        self._table = surface_table(self._surfaces)
+        self._coloured = any(_is_coloured(surface) for surface in self._surfaces)
+        self._metallic = any(
+            surface.kind is SurfaceKind.OPAQUE and surface.specularity > 0
+            for surface in self._surfaces
+        )
+
+    def update(self, path: str, value: Any) -> None:
+        """Change one value of the design by its dotted path, redoing only what depends on it.
+
+        Raises:
+            DesignError: there is no such value, or it does not fit.
+        """
+        self.become(set_value(self.design, path, value))
+
+    def become(self, design: SensorDesign) -> None:
+        """Take on another design, redoing only what depends on the values that differ.
+
+        Fluxes and colours cost nothing, a coating or a camera little; a mirror or blocker that
+        touches no transparent part is bent or moved without resolving the media again. A design
+        that can't be built leaves the model as it was.
+
+        Args:
+            design: most useful when it is like the one before and shares its meshes.
+
+        Raises:
+            DesignError, MeshError, LibraryError: the design can't be built.
+        """
+        old = self.design
+        self.design = design.copy()
+        if _shapes(old) != _shapes(design) or old.meshes != design.meshes:
+            try:
+                self._assemble(self._parts)
+            except OptiSenseError:
+                self.design = old
+                raise
+            return
+        if old.coating != design.coating:
+            self._recoat()
+        if old.camera != design.camera:
+            self._forget("surface", "_store")
+
+    def _recoat(self) -> None:
+        coat = coating_surface(self.design.coating, self._parts.ior_before, Region.SENSING)
+        self._surfaces = [
+            coat if surface.region is Region.SENSING else surface for surface in self._surfaces[:-1]
+        ] + [self._indenter_surface()]
+        self._refresh_surfaces()
+        for name in ("scene", "_fixed"):
+            if name in self.__dict__:
+                self.__dict__[name].table = self._table
+        self._forget("_fine")
+
+    def camera(self, resolution: tuple[int, int] | None = None) -> RayCamera:
+        """The design's camera, at another resolution (width, height) if asked."""
+        camera = self.design.camera
+        width, height = camera.resolution if resolution is None else resolution
+        if width < 1 or height < 1:
+            raise RenderError(f"the resolution is {width}x{height}", hint="give e.g. 320x240")
+        return RayCamera(
+            position=camera.position,
+            direction=camera.direction,
+            up=camera.up,
+            fov=camera.fov,
+            width=int(width),
+            height=int(height),
+            equidistant=camera.projection == "equidistant",
+        )
+
+    @cached_property
+    def surface(self) -> SensingSurface:
+        """The sensing surface with coordinates in mm.
+
+        (0, 0) is where the camera's axis meets it (or the middle of what is seen), u runs
+        towards the right and v towards the top of the image.
+        """
+        axes = self.design.camera.axes()
+        rays = self.chief_rays((3, 3))
+        if rays.hit[1, 1]:
+            origin = rays.points[1, 1].astype(float)
+        else:
+            fine = self.chief_rays((64, 48))
+            if not fine.hit.any():
+                raise sees_nothing(fine)
+            origin = np.median(fine.points[fine.hit].astype(float), axis=0)
+        return SensingSurface(self.sensing, origin, axes[0], axes[1])
+
+    def chief_rays(
+        self, resolution: tuple[int, int] | None = None, contacts: Sequence[Contact] = ()
+    ) -> ChiefRays:
+        """Where each pixel looks, by ideal refraction and reflection; (h, w, ...) arrays."""
+        if contacts:
+            placed = [self.place(contact) for contact in contacts]
+            scene = self._with_indenters(self._fine.pieces, placed)
+        else:
+            scene = self._fine.scene
+        return trace_chief_rays(scene, self.camera(resolution), self._fine.sensing_faces)
+
+    def differentiable_rays(
+        self,
+        moving: Sequence[str] = (),
+        resolution: tuple[int, int] | None = None,
+        fade: float = 1.0,
+    ) -> DifferentiableRays:
+        """Chief rays, with derivatives by the shapes of surfaces and by the camera.
+
+        Args:
+            moving: parts whose vertices are asked about: mirrors, blockers, sensing surfaces.
+            resolution: (width, height) pixels; the camera's own by default.
+            fade: mm; within so much of an open edge of a mirror or of the sensing surface a
+                ray's weight falls to 0.
+
+        Raises:
+            RenderError: no ray arrives, or a moving part is no such surface.
+        """
+        from optisense.optics.ray_gradient import DifferentiableRays
+
+        meshes = self.design.deformed_meshes()
+        chosen = {name: meshes[name] for name in moving}
+        return DifferentiableRays(self._fine.scene, self.camera(resolution), chosen, fade)
+
+    def nine_contacts(self, indenter: Indenter | None = None, depth: float = 0.8) -> list[Contact]:
+        """One contact at each of nine places that cover the visible sensing surface evenly.
+
+        The default indenter is the OptiSense paper's ball of radius 1.5 mm.
+        """
+        rays = self.chief_rays((96, 72))
+        if rays.hit.sum() < 9:
+            raise sees_nothing(rays)
+        points = rays.points[rays.hit].astype(np.float64)
+        # Each pixel stands for the area that its solid angle cuts out of the surface.
+        weights = pixel_areas(rays)[rays.hit]
+        chosen = nine_places(points, weights)
+        ball = indenter if indenter is not None else Sphere(radius=1.5)
+        return [
+            Contact(ball, point=(float(p[0]), float(p[1]), float(p[2])), depth=depth)
+            for p in points[chosen]
+        ]
+
+    def place(self, contact: Contact) -> TriangleMesh:
+        """The part of an indenter that can touch, where a contact puts it in the design's frame.
+
+        Raises:
+            ContactError: the contact is off the surface or deeper than the gel.
+        """
+        if not self.gels:
+            return geometry.place(contact, self.surface)
+        errors = []
+        for gel in self.gels:
+            try:
+                return geometry.place(contact, self.surface, gel)
+            except ContactError as error:
+                errors.append(error)
+        raise errors[0]
+
+    def _scenes(self, contacts: Sequence[Contact]) -> ContactScenes:
+        number = len(self._surfaces) - 1
+        if not contacts:
+            return ContactScenes(self.scene, self._fixed, None, mi.Float())
+        coat = self._surfaces[number]
+        placed = [self.place(contact) for contact in contacts]
+        pieces = [indenter_piece(mesh, coat) for mesh in placed]
+        return ContactScenes(
+            self._with_indenters(self._pieces, placed),
+            self._fixed,
+            RayScene(pieces, [number] * len(pieces), self._table),
+            mi.Float(np.concatenate([_ball(mesh) for mesh in placed]).astype(np.float32)),
+        )
+
+    def _with_indenters(self, fixed: list[Piece], placed: list[TriangleMesh]) -> RayScene:
+        number = len(fixed)
+        pieces = [indenter_piece(mesh, self._surfaces[number]) for mesh in placed]
+        numbers = [*range(number), *[number] * len(pieces)]
+        return RayScene([*fixed, *pieces], numbers, self._table)
+
+
+class _FineScene(NamedTuple):
+    """The sensor with every triangle of its sensing surface."""
+
+    pieces: list[Piece]
+    scene: RayScene
+    sensing_faces: np.ndarray
+
+
+def _shapes(design: SensorDesign) -> tuple[Any, ...]:
+    """What of a design its geometry and its lights' places depend on."""
+    lights = {
+        name: (group.model, group.emitter, group.lights) for name, group in design.lights.items()
+    }
+    return design.parts, design.materials, design.cages, lights
+
+
+def _ball(mesh: TriangleMesh) -> np.ndarray:
+    """(4,) centre and radius of a ball around a mesh."""
+    centre = mesh.bounds.mean(axis=0)
+    return np.append(centre, np.linalg.norm(mesh.vertices - centre, axis=1).max())
+
+
+def _is_coloured(surface: Surface) -> bool:
+    metal = surface.specularity > 0 or surface.kind is SurfaceKind.MIRROR
+    values = [surface.reflectance]
+    if metal:
+        values += [surface.metal_eta, surface.metal_k]
+    if surface.kind not in (SurfaceKind.OPAQUE, SurfaceKind.MIRROR):
+        return False
+    return any(max(v) - min(v) > 1e-6 for v in values)
+
+
+def _sensing_faces(pieces: list[Piece]) -> np.ndarray:
+    out, start = [], 0
+    for piece in pieces:
+        count = len(piece.faces)
+        if piece.surface.region is Region.SENSING:
+            out.append(np.arange(start, start + count))
+            start += count
+        else:
+            out.append(np.full(count, -1, dtype=np.int64))
+    return np.concatenate(out)
