@@ -21,6 +21,7 @@ from optisense.cli.render import render
 from optisense.cli.report import report
 from optisense.cli.search import search
 from optisense.cli.task import task_app
+from optisense.cli.tolerance import tolerance
 
 app = typer.Typer(
     name="optisense",
@@ -40,6 +41,7 @@ app.command()(evaluate)
 app.command()(search)
 app.command()(apply)
 app.command()(report)
+app.command()(tolerance)
 app.command()(export)
 app.command()(doctor)
 app.add_typer(cage_app, name="cage")

@@ -1,0 +1,193 @@
+"""``optisense tolerance``: what errors of making do to a design's score."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from optisense.cli.console import EXIT_INTERRUPTED, ends_well, messages, output
+from optisense.cli.evaluate import parse_settings
+from optisense.cli.options import DesignArgument, parse_resolution
+from optisense.cli.progress import counting_bar
+
+if TYPE_CHECKING:
+    from optisense.search.sensitivity import Estimate
+    from optisense.search.tolerance import Spreading, Tolerance
+
+JSON_FILE = "tolerance.json"
+REPORT_FILE = "tolerance.html"
+
+
+@ends_well
+def tolerance(
+    design: DesignArgument,
+    objective: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--objective",
+            "-b",
+            metavar="NAME",
+            help="rgb2normal, normdiff, aoap, 2to3pw, or your own as FILE.py:FUNCTION. May be "
+            "given several times.",
+            show_default="rgb2normal",
+        ),
+    ] = None,
+    error: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--error",
+            metavar="PATH=SIZE",
+            help="What may be off, and its standard deviation (mm, degrees, or the value's own "
+            "unit); PATH=+-LIMIT for any error up to a limit. lights.position and lights.angle "
+            "mean each light by itself. May be given several times.",
+            show_default="usual ones",
+        ),
+    ] = None,
+    sensors: Annotated[
+        int,
+        typer.Option(min=8, metavar="N", help="About how many manufactured sensors to try."),
+    ] = 120,
+    workers: Annotated[
+        int, typer.Option(min=1, metavar="N", help="Processes on this machine.")
+    ] = 1,
+    seed: Annotated[
+        int,
+        typer.Option(min=0, max=2**32 - 1, metavar="N", help="The same seed: the same sensors."),
+    ] = 0,
+    setting: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--set",
+            metavar="NAME=VALUE",
+            help="A setting of the objectives, such as depth=0.5. May be given several times.",
+            show_default=False,
+        ),
+    ] = None,
+    resolution: Annotated[
+        str | None,
+        typer.Option(
+            metavar="WIDTHxHEIGHT",
+            help="Pixels of images and rays. 640 across, in the camera's shape, when left out.",
+            show_default=False,
+        ),
+    ] = None,
+    photons: Annotated[
+        int | None,
+        typer.Option(min=1, metavar="N", help="Photons to trace.", show_default="5 million"),
+    ] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            "--out", "-o", metavar="DIR", help="Folder for tolerance.json.", show_default=False
+        ),
+    ] = None,
+    report: Annotated[
+        bool, typer.Option("--report", help="Also write tolerance.html, with figures, into it.")
+    ] = False,
+    as_json: Annotated[
+        bool, typer.Option("--json", help="Print JSON with every score instead of tables.")
+    ] = False,
+) -> None:
+    """Tell how a design's score spreads when sensors come out a little other than designed.
+
+    P10 is what nine of ten sensors reach. Each error's share in the variance tells which one
+    matters most.
+    """
+    if report and out is None:
+        raise typer.BadParameter("needs a folder: --out DIR", param_hint="--report")
+    settings = parse_settings(setting)
+    settings |= {} if photons is None else {"photons": photons}
+    if resolution is not None:
+        size = parse_resolution(resolution)
+        settings |= {"resolution": size, "ray_resolution": size}
+
+    from optisense.cli.render import ensure_writable
+    from optisense.search.text import parse_errors
+    from optisense.search.tolerance import tolerance as find_tolerance
+    from optisense.sensors import load
+
+    errors = parse_errors(error) if error else None
+    sensor = load(design)
+    if out is not None:
+        ensure_writable(out)
+    with counting_bar("sensors") as show:
+        found = find_tolerance(
+            sensor,
+            list(objective or ["rgb2normal"]),
+            errors,
+            sensors=sensors,
+            seed=seed,
+            workers=workers,
+            settings=settings,
+            progress=show,
+        )
+    text = json.dumps(found.to_dict(), indent=2, allow_nan=False)
+    if out is not None:
+        _write(found, out, text, report)
+    if as_json:
+        print(text)
+    else:
+        _print(found)
+        if out is not None:
+            for name in [JSON_FILE, *([REPORT_FILE] if report else [])]:
+                output.print(f"written: {out / name}", markup=False)
+    if found.interrupted:
+        messages.print(f"interrupted: this rests on the {found.sensors} sensors until then")
+        raise typer.Exit(EXIT_INTERRUPTED)
+
+
+def _write(found: Tolerance, folder: Path, text: str, report: bool) -> None:
+    from optisense.report.files import write_whole
+    from optisense.report.tolerance import write_tolerance_report
+
+    write_whole(folder / JSON_FILE, text + "\n")
+    if report:
+        write_tolerance_report(folder / REPORT_FILE, found)
+
+
+def _print(found: Tolerance) -> None:
+    """One table of percentiles, and one of shares for each objective."""
+    from rich.table import Table
+
+    table = Table(box=None, pad_edge=False)
+    for head in ("objective", "as designed", "P10", "P50", "P90", "spread", "noise"):
+        table.add_column(head, justify="left" if head == "objective" else "right")
+    for name, each in found.results.items():
+        table.add_row(
+            name,
+            _number(each.nominal),
+            *(_number(value.value) for value in each.percentiles.values()),
+            f"± {each.deviation:.2g}" if math.isfinite(each.deviation) else "",
+            f"± {each.noise:.2g}" if each.noise > 0.0 else "",
+        )
+    output.print(table)
+    for name, each in found.results.items():
+        _print_shares(name, each)
+    for reason, count in sorted(found.failures.items(), key=lambda item: -item[1]):
+        output.print(f"{count} of {found.sensors} sensors fail: {reason}", markup=False)
+
+
+def _print_shares(name: str, found: Spreading) -> None:
+    from rich.table import Table
+
+    table = Table(box=None, pad_edge=False)
+    table.add_column(f"which error matters for {name}")
+    table.add_column("share of the variance", justify="right")
+    table.add_column("90 % interval", justify="right")
+    for source, share in found.shares.items():
+        table.add_row(source, *_share(share))
+    output.print(table)
+
+
+def _share(share: Estimate | None) -> tuple[str, str]:
+    if share is None:
+        return "unknown", ""
+    return f"{share.value:.2f}", f"{share.low:.2f} to {share.high:.2f}"
+
+
+def _number(value: float) -> str:
+    return f"{value:.4g}" if math.isfinite(value) else "fails"

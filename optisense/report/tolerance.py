@@ -1,0 +1,146 @@
+"""The page of a tolerance: how scores spread, and which error of making matters most."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from jinja2 import DictLoader, Environment, StrictUndefined
+from markupsafe import Markup
+
+from optisense import __version__
+from optisense.report.drawing import AMBER, BLUE, GREY, RED, figure_uri, new_figure
+from optisense.report.files import template, write_whole
+from optisense.search.sensitivity import Estimate
+from optisense.search.tolerance import Spreading, Tolerance
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+
+def write_tolerance_report(path: str | Path, tolerance: Tolerance) -> Path:
+    """Write a tolerance as one self-contained HTML page.
+
+    Raises:
+        OutputError: the file can't be written.
+    """
+    write_whole(Path(path), render_tolerance(tolerance))
+    return Path(path)
+
+
+def render_tolerance(tolerance: Tolerance) -> str:
+    """The page of `write_tolerance_report` as text."""
+    environment = Environment(
+        loader=DictLoader({"tolerance": template("tolerance.html.j2")}),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    design = tolerance.design
+    return environment.get_template("tolerance").render(
+        title=design.name,
+        description=design.description,
+        headline=[
+            ("sensors tried", f"{tolerance.sensors:,}"),
+            ("failed", f"{sum(tolerance.failures.values()):,}"),
+            ("time", f"{tolerance.seconds:,.0f} s"),
+        ],
+        interrupted=tolerance.interrupted,
+        objectives=[_objective(name, each) for name, each in tolerance.results.items()],
+        errors=[
+            (path, f"{spread.size:g}", _kind(spread.kind))
+            for path, spread in tolerance.errors.spreads.items()
+        ],
+        failures=sorted(tolerance.failures.items(), key=lambda item: -item[1]),
+        settings=[(key, str(value)) for key, value in tolerance.settings.items()],
+        version=__version__,
+        css=Markup(template("report.css")),
+    )
+
+
+def spread_figure(name: str, found: Spreading) -> Figure:
+    """The scores of all sensors with their percentiles, and the share of each error."""
+    shares = {source: share for source, share in found.shares.items() if share is not None}
+    figure = new_figure(11.0, max(3.2, 1.4 + 0.42 * len(shares)))
+    left, right = figure.subplots(1, 2, width_ratios=[1.25, 1.0])
+    scores = found.scores[np.isfinite(found.scores)]
+    if len(scores):
+        left.hist(scores, bins=min(40, max(8, len(scores) // 6)), color=BLUE, alpha=0.55)
+    left.axvline(
+        found.nominal, color=GREY, lw=1.4, ls="--", label=f"as designed {found.nominal:.4g}"
+    )
+    for key, each in found.percentiles.items():
+        if math.isfinite(each.value):
+            colour = RED if key == "p10" else AMBER
+            if key == "p10":
+                left.axvspan(each.low, each.high, color=colour, alpha=0.12, lw=0)
+            left.axvline(each.value, color=colour, lw=1.5, label=f"{key.upper()} {each.value:.4g}")
+    left.set_xlabel(name)
+    left.set_ylabel("sensors")
+    left.legend(fontsize=8)
+    names = list(shares)
+    values = np.array([share.value for share in shares.values()])
+    ends = np.array([[each.value - each.low, each.high - each.value] for each in shares.values()])
+    if names:
+        right.barh(names, values, color=BLUE, alpha=0.7)
+        reach = np.maximum(np.nan_to_num(ends), 0.0).T
+        right.errorbar(values, names, xerr=reach, fmt="none", ecolor="#333", capsize=3, lw=1)
+    noise = noise_share(found)
+    if noise > 0.0:
+        right.axvline(noise, color=GREY, ls=":", lw=1.4, label="noise of the image alone")
+        right.legend(fontsize=8)
+    right.invert_yaxis()
+    right.set_xlim(left=0.0)
+    right.set_xlabel("share of the variance (total effect)")
+    right.tick_params(axis="y", labelsize=9)
+    return figure
+
+
+def noise_share(found: Spreading) -> float:
+    """The part of the variance that the noise of the image makes up; at most 1."""
+    if not (found.noise > 0.0 and found.deviation > 0.0):
+        return 0.0
+    return min(1.0, (found.noise / found.deviation) ** 2)
+
+
+def _objective(name: str, found: Spreading) -> dict[str, Any]:
+    return {
+        "name": name,
+        "nominal": f"{found.nominal:.4g}",
+        "noise": f"{found.noise:.2g}" if found.noise > 0.0 else "",
+        "deviation": f"{found.deviation:.3g}",
+        "figure": figure_uri(spread_figure(name, found)),
+        "percentiles": [(key.upper(), *_cells(each)) for key, each in found.percentiles.items()],
+        "shares": _shares(found.shares),
+        "noise_share": f"{noise_share(found):.2f}" if noise_share(found) > 0.0 else "",
+    }
+
+
+def _shares(shares: Mapping[str, Estimate | None]) -> list[tuple[str, str, str]]:
+    return [
+        (
+            source,
+            *(("unknown", "") if each is None else (f"{each.value:.2f}", _interval(each, ".2f"))),
+        )
+        for source, each in shares.items()
+    ]
+
+
+def _cells(each: Estimate) -> tuple[str, str]:
+    if not math.isfinite(each.value):
+        return "fails", ""
+    return f"{each.value:.4g}", _interval(each)
+
+
+def _interval(each: Estimate, shape: str = ".4g") -> str:
+    if not (math.isfinite(each.low) and math.isfinite(each.high)):
+        return ""
+    return f"{each.low:{shape}} to {each.high:{shape}}"
+
+
+def _kind(kind: str) -> str:
+    return "standard deviation" if kind == "normal" else "limit, all alike up to it"

@@ -1,0 +1,99 @@
+"""The page and the command of a tolerance say what the numbers say."""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+import optisense as ots
+from optisense.cli import app
+from optisense.design import SensorDesign, set_value
+from optisense.report.tolerance import noise_share, render_tolerance
+from optisense.search import Spread
+from optisense.search.tolerance import Tolerance, tolerance
+
+EVIL = "</table><img src=x onerror=alert(1)>"
+QUICK = ["--objective", "aoap", "--resolution", "40x30"]
+
+
+def score(design: SensorDesign) -> float:
+    red, green, _ = design.coating.reflectance
+    if red > 0.59:
+        raise ValueError(EVIL)
+    return red + 0.1 * green
+
+
+@pytest.fixture(scope="module")
+def found() -> Tolerance:
+    grey = set_value(ots.load("gelsight-mini"), "coating.reflectance", (0.5, 0.5, 0.5))
+    errors = {
+        "coating.reflectance.r": Spread(0.1, "even"),
+        "coating.reflectance.g": Spread(0.02),
+    }
+    return tolerance(grey, score, errors, sensors=150)
+
+
+def test_percentiles_and_shares_are_on_the_page(found: Tolerance) -> None:
+    page = render_tolerance(found)
+    spread = found.results["score"]
+    for key in ("p50", "p90"):
+        assert f"<b>{spread.percentiles[key].value:.4g}</b>" in page
+    for source, share in spread.shares.items():
+        assert share is not None
+        assert f'<code>{source}</code></td><td class="tight"><b>{share.value:.2f}</b>' in page
+    assert "limit, all alike up to it" in page
+    assert len(re.findall(r'<img [^>]*src="data:image/png', page)) == 1
+
+
+def test_failures_are_told_as_text(found: Tolerance) -> None:
+    page = render_tolerance(found)
+    assert sum(found.failures.values()) > 0
+    assert "onerror=alert(1)" in page
+    assert "<img src=x" not in page
+
+
+def test_without_noise_none_is_spoken_of(found: Tolerance) -> None:
+    """A function of the design gives the same for all seeds."""
+    assert found.results["score"].noise == 0.0
+    assert noise_share(found.results["score"]) == 0.0
+    assert "noise" not in render_tolerance(found)
+
+
+def test_the_command(tmp_path: Path) -> None:
+    errors = ["--error", "camera.fov=0.5", "--error", "camera.position.z=+-0.2"]
+    out = tmp_path / "out"
+    done = CliRunner().invoke(
+        app,
+        ["tolerance", "gelsight-mini", *QUICK, *errors, "--sensors", "24", "--out", str(out),
+         "--report", "--json"],
+    )  # fmt: skip
+    assert done.exit_code == 0, done.output
+    told = json.loads(done.stdout)
+    assert told == json.loads((out / "tolerance.json").read_text(encoding="utf-8"))
+    assert told["errors"] == {"camera.fov": ["normal", 0.5], "camera.position.z": ["even", 0.2]}
+    result = told["objectives"]["aoap"]
+    assert told["sensors"] == len(result["scores"]) == 24
+    order = [result["percentiles"][key]["value"] for key in ("p10", "p50", "p90")]
+    assert order == sorted(order)
+    assert set(result["shares"]) == {"camera.fov", "camera.position.z"}
+    assert (out / "tolerance.html").read_text(encoding="utf-8").rstrip().endswith("</html>")
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (["--error", "coating.specularty=0.1"], "specularity"),
+        (["--error", "coating.specularity=much"], "'much' is not a number"),
+        (["--report"], "needs a folder"),
+        (["--sensors", "2"], "greater than or equal to 8"),
+        (["--objective", "rgb2norma"], "rgb2normal"),
+    ],
+)
+def test_bad_input_is_told(options: list[str], message: str) -> None:
+    done = CliRunner().invoke(app, ["tolerance", "gelsight-mini", *options])
+    assert done.exit_code == 2
+    assert message in " ".join(done.output.split())
