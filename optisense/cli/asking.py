@@ -78,11 +78,18 @@ def ask_number(question: str, default: float, least: float = float("-inf")) -> f
     return ask(question, lambda answer: _number(answer, least), f"{default:g}")
 
 
-def ask_number_or_none(question: str, least: float = float("-inf")) -> float | None:
+def ask_number_or_none(
+    question: str, least: float = float("-inf"), whole: bool = False
+) -> float | None:
     """A number, or None for an empty answer or '-'."""
 
     def read(answer: str) -> float | None:
-        return None if answer.lower() in _NONE else _number(answer, least)
+        if answer.lower() in _NONE:
+            return None
+        value = _number(answer, least)
+        if whole and value != int(value):
+            raise ValueError("a whole number")
+        return value
 
     return ask(question, read, "-")
 

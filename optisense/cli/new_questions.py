@@ -195,9 +195,16 @@ def _ask_lights(
         group = _ask_group(each.name, str(guess.colour))
         over = guess.over.model_dump(exclude_none=True)
         over["towards"] = ask_word(
-            f"{each.name}: one on each face that looks to", SIDES, str(guess.over.towards)
+            f"{each.name}: on the faces that look to", SIDES, str(guess.over.towards)
         )
-        groups[each.name] = {**group, "over": over}
+        count = ask_number_or_none(
+            "  number in a row there (- puts one on each face)", 1, whole=True
+        )
+        if count is not None:
+            over |= {"count": int(count), "patches": "largest"}
+            pitch = ask_number_or_none("  mm from one to the next (- spreads them)", 1e-6)
+            over |= {} if pitch is None else {"pitch": pitch}
+        groups[each.name] = {**group, "over": over | _ask_way("square to the surface")}
     window = next((n for n, part in parts.items() if part.role is Role.SUPPORT), gel)
     usual = guessing.lights_around(window, meshes[window], outward)
     if groups:
@@ -223,6 +230,7 @@ def _ask_lights(
             chosen["pitch"] = ask_number_or_none("  mm from one to the next (- spreads them)", 1e-6)
         else:
             chosen["axis"] = ask_word("  axis of the ring", SIDES, outward)
+        chosen |= _ask_way("into the side" if way == "row" else "inward")
         chosen["gap"] = ask_number("  mm from the part to the lights", 0.2)
         chosen["height"] = ask_number_or_none(
             "  mm, where on the third axis (- for the part's middle)"
@@ -230,6 +238,11 @@ def _ask_lights(
             else "  mm, where on the axis (- for the part's middle)"
         )
         groups[name] = {**group, way: {k: v for k, v in chosen.items() if v is not None}}
+
+
+def _ask_way(usual: str) -> dict[str, Any]:
+    way = ask_word(f"  they shine to (- is {usual})", (*SIDES, "-"), "-")
+    return {} if way == "-" else {"direction": way}
 
 
 def _ask_group(name: str, colour: str) -> dict[str, Any]:

@@ -96,7 +96,7 @@ class TestQuestions:
             "glass", "pdms", "black-plastic", "acrylic",
             "gel", "-x-", "+z", "diffuse-grey",
             "side", "nope", "smd-0805", "b", "-3", "2.5",
-            "ring", "window", "6", "+z", "0.4", "-1",
+            "ring", "window", "6", "+z", "-", "0.4", "-1",
             "-",
             "pi-v1", "0,0,-30", "skin", "-y",
         ]  # fmt: skip
@@ -115,6 +115,25 @@ class TestQuestions:
         np.testing.assert_allclose(around[:, 2], -1.0)
         assert design.camera.model == "pi-v1"
         assert design.camera.position == (0, 0, -30) and design.camera.up == (0, -1, 0)
+
+    def test_lights_over_a_surface_and_along_an_edge(self, tmp_path: Path) -> None:
+        answers = [
+            "", "", "", "lights", "nothing", "", "",  # lights go over the floor of the housing
+            "", "", "", "", "",
+            "", "red", "", "+z", "3", "4.5", "+x",
+            "edge", "", "", "", "row", "window", "2", "-y", "6", "+z", "", "-1",
+            "-",
+        ]  # fmt: skip
+        folder = tmp_path / "pad"
+        code, text = new("--from-meshes", CAD, folder, answers="\n".join(answers) + "\n" * 9)
+        assert code == 0, text
+        design = optisense.load(folder)
+        over = places(design, "housing")
+        np.testing.assert_allclose(over, [[x, 0, -23.95] for x in (-4.5, 0, 4.5)], atol=1e-5)
+        assert {light.direction for light in design.lights["housing"].lights} == {(1.0, 0.0, 0.0)}
+        row = places(design, "edge")
+        np.testing.assert_allclose(row, [[-3, -10.2, -1], [3, -10.2, -1]], atol=1e-6)
+        assert {light.direction for light in design.lights["edge"].lights} == {(0.0, 0.0, 1.0)}
 
     def test_answers_are_kept_when_the_files_are_unfit(self, tmp_path: Path) -> None:
         cad = tmp_path / "cad"
