@@ -13,8 +13,10 @@ from optisense.cli.cage import cage_app
 from optisense.cli.check import check
 from optisense.cli.dataset import dataset
 from optisense.cli.doctor import doctor
+from optisense.cli.engine import engine
 from optisense.cli.evaluate import evaluate
 from optisense.cli.export import export
+from optisense.cli.leaving import run_and_leave
 from optisense.cli.library import library_app
 from optisense.cli.new import new
 from optisense.cli.render import render
@@ -43,6 +45,7 @@ app.command()(apply)
 app.command()(report)
 app.command()(tolerance)
 app.command()(export)
+app.command()(engine)
 app.command()(doctor)
 app.add_typer(cage_app, name="cage")
 app.add_typer(library_app, name="library")
@@ -72,4 +75,4 @@ def _options(
 
 def main() -> None:
     """Run the command line with the process's arguments and exit."""
-    app()
+    run_and_leave(app)
