@@ -1,0 +1,79 @@
+"""Numbers that pass through Blender and come back as they were.
+
+Blender keeps properties and coordinates in single precision; a design file has double precision.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+FloatArray = NDArray[np.float64]
+
+
+def short(shown: float) -> float:
+    """The shortest decimal number that is the same in single precision: 0.3, not 0.30000001192."""
+    return float(str(np.float32(shown)))
+
+
+def kept(original: Any, shown: float) -> float:
+    """The number as it was read, while Blender still shows it; else what Blender shows.
+
+    Args:
+        original: the number of the design file; anything else counts as absent.
+        shown: the value of a Blender property.
+    """
+    is_number = isinstance(original, (int, float)) and not isinstance(original, bool)
+    if is_number and np.float32(original) == np.float32(shown):
+        return original
+    return short(shown)
+
+
+def kept_list(original: Any, shown: Sequence[float]) -> list[float]:
+    """`kept` for each number of a vector or colour."""
+    if not isinstance(original, (list, tuple)) or len(original) != len(shown):
+        original = [None] * len(shown)
+    return [kept(one, other) for one, other in zip(original, shown, strict=True)]
+
+
+def kept_array(original: ArrayLike | None, shown: ArrayLike) -> FloatArray:
+    """`kept` for an array; an original of another shape counts as absent."""
+    seen = np.asarray(shown, dtype=np.float32)
+    short_ones = seen.astype(np.float64)
+    if original is not None:
+        before = np.asarray(original, dtype=np.float64)
+        if before.shape == seen.shape:
+            same = before.astype(np.float32) == seen
+            if same.all():
+                return before
+            return np.where(same, before, _short_array(seen))
+    return _short_array(seen) if seen.size else short_ones
+
+
+def _short_array(shown: NDArray[np.float32]) -> FloatArray:
+    return np.array([float(str(x)) for x in shown.ravel()]).reshape(shown.shape)
+
+
+def split(values: ArrayLike) -> list[NDArray[np.float32]]:
+    """Three single-precision arrays whose sum is exactly the double-precision one.
+
+    Three times 24 bits hold the 53 bits of a double.
+    """
+    rest = np.asarray(values, dtype=np.float64)
+    parts = []
+    for _ in range(3):
+        part = rest.astype(np.float32)
+        parts.append(part)
+        rest = rest - part.astype(np.float64)
+    return parts
+
+
+def joined(parts: Sequence[NDArray[np.float32]]) -> FloatArray:
+    """What `split` took apart; added from the smallest, so that nothing is rounded away."""
+    total = np.zeros(parts[0].shape)
+    for part in reversed(parts):
+        total = part.astype(np.float64) + total
+    return total

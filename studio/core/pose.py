@@ -1,0 +1,76 @@
+"""Poses of lights and cameras: Blender's are matrices, a design's are position, direction, up.
+
+In Blender, lights and cameras look along their own -z axis, with +y upward.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from .numbers import kept_list, short
+
+FloatArray = NDArray[np.float64]
+
+SAME_DIRECTION = 3e-6
+"""Unit vectors closer than this are the same: what single precision makes of a rotation."""
+
+
+def matrix_of(position: ArrayLike, direction: ArrayLike, up: ArrayLike | None) -> FloatArray:
+    """(4, 4) of an object that looks along `direction` from `position` (3,) mm.
+
+    Args:
+        direction: (3,) of any length but zero.
+        up: (3,) roughly upward; None takes whichever axis lies most across.
+    """
+    ahead = np.asarray(direction, dtype=np.float64)
+    ahead = ahead / np.linalg.norm(ahead)
+    upward = None if up is None else np.asarray(up, dtype=np.float64)
+    if upward is None or np.linalg.norm(np.cross(ahead, upward)) < 1e-9:
+        upward = np.eye(3)[2 if abs(ahead[2]) < 0.9 else 1]
+    right = np.cross(ahead, upward)
+    right /= np.linalg.norm(right)
+    result = np.eye(4)
+    result[:3, 0] = right
+    result[:3, 1] = np.cross(right, ahead)
+    result[:3, 2] = -ahead
+    result[:3, 3] = position
+    return result
+
+
+def pose_of(matrix: ArrayLike, original: dict[str, Any] | None, *, up: bool) -> dict[str, Any]:
+    """Position, direction and (where `up`) up of an object; as read, where it has not moved.
+
+    Args:
+        matrix: (4, 4) of the object in the world.
+        original: the pose as it was read, if it was.
+        up: whether the result must have an `up`, even if the original has none.
+    """
+    world = np.asarray(matrix, dtype=np.float64)
+    axes = world[:3, :3] / np.linalg.norm(world[:3, :3], axis=0)
+    before = original or {}
+    result: dict[str, Any] = {
+        "position": kept_list(before.get("position"), world[:3, 3].tolist()),
+    }
+    was = None
+    if "direction" in before:
+        was = matrix_of((0, 0, 0), before["direction"], before.get("up"))[:3, :3]
+    if was is not None and np.abs(was[:, 2] - axes[:, 2]).max() < SAME_DIRECTION:
+        result["direction"] = before["direction"]
+        if np.abs(was - axes).max() < SAME_DIRECTION:
+            if before.get("up") is not None:
+                result["up"] = before["up"]
+            elif up:
+                result["up"] = unit(axes[:, 1])
+            return result
+    else:
+        result["direction"] = unit(-axes[:, 2])
+    result["up"] = unit(axes[:, 1])
+    return result
+
+
+def unit(vector: ArrayLike) -> list[float]:
+    """A direction in few digits."""
+    return [short(round(float(x), 6)) + 0.0 for x in np.asarray(vector)]

@@ -1,0 +1,1 @@
+"""The one engine of this Blender, and the jobs that it works on."""

@@ -1,0 +1,67 @@
+"""What the engine offers, asked once when it starts: sensors, the library, objectives, methods."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from ..core.engine import Engine
+from . import session
+
+Items = list[tuple[str, str, str]]
+
+LIBRARY_KINDS = ("material", "coating", "light", "camera")
+
+_lists: dict[str, list[dict[str, Any]]] = {}
+_items: dict[str, Items] = {}
+_NONE: Items = [("NONE", "(the engine is starting)", "Wait a moment, then open this again")]
+
+
+def entries(name: str) -> list[dict[str, Any]]:
+    """What the engine told about `sensors`, `objectives`, `methods` or a kind of the library."""
+    return _lists.get(name, [])
+
+
+def items(name: str) -> Items:
+    """The same as choices of a menu; the texts are kept, as Blender asks for."""
+    return _items.get(name) or _NONE
+
+
+def refresh(engine: Engine) -> None:
+    """Ask for all lists; they are there when the engine has answered."""
+    for what, name in (
+        ("sensors", "sensors"),
+        ("objectives", "objectives"),
+        ("methods", "methods"),
+    ):
+        engine.send(what, on_result=lambda result, name=name: _keep(name, result[name]))
+    for kind in LIBRARY_KINDS:
+        refresh_library(engine, kind)
+
+
+def refresh_library(engine: Engine, kind: str) -> None:
+    """Ask for a kind of the library anew."""
+    engine.send(
+        "library", kind=kind, on_result=lambda result: _keep(kind, result["entries"])
+    )  # fmt: skip
+
+
+def _keep(name: str, rows: list[dict[str, Any]]) -> None:
+    _lists[name] = rows
+    _items[name] = [
+        (
+            row["name"],
+            row.get("title") or row["name"],
+            row.get("description") or row.get("summary") or "",
+        )
+        for row in rows
+    ]
+    session.redraw()
+
+
+def register() -> None:
+    session.on_start(refresh)
+
+
+def unregister() -> None:
+    _lists.clear()
+    _items.clear()

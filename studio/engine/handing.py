@@ -1,0 +1,79 @@
+"""Handing the scene's design to the engine: a folder of meshes, and the rest as JSON."""
+
+from __future__ import annotations
+
+import hashlib
+import shutil
+from pathlib import Path
+from typing import Any
+
+import bpy
+import numpy as np
+
+from ..core import mesh_file
+from ..core.engine import EngineError
+from ..scene.gather import caged_parts, gather_document, part_names
+from ..scene.meshes import REST, part_mesh, shown_vertices
+from . import session
+
+_written: dict[str, bytes] = {}
+
+
+def design(scene: bpy.types.Scene) -> dict[str, Any]:
+    """The scene's design as requests to the engine name it; only changed meshes are written.
+
+    Raises:
+        EngineError: there is no engine, or the scene is no design.
+    """
+    folder = Path(session.folder()) / "design"
+    try:
+        document = gather_document(scene)
+    except ValueError as error:
+        raise EngineError({"kind": "DesignError", "message": str(error)}) from error
+    caged = caged_parts(document)
+    for name, part in part_names(scene).items():
+        path = folder / document["parts"][name]["mesh"]
+        digest = _digest(part, caged=name in caged)
+        if _written.get(str(path)) != digest or not path.is_file():
+            mesh_file.write(part_mesh(part, caged=name in caged), path)
+            _written[str(path)] = digest
+    _copy_profiles(document, Path(scene.optisense.folder), folder)
+    return {"data": document, "folder": str(folder)}
+
+
+def _digest(part: bpy.types.Object, *, caged: bool) -> bytes:
+    """Tells whether a part's mesh at rest changed."""
+    if part.mode == "EDIT":
+        part.update_from_editmode()
+    mesh = part.data
+    text = hashlib.blake2b(digest_size=16)
+    attribute = mesh.attributes.get(f"{REST}_0") if caged else None
+    if attribute is not None:
+        rest = np.empty(3 * len(mesh.vertices), dtype=np.float32)
+        attribute.data.foreach_get("vector", rest)
+        text.update(rest.tobytes())
+    else:
+        text.update(shown_vertices(mesh).tobytes())
+    corners = np.empty(len(mesh.loops), dtype=np.int32)
+    mesh.loops.foreach_get("vertex_index", corners)
+    text.update(corners.tobytes())
+    text.update(np.array(part.matrix_world, dtype=np.float64).tobytes())
+    return text.digest()
+
+
+def _copy_profiles(document: dict[str, Any], source: Path, folder: Path) -> None:
+    """IES files of the design go along."""
+    for group in document["lights"].values():
+        file = (group.get("emitter") or {}).get("file")
+        if file and (source / file).is_file() and source != folder:
+            (folder / file).parent.mkdir(parents=True, exist_ok=True)
+            shutil.copyfile(source / file, folder / file)
+
+
+def without_nulls(values: Any) -> Any:
+    """JSON as the design file has it, where absent means null."""
+    if isinstance(values, dict):
+        return {key: without_nulls(each) for key, each in values.items() if each is not None}
+    if isinstance(values, list):
+        return [without_nulls(each) for each in values]
+    return values

@@ -1,0 +1,41 @@
+"""Why a button is grey."""
+
+from __future__ import annotations
+
+import bpy
+
+from . import session
+
+
+def has_design(operator: type[bpy.types.Operator], context: bpy.types.Context) -> bool:
+    """There is a sensor in the scene."""
+    if context.scene is None or not context.scene.optisense.is_open:
+        operator.poll_message_set("There is no sensor yet: make or open one under Sensor")
+        return False
+    return True
+
+
+def is_idle(operator: type[bpy.types.Operator], context: bpy.types.Context) -> bool:
+    """The engine has nothing long to do."""
+    if session.is_busy():
+        operator.poll_message_set("The engine is busy; wait or cancel")
+        return False
+    return True
+
+
+def in_object_mode(operator: type[bpy.types.Operator], context: bpy.types.Context) -> bool:
+    """Nothing is being edited."""
+    if context.mode != "OBJECT":
+        operator.poll_message_set("Leave edit mode first (Tab)")
+        return False
+    return True
+
+
+def selected(
+    operator: type[bpy.types.Operator], context: bpy.types.Context, *kinds: str, what: str
+) -> list[bpy.types.Object]:
+    """The selected objects of some kinds; says what to select where there are none."""
+    found = [each for each in context.selected_objects if each.optisense.kind in kinds]
+    if not found:
+        operator.poll_message_set(f"Select {what} first")
+    return found

@@ -1,0 +1,65 @@
+"""Where the engine is."""
+
+from __future__ import annotations
+
+import os
+import shlex
+import shutil
+
+import bpy
+from bpy.props import StringProperty
+
+PACKAGE = __package__.rpartition(".")[0]
+ENVIRONMENT = "OPTISENSE_ENGINE"
+
+
+class OPTISENSE_AP_preferences(bpy.types.AddonPreferences):
+    """Settings that outlive a session of Blender."""
+
+    bl_idname = PACKAGE
+
+    engine: StringProperty(
+        name="Engine",
+        description="How to start the engine, for example /home/me/.venv/bin/optisense engine",
+    )
+
+    def draw(self, context: bpy.types.Context) -> None:
+        self.layout.prop(self, "engine")
+        command = engine_command()
+        text = "Found: " + shlex.join(command) if command else "No engine was found. " + HOW_TO_GET
+        self.layout.label(text=text, icon="CHECKMARK" if command else "ERROR")
+
+
+HOW_TO_GET = "Type 'optisense studio' in a terminal, or set the engine's path in the preferences"
+
+
+def preferences() -> bpy.types.AddonPreferences | None:
+    """The extension's preferences; None where it is not installed but only registered."""
+    addon = bpy.context.preferences.addons.get(PACKAGE)
+    return addon.preferences if addon else None
+
+
+def engine_command() -> list[str]:
+    """How to start the engine; empty where none is known.
+
+    What `optisense studio` says comes first, then the preferences, then the search path.
+    """
+    told = os.environ.get(ENVIRONMENT, "")
+    own = preferences()
+    if not told and own is not None:
+        told = own.engine.strip()
+    if told:
+        return [told] if os.path.isfile(told) else shlex.split(told)  # noqa: PTH113
+    found = shutil.which("optisense")
+    return [found, "engine"] if found else []
+
+
+def register() -> None:
+    bpy.utils.register_class(OPTISENSE_AP_preferences)
+    told, own = os.environ.get(ENVIRONMENT, ""), preferences()
+    if told and own is not None and own.engine != told:
+        own.engine = told  # so that a Blender started without `optisense studio` finds it too
+
+
+def unregister() -> None:
+    bpy.utils.unregister_class(OPTISENSE_AP_preferences)

@@ -1,0 +1,265 @@
+"""The running engine, the one long job at a time, and what the panels show of it."""
+
+from __future__ import annotations
+
+import shutil
+import tempfile
+from collections.abc import Callable
+from typing import Any
+
+import bpy
+from bpy.props import BoolProperty, FloatProperty, PointerProperty, StringProperty
+
+from ..core.engine import Answer, Engine, EngineError, Request
+from .preferences import HOW_TO_GET, engine_command
+
+TICK = 0.05
+
+_engine: Engine | None = None
+_folder: str | None = None
+_job: Request | None = None
+_each_tick: list[Callable[[], None]] = []
+_each_start: list[Callable[[Engine], None]] = []
+
+
+def on_tick(work: Callable[[], None]) -> None:
+    """Let something be done some twenty times a second while the engine runs."""
+    _each_tick.append(work)
+
+
+def on_start(work: Callable[[Engine], None]) -> None:
+    """Let something be asked of every engine that is started."""
+    _each_start.append(work)
+
+
+class OPTISENSE_PG_session(bpy.types.PropertyGroup):
+    """What is going on; never saved."""
+
+    busy: StringProperty(description="What the engine works on", options={"SKIP_SAVE"})
+    fraction: FloatProperty(options={"SKIP_SAVE"})
+    progress: StringProperty(options={"SKIP_SAVE"})
+    cancelling: BoolProperty(options={"SKIP_SAVE"})
+    problem: StringProperty(options={"SKIP_SAVE"})
+    hint: StringProperty(options={"SKIP_SAVE"})
+    note: StringProperty(options={"SKIP_SAVE"})
+
+
+def state() -> OPTISENSE_PG_session:
+    """What is going on."""
+    return bpy.context.window_manager.optisense
+
+
+def engine() -> Engine:
+    """The running engine; started where none runs.
+
+    Raises:
+        EngineError: there is none, or it can't be started.
+    """
+    global _engine, _folder
+    if _engine is not None and _engine.alive:
+        return _engine
+    if _engine is not None:
+        _engine.abandon()
+    command = engine_command()
+    if not command:
+        error = {"kind": "EngineGone", "message": "no engine was found", "hint": HOW_TO_GET}
+        raise EngineError(error)
+    if _folder is None:
+        _folder = tempfile.mkdtemp(prefix="optisense-")
+    _engine = Engine(command, _folder)
+    for each in _each_start:
+        each(_engine)
+    if not bpy.app.timers.is_registered(_tick):
+        bpy.app.timers.register(_tick, first_interval=TICK, persistent=True)
+    return _engine
+
+
+def folder() -> str:
+    """Where the engine puts pictures, and where designs go on their way to it."""
+    return engine().folder
+
+
+def running() -> Engine | None:
+    """The engine, if one runs."""
+    return _engine if _engine is not None and _engine.alive else None
+
+
+def ask(
+    what: str, on_result: Answer, on_error: Callable[[EngineError], None], **fields: Any
+) -> Request | None:
+    """A quick request; None where there is no engine."""
+    try:
+        return engine().send(what, on_result=on_result, on_error=on_error, **fields)
+    except EngineError as error:
+        on_error(error)
+        return None
+
+
+def ask_and_wait(what: str, **fields: Any) -> dict[str, Any]:
+    """A request that is answered within a blink, such as a list of the library.
+
+    Raises:
+        EngineError: as the engine says, or there is none.
+    """
+    answers: list[Any] = []
+    running = engine()
+    request = running.send(what, on_result=answers.append, on_error=answers.append, **fields)
+    running.wait(request, timeout=60.0)
+    if isinstance(answers[0], EngineError):
+        raise answers[0]
+    return answers[0]
+
+
+def start_job(
+    title: str,
+    what: str,
+    on_result: Answer,
+    *,
+    on_event: Answer | None = None,
+    wait: bool,
+    **fields: Any,
+) -> bool:
+    """Begin the long job that the panels show; whether it ended well, or goes on.
+
+    Args:
+        title: what it is, for the progress bar.
+        what: the request.
+        on_result: called with its result, with the job over.
+        on_event: called with its events, progress aside.
+        wait: until it is over, for scripts.
+        fields: of the request.
+    """
+    global _job
+    now = state()
+    now.problem = now.hint = now.note = now.progress = ""
+    now.fraction = 0.0
+    now.cancelling = False
+
+    def result(answer: dict[str, Any]) -> None:
+        _over()
+        on_result(answer)
+
+    def event(message: dict[str, Any]) -> None:
+        if message.get("event") == "progress":
+            now = state()
+            fraction = message.get("fraction")
+            if fraction is None and message.get("total"):
+                fraction = message.get("done", 0) / message["total"]
+            now.fraction = fraction or 0.0
+            now.progress = message.get("text") or ""
+        elif on_event is not None:
+            on_event(message)
+
+    try:
+        now.busy = title
+        _job = engine().send(what, on_result=result, on_error=_failed, on_event=event, **fields)
+    except EngineError as error:
+        _failed(error)
+        return False
+    if wait:
+        if _job is not None:
+            engine().wait(_job)
+        return not state().problem
+    redraw()
+    return True
+
+
+def cancel_job() -> None:
+    """Give up the long job."""
+    if _job is not None and _engine is not None:
+        state().cancelling = True
+        _engine.cancel(_job)
+
+
+def is_busy() -> bool:
+    """Whether a long job is being worked on."""
+    return _job is not None and not _job.done
+
+
+def say(error: EngineError) -> None:
+    """Show an error in the panels, and select the part that it is about."""
+    now = state()
+    now.problem = f"{error.message[:1].upper()}{error.message[1:]}"
+    now.hint = ". ".join(text for text in (error.where, error.hint) if text)
+    if error.part:
+        from ..scene.collections import objects_of
+
+        for each in bpy.context.scene.objects:
+            each.select_set(False)
+        for each in objects_of(bpy.context.scene, "PART"):
+            if each.optisense.key == error.part and each.visible_get():
+                each.select_set(True)
+                bpy.context.view_layer.objects.active = each
+    redraw()
+
+
+def redraw() -> None:
+    """Let the panels and pictures be drawn again."""
+    for window in bpy.context.window_manager.windows:
+        for area in window.screen.areas:
+            if area.type in ("VIEW_3D", "IMAGE_EDITOR"):
+                area.tag_redraw()
+
+
+def push_undo(message: str) -> None:
+    """Make what a finished job changed a step of its own in the undo history."""
+    windows = bpy.context.window_manager.windows
+    if windows:
+        with bpy.context.temp_override(window=windows[0]):
+            bpy.ops.ed.undo_push(message=message)
+    elif bpy.ops.ed.undo_push.poll():
+        bpy.ops.ed.undo_push(message=message)
+
+
+def stop() -> None:
+    """End the engine and remove its folder."""
+    global _engine, _folder, _job
+    if _engine is not None:
+        _engine.stop()
+    if _folder is not None:
+        shutil.rmtree(_folder, ignore_errors=True)
+    _engine = _folder = _job = None
+
+
+def _over() -> None:
+    global _job
+    _job = None
+    now = state()
+    now.busy = now.progress = ""
+    now.cancelling = False
+
+
+def _failed(error: EngineError) -> None:
+    _over()
+    if error.kind == "Cancelled":
+        state().note = "Cancelled"
+        redraw()
+    else:
+        say(error)
+
+
+def _tick() -> float | None:
+    if _engine is None:
+        return None
+    if _engine.poll():
+        redraw()
+    for each in _each_tick:
+        each()
+    return None if _engine.ended else TICK
+
+
+def register() -> None:
+    bpy.utils.register_class(OPTISENSE_PG_session)
+    bpy.types.WindowManager.optisense = PointerProperty(
+        type=OPTISENSE_PG_session, options={"SKIP_SAVE"}
+    )
+
+
+def unregister() -> None:
+    if bpy.app.timers.is_registered(_tick):
+        bpy.app.timers.unregister(_tick)
+    stop()
+    _each_tick.clear()
+    _each_start.clear()
+    del bpy.types.WindowManager.optisense
+    bpy.utils.unregister_class(OPTISENSE_PG_session)

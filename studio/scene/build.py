@@ -1,0 +1,115 @@
+"""From a design to a scene."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+import bpy
+
+from ..core.mesh_file import Mesh
+from . import kinds
+from .cages import add_cage
+from .cameras import add_camera
+from .collections import ALL, OPTICAL_SYSTEM, clear, collection, next_order
+from .lamps import add_light
+from .meshes import new_mesh
+
+MILLIMETRE = 0.001
+
+
+def build(scene: bpy.types.Scene, document: dict[str, Any], meshes: dict[str, Mesh]) -> None:
+    """Put a design into a scene, in place of the one that was there.
+
+    Args:
+        scene: what else is in it stays.
+        document: what `design.yaml` holds.
+        meshes: the parts at rest, by name, mm.
+    """
+    clear(scene)
+    scene.unit_settings.system = "METRIC"
+    scene.unit_settings.scale_length = MILLIMETRE
+    scene.unit_settings.length_unit = "MILLIMETERS"
+    for name in ALL:
+        collection(scene, name)
+    design = scene.optisense
+    design.document = json.dumps(document)
+    design.title = document["name"]
+    design.description = document.get("description") or ""
+    _coating(design.coating, document["coating"])
+    design.materials.clear()
+    for name, values in document["materials"].items():
+        add_material(design, name, values)
+    for name, values in document["parts"].items():
+        add_part(scene, name, values, meshes[name])
+    design.light_groups.clear()
+    for name, values in document["lights"].items():
+        group = add_light_group(design, name, values)
+        for pose in values["lights"]:
+            add_light(scene, group, pose)
+    add_camera(scene, document["camera"])
+    for name, values in (document.get("cages") or {}).items():
+        add_cage(scene, name, values)
+
+
+def _coating(coating: bpy.types.PropertyGroup, values: dict[str, Any]) -> None:
+    coating.library = values.get("library") or ""
+    for name in ("reflectance", "eta", "k", "specularity"):
+        setattr(coating, name, values[name])
+
+
+def set_coating(scene: bpy.types.Scene, values: dict[str, Any]) -> None:
+    """Coat the sensing surface with something else, such as a library coating."""
+    _coating(scene.optisense.coating, values)
+
+
+def add_material(
+    design: bpy.types.PropertyGroup, name: str, values: dict[str, Any]
+) -> bpy.types.PropertyGroup:
+    """A material, or the one of that name with other values."""
+    material = design.materials.get(name) or design.materials.add()
+    material.name = name
+    material.kind = values["kind"]
+    for field in ("ior", "roughness", "eta", "k", "reflectance", "dispersion"):
+        if values.get(field) is not None:
+            setattr(material, field, values[field])
+    material.has_dispersion = values.get("dispersion") is not None
+    return material
+
+
+def add_part(
+    scene: bpy.types.Scene, key: str, values: dict[str, Any], mesh: Mesh
+) -> bpy.types.Object:
+    """An object for a part."""
+    part = bpy.data.objects.new(key, new_mesh(key, mesh))
+    own = part.optisense
+    own.order = next_order(scene, "PART")
+    own.kind = "PART"
+    own.key = key
+    own.role = values["role"]
+    own.material = values.get("material") or ""
+    own.priority = values.get("priority", 0)
+    own.mesh_file = values["mesh"]
+    part.color = kinds.LOOKS[own.role]
+    if own.role in ("elastomer", "support", "interface"):
+        part.display_type = "WIRE" if len(mesh.faces) < 200 else "TEXTURED"
+    collection(scene, OPTICAL_SYSTEM).objects.link(part)
+    return part
+
+
+def add_light_group(
+    design: bpy.types.PropertyGroup, name: str, values: dict[str, Any]
+) -> bpy.types.PropertyGroup:
+    """A light group without its lights."""
+    group = design.light_groups.add()
+    group.name = name
+    group.model = values["model"]
+    group.colour = values["colour"]
+    group.flux = values["flux"]
+    emitter = values.get("emitter")
+    if emitter:
+        group.emitter = emitter["kind"]
+        for field in ("shape", "size", "file", "beam", "cutoff"):
+            if field in emitter:
+                setattr(group, field, emitter[field])
+    return group

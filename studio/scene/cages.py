@@ -1,0 +1,200 @@
+"""Cages as meshes of control points; the parts in them follow while points are moved."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+import bmesh
+import bpy
+import numpy as np
+from numpy.typing import NDArray
+
+from ..core import cage as core
+from ..core.numbers import kept, kept_array
+from .collections import CAGES, collection, next_order, object_of, objects_of
+from .meshes import REST, remembered, show_vertices, shown_vertices
+
+MOST_KEPT = 32
+_weights: dict[tuple[bytes, bytes, tuple[int, int, int]], NDArray[np.float32]] = {}
+
+
+def add_cage(scene: bpy.types.Scene, key: str, values: dict[str, Any]) -> bpy.types.Object:
+    """An object for a cage; its parts take their shape from it.
+
+    Args:
+        scene: where to.
+        key: its name in the design.
+        values: the cage as the design file holds it.
+    """
+    points = current_points(values)
+    mesh = bpy.data.meshes.new(f"cage {key}")
+    resolution = tuple(values["resolution"])
+    mesh.from_pydata(points.tolist(), core.edges(resolution).tolist(), [])
+    cage = bpy.data.objects.new(f"cage {key}", mesh)
+    cage.optisense.key = key
+    cage.optisense.order = next_order(scene, "CAGE")
+    cage.optisense.data = json.dumps(values)
+    if isinstance(values.get("blend"), (int, float)):
+        cage.optisense.blend = values["blend"]
+    cage.optisense.kind = "CAGE"
+    cage.show_in_front = True
+    cage.lock_location = cage.lock_rotation = cage.lock_scale = (True, True, True)
+    collection(scene, CAGES).objects.link(cage)
+    for name in values["parts"]:
+        part = object_of(scene, "PART", name)
+        if part is not None:
+            lock(part, True)
+    follow(scene, cage)
+    return cage
+
+
+def lock(part: bpy.types.Object, locked: bool) -> None:
+    """A part in a cage is shaped by it, and not moved by itself."""
+    part.lock_location = part.lock_rotation = part.lock_scale = (locked,) * 3
+
+
+def cage_data(cage: bpy.types.Object) -> dict[str, Any]:
+    """The cage as it was read, or last set by an operator."""
+    values: dict[str, Any] = json.loads(cage.optisense.data)
+    return values
+
+
+def current_points(values: dict[str, Any]) -> NDArray[np.float64]:
+    """(N, 3) mm: where a cage's control points are."""
+    blend = values.get("blend")
+    if blend is None:
+        return as_array(values["points"])
+    share = as_array(blend) if isinstance(blend, list) else blend
+    return core.blended(as_array(values["c_min"]), as_array(values["c_max"]), share)
+
+
+def as_array(points: list[dict[str, float]]) -> NDArray[np.float64]:
+    """(N, 3) of a list of points of the design file."""
+    return np.array([(p["x"], p["y"], p["z"]) for p in points], dtype=np.float64).reshape(-1, 3)
+
+
+def as_points(array: NDArray[np.float64]) -> list[dict[str, float]]:
+    """A list of points for the design file."""
+    return [{"x": x, "y": y, "z": z} for x, y, z in array.tolist()]
+
+
+def shown_points(cage: bpy.types.Object) -> NDArray[np.float32]:
+    """(N, 3) mm: the control points as drawn, also while they are being edited."""
+    if cage.mode == "EDIT":
+        mesh = bmesh.from_edit_mesh(cage.data)
+        return np.array([vertex.co for vertex in mesh.verts], dtype=np.float32).reshape(-1, 3)
+    return shown_vertices(cage.data)
+
+
+def cage_values(cage: bpy.types.Object) -> dict[str, Any]:
+    """The cage as the design file holds it, with the points as they are now.
+
+    Raises:
+        ValueError: control points were added or removed.
+    """
+    values = cage_data(cage)
+    shown = shown_points(cage)
+    before = current_points(values)
+    if len(shown) != len(before):
+        raise ValueError(
+            f"cage '{cage.optisense.key}' has {len(shown)} control points instead of "
+            f"{len(before)}; undo what added or removed some"
+        )
+    if values.get("blend") is not None:
+        blend = values["blend"]
+        if not isinstance(blend, list):
+            values["blend"] = kept(blend, cage.optisense.blend)
+        if np.allclose(shown, current_points(values), rtol=1e-6, atol=1e-5):
+            return values
+        del values["blend"]
+    values["points"] = as_points(kept_array(before, shown))
+    return values
+
+
+def show_blend(cage: bpy.types.Object) -> None:
+    """Draw a cage with two ends at its present blend, and let its parts follow."""
+    if cage.optisense.kind != "CAGE":
+        return
+    values = cage_data(cage)
+    if values.get("c_min") is None or values.get("c_max") is None:
+        return
+    values["blend"] = kept(values.get("blend"), cage.optisense.blend)
+    values.pop("points", None)
+    cage.optisense.data = json.dumps(values)
+    set_points(cage, current_points(values))
+    for scene in cage.users_scene:
+        follow(scene, cage)
+
+
+def set_points(cage: bpy.types.Object, points: NDArray[np.float64]) -> None:
+    """Move the control points, in object mode or while they are being edited."""
+    if cage.mode == "EDIT":
+        mesh = bmesh.from_edit_mesh(cage.data)
+        for vertex, point in zip(mesh.verts, points, strict=True):
+            vertex.co = point
+        bmesh.update_edit_mesh(cage.data)
+    else:
+        show_vertices(cage.data, points)
+
+
+def follow(scene: bpy.types.Scene, cage: bpy.types.Object) -> None:
+    """Give the parts of a cage the shape that its control points say."""
+    values = cage_data(cage)
+    points = shown_points(cage)
+    resolution = tuple(values["resolution"])
+    if len(points) != np.prod(resolution):
+        return
+    for name in values["parts"]:
+        part = object_of(scene, "PART", name)
+        rest = None if part is None else remembered(part.data, REST)
+        if part is None or rest is None or part.mode == "EDIT":
+            continue
+        try:
+            weights = _kept_weights(rest, np.array(values["box"]), resolution)
+        except ValueError:  # the engine's check says so in words
+            continue
+        show_vertices(part.data, weights @ points)
+
+
+def _kept_weights(
+    rest: NDArray[np.float64], box: NDArray[np.float64], resolution: tuple[int, int, int]
+) -> NDArray[np.float32]:
+    key = (rest.tobytes(), box.tobytes(), resolution)
+    if key not in _weights:
+        while len(_weights) >= MOST_KEPT:
+            _weights.pop(next(iter(_weights)))
+        _weights[key] = core.weights(rest, box, resolution).astype(np.float32)
+    return _weights[key]
+
+
+@bpy.app.handlers.persistent
+def _moved(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
+    changed = {
+        update.id.original.name
+        for update in depsgraph.updates
+        if update.is_updated_geometry and isinstance(update.id, bpy.types.Object)
+    }
+    if changed:
+        for cage in objects_of(scene, "CAGE"):
+            if cage.name in changed:
+                follow(scene, cage)
+
+
+@bpy.app.handlers.persistent
+def _undone(*_: Any) -> None:
+    for cage in objects_of(bpy.context.scene, "CAGE"):
+        follow(bpy.context.scene, cage)
+
+
+def register() -> None:
+    bpy.app.handlers.depsgraph_update_post.append(_moved)
+    bpy.app.handlers.undo_post.append(_undone)
+    bpy.app.handlers.redo_post.append(_undone)
+
+
+def unregister() -> None:
+    bpy.app.handlers.depsgraph_update_post.remove(_moved)
+    bpy.app.handlers.undo_post.remove(_undone)
+    bpy.app.handlers.redo_post.remove(_undone)
+    _weights.clear()

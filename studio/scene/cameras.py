@@ -1,0 +1,70 @@
+"""The sensor's camera as a Blender camera."""
+
+from __future__ import annotations
+
+import json
+import math
+from typing import Any
+
+import bpy
+import numpy as np
+
+from ..core.numbers import kept
+from ..core.pose import pose_of
+from .collections import OPTICAL_SYSTEM, collection, objects_of
+from .lamps import place
+
+DRAWN_SIZE = 5.0
+"""How large (mm) the pyramid of the camera is drawn."""
+
+WIDEST_DRAWN = 170.0
+"""Degrees; Blender's pinhole cameras see less than 180."""
+
+
+def add_camera(scene: bpy.types.Scene, values: dict[str, Any]) -> bpy.types.Object:
+    """An object for the design's camera; it becomes the scene's."""
+    camera = bpy.data.objects.new("camera", bpy.data.cameras.new("camera"))
+    own = camera.optisense
+    own.data = json.dumps(values)
+    own.kind = "CAMERA"
+    own.key = "camera"
+    own.model = values["model"]
+    own.projection = values.get("projection", "perspective")
+    own.fov = values["fov"]
+    own.pixels = values["resolution"]
+    place(camera, values)
+    camera.data.display_size = DRAWN_SIZE
+    camera.data.clip_start = 0.01
+    collection(scene, OPTICAL_SYSTEM).objects.link(camera)
+    show(camera)
+    scene.camera = camera
+    return camera
+
+
+def show(camera: bpy.types.Object) -> None:
+    """Let Blender's camera see what the sensor's does, as far as a pinhole can."""
+    if not isinstance(camera.data, bpy.types.Camera):
+        return
+    values = camera.optisense
+    camera.data.sensor_fit = "HORIZONTAL"
+    camera.data.angle = math.radians(min(values.fov, WIDEST_DRAWN))
+    for scene in camera.users_scene:
+        scene.render.resolution_x, scene.render.resolution_y = values.pixels
+
+
+def camera_values(scene: bpy.types.Scene) -> dict[str, Any] | None:
+    """The camera as the design file holds it; None where there is none."""
+    cameras = objects_of(scene, "CAMERA")
+    if not cameras:
+        return None
+    camera = cameras[0]
+    values = camera.optisense
+    before = json.loads(values.data) if values.data else {}
+    pose = pose_of(np.array(camera.matrix_world), before, up=True)
+    return {
+        "model": values.model,
+        "projection": values.projection,
+        "fov": kept(before.get("fov"), values.fov),
+        "resolution": list(values.pixels),
+        **{name: pose[name] for name in ("position", "direction", "up")},
+    }

@@ -1,0 +1,57 @@
+"""The collections that a sensor design lives in."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import bpy
+
+REFERENCE = "Reference"
+OPTICAL_SYSTEM = "OpticalSystem"
+CAGES = "Cages"
+CONTACTS = "Contacts"
+ALL = (REFERENCE, OPTICAL_SYSTEM, CAGES, CONTACTS)
+
+
+def collection(scene: bpy.types.Scene, name: str) -> bpy.types.Collection:
+    """The scene's collection of that name; made where there is none."""
+    for child in scene.collection.children_recursive:
+        if child.name.split(".")[0] == name:
+            return child
+    made = bpy.data.collections.new(name)
+    scene.collection.children.link(made)
+    return made
+
+
+def objects_of(scene: bpy.types.Scene, *kinds: str) -> list[bpy.types.Object]:
+    """The scene's objects of some kinds, in the order of the design file."""
+    found = [each for each in scene.objects if each.optisense.kind in kinds]
+    return sorted(found, key=lambda each: (each.optisense.order, each.name))
+
+
+def object_of(scene: bpy.types.Scene, kind: str, key: str) -> bpy.types.Object | None:
+    """The object of a kind that stands for the part, cage or group member called `key`."""
+    return next((each for each in objects_of(scene, kind) if each.optisense.key == key), None)
+
+
+def next_order(scene: bpy.types.Scene, kind: str) -> int:
+    """An order behind all objects of a kind."""
+    return max((each.optisense.order for each in objects_of(scene, kind)), default=-1) + 1
+
+
+def clear(scene: bpy.types.Scene) -> None:
+    """Remove the design from a scene: its objects and what only they used."""
+    for each in list(_ours(scene)):
+        data = each.data
+        bpy.data.objects.remove(each, do_unlink=True)
+        if data is not None and data.users == 0:
+            if isinstance(data, bpy.types.Mesh):
+                bpy.data.meshes.remove(data)
+            elif isinstance(data, bpy.types.Camera):
+                bpy.data.cameras.remove(data)
+
+
+def _ours(scene: bpy.types.Scene) -> Iterator[bpy.types.Object]:
+    for each in scene.objects:
+        if each.optisense.kind != "NONE":
+            yield each

@@ -1,0 +1,123 @@
+"""Contacts: what presses on the sensing surface, drawn where and as deep as it does."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Any
+
+import bmesh
+import bpy
+from mathutils import Matrix, Vector
+
+from ..core.numbers import short
+from .collections import CONTACTS, collection, next_order, objects_of
+
+COLOUR = (0.48, 0.37, 0.07, 1.0)
+
+
+def add_contact(
+    scene: bpy.types.Scene, point: tuple[float, float, float], outward: tuple[float, float, float]
+) -> bpy.types.Object:
+    """An object for a ball that presses at a point of the sensing surface.
+
+    It stays on the surface when it is moved.
+
+    Args:
+        scene: where to.
+        point: (3,) mm.
+        outward: (3,) the surface's normal, out of the sensor.
+    """
+    contact = bpy.data.objects.new("contact", bpy.data.meshes.new("contact"))
+    values = contact.optisense
+    values.order = next_order(scene, "CONTACT")
+    values.kind = "CONTACT"
+    contact.color = COLOUR
+    turn = Vector(outward).to_track_quat("Z", "Y").to_matrix().to_4x4()
+    contact.matrix_world = Matrix.Translation(point) @ turn
+    collection(scene, CONTACTS).objects.link(contact)
+    surface = sensing_surface(scene)
+    if surface is not None:
+        stay = contact.constraints.new("SHRINKWRAP")
+        stay.name = "On the sensing surface"
+        stay.target = surface
+        stay.shrinkwrap_type = "NEAREST_SURFACE"
+        stay.use_track_normal = True
+        stay.track_axis = "TRACK_NEGATIVE_Z"  # the surface's normals point inward
+    redraw(contact)
+    return contact
+
+
+def sensing_surface(scene: bpy.types.Scene) -> bpy.types.Object | None:
+    """The object of the sensing surface."""
+    parts = objects_of(scene, "PART")
+    return next((each for each in parts if each.optisense.role == "sensing_surface"), None)
+
+
+def redraw(contact: bpy.types.Object) -> None:
+    """Draw the indenter: its own z points outward, its lowest point lies at -depth."""
+    values = contact.optisense
+    if values.kind != "CONTACT" or not isinstance(contact.data, bpy.types.Mesh):
+        return
+    shape = bmesh.new()
+    down = Matrix.Translation((0.0, 0.0, -values.depth))
+    if values.indenter == "sphere":
+        at = down @ Matrix.Translation((0.0, 0.0, values.radius))
+        bmesh.ops.create_icosphere(shape, subdivisions=4, radius=values.radius, matrix=at)
+    elif values.indenter == "cylinder":
+        lying = Matrix.Rotation(math.pi / 2, 4, "Y")
+        at = down @ Matrix.Translation((0.0, 0.0, values.radius)) @ lying
+        bmesh.ops.create_cone(
+            shape, cap_ends=True, segments=48, radius1=values.radius, radius2=values.radius,
+            depth=values.length, matrix=at,
+        )  # fmt: skip
+    elif values.indenter == "plane":
+        tilt = Matrix.Rotation(math.radians(values.tilt[0]), 4, "X") @ Matrix.Rotation(
+            math.radians(values.tilt[1]), 4, "Y"
+        )
+        bmesh.ops.create_grid(shape, x_segments=1, y_segments=1, size=values.size / 2, matrix=tilt)
+        lowest = min((vertex.co.z for vertex in shape.verts), default=0.0)
+        bmesh.ops.translate(shape, verts=shape.verts, vec=(0.0, 0.0, -lowest - values.depth))
+    bmesh.ops.rotate(
+        shape, verts=shape.verts, cent=(0.0, 0.0, 0.0),
+        matrix=Matrix.Rotation(math.radians(values.rotation), 3, "Z"),
+    )  # fmt: skip
+    shape.to_mesh(contact.data)
+    shape.free()
+    contact.data.shade_smooth()
+    contact.data.update()
+
+
+def contact_values(contact: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> dict[str, Any]:
+    """A contact as the engine reads it.
+
+    Args:
+        contact: the object.
+        depsgraph: evaluated, for where the surface holds it.
+    """
+    values = contact.optisense
+    place = contact.evaluated_get(depsgraph).matrix_world.translation
+    indenter: dict[str, Any] = {"kind": values.indenter}
+    if values.indenter == "sphere":
+        indenter["radius"] = short(values.radius)
+    elif values.indenter == "cylinder":
+        indenter.update(radius=short(values.radius), length=short(values.length))
+    elif values.indenter == "plane":
+        indenter.update(
+            tilt_x=short(values.tilt[0]), tilt_y=short(values.tilt[1]), size=short(values.size)
+        )
+    else:
+        file = str(Path(bpy.path.abspath(values.file)).resolve())
+        indenter.update(file=file, scale=short(values.scale))
+    return {
+        "indenter": indenter,
+        "point": [short(value) for value in place],
+        "depth": short(values.depth),
+        "rotation": short(values.rotation),
+    }
+
+
+def contact_list(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> list[dict[str, Any]]:
+    """All contacts of the scene that are not hidden."""
+    contacts = [each for each in objects_of(scene, "CONTACT") if not each.hide_get()]
+    return [contact_values(each, depsgraph) for each in contacts]

@@ -1,0 +1,187 @@
+"""From a scene back to the design, each number as it was read unless it was changed."""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import PurePosixPath
+from typing import Any
+
+import bpy
+
+from ..core.mesh_file import Mesh
+from ..core.numbers import kept, kept_list
+from .cages import cage_values
+from .cameras import camera_values
+from .collections import objects_of
+from .lamps import light_pose
+from .meshes import part_mesh
+
+MATERIAL_FIELDS = {
+    "dielectric": ("ior", "dispersion", "roughness"),
+    "conductor": ("eta", "k", "roughness"),
+    "diffuse": ("reflectance",),
+    "absorber": (),
+}
+
+
+def gather(scene: bpy.types.Scene) -> tuple[dict[str, Any], dict[str, Mesh]]:
+    """The design of a scene: what `design.yaml` holds, and the parts at rest by name.
+
+    Raises:
+        ValueError: the scene holds no design, or one that can't be written down.
+    """
+    document = gather_document(scene)
+    caged = caged_parts(document)
+    parts = part_names(scene)
+    return document, {name: part_mesh(part, caged=name in caged) for name, part in parts.items()}
+
+
+def caged_parts(document: dict[str, Any]) -> set[str]:
+    """The parts that cages bend."""
+    return {name for cage in document["cages"].values() for name in cage["parts"]}
+
+
+def gather_document(scene: bpy.types.Scene) -> dict[str, Any]:
+    """The design of a scene without the meshes of its parts: what `design.yaml` holds.
+
+    Raises:
+        ValueError: the scene holds no design, or one that can't be written down.
+    """
+    design = scene.optisense
+    if not design.is_open:
+        raise ValueError("there is no sensor in this scene; make or open one")
+    document: dict[str, Any] = json.loads(design.document)
+    before = json.loads(design.document)
+    bpy.context.view_layer.update()
+    document["name"] = design.title
+    document["description"] = design.description
+    document["coating"] = _coating(design.coating, before["coating"])
+    document["materials"] = {
+        each.name: material_values(each, before["materials"].get(each.name, {}))
+        for each in design.materials
+    }
+    cages = {each.optisense.key: cage_values(each) for each in objects_of(scene, "CAGE")}
+    parts = part_names(scene)
+    for cage in cages.values():
+        cage["parts"] = [name for name in cage["parts"] if name in parts]
+    document["cages"] = {name: cage for name, cage in cages.items() if cage["parts"]}
+    document["parts"] = {name: _part(name, part) for name, part in parts.items()}
+    _own_files(document["parts"], parts)
+    document["lights"] = _lights(scene, before["lights"])
+    camera = camera_values(scene)
+    if camera is None:
+        raise ValueError("the sensor has no camera; add one in Lights and Camera")
+    document["camera"] = camera
+    return document
+
+
+def _own_files(values: dict[str, Any], parts: dict[str, bpy.types.Object]) -> None:
+    """Parts whose meshes are different objects do not share a file."""
+    owners: dict[str, str] = {}
+    for name in parts:
+        file = values[name]["mesh"]
+        file = str(PurePosixPath(file).with_suffix(".obj"))
+        if owners.setdefault(file.casefold(), name) != name:
+            file = f"meshes/{name}.obj"
+            owners[file.casefold()] = name
+        values[name]["mesh"] = file
+
+
+def part_names(scene: bpy.types.Scene) -> dict[str, bpy.types.Object]:
+    """The parts by their names in the design; a copy made in Blender gets one of its own."""
+    found: dict[str, bpy.types.Object] = {}
+    for part in objects_of(scene, "PART"):
+        name = part.optisense.key
+        if not name or name in found:
+            name = free_name(part.name, found)
+        found[name] = part
+    return found
+
+
+def free_name(wanted: str, taken: Any) -> str:
+    """A name as the design file allows it that is not taken yet."""
+    base = re.sub(r"[^A-Za-z0-9_-]+", "-", wanted).strip("-_")[:58] or "part"
+    name, number = base, 2
+    while name in taken:
+        name, number = f"{base}-{number}", number + 1
+    return name
+
+
+def _coating(coating: bpy.types.PropertyGroup, before: dict[str, Any]) -> dict[str, Any]:
+    values: dict[str, Any] = {"library": coating.library} if coating.library else {}
+    for field in ("reflectance", "eta", "k"):
+        values[field] = kept_list(before.get(field), getattr(coating, field))
+    values["specularity"] = kept(before.get("specularity"), coating.specularity)
+    return values
+
+
+def coating_values(scene: bpy.types.Scene) -> dict[str, Any]:
+    """The coating of a scene's design as the design file holds it."""
+    before = json.loads(scene.optisense.document)["coating"]
+    return _coating(scene.optisense.coating, before)
+
+
+def material_values(
+    material: bpy.types.PropertyGroup, before: dict[str, Any] | None = None
+) -> dict[str, Any]:
+    """A material as the design file holds it."""
+    before = before or {}
+    values: dict[str, Any] = {"kind": material.kind}
+    for field in MATERIAL_FIELDS[material.kind]:
+        shown = getattr(material, field)
+        if field == "dispersion" and not material.has_dispersion:
+            continue
+        if field in ("ior", "roughness"):
+            values[field] = kept(before.get(field), shown)
+        else:
+            values[field] = kept_list(before.get(field), shown)
+    return values
+
+
+def _part(name: str, part: bpy.types.Object) -> dict[str, Any]:
+    own = part.optisense
+    values: dict[str, Any] = {"role": own.role, "mesh": own.mesh_file}
+    if name != own.key or not own.mesh_file:
+        values["mesh"] = f"meshes/{name}.obj"
+    if own.material and own.role != "sensing_surface":
+        values["material"] = own.material
+    values["priority"] = own.priority
+    return values
+
+
+def _lights(scene: bpy.types.Scene, before: dict[str, Any]) -> dict[str, Any]:
+    lights = objects_of(scene, "LIGHT")
+    groups: dict[str, Any] = {}
+    for group in scene.optisense.light_groups:
+        poses = [light_pose(each) for each in lights if each.optisense.group == group.name]
+        if not poses:
+            continue
+        was = before.get(group.name, {})
+        values: dict[str, Any] = {
+            "model": group.model,
+            "colour": kept_list(was.get("colour"), group.colour),
+            "flux": kept(was.get("flux"), group.flux),
+        }
+        emitter = _emitter(group, was.get("emitter") or {})
+        if emitter is not None:
+            values["emitter"] = emitter
+        groups[group.name] = {**values, "lights": poses}
+    return groups
+
+
+def _emitter(group: bpy.types.PropertyGroup, was: dict[str, Any]) -> dict[str, Any] | None:
+    if group.emitter == "library":
+        return None
+    values: dict[str, Any] = {"kind": group.emitter}
+    if was.get("kind") == group.emitter:
+        values |= was
+    if group.emitter == "area":
+        values["shape"] = group.shape
+        values["size"] = kept_list(was.get("size"), group.size)
+    elif group.emitter == "ies":
+        values["file"] = group.file
+    else:
+        values["cutoff"] = kept(was.get("cutoff"), group.cutoff)
+        values["beam"] = kept(was.get("beam"), group.beam)
+    return values

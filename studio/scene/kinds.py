@@ -1,0 +1,88 @@
+"""The words of the design file as choices in a menu."""
+
+from __future__ import annotations
+
+Items = list[tuple[str, str, str]]
+
+OBJECT_KINDS: Items = [
+    ("NONE", "None", "Not part of the sensor"),
+    ("PART", "Part", "A solid or surface of the sensor"),
+    ("LIGHT", "Light", "One light of a group"),
+    ("CAMERA", "Camera", "The sensor's camera"),
+    ("CAGE", "Cage", "Control points that bend parts"),
+    ("CONTACT", "Contact", "Something that presses on the sensor"),
+    ("REFERENCE", "Reference", "A shape that parts, lights and the camera are placed by"),
+    ("SHOWN", "Shown", "Drawn by the extension, such as chief rays; not saved"),
+]
+
+ROLES: Items = [
+    ("sensing_surface", "Sensing surface", "Inside of the opaque coating; normals point inward"),
+    ("elastomer", "Elastomer", "A closed, soft, transparent solid"),
+    ("support", "Support", "A closed, rigid, transparent solid"),
+    ("mirror", "Mirror", "A reflecting surface or solid"),
+    ("blocker", "Blocker", "Opaque: stops light"),
+    ("interface", "Interface", "A refracting sheet"),
+    ("indenter", "Indenter", "An object that touches the sensor"),
+]
+
+REFERENCES: Items = [
+    ("sensing_surface", "Sensing surface reference", "Becomes the coated surface"),
+    ("camera", "Camera reference", "Where the camera goes"),
+    ("light", "Light reference", "Where lights go"),
+    ("support", "Support structure reference", "Becomes a transparent support"),
+    ("elastomer", "Elastomer reference", "Becomes the gel"),
+    ("indenter", "Indenter reference", "Becomes a contact of this shape"),
+    ("mirror", "Mirror reference", "Becomes a mirror"),
+    ("blocker", "Blocking reference", "Becomes an opaque part"),
+    ("interface", "Interface reference", "Becomes a refracting sheet"),
+]
+
+MATERIAL_KINDS: Items = [
+    ("dielectric", "Transparent", "Refracts: silicone, acrylic, glass"),
+    ("conductor", "Metal", "Reflects: a mirror"),
+    ("diffuse", "Diffuse", "An opaque matt surface"),
+    ("absorber", "Absorber", "Absorbs all light"),
+]
+
+KINDS_OF_ROLE: dict[str, tuple[str, ...]] = {
+    "sensing_surface": (),
+    "elastomer": ("dielectric",),
+    "support": ("dielectric",),
+    "interface": ("dielectric",),
+    "mirror": ("conductor", "diffuse"),
+    "blocker": ("absorber", "diffuse", "conductor"),
+    "indenter": ("diffuse", "conductor", "absorber"),
+}
+"""Which kinds of material a role can be made of; a sensing surface wears the coating."""
+
+EMITTERS: Items = [
+    ("library", "Library", "As the library's light"),
+    ("area", "Flat window", "A flat emitting window"),
+    ("ies", "IES profile", "A point that radiates as an IES file says"),
+    ("spot", "Spot", "A point with a cut-off angle"),
+]
+
+WINDOWS: Items = [("disc", "Disc", ""), ("rectangle", "Rectangle", "")]
+
+PROJECTIONS: Items = [
+    ("perspective", "Perspective", "A pinhole camera"),
+    ("equidistant", "Fisheye", "Equal angles are equal distances in the picture"),
+]
+
+INDENTERS: Items = [
+    ("sphere", "Sphere", "A ball"),
+    ("cylinder", "Cylinder", "A lying cylinder"),
+    ("plane", "Plane", "A flat face"),
+    ("mesh", "Mesh", "A mesh file; its lowest point touches first"),
+]
+
+LOOKS: dict[str, tuple[float, float, float, float]] = {
+    "sensing_surface": (0.25, 0.32, 0.38, 0.55),
+    "elastomer": (0.89, 0.38, 0.13, 0.28),
+    "support": (0.16, 0.47, 0.81, 0.24),
+    "mirror": (0.62, 0.68, 0.77, 0.75),
+    "blocker": (0.04, 0.05, 0.06, 1.0),
+    "interface": (0.47, 0.38, 0.92, 0.3),
+    "indenter": (0.48, 0.37, 0.07, 1.0),
+}
+"""Colour and opacity of each role, linear, as drawn elsewhere in OptiSense Studio."""

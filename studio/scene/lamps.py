@@ -1,0 +1,117 @@
+"""Lights in the viewport: the emitting window in its real size, and where it shines."""
+
+from __future__ import annotations
+
+import json
+import math
+from typing import Any
+
+import bpy
+import numpy as np
+from mathutils import Matrix
+
+from ..core.pose import matrix_of, pose_of
+from .collections import OPTICAL_SYSTEM, collection, next_order, objects_of
+
+ARROW = 2.0
+"""Length (mm) of the line that shows where a light shines."""
+
+POINT_SIZE = (0.6, 0.6)
+"""How large (mm) a lamp is drawn that is a point or whose size is not known."""
+
+
+def add_light(
+    scene: bpy.types.Scene, group: bpy.types.PropertyGroup, pose: dict[str, Any]
+) -> bpy.types.Object:
+    """An object for one light.
+
+    Args:
+        scene: where to.
+        group: its light group.
+        pose: `position`, `direction` and maybe `up`, as in the design file.
+    """
+    light = bpy.data.objects.new(group.name, _mesh(group))
+    values = light.optisense
+    values.kind = "LIGHT"
+    values.group = group.name
+    values.order = next_order(scene, "LIGHT")
+    values.data = json.dumps(pose)
+    place(light, pose)
+    light.color = lamp_colour(group)
+    light.show_in_front = True
+    collection(scene, OPTICAL_SYSTEM).objects.link(light)
+    return light
+
+
+def place(item: bpy.types.Object, pose: dict[str, Any]) -> None:
+    """Put a light or camera where the design says."""
+    matrix = matrix_of(pose["position"], pose["direction"], pose.get("up"))
+    item.matrix_world = Matrix(matrix.tolist())
+
+
+def light_pose(light: bpy.types.Object) -> dict[str, Any]:
+    """The pose of a light as the design file holds it."""
+    before = json.loads(light.optisense.data) if light.optisense.data else {}
+    return pose_of(np.array(light.matrix_world), before, up=False)
+
+
+def redraw(scene: bpy.types.Scene, group: bpy.types.PropertyGroup) -> None:
+    """Draw the lights of a group anew, after a change of the group."""
+    lights = [each for each in objects_of(scene, "LIGHT") if each.optisense.group == group.name]
+    if lights:
+        mesh = _mesh(group)
+        for light in lights:
+            light.data = mesh
+            light.color = lamp_colour(group)
+
+
+def lamp_colour(group: bpy.types.PropertyGroup) -> tuple[float, float, float, float]:
+    """The colour of a group, as bright as can be drawn."""
+    brightest = max(*group.colour, 1e-6)
+    red, green, blue = (0.12 + 0.88 * channel / brightest for channel in group.colour)
+    return red, green, blue, 1.0
+
+
+def window(group: bpy.types.PropertyGroup) -> tuple[str, tuple[float, float], float]:
+    """Shape, size (mm) and half angle (degrees) in which a group's lamps are drawn."""
+    if group.emitter == "area":
+        return group.shape, tuple(group.size), 60.0
+    if group.emitter == "spot":
+        return "disc", POINT_SIZE, group.cutoff
+    if group.emitter == "library" and group.library_window:
+        known = json.loads(group.library_window)
+        return known["shape"], tuple(known["size"]), known.get("angle", 60.0)
+    return "disc", POINT_SIZE, 60.0
+
+
+def _mesh(group: bpy.types.PropertyGroup) -> bpy.types.Mesh:
+    name = f"lamp {group.name}"
+    mesh = next((m for m in bpy.data.meshes if m.name == name and m.library is None), None)
+    mesh = mesh or bpy.data.meshes.new(name)
+    mesh.clear_geometry()
+    mesh.from_pydata(*lamp_drawing(*window(group)))
+    mesh.update()
+    return mesh
+
+
+def lamp_drawing(
+    shape: str, size: tuple[float, float], angle: float
+) -> tuple[list[tuple[float, ...]], list[tuple[int, int]], list[list[int]]]:
+    """Vertices (mm), edges and faces of a lamp that shines along -z, its height along y."""
+    width, height = size[0] / 2, size[1] / 2
+    if shape == "rectangle":
+        rim = [(-width, -height), (width, -height), (width, height), (-width, height)]
+    else:
+        turns = [math.tau * step / 24 for step in range(24)]
+        rim = [(width * math.cos(turn), height * math.sin(turn)) for turn in turns]
+    vertices: list[tuple[float, ...]] = [(x, y, 0.0) for x, y in rim]
+    faces = [list(range(len(rim)))[::-1]]
+    start = len(vertices)
+    tip = -max(ARROW, 1.5 * max(size))
+    spread = abs(tip) * 0.3 * math.tan(math.radians(min(angle, 75.0)) / 2)
+    vertices += [(0.0, 0.0, 0.0), (0.0, 0.0, tip)]
+    edges = [(start, start + 1)]
+    for x, y in ((1, 0), (-1, 0), (0, 1), (0, -1)):
+        vertices.append((x * spread, y * spread, tip * 0.7))
+        edges.append((start + 1, len(vertices) - 1))
+    return vertices, edges, faces

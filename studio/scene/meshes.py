@@ -1,0 +1,94 @@
+"""Meshes of parts in Blender, with their shape at rest in full precision beside what is shown."""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..core.mesh_file import Mesh
+from ..core.numbers import joined, kept_array, split
+
+REST = "optisense_rest"
+NORMAL = "optisense_normal"
+
+
+def new_mesh(name: str, mesh: Mesh) -> bpy.types.Mesh:
+    """A Blender mesh that shows the mesh at rest and remembers it exactly."""
+    made = bpy.data.meshes.new(name)
+    made.from_pydata(mesh.vertices.tolist(), [], mesh.faces.tolist(), shade_flat=False)
+    remember(made, REST, mesh.vertices)
+    if mesh.normals is not None:
+        remember(made, NORMAL, mesh.normals)
+    made.update()
+    return made
+
+
+def remember(mesh: bpy.types.Mesh, name: str, values: ArrayLike) -> None:
+    """Keep (n, 3) numbers at the vertices, exactly; undo and .blend files keep them too."""
+    for number, part in enumerate(split(values)):
+        attribute = mesh.attributes.get(f"{name}_{number}")
+        if attribute is None:
+            attribute = mesh.attributes.new(f"{name}_{number}", "FLOAT_VECTOR", "POINT")
+        attribute.data.foreach_set("vector", part.ravel())
+
+
+def remembered(mesh: bpy.types.Mesh, name: str) -> NDArray[np.float64] | None:
+    """What `remember` kept, or None."""
+    parts = []
+    for number in range(3):
+        attribute = mesh.attributes.get(f"{name}_{number}")
+        if attribute is None or len(attribute.data) != len(mesh.vertices):
+            return None
+        values = np.empty(3 * len(mesh.vertices), dtype=np.float32)
+        attribute.data.foreach_get("vector", values)
+        parts.append(values.reshape(-1, 3))
+    return joined(parts)
+
+
+def shown_vertices(mesh: bpy.types.Mesh) -> NDArray[np.float32]:
+    """(n, 3) where the vertices are drawn."""
+    values = np.empty(3 * len(mesh.vertices), dtype=np.float32)
+    mesh.vertices.foreach_get("co", values)
+    return values.reshape(-1, 3)
+
+
+def show_vertices(mesh: bpy.types.Mesh, vertices: ArrayLike) -> None:
+    """Draw the vertices (n, 3) somewhere else."""
+    flat = np.ascontiguousarray(vertices, dtype=np.float32).ravel()
+    mesh.attributes["position"].data.foreach_set("vector", flat)
+    mesh.update()
+
+
+def part_mesh(part: bpy.types.Object, *, caged: bool) -> Mesh:
+    """The mesh of a part at rest, in the design's frame.
+
+    Args:
+        part: a mesh object.
+        caged: whether a cage bends it, so that what is shown is not its shape at rest.
+    """
+    if part.mode == "EDIT":
+        part.update_from_editmode()
+    data = part.data
+    rest = remembered(data, REST)
+    shown = shown_vertices(data)
+    vertices = rest if caged and rest is not None else kept_array(rest, shown)
+    normals = remembered(data, NORMAL)
+    if normals is not None and (rest is None or not np.array_equal(vertices, rest)):
+        normals = None
+    world = np.array(part.matrix_world, dtype=np.float64)
+    if not np.array_equal(world, np.eye(4)):
+        vertices = vertices @ world[:3, :3].T + world[:3, 3]
+        normals = None
+    return Mesh(vertices, _triangles(data), normals)
+
+
+def _triangles(mesh: bpy.types.Mesh) -> NDArray[np.int32]:
+    if all(polygon.loop_total == 3 for polygon in mesh.polygons):
+        corners = np.empty(len(mesh.loops), dtype=np.int32)
+        mesh.loops.foreach_get("vertex_index", corners)
+        return corners.reshape(-1, 3)
+    mesh.calc_loop_triangles()
+    corners = np.empty(3 * len(mesh.loop_triangles), dtype=np.int32)
+    mesh.loop_triangles.foreach_get("vertices", corners)
+    return corners.reshape(-1, 3)

@@ -1,0 +1,117 @@
+"""What an object is in the design, and what the design says about it."""
+
+from __future__ import annotations
+
+import bpy
+from bpy.props import (
+    EnumProperty,
+    FloatProperty,
+    FloatVectorProperty,
+    IntProperty,
+    IntVectorProperty,
+    PointerProperty,
+    StringProperty,
+)
+
+from . import kinds
+
+
+def _camera_changed(values: bpy.types.PropertyGroup, context: bpy.types.Context) -> None:
+    from .cameras import show
+
+    show(values.id_data)
+
+
+def _contact_changed(values: bpy.types.PropertyGroup, context: bpy.types.Context) -> None:
+    from .contacts import redraw
+
+    redraw(values.id_data)
+
+
+def _role_changed(values: bpy.types.PropertyGroup, context: bpy.types.Context) -> None:
+    values.id_data.color = kinds.LOOKS[values.role]
+
+
+def _blend_changed(values: bpy.types.PropertyGroup, context: bpy.types.Context) -> None:
+    from .cages import show_blend
+
+    show_blend(values.id_data)
+
+
+class OPTISENSE_PG_object(bpy.types.PropertyGroup):
+    """An object's place in the design."""
+
+    kind: EnumProperty(name="Kind", items=kinds.OBJECT_KINDS)
+    key: StringProperty(name="Name", description="In the design file")
+    order: IntProperty(description="Its place in the design file", options={"HIDDEN"})
+    data: StringProperty(
+        description="Its values as they were read, with their numbers in full", options={"HIDDEN"}
+    )
+
+    role: EnumProperty(name="Role", items=kinds.ROLES, update=_role_changed)
+    material: StringProperty(name="Material", description="What the part is made of")
+    priority: IntProperty(
+        name="Priority", description="Where solids overlap, the higher one counts",
+        min=-1000, max=1000,
+    )  # fmt: skip
+    mesh_file: StringProperty(options={"HIDDEN"})
+
+    reference: EnumProperty(name="Reference", items=kinds.REFERENCES)
+
+    group: StringProperty(name="Group", description="The light group it belongs to")
+
+    model: StringProperty(name="Model", description="The library camera it started from")
+    projection: EnumProperty(name="Projection", items=kinds.PROJECTIONS, update=_camera_changed)
+    fov: FloatProperty(
+        name="Field of view", description="Degrees, across the image width", min=0.01, max=360.0,
+        default=60.0, precision=3, update=_camera_changed,
+    )  # fmt: skip
+    pixels: IntVectorProperty(
+        name="Resolution", description="Pixels, width and height", size=2, min=1, max=65536,
+        default=(320, 240), update=_camera_changed,
+    )  # fmt: skip
+
+    blend: FloatProperty(
+        name="Blend", description="A: 0 is C_min, 1 is C_max", min=0.0, max=1.0, precision=3,
+        update=_blend_changed,
+    )  # fmt: skip
+
+    indenter: EnumProperty(name="Indenter", items=kinds.INDENTERS, update=_contact_changed)
+    radius: FloatProperty(
+        name="Radius", description="mm", min=0.01, max=1000.0, default=1.5, update=_contact_changed
+    )
+    length: FloatProperty(
+        name="Length", description="mm", min=0.01, max=1000.0, default=8.0, update=_contact_changed
+    )
+    tilt: FloatVectorProperty(
+        name="Tilt", description="Degrees about x and y", size=2, min=-80.0, max=80.0,
+        update=_contact_changed,
+    )  # fmt: skip
+    size: FloatProperty(
+        name="Size", description="mm, width of the plane", min=0.01, max=1000.0, default=8.0,
+        update=_contact_changed,
+    )  # fmt: skip
+    file: StringProperty(
+        name="Mesh", description="OBJ, STL or PLY", subtype="FILE_PATH", update=_contact_changed
+    )
+    scale: FloatProperty(
+        name="Scale", description="From the file's units to mm", min=1e-6, max=1e6, default=1.0,
+        update=_contact_changed,
+    )  # fmt: skip
+    depth: FloatProperty(
+        name="Depth", description="mm, how far it is pressed in", min=0.001, max=100.0,
+        default=0.6, precision=3, update=_contact_changed,
+    )  # fmt: skip
+    rotation: FloatProperty(
+        name="Rotation", description="Degrees about the outward normal", update=_contact_changed
+    )
+
+
+def register() -> None:
+    bpy.utils.register_class(OPTISENSE_PG_object)
+    bpy.types.Object.optisense = PointerProperty(type=OPTISENSE_PG_object)
+
+
+def unregister() -> None:
+    del bpy.types.Object.optisense
+    bpy.utils.unregister_class(OPTISENSE_PG_object)

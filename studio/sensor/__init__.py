@@ -1,0 +1,1 @@
+"""Making, opening, saving and checking a sensor."""

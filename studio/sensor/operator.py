@@ -1,0 +1,261 @@
+"""New, open, save, check."""
+
+from __future__ import annotations
+
+import uuid
+from pathlib import Path
+from typing import Any
+
+import bpy
+from bpy.props import StringProperty
+
+from ..core import mesh_file
+from ..core.engine import EngineError
+from ..engine import catalogue, handing, polls, session
+from ..lights.windows import ask_for_windows
+from ..scene.build import build
+from ..scene.views import show_design
+
+
+class _Opens:
+    """What new and open have in common."""
+
+    def _open(
+        self, context: bpy.types.Context, source: str, folder: str, *, wait: bool
+    ) -> set[str]:
+        scene_name = context.scene.name
+        try:
+            stage = Path(session.folder()) / f"opened-{uuid.uuid4().hex[:8]}"
+        except EngineError as error:
+            session.say(error)
+            self.report({"ERROR"}, error.text())
+            return {"CANCELLED"}
+
+        def opened(result: dict[str, Any]) -> None:
+            scene = bpy.data.scenes.get(scene_name)
+            if scene is None:
+                return
+            document = handing.without_nulls(result["data"])
+            parts = document["parts"].items()
+            meshes = {name: mesh_file.read(stage / part["mesh"]) for name, part in parts}
+            build(scene, document, meshes)
+            scene.optisense.folder = folder or str(stage)
+            scene.optisense.is_saved = bool(folder)
+            show_design(scene)
+            ask_for_windows(scene)
+            warnings = result.get("warnings") or []
+            session.state().note = "; ".join(each.get("message", "") for each in warnings)
+            session.push_undo(f"Open {document['name']}")
+            session.redraw()
+
+        # Written out first: the engine reads what users have, and writes what this reads.
+        session.start_job(
+            "Opening the sensor",
+            "save",
+            lambda _: session.start_job(
+                "Opening the sensor", "open", opened, wait=wait, design=str(stage)
+            ),
+            wait=wait,
+            design=source,
+            to=str(stage),
+        )
+        if wait and session.state().problem:
+            self.report({"ERROR"}, session.state().problem)
+            return {"CANCELLED"}
+        return {"FINISHED"}
+
+
+class OPTISENSE_OT_new(_Opens, bpy.types.Operator):
+    """Start from a built-in sensor"""
+
+    bl_idname = "optisense.new"
+    bl_label = "New Sensor"
+    bl_options = {"REGISTER"}
+
+    sensor: StringProperty(name="Sensor", default="gelsight-mini")
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return polls.is_idle(cls, context) and polls.in_object_mode(cls, context)
+
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        return self._open(context, f"builtin:{self.sensor}", "", wait=False)
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        return self._open(context, f"builtin:{self.sensor}", "", wait=True)
+
+
+class OPTISENSE_MT_new(bpy.types.Menu):
+    """The built-in sensors"""
+
+    bl_idname = "OPTISENSE_MT_new"
+    bl_label = "New Sensor"
+
+    def draw(self, context: bpy.types.Context) -> None:
+        self.layout.operator_context = "INVOKE_DEFAULT"
+        for name, title, description in catalogue.items("sensors"):
+            row = self.layout.row()
+            row.enabled = name != "NONE"
+            row.operator(OPTISENSE_OT_new.bl_idname, text=description or title).sensor = name
+
+
+class OPTISENSE_OT_open(_Opens, bpy.types.Operator):
+    """Open a sensor's folder"""
+
+    bl_idname = "optisense.open"
+    bl_label = "Open Sensor"
+    bl_options = {"REGISTER"}
+
+    filepath: StringProperty(subtype="FILE_PATH")
+    filter_glob: StringProperty(default="*.yaml", options={"HIDDEN"})
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return polls.is_idle(cls, context) and polls.in_object_mode(cls, context)
+
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        context.window_manager.fileselect_add(self)
+        return {"RUNNING_MODAL"}
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        path = Path(bpy.path.abspath(self.filepath)).resolve()
+        folder = path.parent if path.suffix in (".yaml", ".yml") else path
+        return self._open(context, str(folder), str(folder), wait=bpy.app.background)
+
+
+class _Saves:
+    """What save and save as have in common."""
+
+    def _save(self, context: bpy.types.Context, folder: str) -> set[str]:
+        scene = context.scene
+        try:
+            design = handing.design(scene)
+        except EngineError as error:
+            session.say(error)
+            self.report({"ERROR"}, error.text())
+            return {"CANCELLED"}
+        name = scene.name
+        own = scene.optisense.is_saved and Path(scene.optisense.folder) == Path(folder)
+
+        def saved(result: dict[str, Any]) -> None:
+            scene = bpy.data.scenes.get(name)
+            if scene is not None:
+                scene.optisense.folder = result["folder"]
+                scene.optisense.is_saved = True
+            session.state().note = f"Saved in {result['folder']}"
+
+        wait = bpy.app.background
+        done = session.start_job(
+            "Saving", "save", saved, wait=wait, design=design, to=folder, only_new=not own
+        )
+        if not done:
+            self.report({"ERROR"}, session.state().problem)
+        return {"FINISHED"} if done else {"CANCELLED"}
+
+
+class OPTISENSE_OT_save(_Saves, bpy.types.Operator):
+    """Write the sensor to its folder"""
+
+    bl_idname = "optisense.save"
+    bl_label = "Save"
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        if not (polls.has_design(cls, context) and polls.is_idle(cls, context)):
+            return False
+        if not context.scene.optisense.is_saved:
+            cls.poll_message_set("It has no folder yet: use Save As")
+            return False
+        return True
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        return self._save(context, context.scene.optisense.folder)
+
+
+class OPTISENSE_OT_save_as(_Saves, bpy.types.Operator):
+    """Write the sensor to a new folder"""
+
+    bl_idname = "optisense.save_as"
+    bl_label = "Save As"
+
+    filepath: StringProperty(subtype="DIR_PATH")
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return polls.has_design(cls, context) and polls.is_idle(cls, context)
+
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        self.filepath = str(Path.home() / (context.scene.optisense.title or "sensor"))
+        context.window_manager.fileselect_add(self)
+        return {"RUNNING_MODAL"}
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        return self._save(context, str(Path(bpy.path.abspath(self.filepath)).resolve()))
+
+
+class OPTISENSE_OT_check(bpy.types.Operator):
+    """Find what is wrong without simulating"""
+
+    bl_idname = "optisense.check"
+    bl_label = "Check"
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return polls.has_design(cls, context) and polls.is_idle(cls, context)
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        def checked(result: dict[str, Any]) -> None:
+            problems = result["problems"]
+            if not problems:
+                session.state().note = "The design is in order"
+                return
+            worst = next((p for p in problems if p["severity"] == "error"), problems[0])
+            session.say(EngineError({"kind": "DesignError", **worst}))
+
+        try:
+            design = handing.design(context.scene)
+        except EngineError as error:
+            session.say(error)
+            self.report({"ERROR"}, error.text())
+            return {"CANCELLED"}
+        session.start_job("Checking", "check", checked, wait=bpy.app.background, design=design)
+        return {"FINISHED"}
+
+
+class OPTISENSE_OT_cancel(bpy.types.Operator):
+    """Give up what the engine is working on"""
+
+    bl_idname = "optisense.cancel"
+    bl_label = "Cancel"
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        if not session.is_busy():
+            cls.poll_message_set("Nothing is going on")
+            return False
+        return True
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        session.cancel_job()
+        return {"FINISHED"}
+
+
+CLASSES = (
+    OPTISENSE_OT_new,
+    OPTISENSE_MT_new,
+    OPTISENSE_OT_open,
+    OPTISENSE_OT_save,
+    OPTISENSE_OT_save_as,
+    OPTISENSE_OT_check,
+    OPTISENSE_OT_cancel,
+)
+
+
+def register() -> None:
+    for each in CLASSES:
+        bpy.utils.register_class(each)
+
+
+def unregister() -> None:
+    for each in reversed(CLASSES):
+        bpy.utils.unregister_class(each)

@@ -1,0 +1,48 @@
+"""Step 1 in the sidebar."""
+
+from __future__ import annotations
+
+import bpy
+
+from ..engine.layout import SidebarPanel, paragraph, show_job, show_messages
+from ..engine.preferences import HOW_TO_GET, engine_command
+
+
+class OPTISENSE_PT_sensor(SidebarPanel, bpy.types.Panel):
+    bl_idname = "OPTISENSE_PT_sensor"
+    bl_label = "Sensor"
+    bl_order = 1
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return context.scene is not None
+
+    def draw(self, context: bpy.types.Context) -> None:
+        layout = self.layout
+        if not engine_command():
+            paragraph(layout, f"No engine was found. {HOW_TO_GET}.", "ERROR")
+        layout.menu("OPTISENSE_MT_new", icon="FILE_NEW")
+        row = layout.row(align=True)
+        row.operator("optisense.open", text="Open", icon="FILE_FOLDER")
+        row.operator("optisense.save", icon="FILE_TICK")
+        row.operator("optisense.save_as", icon="BLANK1")
+        design = context.scene.optisense
+        if design.is_open:
+            column = layout.column()
+            column.use_property_split = True
+            column.use_property_decorate = False
+            column.prop(design, "title")
+            column.prop(design, "description")
+            if design.is_saved:
+                paragraph(layout, design.folder, "FILE_FOLDER")
+            layout.operator("optisense.check", icon="CHECKMARK")
+        show_job(layout, "Opening the sensor", "Saving", "Checking", "Finding nine places")
+        show_messages(layout)
+
+
+def register() -> None:
+    bpy.utils.register_class(OPTISENSE_PT_sensor)
+
+
+def unregister() -> None:
+    bpy.utils.unregister_class(OPTISENSE_PT_sensor)

@@ -1,0 +1,1 @@
+"""Contacts, pictures, drafts and relighting."""

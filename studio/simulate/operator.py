@@ -1,0 +1,267 @@
+"""Place contacts, simulate, look at the picture."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import bpy
+from bpy_extras import view3d_utils
+from mathutils import Vector
+
+from ..core.engine import EngineError
+from ..engine import handing, polls, session
+from ..scene.collections import objects_of
+from ..scene.contacts import add_contact, sensing_surface
+from . import picture, requests
+
+
+class OPTISENSE_OT_simulate(bpy.types.Operator):
+    """Make the picture that the sensor's camera would take"""
+
+    bl_idname = "optisense.simulate"
+    bl_label = "Simulate"
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return polls.has_design(cls, context) and polls.is_idle(cls, context)
+
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        return self._start(context, wait=False)
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        return self._start(context, wait=True)
+
+    def _start(self, context: bpy.types.Context, *, wait: bool) -> set[str]:
+        try:
+            fields = requests.fields(context.scene)
+        except EngineError as error:
+            session.say(error)
+            self.report({"ERROR"}, error.text())
+            return {"CANCELLED"}
+        done = session.start_job(
+            "Simulating",
+            "simulate",
+            lambda result: requests.take(result, draft=False),
+            wait=wait,
+            **fields,
+        )
+        if not done:
+            self.report({"ERROR"}, session.state().problem)
+            return {"CANCELLED"}
+        return {"FINISHED"}
+
+
+class OPTISENSE_OT_show_picture(bpy.types.Operator):
+    """Show the picture in an Image Editor"""
+
+    bl_idname = "optisense.show_picture"
+    bl_label = "Open in Image Editor"
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        if bpy.data.images.get(picture.IMAGE) is None:
+            cls.poll_message_set("Simulate first")
+            return False
+        if context.screen is None:
+            cls.poll_message_set("There is no window")
+            return False
+        return True
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        areas = context.screen.areas
+        editor = next((each for each in areas if each.type == "IMAGE_EDITOR"), None)
+        if editor is None:
+            known = set(areas)
+            area = next(each for each in areas if each.type == "VIEW_3D")
+            with context.temp_override(area=area):
+                bpy.ops.screen.area_split(direction="VERTICAL", factor=0.5)
+            editor = next((each for each in context.screen.areas if each not in known), area)
+            editor.type = "IMAGE_EDITOR"
+        editor.spaces.active.image = bpy.data.images[picture.IMAGE]
+        return {"FINISHED"}
+
+
+class OPTISENSE_OT_add_contact(bpy.types.Operator):
+    """Press a ball on the middle of the sensing surface"""
+
+    bl_idname = "optisense.add_contact"
+    bl_label = "Add in the Middle"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return polls.has_design(cls, context) and polls.in_object_mode(cls, context)
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        surface = sensing_surface(context.scene)
+        if surface is None:
+            self.report({"ERROR"}, "There is no sensing surface")
+            return {"CANCELLED"}
+        middle = sum((Vector(corner) for corner in surface.bound_box), Vector()) / 8.0
+        found, point, normal, _ = surface.closest_point_on_mesh(middle)
+        if not found:
+            self.report({"ERROR"}, "The sensing surface is empty")
+            return {"CANCELLED"}
+        _add(context, surface, point, normal)
+        return {"FINISHED"}
+
+
+class OPTISENSE_OT_place_contact(bpy.types.Operator):
+    """Click on the sensing surface to press a ball there; Esc or right click ends"""
+
+    bl_idname = "optisense.place_contact"
+    bl_label = "Click to Place"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        if not (polls.has_design(cls, context) and polls.in_object_mode(cls, context)):
+            return False
+        if context.area is None or context.area.type != "VIEW_3D":
+            cls.poll_message_set("Use it in a 3D view")
+            return False
+        return True
+
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        context.window_manager.modal_handler_add(self)
+        context.window.cursor_modal_set("CROSSHAIR")
+        context.workspace.status_text_set("Click on the sensing surface; Esc ends")
+        return {"RUNNING_MODAL"}
+
+    def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        if event.type in ("ESC", "RIGHTMOUSE"):
+            return self._end(context, {"CANCELLED"})
+        if event.type == "LEFTMOUSE" and event.value == "PRESS":
+            if self._pick(context, event):
+                return self._end(context, {"FINISHED"})
+            return {"RUNNING_MODAL"}
+        return {"PASS_THROUGH"}
+
+    def _end(self, context: bpy.types.Context, result: set[str]) -> set[str]:
+        context.window.cursor_modal_restore()
+        context.workspace.status_text_set(None)
+        return result
+
+    def _pick(self, context: bpy.types.Context, event: bpy.types.Event) -> bool:
+        region = next(each for each in context.area.regions if each.type == "WINDOW")
+        place = (event.mouse_x - region.x, event.mouse_y - region.y)
+        view = context.area.spaces.active.region_3d
+        start = view3d_utils.region_2d_to_origin_3d(region, view, place)
+        way = view3d_utils.region_2d_to_vector_3d(region, view, place)
+        return press_along(context, start, way)
+
+
+def press_along(context: bpy.types.Context, start: Vector, way: Vector) -> bool:
+    """Add a contact where a ray meets the sensing surface; whether it does."""
+    surface = sensing_surface(context.scene)
+    if surface is None:
+        return False
+    inverse = surface.matrix_world.inverted()
+    hit, point, normal, _ = surface.ray_cast(inverse @ start, inverse.to_3x3() @ way)
+    if hit:
+        _add(context, surface, point, normal)
+    return hit
+
+
+def _add(
+    context: bpy.types.Context, surface: bpy.types.Object, point: Vector, normal: Vector
+) -> None:
+    outward = -(surface.matrix_world.to_3x3() @ normal)
+    contact = add_contact(context.scene, tuple(surface.matrix_world @ point), tuple(outward))
+    for each in context.selected_objects:
+        each.select_set(False)
+    contact.select_set(True)
+    context.view_layer.objects.active = contact
+
+
+class OPTISENSE_OT_nine_contacts(bpy.types.Operator):
+    """Press nine balls where the camera sees them, as the active contact or as a new one"""
+
+    bl_idname = "optisense.nine_contacts"
+    bl_label = "Nine Places"
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return (
+            polls.has_design(cls, context)
+            and polls.is_idle(cls, context)
+            and polls.in_object_mode(cls, context)
+        )
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        name = context.scene.name
+
+        def placed(result: dict[str, Any]) -> None:
+            scene = bpy.data.scenes.get(name)
+            surface = None if scene is None else sensing_surface(scene)
+            if scene is None or surface is None:
+                return
+            for each in objects_of(scene, "CONTACT"):
+                bpy.data.objects.remove(each)
+            inverse = surface.matrix_world.inverted()
+            for each in result["contacts"]:
+                near = surface.closest_point_on_mesh(inverse @ Vector(each["point"]))
+                outward = -(surface.matrix_world.to_3x3() @ near[2])
+                contact = add_contact(scene, each["point"], tuple(outward))
+                contact.optisense.radius = each["indenter"].get("radius", 1.5)
+                contact.optisense.depth = each["depth"]
+            session.push_undo("Nine contacts")
+            session.redraw()
+
+        try:
+            fields = {"design": handing.design(context.scene), **self._indenter(context)}
+        except EngineError as error:
+            session.say(error)
+            return {"CANCELLED"}
+        session.start_job(
+            "Finding nine places", "nine_places", placed, wait=bpy.app.background, **fields
+        )
+        return {"FINISHED"}
+
+    def _indenter(self, context: bpy.types.Context) -> dict[str, Any]:
+        active = context.active_object
+        radius, depth = 1.5, 0.3
+        if active is not None and active.optisense.kind == "CONTACT":
+            radius, depth = active.optisense.radius, active.optisense.depth
+        indenter = {"kind": "sphere", "radius": round(radius, 6)}
+        return {"indenter": indenter, "depth": round(depth, 6)}
+
+
+class OPTISENSE_OT_clear_contacts(bpy.types.Operator):
+    """Remove all contacts"""
+
+    bl_idname = "optisense.clear_contacts"
+    bl_label = "Remove All"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        if not objects_of(context.scene, "CONTACT"):
+            cls.poll_message_set("There are no contacts")
+            return False
+        return True
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        for each in objects_of(context.scene, "CONTACT"):
+            bpy.data.objects.remove(each)
+        return {"FINISHED"}
+
+
+CLASSES = (
+    OPTISENSE_OT_simulate,
+    OPTISENSE_OT_show_picture,
+    OPTISENSE_OT_add_contact,
+    OPTISENSE_OT_place_contact,
+    OPTISENSE_OT_nine_contacts,
+    OPTISENSE_OT_clear_contacts,
+)
+
+
+def register() -> None:
+    for each in CLASSES:
+        bpy.utils.register_class(each)
+
+
+def unregister() -> None:
+    for each in reversed(CLASSES):
+        bpy.utils.unregister_class(each)

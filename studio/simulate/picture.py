@@ -1,0 +1,60 @@
+"""The picture in the panel and in Image Editors."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import bpy
+import bpy.utils.previews
+import numpy as np
+from numpy.typing import NDArray
+
+IMAGE = "OptiSense picture"
+
+_previews: bpy.utils.previews.ImagePreviewCollection | None = None
+
+
+def show(pixels: NDArray[np.float32]) -> bpy.types.Image:
+    """Show a picture (h, w, 4), row 0 at the bottom, 0 to 1, in place of the one before."""
+    height, width = pixels.shape[:2]
+    image = bpy.data.images.get(IMAGE)
+    if image is None:
+        image = bpy.data.images.new(IMAGE, width, height)
+    elif tuple(image.size) != (width, height):
+        image.scale(width, height)
+    flat = np.ascontiguousarray(pixels, dtype=np.float32).ravel()
+    image.pixels.foreach_set(flat)
+    image.update()
+    if _previews is not None:
+        preview = _previews.get(IMAGE) or _previews.new(IMAGE)
+        preview.image_size = (width, height)
+        preview.image_pixels_float.foreach_set(flat)
+        preview.icon_size = (32, 32)
+    return image
+
+
+def icon() -> int:
+    """The picture as an icon; 0 where there is none."""
+    preview = None if _previews is None else _previews.get(IMAGE)
+    return 0 if preview is None else preview.icon_id
+
+
+def file_icon(path: str) -> int:
+    """A picture file, such as a figure or a material's ball, as an icon; 0 if it is not there."""
+    if _previews is None or not path or not Path(path).is_file():
+        return 0
+    key = f"{path}:{Path(path).stat().st_mtime_ns}"
+    preview = _previews.get(key) or _previews.load(key, path, "IMAGE")
+    return preview.icon_id
+
+
+def register() -> None:
+    global _previews
+    _previews = bpy.utils.previews.new()
+
+
+def unregister() -> None:
+    global _previews
+    if _previews is not None:
+        bpy.utils.previews.remove(_previews)
+    _previews = None

@@ -1,0 +1,71 @@
+"""How to simulate, and what was simulated."""
+
+from __future__ import annotations
+
+import bpy
+from bpy.props import (
+    BoolProperty,
+    EnumProperty,
+    FloatProperty,
+    IntProperty,
+    PointerProperty,
+    StringProperty,
+)
+
+SIZES = [
+    ("160", "160 pixels wide", "A quick look"),
+    ("320", "320 pixels wide", ""),
+    ("640", "640 pixels wide", ""),
+    ("CAMERA", "As the camera", "The camera's own resolution"),
+]
+
+
+def _draft_changed(values: bpy.types.PropertyGroup, context: bpy.types.Context) -> None:
+    from .drafts import wanted
+
+    wanted()
+
+
+class OPTISENSE_PG_simulation(bpy.types.PropertyGroup):
+    """Settings of pictures."""
+
+    size: EnumProperty(name="Size", items=SIZES, default="320")
+    noise: FloatProperty(
+        name="Noise", description="Per cent; simulate until no more is left", min=0.5, max=100.0,
+        default=5.0, precision=1,
+    )  # fmt: skip
+    auto_exposure: BoolProperty(name="Automatic exposure", default=True)
+    exposure: FloatProperty(name="Exposure", min=1e-6, max=1e9, default=30.0)
+    seed: IntProperty(name="Seed", min=0, max=2**31 - 1)
+    draft: BoolProperty(
+        name="Draft while editing",
+        description="Update a small, noisy picture while lights and cages are moved",
+        update=_draft_changed,
+    )
+
+
+class OPTISENSE_PG_picture(bpy.types.PropertyGroup):
+    """The picture that is shown; never saved."""
+
+    image: StringProperty(description="The engine's name of it", options={"SKIP_SAVE"})
+    shown: BoolProperty(options={"SKIP_SAVE"})
+    is_draft: BoolProperty(options={"SKIP_SAVE"})
+    is_relit: BoolProperty(options={"SKIP_SAVE"})
+    summary: StringProperty(options={"SKIP_SAVE"})
+    file: StringProperty(options={"SKIP_SAVE"})
+
+
+def register() -> None:
+    bpy.utils.register_class(OPTISENSE_PG_simulation)
+    bpy.utils.register_class(OPTISENSE_PG_picture)
+    bpy.types.Scene.optisense_simulation = PointerProperty(type=OPTISENSE_PG_simulation)
+    bpy.types.WindowManager.optisense_picture = PointerProperty(
+        type=OPTISENSE_PG_picture, options={"SKIP_SAVE"}
+    )
+
+
+def unregister() -> None:
+    del bpy.types.WindowManager.optisense_picture
+    del bpy.types.Scene.optisense_simulation
+    bpy.utils.unregister_class(OPTISENSE_PG_picture)
+    bpy.utils.unregister_class(OPTISENSE_PG_simulation)

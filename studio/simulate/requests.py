@@ -1,0 +1,74 @@
+"""What is asked of the engine for a picture, and what becomes of its answer."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import bpy
+import numpy as np
+
+from ..engine import handing, session
+from ..scene.contacts import contact_list
+from . import picture
+
+LATEST = "picture"
+
+
+def resolution(scene: bpy.types.Scene) -> list[int] | None:
+    """Width and height to simulate; None is the camera's own."""
+    size = scene.optisense_simulation.size
+    if size == "CAMERA" or scene.camera is None:
+        return None
+    width, height = scene.camera.optisense.pixels
+    return [int(size), max(1, round(int(size) * height / width))]
+
+
+def fields(scene: bpy.types.Scene) -> dict[str, Any]:
+    """A whole picture of the scene's design and contacts.
+
+    Raises:
+        EngineError: there is no engine, or the scene is no design.
+    """
+    settings = scene.optisense_simulation
+    depsgraph = bpy.context.evaluated_depsgraph_get()
+    asked: dict[str, Any] = {
+        "design": handing.design(scene),
+        "contacts": contact_list(scene, depsgraph),
+        "noise": round(settings.noise, 3),
+        "seed": settings.seed,
+        "exposure": "auto" if settings.auto_exposure else settings.exposure,
+        "files": ["picture", "pixels"],
+        "name": LATEST,
+    }
+    size = resolution(scene)
+    if size is not None:
+        asked["resolution"] = size
+    return asked
+
+
+def take(result: dict[str, Any], *, draft: bool) -> None:
+    """Show the engine's answer."""
+    pixels = np.load(result["files"]["pixels"])
+    picture.show(pixels)
+    now = bpy.context.window_manager.optisense_picture
+    now.image = result["image"]
+    now.shown = True
+    now.is_draft = draft
+    now.is_relit = False
+    now.file = result["files"].get("picture", "")
+    now.summary = summary(result)
+    session.redraw()
+
+
+def summary(result: dict[str, Any]) -> str:
+    """Size, noise and time of a picture, in a line."""
+    width, height = result["size"]
+    texts = [f"{width} x {height}"]
+    settings = result.get("settings") or {}
+    noise = settings.get("noise_reached_percent")
+    if noise is not None:
+        texts.append(f"noise {noise:.1f} %")
+    seconds = (settings.get("seconds") or {}).get("total")
+    if seconds is not None:
+        texts.append(f"{seconds:.1f} s")
+    return ", ".join(texts)

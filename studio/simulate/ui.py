@@ -1,0 +1,94 @@
+"""Step 5 in the sidebar."""
+
+from __future__ import annotations
+
+import bpy
+
+from ..engine import session
+from ..engine.layout import SidebarPanel, show_job
+from ..scene.collections import objects_of
+from . import picture
+
+
+class OPTISENSE_PT_simulate(SidebarPanel, bpy.types.Panel):
+    bl_idname = "OPTISENSE_PT_simulate"
+    bl_label = "Simulate"
+    bl_order = 5
+
+    def draw(self, context: bpy.types.Context) -> None:
+        layout = self.layout
+        scene = context.scene
+        column = layout.column(align=True)
+        row = column.row(align=True)
+        row.operator("optisense.place_contact", icon="CURSOR")
+        row.operator("optisense.add_contact", text="Middle", icon="ADD")
+        row = column.row(align=True)
+        row.operator("optisense.nine_contacts", icon="GRID")
+        row.operator("optisense.clear_contacts", icon="X")
+        active = context.active_object
+        if active is not None and active.optisense.kind == "CONTACT":
+            _contact(layout.box().column(), active.optisense)
+        settings = scene.optisense_simulation
+        column = layout.column()
+        column.use_property_split = True
+        column.use_property_decorate = False
+        column.prop(settings, "size")
+        column.prop(settings, "noise", text="Noise (%)")
+        column.prop(settings, "auto_exposure")
+        if not settings.auto_exposure:
+            column.prop(settings, "exposure")
+        column.prop(settings, "draft")
+        row = layout.row()
+        row.scale_y = 1.4
+        row.operator("optisense.simulate", icon="RENDER_STILL")
+        show_job(layout, "Simulating")
+        now = context.window_manager.optisense_picture
+        if not now.shown:
+            count = len(objects_of(scene, "CONTACT"))
+            layout.label(text=f"{count} contacts" if count != 1 else "1 contact")
+            return
+        icon = picture.icon()
+        if icon:
+            layout.template_icon(icon_value=icon, scale=11.0)
+        kind = "Draft, " if now.is_draft else "Relit, " if now.is_relit else ""
+        layout.label(text=kind + now.summary)
+        layout.operator("optisense.show_picture", icon="IMAGE_DATA")
+        _light_levels(layout, scene)
+
+
+def _contact(column: bpy.types.UILayout, values: bpy.types.PropertyGroup) -> None:
+    column.use_property_split = True
+    column.use_property_decorate = False
+    column.prop(values, "indenter")
+    if values.indenter in ("sphere", "cylinder"):
+        column.prop(values, "radius", text="Radius (mm)")
+    if values.indenter == "cylinder":
+        column.prop(values, "length", text="Length (mm)")
+    if values.indenter == "plane":
+        column.prop(values, "tilt")
+        column.prop(values, "size", text="Size (mm)")
+    if values.indenter == "mesh":
+        column.prop(values, "file")
+        column.prop(values, "scale")
+    column.prop(values, "depth", text="Depth (mm)")
+    column.prop(values, "rotation")
+
+
+def _light_levels(layout: bpy.types.UILayout, scene: bpy.types.Scene) -> None:
+    """Flux and colour of each group; the picture follows at once."""
+    box = layout.box().column(align=True)
+    box.label(text="Relight", icon="LIGHT")
+    box.enabled = session.running() is not None
+    for group in scene.optisense.light_groups:
+        row = box.row(align=True)
+        row.label(text=group.name)
+        row.prop(group, "flux", text="mW")
+        row.prop(group, "colour", text="")
+
+
+def register() -> None:
+    bpy.utils.register_class(OPTISENSE_PT_simulate)
+
+
+def unregister() -> None:
+    bpy.utils.unregister_class(OPTISENSE_PT_simulate)
