@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import time
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import drjit as dr
 import mitsuba as mi
@@ -20,9 +21,11 @@ from optisense.optics.film import Film
 from optisense.optics.light_field import LightField
 from optisense.optics.sampling import seed_of
 from optisense.optics.shading import ContactScenes, shade
-from optisense.optics.sppm import SppmResult
 from optisense.optics.surfaces import Region
 from optisense.optics.visible_points import film_samples, find_visible_points
+
+if TYPE_CHECKING:
+    from optisense.optics.sppm import SppmResult
 
 CONTACT_SAMPLES = 16
 """Camera samples of a pixel in contacts, where tilt and shadow change within it, in an image of

@@ -21,7 +21,6 @@ from optisense.optics.image import TactileImage
 from optisense.optics.imaging import ImageLayers, render_field
 from optisense.optics.ray_model import RayModel
 from optisense.optics.shading import ContactScenes
-from optisense.optics.sppm import render_sppm
 from optisense.optics.surfaces import SurfaceKind
 from optisense.optics.versions import versions
 
@@ -198,6 +197,8 @@ class OpticalModel(RayModel):
         began: float,
         tell: Callable[[float, int, float | None], None],
     ) -> ImageLayers:
+        from optisense.optics.sppm import render_sppm
+
         per_light = max(1, SPPM_PASS // self._emitter_table.count)
         emitted = per_light * self._emitter_table.count
         passes = max(1, -(-(photons or 16 * DEFAULT_PHOTONS) // emitted))
