@@ -1,0 +1,23 @@
+"""``optisense engine``: the process that front ends talk to."""
+
+from __future__ import annotations
+
+import sys
+
+import typer
+
+from optisense.cli.console import messages
+
+
+def engine() -> None:
+    """Serve a front end at standard input and output, by lines of JSON (see docs/engine.md)."""
+    if sys.stdin.isatty():
+        messages.print(
+            "this is for programs: they write requests to its standard input, one JSON object a "
+            "line. End it with Ctrl-D.",
+            markup=False,
+        )
+    from optisense.engine.server import serve
+
+    serve()
+    raise typer.Exit

@@ -1,0 +1,127 @@
+"""Contacts as requests write them."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from optisense.errors import ContactError
+from optisense.geometry import Contact, Cylinder, Indenter, MeshIndenter, Plane, Sphere
+from optisense.geometry.contact_text import parse_contact
+
+
+class _Given(BaseModel):
+    model_config = ConfigDict(extra="forbid")
+
+
+class GivenSphere(_Given):
+    """A ball."""
+
+    kind: Literal["sphere"]
+    radius: float
+
+
+class GivenCylinder(_Given):
+    """A cylinder on its side."""
+
+    kind: Literal["cylinder"]
+    radius: float
+    length: float = 40.0
+    angle: float = 0.0
+
+
+class GivenPlane(_Given):
+    """A plate."""
+
+    kind: Literal["plane"]
+    tilt_x: float = 0.0
+    tilt_y: float = 0.0
+    size: float = 8.0
+
+
+class GivenMesh(_Given):
+    """A mesh file."""
+
+    kind: Literal["mesh"]
+    file: str
+    scale: float = 1.0
+
+
+GivenIndenter = Annotated[
+    GivenSphere | GivenCylinder | GivenPlane | GivenMesh, Field(discriminator="kind")
+]
+
+
+class GivenContact(_Given):
+    """A contact as an object."""
+
+    indenter: GivenIndenter
+    at: tuple[float, float] | None = None
+    point: tuple[float, float, float] | None = None
+    depth: float = 0.5
+    rotation: float = 0.0
+
+
+AnyContact = str | GivenContact
+"""What stands under `contacts` in a request."""
+
+
+def indenter_of(given: GivenIndenter) -> Indenter:
+    """The indenter.
+
+    Raises:
+        ContactError: a size makes no sense.
+    """
+    if isinstance(given, GivenSphere):
+        return Sphere(given.radius)
+    if isinstance(given, GivenCylinder):
+        return Cylinder(given.radius, given.length, given.angle)
+    if isinstance(given, GivenPlane):
+        return Plane(given.tilt_x, given.tilt_y, given.size)
+    return MeshIndenter(given.file, given.scale)
+
+
+def contact_of(given: AnyContact) -> Contact:
+    """The contact.
+
+    Raises:
+        ContactError: it can't be read, or its numbers make no sense.
+    """
+    if isinstance(given, str):
+        return parse_contact(given)
+    return Contact(
+        indenter_of(given.indenter),
+        at=given.at,
+        point=given.point,
+        depth=given.depth,
+        rotation=given.rotation,
+    )
+
+
+def contacts_of(given: list[AnyContact]) -> list[Contact]:
+    """The contacts; an error says which one it is.
+
+    Raises:
+        ContactError: as of `contact_of`.
+    """
+    found = []
+    for number, each in enumerate(given):
+        try:
+            found.append(contact_of(each))
+        except ContactError as error:
+            where = error.where or f"contacts[{number}]"
+            raise ContactError(error.message, where=where, hint=error.hint) from None
+    return found
+
+
+def plain_contact(contact: Contact, indenter: GivenIndenter) -> dict[str, Any]:
+    """A contact as a request can give it again."""
+    given = GivenContact(
+        indenter=indenter,
+        at=contact.at,
+        point=contact.point,
+        depth=contact.depth,
+        rotation=contact.rotation,
+    )
+    return given.model_dump(exclude_none=True)

@@ -1,0 +1,219 @@
+"""Requests about designs that need no renderer: opening, saving, checking, cages, the workshop."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+from pydantic import Field
+
+from optisense.design import (
+    Role,
+    SensorDesign,
+    add_cage,
+    refine_cage,
+    remove_cage,
+    save_design,
+    set_range,
+    settle_cage,
+)
+from optisense.design.near import suggestion
+from optisense.design.parts import TRANSPARENT_SOLIDS
+from optisense.engine.designs import AnyMesh
+from optisense.engine.failures import ProtocolError, problem_row
+from optisense.engine.files import Files
+from optisense.engine.jobs import Job
+from optisense.engine.protocol import Fields
+from optisense.engine.rendering import OfDesign, design_of
+from optisense.engine.requests import Lane, handles
+from optisense.engine.session import Session
+from optisense.errors import DesignError, MeshError, OutputError
+from optisense.geometry import TriangleMesh, cage_weights
+from optisense.library import with_own_lights
+from optisense.sensors.registry import BUILDERS
+
+Resolution = tuple[int, int, int]
+Place = tuple[float, float, float]
+
+
+class Nothing(Fields):
+    """A request without fields of its own."""
+
+
+class Save(OfDesign):
+    """See docs/engine.md."""
+
+    to: str
+    only_new: bool = False
+
+
+class Mesh(Fields):
+    """See docs/engine.md."""
+
+    file: AnyMesh
+    role: Role | None = None
+    scale: float = Field(default=1.0, gt=0.0)
+
+
+class Cage(OfDesign):
+    """See docs/engine.md."""
+
+    action: Literal["add", "remove", "refine", "range", "settle"]
+    cage: str
+    parts: list[str] = Field(default_factory=list)
+    resolution: Resolution = (3, 3, 3)
+    margin: float = Field(default=0.0, ge=0.0)
+    c_min: list[Place] | None = None
+    c_max: list[Place] | None = None
+    blend: float | None = 0.0
+
+
+class CageWeights(OfDesign):
+    """See docs/engine.md."""
+
+    cage: str
+
+
+class Export(OfDesign):
+    """See docs/engine.md."""
+
+    to: str
+    formats: list[Literal["stl", "obj", "3mf", "step"]] = Field(default=["stl"])
+
+
+@handles("sensors", Nothing, Lane.QUICK)
+def sensors(session: Session, fields: Nothing, job: Job) -> dict[str, Any]:
+    """The built-in sensors."""
+    rows = []
+    for name in BUILDERS:
+        job.check()
+        rows.append({"name": name, "description": session.designs.read(name).description})
+    return {"sensors": rows}
+
+
+@handles("open", OfDesign, Lane.QUICK)
+def open_design(session: Session, fields: OfDesign, job: Job) -> dict[str, Any]:
+    """A design as JSON, with its meshes."""
+    files = session.files(fields, job.id)
+    design = design_of(session, fields, job)
+    warnings = [p for p in session.designs.problems(design) if p.severity == "warning"]
+    return {
+        "data": design.model_dump(mode="json"),
+        "meshes": files.meshes(design.meshes),
+        "shapes": bent_shapes(design, files),
+        "warnings": [problem_row(each, design) for each in warnings],
+    }
+
+
+@handles("save", Save, Lane.QUICK)
+def save(session: Session, fields: Save, job: Job) -> dict[str, Any]:
+    """Write a design folder."""
+    folder = Path(fields.to)
+    design = design_of(session, fields, job)
+    if folder.exists() and not folder.is_dir():
+        raise OutputError("this is a file, not a folder", where=str(folder))
+    if fields.only_new and folder.is_dir() and any(folder.iterdir()):
+        raise OutputError(
+            "the folder is not empty", where=str(folder), hint="Name a folder that doesn't exist"
+        )
+    save_design(with_own_lights(design), folder)
+    return {"folder": str(folder)}
+
+
+@handles("mesh", Mesh, Lane.QUICK)
+def mesh(session: Session, fields: Mesh, job: Job) -> dict[str, Any]:
+    """A mesh file, and what is wrong with it for a part of some role."""
+    files = session.files(fields, job.id)
+    found = session.designs.mesh(fields.file, fields.scale)
+    problem = None
+    try:
+        found = found.validate("mesh", closed=fields.role in TRANSPARENT_SOLIDS)
+    except MeshError as error:
+        problem = {"message": error.message, "where": error.where, "hint": error.hint}
+    return {
+        "mesh": files.mesh("mesh", found),
+        "closed": found.is_closed if problem is None else None,
+        "bounds": found.bounds,
+        "problem": problem,
+    }
+
+
+@handles("check", OfDesign, Lane.QUICK)
+def check(session: Session, fields: OfDesign, job: Job) -> dict[str, Any]:
+    """All that can be found wrong with a design without tracing light."""
+    design = design_of(session, fields, job)
+    found = session.designs.problems(design)
+    return {"problems": [problem_row(each, design) for each in found]}
+
+
+@handles("cage", Cage, Lane.QUICK)
+def cage(session: Session, fields: Cage, job: Job) -> dict[str, Any]:
+    """Another cage, or a changed one."""
+    design = design_of(session, fields, job)
+    if fields.action == "add":
+        changed = add_cage(design, fields.cage, fields.parts, fields.resolution, fields.margin)
+    elif fields.action == "remove":
+        changed = remove_cage(design, fields.cage)
+    elif fields.action == "refine":
+        changed = refine_cage(design, fields.cage, fields.resolution)
+    elif fields.action == "range":
+        for name in ("c_min", "c_max"):
+            _check_count(design, fields, name)
+        changed = set_range(design, fields.cage, fields.c_min, fields.c_max, fields.blend)
+    else:
+        changed = settle_cage(design, fields.cage)
+    return {"cages": changed.model_dump(mode="json", include={"cages"})["cages"]}
+
+
+@handles("cage_weights", CageWeights, Lane.QUICK)
+def weights(session: Session, fields: CageWeights, job: Job) -> dict[str, Any]:
+    """How much each control point of a cage moves each vertex of its parts."""
+    files = session.files(fields, job.id)
+    design = design_of(session, fields, job)
+    if fields.cage not in design.cages:
+        hint = suggestion(fields.cage, design.cages, limit=20)
+        raise DesignError(f"there is no cage '{fields.cage}'", where="cages", hint=hint)
+    chosen = design.cages[fields.cage]
+    written = {}
+    for part in chosen.parts:
+        job.check()
+        values = cage_weights(design.meshes[part].vertices, chosen.box, chosen.resolution)
+        written[part] = files.array(f"{part}.weights.npy", values.astype(np.float32))
+    return {"weights": written, "points": int(np.prod(chosen.resolution))}
+
+
+@handles("export", Export, Lane.QUICK)
+def export(session: Session, fields: Export, job: Job) -> dict[str, Any]:
+    """Files for the workshop."""
+    from optisense.workshop import export as write
+
+    written = write(design_of(session, fields, job), fields.to, fields.formats)
+    return {"files": [str(path) for path in written]}
+
+
+def bent_shapes(
+    design: SensorDesign, files: Files, before: SensorDesign | None = None
+) -> dict[str, dict[str, str]]:
+    """The parts whose present shape differs from their mesh at rest, or from that in `before`."""
+    shapes = design.deformed_meshes()
+    others = design.meshes if before is None else before.deformed_meshes()
+    bent = {name: mesh for name, mesh in shapes.items() if not _alike(mesh, others.get(name))}
+    return files.meshes(bent, "shape.")
+
+
+def _alike(one: TriangleMesh, other: TriangleMesh | None) -> bool:
+    return other is not None and (
+        one is other
+        or (one.vertices.shape == other.vertices.shape and (one.vertices == other.vertices).all())
+    )
+
+
+def _check_count(design: SensorDesign, fields: Cage, name: str) -> None:
+    given = getattr(fields, name)
+    known = design.cages.get(fields.cage)
+    if given is not None and known is not None and len(given) != np.prod(known.resolution):
+        raise ProtocolError(
+            f"{name} has {len(given)} points, the cage {int(np.prod(known.resolution))}",
+            where=name,
+        )

@@ -1,0 +1,245 @@
+"""Designs as requests name them, read again only where something changed."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+from weakref import WeakKeyDictionary
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from optisense.design import IesEmitter, SensorDesign, check_design, load_design, set_value
+from optisense.design.near import near_match
+from optisense.design.parts import TRANSPARENT_SOLIDS, Role
+from optisense.design.problems import Problem, design_error
+from optisense.design.storage import DESIGN_FILE
+from optisense.engine.failures import ProtocolError, UnsoundDesignError
+from optisense.errors import DesignError, MeshError
+from optisense.geometry import TriangleMesh
+from optisense.library import names
+from optisense.sensors import load
+
+MOST_MESHES = 200
+"""Mesh files that are kept; the one not asked for longest goes first."""
+
+Stamp = tuple[str, int, int]
+
+
+class DesignReference(BaseModel):
+    """A design that is not just named; see docs/engine.md."""
+
+    model_config = ConfigDict(extra="forbid", populate_by_name=True)
+
+    source: str | None = Field(default=None, alias="from")
+    data: dict[str, Any] | None = None
+    folder: str | None = None
+    set: dict[str, Any] = Field(default_factory=dict)
+
+
+AnyDesign = str | DesignReference
+"""What stands under `design` in a request."""
+
+
+class MeshFile(BaseModel):
+    """A mesh as NumPy files."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    vertices: str
+    faces: str
+
+
+AnyMesh = str | MeshFile
+"""A mesh file, or the two arrays of one."""
+
+
+class Designs:
+    """Reads designs and keeps what it has read.
+
+    The same file gives the same mesh object, from which an `OpticalModel` sees what has changed.
+    """
+
+    def __init__(self) -> None:
+        """Nothing is read yet."""
+        self._built: dict[str, SensorDesign] = {}
+        self._folders: dict[str, tuple[list[Stamp], SensorDesign]] = {}
+        self._meshes: dict[tuple[Stamp, ...], TriangleMesh] = {}
+        self._valid: WeakKeyDictionary[TriangleMesh, dict[bool, TriangleMesh]] = WeakKeyDictionary()
+        self._sound: tuple[SensorDesign, list[Problem]] | None = None
+
+    def read(self, given: AnyDesign, meshes: Mapping[str, AnyMesh] | None = None) -> SensorDesign:
+        """The design that a request names.
+
+        Args:
+            given: a name, a folder, or values.
+            meshes: files to take for some parts instead of the design's own.
+
+        Raises:
+            DesignError, MeshError, LibraryError: it can't be read.
+            ProtocolError: the reference itself makes no sense.
+        """
+        if isinstance(given, str):
+            design = self._named(given)
+        elif given.data is not None:
+            if given.source is not None:
+                raise ProtocolError("a design has both 'from' and 'data'", where="design")
+            design = self._from_data(given.data, given.folder, meshes or {})
+        elif given.source is not None:
+            design = self._named(given.source)
+        else:
+            raise ProtocolError(
+                "the design has neither 'from' nor 'data'", where="design",
+                hint='Write a name, a folder, {"from": ...} or {"data": ..., "folder": ...}',
+            )  # fmt: skip
+        if meshes:
+            design = self._with_meshes(design, meshes)
+        if not isinstance(given, str):
+            for path, value in given.set.items():
+                design = set_value(design, path, value)
+        return design
+
+    def problems(self, design: SensorDesign) -> list[Problem]:
+        """All that `check` finds; the answer for the last design is kept."""
+        if self._sound is not None and _same(self._sound[0], design):
+            return self._sound[1]
+        found = check_design(design, light_names=names("light"))
+        self._sound = design, found
+        return found
+
+    def must_be_sound(self, design: SensorDesign) -> list[Problem]:
+        """The warnings about a design.
+
+        Raises:
+            UnsoundDesignError: it can't be simulated, or only wrongly.
+        """
+        found = self.problems(design)
+        if any(problem.severity == "error" for problem in found):
+            raise UnsoundDesignError(found, f"design '{design.name}'")
+        return found
+
+    def mesh(self, given: AnyMesh, scale: float = 1.0) -> TriangleMesh:
+        """The mesh in a file, or in two arrays; not checked.
+
+        Raises:
+            MeshError: it can't be read.
+        """
+        paths = [given] if isinstance(given, str) else [given.vertices, given.faces]
+        key = tuple(_stamp(Path(path)) for path in paths)
+        mesh = self._meshes.pop(key, None)
+        if mesh is None:
+            if isinstance(given, str):
+                mesh = TriangleMesh.load(given)
+            else:
+                mesh = TriangleMesh(_array(given.vertices), _array(given.faces))
+        self._meshes[key] = mesh
+        while len(self._meshes) > MOST_MESHES:
+            del self._meshes[next(iter(self._meshes))]
+        return mesh if scale == 1.0 else mesh.transformed(np.diag([scale, scale, scale]))
+
+    def _named(self, name: str) -> SensorDesign:
+        path = Path(name)
+        if not path.is_absolute():
+            if name not in self._built:
+                self._built[name] = load(name if name.startswith("builtin:") else f"builtin:{name}")
+            return self._built[name]
+        file = path / DESIGN_FILE if path.is_dir() else path
+        kept = self._folders.get(name)
+        if kept is not None and _stamps(kept[1], file) == kept[0]:
+            return kept[1]
+        design = load_design(file)
+        for part, value in design.parts.items():  # the same file is the same mesh
+            mesh = self.mesh(str((file.parent / value.mesh).resolve()))
+            design.meshes[part] = self._checked(mesh, part, value.role)
+        design._source, design._lines = None, {}  # from here on a place is a dotted path
+        self._folders[name] = _stamps(design, file), design
+        return design
+
+    def _from_data(
+        self, data: dict[str, Any], folder: str | None, elsewhere: Mapping[str, AnyMesh]
+    ) -> SensorDesign:
+        try:
+            design = SensorDesign.model_validate(data)
+        except ValidationError as error:
+            raise design_error(error, data, where="design") from None
+        base = None if folder is None else Path(folder)
+        for name, part in design.parts.items():
+            if name not in elsewhere:
+                path = _inside(base, part.mesh, f"parts.{name}.mesh")
+                design.meshes[name] = self._checked(self.mesh(str(path)), name, part.role)
+        for name, group in design.lights.items():
+            if isinstance(group.emitter, IesEmitter):
+                _inside(base, group.emitter.file, f"lights.{name}.emitter.file")
+                group.emitter._folder = base
+        return design
+
+    def _with_meshes(self, design: SensorDesign, meshes: Mapping[str, AnyMesh]) -> SensorDesign:
+        design = design.copy()
+        for name, given in meshes.items():
+            if name not in design.parts:
+                near = near_match(name, list(design.parts))
+                raise DesignError(
+                    f"there is a mesh for a part '{name}', which the design does not have",
+                    where="meshes",
+                    hint=f"Did you mean '{near}'?" if near else None,
+                )
+            design.meshes[name] = self._checked(self.mesh(given), name, design.parts[name].role)
+        return design
+
+    def _checked(self, mesh: TriangleMesh, name: str, role: Role) -> TriangleMesh:
+        """The mesh, turned outward where it must be closed; the same object for the same mesh."""
+        closed = role in TRANSPARENT_SOLIDS
+        kept = self._valid.setdefault(mesh, {})
+        if closed not in kept:
+            try:
+                kept[closed] = mesh.validate(name, closed=closed)
+            except MeshError as error:
+                raise MeshError(
+                    f"part '{name}': {error.message}", where=f"parts.{name}.mesh", hint=error.hint
+                ) from error
+        return kept[closed]
+
+
+def _same(one: SensorDesign, other: SensorDesign) -> bool:
+    return one is other or (one == other and one.meshes == other.meshes)
+
+
+def _stamps(design: SensorDesign, file: Path) -> list[Stamp]:
+    """What tells whether any file of a design has changed."""
+    meshes = [file.parent / part.mesh for part in design.parts.values()]
+    emitters = [group.emitter for group in design.lights.values()]
+    others = [file.parent / each.file for each in emitters if isinstance(each, IesEmitter)]
+    return [_stamp(path) for path in (file, *meshes, *others)]
+
+
+def _stamp(path: Path) -> Stamp:
+    """What tells whether a file has changed."""
+    try:
+        found = path.stat()
+    except OSError:
+        return str(path), -1, -1
+    return str(path), found.st_mtime_ns, found.st_size
+
+
+def _array(path: str) -> Any:
+    """What a NumPy file holds; nothing in it is run."""
+    try:
+        return np.load(path, allow_pickle=False)
+    except (OSError, ValueError, EOFError) as error:
+        raise MeshError(f"can't read the array: {error}", where=path) from None
+
+
+def _inside(folder: Path | None, relative: str, where: str) -> Path:
+    """A file of a design; paths must not leave its folder, links followed."""
+    if folder is None:
+        raise DesignError(
+            f"'{relative}' is in no folder", where=where, hint="Name the design's folder"
+        )
+    path = (folder / relative).resolve()
+    if not path.is_relative_to(folder.resolve()):
+        raise DesignError(f"'{relative}' leads out of the design folder", where=where)
+    if not path.is_file():
+        raise DesignError(f"there is no file '{relative}' in the design folder", where=where,
+                          hint=f"The folder is {folder}")  # fmt: skip
+    return path

@@ -1,0 +1,147 @@
+"""What can go wrong with a request, and each of it as data."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+from optisense.design import Problem, SensorDesign
+from optisense.errors import OptiSenseError
+
+
+class ProtocolError(OptiSenseError):
+    """A line that is no request, or one that makes no sense: the front end's mistake."""
+
+    def __init__(
+        self,
+        message: str,
+        *,
+        where: str | None = None,
+        hint: str | None = None,
+        request: int | str | None = None,
+    ) -> None:
+        super().__init__(message, where=where, hint=hint)
+        self.request = request
+
+
+class Cancelled(BaseException):
+    """Raised at a safe point of a request that was cancelled.
+
+    No `Exception`, so that code which tells any failure of a score as a score's failure lets it
+    pass.
+    """
+
+
+class UnsoundDesignError(OptiSenseError):
+    """A design that `check` refuses, with all that it found."""
+
+    def __init__(self, problems: Sequence[Problem], source: str) -> None:
+        errors = [problem for problem in problems if problem.severity == "error"]
+        first = errors[0]
+        more = f" (and {len(errors) - 1} more)" if len(errors) > 1 else ""
+        super().__init__(first.message + more, where=first.where, hint=first.hint)
+        self.problems = list(problems)
+        self.source = source
+
+
+def as_data(
+    error: BaseException, design: SensorDesign | None = None, parts: Iterable[str] = ()
+) -> dict[str, Any]:
+    """An error as the protocol tells it.
+
+    Args:
+        error: of any kind; one of ours says where and what to do.
+        design: what the request was about, to find the part in.
+        parts: names of parts that are known otherwise.
+    """
+    known = [*(design.parts if design is not None else ()), *parts]
+    if isinstance(error, Cancelled):
+        return _row("Cancelled", "the request was cancelled", None, None, known, design)
+    if isinstance(error, UnsoundDesignError):
+        row = _row("DesignError", error.message, error.where, error.hint, known, design)
+        row["problems"] = [problem_row(problem, design) for problem in error.problems]
+        return row
+    if isinstance(error, OptiSenseError):
+        kind = type(error).__name__
+        return _row(kind, error.message, error.where, error.hint, known, design)
+    if isinstance(error, MemoryError):
+        hint = "Use a smaller resolution or fewer photons"
+        return _row("SetupError", "not enough memory", None, hint, known, design)
+    if isinstance(error, OSError):
+        where = str(error.filename) if error.filename else None
+        return _row("OutputError", error.strerror or str(error), where, None, known, design)
+    return _row(
+        "InternalError",
+        f"unexpected {type(error).__name__}: {error}",
+        None,
+        "This is a defect of OptiSense; the log of the engine shows where it is",
+        known,
+        design,
+    )
+
+
+def problem_row(problem: Problem, design: SensorDesign | None) -> dict[str, Any]:
+    """What `check` has found, with the part that it is about."""
+    known = list(design.parts) if design is not None else []
+    path = path_in(problem.where)
+    return {
+        "severity": problem.severity,
+        "message": problem.message,
+        "where": problem.where,
+        "hint": problem.hint,
+        "path": path,
+        "part": part_of(problem.message, path, known, design),
+    }
+
+
+def path_in(where: str | None) -> str | None:
+    """The dotted path of a value in the design, where a place is one."""
+    if where is None:
+        return None
+    found = _PATH.fullmatch(where)
+    return where if found else None
+
+
+def part_of(
+    message: str, path: str | None, known: Sequence[str], design: SensorDesign | None = None
+) -> str | None:
+    """The part that an error is about: by its path, or else by its name in the message."""
+    if path is not None:
+        found = re.match(r"parts\.([A-Za-z0-9_-]+)", path)
+        if found:
+            return found[1]
+    for text in re.findall(r"'([^']+)'", message):
+        if text in known:
+            return str(text)
+    if path is not None and design is not None:
+        found = re.match(r"cages\.([A-Za-z0-9_-]+)", path)
+        if found and found[1] in design.cages:
+            return design.cages[found[1]].parts[0]
+    return None
+
+
+_PATH = re.compile(
+    r"(schema_version|name|description|coating|materials|parts|lights|camera|cages|provenance)"
+    r"(\.[A-Za-z0-9_-]+|\[\d+\])*"
+)
+
+
+def _row(
+    kind: str,
+    message: str,
+    where: str | None,
+    hint: str | None,
+    known: Sequence[str],
+    design: SensorDesign | None,
+) -> dict[str, Any]:
+    path = path_in(where)
+    return {
+        "kind": kind,
+        "message": message,
+        "where": where,
+        "hint": hint,
+        "path": path,
+        "part": part_of(message, path, known, design),
+        "problems": [],
+    }

@@ -1,0 +1,86 @@
+"""Files that a request makes: pictures, arrays and meshes, each written whole."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+from uuid import uuid4
+
+import numpy as np
+from numpy.typing import NDArray
+
+from optisense.errors import OutputError
+from optisense.geometry import TriangleMesh
+from optisense.report.pictures import png
+
+
+class Files:
+    """The files of one request: in its folder, named after it."""
+
+    def __init__(self, folder: Path, name: str) -> None:
+        """Files `NAME.*` in a folder.
+
+        Raises:
+            OutputError: there is no such folder, or the name is not that of a file.
+        """
+        if not folder.is_dir():
+            raise OutputError(
+                "there is no such folder", where=str(folder), hint="Make it before it is named"
+            )
+        if not name or name != Path(name).name or name in (".", ".."):
+            raise OutputError(
+                f"'{name}' can't begin the name of a file", hint="Use letters, digits, '-' and '_'"
+            )
+        self.folder = folder
+        self.name = name
+
+    def path(self, rest: str) -> Path:
+        """Where the file with this ending goes."""
+        return self.folder / f"{self.name}.{rest}"
+
+    def picture(self, rest: str, picture: NDArray[np.uint8]) -> str:
+        """Write a PNG; returns its path."""
+        return self._write(rest, lambda path: path.write_bytes(png(picture)))
+
+    def array(self, rest: str, values: NDArray[Any]) -> str:
+        """Write a NumPy file; returns its path."""
+        whole = np.ascontiguousarray(values)
+
+        def write(path: Path) -> None:
+            with path.open("wb") as file:
+                np.save(file, whole)
+
+        return self._write(rest, write)
+
+    def mesh(self, rest: str, mesh: TriangleMesh) -> dict[str, str]:
+        """Write a mesh as float32 vertices and int32 faces; returns their paths."""
+        return {
+            "vertices": self.array(f"{rest}.vertices.npy", mesh.vertices.astype(np.float32)),
+            "faces": self.array(f"{rest}.faces.npy", mesh.faces.astype(np.int32)),
+        }
+
+    def meshes(
+        self, meshes: Mapping[str, TriangleMesh], before: str = ""
+    ) -> dict[str, dict[str, str]]:
+        """Write several, by name."""
+        return {name: self.mesh(f"{before}{name}", mesh) for name, mesh in meshes.items()}
+
+    def _write(self, rest: str, write: Callable[[Path], object]) -> str:
+        path = self.path(rest)
+        temporary = path.with_name(f".{path.name}.{os.getpid()}-{uuid4().hex[:8]}.tmp")
+        try:
+            write(temporary)
+            temporary.replace(path)
+        except OSError as error:
+            raise OutputError(
+                f"a file can't be written: {error.strerror or error}",
+                where=str(path),
+                hint="Free space on this disk, or name another folder",
+            ) from error
+        finally:
+            with contextlib.suppress(OSError):
+                temporary.unlink(missing_ok=True)
+        return str(path)

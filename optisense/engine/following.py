@@ -1,0 +1,167 @@
+"""Telling a front end what a search does, by reading the trials that it writes."""
+
+from __future__ import annotations
+
+import math
+import threading
+import time
+from pathlib import Path
+from typing import Any
+
+from optisense.engine.failures import Cancelled
+from optisense.engine.files import Files
+from optisense.engine.jobs import Job
+from optisense.engine.search_process import SearchProcess, is_running
+from optisense.search import Study
+from optisense.search.store import Row
+
+LOOK_EVERY = 0.25
+"""Seconds between looks at the study; longer where a look itself takes long."""
+
+LOOKING_SHARE = 0.05
+"""Of the time at most."""
+
+MOST_AT_ONCE = 20
+"""Trials told one by one in a look; of more, only the best one and the last."""
+
+
+class Following:
+    """A study that is followed until nobody runs it any more."""
+
+    def __init__(self, folder: Path, job: Job, files: Files, child: SearchProcess | None) -> None:
+        """Follow a study.
+
+        Args:
+            folder: of the study.
+            job: whom to tell.
+            files: where meshes of the best go.
+            child: the process that runs it, if that is the engine's own.
+        """
+        self._folder = folder
+        self._job = job
+        self._files = files
+        self._child = child
+        self._told: set[int] = set()
+        self._best = -math.inf
+        self._left = threading.Event()
+        self._done = self._failed = 0
+        self._began = time.monotonic()
+        self._before: int | None = None
+
+    def result(self) -> dict[str, Any]:
+        """Follow it to its end.
+
+        Raises:
+            OptiSenseError: there is no study, or the search failed.
+            Cancelled: it was only watched, and that was cancelled.
+        """
+        study = Study.open(self._folder)
+        try:
+            self._job.tell(
+                "begun",
+                study=str(self._folder),
+                pid=None if self._child is None else self._child.pid,
+                budget=study.settings.budget,
+                objectives=study.settings.names,
+                parameters=study.space.names,
+            )
+            self._job.on_cancel(self._cancel)
+            self._follow(study)
+            told = self._outcome(study)
+        finally:
+            study.close()
+        return {
+            "study": str(self._folder),
+            "done": self._done,
+            "failed": self._failed,
+            **told,
+        }
+
+    def _cancel(self, leaving: bool) -> None:
+        """What `cancel` means: stop the engine's own search, or stop looking at another's."""
+        if self._child is not None and not (leaving and self._child.go_on):
+            self._child.stop()
+        else:
+            self._left.set()
+
+    def _follow(self, study: Study) -> None:
+        while not self._left.is_set():
+            running = self._runs()  # asked first, so that the last trials are seen
+            began = time.monotonic()
+            self._look(study)
+            if not running:
+                return
+            took = time.monotonic() - began
+            self._left.wait(max(LOOK_EVERY, took / LOOKING_SHARE))
+
+    def _runs(self) -> bool:
+        return is_running(self._folder) if self._child is None else self._child.running
+
+    def _look(self, study: Study) -> None:
+        """Tell of the trials that were finished since the last look."""
+        rows = [row for row in study.store.rows() if row.outcome is not None]
+        new = [row for row in rows if row.number not in self._told]
+        self._told.update(row.number for row in new)
+        self._done = sum(row.generation >= 0 for row in rows)
+        self._failed = sum(row.generation >= 0 and _failed(row) for row in rows)
+        if self._before is None:
+            self._before = self._done
+        if not new:
+            return
+        best = max((_score(row, study.objective) for row in new), default=-math.inf)
+        for row in new:
+            is_best = _score(row, study.objective) == best > self._best
+            if is_best:
+                self._best = best
+            if is_best or len(new) <= MOST_AT_ONCE or row is new[-1]:
+                self._tell(study, row, is_best)
+        speed = (self._done - self._before) / max(time.monotonic() - self._began, 1e-6)
+        left = (study.settings.budget - self._done) / speed if speed > 0 else None
+        self._job.tell(
+            "progress",
+            done=self._done,
+            total=study.settings.budget,
+            failed=self._failed,
+            fraction=min(1.0, self._done / max(1, study.settings.budget)),
+            seconds_left=None if left is None else round(max(0.0, left), 1),
+            text=f"{self._done} of {study.settings.budget} trials",
+        )
+
+    def _tell(self, study: Study, row: Row, is_best: bool) -> None:
+        from optisense.engine.designing import bent_shapes
+        from optisense.engine.searching import trial_row
+
+        trial = study.trial_of(row)
+        shapes = bent_shapes(trial.design, self._files, study.space.design) if is_best else {}
+        self._job.tell(
+            "trial",
+            **trial_row(study, trial),
+            done=self._done,
+            total=study.settings.budget,
+            best=is_best,
+            shapes=shapes,
+        )
+
+    def _outcome(self, study: Study) -> dict[str, Any]:
+        if self._child is not None and not self._left.is_set():
+            return self._child.outcome()
+        if self._child is None and self._job.cancelled:
+            raise Cancelled
+        best = study.best
+        ended = study.store.fact("ended")
+        return {
+            "interrupted": ended == "interrupted",
+            "ended": ended,
+            "notes": [],
+            "best": None if best is None else best.number,
+        }
+
+
+def _score(row: Row, objective: str) -> float:
+    assert row.outcome is not None
+    score = row.outcome.scores.get(objective, math.nan)
+    return score if math.isfinite(score) else -math.inf
+
+
+def _failed(row: Row) -> bool:
+    return row.outcome is not None and row.outcome.failed

@@ -1,0 +1,137 @@
+"""Requests about the library: its entries, their pictures, and adding one's own."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from pydantic import Field
+
+from optisense import library
+from optisense.design.emitters import IesEmitter
+from optisense.engine.failures import ProtocolError
+from optisense.engine.jobs import Job
+from optisense.engine.protocol import Fields
+from optisense.engine.requests import Lane, handles
+from optisense.engine.session import Session
+from optisense.library import AnyEntry
+from optisense.library.adding import check_new_name
+from optisense.library.loader import kind_named
+from optisense.library.own_parts import write_own
+from optisense.library.reading import make_entry
+
+
+class OfKind(Fields):
+    """See docs/engine.md."""
+
+    kind: str
+
+
+class OneEntry(OfKind):
+    """See docs/engine.md."""
+
+    entry: str
+
+
+class Preview(OfKind):
+    """See docs/engine.md."""
+
+    entry: str | None = None
+    value: dict[str, Any] | None = None
+
+
+class LibraryAdd(OneEntry):
+    """See docs/engine.md."""
+
+    value: dict[str, Any]
+    description: str
+    maker: str | None = None
+    source: str = "set by hand in a front end"
+    status: str = "assumed"
+    sources: dict[str, Any] | None = Field(default=None)
+
+
+@handles("library", OfKind, Lane.QUICK)
+def entries(session: Session, fields: OfKind, job: Job) -> dict[str, Any]:
+    """The entries of a kind."""
+    rows = []
+    for name in library.names(fields.kind):
+        job.check()
+        entry = library.entry(fields.kind, name)
+        own = library.is_own(fields.kind, name)
+        rows.append({"name": name, "description": entry.description, "own": own})
+    return {"entries": rows}
+
+
+@handles("entry", OneEntry, Lane.QUICK)
+def entry(session: Session, fields: OneEntry, job: Job) -> dict[str, Any]:
+    """One entry in full."""
+    found = library.entry(fields.kind, fields.entry)
+    own = library.is_own(fields.kind, fields.entry)
+    return {"entry": found.model_dump(mode="json", exclude_none=True), "own": own}
+
+
+@handles("preview", Preview, Lane.QUICK)
+def preview(session: Session, fields: Preview, job: Job) -> dict[str, Any]:
+    """A picture of an entry, or of values that are in no library yet."""
+    from optisense.library import previews
+
+    files = session.files(fields, job.id)
+    if (fields.entry is None) == (fields.value is None):
+        raise ProtocolError("give either 'entry' or 'value'", where="preview")
+    if fields.entry is not None:
+        name, drawn = fields.entry, library.entry(fields.kind, fields.entry)
+    else:
+        assert fields.value is not None
+        name = fields.name or f"a {kind_named(fields.kind)}"
+        drawn = _made(fields.kind, name, fields.value, " ", "assumed", "being edited")
+    path = files.path("preview.png")
+    previews.save(previews.draw(name, drawn), path)
+    return {"files": {"picture": str(path)}}
+
+
+@handles("library_add", LibraryAdd, Lane.QUICK)
+def library_add(session: Session, fields: LibraryAdd, job: Job) -> dict[str, Any]:
+    """Keep values as one of the user's own parts."""
+    check_new_name(fields.entry)
+    made = _made(
+        fields.kind,
+        fields.entry,
+        fields.value,
+        fields.description,
+        fields.status,
+        fields.source,
+        {"maker": fields.maker} if fields.maker else {},
+        fields.sources,
+    )
+    if isinstance(made.value, IesEmitter):
+        raise ProtocolError(
+            "a light with an IES file can't be added by its values",
+            where="value",
+            hint="Use `optisense library add FILE.ies`",
+        )
+    path = write_own(kind_named(fields.kind), fields.entry, made)
+    return {"entry": fields.entry, "file": str(path)}
+
+
+def _made(
+    kind: str,
+    name: str,
+    value: dict[str, Any],
+    description: str,
+    status: str,
+    source: str,
+    more: dict[str, Any] | None = None,
+    sources: dict[str, Any] | None = None,
+) -> AnyEntry:
+    """An entry of values; each of its numbers has the same source unless `sources` are given."""
+    singular = kind_named(kind)
+    own = {key: each for key, each in value.items() if each is not None}
+    own.pop("library", None)
+    given = {"status": status, "source": source}
+    data = {
+        "description": description,
+        "value": own,
+        "sources": sources or {key: given for key in own if key != "kind"} or {"kind": given},
+        **(more or {}),
+    }
+    return make_entry(singular, name, data, {}, f"{singular} '{name}'")

@@ -1,0 +1,141 @@
+"""Lines in, lines out: what a request, an answer, an event and an error look like.
+
+docs/engine.md is the reference; `PROTOCOL` is raised when something in it goes away or changes
+its meaning.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, TypeVar
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, ValidationError
+
+from optisense.design.problems import design_error
+from optisense.engine.failures import ProtocolError
+
+PROTOCOL = 1
+
+MOST_OF_A_LINE = 64 * 1024 * 1024
+"""Bytes of a request; one that is longer is a mistake and not read into memory."""
+
+LONGEST_ID = 64
+
+RequestId = int | str
+
+
+class Fields(BaseModel):
+    """The fields of a request: those it does not have are refused."""
+
+    model_config = ConfigDict(extra="forbid", strict=False)
+
+    name: str | None = None
+    to: str | None = None
+
+
+@dataclass(frozen=True)
+class Request:
+    """A request as it came: its fields are not checked yet."""
+
+    id: RequestId
+    do: str
+    fields: dict[str, Any]
+
+
+def read_request(line: bytes) -> Request:
+    """The request on a line.
+
+    Raises:
+        ProtocolError: it is none; carries the id where that could be read.
+    """
+    if len(line) > MOST_OF_A_LINE:
+        raise ProtocolError(
+            "the line is too long", hint="Send large data by files, named in the request"
+        )
+    try:
+        data = json.loads(line.decode("utf-8"), parse_constant=_not_a_number)
+    except (ValueError, RecursionError) as error:
+        raise ProtocolError(
+            f"the line is not JSON: {error}", hint="Write one JSON object on each line"
+        ) from None
+    if not isinstance(data, dict):
+        raise ProtocolError("the line is not a JSON object", hint='Write {"id": 1, "do": "hello"}')
+    number = data.pop("id", None)
+    if not is_id(number):
+        raise ProtocolError(
+            "the request has no id that can be used",
+            where="id",
+            hint=f"Give a whole number or a text of at most {LONGEST_ID} characters",
+        )
+    do = data.pop("do", None)
+    if not isinstance(do, str):
+        raise ProtocolError(
+            "the request does not say what to do", where="do", hint='Write "do": "simulate"',
+            request=number,
+        )  # fmt: skip
+    return Request(number, do, data)
+
+
+def is_id(value: object) -> bool:
+    """Whether a value can be the id of a request."""
+    if isinstance(value, str):
+        return 0 < len(value) <= LONGEST_ID
+    return isinstance(value, int) and not isinstance(value, bool) and abs(value) < 2**53
+
+
+_F = TypeVar("_F", bound=Fields)
+
+
+def checked_fields(kind: type[_F], request: Request) -> _F:
+    """The fields of a request as it should have them.
+
+    Raises:
+        ProtocolError: one is missing, unknown (names the near match) or of the wrong kind.
+    """
+    try:
+        return kind.model_validate(request.fields)
+    except ValidationError as error:
+        found = design_error(error, request.fields, where=request.do, model=kind)
+        raise ProtocolError(
+            found.message, where=found.where, hint=found.hint, request=request.id
+        ) from None
+
+
+def answer(number: RequestId | None, result: Mapping[str, Any]) -> dict[str, Any]:
+    """The message that a request is done."""
+    return {"id": number, "ok": True, "result": result}
+
+
+def refusal(number: RequestId | None, error: Mapping[str, Any]) -> dict[str, Any]:
+    """The message that it is not; `error` as of `optisense.engine.failures.as_data`."""
+    return {"id": number, "ok": False, "error": error}
+
+
+def to_line(message: Mapping[str, Any]) -> bytes:
+    """A message as the line to write; numbers that are not finite become null."""
+    text = json.dumps(_plain(message), ensure_ascii=False, allow_nan=False, separators=(",", ":"))
+    return text.encode("utf-8", "replace") + b"\n"
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, np.generic | np.ndarray):
+        value = value.tolist()
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    if value is None or isinstance(value, bool | str | int):
+        return value
+    if isinstance(value, Mapping):
+        return {str(key): _plain(inner) for key, inner in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(inner) for inner in value]
+    if isinstance(value, BaseModel):
+        return _plain(value.model_dump(mode="json"))
+    return str(value)
+
+
+def _not_a_number(word: str) -> float:
+    raise ValueError(f"{word} is not JSON")

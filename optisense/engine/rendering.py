@@ -1,0 +1,382 @@
+"""Requests that render: images, drafts, the same image under other lights, contacts, rays."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field
+
+from optisense.design import LightGroup, SensorDesign
+from optisense.design.near import suggestion
+from optisense.engine.contacts import AnyContact, GivenIndenter, contacts_of, indenter_of
+from optisense.engine.contacts import plain_contact as plain
+from optisense.engine.designs import AnyDesign, AnyMesh
+from optisense.engine.failures import ProtocolError
+from optisense.engine.files import Files
+from optisense.engine.jobs import Job
+from optisense.engine.protocol import Fields
+from optisense.engine.requests import Lane, handles
+from optisense.engine.session import KeptImage, Session, name_of
+from optisense.errors import RenderError
+from optisense.geometry import locate
+
+if TYPE_CHECKING:
+    from optisense.optics import Progress, TactileImage
+
+PHOTONS = 1_500_000
+"""Of an image where nothing is asked, as of `optisense render`."""
+
+DRAFT_PHOTONS = 60_000
+DRAFT_WIDTH = 160
+
+MOST_PIXELS = 20_000_000
+"""Of an image; more is a slip, and would take all memory."""
+
+ImageFile = Literal["picture", "pixels", "radiance", "layers", "normals", "points", "mask"]
+
+
+class OfDesign(Fields):
+    """A request about a design."""
+
+    design: AnyDesign
+    meshes: dict[str, AnyMesh] = Field(default_factory=dict)
+
+
+class Warm(OfDesign):
+    """See docs/engine.md."""
+
+    contacts: bool = False
+
+
+class Simulate(OfDesign):
+    """See docs/engine.md."""
+
+    contacts: list[AnyContact] = Field(default_factory=list)
+    resolution: tuple[int, int] | None = None
+    photons: int | None = Field(default=None, gt=0)
+    noise: float | None = Field(default=None, gt=0.0)
+    seconds: float | None = Field(default=None, gt=0.0)
+    seed: int = Field(default=0, ge=0, lt=2**32)
+    exposure: float | Literal["auto"] = "auto"
+    draft: bool = False
+    files: list[ImageFile] = Field(default=["picture"])
+
+
+class LightChange(Fields):
+    """Other light of a group."""
+
+    flux: float | None = Field(default=None, ge=0.0)
+    colour: tuple[float, float, float] | None = None
+
+
+class Relight(Fields):
+    """See docs/engine.md."""
+
+    image: str
+    lights: dict[str, LightChange] = Field(default_factory=dict)
+    exposure: float | Literal["auto", "same"] = "same"
+    files: list[ImageFile] = Field(default=["picture"])
+
+
+class Report(Fields):
+    """See docs/engine.md."""
+
+    image: str
+    file: str
+
+
+class Place(OfDesign):
+    """See docs/engine.md."""
+
+    contacts: list[AnyContact]
+
+
+class NinePlaces(OfDesign):
+    """See docs/engine.md."""
+
+    indenter: GivenIndenter
+    depth: float = 0.5
+    rotation: float = 0.0
+
+
+class ChiefRayGrid(OfDesign):
+    """See docs/engine.md."""
+
+    contacts: list[AnyContact] = Field(default_factory=list)
+    resolution: tuple[int, int] = (16, 12)
+
+
+def design_of(session: Session, fields: OfDesign, job: Job) -> SensorDesign:
+    """The design that a request is about."""
+    job.design = session.designs.read(fields.design, fields.meshes)
+    return job.design
+
+
+@handles("warm", Warm, Lane.RENDER)
+def warm(session: Session, fields: Warm, job: Job) -> dict[str, Any]:
+    """Build the sensor and compile what an image needs."""
+    began = time.perf_counter()
+    design = design_of(session, fields, job)
+    job.progress(0.0, "loading the renderer")
+    model = session.renderer.model(design)
+    job.progress(0.2, "building the sensor")
+    size = _draft_size(design)
+    tell = _teller(job)
+    model.render((), size, photons=DRAFT_PHOTONS, progress=tell)
+    if fields.contacts:
+        job.progress(0.7, "pressing once")
+        model.render(contacts_of(["sphere:1.5@0,0:0.2"]), size, photons=DRAFT_PHOTONS)
+    return {"seconds": round(time.perf_counter() - began, 3)}
+
+
+@handles("simulate", Simulate, Lane.RENDER)
+def simulate(session: Session, fields: Simulate, job: Job) -> dict[str, Any]:
+    """A tactile image, or a draft of one."""
+    files = session.files(fields, job.id)
+    design = design_of(session, fields, job)
+    contacts = contacts_of(fields.contacts)
+    size = _checked_size(fields.resolution, design)
+    photons = fields.photons
+    if fields.draft:
+        size = fields.resolution or _draft_size(design)
+        photons = photons if photons or fields.noise or fields.seconds else DRAFT_PHOTONS
+    else:
+        session.designs.must_be_sound(design)
+        photons = photons if photons or fields.noise or fields.seconds else PHOTONS
+        job.progress(0.0, "building the sensor")
+    model = session.renderer.model(design)
+    image = model.render(
+        contacts,
+        resolution=size,
+        photons=photons,
+        noise=fields.noise,
+        seconds=fields.seconds,
+        seed=fields.seed,
+        progress=_teller(job),
+    )
+    image.settings["contacts"] = [_text(given) for given in fields.contacts]
+    exposure = _exposure(image, fields.exposure)
+    name = name_of(fields, job.id)
+    indenters = {} if fields.draft else _indenters(model, contacts)
+    kept = KeptImage(image, design, contacts, indenters, exposure, fields.draft)
+    written = write_image(image, exposure, fields.files, files)
+    session.images.keep(name, kept)
+    return {
+        "image": name,
+        "draft": fields.draft,
+        "size": _size(image),
+        "exposure": exposure,
+        "lights": {
+            group: {"flux": each.flux, "colour": list(each.colour)}
+            for group, each in design.lights.items()
+        },
+        "files": written,
+        "settings": image.settings,
+    }
+
+
+@handles("relight", Relight, Lane.QUICK)
+def relight(session: Session, fields: Relight, job: Job) -> dict[str, Any]:
+    """The same image under other lights."""
+    files = session.files(fields, job.id)
+    kept = session.images.find(fields.image)
+    lights = kept.design.lights
+    flux = {
+        name: _changed(name, lights, change).channel_flux()
+        for name, change in fields.lights.items()
+    }
+    image = kept.image.relit(flux)
+    exposure = kept.exposure if fields.exposure == "same" else _exposure(image, fields.exposure)
+    return {
+        "image": fields.image,
+        "size": _size(image),
+        "exposure": exposure,
+        "files": write_image(image, exposure, fields.files, files),
+    }
+
+
+@handles("report", Report, Lane.QUICK)
+def report(session: Session, fields: Report, job: Job) -> dict[str, Any]:
+    """The HTML page of an image."""
+    from optisense.report import write_report
+
+    kept = session.images.find(fields.image)
+    path = write_report(
+        Path(fields.file),
+        kept.design,
+        kept.image,
+        kept.contacts,
+        exposure=kept.exposure,
+        indenters=kept.indenters,
+    )
+    return {"file": str(path)}
+
+
+@handles("place", Place, Lane.RENDER)
+def place(session: Session, fields: Place, job: Job) -> dict[str, Any]:
+    """Contacts where they sit on the surface."""
+    files = session.files(fields, job.id)
+    model = session.renderer.model(design_of(session, fields, job))
+    rows = []
+    for number, contact in enumerate(contacts_of(fields.contacts)):
+        spot = locate(contact, model.surface)
+        rows.append(
+            {
+                "point": spot.point,
+                "inward": spot.inward,
+                "mesh": files.mesh(f"contact{number}", model.place(contact)),
+            }
+        )
+    return {"contacts": rows}
+
+
+@handles("nine_places", NinePlaces, Lane.RENDER)
+def nine_places(session: Session, fields: NinePlaces, job: Job) -> dict[str, Any]:
+    """Nine contacts that cover what the camera sees."""
+    model = session.renderer.model(design_of(session, fields, job))
+    found = model.nine_contacts(indenter_of(fields.indenter), fields.depth)
+    turned = [replace(contact, rotation=fields.rotation) for contact in found]
+    return {"contacts": [plain(contact, fields.indenter) for contact in turned]}
+
+
+@handles("chief_rays", ChiefRayGrid, Lane.RENDER)
+def chief_rays(session: Session, fields: ChiefRayGrid, job: Job) -> dict[str, Any]:
+    """The ways of chief rays, for drawing."""
+    from optisense.optics import Outcome
+    from optisense.optics.ray_paths import trace_paths
+
+    files = session.files(fields, job.id)
+    design = design_of(session, fields, job)
+    _checked_size(fields.resolution, design)
+    model = session.renderer.model(design)
+    paths = trace_paths(model, fields.resolution, contacts_of(fields.contacts))
+    return {
+        "files": {
+            "vertices": files.array("rays.vertices.npy", paths.vertices),
+            "counts": files.array("rays.counts.npy", paths.counts),
+            "outcomes": files.array("rays.outcomes.npy", paths.outcomes),
+        },
+        "rays": len(paths.counts),
+        "outcome_names": [each.name.lower() for each in Outcome],
+        "hit": float((paths.outcomes == Outcome.HIT).mean()),
+    }
+
+
+def write_image(
+    image: TactileImage, exposure: float, wanted: list[ImageFile], files: Files
+) -> dict[str, Any]:
+    """Write the files of an image that were asked for; their paths by kind."""
+    written: dict[str, Any] = {}
+    picture: NDArray[np.uint8] | None = None
+    if "picture" in wanted or "pixels" in wanted:
+        picture = image.picture(exposure)
+    if picture is not None and "picture" in wanted:
+        written["picture"] = files.picture("picture.png", picture)
+    if picture is not None and "pixels" in wanted:
+        written["pixels"] = files.array("pixels.npy", blender_pixels(picture))
+    arrays: dict[str, Callable[[], NDArray[Any]]] = {
+        "radiance": lambda: image.radiance,
+        "normals": lambda: image.normals.astype(np.float32),
+        "points": lambda: image.points.astype(np.float32),
+        "mask": lambda: image.contact_mask.astype(np.uint8),
+    }
+    for name, values in arrays.items():
+        if name in wanted:
+            written[name] = files.array(f"{name}.npy", values())
+    if "layers" in wanted:
+        written["layers"] = {
+            name: files.array(f"layer.{name}.npy", layer) for name, layer in image.layers.items()
+        }
+    return written
+
+
+def blender_pixels(picture: NDArray[np.uint8]) -> NDArray[np.float32]:
+    """(h, w, 4) of a picture (h, w, 3): 0 to 1, opaque, row 0 at the bottom."""
+    height, width = picture.shape[:2]
+    pixels = np.ones((height, width, 4), dtype=np.float32)
+    np.multiply(picture[::-1], np.float32(1.0 / 255.0), out=pixels[..., :3], dtype=np.float32)
+    return pixels
+
+
+def _teller(job: Job) -> Callable[[Progress], None]:
+    def tell(progress: Progress) -> None:
+        text = f"{progress.photons / 1e6:.1f} million photons"
+        if progress.noise is not None:
+            text += f", noise {progress.noise:.1f} %"
+        job.progress(
+            progress.fraction,
+            text,
+            photons=progress.photons,
+            noise=progress.noise,
+            seconds=round(progress.seconds, 3),
+        )
+
+    return tell
+
+
+def _exposure(image: TactileImage, given: float | Literal["auto", "same"]) -> float:
+    if isinstance(given, str):
+        from optisense.optics.response import auto_exposure
+
+        return auto_exposure(image.radiance)
+    if not given > 0.0:
+        raise RenderError(f"the exposure is {given:g}", hint='Give "auto" or a factor above 0')
+    return given
+
+
+def _changed(name: str, lights: Mapping[str, LightGroup], change: LightChange) -> LightGroup:
+    """A light group with another flux or colour.
+
+    Raises:
+        ProtocolError: there is no such group, or a colour of nothing.
+    """
+    if name not in lights:
+        hint = suggestion(name, lights, limit=20)
+        raise ProtocolError(f"the image has no light group '{name}'", where="lights", hint=hint)
+    group = lights[name]
+    colour = group.colour if change.colour is None else change.colour
+    if min(colour) < 0.0 or sum(colour) <= 0.0:
+        raise ProtocolError(
+            f"the colour of '{name}' is {list(colour)}",
+            where="lights",
+            hint="Give R, G and B from 0 with one above 0; for darkness set flux to 0",
+        )
+    flux = group.flux if change.flux is None else change.flux
+    return group.model_copy(update={"colour": colour, "flux": flux})
+
+
+def _checked_size(
+    resolution: tuple[int, int] | None, design: SensorDesign
+) -> tuple[int, int] | None:
+    width, height = resolution or design.camera.resolution
+    if width * height > MOST_PIXELS:
+        raise RenderError(
+            f"a picture of {width} x {height} pixels is too large",
+            hint=f"Ask for at most {MOST_PIXELS:,} pixels",
+        )
+    return resolution
+
+
+def _draft_size(design: SensorDesign) -> tuple[int, int]:
+    width, height = design.camera.resolution
+    return DRAFT_WIDTH, max(1, round(DRAFT_WIDTH * height / width))
+
+
+def _indenters(model: Any, contacts: list[Any]) -> dict[str, Any]:
+    """The indenters' meshes, for the report."""
+    return {f"contact {number}": model.place(each) for number, each in enumerate(contacts, 1)}
+
+
+def _size(image: TactileImage) -> list[int]:
+    height, width = image.contact_mask.shape
+    return [width, height]
+
+
+def _text(given: AnyContact) -> Any:
+    return given if isinstance(given, str) else given.model_dump(exclude_none=True)

@@ -1,0 +1,66 @@
+"""The requests that the engine knows: their fields, their line, and who does them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from enum import Enum
+from typing import Any, TypeVar
+
+from optisense.design.near import suggestion
+from optisense.engine.failures import ProtocolError
+from optisense.engine.jobs import Job
+from optisense.engine.protocol import Fields
+from optisense.engine.session import Session
+
+Handler = Callable[[Session, Any, Job], dict[str, Any]]
+
+
+class Lane(Enum):
+    """Where a request is done."""
+
+    QUICK = "quick"  # what needs no renderer, one after another
+    RENDER = "render"  # what needs it, one after another
+    OWN = "own"  # in a thread of its own, since it mostly waits
+
+
+@dataclass(frozen=True)
+class Kind:
+    """A kind of request."""
+
+    do: str
+    fields: type[Fields]
+    lane: Lane
+    handler: Handler
+
+
+_kinds: dict[str, Kind] = {}
+
+_H = TypeVar("_H", bound=Callable[..., dict[str, Any]])
+
+
+def handles(do: str, fields: type[Fields], lane: Lane) -> Callable[[_H], _H]:
+    """Register a function `(session, fields, job) -> result` for a kind of request."""
+
+    def register(function: _H) -> _H:
+        _kinds[do] = Kind(do, fields, lane, function)
+        return function
+
+    return register
+
+
+def find(do: str, others: tuple[str, ...] = ()) -> Kind:
+    """The kind of request of this name.
+
+    Raises:
+        ProtocolError: there is none; names the near match.
+    """
+    if do not in _kinds:
+        hint = suggestion(do, [*_kinds, *others], limit=60)
+        raise ProtocolError(f"there is no request '{do}'", where="do", hint=hint)
+    return _kinds[do]
+
+
+def names() -> list[str]:
+    """All kinds of requests with a handler."""
+    return list(_kinds)

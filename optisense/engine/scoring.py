@@ -1,0 +1,98 @@
+"""Requests that score a design."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from pydantic import Field
+
+from optisense.engine.failures import Cancelled
+from optisense.engine.files import Files
+from optisense.engine.jobs import Job
+from optisense.engine.protocol import Fields
+from optisense.engine.rendering import OfDesign, design_of
+from optisense.engine.requests import Lane, handles
+from optisense.engine.session import Session
+from optisense.objectives import BUILT_IN, Evaluation, Score, Settings
+from optisense.objectives.registry import find, names, resolve
+from optisense.objectives.run import run_objective, split_settings
+
+DOTS_PER_INCH = 110
+
+
+class Nothing(Fields):
+    """A request without fields of its own."""
+
+
+class Evaluate(OfDesign):
+    """See docs/engine.md."""
+
+    objectives: list[str] = Field(default_factory=lambda: list(BUILT_IN), min_length=1)
+    settings: dict[str, Any] = Field(default_factory=dict)
+    figures: bool = False
+
+
+@handles("objectives", Nothing, Lane.QUICK)
+def objectives(session: Session, fields: Nothing, job: Job) -> dict[str, Any]:
+    """What can be scored."""
+    rows = []
+    for name in names():
+        each = find(name)
+        rows.append(
+            {
+                "name": each.name,
+                "title": each.title,
+                "summary": each.summary,
+                "settings": each.settings,
+            }
+        )
+    return {"objectives": rows}
+
+
+@handles("evaluate", Evaluate, Lane.RENDER)
+def evaluate(session: Session, fields: Evaluate, job: Job) -> dict[str, Any]:
+    """Score a design, objective by objective."""
+    files = session.files(fields, job.id)
+    wanted = resolve(fields.objectives)
+    shared, own = split_settings(fields.settings, wanted)
+    settings = Settings(**shared)
+    design = design_of(session, fields, job)
+    session.designs.must_be_sound(design)
+    job.progress(0.0, "building the sensor")
+    model = session.renderer.model(design)
+    done = 0
+
+    def tell(fraction: float, text: str) -> None:
+        job.progress((done + min(max(fraction, 0.0), 1.0)) / len(wanted), text)
+
+    evaluation = Evaluation(model, settings, tell)
+    rows = []
+    for each in wanted:
+        tell(0.0, each.title)
+        score = run_objective(each, evaluation, own[each.name])
+        job.check()
+        row = score.to_dict() | {"beside": score.beside, "figure": None}
+        if fields.figures:
+            row["figure"] = _figure(score, files)
+        job.tell("score", score=row)
+        rows.append(row)
+        done += 1
+    return {"scores": rows}
+
+
+def _figure(score: Score, files: Files) -> str | None:
+    """Draw a score; None where a user's own drawing fails."""
+    try:
+        figure = score.figure()
+        path = files.path(f"{score.objective}.png")
+        from optisense.library.previews import save
+
+        save(figure, path)
+    except Cancelled:
+        raise
+    except (ValueError, TypeError, KeyError, AttributeError) as error:
+        import sys
+
+        print(f"the figure of {score.objective} can't be drawn: {error}", file=sys.stderr)
+        return None
+    return str(path)

@@ -1,0 +1,146 @@
+"""The process that runs a study for the engine: started here, told to stop, found again."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+from optisense import errors
+from optisense.errors import OptiSenseError, SearchError
+from optisense.search.store import Lock
+from optisense.search.study import LOCK_FILE
+
+PROCESS_FILE = "process.json"
+"""In the study's folder while one of these processes runs it: how to end it."""
+
+LOG_FILE = "search.log"
+"""What the process says besides its result; for finding out why it died."""
+
+LAST_WORDS = 2000
+
+
+class SearchProcess:
+    """A running search."""
+
+    def __init__(self, folder: Path, workers: int, budget: int | None, go_on: bool) -> None:
+        """Start it.
+
+        Args:
+            folder: of the study.
+            workers: processes that score trials.
+            budget: trials in all; the study's own if None.
+            go_on: whether it outlives this process.
+        """
+        self.folder = folder
+        self.go_on = go_on
+        command = [sys.executable, "-m", "optisense.engine.searcher", str(folder)]
+        command += ["--workers", str(workers)]
+        command += [] if budget is None else ["--budget", str(budget)]
+        command += ["--go-on"] if go_on else []
+        environment = {**os.environ}
+        environment["PYTHONPATH"] = os.pathsep.join(path or str(Path.cwd()) for path in sys.path)
+        with (folder / LOG_FILE).open("ab") as log:
+            self._process = subprocess.Popen(
+                command,
+                stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE,
+                stderr=log,
+                env=environment,
+                start_new_session=True,  # Ctrl-C in the front end's terminal is not for it
+            )
+
+    @property
+    def pid(self) -> int:
+        """Its process."""
+        return self._process.pid
+
+    @property
+    def running(self) -> bool:
+        """Whether it has not ended."""
+        return self._process.poll() is None
+
+    def stop(self) -> None:
+        """Ask it to end after the trials that it is at; asked again, it drops them."""
+        with contextlib.suppress(OSError, ValueError):
+            assert self._process.stdin is not None
+            self._process.stdin.write(b"stop\n")
+            self._process.stdin.flush()
+
+    def outcome(self) -> dict[str, Any]:
+        """What it told at its end.
+
+        Raises:
+            OptiSenseError: it failed, or died.
+        """
+        assert self._process.stdout is not None
+        told = self._process.stdout.read()
+        code = self._process.wait()
+        for stream in (self._process.stdin, self._process.stdout):
+            with contextlib.suppress(OSError):
+                if stream is not None:
+                    stream.close()
+        try:
+            outcome: dict[str, Any] = json.loads(told)
+        except ValueError:
+            way = f"signal {-code}" if code < 0 else f"exit code {code}"
+            raise SearchError(
+                f"the search's process has died ({way}); its finished trials are kept",
+                where=str(self.folder),
+                hint=_last_words(self.folder / LOG_FILE),
+            ) from None
+        if "error" in outcome:
+            raise _error_of(outcome["error"])
+        return outcome
+
+
+def is_running(folder: Path) -> bool:
+    """Whether any process runs a study at present."""
+    if not (folder / LOCK_FILE).exists():
+        return False
+    try:
+        Lock(folder / LOCK_FILE).release()
+    except OptiSenseError:
+        return True
+    return False
+
+
+def stop_other(folder: Path) -> bool:
+    """Ask the process that runs a study to end; false where none does.
+
+    Raises:
+        SearchError: it runs, but not by an engine.
+    """
+    if not is_running(folder):
+        return False
+    try:
+        number = int(json.loads((folder / PROCESS_FILE).read_text(encoding="utf-8"))["pid"])
+    except (OSError, ValueError, KeyError, TypeError):
+        raise SearchError(
+            "the study is run by a program that can't be stopped from here",
+            where=str(folder),
+            hint="Press Ctrl-C where it was started; nothing that it has finished is lost",
+        ) from None
+    with contextlib.suppress(ProcessLookupError):
+        os.kill(number, signal.SIGINT)
+    return True
+
+
+def _error_of(data: dict[str, Any]) -> OptiSenseError:
+    kind = getattr(errors, str(data.get("kind")), SearchError)
+    made: OptiSenseError = kind(data["message"], where=data.get("where"), hint=data.get("hint"))
+    return made
+
+
+def _last_words(log: Path) -> str | None:
+    """The last line of a log."""
+    try:
+        text = log.read_bytes()[-LAST_WORDS:].decode("utf-8", "replace").strip()
+    except OSError:
+        return None
+    return text.splitlines()[-1] if text else None

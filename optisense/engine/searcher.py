@@ -1,0 +1,98 @@
+"""``python -m optisense.engine.searcher STUDY``: runs a study for an engine.
+
+Standard input tells when to end: a line "stop" ends it after the trials that it is at, and a
+second one at once; the end of the input does so too, unless ``--go-on`` is given. The result is
+one line of JSON on standard output.
+"""
+
+from __future__ import annotations
+
+import _thread
+import argparse
+import contextlib
+import json
+import os
+import sys
+import threading
+import time
+import traceback
+from pathlib import Path
+from typing import Any
+
+from optisense.engine.channel import Channel
+from optisense.engine.failures import as_data
+from optisense.engine.search_process import PROCESS_FILE
+from optisense.errors import OptiSenseError
+
+PATIENCE = 20.0
+"""Seconds after which a search whose engine has gone drops its trial, and then dies."""
+
+NICENESS = 5
+"""A search runs for hours: let drafts in the front end go first."""
+
+
+def main() -> None:
+    """Run the study that the command line names, and end the process."""
+    parser = argparse.ArgumentParser()
+    parser.add_argument("study", type=Path)
+    parser.add_argument("--workers", type=int, default=1)
+    parser.add_argument("--budget", type=int)
+    parser.add_argument("--go-on", action="store_true")
+    given = parser.parse_args()
+    channel = Channel.of_standard_output()
+    threading.Thread(target=_listen, args=(given.go_on,), daemon=True).start()
+    with contextlib.suppress(OSError, AttributeError):
+        os.nice(NICENESS)
+    channel.send(_run(given.study, given.workers, given.budget))
+    channel.close()
+    sys.stderr.flush()
+    os._exit(0)
+
+
+def _run(folder: Path, workers: int, budget: int | None) -> dict[str, Any]:
+    """Run a study; its result, or the error, as data."""
+    mark = folder / PROCESS_FILE
+    try:
+        from optisense.search import Study, run_study
+
+        study = Study.open(folder)
+        study.lock()  # before the mark: it must tell of the process that has the study
+        mark.write_text(json.dumps({"pid": os.getpid()}), encoding="utf-8")
+        try:
+            result = run_study(study, workers=workers, limit=budget)
+            best = study.best
+            return {
+                "interrupted": result.interrupted,
+                "ended": result.ended,
+                "notes": list(result.notes),
+                "best": None if best is None else best.number,
+            }
+        finally:
+            with contextlib.suppress(OSError):
+                mark.unlink(missing_ok=True)
+            study.close()
+    except KeyboardInterrupt:
+        return {"interrupted": True, "ended": "interrupted", "notes": [], "best": None}
+    except OptiSenseError as error:
+        return {"error": as_data(error)}
+    except Exception as error:
+        traceback.print_exc()
+        return {"error": as_data(error)}
+
+
+def _listen(go_on: bool) -> None:
+    """Turn what comes on standard input into Ctrl-C."""
+    for line in sys.stdin.buffer:
+        if line.strip() == b"stop":
+            _thread.interrupt_main()
+    if go_on:
+        return
+    _thread.interrupt_main()
+    time.sleep(PATIENCE)
+    _thread.interrupt_main()
+    time.sleep(PATIENCE)
+    os._exit(1)
+
+
+if __name__ == "__main__":
+    main()

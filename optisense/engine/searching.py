@@ -1,0 +1,250 @@
+"""Requests about searches: each runs in a process of its own and keeps its trials in a folder."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from pydantic import Field
+
+from optisense.engine.designing import bent_shapes
+from optisense.engine.failures import ProtocolError
+from optisense.engine.following import Following
+from optisense.engine.jobs import Job
+from optisense.engine.protocol import Fields
+from optisense.engine.rendering import OfDesign, design_of
+from optisense.engine.requests import Lane, handles
+from optisense.engine.search_process import SearchProcess, is_running, stop_other
+from optisense.engine.session import Session
+from optisense.errors import OutputError
+from optisense.search import Plan, SearchSpace, Study, Trial
+from optisense.search.applied import design_of as design_of_trial
+from optisense.search.methods import find, names
+from optisense.search.space import BoundSpace
+from optisense.search.study import beside
+from optisense.search.text import parse_space
+from optisense.sensors import save_design
+
+
+class Nothing(Fields):
+    """A request without fields of its own."""
+
+
+class Space(OfDesign):
+    """See docs/engine.md."""
+
+    vary: list[str] = Field(min_length=1)
+
+
+class Search(Space):
+    """See docs/engine.md."""
+
+    study: str
+    objectives: list[str] = Field(min_length=1)
+    method: str = "cma-es"
+    budget: int | None = Field(default=None, ge=1)
+    seed: int = Field(default=0, ge=0, lt=2**32)
+    settings: dict[str, Any] = Field(default_factory=dict)
+    options: dict[str, Any] = Field(default_factory=dict)
+    may_cross: bool = False
+    workers: int = Field(default=1, ge=1)
+    go_on: bool = False
+
+
+class OfStudy(Fields):
+    """A request about a study."""
+
+    study: str
+
+
+class Resume(OfStudy):
+    """See docs/engine.md."""
+
+    workers: int = Field(default=1, ge=1)
+    budget: int | None = Field(default=None, ge=1)
+    go_on: bool = False
+
+
+class OneTrial(OfStudy):
+    """See docs/engine.md."""
+
+    trial: int | str = "best"
+
+
+class Apply(OneTrial):
+    """See docs/engine.md."""
+
+    to: str
+
+
+@handles("methods", Nothing, Lane.QUICK)
+def methods(session: Session, fields: Nothing, job: Job) -> dict[str, Any]:
+    """Ways to search."""
+    return {"methods": [{"name": name, "summary": find(name).summary} for name in names()]}
+
+
+@handles("space", Space, Lane.OWN)
+def space(session: Session, fields: Space, job: Job) -> dict[str, Any]:
+    """What may change, looked up in a design."""
+    design = design_of(session, fields, job)
+    bound = SearchSpace(parse_space(fields.vary)).bind(design)
+    return {"parameters": _parameters(bound)}
+
+
+@handles("search", Search, Lane.OWN)
+def search(session: Session, fields: Search, job: Job) -> dict[str, Any]:
+    """Begin a study and follow it to its end."""
+    files = session.files(fields, job.id)
+    folder = _absolute(fields.study)
+    design = design_of(session, fields, job)
+    session.designs.must_be_sound(design)
+    plan = Plan(
+        space=SearchSpace(parse_space(fields.vary)),
+        goals=fields.objectives,
+        method=fields.method,
+        options=fields.options or None,
+        budget=fields.budget,
+        seed=fields.seed,
+        settings=fields.settings or None,
+        apart=not fields.may_cross,
+    )
+    job.check()
+    Study.create(folder, design, plan).close()
+    child = SearchProcess(folder, fields.workers, None, fields.go_on)
+    return Following(folder, job, files, child).result()
+
+
+@handles("resume", Resume, Lane.OWN)
+def resume(session: Session, fields: Resume, job: Job) -> dict[str, Any]:
+    """Go on with a study and follow it to its end."""
+    files = session.files(fields, job.id)
+    folder = _absolute(fields.study)
+    Study.open(folder).close()  # says what is wrong with it before a process is started
+    child = SearchProcess(folder, fields.workers, fields.budget, fields.go_on)
+    return Following(folder, job, files, child).result()
+
+
+@handles("watch", OfStudy, Lane.OWN)
+def watch(session: Session, fields: OfStudy, job: Job) -> dict[str, Any]:
+    """Follow a study that another process runs."""
+    files = session.files(fields, job.id)
+    return Following(_absolute(fields.study), job, files, None).result()
+
+
+@handles("stop", OfStudy, Lane.OWN)
+def stop(session: Session, fields: OfStudy, job: Job) -> dict[str, Any]:
+    """End a search, whoever follows it."""
+    return {"stopped": stop_other(_absolute(fields.study))}
+
+
+@handles("study", OfStudy, Lane.OWN)
+def about_study(session: Session, fields: OfStudy, job: Job) -> dict[str, Any]:
+    """All about a study but its designs."""
+    folder = _absolute(fields.study)
+    with _opened(folder) as study:
+        trials = study.trials
+        best = study.best
+        settings = study.settings
+        return {
+            "design": settings.design,
+            "objectives": settings.names,
+            "method": settings.method,
+            "budget": settings.budget,
+            "seed": settings.seed,
+            "running": is_running(folder),
+            "ended": study.store.fact("ended"),
+            "parameters": study.space.names,
+            "best": None if best is None else best.number,
+            "curve": [curve_row(trial) for trial in trials],
+        }
+
+
+@handles("trial", OneTrial, Lane.OWN)
+def trial(session: Session, fields: OneTrial, job: Job) -> dict[str, Any]:
+    """One trial as a design."""
+    files = session.files(fields, job.id)
+    with _opened(_absolute(fields.study)) as study:
+        chosen = study.trial(fields.trial)
+        design = design_of_trial(study, chosen)
+        return {
+            **trial_row(study, chosen),
+            "fresh_scores": {name: _finite(chosen.fresh_score(name)) for name in chosen.scores},
+            "data": design.model_dump(mode="json"),
+            "folder": str(_absolute(fields.study) / "design"),
+            "shapes": bent_shapes(design, files, study.space.design),
+        }
+
+
+@handles("apply", Apply, Lane.OWN)
+def apply(session: Session, fields: Apply, job: Job) -> dict[str, Any]:
+    """Write a trial as a design folder."""
+    folder = Path(fields.to)
+    if folder.is_dir() and any(folder.iterdir()):
+        raise OutputError(
+            "the folder is not empty", where=str(folder), hint="Name a folder that doesn't exist"
+        )
+    with _opened(_absolute(fields.study)) as study:
+        chosen = study.trial(fields.trial)
+        save_design(design_of_trial(study, chosen), folder)
+        return {"folder": str(folder), "number": chosen.number}
+
+
+def curve_row(trial: Trial) -> dict[str, Any]:
+    """A point of the curve of scores."""
+    return {
+        "number": trial.number,
+        "start": trial.is_start,
+        "scores": {name: _finite(value) for name, value in trial.scores.items()},
+        "failure": trial.failure,
+    }
+
+
+def trial_row(study: Study, trial: Trial) -> dict[str, Any]:
+    """A trial without its design."""
+    return {
+        **curve_row(trial),
+        "values": trial.values,
+        "vector": trial.vector,
+        "beside": beside(study, trial),
+    }
+
+
+@contextmanager
+def _opened(folder: Path) -> Iterator[Study]:
+    study = Study.open(folder)
+    try:
+        yield study
+    finally:
+        study.close()
+
+
+def _absolute(folder: str) -> Path:
+    path = Path(folder)
+    if not path.is_absolute():
+        raise ProtocolError(
+            f"the study '{folder}' has no absolute path", where="study", hint="Give it whole"
+        )
+    return path
+
+
+def _parameters(bound: BoundSpace) -> list[dict[str, Any]]:
+    rows = []
+    for number, parameter in enumerate(bound.parameters):
+        labels = getattr(parameter.kind, "labels", None)
+        rows.append(
+            {
+                "name": parameter.name,
+                "lower": bound.lower[number],
+                "upper": bound.upper[number],
+                "start": bound.start[number],
+                "options": None if labels is None else list(labels),
+            }
+        )
+    return rows
+
+
+def _finite(value: float) -> float | None:
+    return value if math.isfinite(value) else None

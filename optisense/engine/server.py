@@ -1,0 +1,260 @@
+"""The engine: reads requests, gives them to their lines, and answers each exactly once."""
+
+from __future__ import annotations
+
+import faulthandler
+import os
+import sys
+import threading
+import time
+import traceback
+from collections.abc import Mapping
+from pathlib import Path
+from typing import IO, Any
+
+from optisense import __version__
+from optisense.engine import requests
+from optisense.engine.channel import Channel
+from optisense.engine.failures import Cancelled, ProtocolError, as_data
+from optisense.engine.jobs import Job, Line
+from optisense.engine.protocol import (
+    MOST_OF_A_LINE,
+    PROTOCOL,
+    Fields,
+    Request,
+    RequestId,
+    answer,
+    checked_fields,
+    read_request,
+    refusal,
+)
+from optisense.engine.requests import Kind, Lane
+from optisense.engine.session import Session
+from optisense.errors import OptiSenseError, OutputError
+
+FAREWELL = 3.0
+"""Seconds that `shutdown` waits for what is being worked on."""
+
+AT_ONCE = ("hello", "cancel", "shutdown")
+"""Requests that wait for nothing."""
+
+
+class Hello(Fields):
+    """See docs/engine.md."""
+
+    protocol: int
+    client: str = ""
+    folder: str
+    variant: str = "auto"
+
+
+class Cancel(Fields):
+    """See docs/engine.md."""
+
+    of: int | str
+
+
+class Engine:
+    """Serves one front end until it goes."""
+
+    def __init__(self, channel: Channel) -> None:
+        """Nothing is loaded yet.
+
+        Args:
+            channel: where answers go.
+        """
+        # Each module registers the requests that it handles.
+        from optisense.engine import designing, keeping, rendering, scoring, searching
+
+        assert all((designing, keeping, rendering, scoring, searching))
+        self.session = Session()
+        self._channel = channel
+        self._lines = {lane: Line(lane.value) for lane in (Lane.QUICK, Lane.RENDER)}
+        self._open: dict[RequestId, Job] = {}
+        self._changed = threading.Condition()
+        self._ending = False
+
+    def serve(self, requests_in: IO[bytes]) -> None:
+        """Read requests until there are no more, or `shutdown` comes."""
+        while not self._ending and not self._channel.gone:
+            line = requests_in.readline(MOST_OF_A_LINE + 1)
+            if not line:
+                break
+            whole = line
+            while not line.endswith(b"\n") and line:  # too long, or the last one
+                line = requests_in.readline(MOST_OF_A_LINE)
+            if whole.strip():
+                self._take(whole)
+        self._cancel_all()
+
+    def _take(self, line: bytes) -> None:
+        """Begin with a request, or say why not."""
+        number: RequestId | None = None
+        try:
+            request = read_request(line)
+            number = request.id
+            with self._changed:
+                taken = number in self._open
+            if taken:
+                number = None  # the answer to this id is that of the other request
+                raise ProtocolError(
+                    f"a request with the id {request.id!r} is still open",
+                    where="id",
+                    hint="Give each request an id of its own",
+                )
+            self._begin(request)
+        except ProtocolError as error:
+            known = error.request if number is None and error.request is not None else number
+            self._channel.send(refusal(known, as_data(error)))
+        except Exception as error:
+            self._channel.send(refusal(number, as_data(error)))
+            traceback.print_exc()
+
+    def _begin(self, request: Request) -> None:
+        if request.do == "hello":
+            self._hello(request)
+            return
+        if self.session.folder is None:
+            raise ProtocolError(
+                f"'{request.do}' came before 'hello'", hint="Say hello first, and wait for it"
+            )
+        if request.do == "cancel":
+            self._cancel(request)
+        elif request.do == "shutdown":
+            self._shutdown(request)
+        else:
+            self._enter(request)
+
+    def _enter(self, request: Request) -> None:
+        """Put a request into its line."""
+        kind = requests.find(request.do, AT_ONCE)
+        fields = checked_fields(kind.fields, request)
+        job = Job(request.id, self._channel.send, draft=bool(getattr(fields, "draft", False)))
+        with self._changed:
+            self._open[request.id] = job
+        task = _Work(self, kind, fields, job)
+        if kind.lane is Lane.OWN:
+            threading.Thread(target=task.run, name=kind.do, daemon=True).start()
+        else:
+            self._lines[kind.lane].put(task)
+
+    def _hello(self, request: Request) -> None:
+        version = request.fields.get("protocol")
+        if version != PROTOCOL or isinstance(version, bool):
+            raise ProtocolError(
+                f"the front end speaks protocol {version!r}, this engine (OptiSense "
+                f"{__version__}) protocol {PROTOCOL}",
+                where="protocol",
+                hint="Install versions of the front end and of OptiSense that belong together",
+            )
+        fields = checked_fields(Hello, request)
+        if fields.variant not in ("auto", "llvm", "cuda"):
+            raise ProtocolError(
+                f"there is no variant '{fields.variant}'", where="variant",
+                hint="Use auto, llvm or cuda",
+            )  # fmt: skip
+        folder = Path(fields.folder)
+        if not folder.is_absolute() or not folder.is_dir():
+            error = OutputError(
+                "there is no such folder", where=fields.folder, hint="Make it first; give it whole"
+            )
+            self._channel.send(refusal(request.id, as_data(error)))
+            return
+        self.session.folder = folder
+        self.session.renderer.variant = fields.variant
+        facts = {
+            "protocol": PROTOCOL,
+            "version": __version__,
+            "pid": os.getpid(),
+            "folder": str(folder),
+            "requests": [*AT_ONCE, *requests.names()],
+        }
+        self._channel.send(answer(request.id, facts))
+
+    def _cancel(self, request: Request) -> None:
+        fields = checked_fields(Cancel, request)
+        with self._changed:
+            job = self._open.get(fields.of)
+        if job is not None:
+            job.cancel()
+            for line in self._lines.values():
+                if line.drop(job):
+                    break
+        self._channel.send(answer(request.id, {"cancelled": job is not None}))
+
+    def _shutdown(self, request: Request) -> None:
+        checked_fields(Fields, request)
+        self._ending = True
+        self._cancel_all()
+        until = time.monotonic() + FAREWELL
+        with self._changed:
+            while self._open and (left := until - time.monotonic()) > 0:
+                self._changed.wait(left)
+        self._channel.send(answer(request.id, {}))
+
+    def _cancel_all(self) -> None:
+        with self._changed:
+            jobs = list(self._open.values())
+        for job in jobs:
+            job.cancel(leaving=True)
+            for line in self._lines.values():
+                line.drop(job)
+
+    def answered(self, job: Job, message: Mapping[str, Any]) -> None:
+        """Send the answer to a request, after which its id is free."""
+        with self._changed:
+            if self._open.pop(job.id, None) is None:
+                return
+            self._channel.send(message)
+            self._changed.notify_all()
+
+
+class _Work:
+    """A request with everything that it needs; see `optisense.engine.jobs.Task`."""
+
+    def __init__(self, engine: Engine, kind: Kind, fields: Fields, job: Job) -> None:
+        self._engine = engine
+        self._kind = kind
+        self._fields = fields
+        self.job = job
+
+    def run(self) -> None:
+        """Do it and answer."""
+        session = self._engine.session
+        try:
+            self.job.check()
+            result = self._kind.handler(session, self._fields, self.job)
+        except (OptiSenseError, Cancelled, OSError, MemoryError) as error:
+            self._refuse(as_data(error, self.job.design))
+        except BaseException as error:
+            traceback.print_exc()
+            if self._kind.lane is Lane.RENDER:
+                session.renderer.forget()
+            self._refuse(as_data(error, self.job.design))
+        else:
+            self._engine.answered(self.job, answer(self.job.id, result))
+
+    def give_up(self, kind: str) -> None:
+        """Answer without having done it."""
+        error = as_data(Cancelled())
+        if kind == "Replaced":
+            error |= {"kind": kind, "message": "a newer draft took its place"}
+        self._refuse(error)
+
+    def _refuse(self, error: dict[str, Any]) -> None:
+        self._engine.answered(self.job, refusal(self.job.id, error))
+
+
+def serve() -> None:
+    """Serve the front end at standard input and output, and end the process with it."""
+    faulthandler.enable()
+    channel = Channel.of_standard_output()
+    try:
+        Engine(channel).serve(sys.stdin.buffer)
+    except KeyboardInterrupt:
+        pass
+    finally:
+        channel.close()
+        sys.stderr.flush()
+        # Threads may be in the middle of a render, which can't be waited for.
+        os._exit(0)

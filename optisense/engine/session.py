@@ -1,0 +1,137 @@
+"""What the engine keeps between requests."""
+
+from __future__ import annotations
+
+import threading
+from collections import OrderedDict
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from optisense.design import SensorDesign
+from optisense.engine.designs import Designs
+from optisense.engine.failures import Cancelled, ProtocolError
+from optisense.engine.files import Files
+from optisense.engine.protocol import Fields
+from optisense.errors import OptiSenseError
+from optisense.geometry import Contact, TriangleMesh
+
+if TYPE_CHECKING:
+    from optisense.optics import OpticalModel, TactileImage
+
+MOST_IMAGES = 6
+DRAFTS = 1
+
+
+@dataclass(frozen=True)
+class KeptImage:
+    """An image with what it was made of."""
+
+    image: TactileImage
+    design: SensorDesign
+    contacts: Sequence[Contact]
+    indenters: Mapping[str, TriangleMesh]
+    exposure: float
+    draft: bool
+
+
+class Images:
+    """The last images, by the names of their requests."""
+
+    def __init__(self) -> None:
+        """None yet."""
+        self._kept: OrderedDict[str, KeptImage] = OrderedDict()
+        self._lock = threading.Lock()
+
+    def keep(self, name: str, image: KeptImage) -> None:
+        """Keep an image, and let the oldest of its kind go."""
+        with self._lock:
+            self._kept.pop(name, None)
+            self._kept[name] = image
+            same = [key for key, each in self._kept.items() if each.draft == image.draft]
+            for key in same[: len(same) - (DRAFTS if image.draft else MOST_IMAGES)]:
+                del self._kept[key]
+
+    def find(self, name: str) -> KeptImage:
+        """An image that is kept.
+
+        Raises:
+            ProtocolError: there is none of this name any more.
+        """
+        with self._lock:
+            if name not in self._kept:
+                raise ProtocolError(
+                    f"there is no image '{name}'",
+                    where="image",
+                    hint=f"The last {MOST_IMAGES} images and the last draft are kept; simulate "
+                    "again",
+                )
+            return self._kept[name]
+
+
+class Renderer:
+    """The one optical model, which takes on whatever design comes; for one thread only."""
+
+    def __init__(self) -> None:
+        """Nothing is loaded yet."""
+        self.variant = "auto"
+        self._model: OpticalModel | None = None
+
+    def model(self, design: SensorDesign) -> OpticalModel:
+        """The model of a design; what did not change since the last one is not made again.
+
+        Raises:
+            SetupError: the renderer can't run on this machine.
+            OptiSenseError: the design can't be built.
+        """
+        from optisense.optics import OpticalModel
+
+        if self._model is None:
+            self._model = OpticalModel(design, self.variant)
+        else:
+            try:
+                self._model.become(design)
+            except (OptiSenseError, Cancelled):
+                raise
+            except BaseException:
+                self._model = None  # half made: never to be used again
+                raise
+        return self._model
+
+    def forget(self) -> None:
+        """Drop the model after a failure that nobody foresaw."""
+        self._model = None
+
+
+class Session:
+    """One front end's work.
+
+    Attributes:
+        folder: where files go that no request puts elsewhere.
+        designs: what was read.
+        renderer: the model.
+        images: what was rendered.
+    """
+
+    def __init__(self) -> None:
+        """Before `hello`."""
+        self.folder: Path | None = None
+        self.designs = Designs()
+        self.renderer = Renderer()
+        self.images = Images()
+
+    def files(self, fields: Fields, number: int | str) -> Files:
+        """Where the files of a request go.
+
+        Raises:
+            OutputError: there is no such folder, or the name is not that of a file.
+        """
+        assert self.folder is not None  # `hello` comes first
+        folder = self.folder if fields.to is None else Path(fields.to)
+        return Files(folder, name_of(fields, number))
+
+
+def name_of(fields: Fields, number: int | str) -> str:
+    """What a request's files and image are called."""
+    return fields.name if fields.name is not None else str(number)

@@ -1,0 +1,116 @@
+"""The ways of chief rays from the camera to where they end, for drawing."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+from numpy.typing import NDArray
+
+from optisense.geometry import Contact
+from optisense.optics.chief_rays import MAX_DEPTH, Outcome
+from optisense.optics.ray_scene import RayScene, intersect, leave
+from optisense.optics.scattering import refract, surface_kind, surface_region
+from optisense.optics.surfaces import Region, SurfaceKind
+
+if TYPE_CHECKING:
+    from optisense.optics.model import OpticalModel
+
+TAIL = 5.0
+"""mm that a ray which escapes is drawn on behind the last surface."""
+
+
+@dataclass(frozen=True)
+class RayPaths:
+    """Polylines, one after the other.
+
+    Attributes:
+        vertices: (n, 3) float32, mm.
+        counts: (rays,) int32, the vertices of each, at least two.
+        outcomes: (rays,) uint8, of `Outcome`.
+    """
+
+    vertices: NDArray[np.float32]
+    counts: NDArray[np.int32]
+    outcomes: NDArray[np.uint8]
+
+
+def trace_paths(
+    model: OpticalModel, resolution: tuple[int, int], contacts: Sequence[Contact] = ()
+) -> RayPaths:
+    """The way of the ray through the middle of each pixel, row by row.
+
+    Args:
+        model: a sensor.
+        resolution: (width, height) of the grid of pixels.
+        contacts: what presses.
+
+    Raises:
+        ContactError: a contact is off the surface or deeper than the gel.
+        RenderError: the resolution makes no sense.
+    """
+    camera = model.camera(resolution)
+    scene = model._fine.scene
+    if contacts:
+        placed = [model.place(contact) for contact in contacts]
+        scene = model._with_indenters(model._fine.pieces, placed)
+    index = dr.arange(mi.UInt32, camera.width * camera.height)
+    origin, direction = camera.rays(
+        mi.Float(index % camera.width) + 0.5, mi.Float(index // camera.width) + 0.5
+    )
+    count = camera.width * camera.height
+    points = [np.broadcast_to(_rows(origin), (count, 3))]
+    lengths = np.ones(count, dtype=np.int32)
+    outcomes = np.full(count, int(Outcome.DEPTH_LIMIT), dtype=np.uint8)
+    total = np.zeros(count, dtype=bool)
+    active = mi.Bool(True) & (index < count)
+    for _ in range(MAX_DEPTH):
+        step = _step(scene, origin, direction, active)
+        dr.eval(step)
+        going = np.asarray(active).astype(bool)
+        if not going.any():
+            break
+        end, ended, reflected, origin, direction, active = step
+        points.append(_rows(end))
+        lengths[going] += 1
+        told = np.asarray(ended).astype(np.int32)
+        closed = going & (told >= 0)
+        outcomes[closed] = told[closed]
+        total |= going & np.asarray(reflected).astype(bool)
+    outcomes[total & (outcomes != int(Outcome.HIT))] = int(Outcome.TOTAL_REFLECTION)
+    every = np.stack(points, axis=1)
+    chosen = np.arange(every.shape[1])[None, :] < lengths[:, None]
+    return RayPaths(every[chosen].astype(np.float32), lengths, outcomes)
+
+
+def _step(scene: RayScene, origin: Any, direction: Any, active: Any) -> tuple[Any, ...]:
+    """One surface further: where it is met, the outcome or -1, whether all light was reflected,
+    and the ray that goes on; by the rules of `optisense.optics.chief_rays`.
+    """
+    hit = intersect(scene.scene, scene.rows, scene.corners, origin, direction, active, True)
+    kind, eta, _alpha = surface_kind(scene.table, hit.surface, hit.valid)
+    region = surface_region(scene.table, hit.surface, hit.valid)
+    opaque = hit.valid & (kind == int(SurfaceKind.OPAQUE))
+    arrived = opaque & (region != int(Region.OTHER))
+    absorbing = (kind == int(SurfaceKind.ABSORBER)) | (kind == int(SurfaceKind.LIGHT))
+    ended = hit.valid & ~arrived & (opaque | absorbing)
+    outcome = dr.select(ended, int(Outcome.ABSORBED), mi.Int32(-1))
+    outcome = dr.select(arrived, int(Outcome.HIT), outcome)
+    outcome = dr.select(hit.valid, outcome, int(Outcome.ESCAPED))
+    reflectance, mirrored, transmitted, _relative = refract(direction, hit.shading_normal, eta)
+    mirror = kind == int(SurfaceKind.MIRROR)
+    goes_on = active & hit.valid & ~arrived & ~ended
+    totally = goes_on & ~mirror & (reflectance >= 1)
+    turned = dr.select(mirror | totally, mirrored, transmitted)
+    end = dr.select(hit.valid, hit.point, origin + TAIL * direction)
+    start = dr.select(goes_on, leave(hit.point, hit.normal, turned), origin)
+    return end, outcome, totally, start, dr.select(goes_on, turned, direction), goes_on
+
+
+def _rows(values: object) -> NDArray[np.float32]:
+    """(n, 3) of a Dr.Jit vector."""
+    return np.asarray(values, dtype=np.float32).T.reshape(-1, 3)
