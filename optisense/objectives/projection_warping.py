@@ -21,6 +21,9 @@ JUMP = 4.0
 fold or a gap. On a smooth surface neighbouring edges differ by at most a factor of 2.4, which they
 reach where the surface is seen edge-on."""
 
+BAND = 24
+"""Rows of an image that are worked on at once."""
+
 MOST_EVEN = 1e-6
 """Deviations below this part of the mean are rounding of single-precision points."""
 
@@ -100,12 +103,16 @@ def triangle_areas(
 
 
 def _half_cross(a: list[NDArray[np.float32]], b: list[NDArray[np.float32]]) -> NDArray[np.float32]:
-    cross = (
-        a[1] * b[2] - a[2] * b[1],
-        a[2] * b[0] - a[0] * b[2],
-        a[0] * b[1] - a[1] * b[0],
-    )
-    half: NDArray[np.float32] = 0.5 * np.sqrt(cross[0] ** 2 + cross[1] ** 2 + cross[2] ** 2)
+    """Half the length of the cross product, in bands of rows that stay in a processor's cache."""
+    half = np.empty_like(a[0])
+    for top in range(0, len(half), BAND):
+        band = slice(top, top + BAND)
+        (ax, ay, az), (bx, by, bz) = ([c[band] for c in edge] for edge in (a, b))
+        square = (ay * bz - az * by) ** 2
+        square += (az * bx - ax * bz) ** 2
+        square += (ax * by - ay * bx) ** 2
+        np.sqrt(square, out=half[band])
+    half *= np.float32(0.5)
     return half
 
 

@@ -1,0 +1,339 @@
+"""How far scores scatter, how far they are off, what they cost, and what they depend on.
+
+``python -m benchmarks.scores [--seeds N] [--dry]`` writes scores.json and scores.md beside this
+file. The sensor is GelSight Mini with its flat gel, at the default settings of `evaluate`.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
+from pathlib import Path
+from statistics import mean, stdev
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from rich.console import Console
+
+import optisense
+from benchmarks.results import machine
+from benchmarks.timing import Time, medians, timed
+from optisense.objectives import Evaluation, Press, Score, Settings, evaluate, find
+from optisense.objectives.rgb2normal import fit, line, signed_angles
+from optisense.objectives.run import run_objective
+from optisense.optics import OpticalModel
+
+FOLDER = Path(__file__).parent
+DESIGN = "gelsight-mini"
+SEEDS = 6
+WARM_UP_SEED = 1000
+RAY_RUNS = 7
+IMAGES = ("rgb2normal", "normdiff")
+RAYS = ("aoap", "2to3pw")
+DIRECTIONS = (0.0, 45.0, 90.0, 135.0)
+ANGLES = (20.0, 25.0, 30.0)
+DEPTHS = (0.1, 0.2, 0.5)
+PIXEL_NOISE = 1.5 / 255
+"""Of a real GelSight Mini: 1.1 to 1.9 grey levels."""
+
+TARGETS = {
+    "rgb2normal": "standard deviation 0.003; 10 s for all nine places, light included",
+    "normdiff": "standard deviation 2 %; 2 s more",
+    "aoap": "50 ms at 640x480",
+    "2to3pw": "50 ms at 640x480",
+}
+
+Responses = list[NDArray[np.float32]]
+
+
+class GivenPresses:
+    """Stands for an evaluation, where an objective reads presses only."""
+
+    def __init__(self, presses: Sequence[Press]) -> None:
+        self.presses = list(presses)
+
+
+def main() -> None:
+    """Measure, print and write."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--seeds", type=int, default=SEEDS)
+    parser.add_argument("--dry", action="store_true", help="print only, write no results")
+    options = parser.parse_args()
+    console = Console()
+    about = machine()
+    model = OpticalModel(optisense.load(DESIGN))
+
+    def tell(text: str) -> None:
+        console.print(f"[dim]{text}")
+
+    tell("warming up")
+    evaluate(Evaluation(model, Settings(seed=WARM_UP_SEED)), [*IMAGES, *RAYS])
+    scatter, presses, responses = measure_seeds(model, options.seeds, tell)
+    tell("what it depends on")
+    found = {
+        "machine": about,
+        "design": DESIGN,
+        "scores": scatter | measure_rays(model),
+        "more_light": measure_more_light(presses, responses),
+        "one_image": measure_one_image(model, options.seeds - 1, presses, responses[-1]),
+        "rgb2normal_depends_on": [
+            *measure_reading(_lit(presses, responses)),
+            *measure_presses(model, options.seeds - 1, scatter),
+        ],
+    }
+    text = _markdown(found)
+    console.print(text, markup=False)
+    if not options.dry:
+        (FOLDER / "scores.json").write_text(json.dumps(found, indent=2) + "\n", encoding="utf-8")
+        (FOLDER / "scores.md").write_text(text, encoding="utf-8")
+
+
+def measure_seeds(
+    model: OpticalModel, seeds: int, tell: Callable[[str], None]
+) -> tuple[dict[str, Any], list[Press], list[Responses]]:
+    """Scores with several seeds, each with light of its own; and what the camera read."""
+    values: dict[str, list[float]] = {name: [] for name in IMAGES}
+    times: dict[str, list[Time]] = {name: [] for name in IMAGES}
+    presses: list[Press] = []
+    responses: list[Responses] = []
+    for seed in range(seeds):
+        evaluation = Evaluation(model, Settings(seed=seed))
+        for name in IMAGES:
+            scores: list[Score] = []
+            times[name].append(
+                timed(lambda e=evaluation, n=name, s=scores: s.append(_score(e, n)))  # type: ignore[misc]
+            )
+            values[name].append(scores[0].value)
+        presses = evaluation.presses
+        responses.append([press.response[press.box] for press in presses])
+        tell(f"seed {seed}: " + ", ".join(f"{n} {values[n][-1]:.4f}" for n in IMAGES))
+    found = {
+        name: {
+            "values": values[name],
+            "mean": mean(values[name]),
+            "standard_deviation": stdev(values[name]),
+            **_seconds(medians(times[name])),
+        }
+        for name in IMAGES
+    }
+    return found, presses, responses
+
+
+def measure_rays(model: OpticalModel) -> dict[str, Any]:
+    """Scores of chief rays, each with rays of its own."""
+    found = {}
+    for name in RAYS:
+        scores: list[Score] = []
+        times = [
+            timed(lambda n=name, s=scores: s.append(_score(Evaluation(model), n)))  # type: ignore[misc]
+            for _ in range(RAY_RUNS)
+        ]
+        found[name] = {"mean": scores[0].value, **_seconds(medians(times))}
+    return found
+
+
+def measure_more_light(presses: list[Press], responses: list[Responses]) -> dict[str, Any]:
+    """Scores of the mean of several images, and from them the score with endless light.
+
+    The error of a score falls as 1 over the light: mean over single images, s(1), and the score
+    of the mean of all k images, s(k), give s(k) + (s(k) - s(1)) / (k - 1).
+    """
+    count = len(responses)
+    found: dict[str, Any] = {}
+    for name in IMAGES:
+        rows = {}
+        for together in (k for k in range(1, count + 1) if count % k == 0):
+            groups = [responses[i : i + together] for i in range(0, count, together)]
+            rows[together] = mean(_value(name, _lit(presses, group)) for group in groups)
+        limit = rows[count] + (rows[count] - rows[1]) / (count - 1)
+        found[name] = {
+            "mean_of_images": {str(k): value for k, value in rows.items()},
+            "endless_light": limit,
+            "bias": rows[1] - limit,
+        }
+    return found
+
+
+def measure_one_image(
+    model: OpticalModel, seed: int, presses: list[Press], responses: Responses
+) -> dict[str, Any]:
+    """All nine contacts in one image against one by one, in the same light."""
+    evaluations: list[Evaluation] = []
+    time = timed(lambda: evaluations.append(_pressed(model, seed, together=True)))
+    alone = timed(lambda: evaluations.append(_pressed(model, seed, together=False)))
+    found: dict[str, Any] = {
+        "seconds_one_image": _seconds(time),
+        "seconds_one_by_one": _seconds(alone),
+    }
+    for name in IMAGES:
+        one, each = (evaluate(evaluation, name) for evaluation in evaluations)
+        places = [
+            abs(a["score"] - b["score"])
+            for a, b in zip(one.parts["places"], each.parts["places"], strict=True)
+        ]
+        found[name] = {
+            "one_image": one.value,
+            "one_by_one": each.value,
+            "largest_difference_of_a_place": max(places),
+        }
+    return found
+
+
+def measure_reading(presses: list[Press]) -> Iterator[dict[str, Any]]:
+    """RGB2Normal of the same images, read in other ways."""
+    rng = np.random.default_rng(0)
+    yield _row("the mean image of all seeds", presses)
+    for most in ANGLES:
+        yield _row(f"only normals within {most:g}°", presses, most=most)
+    yield _row("linear response instead of the picture", presses, kind="response")
+    yield _row("noise of 1.5 grey levels a pixel", presses, noise=PIXEL_NOISE, rng=rng)
+    edge = min(float(press.place[0]) for press in presses)
+    beside = [press for press in presses if press.place[0] < edge + 1.0]
+    others = [press for press in presses if press.place[0] >= edge + 1.0]
+    yield _row("only the three places beside the green LEDs", beside)
+    yield _row("without these three places", others)
+
+
+def measure_presses(
+    model: OpticalModel, seed: int, scatter: dict[str, Any]
+) -> Iterator[dict[str, Any]]:
+    """RGB2Normal of other images with the light of one seed."""
+    value = scatter["rgb2normal"]["values"][seed]
+    yield {"what": f"one image a place, seed {seed}", "value": value}
+    changes: list[tuple[str, dict[str, Any]]] = [
+        (f"pressed {depth:g} mm deep instead of 0.3", {"depth": depth}) for depth in DEPTHS
+    ]
+    changes += [("320x240 pixels", {"resolution": (320, 240)})]
+    changes += [("1 million photons", {"photons": 1_000_000})]
+    for what, change in changes:
+        score = _score(Evaluation(model, Settings(seed=seed, **change)), "rgb2normal")
+        yield {"what": what, "value": score.value, **_by_direction(score.parts["directions"])}
+
+
+def _pressed(model: OpticalModel, seed: int, together: bool) -> Evaluation:
+    evaluation = Evaluation(model, Settings(seed=seed, together=together))
+    assert evaluation.presses
+    return evaluation
+
+
+def _score(evaluation: Evaluation, name: str) -> Score:
+    score = run_objective(find(name), evaluation)
+    if score.failure is not None:
+        raise RuntimeError(score.failure)
+    return score
+
+
+def _value(name: str, presses: Sequence[Press]) -> float:
+    value, *_ = find(name).function(GivenPresses(presses))
+    return float(value)
+
+
+def _lit(presses: list[Press], responses: list[Responses]) -> list[Press]:
+    """The presses with the mean of what the camera read."""
+    found = []
+    for number, press in enumerate(presses):
+        response = np.zeros_like(press.response)
+        response[press.box] = np.mean([each[number] for each in responses], axis=0)
+        found.append(replace(press, response=response))
+    return found
+
+
+def _row(
+    what: str,
+    presses: Sequence[Press],
+    most: float = 90.0,
+    kind: str = "picture",
+    noise: float = 0.0,
+    rng: np.random.Generator | None = None,
+) -> dict[str, Any]:
+    table = np.zeros((len(presses), len(DIRECTIONS)))
+    for row, press in enumerate(presses):
+        for column, angle in enumerate(DIRECTIONS):
+            chosen = line(press, angle)
+            angles = signed_angles(press, angle, press.normals[chosen])
+            colours = press.colours(chosen, kind)
+            if rng is not None:
+                colours = colours + noise * rng.standard_normal(colours.shape)
+            kept = np.abs(angles) < most
+            table[row, column] = fit(angles[kept], colours[kept]).linearity
+    means = {f"{a:g}": float(m) for a, m in zip(DIRECTIONS, table.mean(axis=0), strict=True)}
+    return {"what": what, "value": float(table.mean()), **_by_direction(means)}
+
+
+def _by_direction(means: dict[str, float]) -> dict[str, Any]:
+    return {"directions": {f"{angle:g}": means[f"{angle:g}"] for angle in DIRECTIONS}}
+
+
+def _seconds(time: Time) -> dict[str, float]:
+    return {"wall_s": round(time.wall, 3), "cpu_s": round(time.cpu, 3)}
+
+
+def _markdown(found: dict[str, Any]) -> str:
+    about = found["machine"]
+    busy = f"; the machine was busy (load {about['load_at_start']})" if about["busy"] else ""
+    lines = [
+        "# Scores: scatter, bias, time",
+        "",
+        "Written by `python -m benchmarks.scores`; do not edit.",
+        "",
+        f"{about['date']}, {about['processor']}, {about['cores']} cores, Python "
+        f"{about['python']}{busy}. {found['design']}, default settings.",
+        "",
+        "| score | value | standard deviation over seeds | seconds | CPU seconds | target |",
+        "|---|---|---|---|---|---|",
+    ]
+    for name, row in found["scores"].items():
+        spread = row.get("standard_deviation")
+        text = (
+            "none" if spread is None else f"{spread:.4f} ({100 * spread / abs(row['mean']):.1f} %)"
+        )
+        lines.append(
+            f"| {name} | {row['mean']:.4f} | {text} | {row['wall_s']:.2f} | {row['cpu_s']:.2f} | "
+            f"{TARGETS[name]} |"
+        )
+    lines += [
+        "",
+        "## Off a converged image",
+        "",
+        "| score | images averaged | value |",
+        "|---|---|---|",
+    ]
+    for name, row in found["more_light"].items():
+        lines += [f"| {name} | {k} | {v:.4f} |" for k, v in row["mean_of_images"].items()]
+        lines.append(
+            f"| {name} | endless | {row['endless_light']:.4f} (off by {row['bias']:+.4f}) |"
+        )
+    one = found["one_image"]
+    lines += ["", "## All nine contacts in one image", ""]
+    lines += [
+        "| score | one image | one by one | largest difference of a place |",
+        "|---|---|---|---|",
+    ]
+    lines += [
+        f"| {name} | {one[name]['one_image']:.4f} | {one[name]['one_by_one']:.4f} | "
+        f"{one[name]['largest_difference_of_a_place']:.4f} |"
+        for name in IMAGES
+    ]
+    each, together = one["seconds_one_by_one"], one["seconds_one_image"]
+    lines += [
+        "",
+        f"In light that is there: {together['cpu_s']:.1f} CPU seconds in one image, "
+        f"{each['cpu_s']:.1f} one by one.",
+        "",
+        "## What RGB2Normal depends on, one thing at a time",
+        "",
+        "| what | RGB2Normal | " + " | ".join(f"{a:g}°" for a in DIRECTIONS) + " |",
+        "|---|---|" + "---|" * len(DIRECTIONS),
+    ]
+    for row in found["rgb2normal_depends_on"]:
+        ways = row.get("directions")
+        cells = [f"{v:.3f}" for v in ways.values()] if ways else [""] * len(DIRECTIONS)
+        lines.append(f"| {row['what']} | {row['value']:.4f} | " + " | ".join(cells) + " |")
+    return "\n".join(lines) + "\n"
+
+
+if __name__ == "__main__":
+    main()
