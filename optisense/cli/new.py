@@ -135,8 +135,9 @@ def _from_cad(source: Path, folder: Path, units: str | None, yes: bool, overwrit
     if units is not None:
         recipe.units = _units(units)
     try:
-        made = design_from_meshes(recipe)
-        problems = check(made.design)
+        with messages.status("fitting the parts together"):  # half a minute for 100,000 faces
+            made = design_from_meshes(recipe)
+            problems = check(made.design)
     except OptiSenseError:
         if asked:  # nobody likes to answer twice
             save_recipe(recipe, folder / RECIPE_FILE)

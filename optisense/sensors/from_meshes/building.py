@@ -142,6 +142,13 @@ class _Builder(Bench):
         self.notes += [f"{name}: {note}" for note in notes]
         return result
 
+    def _refuse_bad(self, name: str, sheet: TriangleMesh) -> None:
+        """As solids are checked when they are read."""
+        try:
+            refuse_bad_sheet(sheet, name)
+        except MeshError as error:
+            raise MeshError(error.message, where=self.label(name), hint=error.hint) from None
+
     def _lay_skins(self) -> None:
         """Sensing surfaces on the faces of the gel, looking into it."""
         gels = {n: self.meshes[n] for n in self.of(Role.ELASTOMER)}
@@ -155,10 +162,8 @@ class _Builder(Bench):
                     where=self.label(name),
                     hint="Say which faces: towards: +z (or another side), perhaps tangent: true",
                 )
-            try:
-                refuse_bad_sheet(skin, name)
-            except MeshError as error:
-                raise MeshError(error.message, where=self.label(name), hint=error.hint) from None
+            if part.faces_of is None or part.faces_of not in self.solids():
+                self._refuse_bad(name, skin)
             notes: list[str] = []
             if part.faces_of is None and gels:
                 skin, notes = lay_on_elastomer(name, skin, gels, self.recipe.join)
