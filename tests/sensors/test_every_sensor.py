@@ -3,13 +3,20 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 from optisense import sensors
-from optisense.design import SensorDesign, load_design, save_design
+from optisense.design import Role, SensorDesign, load_design, save_design
 from optisense.design.parts import TRANSPARENT_SOLIDS
+from optisense.geometry import Contact, Cylinder, MeshIndenter, Plane, Sphere, TriangleMesh
+from optisense.optics import OpticalModel
+from optisense.optics.chief_rays import Outcome
+from optisense.optics.image import TactileImage
+
+SMALL: dict[str, Any] = {"resolution": (160, 120), "photons": 200_000}
 
 
 @pytest.fixture(scope="module", params=list(sensors.BUILDERS))
@@ -50,3 +57,42 @@ def test_what_is_assumed_is_marked(sensor: SensorDesign) -> None:
         assert f"lights.{name}" in sensor.provenance
     assert "camera.position" in sensor.provenance
     assert any(entry.status == "assumed" for entry in sensor.provenance.values())
+
+
+@pytest.fixture(scope="module")
+def model(sensor: SensorDesign) -> OpticalModel:
+    return OpticalModel(sensor)
+
+
+def test_no_ray_of_the_picture_is_lost(model: OpticalModel) -> None:
+    """Each ray meets the sensing surface, or ends on a part that absorbs it."""
+    rays = model.chief_rays((160, 120))
+    assert set(np.unique(rays.outcome)) <= {Outcome.HIT, Outcome.ABSORBED}
+    if not model.design.parts_of(Role.BLOCKER):
+        assert rays.hit.all()
+
+
+@pytest.fixture(scope="module")
+def untouched(model: OpticalModel) -> TactileImage:
+    return model.render([], **SMALL)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", ["sphere", "cylinder", "plane", "mesh"])
+def test_every_indenter_shows(
+    model: OpticalModel, untouched: TactileImage, kind: str, tmp_path: Path
+) -> None:
+    brick = tmp_path / "brick.obj"
+    TriangleMesh.box((-2, -1.5, 0), (2, 1.5, 4)).save_obj(brick)
+    indenter = {
+        "sphere": Sphere(radius=2.5),
+        "cylinder": Cylinder(radius=2.0, length=4.0),
+        "plane": Plane(size=4.0),
+        "mesh": MeshIndenter(brick),
+    }[kind]
+    middle = model.nine_contacts()[4].point
+    image = model.render([Contact(indenter, point=middle, depth=0.6)], **SMALL)
+    pressed = image.contact_mask
+    assert pressed.sum() > 20
+    change = np.abs(image.radiance - untouched.radiance).max(axis=2)
+    assert np.median(change[pressed]) > 5.0 * np.median(change[~pressed])

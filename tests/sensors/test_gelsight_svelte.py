@@ -13,7 +13,6 @@ from optisense import sensors
 from optisense.design import Role, SensorDesign, set_value
 from optisense.design.cage import as_array
 from optisense.errors import DesignError
-from optisense.geometry import Contact, Cylinder, MeshIndenter, Plane, Sphere, TriangleMesh
 from optisense.optics import OpticalModel
 from optisense.optics.chief_rays import ChiefRays, Outcome
 from optisense.sensors.gelsight_svelte import PALM_OUTLINE
@@ -182,24 +181,6 @@ class TestLight:
         image = model.render(resolution=(160, 120), photons=100_000)
         lit = image.radiance.max(axis=2)
         assert lit.max() < 6.0 * np.median(lit[lit > 0.0])
-
-    @pytest.mark.slow
-    @pytest.mark.parametrize("kind", ["sphere", "cylinder", "plane", "mesh"])
-    def test_every_indenter_shows(self, model: OpticalModel, kind: str, tmp_path) -> None:  # type: ignore[no-untyped-def]
-        brick = tmp_path / "brick.obj"
-        TriangleMesh.box((-3, -2, 0), (3, 2, 4)).save_obj(brick)
-        indenter = {
-            "sphere": Sphere(radius=3.0),
-            "cylinder": Cylinder(radius=2.0, length=6.0),
-            "plane": Plane(size=6.0),
-            "mesh": MeshIndenter(brick),
-        }[kind]
-        contact = Contact(indenter, depth=0.6)
-        settings = {"resolution": (160, 120), "photons": 100_000}
-        image, before = model.render([contact], **settings), model.render(**settings)
-        assert image.contact_mask.sum() > 50
-        change = np.abs(image.radiance - before.radiance).max(axis=2)
-        assert change[image.contact_mask].mean() > 3.0 * change[~image.contact_mask].mean()
 
 
 def _back_to_the_pupil(
