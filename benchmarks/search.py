@@ -1,0 +1,231 @@
+"""What a search costs beside its trials, what a second process brings, and two whole searches.
+
+``python -m benchmarks.search [--only PART] [--dry]`` writes search.json and search.md beside this
+file. It needs a machine that does nothing else.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import resource
+import tempfile
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from rich.console import Console
+
+import optisense
+from benchmarks.results import machine
+from optisense.design import SensorDesign
+from optisense.search import Around, Outcome, Plan, SearchSpace, Study, run_study
+from optisense.search.evaluation import Evaluator
+from optisense.search.executors import ProcessPool, Runner, SerialRunner
+from optisense.search.running import Run
+
+FOLDER = Path(__file__).parent
+PARTS = ("overhead", "workers", "coatings", "mirror")
+
+POINTS = {"cages.M1.points": Around(1.0)}
+"""All 81 numbers of the cage of GelSight Svelte's mirror, mm."""
+
+BLEND = {"cages.M1.blend": (0.0, 1.0)}
+"""The same between the paper's C_min and C_max: its matrix A, without what is alike in both."""
+
+COATINGS = {"coating.specularity": (0.0, 1.0, 11)}
+OVERHEAD_TRIALS = 3000
+RAY_TRIALS, RENDERED_TRIALS = 240, 24
+WARM = 4
+"""Trials of each worker that are left out, while it builds its model."""
+
+MIRROR_BUDGET = 5000
+MIRROR_SECONDS = 300.0
+PAPER = {"start": 0.236, "best": 0.635}
+"""AOAP of Svelte's mirror in the OptiSense paper, before and after its search."""
+
+
+class Nothing:
+    """A trial that takes no time: a score as rough as any, from the point alone."""
+
+    renders = False
+
+    def __call__(self, vector: np.ndarray, seed: int) -> Outcome:
+        """See `optisense.search.evaluation.Evaluator`."""
+        return Outcome({"nothing": -float(np.abs(vector).sum())})
+
+
+def nothing(design: SensorDesign) -> float:
+    """Stands for `Nothing` in a plan."""
+    raise AssertionError
+
+
+def main() -> None:
+    """Measure, print and write."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--only", choices=PARTS, help="measure one part only")
+    parser.add_argument("--dry", action="store_true", help="print only, write no results")
+    options = parser.parse_args()
+    console = Console()
+    about = machine()
+    if about["busy"]:
+        console.print(f"[yellow]The load is {about['load_at_start']}: timings will be noisy.")
+    path = FOLDER / "search.json"
+    found = json.loads(path.read_text(encoding="utf-8")) if path.is_file() else {}
+    measures = dict(zip(PARTS, (overhead, workers, coatings, mirror), strict=True))
+    for part in (options.only,) if options.only else PARTS:
+        console.print(f"[dim]{part}")
+        found[part] = {"machine": about, **measures[part]()}
+        console.print_json(json.dumps(found[part]))
+        if not options.dry:
+            path.write_text(json.dumps(found, indent=1) + "\n", encoding="utf-8")
+            (FOLDER / "search.md").write_text(_table(found), encoding="utf-8")
+
+
+def overhead() -> dict[str, Any]:
+    """Processor time of the search's own process for each trial: proposal, store, dispatch."""
+    design = optisense.load("gelsight-svelte")
+
+    def seconds(make_runner: Callable[[Evaluator], Runner]) -> dict[str, float]:
+        with tempfile.TemporaryDirectory() as folder:
+            plan = Plan(
+                space=SearchSpace(POINTS), goals=[nothing], budget=OVERHEAD_TRIALS, apart=False
+            )
+            study = Study.create(Path(folder) / "study", design, plan)
+            run = Run(study, make_runner)
+            cpu, wall, children = time.process_time(), time.perf_counter(), _children()
+            run.go()
+            cpu, wall = time.process_time() - cpu, time.perf_counter() - wall
+            children = _children() - children
+            study.close()
+        return {
+            "cpu_ms_a_trial": round(1000 * cpu / OVERHEAD_TRIALS, 4),
+            "cpu_ms_a_trial_of_workers": round(1000 * children / OVERHEAD_TRIALS, 4),
+            "wall_ms_a_trial": round(1000 * wall / OVERHEAD_TRIALS, 4),
+        }
+
+    return {
+        "parameters": 81,
+        "trials": OVERHEAD_TRIALS,
+        "target_ms": 1.0,
+        "this_process": seconds(lambda _: SerialRunner(Nothing())),
+        "two_workers": seconds(lambda _: ProcessPool(Nothing(), 2)),
+    }
+
+
+def workers() -> dict[str, Any]:
+    """Trials a second of one and of two processes."""
+    mini, svelte = optisense.load("gelsight-mini"), optisense.load("gelsight-svelte")
+    smooth = SearchSpace({"coating.specularity": (0.0, 0.3), "lights.*.flux": (1.0, 2.0)})
+    light = {"photons": 1_000_000, "resolution": (320, 240)}
+    cases: dict[str, Any] = {
+        "chief_rays": (svelte, SearchSpace(BLEND), "aoap", {}, RAY_TRIALS, 1.8),
+        "rendered": (mini, smooth, "rgb2normal", light, RENDERED_TRIALS, 1.6),
+    }
+    found: dict[str, Any] = {}
+    for name, (design, space, goal, settings, trials, target) in cases.items():
+        rates = {}
+        for count in (1, 2):
+            plan = Plan(
+                space=space, goals=[goal], method="random", budget=trials, settings=settings
+            )
+            study = Study.create(None, design, plan)
+            run_study(study, workers=count, own_process=True)
+            times = sorted(row.finished or 0.0 for row in study.store.rows())
+            warm = WARM * count
+            rates[count] = (len(times) - 1 - warm) / (times[-1] - times[warm])
+            study.close()
+        found[name] = {
+            "objective": goal,
+            "trials_a_second": {str(count): round(rate, 3) for count, rate in rates.items()},
+            "two_to_one": round(rates[2] / rates[1], 3),
+            "target": target,
+        }
+    return found
+
+
+def coatings() -> dict[str, Any]:
+    """A grid of 11 coatings of GelSight Mini by RGB2Normal."""
+    began = time.perf_counter()
+    plan = Plan(space=SearchSpace(COATINGS), goals=["rgb2normal"], method="grid")
+    study = Study.create(None, optisense.load("gelsight-mini"), plan)
+    result = run_study(study, workers=1)
+    seconds = time.perf_counter() - began
+    scores = {f"{t.vector[0]:g}": _or_none(t.score) for t in result.trials if not t.is_start}
+    return {"seconds": round(seconds, 1), "target_seconds": 120.0, "scores": scores}
+
+
+def mirror() -> dict[str, Any]:
+    """The mirror of GelSight Svelte by CMA-ES and AOAP, for as long as the target allows."""
+    began = time.perf_counter()
+    plan = Plan(space=SearchSpace(BLEND), goals=["aoap"], budget=MIRROR_BUDGET)
+    study = Study.create(None, optisense.load("gelsight-svelte"), plan)
+
+    def stop(progress: Any) -> None:
+        if progress.stage == "trials" and time.perf_counter() - began > MIRROR_SECONDS:
+            raise KeyboardInterrupt
+
+    result = run_study(study, workers=2, progress=stop)
+    best, start = result.best, result.start
+    reached = PAPER["best"] - PAPER["start"]
+    enough = [
+        row.finished
+        for row in study.store.rows()
+        if row.outcome and row.outcome.scores["aoap"] - start.score >= reached
+    ]
+    first = min((row.finished or 0.0) for row in study.store.rows() if row.finished)
+    return {
+        "seconds": round(time.perf_counter() - began, 1),
+        "trials": len(result.trials) - 1,
+        "start": {"aoap": start.score, "coverage": start.parts["aoap"]["coverage"]},
+        "best": {"aoap": best.score, "coverage": best.parts["aoap"]["coverage"]},
+        "paper": PAPER,
+        "seconds_to_the_papers_improvement": round(min(enough) - first, 1) if enough else None,
+        "target_seconds": MIRROR_SECONDS,
+    }
+
+
+def _children() -> float:
+    usage = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return usage.ru_utime + usage.ru_stime
+
+
+def _or_none(value: float) -> float | None:
+    return value if np.isfinite(value) else None
+
+
+def _table(found: dict[str, Any]) -> str:
+    lines = ["# Searches", "", "| what | measured | target |", "|---|---|---|"]
+    if "overhead" in found:
+        part = found["overhead"]
+        for name, title in (("this_process", "in one process"), ("two_workers", "two workers")):
+            value = part[name]["cpu_ms_a_trial"]
+            lines.append(f"| Overhead a trial, 81 numbers, {title} | {value:.2f} ms | under 1 ms |")
+    if "workers" in found:
+        for name, title in (("chief_rays", "chief rays"), ("rendered", "rendered")):
+            row = found["workers"][name]
+            times = f"{row['two_to_one']:.2f} | {row['target']} or more |"
+            lines.append(f"| Two workers to one, {title} | {times}")
+    if "coatings" in found:
+        lines.append(
+            f"| 11 coatings by RGB2Normal | {found['coatings']['seconds']:.0f} s | 120 s or less |"
+        )
+    if "mirror" in found:
+        row = found["mirror"]
+        start, best = row["start"], row["best"]
+        lines.append(
+            f"| Svelte's mirror by AOAP, {row['trials']} trials in {row['seconds']:.0f} s | "
+            f"{start['aoap']:.3f} to {best['aoap']:.3f} (coverage {start['coverage']:.2f} to "
+            f"{best['coverage']:.2f}) | {PAPER['start']} to {PAPER['best']} in 300 s |"
+        )
+    about = next(iter(found.values()))["machine"]
+    lines += ["", f"{about['processor']}, {about['cores']} cores, {about['date']}."]
+    return "\n".join(lines) + "\n"
+
+
+if __name__ == "__main__":
+    from benchmarks.search import main as begin  # under the name by which workers find `Nothing`
+
+    begin()
