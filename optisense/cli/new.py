@@ -193,6 +193,7 @@ def _say_guesses(recipe: Recipe, guessed: bool) -> None:
         return
     for name, part in recipe.parts.items():
         source = part.file or f"faces of {part.faces_of} that look to {part.towards}"
+        source += f", body {part.solid}" if part.solid else ""
         messages.print(f"guessed: {name} is {part.role.value} ({source})", markup=False)
     groups = ", ".join(recipe.lights)
     messages.print(f"guessed: lights {groups}; camera {recipe.camera.model}", markup=False)

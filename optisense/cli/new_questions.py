@@ -66,7 +66,7 @@ def ask_recipe(source: Path, units: Units | None) -> Recipe:
     found = guessing.find_bodies(source)
     folder = source if source.is_dir() else source.parent
     say(f"{len(found)} bodies in {source}. Enter takes the answer in brackets.")
-    name = ask("Name of the sensor", _not_empty, folder.resolve().name or "sensor")
+    name = ask("Name of the sensor", _not_empty, guessing.usual_name(source))
     units = units or _ask_units(found)
     meshes = {each.name: each.mesh(units) for each in found}
     uses = _ask_uses(found, meshes)

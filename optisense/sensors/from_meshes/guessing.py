@@ -205,13 +205,19 @@ def guess_recipe(source: str | Path, units: Units | None = None) -> Recipe:
         lights = lights_around(window, meshes[window], outward)
     lens = next((each for each in found if each.use == "camera"), None)
     recipe = Recipe(
-        name=folder.resolve().name or "sensor",
+        name=usual_name(source),
         units=units,
         parts=parts,
         lights=lights,
         camera=CameraChoice(model=CAMERA, at=lens.shape if lens else None),
     )
     return recipe.relative_to(folder)
+
+
+def usual_name(source: Path) -> str:
+    """What a sensor is called after its file or folder."""
+    path = source.resolve()
+    return (path.name if source.is_dir() else path.stem)[:200] or "sensor"
 
 
 def part_of(found: Found, role: Role, material: str | None = None) -> PartChoice:
