@@ -7,11 +7,25 @@ imports bpy, numpy and the standard library only.
 
 from __future__ import annotations
 
-from . import engine, scene, sensor, simulate  # noqa: F401  (the packages hold the modules below)
 from .engine import catalogue, preferences, session, starting
+from .evaluate import operator as evaluate_operator
+from .evaluate import prop as evaluate_prop
+from .evaluate import ui as evaluate_ui
+from .export import operator as export_operator
+from .export import ui as export_ui
+from .lights import operator as light_operator
+from .lights import ui as light_ui
+from .materials import operator as material_operator
+from .materials import ui as material_ui
+from .optimise import following
+from .optimise import operator as optimise_operator
+from .optimise import prop as optimise_prop
+from .optimise import ui as optimise_ui
 from .scene import cages, object_properties, properties
 from .sensor import operator as sensor_operator
 from .sensor import ui as sensor_ui
+from .shapes import cage_operator, reference_operator
+from .shapes import ui as shape_ui
 from .simulate import drafts, picture, relight
 from .simulate import operator as simulate_operator
 from .simulate import prop as simulate_prop
@@ -28,10 +42,26 @@ MODULES = (
     simulate_prop,
     relight,
     drafts,
+    evaluate_prop,
+    optimise_prop,
+    following,
     sensor_operator,
+    reference_operator,
+    cage_operator,
+    material_operator,
+    light_operator,
     simulate_operator,
+    evaluate_operator,
+    optimise_operator,
+    export_operator,
     sensor_ui,
+    shape_ui,
+    material_ui,
+    light_ui,
     simulate_ui,
+    evaluate_ui,
+    optimise_ui,
+    export_ui,
     starting,
 )
 

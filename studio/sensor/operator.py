@@ -2,19 +2,15 @@
 
 from __future__ import annotations
 
-import uuid
 from pathlib import Path
 from typing import Any
 
 import bpy
 from bpy.props import StringProperty
 
-from ..core import mesh_file
 from ..core.engine import EngineError
 from ..engine import catalogue, handing, polls, session
-from ..lights.windows import ask_for_windows
-from ..scene.build import build
-from ..scene.views import show_design
+from .opening import new_stage, open_stage
 
 
 class _Opens:
@@ -23,41 +19,22 @@ class _Opens:
     def _open(
         self, context: bpy.types.Context, source: str, folder: str, *, wait: bool
     ) -> set[str]:
-        scene_name = context.scene.name
+        name = context.scene.name
         try:
-            stage = Path(session.folder()) / f"opened-{uuid.uuid4().hex[:8]}"
+            stage = new_stage()
         except EngineError as error:
             session.say(error)
             self.report({"ERROR"}, error.text())
             return {"CANCELLED"}
 
-        def opened(result: dict[str, Any]) -> None:
-            scene = bpy.data.scenes.get(scene_name)
-            if scene is None:
-                return
-            document = handing.without_nulls(result["data"])
-            parts = document["parts"].items()
-            meshes = {name: mesh_file.read(stage / part["mesh"]) for name, part in parts}
-            build(scene, document, meshes)
-            scene.optisense.folder = folder or str(stage)
-            scene.optisense.is_saved = bool(folder)
-            show_design(scene)
-            ask_for_windows(scene)
-            warnings = result.get("warnings") or []
-            session.state().note = "; ".join(each.get("message", "") for each in warnings)
-            session.push_undo(f"Open {document['name']}")
-            session.redraw()
+        def written(_: dict[str, Any]) -> None:
+            scene = bpy.data.scenes.get(name)
+            if scene is not None:
+                open_stage(scene, stage, wait=wait, folder=folder)
 
         # Written out first: the engine reads what users have, and writes what this reads.
         session.start_job(
-            "Opening the sensor",
-            "save",
-            lambda _: session.start_job(
-                "Opening the sensor", "open", opened, wait=wait, design=str(stage)
-            ),
-            wait=wait,
-            design=source,
-            to=str(stage),
+            "Opening the sensor", "save", written, wait=wait, design=source, to=str(stage)
         )
         if wait and session.state().problem:
             self.report({"ERROR"}, session.state().problem)

@@ -25,17 +25,23 @@ def show(pixels: NDArray[np.float32]) -> bpy.types.Image:
     flat = np.ascontiguousarray(pixels, dtype=np.float32).ravel()
     image.pixels.foreach_set(flat)
     image.update()
-    if _previews is not None:
-        preview = _previews.get(IMAGE) or _previews.new(IMAGE)
-        preview.image_size = (width, height)
-        preview.image_pixels_float.foreach_set(flat)
-        preview.icon_size = (32, 32)
+    show_icon(IMAGE, pixels)
     return image
 
 
-def icon() -> int:
-    """The picture as an icon; 0 where there is none."""
-    preview = None if _previews is None else _previews.get(IMAGE)
+def show_icon(name: str, pixels: NDArray[np.float32]) -> None:
+    """Let panels show a picture (h, w, 4), row 0 at the bottom, under a name."""
+    if _previews is None:
+        return
+    height, width = pixels.shape[:2]
+    preview = _previews.get(name) or _previews.new(name)
+    preview.image_size = (width, height)
+    preview.image_pixels_float.foreach_set(np.ascontiguousarray(pixels, np.float32).ravel())
+
+
+def icon(name: str = IMAGE) -> int:
+    """A picture of `show_icon` as an icon; 0 where there is none."""
+    preview = None if _previews is None else _previews.get(name)
     return 0 if preview is None else preview.icon_id
 
 

@@ -1,0 +1,1 @@
+"""Scores of the sensor, and its chief rays in the viewport."""

@@ -1,0 +1,153 @@
+"""Score the sensor, draw its chief rays."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import bpy
+
+from ..core.engine import EngineError
+from ..engine import handing, polls, session
+from . import rays
+
+RAYS = (16, 12)
+
+
+class OPTISENSE_OT_evaluate(bpy.types.Operator):
+    """Score the sensor by the chosen objectives"""
+
+    bl_idname = "optisense.evaluate"
+    bl_label = "Evaluate"
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        if not (polls.has_design(cls, context) and polls.is_idle(cls, context)):
+            return False
+        if not chosen(context):
+            cls.poll_message_set("Choose an objective first")
+            return False
+        return True
+
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        return self._start(context, wait=False)
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        return self._start(context, wait=True)
+
+    def _start(self, context: bpy.types.Context, *, wait: bool) -> set[str]:
+        try:
+            design = handing.design(context.scene)
+        except EngineError as error:
+            session.say(error)
+            self.report({"ERROR"}, error.text())
+            return {"CANCELLED"}
+        done = session.start_job(
+            "Evaluating",
+            "evaluate",
+            take,
+            wait=wait,
+            design=design,
+            objectives=chosen(context),
+            figures=True,
+            name="scores",
+        )
+        if not done:
+            self.report({"ERROR"}, session.state().problem)
+        return {"FINISHED"} if done else {"CANCELLED"}
+
+
+def chosen(context: bpy.types.Context) -> list[str]:
+    """The objectives to score by, the user's own last."""
+    values = context.window_manager.optisense_evaluation
+    names = [name for name in sorted(values.chosen) if name != "NONE"]
+    return [*names, bpy.path.abspath(values.own)] if values.own.strip() else names
+
+
+def take(result: dict[str, Any]) -> None:
+    """Keep the scores for the panel."""
+    values = bpy.context.window_manager.optisense_evaluation
+    values.scores.clear()
+    for row in result["scores"]:
+        score = values.scores.add()
+        score.name = row["objective"]
+        score.title = row.get("title") or row["objective"]
+        score.value = "" if row["value"] is None else f"{row['value']:.4g}"
+        score.failure = row.get("failure") or ""
+        parts = row.get("parts") or {}
+        score.parts = "\n".join(
+            f"{name.replace('_', ' ')}: {value:.4g}"
+            for name, value in parts.items()
+            if isinstance(value, (int, float))
+        )
+        score.figure = row.get("figure") or ""
+    session.redraw()
+
+
+class OPTISENSE_OT_show_rays(bpy.types.Operator):
+    """Draw a coarse grid of chief rays, coloured by what becomes of them"""
+
+    bl_idname = "optisense.show_rays"
+    bl_label = "Show Chief Rays"
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return polls.has_design(cls, context) and polls.is_idle(cls, context)
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        name = context.scene.name
+
+        def traced(result: dict[str, Any]) -> None:
+            scene = bpy.data.scenes.get(name)
+            if scene is not None:
+                text = rays.show(scene, result)
+                bpy.context.window_manager.optisense_evaluation.rays = text
+                session.push_undo("Chief rays")
+
+        try:
+            design = handing.design(context.scene)
+        except EngineError as error:
+            session.say(error)
+            self.report({"ERROR"}, error.text())
+            return {"CANCELLED"}
+        done = session.start_job(
+            "Tracing rays",
+            "chief_rays",
+            traced,
+            wait=bpy.app.background,
+            design=design,
+            resolution=list(RAYS),
+        )
+        return {"FINISHED"} if done else {"CANCELLED"}
+
+
+class OPTISENSE_OT_hide_rays(bpy.types.Operator):
+    """Remove the chief rays"""
+
+    bl_idname = "optisense.hide_rays"
+    bl_label = "Hide"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        if not any(each.optisense.kind == "SHOWN" for each in context.scene.objects):
+            cls.poll_message_set("No rays are shown")
+            return False
+        return True
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        rays.clear(context.scene)
+        context.window_manager.optisense_evaluation.rays = ""
+        return {"FINISHED"}
+
+
+CLASSES = (OPTISENSE_OT_evaluate, OPTISENSE_OT_show_rays, OPTISENSE_OT_hide_rays)
+
+
+def register() -> None:
+    for each in CLASSES:
+        bpy.utils.register_class(each)
+
+
+def unregister() -> None:
+    for each in reversed(CLASSES):
+        bpy.utils.unregister_class(each)

@@ -1,0 +1,65 @@
+"""Chief rays as curves, one object for each outcome."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import bpy
+import numpy as np
+from numpy.typing import NDArray
+
+from ..scene.collections import collection
+
+NAME = "Chief rays"
+THICKNESS = 0.02
+COLOURS = {
+    "hit": (0.05, 0.55, 0.2, 1.0),
+    "escaped": (0.9, 0.1, 0.1, 1.0),
+    "absorbed": (0.1, 0.1, 0.1, 1.0),
+    "total_reflection": (0.9, 0.5, 0.0, 1.0),
+    "depth_limit": (0.5, 0.1, 0.7, 1.0),
+}
+
+
+def show(scene: bpy.types.Scene, result: dict[str, Any]) -> str:
+    """Draw the engine's chief rays in place of those before; what became of them, in words."""
+    clear(scene)
+    files = result["files"]
+    vertices, counts = np.load(files["vertices"]), np.load(files["counts"])
+    outcomes = np.load(files["outcomes"])
+    lines = np.split(vertices, np.cumsum(counts)[:-1])
+    texts = []
+    for number, name in enumerate(result["outcome_names"]):
+        chosen = [line for line, outcome in zip(lines, outcomes, strict=True) if outcome == number]
+        if chosen:
+            _draw(scene, name, chosen)
+            texts.append(f"{100 * len(chosen) / len(lines):.0f} % {name.replace('_', ' ')}")
+    return ", ".join(texts)
+
+
+def clear(scene: bpy.types.Scene) -> None:
+    """Remove the rays."""
+    for each in list(scene.objects):
+        if each.optisense.kind == "SHOWN" and each.optisense.key.startswith("ray "):
+            curve = each.data
+            bpy.data.objects.remove(each)
+            bpy.data.curves.remove(curve)
+
+
+def _draw(scene: bpy.types.Scene, outcome: str, lines: list[NDArray[np.float32]]) -> None:
+    curve = bpy.data.curves.new(f"{NAME}: {outcome}", "CURVE")
+    curve.dimensions = "3D"
+    curve.bevel_depth = THICKNESS
+    curve.bevel_resolution = 0
+    for line in lines:
+        spline = curve.splines.new("POLY")
+        spline.points.add(len(line) - 1)
+        homogeneous = np.ones((len(line), 4), dtype=np.float32)
+        homogeneous[:, :3] = line
+        spline.points.foreach_set("co", homogeneous.ravel())
+    item = bpy.data.objects.new(curve.name, curve)
+    item.optisense.kind = "SHOWN"
+    item.optisense.key = f"ray {outcome}"
+    item.color = COLOURS.get(outcome, (0.5, 0.5, 0.5, 1.0))
+    item.hide_select = True
+    collection(scene, NAME).objects.link(item)

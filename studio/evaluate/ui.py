@@ -1,0 +1,61 @@
+"""Step 6 in the sidebar."""
+
+from __future__ import annotations
+
+import bpy
+
+from ..engine import catalogue
+from ..engine.layout import SidebarPanel, paragraph, show_job
+from ..simulate.picture import file_icon
+
+
+class OPTISENSE_PT_evaluate(SidebarPanel, bpy.types.Panel):
+    bl_idname = "OPTISENSE_PT_evaluate"
+    bl_label = "Evaluate"
+    bl_order = 6
+
+    def draw(self, context: bpy.types.Context) -> None:
+        layout = self.layout
+        values = context.window_manager.optisense_evaluation
+        column = layout.column(align=True)
+        if catalogue.entries("objectives"):
+            column.prop(values, "chosen")
+        else:
+            column.label(text="Waiting for the engine ...")
+        layout.prop(values, "own")
+        row = layout.row()
+        row.scale_y = 1.4
+        row.operator("optisense.evaluate", icon="CHECKMARK")
+        show_job(layout, "Evaluating", "Tracing rays")
+        for score in values.scores:
+            _score(layout.box(), score)
+        row = layout.row(align=True)
+        row.operator("optisense.show_rays", icon="CURVE_DATA")
+        row.operator("optisense.hide_rays", icon="X")
+        if values.rays:
+            paragraph(layout, values.rays)
+
+
+def _score(layout: bpy.types.UILayout, score: bpy.types.PropertyGroup) -> None:
+    row = layout.row()
+    row.label(text=score.title)
+    if score.failure:
+        row.label(text="failed", icon="ERROR")
+        paragraph(layout, score.failure)
+        return
+    row.label(text=score.value)
+    column = layout.column(align=True)
+    column.scale_y = 0.8
+    for line in score.parts.splitlines():
+        column.label(text=line, icon="DOT")
+    icon = file_icon(score.figure)
+    if icon:
+        layout.template_icon(icon_value=icon, scale=9.0)
+
+
+def register() -> None:
+    bpy.utils.register_class(OPTISENSE_PT_evaluate)
+
+
+def unregister() -> None:
+    bpy.utils.unregister_class(OPTISENSE_PT_evaluate)

@@ -1,0 +1,1 @@
+"""Out of the studio: a report, and files for the workshop."""

@@ -1,0 +1,28 @@
+"""Step 8 in the sidebar."""
+
+from __future__ import annotations
+
+import bpy
+
+from ..engine.layout import SidebarPanel, show_job
+
+
+class OPTISENSE_PT_export(SidebarPanel, bpy.types.Panel):
+    bl_idname = "OPTISENSE_PT_export"
+    bl_label = "Report and Export"
+    bl_order = 8
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def draw(self, context: bpy.types.Context) -> None:
+        column = self.layout.column(align=True)
+        column.operator("optisense.report", icon="TEXT")
+        column.operator("optisense.export", icon="EXPORT")
+        show_job(self.layout, "Writing")
+
+
+def register() -> None:
+    bpy.utils.register_class(OPTISENSE_PT_export)
+
+
+def unregister() -> None:
+    bpy.utils.unregister_class(OPTISENSE_PT_export)

@@ -1,0 +1,296 @@
+"""Add lights and the camera, and choose their models from the library."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import bpy
+import numpy as np
+from bpy.props import EnumProperty, FloatProperty, FloatVectorProperty, IntProperty, StringProperty
+from mathutils import Vector
+
+from ..core.engine import EngineError
+from ..core.pose import unit
+from ..core.rows import row_on_face
+from ..engine import catalogue, polls, session
+from ..scene.build import add_light_group
+from ..scene.cameras import add_camera
+from ..scene.collections import objects_of
+from ..scene.gather import free_name
+from ..scene.lamps import add_light, lamp_colour, redraw
+from .windows import ask_for_windows
+
+
+def _light_models(operator: Any, context: bpy.types.Context | None) -> catalogue.Items:
+    return catalogue.items("light")
+
+
+def _camera_models(operator: Any, context: bpy.types.Context | None) -> catalogue.Items:
+    return catalogue.items("camera")
+
+
+def _groups(operator: Any, context: bpy.types.Context | None) -> catalogue.Items:
+    global _group_items
+    scene = bpy.context.scene if context is None else context.scene
+    names = [group.name for group in scene.optisense.light_groups]
+    _group_items = [("NEW", "A new group", "")] + [(name, name, "") for name in names]
+    return _group_items
+
+
+_group_items: catalogue.Items = []
+
+
+class OPTISENSE_OT_add_light(bpy.types.Operator):
+    """Add a row of lights on the selected light reference, or one at the 3D cursor"""
+
+    bl_idname = "optisense.add_light"
+    bl_label = "Add Light"
+    bl_options = {"REGISTER", "UNDO"}
+
+    model: EnumProperty(name="Model", items=_light_models)
+    group: EnumProperty(name="Group", items=_groups)
+    name: StringProperty(name="Name of a new group", default="white")
+    colour: FloatVectorProperty(
+        name="Colour of a new group", size=3, min=0.0, max=1.0, subtype="COLOR", default=(1.0,) * 3
+    )
+    flux: FloatProperty(name="Flux of a new group (mW)", min=0.0, max=1e6, default=2.0)
+    count: IntProperty(name="Count", min=1, max=1000, default=1)
+    pitch: FloatProperty(
+        name="Pitch (mm)", description="Between neighbours in the row", min=0.01, default=4.0
+    )
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return polls.has_design(cls, context) and polls.in_object_mode(cls, context)
+
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        return context.window_manager.invoke_props_dialog(self)
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        scene = context.scene
+        design = scene.optisense
+        if self.group in ("NEW", ""):
+            if self.model in ("NONE", ""):
+                self.report({"ERROR"}, "The library is not loaded yet; try again in a moment")
+                return {"CANCELLED"}
+            if max(self.colour) <= 0.0:
+                self.report({"ERROR"}, "A colour needs at least one channel above 0")
+                return {"CANCELLED"}
+            name = free_name(self.name or "white", design.light_groups)
+            values = {"model": self.model, "colour": self.colour, "flux": self.flux}
+            group = add_light_group(design, name, values)
+        else:
+            group = design.light_groups[self.group]
+        for pose in self._poses(context):
+            add_light(scene, group, pose).select_set(True)
+        ask_for_windows(scene)
+        return {"FINISHED"}
+
+    def _poses(self, context: bpy.types.Context) -> list[dict[str, Any]]:
+        middle = _middle(context.scene)
+        references = [
+            each
+            for each in context.selected_objects
+            if each.optisense.kind == "REFERENCE" and each.optisense.reference == "light"
+        ]
+        for each in context.selected_objects:
+            each.select_set(False)
+        poses = []
+        for reference in references:
+            corners = np.array([reference.matrix_world @ v.co for v in reference.data.vertices])
+            normal = _normal(reference)
+            poses += row_on_face(corners, normal, np.array(middle), self.count, self.pitch)
+        if not references:
+            start = context.scene.cursor.location
+            way = middle - start
+            way = way.normalized() if way.length > 1e-6 else Vector((0.0, 0.0, 1.0))
+            across = way.orthogonal().normalized()
+            for number in range(self.count):
+                shift = (number - (self.count - 1) / 2) * self.pitch
+                place = start + across * shift
+                position = [round(value, 4) for value in place]
+                poses.append({"position": position, "direction": unit(way)})
+        return poses
+
+
+def _middle(scene: bpy.types.Scene) -> Vector:
+    """The middle of the sensing surface; the origin where there is none."""
+    from ..scene.contacts import sensing_surface
+
+    surface = sensing_surface(scene)
+    if surface is None:
+        return Vector()
+    return surface.matrix_world @ (sum((Vector(c) for c in surface.bound_box), Vector()) / 8.0)
+
+
+def _normal(reference: bpy.types.Object) -> np.ndarray:
+    """The direction in which most of a surface faces, weighted by area."""
+    total = sum((face.normal * face.area for face in reference.data.polygons), Vector())
+    turned = reference.matrix_world.to_3x3() @ total
+    return np.array(turned if turned.length > 1e-9 else (0.0, 0.0, 1.0))
+
+
+class OPTISENSE_OT_add_camera(bpy.types.Operator):
+    """Put a camera of the library on the selected camera reference, or at the 3D cursor"""
+
+    bl_idname = "optisense.add_camera"
+    bl_label = "Add Camera"
+    bl_options = {"REGISTER", "UNDO"}
+
+    model: EnumProperty(name="Model", items=_camera_models)
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return polls.has_design(cls, context) and polls.in_object_mode(cls, context)
+
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        return context.window_manager.invoke_props_dialog(self)
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        scene = context.scene
+        try:
+            entry = session.ask_and_wait("entry", kind="camera", entry=self.model)["entry"]
+        except EngineError as error:
+            self.report({"ERROR"}, error.text())
+            return {"CANCELLED"}
+        references = [
+            each
+            for each in context.selected_objects
+            if each.optisense.kind == "REFERENCE" and each.optisense.reference == "camera"
+        ]
+        place = scene.cursor.location.copy()
+        if references:
+            box = (Vector(corner) for corner in references[0].bound_box)
+            place = references[0].matrix_world @ (sum(box, Vector()) / 8.0)
+        way = _middle(scene) - place
+        if way.length < 1e-6:
+            way = Vector((0.0, 0.0, 1.0))
+        way.normalize()
+        up = (0.0, 1.0, 0.0) if abs(way.y) < 0.9 else (1.0, 0.0, 0.0)
+        width, height = entry["value"]["resolution"]
+        scale = min(1.0, 320 / width)
+        for each in objects_of(scene, "CAMERA"):
+            bpy.data.objects.remove(each)
+        add_camera(
+            scene,
+            {
+                "model": self.model,
+                "projection": entry["value"].get("projection", "perspective"),
+                "fov": entry["value"]["fov"],
+                "resolution": [round(width * scale), round(height * scale)],
+                "position": [round(value, 4) for value in place],
+                "direction": unit(way),
+                "up": list(up),
+            },
+        )
+        return {"FINISHED"}
+
+
+class OPTISENSE_OT_set_model(bpy.types.Operator):
+    """Use another lamp of the library for this group"""
+
+    bl_idname = "optisense.set_model"
+    bl_label = "Choose Lamp"
+    bl_options = {"REGISTER", "UNDO"}
+    bl_property = "model"
+
+    model: EnumProperty(name="Model", items=_light_models)
+    group: StringProperty()
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return polls.has_design(cls, context)
+
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        context.window_manager.invoke_search_popup(self)
+        return {"RUNNING_MODAL"}
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        group = context.scene.optisense.light_groups.get(self.group)
+        if group is None or self.model in ("NONE", ""):
+            return {"CANCELLED"}
+        group.model = self.model
+        group.library_window = ""
+        group.emitter = "library"
+        ask_for_windows(context.scene)
+        return {"FINISHED"}
+
+
+class OPTISENSE_OT_set_group(bpy.types.Operator):
+    """Move the selected lights to another group"""
+
+    bl_idname = "optisense.set_group"
+    bl_label = "Move to Group"
+    bl_options = {"REGISTER", "UNDO"}
+
+    group: EnumProperty(name="Group", items=_groups)
+    name: StringProperty(name="Name of a new group", default="white")
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return polls.has_design(cls, context) and bool(
+            polls.selected(cls, context, "LIGHT", what="lights")
+        )
+
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        return context.window_manager.invoke_props_dialog(self)
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        design = context.scene.optisense
+        lights = [each for each in context.selected_objects if each.optisense.kind == "LIGHT"]
+        if self.group in ("NEW", ""):
+            old = design.light_groups.get(lights[0].optisense.group)
+            values = {"model": "smd-3528", "colour": (1.0, 1.0, 1.0), "flux": 2.0}
+            if old is not None:
+                values = {"model": old.model, "colour": old.colour[:], "flux": old.flux}
+            group = add_light_group(design, free_name(self.name, design.light_groups), values)
+        else:
+            group = design.light_groups[self.group]
+        for light in lights:
+            light.optisense.group = group.name
+            light.color = lamp_colour(group)
+        redraw(context.scene, group)
+        ask_for_windows(context.scene)
+        return {"FINISHED"}
+
+
+class OPTISENSE_OT_look_through(bpy.types.Operator):
+    """See the sensor through its own camera, as a pinhole in air"""
+
+    bl_idname = "optisense.look_through"
+    bl_label = "Look Through Camera"
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        if context.area is None or context.area.type != "VIEW_3D":
+            cls.poll_message_set("Use it in a 3D view")
+            return False
+        return polls.has_design(cls, context)
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        cameras = objects_of(context.scene, "CAMERA")
+        if not cameras:
+            self.report({"ERROR"}, "The sensor has no camera")
+            return {"CANCELLED"}
+        context.scene.camera = cameras[0]
+        context.space_data.region_3d.view_perspective = "CAMERA"
+        return {"FINISHED"}
+
+
+CLASSES = (
+    OPTISENSE_OT_add_light,
+    OPTISENSE_OT_add_camera,
+    OPTISENSE_OT_set_model,
+    OPTISENSE_OT_set_group,
+    OPTISENSE_OT_look_through,
+)
+
+
+def register() -> None:
+    for each in CLASSES:
+        bpy.utils.register_class(each)
+
+
+def unregister() -> None:
+    for each in reversed(CLASSES):
+        bpy.utils.unregister_class(each)

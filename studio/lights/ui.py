@@ -1,0 +1,85 @@
+"""Step 4 in the sidebar."""
+
+from __future__ import annotations
+
+import bpy
+
+from ..engine.layout import SidebarPanel
+from ..scene.collections import objects_of
+
+
+class OPTISENSE_UL_light_groups(bpy.types.UIList):
+    """Light groups: name, colour, flux."""
+
+    def draw_item(self, context, layout, data, item, icon, active_data, active_property) -> None:
+        row = layout.row(align=True)
+        row.label(text=item.name, icon="LIGHT")
+        row.prop(item, "colour", text="")
+        row.prop(item, "flux", text="mW")
+
+
+class OPTISENSE_PT_lights(SidebarPanel, bpy.types.Panel):
+    bl_idname = "OPTISENSE_PT_lights"
+    bl_label = "Lights and Camera"
+    bl_order = 4
+
+    def draw(self, context: bpy.types.Context) -> None:
+        layout = self.layout
+        scene = context.scene
+        design = scene.optisense
+        row = layout.row(align=True)
+        row.operator("optisense.add_light", icon="LIGHT_AREA")
+        row.operator("optisense.add_camera", icon="CAMERA_DATA")
+        layout.template_list(
+            "OPTISENSE_UL_light_groups", "", design, "light_groups", design, "light_group_index",
+            rows=3,
+        )  # fmt: skip
+        if 0 <= design.light_group_index < len(design.light_groups):
+            _group(layout.box(), design.light_groups[design.light_group_index])
+        layout.operator("optisense.set_group", icon="GROUP")
+        cameras = objects_of(scene, "CAMERA")
+        if cameras:
+            _camera(layout.box(), cameras[0].optisense)
+
+
+def _group(layout: bpy.types.UILayout, group: bpy.types.PropertyGroup) -> None:
+    row = layout.row()
+    row.label(text=f"{group.model}")
+    row.operator("optisense.set_model", text="Choose", icon="VIEWZOOM").group = group.name
+    column = layout.column()
+    column.use_property_split = True
+    column.use_property_decorate = False
+    column.prop(group, "emitter")
+    if group.emitter == "area":
+        column.prop(group, "shape")
+        column.prop(group, "size", text="Size (mm)")
+    elif group.emitter == "ies":
+        column.prop(group, "file")
+    elif group.emitter == "spot":
+        column.prop(group, "beam")
+        column.prop(group, "cutoff")
+
+
+def _camera(layout: bpy.types.UILayout, camera: bpy.types.PropertyGroup) -> None:
+    row = layout.row()
+    row.label(text=f"Camera: {camera.model}", icon="CAMERA_DATA")
+    row.operator("optisense.look_through", text="", icon="HIDE_OFF")
+    column = layout.column()
+    column.use_property_split = True
+    column.use_property_decorate = False
+    column.prop(camera, "projection")
+    column.prop(camera, "fov", text="Field of view (°)")
+    column.prop(camera, "pixels")
+
+
+CLASSES = (OPTISENSE_UL_light_groups, OPTISENSE_PT_lights)
+
+
+def register() -> None:
+    for each in CLASSES:
+        bpy.utils.register_class(each)
+
+
+def unregister() -> None:
+    for each in reversed(CLASSES):
+        bpy.utils.unregister_class(each)

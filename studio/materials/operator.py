@@ -1,0 +1,222 @@
+"""Choose, preview, apply, edit and keep materials."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import bpy
+from bpy.props import EnumProperty, PointerProperty, StringProperty
+
+from ..core.engine import EngineError
+from ..engine import catalogue, handing, polls, session
+from ..scene.build import add_material, set_coating
+from ..scene.gather import coating_values, free_name, material_values
+from ..scene.kinds import KINDS_OF_ROLE
+
+
+def _materials(values: Any, context: bpy.types.Context | None) -> catalogue.Items:
+    return catalogue.items("material")
+
+
+def _coatings(values: Any, context: bpy.types.Context | None) -> catalogue.Items:
+    return catalogue.items("coating")
+
+
+class OPTISENSE_PG_material_choice(bpy.types.PropertyGroup):
+    """What is chosen in the library."""
+
+    kind: EnumProperty(
+        name="For",
+        items=[
+            ("material", "Parts", "Optical materials"),
+            ("coating", "Sensing surface", "Coatings"),
+        ],
+        options={"SKIP_SAVE"},
+    )
+    material: EnumProperty(name="Material", items=_materials, options={"SKIP_SAVE"})
+    coating: EnumProperty(name="Coating", items=_coatings, options={"SKIP_SAVE"})
+    preview: StringProperty(options={"SKIP_SAVE"})
+    previewed: StringProperty(options={"SKIP_SAVE"})
+
+    @property
+    def entry(self) -> str:
+        """The library's name of what is chosen; empty while the library is not loaded."""
+        name = self.material if self.kind == "material" else self.coating
+        return "" if name == "NONE" else name
+
+
+def _choice(context: bpy.types.Context) -> OPTISENSE_PG_material_choice:
+    return context.window_manager.optisense_material
+
+
+def _chosen(operator: type[bpy.types.Operator], context: bpy.types.Context) -> bool:
+    if not _choice(context).entry:
+        operator.poll_message_set("The library is not loaded yet")
+        return False
+    return True
+
+
+class OPTISENSE_OT_preview_material(bpy.types.Operator):
+    """Draw the chosen material"""
+
+    bl_idname = "optisense.preview_material"
+    bl_label = "Preview Material"
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return _chosen(cls, context) and polls.is_idle(cls, context)
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        choice = _choice(context)
+        entry = choice.entry
+
+        def drawn(result: dict[str, Any]) -> None:
+            choice = _choice(bpy.context)
+            choice.preview = result["files"]["picture"]
+            choice.previewed = entry
+            session.redraw()
+
+        done = session.start_job(
+            "Drawing the material",
+            "preview",
+            drawn,
+            wait=bpy.app.background,
+            kind=choice.kind,
+            entry=entry,
+            name="material",
+        )
+        return {"FINISHED"} if done else {"CANCELLED"}
+
+
+class OPTISENSE_OT_apply_material(bpy.types.Operator):
+    """Make the selected parts of the chosen material, or coat the sensing surface"""
+
+    bl_idname = "optisense.apply_material"
+    bl_label = "Apply to Selected"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        if not (polls.has_design(cls, context) and _chosen(cls, context)):
+            return False
+        parts = polls.selected(cls, context, "PART", what="a part")
+        if not parts:
+            return False
+        surface = [each.optisense.role == "sensing_surface" for each in parts]
+        if _choice(context).kind == "coating" and not any(surface):
+            cls.poll_message_set("Select the sensing surface: coatings are for it only")
+            return False
+        if _choice(context).kind == "material" and all(surface):
+            cls.poll_message_set("The sensing surface takes a coating, not a material")
+            return False
+        return True
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        choice = _choice(context)
+        name = choice.entry
+        try:
+            entry = session.ask_and_wait("entry", kind=choice.kind, entry=name)["entry"]
+        except EngineError as error:
+            session.say(error)
+            self.report({"ERROR"}, error.text())
+            return {"CANCELLED"}
+        values = handing.without_nulls(entry["value"])
+        design = context.scene.optisense
+        if choice.kind == "coating":
+            set_coating(context.scene, {"library": name, **values})
+            return {"FINISHED"}
+        parts = [
+            each
+            for each in context.selected_objects
+            if each.optisense.kind == "PART" and each.optisense.role != "sensing_surface"
+        ]
+        for part in parts:
+            fitting = KINDS_OF_ROLE[part.optisense.role]
+            if values["kind"] not in fitting:
+                self.report(
+                    {"ERROR"},
+                    f"'{part.optisense.key}' ({part.optisense.role.replace('_', ' ')}) needs a "
+                    f"material of kind {' or '.join(fitting)}; {name} is a {values['kind']}",
+                )
+                return {"CANCELLED"}
+        add_material(design, name, values)
+        for part in parts:
+            part.optisense.material = name
+        return {"FINISHED"}
+
+
+class OPTISENSE_OT_keep_material(bpy.types.Operator):
+    """Keep the material of the active part (or the coating) in the library, as your own"""
+
+    bl_idname = "optisense.keep_material"
+    bl_label = "Save as My Own"
+
+    name: StringProperty(name="Name", default="my-material")
+    description: StringProperty(name="Description")
+    source: StringProperty(name="Source of its numbers", default="chosen by hand")
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        if not (polls.has_design(cls, context) and polls.is_idle(cls, context)):
+            return False
+        active = context.active_object
+        if active is None or active.optisense.kind != "PART":
+            cls.poll_message_set("Select a part first")
+            return False
+        own = active.optisense
+        design = context.scene.optisense
+        if own.role != "sensing_surface" and own.material not in design.materials:
+            cls.poll_message_set("This part has no material")
+            return False
+        return True
+
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        return context.window_manager.invoke_props_dialog(self, width=400)
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        own = context.active_object.optisense
+        if own.role == "sensing_surface":
+            kind, values = "coating", coating_values(context.scene)
+            values.pop("library", None)
+        else:
+            kind = "material"
+            values = material_values(context.scene.optisense.materials[own.material])
+        name = free_name(self.name, ())
+        try:
+            session.ask_and_wait(
+                "library_add",
+                kind=kind,
+                entry=name,
+                value=values,
+                description=self.description or name,
+                source=self.source,
+            )
+        except EngineError as error:
+            session.say(error)
+            self.report({"ERROR"}, error.text())
+            return {"CANCELLED"}
+        catalogue.refresh_library(session.engine(), kind)
+        session.state().note = f"'{name}' is in your library"
+        return {"FINISHED"}
+
+
+CLASSES = (
+    OPTISENSE_PG_material_choice,
+    OPTISENSE_OT_preview_material,
+    OPTISENSE_OT_apply_material,
+    OPTISENSE_OT_keep_material,
+)
+
+
+def register() -> None:
+    for each in CLASSES:
+        bpy.utils.register_class(each)
+    bpy.types.WindowManager.optisense_material = PointerProperty(
+        type=OPTISENSE_PG_material_choice, options={"SKIP_SAVE"}
+    )
+
+
+def unregister() -> None:
+    del bpy.types.WindowManager.optisense_material
+    for each in reversed(CLASSES):
+        bpy.utils.unregister_class(each)

@@ -1,0 +1,75 @@
+"""Step 3 in the sidebar."""
+
+from __future__ import annotations
+
+import bpy
+
+from ..engine.layout import SidebarPanel, show_job
+from ..simulate.picture import file_icon
+
+
+class OPTISENSE_PT_materials(SidebarPanel, bpy.types.Panel):
+    bl_idname = "OPTISENSE_PT_materials"
+    bl_label = "Materials"
+    bl_order = 3
+
+    def draw(self, context: bpy.types.Context) -> None:
+        layout = self.layout
+        choice = context.window_manager.optisense_material
+        row = layout.row(align=True)
+        row.prop(choice, "kind", expand=True)
+        layout.prop(choice, choice.kind, text="")
+        row = layout.row(align=True)
+        row.operator("optisense.preview_material", text="Preview", icon="SHADING_RENDERED")
+        row.operator("optisense.apply_material", icon="MATERIAL")
+        show_job(layout, "Drawing the material")
+        icon = file_icon(choice.preview)
+        if icon:
+            layout.template_icon(icon_value=icon, scale=7.0)
+            layout.label(text=choice.previewed)
+        active = context.active_object
+        if active is not None and active.optisense.kind == "PART":
+            _part(layout.box(), context, active.optisense)
+
+
+def _part(
+    layout: bpy.types.UILayout, context: bpy.types.Context, own: bpy.types.PropertyGroup
+) -> None:
+    design = context.scene.optisense
+    column = layout.column()
+    column.use_property_split = True
+    column.use_property_decorate = False
+    if own.role == "sensing_surface":
+        layout.label(text=f"Coating: {design.coating.library or 'own'}")
+        for field in ("reflectance", "specularity", "eta", "k"):
+            column.prop(design.coating, field)
+    else:
+        column.prop_search(own, "material", design, "materials")
+        material = design.materials.get(own.material)
+        if material is None:
+            none = "absorbs all light" if own.role == "blocker" else "needs a material"
+            layout.label(text=f"No material: {none}", icon="INFO")
+            return
+        _material(column, material)
+    layout.operator("optisense.keep_material", icon="FILE_TICK")
+
+
+def _material(column: bpy.types.UILayout, material: bpy.types.PropertyGroup) -> None:
+    column.prop(material, "kind")
+    if material.kind == "dielectric":
+        column.prop(material, "ior")
+    if material.kind == "conductor":
+        column.prop(material, "eta")
+        column.prop(material, "k")
+    if material.kind == "diffuse":
+        column.prop(material, "reflectance")
+    if material.kind in ("dielectric", "conductor"):
+        column.prop(material, "roughness")
+
+
+def register() -> None:
+    bpy.utils.register_class(OPTISENSE_PT_materials)
+
+
+def unregister() -> None:
+    bpy.utils.unregister_class(OPTISENSE_PT_materials)

@@ -1,0 +1,103 @@
+"""What the panel and the viewport show of a search while it runs."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import bpy
+import numpy as np
+
+from ..core.vary import curve_picture
+from ..engine import session
+from ..scene.collections import collection
+from ..simulate import picture
+
+CURVE = "OptiSense search"
+CURVE_SIZE = (320, 160)
+GHOSTS = "Best so far"
+
+_curve: list[float | None] = []
+
+
+def begin() -> None:
+    """Forget the search before."""
+    _curve.clear()
+    found = bpy.context.window_manager.optisense_found
+    found.best = found.values = found.start = found.ended = ""
+    clear_ghosts(bpy.context.scene)
+
+
+def take(event: dict[str, Any]) -> None:
+    """An event of a search: a trial is finished."""
+    if event.get("event") != "trial":
+        return
+    scores = event.get("scores") or {}
+    objective = bpy.context.scene.optisense_search.objective
+    score = scores.get(objective, next(iter(scores.values()), None))
+    _curve.append(score)
+    found = bpy.context.window_manager.optisense_found
+    if score is not None and event.get("start"):
+        found.start = f"{score:.4g}"
+    if score is not None and event.get("best"):
+        found.best = f"{score:.4g}"
+        found.values = "\n".join(
+            f"{name} = {value:.4g}" if isinstance(value, float) else f"{name} = {value}"
+            for name, value in list((event.get("values") or {}).items())[:8]
+        )
+        show_ghosts(bpy.context.scene, event.get("shapes") or {})
+    picture.show_icon(CURVE, curve_picture(_curve, CURVE_SIZE))
+    session.redraw()
+
+
+def take_curve(rows: list[dict[str, Any]]) -> None:
+    """All trials of a study at once."""
+    begin()
+    for number, row in enumerate(rows):
+        scores = [each for each in _curve if each is not None]
+        score = next(iter((row.get("scores") or {}).values()), None)
+        better = score is not None and (not scores or score > max(scores))
+        take({"event": "trial", "best": better, "number": number, **row})
+
+
+def show_ghosts(scene: bpy.types.Scene, shapes: dict[str, Any]) -> None:
+    """Draw the parts of the best design so far that differ from the start, as wires."""
+    clear_ghosts(scene)
+    for name, files in shapes.items():
+        mesh = bpy.data.meshes.new(f"ghost {name}")
+        vertices, faces = np.load(files["vertices"]), np.load(files["faces"])
+        mesh.from_pydata(vertices.tolist(), [], faces.tolist())
+        ghost = bpy.data.objects.new(f"ghost {name}", mesh)
+        ghost.optisense.kind = "SHOWN"
+        ghost.optisense.key = f"ghost {name}"
+        ghost.display_type = "WIRE"
+        ghost.color = (1.0, 0.55, 0.1, 0.6)
+        ghost.hide_select = True
+        collection(scene, GHOSTS).objects.link(ghost)
+
+
+def clear_ghosts(scene: bpy.types.Scene) -> None:
+    """Remove what `show_ghosts` drew."""
+    for each in list(scene.objects):
+        if each.optisense.kind == "SHOWN" and each.optisense.key.startswith("ghost "):
+            mesh = each.data
+            bpy.data.objects.remove(each)
+            bpy.data.meshes.remove(mesh)
+
+
+def finished(result: dict[str, Any]) -> None:
+    """The search is over."""
+    found = bpy.context.window_manager.optisense_found
+    done = result.get("done")
+    why = "stopped" if result.get("interrupted") else result.get("ended") or "finished"
+    found.ended = f"{done} trials: {why}"
+    notes = [str(note) for note in result.get("notes") or []]
+    session.state().note = "; ".join(notes)
+    session.redraw()
+
+
+def unregister() -> None:
+    _curve.clear()
+
+
+def register() -> None:
+    _curve.clear()

@@ -1,0 +1,315 @@
+"""Choose what may vary, search, look, apply."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import bpy
+from bpy.props import StringProperty
+
+from ..core import vary
+from ..core.engine import EngineError
+from ..engine import handing, polls, session
+from ..scene.cages import cage_data
+from ..scene.collections import objects_of
+from ..sensor.opening import new_stage, open_stage
+from . import following
+
+TITLE = "Searching"
+
+
+def suggestions(context: bpy.types.Context) -> list[vary.Suggestion]:
+    """What a search may change of the active object."""
+    active = context.active_object
+    own = None if active is None else active.optisense
+    if own is None:
+        return []
+    if own.kind == "CAMERA":
+        return vary.for_camera()
+    if own.kind == "LIGHT":
+        group = [e for e in objects_of(context.scene, "LIGHT") if e.optisense.group == own.group]
+        return vary.for_light(own.group, group.index(active))
+    if own.kind == "PART":
+        materials = context.scene.optisense.materials
+        kind = materials[own.material].kind if own.material in materials else ""
+        return vary.for_part(own.role, own.material, kind)
+    if own.kind == "CAGE":
+        if active.mode == "EDIT":
+            active.update_from_editmode()
+        chosen = (
+            [v.index for v in active.data.vertices if v.select] if active.mode == "EDIT" else []
+        )
+        blended = cage_data(active).get("blend") is not None
+        return vary.for_cage(own.key, chosen, blended=blended)
+    return []
+
+
+class OPTISENSE_OT_vary(bpy.types.Operator):
+    """Let the search change this"""
+
+    bl_idname = "optisense.vary"
+    bl_label = "Vary"
+    bl_options = {"REGISTER", "UNDO"}
+
+    label: StringProperty()
+    text: StringProperty()
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return polls.has_design(cls, context)
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        search = context.scene.optisense_search
+        if all(row.text != self.text for row in search.vary):
+            row = search.vary.add()
+            row.name, row.text = self.label or self.text.partition("=")[0], self.text
+            search.vary_index = len(search.vary) - 1
+        return {"FINISHED"}
+
+
+class OPTISENSE_MT_vary(bpy.types.Menu):
+    """What a search may change of the active object"""
+
+    bl_idname = "OPTISENSE_MT_vary"
+    bl_label = "Vary ..."
+
+    def draw(self, context: bpy.types.Context) -> None:
+        found = suggestions(context)
+        if not found:
+            self.layout.label(text="Select a light, a part, a cage or the camera")
+        for each in found:
+            choice = self.layout.operator("optisense.vary", text=f"{each.label}:  {each.text}")
+            choice.label, choice.text = each.label, each.text
+
+
+class OPTISENSE_OT_vary_remove(bpy.types.Operator):
+    """Keep this as it is"""
+
+    bl_idname = "optisense.vary_remove"
+    bl_label = "Remove"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        if not context.scene.optisense_search.vary:
+            cls.poll_message_set("Nothing varies yet")
+            return False
+        return True
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        search = context.scene.optisense_search
+        search.vary.remove(search.vary_index)
+        search.vary_index = max(0, search.vary_index - 1)
+        return {"FINISHED"}
+
+
+def _may_search(operator: type[bpy.types.Operator], context: bpy.types.Context) -> bool:
+    return polls.has_design(operator, context) and polls.is_idle(operator, context)
+
+
+def _study(context: bpy.types.Context) -> str:
+    """The folder of the study as an absolute path; empty where none is named."""
+    text = context.scene.optisense_search.study
+    return str(Path(bpy.path.abspath(text)).resolve()) if text else ""
+
+
+def _new_study(context: bpy.types.Context) -> str:
+    """A folder beside the design's that is not there yet."""
+    folder = Path(context.scene.optisense.folder)
+    number = 1
+    while (study := folder.with_name(f"{folder.name}-search-{number}")).exists():
+        number += 1
+    return str(study)
+
+
+class OPTISENSE_OT_search(bpy.types.Operator):
+    """Search for a better sensor; every trial is kept in a folder"""
+
+    bl_idname = "optisense.search"
+    bl_label = "Search"
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        if not _may_search(cls, context):
+            return False
+        search = context.scene.optisense_search
+        if not vary.texts_of(search.vary):
+            cls.poll_message_set("Choose what may vary first")
+            return False
+        if not search.study and not context.scene.optisense.is_saved:
+            cls.poll_message_set("Save the sensor first, or name a folder for the study")
+            return False
+        return True
+
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        return self._start(context, wait=False)
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        return self._start(context, wait=True)
+
+    def _start(self, context: bpy.types.Context, *, wait: bool) -> set[str]:
+        search = context.scene.optisense_search
+        study = _study(context)
+        if not study or (Path(study).is_dir() and any(Path(study).iterdir())):
+            if not context.scene.optisense.is_saved:
+                self.report({"ERROR"}, "The folder of the study is not empty; name another one")
+                return {"CANCELLED"}
+            study = search.study = _new_study(context)
+        try:
+            design = handing.design(context.scene)
+        except EngineError as error:
+            session.say(error)
+            self.report({"ERROR"}, error.text())
+            return {"CANCELLED"}
+        following.begin()
+        fields: dict[str, Any] = {"budget": search.budget} if search.budget else {}
+        done = session.start_job(
+            TITLE,
+            "search",
+            following.finished,
+            on_event=following.take,
+            wait=wait,
+            design=design,
+            study=study,
+            vary=vary.texts_of(search.vary),
+            objectives=[search.objective],
+            method=search.method,
+            seed=search.seed,
+            workers=search.workers,
+            go_on=search.go_on,
+            name="search",
+            **fields,
+        )
+        if not done:
+            self.report({"ERROR"}, session.state().problem)
+        return {"FINISHED"} if done else {"CANCELLED"}
+
+
+class _WithStudy:
+    """Operators that need a study that was begun."""
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        if not _may_search(cls, context):
+            return False
+        if not context.scene.optisense_search.study:
+            cls.poll_message_set("There is no study yet: search first, or name its folder")
+            return False
+        return True
+
+
+class OPTISENSE_OT_resume(_WithStudy, bpy.types.Operator):
+    """Go on with the study, for as many trials as the budget says"""
+
+    bl_idname = "optisense.resume"
+    bl_label = "Resume"
+
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        return self._start(context, wait=False)
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        return self._start(context, wait=True)
+
+    def _start(self, context: bpy.types.Context, *, wait: bool) -> set[str]:
+        search = context.scene.optisense_search
+        study = _study(context)
+
+        def known(result: dict[str, Any]) -> None:
+            following.take_curve(result["curve"])
+            fields: dict[str, Any] = {"workers": search.workers, "go_on": search.go_on}
+            if search.budget:
+                fields["budget"] = search.budget
+            session.start_job(
+                TITLE,
+                "watch" if result.get("running") else "resume",
+                following.finished,
+                on_event=following.take,
+                wait=wait,
+                study=study,
+                name="search",
+                **({} if result.get("running") else fields),
+            )
+
+        done = session.start_job("Reading the study", "study", known, wait=wait, study=study)
+        if not done:
+            self.report({"ERROR"}, session.state().problem)
+        return {"FINISHED"} if done else {"CANCELLED"}
+
+
+class OPTISENSE_OT_apply_best(_WithStudy, bpy.types.Operator):
+    """Replace the sensor in this scene by the best one of the study"""
+
+    bl_idname = "optisense.apply_best"
+    bl_label = "Apply Best"
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        scene = context.scene
+        name, folder, saved = scene.name, scene.optisense.folder, scene.optisense.is_saved
+        wait = bpy.app.background
+        try:
+            stage = new_stage()
+        except EngineError as error:
+            session.say(error)
+            return {"CANCELLED"}
+
+        def applied(_: dict[str, Any]) -> None:
+            scene = bpy.data.scenes.get(name)
+            if scene is not None:
+                following.clear_ghosts(scene)
+                open_stage(scene, stage, wait=wait, folder=folder if saved else "")
+
+        done = session.start_job(
+            "Applying", "apply", applied, wait=wait, study=_study(context), to=str(stage)
+        )
+        if not done:
+            self.report({"ERROR"}, session.state().problem)
+        return {"FINISHED"} if done else {"CANCELLED"}
+
+
+class OPTISENSE_OT_keep_variant(_WithStudy, bpy.types.Operator):
+    """Write the best sensor of the study to a folder of its own; this one stays"""
+
+    bl_idname = "optisense.keep_variant"
+    bl_label = "Keep as Variant"
+
+    filepath: StringProperty(subtype="DIR_PATH")
+
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        self.filepath = f"{_study(context)}-best"
+        context.window_manager.fileselect_add(self)
+        return {"RUNNING_MODAL"}
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        target = str(Path(bpy.path.abspath(self.filepath)).resolve())
+
+        def kept(result: dict[str, Any]) -> None:
+            session.state().note = f"Written to {result['folder']}"
+
+        done = session.start_job(
+            "Applying", "apply", kept, wait=bpy.app.background, study=_study(context), to=target
+        )
+        if not done:
+            self.report({"ERROR"}, session.state().problem)
+        return {"FINISHED"} if done else {"CANCELLED"}
+
+
+CLASSES = (
+    OPTISENSE_OT_vary,
+    OPTISENSE_MT_vary,
+    OPTISENSE_OT_vary_remove,
+    OPTISENSE_OT_search,
+    OPTISENSE_OT_resume,
+    OPTISENSE_OT_apply_best,
+    OPTISENSE_OT_keep_variant,
+)
+
+
+def register() -> None:
+    for each in CLASSES:
+        bpy.utils.register_class(each)
+
+
+def unregister() -> None:
+    for each in reversed(CLASSES):
+        bpy.utils.unregister_class(each)

@@ -1,0 +1,80 @@
+"""Step 7 in the sidebar."""
+
+from __future__ import annotations
+
+import bpy
+
+from ..engine import catalogue
+from ..engine.layout import SidebarPanel, show_job
+from ..simulate.picture import icon
+from .following import CURVE
+
+
+class OPTISENSE_UL_vary(bpy.types.UIList):
+    """What may vary: tick, label, range."""
+
+    def draw_item(self, context, layout, data, item, icon, active_data, active_property) -> None:
+        row = layout.row(align=True)
+        row.prop(item, "active", text="")
+        row.prop(item, "text", text="", emboss=False)
+
+
+class OPTISENSE_PT_optimise(SidebarPanel, bpy.types.Panel):
+    bl_idname = "OPTISENSE_PT_optimise"
+    bl_label = "Optimise"
+    bl_order = 7
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def draw(self, context: bpy.types.Context) -> None:
+        layout = self.layout
+        search = context.scene.optisense_search
+        found = context.window_manager.optisense_found
+        row = layout.row(align=True)
+        row.menu("OPTISENSE_MT_vary", icon="ADD")
+        row.operator("optisense.vary_remove", text="", icon="REMOVE")
+        layout.template_list("OPTISENSE_UL_vary", "", search, "vary", search, "vary_index", rows=3)
+        column = layout.column()
+        column.use_property_split = True
+        column.use_property_decorate = False
+        for what in ("objective", "method"):
+            if catalogue.entries(f"{what}s"):
+                row = column.row(align=True)
+                row.prop(search, what)
+                row.prop(found, f"{what}_choice", text="", icon_only=True)
+            else:
+                column.prop(search, what)
+        for name in ("budget", "workers", "seed", "go_on", "study"):
+            column.prop(search, name)
+        row = layout.row(align=True)
+        row.scale_y = 1.4
+        row.operator("optisense.search", icon="VIEWZOOM")
+        row.operator("optisense.resume", icon="PLAY")
+        show_job(layout, "Searching", "Reading the study", "Applying")
+        curve = icon(CURVE)
+        if curve:
+            layout.template_icon(icon_value=curve, scale=7.0)
+        column = layout.column(align=True)
+        column.scale_y = 0.8
+        if found.best:
+            start = f", at the start {found.start}" if found.start else ""
+            column.label(text=f"Best so far {found.best}{start}")
+        for line in found.values.splitlines():
+            column.label(text=line, icon="DOT")
+        if found.ended:
+            column.label(text=found.ended)
+        row = layout.row(align=True)
+        row.operator("optisense.apply_best", icon="CHECKMARK")
+        row.operator("optisense.keep_variant", icon="DUPLICATE")
+
+
+CLASSES = (OPTISENSE_UL_vary, OPTISENSE_PT_optimise)
+
+
+def register() -> None:
+    for each in CLASSES:
+        bpy.utils.register_class(each)
+
+
+def unregister() -> None:
+    for each in reversed(CLASSES):
+        bpy.utils.unregister_class(each)

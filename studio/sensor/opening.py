@@ -1,0 +1,67 @@
+"""From a design folder that the engine wrote to a scene."""
+
+from __future__ import annotations
+
+import uuid
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import bpy
+
+from ..core import mesh_file
+from ..engine import handing, session
+from ..lights.windows import ask_for_windows
+from ..scene.build import build
+from ..scene.views import show_design
+
+
+def new_stage() -> Path:
+    """A folder of the engine's, not there yet, for a design on its way.
+
+    Raises:
+        EngineError: there is no engine.
+    """
+    return Path(session.folder()) / f"stage-{uuid.uuid4().hex[:8]}"
+
+
+def open_stage(
+    scene: bpy.types.Scene,
+    stage: Path,
+    *,
+    wait: bool,
+    folder: str = "",
+    then: Callable[[bpy.types.Scene], None] | None = None,
+) -> bool:
+    """Open what the engine wrote into a stage, as the job that the panels show.
+
+    Args:
+        scene: where to.
+        stage: the folder.
+        wait: until it is there.
+        folder: the user's own folder of it; empty where it is not saved.
+        then: called when it is open.
+    """
+    name = scene.name
+
+    def opened(result: dict[str, Any]) -> None:
+        scene = bpy.data.scenes.get(name)
+        if scene is None:
+            return
+        document = handing.without_nulls(result["data"])
+        parts = document["parts"].items()
+        build(scene, document, {key: mesh_file.read(stage / part["mesh"]) for key, part in parts})
+        scene.optisense.folder = folder or str(stage)
+        scene.optisense.is_saved = bool(folder)
+        show_design(scene)
+        ask_for_windows(scene)
+        warnings = result.get("warnings") or []
+        session.state().note = "; ".join(each.get("message", "") for each in warnings)
+        if then is not None:
+            then(scene)
+        session.push_undo(f"Open {document['name']}")
+        session.redraw()
+
+    return session.start_job(
+        "Opening the sensor", "open", opened, wait=wait, design=str(stage), name="opened"
+    )

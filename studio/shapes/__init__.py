@@ -1,0 +1,1 @@
+"""Shapes: meshes, references, parts, cages."""

@@ -1,0 +1,263 @@
+"""Cages: make, bend, bound, remove."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+import bpy
+import numpy as np
+from bpy.props import EnumProperty, IntVectorProperty
+
+from ..core import cage as core
+from ..core.numbers import kept_array
+from ..engine import polls
+from ..scene.cages import (
+    add_cage,
+    as_points,
+    cage_data,
+    cage_values,
+    current_points,
+    follow,
+    lock,
+    set_points,
+    shown_points,
+)
+from ..scene.collections import object_of, objects_of
+from ..scene.gather import free_name, part_names
+from ..scene.meshes import REST, part_mesh, remembered, show_vertices
+
+
+def _cage(
+    operator: type[bpy.types.Operator], context: bpy.types.Context
+) -> bpy.types.Object | None:
+    """The active cage, or the one around the active part."""
+    active = context.active_object
+    if active is not None and active.optisense.kind == "CAGE":
+        return active
+    if active is not None and active.optisense.kind == "PART":
+        for cage in objects_of(context.scene, "CAGE"):
+            if active.optisense.key in cage_data(cage)["parts"]:
+                return cage
+    operator.poll_message_set("Select a cage, or a part that is in one")
+    return None
+
+
+class OPTISENSE_OT_new_cage(bpy.types.Operator):
+    """Put a cage of control points around the selected parts"""
+
+    bl_idname = "optisense.new_cage"
+    bl_label = "Create a New Cage"
+    bl_options = {"REGISTER", "UNDO"}
+
+    resolution: IntVectorProperty(
+        name="Points along x, y, z", size=3, min=2, max=64, soft_max=9, default=(3, 3, 3)
+    )
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        if not (polls.has_design(cls, context) and polls.in_object_mode(cls, context)):
+            return False
+        parts = polls.selected(cls, context, "PART", what="the parts to bend")
+        if not parts:
+            return False
+        caged = {n for c in objects_of(context.scene, "CAGE") for n in cage_data(c)["parts"]}
+        if any(each.optisense.key in caged for each in parts):
+            cls.poll_message_set("A selected part is in a cage already")
+            return False
+        return True
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        scene = context.scene
+        if np.prod(self.resolution) > 20_000:
+            self.report({"ERROR"}, "More than 20,000 control points")
+            return {"CANCELLED"}
+        named = {part: name for name, part in part_names(scene).items()}
+        parts = [each for each in context.selected_objects if each.optisense.kind == "PART"]
+        corners = []
+        for part in parts:
+            part.optisense.key = named[part]
+            vertices = part_mesh(part, caged=False).vertices
+            corners += [vertices.min(axis=0), vertices.max(axis=0)]
+        lower, upper = np.min(corners, axis=0), np.max(corners, axis=0)
+        thin = upper - lower < 1e-3  # a flat sheet needs a box with some height
+        lower, upper = lower - 0.5 * thin, upper + 0.5 * thin
+        box = np.array([lower, upper])
+        resolution = tuple(self.resolution)
+        taken = [each.optisense.key for each in objects_of(scene, "CAGE")]
+        key = free_name(parts[0].optisense.key, taken)
+        values = {
+            "parts": [part.optisense.key for part in parts],
+            "resolution": list(resolution),
+            "box": box.tolist(),
+            "points": as_points(core.rest_points(box, resolution)),
+        }
+        cage = add_cage(scene, key, values)
+        for each in context.selected_objects:
+            each.select_set(False)
+        cage.select_set(True)
+        context.view_layer.objects.active = cage
+        return {"FINISHED"}
+
+
+class OPTISENSE_OT_edit_shape(bpy.types.Operator):
+    """Move control points; the parts in the cage follow. Press again, or Tab, to end"""
+
+    bl_idname = "optisense.edit_shape"
+    bl_label = "Edit Shape"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return _cage(cls, context) is not None
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        cage = _cage(type(self), context)
+        if cage.mode == "EDIT":
+            bpy.ops.object.mode_set(mode="OBJECT")
+            return {"FINISHED"}
+        if context.mode != "OBJECT":
+            bpy.ops.object.mode_set(mode="OBJECT")
+        for each in context.selected_objects:
+            each.select_set(False)
+        cage.hide_set(False)
+        cage.select_set(True)
+        context.view_layer.objects.active = cage
+        bpy.ops.object.mode_set(mode="EDIT")
+        bpy.ops.mesh.select_mode(type="VERT")
+        bpy.ops.mesh.select_all(action="DESELECT")
+        return {"FINISHED"}
+
+
+class OPTISENSE_OT_set_bound(bpy.types.Operator):
+    """Take the present shape as one end of the range that A blends and searches use"""
+
+    bl_idname = "optisense.set_bound"
+    bl_label = "Set Bound"
+    bl_options = {"REGISTER", "UNDO"}
+
+    bound: EnumProperty(items=[("c_min", "C_min", "A = 0"), ("c_max", "C_max", "A = 1")])
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return _cage(cls, context) is not None
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        cage = _cage(type(self), context)
+        shown = shown_points(cage)
+        try:
+            values = cage_values(cage)
+        except ValueError as error:
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+        now = kept_array(current_points(values), shown)
+        values[self.bound] = as_points(now)
+        values.pop("blend", None)
+        values["points"] = as_points(now)
+        cage.optisense.data = json.dumps(values)
+        return {"FINISHED"}
+
+
+class OPTISENSE_OT_blend(bpy.types.Operator):
+    """Give the cage the shape (1 - A) C_min + A C_max, with the slider for A"""
+
+    bl_idname = "optisense.blend"
+    bl_label = "Blend C_min and C_max"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        cage = _cage(cls, context)
+        if cage is None:
+            return False
+        values = cage_data(cage)
+        if not (values.get("c_min") and values.get("c_max")):
+            cls.poll_message_set("Set C_min and C_max first")
+            return False
+        return True
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        cage = _cage(type(self), context)
+        cage.optisense.blend = cage.optisense.blend  # the update shows and follows
+        return {"FINISHED"}
+
+
+class OPTISENSE_OT_rest_cage(bpy.types.Operator):
+    """Put all control points back: the parts take their undeformed shape"""
+
+    bl_idname = "optisense.rest_cage"
+    bl_label = "Back to Rest"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return _cage(cls, context) is not None
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        cage = _cage(type(self), context)
+        values = cage_data(cage)
+        points = core.rest_points(values["box"], tuple(values["resolution"]))
+        values.pop("blend", None)
+        values["points"] = as_points(points)
+        cage.optisense.data = json.dumps(values)
+        try:
+            set_points(cage, points)
+        except ValueError:
+            self.report({"ERROR"}, "Control points were added or removed; undo that first")
+            return {"CANCELLED"}
+        follow(context.scene, cage)
+        return {"FINISHED"}
+
+
+class OPTISENSE_OT_remove_cage(bpy.types.Operator):
+    """Remove the cage; its parts go back to rest"""
+
+    bl_idname = "optisense.remove_cage"
+    bl_label = "Remove Cage"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return polls.in_object_mode(cls, context) and _cage(cls, context) is not None
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        cage = _cage(type(self), context)
+        for name in cage_data(cage)["parts"]:
+            part = object_of(context.scene, "PART", name)
+            rest = None if part is None else remembered(part.data, REST)
+            if part is not None and rest is not None:
+                show_vertices(part.data, rest)
+                lock(part, False)
+        bpy.data.objects.remove(cage)
+        return {"FINISHED"}
+
+
+def active_cage(context: bpy.types.Context) -> tuple[bpy.types.Object, dict[str, Any]] | None:
+    """The cage that the panel shows, with its values."""
+    active = context.active_object
+    cages = objects_of(context.scene, "CAGE")
+    for cage in cages:
+        values = cage_data(cage)
+        if cage == active or (active is not None and active.optisense.key in values["parts"]):
+            return cage, values
+    return None
+
+
+CLASSES = (
+    OPTISENSE_OT_new_cage,
+    OPTISENSE_OT_edit_shape,
+    OPTISENSE_OT_set_bound,
+    OPTISENSE_OT_blend,
+    OPTISENSE_OT_rest_cage,
+    OPTISENSE_OT_remove_cage,
+)
+
+
+def register() -> None:
+    for each in CLASSES:
+        bpy.utils.register_class(each)
+
+
+def unregister() -> None:
+    for each in reversed(CLASSES):
+        bpy.utils.unregister_class(each)

@@ -1,0 +1,225 @@
+"""Bring in meshes, and say what they are for."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import bpy
+import numpy as np
+from bpy.props import EnumProperty, FloatProperty, StringProperty
+
+from ..core import mesh_file
+from ..core.engine import EngineError
+from ..core.mesh_file import Mesh
+from ..engine import polls, session
+from ..scene import kinds
+from ..scene.build import add_material, add_part
+from ..scene.collections import REFERENCE, collection
+from ..scene.contacts import add_contact, sensing_surface
+from ..scene.gather import free_name, part_names
+from ..scene.meshes import new_mesh, part_mesh
+
+PLACES = ("camera", "light")
+"""References that lights and the camera are placed by; the others become parts."""
+
+FIRST_MATERIAL: dict[str, tuple[str, dict[str, Any]]] = {
+    "elastomer": ("silicone", {"kind": "dielectric", "ior": 1.41, "roughness": 0.0}),
+    "support": ("acrylic", {"kind": "dielectric", "ior": 1.491, "roughness": 0.0}),
+    "interface": ("acrylic", {"kind": "dielectric", "ior": 1.491, "roughness": 0.0}),
+    "mirror": (
+        "mirror-aluminium",
+        {
+            "kind": "conductor",
+            "eta": [1.43, 0.922, 0.686],
+            "k": [7.508, 6.373, 5.635],
+            "roughness": 0.0,
+        },
+    ),
+}
+"""What a new part is made of until the user chooses: silicone (1.41), PMMA (1.491), and
+aluminium (the index of the diffuse-grey coating's flake); a blocker absorbs."""
+
+
+class OPTISENSE_OT_add_mesh(bpy.types.Operator):
+    """Read a mesh file (OBJ, STL, PLY) into the collection Reference"""
+
+    bl_idname = "optisense.add_mesh"
+    bl_label = "Add .obj Mesh"
+    bl_options = {"REGISTER", "UNDO"}
+
+    filepath: StringProperty(subtype="FILE_PATH")
+    filter_glob: StringProperty(default="*.obj;*.stl;*.ply;*.3mf;*.step;*.stp", options={"HIDDEN"})
+    scale: FloatProperty(
+        name="Scale", description="From the file's units to mm", min=1e-6, max=1e6, default=1.0
+    )
+
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        context.window_manager.fileselect_add(self)
+        return {"RUNNING_MODAL"}
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        path = Path(bpy.path.abspath(self.filepath)).resolve()
+        try:
+            result = session.ask_and_wait("mesh", file=str(path), scale=self.scale)
+        except EngineError as error:
+            session.say(error)
+            self.report({"ERROR"}, error.text())
+            return {"CANCELLED"}
+        files = result["mesh"]
+        vertices = np.load(files["vertices"]).astype(np.float64)
+        mesh = Mesh(vertices, np.load(files["faces"]).astype(np.int32))
+        item = bpy.data.objects.new(path.stem, new_mesh(path.stem, mesh))
+        item.optisense.kind = "REFERENCE"
+        item.optisense.reference = "support" if result.get("closed") else "sensing_surface"
+        item.color = (0.6, 0.6, 0.6, 0.5)
+        collection(context.scene, REFERENCE).objects.link(item)
+        for each in context.selected_objects:
+            each.select_set(False)
+        item.select_set(True)
+        context.view_layer.objects.active = item
+        return {"FINISHED"}
+
+
+class OPTISENSE_OT_set_reference(bpy.types.Operator):
+    """Say what the selected meshes are for; all but camera and light references become parts"""
+
+    bl_idname = "optisense.set_reference"
+    bl_label = "Set as Reference"
+    bl_options = {"REGISTER", "UNDO"}
+
+    reference: EnumProperty(name="Reference", items=kinds.REFERENCES)
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        if not (polls.has_design(cls, context) and polls.in_object_mode(cls, context)):
+            return False
+        return bool(_meshes(cls, context))
+
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        return context.window_manager.invoke_props_dialog(self)
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        scene = context.scene
+        for item in _meshes(type(self), context):
+            _into(scene, item, REFERENCE)
+            item.optisense.kind = "REFERENCE"
+            item.optisense.reference = self.reference
+            if self.reference == "indenter":
+                _press(self, scene, item)
+            elif self.reference not in PLACES:
+                make_part(scene, item, self.reference)
+                item.hide_set(True)
+        return {"FINISHED"}
+
+
+def _meshes(
+    operator: type[bpy.types.Operator], context: bpy.types.Context
+) -> list[bpy.types.Object]:
+    found = [
+        each
+        for each in context.selected_objects
+        if each.type == "MESH" and each.optisense.kind in ("NONE", "REFERENCE")
+    ]
+    if not found:
+        operator.poll_message_set("Select a mesh first that is no part of the sensor yet")
+    return found
+
+
+def _into(scene: bpy.types.Scene, item: bpy.types.Object, name: str) -> None:
+    target = collection(scene, name)
+    for each in list(item.users_collection):
+        if each != target:
+            each.objects.unlink(item)
+    if item.name not in target.objects:
+        target.objects.link(item)
+
+
+def make_part(scene: bpy.types.Scene, item: bpy.types.Object, role: str) -> bpy.types.Object:
+    """A part of the sensor in the shape of a reference, made of what is usual for its role."""
+    design = scene.optisense
+    key = free_name(item.name, part_names(scene))
+    values: dict[str, Any] = {"role": role, "mesh": f"meshes/{key}.obj"}
+    if role in FIRST_MATERIAL:
+        name, material = FIRST_MATERIAL[role]
+        if name not in design.materials:
+            add_material(design, name, material)
+        values["material"] = name
+    part = add_part(scene, key, values, part_mesh(item, caged=False))
+    part.select_set(True)
+    return part
+
+
+def _press(operator: bpy.types.Operator, scene: bpy.types.Scene, item: bpy.types.Object) -> None:
+    """A contact in the shape of a mesh; the mesh goes to a file, which the engine reads."""
+    surface = sensing_surface(scene)
+    if surface is None:
+        operator.report({"WARNING"}, "There is no sensing surface to press on")
+        return
+    folder = Path(session.folder()) / "indenters"
+    path = folder / f"{free_name(item.name, ())}.obj"
+    mesh_file.write(part_mesh(item, caged=False), path)
+    found, point, normal, _ = surface.closest_point_on_mesh((0.0, 0.0, 0.0))
+    if found:
+        contact = add_contact(scene, tuple(surface.matrix_world @ point), tuple(-normal))
+        contact.optisense.file = str(path)
+        contact.optisense.indenter = "mesh"
+
+
+class OPTISENSE_OT_remove_part(bpy.types.Operator):
+    """Take the selected parts out of the sensor; their references stay"""
+
+    bl_idname = "optisense.remove_part"
+    bl_label = "Remove from Sensor"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return polls.in_object_mode(cls, context) and bool(
+            polls.selected(cls, context, "PART", what="a part")
+        )
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        for each in list(context.selected_objects):
+            if each.optisense.kind == "PART":
+                bpy.data.objects.remove(each)
+        return {"FINISHED"}
+
+
+class OPTISENSE_OT_flip(bpy.types.Operator):
+    """Turn the selected surfaces around: a sensing surface must face into the sensor"""
+
+    bl_idname = "optisense.flip"
+    bl_label = "Flip Normals"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return polls.in_object_mode(cls, context) and bool(
+            polls.selected(cls, context, "PART", "REFERENCE", what="a part")
+        )
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        for each in context.selected_objects:
+            if each.optisense.kind in ("PART", "REFERENCE") and each.type == "MESH":
+                each.data.flip_normals()
+                each.data.update()
+        return {"FINISHED"}
+
+
+CLASSES = (
+    OPTISENSE_OT_add_mesh,
+    OPTISENSE_OT_set_reference,
+    OPTISENSE_OT_remove_part,
+    OPTISENSE_OT_flip,
+)
+
+
+def register() -> None:
+    for each in CLASSES:
+        bpy.utils.register_class(each)
+
+
+def unregister() -> None:
+    for each in reversed(CLASSES):
+        bpy.utils.unregister_class(each)

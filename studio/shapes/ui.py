@@ -1,0 +1,72 @@
+"""Step 2 in the sidebar."""
+
+from __future__ import annotations
+
+import bpy
+
+from ..engine.layout import SidebarPanel
+from .cage_operator import active_cage
+
+
+class OPTISENSE_PT_shapes(SidebarPanel, bpy.types.Panel):
+    bl_idname = "OPTISENSE_PT_shapes"
+    bl_label = "Shapes"
+    bl_order = 2
+
+    def draw(self, context: bpy.types.Context) -> None:
+        layout = self.layout
+        column = layout.column(align=True)
+        column.operator("optisense.add_mesh", icon="IMPORT")
+        column.operator("optisense.set_reference", icon="PINNED")
+        active = context.active_object
+        if active is not None and active.optisense.kind == "PART":
+            _part(layout.box(), active)
+        box = layout.box()
+        box.label(text="Cage", icon="MESH_GRID")
+        column = box.column(align=True)
+        column.operator("optisense.new_cage", icon="ADD")
+        editing = context.mode == "EDIT_MESH"
+        column.operator(
+            "optisense.edit_shape",
+            text="End Editing" if editing else "Edit Shape",
+            icon="EDITMODE_HLT",
+        )
+        found = active_cage(context)
+        if found is not None:
+            _cage(box, *found)
+
+
+def _part(layout: bpy.types.UILayout, part: bpy.types.Object) -> None:
+    layout.label(text=part.optisense.key or part.name, icon="MESH_DATA")
+    column = layout.column()
+    column.use_property_split = True
+    column.use_property_decorate = False
+    column.prop(part.optisense, "role")
+    column.prop(part.optisense, "priority")
+    row = layout.row(align=True)
+    row.operator("optisense.flip", icon="UV_SYNC_SELECT")
+    row.operator("optisense.remove_part", text="", icon="X")
+
+
+def _cage(layout: bpy.types.UILayout, cage: bpy.types.Object, values: dict) -> None:
+    along = " x ".join(str(count) for count in values["resolution"])
+    layout.label(text=f"{cage.optisense.key}: {along}, bends {', '.join(values['parts'])}")
+    row = layout.row(align=True)
+    for bound, name in (("c_min", "C_min"), ("c_max", "C_max")):
+        icon = "CHECKMARK" if values.get(bound) else "BLANK1"
+        row.operator("optisense.set_bound", text=f"Set {name}", icon=icon).bound = bound
+    if isinstance(values.get("blend"), (int, float)):
+        layout.prop(cage.optisense, "blend", text="A", slider=True)
+    elif values.get("c_min") and values.get("c_max"):
+        layout.operator("optisense.blend")
+    row = layout.row(align=True)
+    row.operator("optisense.rest_cage", icon="LOOP_BACK")
+    row.operator("optisense.remove_cage", text="", icon="X")
+
+
+def register() -> None:
+    bpy.utils.register_class(OPTISENSE_PT_shapes)
+
+
+def unregister() -> None:
+    bpy.utils.unregister_class(OPTISENSE_PT_shapes)
