@@ -92,10 +92,10 @@ class TestChecks:
         cage_problems(svelte)
         times = []
         for _ in range(5):
-            began = time.perf_counter()
+            began = time.process_time()
             assert cage_problems(svelte) == []
-            times.append(time.perf_counter() - began)
-        assert min(times) < 0.1  # 0.015 s on an idle machine
+            times.append(time.process_time() - began)
+        assert min(times) < 0.1  # 0.015 s of processor time
 
 
 class TestEditing:
