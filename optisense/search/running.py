@@ -291,8 +291,8 @@ class Run:
         else:
             self._done += 1
             self._failed += outcome.failed
-        if outcome.failure is not None:
-            self._reasons[outcome.failure] += 1
+            if outcome.failure is not None:
+                self._reasons[outcome.failure] += 1
         if not outcome.failed:
             self._best = score if math.isnan(self._best) else max(self._best, score)
         enough = ALL_FAIL_WITH_START if math.isnan(self._start_score) else ALL_FAIL

@@ -43,7 +43,7 @@ def test_grid_scores_every_combination(mini: SensorDesign, goals: ModuleType) ->
 
 def test_progress_tells_of_best_rate_and_time_left(mini: SensorDesign, goals: ModuleType) -> None:
     seen: list[Progress] = []
-    search(mini, SPACE, goals.told, budget=40, progress=seen.append)
+    search(mini, SPACE, goals.nearness, budget=40, progress=seen.append)
     last = [each for each in seen if each.stage == "trials"][-1]
     assert last.total == 40
     assert 0 < last.done <= 40
@@ -79,7 +79,7 @@ def test_stops_early_when_every_trial_fails(
 ) -> None:
     with pytest.raises(SearchError, match="no such sensor can be made") as told:
         search(mini, SPACE, goals.broken, budget=1000, out=tmp_path / "study")
-    assert "have failed" in told.value.message
+    assert "all 5 trials so far have failed, 5 of them" in told.value.message
     study = Study.open(tmp_path / "study")
     assert 1 <= len(study.trials) <= 6
     with pytest.raises(SearchError, match="'best'"):
