@@ -65,13 +65,13 @@ def dataset(model: ots.OpticalModel) -> None:
 
 def misalignment(model: ots.OpticalModel) -> None:
     """Read against true angles."""
-    settings = SampleSettings(count=100, resolution=(32, 24), photons=PHOTONS)
+    settings = SampleSettings(count=80, resolution=(32, 24), photons=PHOTONS)
     _save(draw_perception(perceive(Misalignment(), model, settings)), "task-misalignment")
 
 
 def reconstruction(model: ots.OpticalModel) -> None:
     """Three shapes that the network was not fitted to."""
-    settings = ReconstructionSettings(resolution=(240, 180), photons=PHOTONS)
+    settings = ReconstructionSettings(resolution=(160, 120), photons=PHOTONS)
     result = reconstruct(model, settings)
     _save(draw_reconstruction(result, model.design.camera.axes()), "task-reconstruction")
 

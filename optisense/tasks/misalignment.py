@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,12 +20,12 @@ THICKNESS = 2.0
 """mm of the plate."""
 
 RAYS = 32, 24
-"""Of the camera, that tell how far it sees."""
+"""Of the camera, that tell how far it sees and what a plane covers."""
 
 MARGIN = 0.5
 """mm that the plate reaches beyond the outermost of these rays."""
 
-LEAST_SHARE = 0.5
+LEAST_SHARE = 0.9
 """Of the crop, that must show the plane."""
 
 
@@ -89,10 +89,15 @@ class Misalignment:
 
         Raises:
             ContactError: the plane would go through the gel.
+            TaskError: it would not cover the crop.
         """
+        from optisense.optics.surfaces import Region
+
         for angle_x in (-self.range, self.range):
             for angle_y in (-self.range, self.range):
-                plane_contact(model, angle_x, angle_y, self.depth)
+                contact = plane_contact(model, angle_x, angle_y, self.depth)
+                rays = model.chief_rays(RAYS, [contact])
+                self._ensure_covered(rays.hit & (rays.region == Region.INDENTER))
 
     def contact(
         self, model: OpticalModel, rng: np.random.Generator
@@ -107,16 +112,25 @@ class Misalignment:
         Raises:
             TaskError: less than LEAST_SHARE of the crop shows the plane.
         """
-        rows, columns = (central(length, self.crop) for length in picture.shape[:2])
-        touched = image.contact_mask[rows, columns]
+        touched = self._ensure_covered(image.contact_mask)
+        middle = self._middle(picture)[touched]
+        mean: list[float] = middle.mean(axis=0, dtype=np.float64).tolist()
+        return mean
+
+    def _middle(self, values: NDArray[Any]) -> NDArray[Any]:
+        """The crop of (h, w, ...)."""
+        rows, columns = (central(length, self.crop) for length in values.shape[:2])
+        return values[rows, columns]
+
+    def _ensure_covered(self, contact_mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
+        """The crop of a contact mask (h, w), or an error if too little of it is true."""
+        touched = self._middle(contact_mask)
         if touched.mean() < LEAST_SHARE:
             raise TaskError(
                 f"the plane covers only {100 * touched.mean():.0f} % of the crop",
                 hint="Press deeper, at smaller angles, or average a smaller crop",
             )
-        middle = picture[rows, columns][touched]
-        mean: list[float] = middle.mean(axis=0, dtype=np.float64).tolist()
-        return mean
+        return touched
 
 
 def central(length: int, part: float) -> slice:

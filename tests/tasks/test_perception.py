@@ -134,6 +134,8 @@ def test_what_cannot_work_is_told_before_any_picture(lambertian: Any) -> None:
         perceive(Misalignment(range=30), lambertian, QUIET)
     with pytest.raises(ContactError, match="thick"):
         perceive(CylinderRadius(depth=5), lambertian, QUIET)
+    with pytest.raises(TaskError, match=r"covers only \d+ % of the crop"):
+        perceive(Misalignment(depth=0.05), lambertian, QUIET)
     with pytest.raises(TaskError, match="make no sense"):
         perceive(Misalignment(), lambertian, SampleSettings(count=8))
     with pytest.raises(TaskError, match="make no sense"):
