@@ -139,10 +139,11 @@ class CurvedMirror:
             DesignError: even the flat mirror is closer.
         """
         skin = shapely.Polygon(obstacle)
+        shapely.prepare(skin)
 
         def too_near(sagittas: FloatArray) -> NDArray[np.bool_]:
             curves = shapely.linestrings([self.curve(sagitta) for sagitta in sagittas])
-            return np.asarray(shapely.dwithin(curves, skin, clearance))
+            return np.asarray(shapely.dwithin(skin, curves, clearance))
 
         if too_near(np.zeros(1))[0]:
             gap = shapely.LineString(self.curve(0.0)).distance(skin)
