@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 from pydantic import ValidationError
+from scipy.spatial import cKDTree
 
 from optisense import library
 from optisense.design import Camera, LightGroup, Provenance, Role, Status
@@ -71,8 +72,7 @@ def _note_crowded(bench: Bench, name: str, group: LightGroup) -> None:
     if package is None or len(group.lights) < 2:
         return
     places = np.array([light.position for light in group.lights])
-    apart = np.linalg.norm(places[:, None] - places[None], axis=2)
-    nearest = float(apart[np.triu_indices(len(places), 1)].min())
+    nearest = float(cKDTree(places).query(places, k=2)[0][:, 1].min())
     if nearest < min(package[:2]) - 1e-6:
         bench.notes.append(
             f"lights {name}: they are {nearest:.2f} mm apart, but a {group.model} is "

@@ -38,6 +38,11 @@ Angle = Annotated[Number, Field(ge=0.0, le=180.0)]
 Turn = Annotated[Number, Field(ge=-720.0, le=720.0)]
 Pixels = Annotated[Count, Field(le=65_536)]
 
+MOST_LIGHTS = 10_000
+"""In a group; more are a slip."""
+
+Lights = Annotated[Count, Field(le=MOST_LIGHTS)]
+
 
 def _colour(value: Any) -> str | tuple[float, float, float]:
     if isinstance(value, str):
@@ -62,7 +67,7 @@ def _one_or_two(least: float, whole: bool, form: str) -> PlainValidator:
         return (
             isinstance(value, kinds)
             and not isinstance(value, bool)
-            and (value >= least if whole else least < value < float("inf"))
+            and (least <= value <= MOST_LIGHTS if whole else least < value < float("inf"))
         )
 
     def read(value: Any) -> Any:
@@ -80,7 +85,9 @@ ColourWord = Annotated[str | tuple[float, float, float], PlainValidator(_colour)
 
 CountOrTwo = Annotated[
     int | tuple[int, int],
-    _one_or_two(1, True, "must be a whole number from 1, or two of them: [along, across]"),
+    _one_or_two(
+        1, True, f"must be a whole number from 1 to {MOST_LIGHTS}, or two of them: [along, across]"
+    ),
 ]
 PitchOrTwo = Annotated[
     float | tuple[float, float],
@@ -136,7 +143,7 @@ class Row(Model):
     along: Literal["x", "y", "z"] | None = Field(
         default=None, description="the row runs this way; the longer one if left out"
     )
-    count: Count
+    count: Lights
     pitch: Positive | None = Field(
         default=None, description="mm between lights; spread over the side if left out"
     )
@@ -157,7 +164,7 @@ class Ring(Model):
 
     part: Name = Field(description="around the middle of this part")
     axis: Side = Field(default="+z", description="of the circle")
-    count: Count
+    count: Lights
     radius: Positive | None = Field(
         default=None, description="mm; half the part's width plus gap if left out"
     )
@@ -185,6 +192,12 @@ class Over(Shape):
     direction: Annotated[Direction, or_words("normal", "-normal")] = Field(
         default="normal", description="normal; -normal; or a direction for all"
     )
+
+    @model_validator(mode="after")
+    def _not_too_many(self) -> Over:
+        if isinstance(self.count, tuple) and self.count[0] * self.count[1] > MOST_LIGHTS:
+            raise ValueError(f"{self.count[0]} x {self.count[1]} are more than {MOST_LIGHTS}")
+        return self
 
 
 class LightChoice(Model):

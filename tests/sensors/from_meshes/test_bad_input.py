@@ -119,6 +119,13 @@ class TestRecipes:
             ("role: sensing_surface", "role: blocker", 2, "no part is a sensing_surface"),
             ("part: plate", "part: plat", 7, "there is no part 'plat'"),
             ("count: 4", "count: 0", 7, "greater than or equal to 1"),
+            ("count: 4", "count: 1000000", 7, "less than or equal to 10000"),
+            (
+                "row: {part: plate, side: +y, count: 4, pitch: 4.5}",
+                "over: {faces_of: plate, towards: +y, count: [200, 200]}",
+                7,
+                "200 x 200 are more",
+            ),
             ("side: +y", "side: y+", 7, "must be one of +x"),
             ("colour: red", "colour: pink", 7, "unknown colour"),
             ("row:", "rows:", 7, "unknown field"),
