@@ -64,7 +64,8 @@ def print_result(result: Result, out: Path) -> None:
         output.print("no trial has a score yet")
         return
     name = study.objective
-    line = f"best: trial {best.number}, {name} {best.score:.4g}"
+    said = "best so far" if result.interrupted else "best"
+    line = f"{said}: trial {best.number}, {name} {best.score:.4g}"
     if start is not None and math.isfinite(start.score):
         line += f" (start {start.score:.4g})"
     output.print(line, markup=False)

@@ -329,6 +329,7 @@ def _check_free(folder: Path) -> None:
 
     Raises:
         SearchError: it does.
+        OutputError: it is no folder.
     """
     if (folder / STUDY_FILE).exists():
         raise SearchError(
@@ -336,6 +337,8 @@ def _check_free(folder: Path) -> None:
             where=str(folder),
             hint="Go on with it by --resume, or name another folder",
         )
+    if folder.exists() and not folder.is_dir():
+        raise OutputError("this is a file, not a folder", where=str(folder))
     if folder.is_dir() and any(folder.iterdir()):
         raise SearchError(
             "the folder is not empty", where=str(folder), hint="Name a folder that doesn't exist"

@@ -151,6 +151,23 @@ def test_the_best_is_scored_again_before_it_is_named(mini: SensorDesign) -> None
     assert result.start.fresh
 
 
+def test_several_goals_are_weighed(mini: SensorDesign, goals: ModuleType) -> None:
+    """Dull and shiny can't both be had: the front runs from one to the other."""
+    both = [goals.nearness, goals.brightness]
+    result = search(mini, SPACE, both, method="pareto", budget=120, seed=1)
+    scores = np.array([list(trial.scores.values()) for trial in result.front])
+    assert len(scores) > 5
+    assert (np.diff(scores[:, 0]) <= 0).all()  # the best in the first goal comes first,
+    assert (np.diff(scores[:, 1]) >= 0).all()  # and what it costs is won in the second
+    assert np.ptp(scores[:, 1]) > 0.5
+    for trial in result.trials:
+        values = list(trial.scores.values())
+        assert not ((values >= scores) & (np.array(values) != scores)).all(axis=1).any()
+    plain = search(mini, SPACE, both, budget=30)
+    assert set(plain.best.scores) == {"nearness", "brightness"}
+    assert plain.best.score == max(trial.score for trial in plain.trials)
+
+
 class TestResume:
     def test_a_larger_budget_goes_on_where_it_ended(
         self, mini: SensorDesign, goals: ModuleType, tmp_path: Path
