@@ -9,7 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from optisense import OpticalModel, SensorDesign, load
+from optisense import OpticalModel, SensorDesign, library, load
+from optisense.design import LightGroup
 from optisense.errors import ContactError, TaskError
 from optisense.tasks import ContactDraw, Dataset, DatasetSettings, generate
 
@@ -170,3 +171,25 @@ def test_a_missing_mesh_is_told_before_anything_is_written(
 def test_a_folder_without_a_dataset_is_an_error(tmp_path: Path) -> None:
     with pytest.raises(TaskError, match="no dataset"):
         Dataset.load(tmp_path)
+
+
+LAMP = "IESNA:LM-63-2002\n[MANUFAC] us\nTILT=NONE\n1 -1 1 3 1 1 2 0 0 0\n1 1 5\n0 45 90\n0\n9 5 0\n"
+
+
+def test_a_dataset_of_a_sensor_with_an_own_lamp_opens_and_continues_elsewhere(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("OPTISENSE_LIBRARY", str(tmp_path / "own"))
+    (tmp_path / "our-lamp.ies").write_text(LAMP)
+    red = (1.0, 0.0, 0.0)
+    library.add_ies(tmp_path / "our-lamp.ies", flux=4.0, colour=red, colour_name="red")
+    design = load("gelsight-mini")
+    lamps = design.lights["red"].model_dump() | {"model": "our-lamp"}
+    design.lights["red"] = LightGroup.model_validate(lamps)
+    settings = replace(SETTINGS, radiance=False)
+    folder = tmp_path / "data"
+    generate(OpticalModel(design), folder, 1, settings)
+    assert len(generate(OpticalModel(design), folder, 2, settings)) == 2
+    # Another machine has the folder, and not the lamp.
+    monkeypatch.setenv("OPTISENSE_LIBRARY", str(tmp_path / "elsewhere"))
+    assert len(generate(OpticalModel(load(folder / "design")), folder, 3, settings)) == 3
