@@ -18,7 +18,7 @@ PHOTONS = 1_000_000
 """Of a picture on the page: enough to look at."""
 
 ACROSS = 320
-"""Pixels across a picture and the rays that tell the coverage."""
+"""Pixels across a picture."""
 
 
 @dataclass(frozen=True)
@@ -49,7 +49,7 @@ def look(
 
     Args:
         design: the sensor.
-        settings: of the objectives, whose ball and depth are taken.
+        settings: of the objectives, whose ball, depth and resolution of the rays are taken.
         photons: to trace.
         seed: of the light.
 
@@ -58,20 +58,20 @@ def look(
     """
     from optisense.optics import OpticalModel
 
-    known = {key: (settings or {}).get(key) for key in ("radius", "depth")}
-    ball = Settings(**{key: value for key, value in known.items() if value is not None})
+    taken = ("radius", "depth", "ray_resolution")
+    shared = Settings(**{key: value for key, value in (settings or {}).items() if key in taken})
     width, height = design.camera.resolution
     size = ACROSS, max(1, round(ACROSS * height / width))
     try:
         model = OpticalModel(design)
-        score = evaluate(Evaluation(model, Settings(ray_resolution=size)), "aoap")
+        score = evaluate(Evaluation(model, shared), "aoap")
         if score.failure is not None:
             return Look(failure=score.failure)
         facts = {
             "upright rays (mean cosine)": score.parts["mean_cosine"],
             "pixels that see the surface": score.parts["pixels_that_see_the_surface"],
         }
-        contacts = model.nine_contacts(Sphere(ball.radius), ball.depth)
+        contacts = model.nine_contacts(Sphere(shared.radius), shared.depth)
         image = model.render(contacts, resolution=size, photons=photons, seed=seed)
     except SetupError:
         raise

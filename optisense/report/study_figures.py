@@ -206,7 +206,10 @@ def front(
 
 def sections(before: SensorDesign, after: SensorDesign) -> Figure:
     """The outlines of two designs in one cut, in the frame of the first."""
-    figure = new_figure(7.0, 5.0)
+    low, high = section(before).bounds
+    figure = new_figure(
+        8.5, float(np.clip(7.0 * (high - low)[1] / (high - low)[0], 2.0, 6.0)) + 0.6
+    )
     axes = figure.subplots()
     for design, colour, style, width, label in (
         (before, GREY, "--", 1.1, "before"),

@@ -1,0 +1,263 @@
+"""All 6,561 colourings of GelSight360, and five of them rendered by themselves.
+
+``python -m benchmarks.colourings [--photons MILLIONS] [--out STUDY] [--dry]`` writes
+colourings.json and colourings.md beside this file.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+import os
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from rich.console import Console
+
+import optisense
+from benchmarks.results import machine
+from optisense.design import SensorDesign, set_value
+from optisense.objectives import Evaluation, Settings
+from optisense.objectives.relighting import Relighting
+from optisense.optics import OpticalModel
+from optisense.search import Result, Trial, search
+
+FOLDER = Path(__file__).parent
+OBJECTIVES = ("rgb2normal", "normdiff")
+COLOURS = {"lights.lg*.colour": ["R", "G", "B"]}
+DRAWN = 5
+SEEDS = (101, 102, 103, 104)
+"""Of the images whose scatter is the noise."""
+OTHER_SEED = 999
+"""Of the colourings' own renderings."""
+TARGET_SECONDS = 600.0
+
+PAPERS = ("GRRGGRRG", "GBBRRGGB", "GRRBBGGR", "GBRBRGBR", "RGBRGBRG")
+"""The colourings of the OptiSense paper's table, the original first."""
+
+Scores = dict[str, float]
+
+
+def main() -> None:
+    """Search, draw five, render them, and write what came of it after each part."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--photons", type=float, default=5.0, help="millions an image")
+    parser.add_argument("--out", help="keep the study in this folder", metavar="STUDY")
+    parser.add_argument("--dry", action="store_true", help="print only, write no results")
+    options = parser.parse_args()
+    photons = round(options.photons * 1e6)
+    console = Console()
+    about = machine()
+    design = optisense.load("gelsight360")
+    began, spent = time.perf_counter(), time.process_time()
+    result = search(
+        design,
+        COLOURS,
+        list(OBJECTIVES),
+        method="light-colours",
+        settings={"photons": photons},
+        out=options.out,
+    )
+    total, processor = time.perf_counter() - began, time.process_time() - spent
+    trials = [trial for trial in result.trials if not trial.is_start]
+    seconds = [trial.outcome.seconds for trial in result.trials]
+    found: dict[str, Any] = {
+        "machine": {**about, "load_at_end": round(os.getloadavg()[0], 2)},
+        "colourings": len(trials),
+        "photons_an_image": photons,
+        "seconds": {
+            "all": round(total, 1),
+            "processor": round(processor, 1),
+            "layers": round(seconds[0], 1),
+            "a_colouring": round(float(np.median(seconds[1:])), 4),
+        },
+        "best": {name: _best(trials, name) for name in OBJECTIVES},
+        "of_the_paper": _of_the_paper(trials),
+        "after_fresh_seeds": {
+            "colouring": letters(result.best),
+            "rgb2normal": result.best.fresh_score(),
+            "standard_deviation": result.best.fresh_spread(),
+        },
+        "rendered_by_themselves": [],
+    }
+    if not options.dry:
+        write(found)
+    console.print(f"{len(trials):,} colourings in {total:.0f} s, {processor:.0f} s of processors")
+    for row in compared(result, trials, photons, console):
+        found["rendered_by_themselves"].append(row)
+        if not options.dry:
+            write(found)
+    console.print_json(json.dumps(found))
+
+
+def write(found: dict[str, Any]) -> None:
+    """Put a run among those of other numbers of photons."""
+    path = FOLDER / "colourings.json"
+    runs = json.loads(path.read_text()) if path.is_file() else {}
+    runs[str(found["photons_an_image"])] = found
+    path.write_text(json.dumps(runs, indent=2) + "\n")
+    (FOLDER / "colourings.md").write_text(markdown(runs))
+
+
+def letters(trial: Trial) -> str:
+    """The colours of the groups, as RGBRGBRG."""
+    return "".join(str(value)[0].upper() for value in _named(trial).values())
+
+
+def _named(trial: Trial) -> dict[str, str]:
+    shares = {"1,0,0": "R", "0,1,0": "G", "0,0,1": "B"}
+    return {name: shares.get(str(v), str(v)) for name, v in trial.values.items()}
+
+
+def _best(trials: list[Trial], name: str) -> dict[str, Any]:
+    best = max(trials, key=lambda trial: trial.scores[name])
+    values = [trial.scores[name] for trial in trials]
+    return {
+        "colouring": letters(best),
+        "score": best.scores[name],
+        "median_of_all": float(np.median(values)),
+        "worst": float(np.min(values)),
+    }
+
+
+def _of_the_paper(trials: list[Trial]) -> dict[str, Scores]:
+    known = {letters(trial): trial for trial in trials}
+    return {each: dict(known[each].scores) for each in PAPERS}
+
+
+def compared(
+    result: Result, trials: list[Trial], photons: int, console: Console
+) -> Iterator[dict[str, Any]]:
+    """Five colourings, drawn at random: scored from layers and rendered by themselves."""
+    drawn = np.random.default_rng(5).choice(len(trials), DRAWN, replace=False)
+    chosen = [trials[number] for number in drawn]
+    scatter: list[list[Scores]] = [[] for _ in chosen]
+    model = OpticalModel(result.study.space.design)
+    for seed in SEEDS:
+        relighting = Relighting(Evaluation(model, Settings(photons=photons, seed=seed)))
+        for number, trial in enumerate(chosen):
+            scatter[number].append(scores_of(relighting.lit(trial.design)))
+        console.print(f"seed {seed}: five colourings from layers")
+    for number, (trial, samples) in enumerate(zip(chosen, scatter, strict=True)):
+        own = rendered(trial.design, photons, OTHER_SEED)
+        again = rendered(trial.design, photons, result.study.settings.seed) if not number else {}
+        row: dict[str, Any] = {"colouring": letters(trial)}
+        for name in OBJECTIVES:
+            values = np.array([each[name] for each in samples])
+            noise = float(values.std(ddof=1))
+            row[name] = {
+                "in_the_search": trial.scores[name],
+                "rendered_with_the_same_seed": again.get(name),
+                "from_layers_other_seeds": float(values.mean()),
+                "noise": noise,
+                "rendered_with_another_seed": own[name],
+                "difference_in_noises": abs(own[name] - float(values.mean()))
+                / (noise * math.sqrt(1.0 + 1.0 / len(values))),
+            }
+        console.print(f"{letters(trial)} rendered by itself")
+        yield row
+
+
+def rendered(design: SensorDesign, photons: int, seed: int) -> Scores:
+    """Scores of a design from a model and images of its own."""
+    plain = set_value(design, "name", "by itself")
+    return scores_of(Evaluation(OpticalModel(plain), Settings(photons=photons, seed=seed)))
+
+
+def scores_of(evaluation: Evaluation) -> Scores:
+    """The values of both objectives."""
+    found = optisense.evaluate(evaluation, list(OBJECTIVES))
+    return {name: score.value for name, score in found.items()}
+
+
+def markdown(runs: dict[str, Any]) -> str:
+    """The results for people."""
+    lines = [
+        "# All colourings of GelSight360",
+        "",
+        "All 3^8 = 6,561 ways to make the eight light groups red, green or blue, by RGB2Normal",
+        "and NormDiff, from one rendering of each group. Made by `python -m",
+        f"benchmarks.colourings`. The goal is {TARGET_SECONDS:.0f} s on two cores, rendering",
+        "included. The time also holds scoring the best ones again with three fresh seeds.",
+        "Processor time is that of all threads; on a machine with nothing else to do the wall",
+        "time is below it.",
+        "",
+        "| photons | wall time | processor time | of it the layers | a colouring | load at start |",
+        "|---|---|---|---|---|---|",
+    ]
+    for found in runs.values():
+        seconds, about = found["seconds"], found["machine"]
+        each = seconds.get("a_colouring")
+        lines.append(
+            f"| {found['photons_an_image']:,} | {seconds['all']:.0f} s | "
+            f"{seconds['processor']:.0f} s | {_or_dash(seconds.get('layers'), ' s')} | "
+            f"{_or_dash(None if each is None else 1000 * each, ' ms')} | "
+            f"{about['load_at_start']} on {about['cores']} cores |"
+        )
+    about = next(iter(runs.values()))["machine"]
+    lines += ["", f"Measured on {about['date']}: {about['processor']}."]
+    for found in runs.values():
+        if "best" in found:
+            lines += _scores(found)
+        if found.get("rendered_by_themselves"):
+            lines += _agreement(found)
+    return "\n".join(lines) + "\n"
+
+
+def _scores(found: dict[str, Any]) -> list[str]:
+    lines = [
+        "",
+        f"## Scores, {found['photons_an_image']:,} photons",
+        "",
+        "| objective | best | its score | median of all | worst |",
+        "|---|---|---|---|---|",
+    ]
+    for name, best in found["best"].items():
+        lines.append(
+            f"| {name} | {best['colouring']} | {best['score']:.4g} | {best['median_of_all']:.4g} | "
+            f"{best['worst']:.4g} |"
+        )
+    lines += ["", "The colourings of the OptiSense paper, on our geometry:", ""]
+    lines += ["| colouring | NormDiff | RGB2Normal |", "|---|---|---|"]
+    for each, scores in found["of_the_paper"].items():
+        lines.append(f"| {each} | {scores['normdiff']:.2f} | {scores['rgb2normal']:.3f} |")
+    return lines
+
+
+def _agreement(found: dict[str, Any]) -> list[str]:
+    lines = [
+        "",
+        f"## Rendered by themselves, {found['photons_an_image']:,} photons",
+        "",
+        "Colourings drawn at random, each rendered by itself with another seed, against the",
+        f"mean over {len(SEEDS)} seeds from layers. The noise is the standard deviation over these",
+        "seeds; the difference is in units of the noise of both together. The last column is a",
+        "rendering with the seed of the search.",
+        "",
+        "| colouring | objective | from layers | noise | rendered | difference in noises | in the "
+        "search | same seed |",
+        "|---|---|---|---|---|---|---|---|",
+    ]
+    for row in found["rendered_by_themselves"]:
+        for name in OBJECTIVES:
+            one = row[name]
+            again = one["rendered_with_the_same_seed"]
+            lines.append(
+                f"| {row['colouring']} | {name} | {one['from_layers_other_seeds']:.4f} | "
+                f"{one['noise']:.4f} | {one['rendered_with_another_seed']:.4f} | "
+                f"{one['difference_in_noises']:.1f} | {one['in_the_search']:.6f} | "
+                f"{'' if again is None else f'{again:.6f}'} |"
+            )
+    return lines
+
+
+def _or_dash(value: float | None, unit: str) -> str:
+    return "-" if value is None else f"{value:.0f}{unit}"
+
+
+if __name__ == "__main__":
+    main()
