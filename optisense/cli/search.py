@@ -10,6 +10,7 @@ import typer
 
 from optisense.cli.console import EXIT_INTERRUPTED, ends_well, messages, output
 from optisense.cli.evaluate import parse_settings
+from optisense.cli.options import parse_variant
 from optisense.cli.search_result import print_result, summary
 from optisense.cli.searching import search_progress
 
@@ -146,6 +147,12 @@ def search(
             min=2, metavar="N", help="Manufactured sensors a trial, with --error.", show_default="8"
         ),
     ] = None,
+    variant: Annotated[
+        str,
+        typer.Option(
+            metavar="auto|llvm|cuda", help="Render on the processor (llvm) or a GPU (cuda)."
+        ),
+    ] = "auto",
     as_json: Annotated[
         bool, typer.Option("--json", help="Print the result as JSON instead of text.")
     ] = False,
@@ -159,6 +166,7 @@ def search(
     if methods:
         _print_methods()
         return
+    parse_variant(variant)
     if out is None:
         raise typer.BadParameter("name a folder for the study", param_hint="--out")
 
@@ -173,6 +181,7 @@ def search(
                 workers=workers,
                 cluster=cluster,
                 limit=budget,
+                variant=variant,
                 progress=show,
                 told=lambda: messages.print(
                     "stopping after this trial; Ctrl-C again drops it", style="yellow"

@@ -84,7 +84,9 @@ def print_result(result: Result, out: Path) -> None:
         output.print(f"  and {len(values) - MOST_VALUES} more")
     if _several(result):
         _print_front(result)
-    if not best.is_start and not result.interrupted:
+    if best.is_start:
+        output.print("no trial is better than the start")
+    elif not result.interrupted:
         output.print(f"Take it:  optisense apply {out} --trial best --out better", style="dim")
 
 

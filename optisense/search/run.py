@@ -42,6 +42,7 @@ def search(
     errors: MakingErrors | Mapping[str, Spread | float] | None = None,
     samples: int = SAMPLES,
     apart: bool = True,
+    variant: str = "auto",
     progress: Tell | None = None,
 ) -> Result:
     """Search a space for the design with the highest score.
@@ -69,6 +70,7 @@ def search(
         errors: of making: P10 over manufactured sensors is maximised instead of the plain score.
         samples: manufactured sensors a trial.
         apart: whether parts must not cut through one another.
+        variant: of the renderer: "auto", "llvm" or "cuda".
         progress: called now and then.
 
     Raises:
@@ -107,6 +109,7 @@ def search(
         cluster=cluster,
         executor=executor,
         limit=budget if resume else None,
+        variant=variant,
         progress=progress,
     )
 
@@ -119,6 +122,7 @@ def run_study(
     executor: Executor | None = None,
     own_process: bool = False,
     limit: int | None = None,
+    variant: str = "auto",
     progress: Tell | None = None,
     told: Callable[[], None] | None = None,
 ) -> Result:
@@ -129,6 +133,7 @@ def run_study(
         workers, cluster, executor: as of `search`.
         own_process: use a process of its own even for one worker.
         limit: trials in all; the study's budget if None.
+        variant: of the renderer, as of `search`.
         progress: called now and then.
         told: called when Ctrl-C waits for a trial in this process to finish.
 
@@ -148,7 +153,7 @@ def run_study(
         return ProcessPool(evaluator, workers)
 
     try:
-        return Run(study, make_runner, progress, limit).go()
+        return Run(study, make_runner, progress, limit, variant).go()
     except OptiSenseError:
         if not study.trials:  # no worker could work: there is nothing to go on with
             study.discard()

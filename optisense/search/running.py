@@ -124,6 +124,7 @@ class Run:
         make_runner: MakeRunner,
         tell: Tell | None = None,
         limit: int | None = None,
+        variant: str = "auto",
     ) -> None:
         """Get ready; nothing is scored yet.
 
@@ -132,6 +133,7 @@ class Run:
             make_runner: who works out the trials.
             tell: called now and then.
             limit: how many trials there may be; the study's budget if None.
+            variant: of the renderer.
 
         Raises:
             OptiSenseError: the study can't be run here.
@@ -139,7 +141,7 @@ class Run:
         self.study = study
         settings = study.settings
         self.limit = settings.budget if limit is None else limit
-        usual = study.evaluator()
+        usual = study.evaluator(variant)
         problem = Problem(study.space, tuple(settings.names), settings.budget, settings.seed)
         self.method: Method = make(settings.method, problem, settings.options)
         self._evaluator: Evaluator = self.method.evaluator(usual)

@@ -167,8 +167,8 @@ class Study:
                 hint="Go on with it as it was begun, or begin a new one with another --out",
             )
 
-    def evaluator(self) -> DesignEvaluator:
-        """What scores its points.
+    def evaluator(self, variant: str = "auto") -> DesignEvaluator:
+        """What scores its points, on a variant of the renderer.
 
         Raises:
             SearchError: a goal or rule is known only to the program that began the study.
@@ -190,8 +190,9 @@ class Study:
                     where=path,
                     hint="Undo the change, or begin a new study",
                 )
+        settings = self.settings
         return DesignEvaluator(
-            self.space, self.goals, self.settings.settings, apart=self.settings.apart
+            self.space, self.goals, settings.settings, apart=settings.apart, variant=variant
         )
 
     @property

@@ -101,6 +101,15 @@ def test_json(study: Path) -> None:
     assert not found["interrupted"]
 
 
+def test_a_start_that_is_not_beaten(mine: Path, tmp_path: Path) -> None:
+    result = run("gelsight-mini", "--vary", "coating.specularity=0.7:1:2", "-b", f"{mine}:near",
+                 "--method", "grid", "--out", tmp_path / "study", "--variant", "llvm")  # fmt: skip
+    assert result.exit_code == 0, result.output
+    assert "best: trial 0" in result.output
+    assert "no trial is better than the start" in result.output
+    assert "optisense apply" not in result.output
+
+
 def test_resume_takes_no_other_settings(study: Path, mine: Path) -> None:
     for words, said in (
         (["--seed", "4"], "seed: 0 -> 4"),
@@ -191,7 +200,7 @@ def test_ctrl_c_keeps_what_is_finished(mine: Path, tmp_path: Path) -> None:
 def test_methods_are_listed() -> None:
     result = run("--methods")
     assert result.exit_code == 0
-    for name in ("grid", "random", "cma-es", "pareto"):
+    for name in ("grid", "random", "cma-es", "gradient", "pareto", "types", "light-colours"):
         assert any(line.startswith(name) for line in result.output.splitlines())
 
 
