@@ -1,0 +1,162 @@
+"""How long each built-in sensor takes: to load and check, to a picture, to a first picture.
+
+``python -m benchmarks.sensors [--only NAME] [--dry]`` writes sensors.json and sensors.md beside
+this file. It needs a machine that does nothing else; where it has to share one, the processor
+seconds tell more than the others.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+import tempfile
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from rich.console import Console
+
+from benchmarks.results import machine
+from benchmarks.timing import Time, medians, run_child, timed
+from optisense import OpticalModel, sensors
+from optisense.geometry import Contact, Sphere
+from optisense.optics import TactileImage
+
+FOLDER = Path(__file__).parent
+NAMES = ("gelsight-mini", "gelbelt", "gelsight360", "gelsight-svelte")
+RESOLUTION = (320, 240)
+WANTED_NOISE = 0.03
+"""Of the light in the contact."""
+PHOTONS = (250_000, 500_000, 1_000_000, 2_000_000, 4_000_000, 8_000_000)
+RUNS = 3
+CHILD_RUNS = 5
+RADIUS, DEPTH = 1.5, 0.8
+"""mm: the ball that is pressed in."""
+
+LOAD_AND_CHECK = "from optisense import sensors; sensors.check(sensors.build('{name}'))"
+TARGETS = {"load_and_check": 1.0, "image_new_photons": 1.5, "first_image": 8.0}
+"""Seconds."""
+
+
+def main() -> None:
+    """Measure, print and write."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--only", choices=NAMES, help="measure one sensor only")
+    parser.add_argument("--dry", action="store_true", help="print only, write no results")
+    options = parser.parse_args()
+    console = Console()
+    about = machine()
+    if about["busy"]:
+        console.print(f"[yellow]The load is {about['load_at_start']}: timings will be noisy.")
+    path = FOLDER / "sensors.json"
+    found = json.loads(path.read_text(encoding="utf-8")) if path.is_file() else {}
+    for name in (options.only,) if options.only else NAMES:
+        console.print(f"[dim]{name}")
+        found[name] = {"machine": about, **measure(name)}
+        console.print_json(json.dumps(found[name]))
+        if not options.dry:
+            path.write_text(json.dumps(found, indent=1) + "\n", encoding="utf-8")
+            (FOLDER / "sensors.md").write_text(table(found), encoding="utf-8")
+
+
+def measure(name: str) -> dict[str, Any]:
+    """All numbers of a sensor."""
+    design = sensors.build(name)
+    inside = medians([timed(lambda: sensors.check(sensors.build(name))) for _ in range(CHILD_RUNS)])
+    child = [sys.executable, "-c", LOAD_AND_CHECK.format(name=name)]
+    loaded = medians([run_child(child)[0] for _ in range(CHILD_RUNS)])
+
+    model = OpticalModel(design)
+    place = model.nine_contacts()[4].point
+    assert place is not None
+    ball = Contact(Sphere(radius=RADIUS), point=place, depth=DEPTH)
+    photons, noise = least_photons(model, ball)
+    images: list[TactileImage] = []
+    fresh, kept = [], []
+    for seed in range(10, 10 + RUNS):
+        settings = {"resolution": RESOLUTION, "photons": photons, "seed": seed}
+        fresh.append(timed(lambda s=settings: images.append(model.render([ball], **s))))  # type: ignore[misc]
+        kept.append(timed(lambda s=settings: model.render([ball], **s)))  # type: ignore[misc]
+    text = ",".join(f"{x:.4f}" for x in place)
+    with tempfile.TemporaryDirectory() as folder:
+        command = [sys.executable, "-m", "optisense.cli", "render", name, "--contact"]
+        command += [f"sphere:{RADIUS}@{text}:{DEPTH}", "--out"]
+        first = [run_child([*command, f"{folder}/{run}"])[0] for run in range(RUNS)]
+    return {
+        "build_and_check": plain(inside),
+        "load_and_check": plain(loaded),
+        "photons": photons,
+        "noise_in_contact": round(noise, 4),
+        "noise_told": images[-1].settings["noise_reached_percent"],
+        "image_new_photons": plain(medians(fresh)),
+        "image_kept_light": plain(medians(kept)),
+        "first_image": plain(medians(first)),
+        "pixels_in_contact": int(images[-1].contact_mask.sum()),
+    }
+
+
+def least_photons(model: OpticalModel, ball: Contact) -> tuple[int, float]:
+    """The fewest of PHOTONS that bring the noise in the contact to WANTED_NOISE, and that noise."""
+    photons, noise = PHOTONS[0], float("inf")
+    for photons in PHOTONS:
+        noise = noise_in_contact(model, ball, photons)
+        if noise <= WANTED_NOISE:
+            break
+    return photons, noise
+
+
+def noise_in_contact(model: OpticalModel, ball: Contact, photons: int) -> float:
+    """RMS over the contact's pixels and channels of what two seeds differ by, over sqrt 2, in
+    relation to the mean there."""
+    one, other = (
+        model.render([ball], resolution=RESOLUTION, photons=photons, seed=seed) for seed in (1, 2)
+    )
+    mask = one.contact_mask & other.contact_mask
+    a, b = one.radiance[mask].astype(np.float64), other.radiance[mask].astype(np.float64)
+    lit = (a + b).sum(axis=0) > 0.0
+    return float(np.sqrt(((a - b)[:, lit] ** 2).mean() / 2.0) / (0.5 * (a + b)[:, lit].mean()))
+
+
+def plain(time: Time) -> dict[str, float]:
+    """Ready for JSON."""
+    return {"wall_s": round(time.wall, 3), "cpu_s": round(time.cpu, 3)}
+
+
+def table(found: dict[str, Any]) -> str:
+    """The results as Markdown."""
+    head = ("sensor", "build and check", "load and check in a new process", "photons",
+            "noise in the contact", "image, new photons", "image, light kept",
+            "first image in a new process")  # fmt: skip
+    lines = [
+        "# Built-in sensors", "", "Written by `python -m benchmarks.sensors`; do not edit.", "",
+        "Seconds, and in brackets processor seconds of all threads; medians. A ball of radius "
+        f"{RADIUS} mm, {DEPTH} mm deep, in the middle of what the camera sees, at "
+        f"{RESOLUTION[0]}x{RESOLUTION[1]}, with as many photons as bring the noise in the contact "
+        f"to {100 * WANTED_NOISE:g} %. Targets: load and check "
+        f"{TARGETS['load_and_check']:g} s, image {TARGETS['image_new_photons']:g} s, first image "
+        f"{TARGETS['first_image']:g} s.", "",
+        "| " + " | ".join(head) + " |", "|" + "---|" * len(head),
+    ]  # fmt: skip
+    for name, row in found.items():
+        times = {
+            key: f"{value['wall_s']:.2f} ({value['cpu_s']:.2f})"
+            for key, value in row.items()
+            if isinstance(value, dict) and "wall_s" in value
+        }
+        cells = (name, times["build_and_check"], times["load_and_check"], f"{row['photons']:,}",
+                 f"{100 * row['noise_in_contact']:.1f} %", times["image_new_photons"],
+                 times["image_kept_light"], times["first_image"])  # fmt: skip
+        lines.append("| " + " | ".join(cells) + " |")
+    lines.append("")
+    for name, row in found.items():
+        about = row["machine"]
+        busy = f"; the machine was busy (load {about['load_at_start']})" if about["busy"] else ""
+        lines.append(
+            f"- {name}: {about['date']}, {about['processor']}, {about['cores']} cores{busy}"
+        )
+    return "\n".join(lines) + "\n"
+
+
+if __name__ == "__main__":
+    main()
