@@ -12,7 +12,7 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import distance_transform_edt
+from scipy import ndimage
 
 from optisense.optics.camera import RayCamera
 from optisense.optics.chief_rays import ChiefRays
@@ -35,6 +35,20 @@ RIM_SAMPLES = 6
 USUAL_WIDTH = 320
 REFINED = 8.0 / 320.0
 """How far around a contact, as a part of the image width."""
+
+GRAIN_SAMPLES = 8
+"""So many more camera samples, or as many as double the work, where the rest of the image is grainy:
+where neighbouring cells of the light field differ much, one sample, which reads one of them, shows
+which.
+"""
+GRAIN = 0.02
+"""Deviation from the neighbours, relative, above which an image is grainy: a camera's own noise is
+about 0.01."""
+CROSS = np.array([[0, 1, 0], [1, 0, 1], [0, 1, 0]], dtype=np.float32) / 4
+DARK = 0.02
+"""Of the mean: what is darker may be grainy."""
+GRAIN_REACH = 9
+"""Pixels across that are judged, and sampled again, together."""
 
 
 @dataclass
@@ -84,6 +98,20 @@ def _repeated(mask: NDArray[np.bool_], times: int) -> tuple[mi.UInt32, mi.UInt32
     return dr.gather(mi.UInt32, chosen, lane % count), lane // count + 1
 
 
+def _grainy(image: NDArray[np.float32], where: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """(h, w) which pixels of a mask lie in grainy places: where an image (h, w) often differs from
+    the mean of the four neighbours, by more than a smooth image can.
+    """
+    if not where.any():
+        return where
+    inner = ndimage.binary_erosion(where) & (image > DARK * image[where].mean())
+    mean = ndimage.convolve(image, CROSS, mode="nearest")
+    off = np.where(inner, (image - mean) / np.maximum(np.abs(mean), 1e-30), 0.0)
+    share = ndimage.uniform_filter(inner.astype(np.float32), GRAIN_REACH)
+    square = ndimage.uniform_filter((off**2).astype(np.float32), GRAIN_REACH)
+    return where & (square > GRAIN**2 * np.maximum(share, 1e-6))
+
+
 def masked(values: NDArray[np.float32], where: NDArray[np.bool_]) -> NDArray[np.float32]:
     """Values (h, w, 3) with NaN outside a mask."""
     return np.where(where[..., None], values, np.nan).astype(np.float32)
@@ -124,7 +152,7 @@ def render_field(
     near = np.zeros_like(mask)
     samples = [1]
     if mask.any():
-        distance = distance_transform_edt(~mask)
+        distance = ndimage.distance_transform_edt(~mask)
         near = distance <= max(2.0, REFINED * width)
         share = min(1.0, USUAL_WIDTH / width)
         inner, outer = (max(2, round(n * share)) for n in (CONTACT_SAMPLES, RIM_SAMPLES))
@@ -140,9 +168,19 @@ def render_field(
         sample(pixel, number, True)
         samples = [1, outer, inner]
     far = dr.compress(mi.Bool((~near).ravel()))
+    layers = None
     if dr.width(far) and not only_contacts:
         sample(far, dr.zeros(mi.UInt32, dr.width(far)), False)
-    layers = film.layers(width, height)
+        layers = film.layers(width, height)
+        grainy = _grainy(layers.sum(axis=(0, 3)), ~near & rays.hit)
+        if grainy.any():
+            affordable = round(dr.width(far) / int(grainy.sum()))
+            pixel, number = _repeated(grainy, min(GRAIN_SAMPLES, max(2, affordable)))
+            dr.eval(pixel, number)
+            sample(pixel, number, False)
+            layers = None
+    if layers is None:
+        layers = film.layers(width, height)
     return ImageLayers(
         radiance=layers,
         normals=masked(rays.normals, rays.hit),

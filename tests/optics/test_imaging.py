@@ -1,0 +1,40 @@
+"""Where an image is found grainy, and that what is sampled again becomes smooth."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from optisense import OpticalModel
+from optisense.optics import imaging
+from optisense.sensors import BUILDERS
+
+
+def test_noise_is_grainy_and_slopes_edges_of_the_mask_and_darkness_are_not() -> None:
+    random = np.random.default_rng(0)
+    y, x = np.mgrid[:60, :80]
+    image = 1.0 + 0.01 * x + 0.02 * y
+    image[10:30, 10:30] *= 1 + 0.05 * random.normal(size=(20, 20))
+    image[:, 60:] = 0.005 * random.random((60, 20))
+    where = (x < 75) & (y > 2)
+    found = imaging._grainy(image.astype(np.float32), where)
+    assert found[14:26, 14:26].all()
+    assert not found[36:, :50].any()
+    assert not found[:, 66:].any()
+    assert not imaging._grainy(image.astype(np.float32), np.zeros_like(where)).any()
+
+
+def test_an_untouched_gel_has_less_grain_than_one_camera_sample_a_pixel_would_show() -> None:
+    model = OpticalModel(BUILDERS["gelsight-mini"](), "llvm")
+
+    def grain() -> float:
+        image = model.render(resolution=(160, 120), photons=500_000).radiance.sum(axis=2)
+        return float(np.abs(np.diff(image, n=2, axis=1)).mean() / image.mean())
+
+    often = grain()
+    usual = imaging._grainy
+    try:
+        imaging._grainy = lambda image, where: np.zeros_like(where)
+        once = grain()
+    finally:
+        imaging._grainy = usual
+    assert often < 0.9 * once  # the rest is noise of photons
