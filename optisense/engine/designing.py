@@ -33,6 +33,9 @@ from optisense.geometry import TriangleMesh, cage_weights
 from optisense.library import with_own_lights
 from optisense.sensors.registry import BUILDERS
 
+SAME_PLACE = 1e-6
+"""mm: rounding in a cage at rest."""
+
 Resolution = tuple[int, int, int]
 Place = tuple[float, float, float]
 
@@ -205,7 +208,10 @@ def bent_shapes(
 def _alike(one: TriangleMesh, other: TriangleMesh | None) -> bool:
     return other is not None and (
         one is other
-        or (one.vertices.shape == other.vertices.shape and (one.vertices == other.vertices).all())
+        or (
+            one.vertices.shape == other.vertices.shape
+            and bool((abs(one.vertices - other.vertices) < SAME_PLACE).all())
+        )
     )
 
 

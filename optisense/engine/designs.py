@@ -15,7 +15,7 @@ from optisense.design.near import near_match
 from optisense.design.parts import TRANSPARENT_SOLIDS, Role
 from optisense.design.problems import Problem, design_error
 from optisense.design.storage import DESIGN_FILE
-from optisense.engine.failures import ProtocolError, UnsoundDesignError
+from optisense.engine.failures import ProtocolError, UnsoundDesignError, place_in
 from optisense.errors import DesignError, MeshError
 from optisense.geometry import TriangleMesh
 from optisense.library import names
@@ -162,7 +162,9 @@ class Designs:
         try:
             design = SensorDesign.model_validate(data)
         except ValidationError as error:
-            raise design_error(error, data, where="design") from None
+            found = design_error(error, data, where="design")
+            where = place_in(found.message, data.get("parts")) or found.where
+            raise DesignError(found.message, where=where, hint=found.hint) from None
         base = None if folder is None else Path(folder)
         for name, part in design.parts.items():
             if name not in elsewhere:

@@ -103,6 +103,22 @@ def path_in(where: str | None) -> str | None:
     return where if found else None
 
 
+def place_in(message: str, parts: object = None) -> str | None:
+    """The first dotted path that a message quotes, or the path of the first part that it names.
+
+    Args:
+        message: of an error.
+        parts: the parts of the design as JSON, or whatever stands there.
+    """
+    known = parts if isinstance(parts, dict) else {}
+    for text in re.findall(r"'([^']+)'", message):
+        if "." in text and _PATH.fullmatch(text):
+            return str(text)
+        if text in known:
+            return f"parts.{text}"
+    return None
+
+
 def part_of(
     message: str, path: str | None, known: Sequence[str], design: SensorDesign | None = None
 ) -> str | None:

@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 
 from optisense.errors import OutputError
 from optisense.geometry import TriangleMesh
-from optisense.report.pictures import png
 
 
 class Files:
@@ -43,6 +42,8 @@ class Files:
 
     def picture(self, rest: str, picture: NDArray[np.uint8]) -> str:
         """Write a PNG; returns its path."""
+        from optisense.report.pictures import png
+
         return self._write(rest, lambda path: path.write_bytes(png(picture)))
 
     def array(self, rest: str, values: NDArray[Any]) -> str:

@@ -6,14 +6,16 @@ import math
 import threading
 import time
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from optisense.engine.failures import Cancelled
 from optisense.engine.files import Files
 from optisense.engine.jobs import Job
 from optisense.engine.search_process import SearchProcess, is_running
-from optisense.search import Study
-from optisense.search.store import Row
+
+if TYPE_CHECKING:
+    from optisense.search import Study
+    from optisense.search.store import Row
 
 LOOK_EVERY = 0.25
 """Seconds between looks at the study; longer where a look itself takes long."""
@@ -55,6 +57,8 @@ class Following:
             OptiSenseError: there is no study, or the search failed.
             Cancelled: it was only watched, and that was cancelled.
         """
+        from optisense.search import Study
+
         study = Study.open(self._folder)
         try:
             self._job.tell(

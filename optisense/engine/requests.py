@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum
+from importlib import import_module
 from typing import Any, TypeVar
 
 from optisense.design.near import suggestion
@@ -55,6 +56,7 @@ def find(do: str, others: tuple[str, ...] = ()) -> Kind:
     Raises:
         ProtocolError: there is none; names the near match.
     """
+    _load()
     if do not in _kinds:
         hint = suggestion(do, [*_kinds, *others], limit=60)
         raise ProtocolError(f"there is no request '{do}'", where="do", hint=hint)
@@ -63,4 +65,11 @@ def find(do: str, others: tuple[str, ...] = ()) -> Kind:
 
 def names() -> list[str]:
     """All kinds of requests with a handler."""
+    _load()
     return list(_kinds)
+
+
+def _load() -> None:
+    """Import the modules that register requests; late, so that `hello` need not wait for them."""
+    for module in ("rendering", "designing", "keeping", "scoring", "searching"):
+        import_module(f"optisense.engine.{module}")

@@ -2,22 +2,25 @@
 
 from __future__ import annotations
 
-from typing import Any
+import sys
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Any
 
 from pydantic import Field
 
-from optisense.engine.failures import Cancelled
 from optisense.engine.files import Files
 from optisense.engine.jobs import Job
 from optisense.engine.protocol import Fields
 from optisense.engine.rendering import OfDesign, design_of
 from optisense.engine.requests import Lane, handles
 from optisense.engine.session import Session
-from optisense.objectives import BUILT_IN, Evaluation, Score, Settings
-from optisense.objectives.registry import find, names, resolve
-from optisense.objectives.run import run_objective, split_settings
 
-DOTS_PER_INCH = 110
+if TYPE_CHECKING:
+    from optisense.objectives import Score
+
+_registering = threading.Lock()
 
 
 class Nothing(Fields):
@@ -27,7 +30,9 @@ class Nothing(Fields):
 class Evaluate(OfDesign):
     """See docs/engine.md."""
 
-    objectives: list[str] = Field(default_factory=lambda: list(BUILT_IN), min_length=1)
+    objectives: list[str] = Field(
+        default=["rgb2normal", "normdiff", "aoap", "2to3pw"], min_length=1
+    )
     settings: dict[str, Any] = Field(default_factory=dict)
     figures: bool = False
 
@@ -35,6 +40,8 @@ class Evaluate(OfDesign):
 @handles("objectives", Nothing, Lane.QUICK)
 def objectives(session: Session, fields: Nothing, job: Job) -> dict[str, Any]:
     """What can be scored."""
+    from optisense.objectives.registry import find, names
+
     rows = []
     for name in names():
         each = find(name)
@@ -52,8 +59,13 @@ def objectives(session: Session, fields: Nothing, job: Job) -> dict[str, Any]:
 @handles("evaluate", Evaluate, Lane.RENDER)
 def evaluate(session: Session, fields: Evaluate, job: Job) -> dict[str, Any]:
     """Score a design, objective by objective."""
+    from optisense.objectives import Evaluation, Settings
+    from optisense.objectives.registry import resolve
+    from optisense.objectives.run import run_objective, split_settings
+
     files = session.files(fields, job.id)
-    wanted = resolve(fields.objectives)
+    with own_objectives():
+        wanted = resolve(fields.objectives)
     shared, own = split_settings(fields.settings, wanted)
     settings = Settings(**shared)
     design = design_of(session, fields, job)
@@ -80,19 +92,33 @@ def evaluate(session: Session, fields: Evaluate, job: Job) -> dict[str, Any]:
     return {"scores": rows}
 
 
+@contextmanager
+def own_objectives() -> Iterator[None]:
+    """What a user's files register here is forgotten afterwards.
+
+    Objectives of one name in two files must not get into each other's way in a process that lives
+    for days, and a file that was edited must count as it is now.
+    """
+    from optisense.objectives import registry
+
+    with _registering:
+        registry.names()  # the built-in ones are loaded once only
+        before = dict(registry._registry)
+        try:
+            yield
+        finally:
+            registry._registry.clear()
+            registry._registry.update(before)
+
+
 def _figure(score: Score, files: Files) -> str | None:
     """Draw a score; None where a user's own drawing fails."""
+    from optisense.library.previews import save
+
+    path = files.path(f"{score.objective}.png")
     try:
-        figure = score.figure()
-        path = files.path(f"{score.objective}.png")
-        from optisense.library.previews import save
-
-        save(figure, path)
-    except Cancelled:
-        raise
+        save(score.figure(), path)
     except (ValueError, TypeError, KeyError, AttributeError) as error:
-        import sys
-
         print(f"the figure of {score.objective} can't be drawn: {error}", file=sys.stderr)
         return None
     return str(path)

@@ -13,8 +13,6 @@ from typing import Any
 
 from optisense import errors
 from optisense.errors import OptiSenseError, SearchError
-from optisense.search.store import Lock
-from optisense.search.study import LOCK_FILE
 
 PROCESS_FILE = "process.json"
 """In the study's folder while one of these processes runs it: how to end it."""
@@ -101,6 +99,9 @@ class SearchProcess:
 
 def is_running(folder: Path) -> bool:
     """Whether any process runs a study at present."""
+    from optisense.search.store import Lock
+    from optisense.search.study import LOCK_FILE
+
     if not (folder / LOCK_FILE).exists():
         return False
     try:

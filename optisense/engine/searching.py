@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from pydantic import Field
 
@@ -17,16 +17,15 @@ from optisense.engine.jobs import Job
 from optisense.engine.protocol import Fields
 from optisense.engine.rendering import OfDesign, design_of
 from optisense.engine.requests import Lane, handles
+from optisense.engine.scoring import own_objectives
 from optisense.engine.search_process import SearchProcess, is_running, stop_other
 from optisense.engine.session import Session
 from optisense.errors import OutputError
-from optisense.search import Plan, SearchSpace, Study, Trial
-from optisense.search.applied import design_of as design_of_trial
-from optisense.search.methods import find, names
-from optisense.search.space import BoundSpace
-from optisense.search.study import beside
-from optisense.search.text import parse_space
 from optisense.sensors import save_design
+
+if TYPE_CHECKING:
+    from optisense.search import Study, Trial
+    from optisense.search.space import BoundSpace
 
 
 class Nothing(Fields):
@@ -83,12 +82,17 @@ class Apply(OneTrial):
 @handles("methods", Nothing, Lane.QUICK)
 def methods(session: Session, fields: Nothing, job: Job) -> dict[str, Any]:
     """Ways to search."""
+    from optisense.search.methods import find, names
+
     return {"methods": [{"name": name, "summary": find(name).summary} for name in names()]}
 
 
 @handles("space", Space, Lane.OWN)
 def space(session: Session, fields: Space, job: Job) -> dict[str, Any]:
     """What may change, looked up in a design."""
+    from optisense.search import SearchSpace
+    from optisense.search.text import parse_space
+
     design = design_of(session, fields, job)
     bound = SearchSpace(parse_space(fields.vary)).bind(design)
     return {"parameters": _parameters(bound)}
@@ -97,6 +101,9 @@ def space(session: Session, fields: Space, job: Job) -> dict[str, Any]:
 @handles("search", Search, Lane.OWN)
 def search(session: Session, fields: Search, job: Job) -> dict[str, Any]:
     """Begin a study and follow it to its end."""
+    from optisense.search import Plan, SearchSpace, Study
+    from optisense.search.text import parse_space
+
     files = session.files(fields, job.id)
     folder = _absolute(fields.study)
     design = design_of(session, fields, job)
@@ -112,7 +119,8 @@ def search(session: Session, fields: Search, job: Job) -> dict[str, Any]:
         apart=not fields.may_cross,
     )
     job.check()
-    Study.create(folder, design, plan).close()
+    with own_objectives():
+        Study.create(folder, design, plan).close()
     child = SearchProcess(folder, fields.workers, None, fields.go_on)
     return Following(folder, job, files, child).result()
 
@@ -122,7 +130,8 @@ def resume(session: Session, fields: Resume, job: Job) -> dict[str, Any]:
     """Go on with a study and follow it to its end."""
     files = session.files(fields, job.id)
     folder = _absolute(fields.study)
-    Study.open(folder).close()  # says what is wrong with it before a process is started
+    with _opened(folder) as study:  # says what is wrong with it before a process is started
+        study.lock()
     child = SearchProcess(folder, fields.workers, fields.budget, fields.go_on)
     return Following(folder, job, files, child).result()
 
@@ -165,6 +174,8 @@ def about_study(session: Session, fields: OfStudy, job: Job) -> dict[str, Any]:
 @handles("trial", OneTrial, Lane.OWN)
 def trial(session: Session, fields: OneTrial, job: Job) -> dict[str, Any]:
     """One trial as a design."""
+    from optisense.search.applied import design_of as design_of_trial
+
     files = session.files(fields, job.id)
     with _opened(_absolute(fields.study)) as study:
         chosen = study.trial(fields.trial)
@@ -181,6 +192,8 @@ def trial(session: Session, fields: OneTrial, job: Job) -> dict[str, Any]:
 @handles("apply", Apply, Lane.OWN)
 def apply(session: Session, fields: Apply, job: Job) -> dict[str, Any]:
     """Write a trial as a design folder."""
+    from optisense.search.applied import design_of as design_of_trial
+
     folder = Path(fields.to)
     if folder.is_dir() and any(folder.iterdir()):
         raise OutputError(
@@ -204,6 +217,8 @@ def curve_row(trial: Trial) -> dict[str, Any]:
 
 def trial_row(study: Study, trial: Trial) -> dict[str, Any]:
     """A trial without its design."""
+    from optisense.search.study import beside
+
     return {
         **curve_row(trial),
         "values": trial.values,
@@ -214,6 +229,8 @@ def trial_row(study: Study, trial: Trial) -> dict[str, Any]:
 
 @contextmanager
 def _opened(folder: Path) -> Iterator[Study]:
+    from optisense.search import Study
+
     study = Study.open(folder)
     try:
         yield study

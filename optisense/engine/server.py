@@ -63,10 +63,6 @@ class Engine:
         Args:
             channel: where answers go.
         """
-        # Each module registers the requests that it handles.
-        from optisense.engine import designing, keeping, rendering, scoring, searching
-
-        assert all((designing, keeping, rendering, scoring, searching))
         self.session = Session()
         self._channel = channel
         self._lines = {lane: Line(lane.value) for lane in (Lane.QUICK, Lane.RENDER)}
@@ -167,7 +163,6 @@ class Engine:
             "version": __version__,
             "pid": os.getpid(),
             "folder": str(folder),
-            "requests": [*AT_ONCE, *requests.names()],
         }
         self._channel.send(answer(request.id, facts))
 

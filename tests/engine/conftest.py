@@ -1,0 +1,168 @@
+"""A front end as short as can be, and engines that tests talk to."""
+
+from __future__ import annotations
+
+import json
+import os
+import queue
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+PATIENCE = 120.0
+"""Seconds after which an engine that says nothing has failed a test."""
+
+
+class Client:
+    """Starts an engine; reads all that it says in a thread."""
+
+    def __init__(self, folder: Path, hello: bool = True) -> None:
+        self.folder = folder
+        folder.mkdir(parents=True, exist_ok=True)
+        self.log = folder / "log.txt"
+        self.process = subprocess.Popen(
+            [sys.executable, "-m", "optisense.cli", "engine"],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=self.log.open("ab"),
+            env={**os.environ, "OPTISENSE_LIBRARY": str(folder / "own-library")},
+        )
+        self._messages: queue.Queue[dict[str, Any] | None] = queue.Queue()
+        self.all: list[dict[str, Any]] = []
+        self.raw: list[bytes] = []
+        self.last = 0
+        threading.Thread(target=self._read, daemon=True).start()
+        if hello:
+            self.greeting = self.ask("hello", protocol=1, client="a test", folder=str(folder))
+
+    def _read(self) -> None:
+        assert self.process.stdout is not None
+        for line in self.process.stdout:
+            self.raw.append(line)
+            self._messages.put(json.loads(line))
+        self._messages.put(None)
+
+    def write(self, line: bytes) -> None:
+        """Write whatever it is."""
+        assert self.process.stdin is not None
+        self.process.stdin.write(line)
+        self.process.stdin.flush()
+
+    def send(self, do: str, **fields: Any) -> int:
+        """Begin a request; returns its id."""
+        self.last += 1
+        self.write(json.dumps({"id": self.last, "do": do, **fields}).encode() + b"\n")
+        return self.last
+
+    def next(self) -> dict[str, Any]:
+        """The next message, whatever it is.
+
+        Raises:
+            EOFError: the engine has ended.
+        """
+        message = self._messages.get(timeout=PATIENCE)
+        if message is None:
+            raise EOFError(self.log.read_text()[-2000:])
+        self.all.append(message)
+        return message
+
+    def wait(self, number: int | str | None) -> dict[str, Any]:
+        """The answer to a request; events and other answers before it stay in `all`."""
+        return self.until(lambda message: message["id"] == number and "ok" in message)
+
+    def until(self, fits: Callable[[dict[str, Any]], bool]) -> dict[str, Any]:
+        """The first message that fits, among those that came and those that come."""
+        for message in self.all:
+            if fits(message):
+                return message
+        until = time.monotonic() + PATIENCE
+        while not fits(message := self.next()):
+            assert time.monotonic() < until, self.all[-5:]
+        return message
+
+    def event(self, number: int, kind: str) -> dict[str, Any]:
+        """The first event of a kind."""
+        return self.until(lambda message: message["id"] == number and message.get("event") == kind)
+
+    def events(self, number: int, kind: str) -> list[dict[str, Any]]:
+        """The events of a kind that have come."""
+        return [each for each in self.all if each["id"] == number and each.get("event") == kind]
+
+    def ask(self, do: str, **fields: Any) -> dict[str, Any]:
+        """Make a request that must succeed."""
+        return self.result(self.send(do, **fields))
+
+    def result(self, number: int) -> dict[str, Any]:
+        """The result of a request that must succeed."""
+        message = self.wait(number)
+        assert message["ok"], message["error"]
+        result: dict[str, Any] = message["result"]
+        return result
+
+    def refused(self, do: str, **fields: Any) -> dict[str, Any]:
+        """Make a request that must be refused; its error."""
+        return self.error(self.send(do, **fields))
+
+    def error(self, number: int | str | None) -> dict[str, Any]:
+        """The error of a request that must be refused."""
+        message = self.wait(number)
+        assert not message["ok"], message
+        error: dict[str, Any] = message["error"]
+        return error
+
+    def leave(self) -> int:
+        """Go away as a front end that is closed does; how the engine ended."""
+        assert self.process.stdin is not None
+        self.process.stdin.close()
+        return self.process.wait(20)
+
+
+def _gone(pid: int) -> bool:
+    """Whether a process ends soon."""
+    until = time.monotonic() + 60.0
+    while time.monotonic() < until:
+        try:
+            os.kill(pid, 0)
+        except ProcessLookupError:
+            return True
+        state = Path(f"/proc/{pid}/stat")
+        if state.exists() and state.read_text().rsplit(")", 1)[1].split()[0] == "Z":
+            return True
+        time.sleep(0.05)
+    return False
+
+
+@pytest.fixture(scope="session")
+def gone() -> Callable[[int], bool]:
+    """Whether a process ends soon, by its number."""
+    return _gone
+
+
+@pytest.fixture(scope="session")
+def engine(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Client]:
+    """An engine that many tests share, as a front end does."""
+    client = Client(tmp_path_factory.mktemp("engine"))
+    yield client
+    client.process.kill()
+    client.process.wait()
+
+
+@pytest.fixture
+def start(tmp_path: Path) -> Iterator[Callable[..., Client]]:
+    """Starts engines of a test's own."""
+    clients: list[Client] = []
+
+    def begin(hello: bool = True) -> Client:
+        clients.append(Client(tmp_path / f"engine{len(clients)}", hello))
+        return clients[-1]
+
+    yield begin
+    for client in clients:
+        client.process.kill()
+        client.process.wait()

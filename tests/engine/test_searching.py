@@ -1,0 +1,182 @@
+"""Searches by the engine: watched live, stopped, resumed, and outliving it."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from optisense.design import load_design
+
+OBJECTIVE = """
+import time
+
+def shine(evaluation):
+    '''Best at a specularity of 0.5, and at a camera further up; renders nothing.'''
+    design = evaluation.design
+    time.sleep({pause})
+    return -abs(design.coating.specularity - 0.5) + 0.01 * design.camera.position[2]
+"""
+
+
+@pytest.fixture
+def goal(tmp_path: Path) -> Callable[[float], str]:
+    def make(pause: float = 0.0) -> str:
+        file = tmp_path / "goal.py"
+        file.write_text(OBJECTIVE.format(pause=pause))
+        return f"{file}:shine"
+
+    return make
+
+
+def test_a_search_is_watched_to_its_end(
+    engine: Any, tmp_path: Path, goal: Callable[..., str]
+) -> None:
+    study = str(tmp_path / "study")
+    number = engine.send(
+        "search",
+        design="gelsight-mini",
+        study=study,
+        vary=["coating.specularity=0:1:5"],
+        objectives=[goal()],
+        method="grid",
+    )
+    result = engine.result(number)
+    assert (result["done"], result["failed"], result["interrupted"]) == (5, 0, False)
+    begun = engine.events(number, "begun")[0]
+    assert (begun["budget"], begun["objectives"]) == (5, ["shine"])
+    trials = engine.events(number, "trial")
+    assert sorted(each["number"] for each in trials) == list(range(6))
+    best = [each for each in trials if each["best"]]
+    scores = [each["scores"]["shine"] for each in best]
+    assert scores == sorted(scores)
+    assert best[-1]["values"] == {"coating.specularity": 0.5}
+    assert best[-1]["number"] == result["best"]
+    about = engine.ask("study", study=study)
+    assert (about["running"], about["best"], len(about["curve"])) == (False, result["best"], 6)
+    one = engine.ask("trial", study=study, trial="best")
+    assert one["data"]["coating"]["specularity"] == 0.5
+    engine.ask("apply", study=study, to=str(tmp_path / "better"))
+    assert load_design(tmp_path / "better").coating.specularity == 0.5
+    taken = engine.refused(
+        "search",
+        design="gelsight-mini",
+        study=study,
+        vary=["coating.specularity=0:1:5"],
+        objectives=["aoap"],
+    )
+    assert taken["kind"] == "SearchError" and "already" in taken["message"]
+
+
+def test_the_best_so_far_comes_with_its_shapes(
+    engine: Any, tmp_path: Path, goal: Callable[..., str]
+) -> None:
+    file = tmp_path / "bend.py"
+    file.write_text(
+        "def bend(evaluation):\n"
+        "    return float(evaluation.design.deformed_meshes()['gel'].vertices[:, 2].mean())\n"
+    )
+    number = engine.send(
+        "search",
+        design="gelsight-mini",
+        study=str(tmp_path / "study"),
+        vary=["cages.skin.points[14].z=-1:1:3"],
+        objectives=[f"{file}:bend"],
+        method="grid",
+        may_cross=True,
+    )
+    engine.result(number)
+    best = [each for each in engine.events(number, "trial") if each["best"]][-1]
+    assert set(best["shapes"]) == {"skin", "gel"}
+    shown = np.load(best["shapes"]["gel"]["vertices"])
+    assert shown[:, 2].mean() == pytest.approx(best["scores"]["bend"], abs=1e-4)
+
+
+def test_mistakes_are_told_before_anything_is_begun(engine: Any, tmp_path: Path) -> None:
+    study = tmp_path / "study"
+    given = {"design": "gelsight-mini", "study": str(study), "objectives": ["aoap"]}
+    wrong = engine.refused("search", vary=["coating.shine=0:1"], **given)
+    assert wrong["kind"] in ("DesignError", "SearchError") and "shine" in wrong["message"]
+    wrong = engine.refused("search", vary=["coating.specularity"], **given)
+    assert wrong["kind"] == "SearchError"
+    wrong = engine.refused("search", vary=["coating.specularity=0:1"], method="luck", **given)
+    assert wrong["kind"] == "SearchError"
+    assert not study.exists()
+    assert engine.refused("watch", study=str(study))["kind"] == "SearchError"
+    assert engine.refused("watch", study="relative")["where"] == "study"
+    rows = engine.ask("space", design="gelsight-mini", vary=["coating.specularity=0:1"])
+    assert [(p["name"], p["lower"], p["upper"]) for p in rows["parameters"]] == [
+        ("coating.specularity", 0, 1)
+    ]
+
+
+def test_a_search_in_which_everything_fails_says_why(engine: Any, tmp_path: Path) -> None:
+    file = tmp_path / "fails.py"
+    file.write_text("def fails(evaluation):\n    raise ValueError('no luck')\n")
+    error = engine.refused(
+        "search",
+        design="gelsight-mini",
+        study=str(tmp_path / "study"),
+        vary=["coating.specularity=0:1:9"],
+        objectives=[f"{file}:fails"],
+        method="grid",
+    )
+    assert error["kind"] == "SearchError" and "no luck" in error["message"]
+
+
+def test_a_cancelled_search_keeps_its_trials_and_goes_on_later(
+    engine: Any, tmp_path: Path, goal: Callable[..., str]
+) -> None:
+    study = str(tmp_path / "study")
+    number = engine.send(
+        "search",
+        design="gelsight-mini",
+        study=study,
+        vary=["coating.specularity=0:1:20"],
+        objectives=[goal(0.2)],
+        method="grid",
+    )
+    engine.until(lambda m: m["id"] == number and m.get("event") == "trial" and m["done"] >= 1)
+    assert engine.ask("study", study=study)["running"]
+    busy = engine.refused("resume", study=study)
+    assert busy["kind"] == "SearchError" and "another process" in busy["message"]
+    assert engine.ask("cancel", of=number) == {"cancelled": True}
+    stopped = engine.result(number)
+    assert stopped["interrupted"] and 1 <= stopped["done"] < 20
+    again = engine.send("resume", study=study)
+    assert engine.result(again)["done"] == 20
+    assert not engine.ask("study", study=study)["running"]
+
+
+def test_a_search_ends_with_the_engine_or_outlives_it(
+    start: Callable[..., Any], tmp_path: Path, goal: Callable[..., str], gone: Callable[[int], bool]
+) -> None:
+    client = start()
+    numbers = {}
+    for go_on in (False, True):
+        numbers[go_on] = client.send(
+            "search",
+            design="gelsight-mini",
+            study=str(tmp_path / f"study-{go_on}"),
+            vary=["coating.specularity=0:1:500"],
+            objectives=[goal(0.1)],
+            method="grid",
+            go_on=go_on,
+        )
+    for number in numbers.values():
+        client.event(number, "trial")
+    processes = {key: client.event(n, "begun")["pid"] for key, n in numbers.items()}
+    client.process.kill()
+    assert gone(processes[False])
+    os.kill(processes[True], 0)  # it is there
+    later = start()
+    seen = later.send("watch", study=str(tmp_path / "study-True"))
+    later.until(lambda m: m["id"] == seen and m.get("event") == "trial" and m["done"] >= 3)
+    assert later.ask("stop", study=str(tmp_path / "study-True")) == {"stopped": True}
+    assert later.result(seen)["interrupted"]
+    assert gone(processes[True])
+    assert later.ask("stop", study=str(tmp_path / "study-True")) == {"stopped": False}
