@@ -37,7 +37,7 @@ REFINED = 8.0 / 320.0
 """How far around a contact, as a part of the image width."""
 
 GRAIN_SAMPLES = 8
-"""So many more camera samples, or as many as double the work, where the rest of the image is grainy:
+"""So many more camera samples, or as many as double the work, where the rest of an image is grainy:
 where neighbouring cells of the light field differ much, one sample, which reads one of them, shows
 which.
 """
