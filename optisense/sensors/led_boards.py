@@ -70,7 +70,7 @@ class LedBoards:
         return np.asarray(self.bottom + pitch * (np.arange(self.leds) + 0.5), dtype=np.float64)
 
     def mesh(self) -> TriangleMesh:
-        """The boards and the bodies of their LEDs: closed boxes, of which some overlap."""
+        """The boards and the bodies of the LEDs on them: closed boxes that touch."""
         across, half = 0.5 * self.thickness, self._half_depth
         top = self.bottom + self.height
         bodies = [
@@ -78,11 +78,11 @@ class LedBoards:
                 (self.radius - half, -across, self.bottom), (self.radius + half, across, top)
             )
         ]
-        reach = across + LED_HEIGHT
+        inner, outer = self.radius - 0.5 * LED[0], self.radius + 0.5 * LED[0]
         for z in self._heights():
-            low = (self.radius - 0.5 * LED[0], -reach, z - 0.5 * LED[1])
-            high = (self.radius + 0.5 * LED[0], reach, z + 0.5 * LED[1])
-            bodies.append(TriangleMesh.box(low, high))
+            for y in (-across - LED_HEIGHT, across):
+                low = (inner, y, z - 0.5 * LED[1])
+                bodies.append(TriangleMesh.box(low, (outer, y + LED_HEIGHT, z + 0.5 * LED[1])))
         return TriangleMesh.joined(
             [body.transformed(_turned(board)) for board in range(BOARDS) for body in bodies]
         )

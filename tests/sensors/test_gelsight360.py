@@ -147,6 +147,12 @@ class TestLights:
             assert (side * away > 0.0).all() and (side * away < 15.0).all()
             assert (side * turn > 0.0).all()
 
+    def test_boards_and_the_bodies_on_them_have_their_volume(self, design: SensorDesign) -> None:
+        board = (SHELL - 0.3) * 1.0 * 12.0
+        body = 1.25 * 2.0 * 0.8
+        expected = 4.0 * (board + 2 * 4 * body)
+        assert design.meshes["boards"].volume == pytest.approx(expected)
+
     def test_leds_stand_in_the_wall_clear_of_their_boards(self, design: SensorDesign) -> None:
         places = np.array([li.position for g in design.lights.values() for li in g.lights])
         assert inside(places, design.meshes["shell"]).all()
