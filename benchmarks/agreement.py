@@ -12,7 +12,6 @@ from __future__ import annotations
 import argparse
 import itertools
 import json
-import time
 from pathlib import Path
 from typing import Any
 
@@ -22,10 +21,15 @@ from scipy.stats import rankdata
 
 from benchmarks import results
 from optisense.objectives import evaluate
+from optisense.objectives.score import json_ready
 from optisense.optics import OpticalModel
+from optisense.optics.response import auto_exposure
 from optisense.sensors import load
 from optisense.tasks import CylinderRadius, Misalignment, SampleSettings, perceive
 from optisense.tasks.records import read_json, write_json, write_whole
+
+Row = dict[str, Any]
+"""One coating: its specularity, its scores (None with a failure beside), errors and SNRs."""
 
 SENSORS = ("gelsight-mini-cylindrical", "gelsight-mini")
 SPECULARITIES = (0.0, 0.1, 0.2, 0.35, 0.5, 0.75, 1.0)
@@ -36,6 +40,10 @@ SEED = 1
 # Smaller than a user would take: the features are means and spreads over many pixels.
 RESOLUTIONS = {"misalignment": (32, 24), "cylinder-radius": (64, 48)}
 OBJECTIVE_RESOLUTION = 320, 240
+
+DARKER = 0.25
+"""Of the exposure that suits the untouched sensor, for the objectives: at the whole of it they
+refuse shiny coatings, whose contacts are overexposed. Tasks take pictures at the whole of it."""
 
 FOLDER = Path(__file__).parent
 CACHE = FOLDER / ".cache" / "agreement"
@@ -56,7 +64,7 @@ def main() -> None:
     """Measure what is missing, and write agreement.json and agreement.md after each coating."""
     options = _options()
     console = Console()
-    made: dict[str, list[dict[str, float]]] = {}
+    made: dict[str, list[Row]] = {}
     for sensor in options.sensors:
         model: OpticalModel | None = None
         made[sensor] = []
@@ -65,7 +73,7 @@ def main() -> None:
             if not (folder / "row.json").exists():
                 model = model or OpticalModel(load(sensor), options.variant)
                 model.update("coating.specularity", value)
-                write_json(folder / "row.json", measure(model, value, options, folder))
+                write_json(folder / "row.json", json_ready(measure(model, value, options, folder)))
             row = read_json(folder / "row.json")
             made[sensor].append(row)
             console.print(f"{sensor} {_line(row)}", highlight=False)
@@ -75,22 +83,22 @@ def main() -> None:
         console.print_json(json.dumps({name: agreement(rows) for name, rows in made.items()}))
 
 
-def measure(
-    model: OpticalModel, value: float, options: argparse.Namespace, folder: Path
-) -> dict[str, float]:
+def measure(model: OpticalModel, value: float, options: argparse.Namespace, folder: Path) -> Row:
     """One coating: both objectives, both tasks. Finished samples are kept in the folder."""
-    began = time.process_time()
     folder.mkdir(parents=True, exist_ok=True)
+    blank = model.render([], OBJECTIVE_RESOLUTION, options.photons, seed=SEED)
     scores = evaluate(
         model,
         list(OBJECTIVES),
         resolution=OBJECTIVE_RESOLUTION,
         photons=options.photons,
         seed=SEED,
+        exposure=DARKER * auto_exposure(blank.radiance),
     )
-    row: dict[str, float] = {"specularity": value}
+    row: Row = {"specularity": value}
     for name, score in scores.items():
-        row[name] = float("nan") if score.failure else score.value
+        row[name] = None if score.failure else score.value
+        row[f"{name}_failure"] = str(score.failure or "")
     for task, name in ((Misalignment(), "misalignment"), (CylinderRadius(), "radius")):
         settings = SampleSettings(
             options.samples, SEED, resolution=RESOLUTIONS[task.name], photons=options.photons
@@ -100,24 +108,28 @@ def measure(
         row[f"{name}_error_spread"] = result.reading.spread
         row[f"{name}_guess"] = result.reading.guess
         row[f"{name}_snr"] = result.snr
-    return row | {"cpu_seconds": time.process_time() - began}
+    return row
 
 
-def agreement(rows: list[dict[str, float]]) -> dict[str, dict[str, dict[str, float]]]:
-    """Spearman's correlation of each objective with each measure; 1 is the same ranking."""
-    return {
-        objective: {
-            name: dict(
-                zip(
-                    ("correlation", "chance"),
-                    spearman([row[objective] for row in rows], [sign * row[name] for row in rows]),
-                    strict=True,
-                )
+def agreement(rows: list[Row]) -> dict[str, dict[str, dict[str, float]]]:
+    """Spearman's correlation of each objective with each measure; 1 is the same ranking.
+
+    Coatings that an objective can't score are left out of its comparisons.
+    """
+    found: dict[str, dict[str, dict[str, float]]] = {}
+    for objective in OBJECTIVES:
+        scored = [row for row in rows if row[objective] is not None]
+        found[objective] = {}
+        for name, (_, sign) in MEASURES.items():
+            ranks, chance = spearman(
+                [row[objective] for row in scored], [sign * row[name] for row in scored]
             )
-            for name, (_, sign) in MEASURES.items()
-        }
-        for objective in OBJECTIVES
-    }
+            found[objective][name] = {
+                "correlation": ranks,
+                "chance": chance,
+                "coatings": len(scored),
+            }
+    return found
 
 
 def spearman(first: list[float], second: list[float]) -> tuple[float, float]:
@@ -136,7 +148,7 @@ def spearman(first: list[float], second: list[float]) -> tuple[float, float]:
     return reached, float((orders @ a / scale >= reached - 1e-9).mean())
 
 
-def _write(made: dict[str, list[dict[str, float]]], options: argparse.Namespace) -> None:
+def _write(made: dict[str, list[Row]], options: argparse.Namespace) -> None:
     before = read_json(JSON) if JSON.exists() else {"sensors": {}}
     sensors = before["sensors"] | {
         name: {"rows": rows, "agreement": agreement(rows)} for name, rows in made.items()
@@ -151,7 +163,7 @@ def _write(made: dict[str, list[dict[str, float]]], options: argparse.Namespace)
         },
         "sensors": sensors,
     }
-    write_json(JSON, values)
+    write_json(JSON, json_ready(values))
     write_whole(MARKDOWN, lambda path: path.write_text(_markdown(values), encoding="utf-8"))
 
 
@@ -164,7 +176,9 @@ def _markdown(values: dict[str, Any]) -> str:
         "",
         f"{settings['samples']} contacts a task, {settings['photons']:,} photons, camera noise of "
         "1.5 levels of 255; errors are mean absolute errors of a cross-validated random forest, "
-        "± their standard deviation among its folds.",
+        "± their standard deviation among its folds. Tasks' pictures are exposed to suit the "
+        f"untouched sensor; the objectives judge images {DARKER:g} times as bright, since they "
+        "refuse contacts that are overexposed, as those of shiny coatings are.",
     ]
     for sensor, found in values["sensors"].items():
         rows = found["rows"]
@@ -175,8 +189,7 @@ def _markdown(values: dict[str, Any]) -> str:
             lines.append(
                 _cells(
                     f"{row['specularity']:g}",
-                    f"{row['rgb2normal']:.4f}",
-                    f"{row['normdiff']:.2f}",
+                    *("none" if row[name] is None else f"{row[name]:.4g}" for name in OBJECTIVES),
                     *(
                         f"{row[f'{name}_error']:.3f} ± {row[f'{name}_error_spread']:.3f}"
                         for name in ("misalignment", "radius")
@@ -188,11 +201,17 @@ def _markdown(values: dict[str, Any]) -> str:
         lines += [
             "",
             f"Guessing the mean would be off by {guess['misalignment_guess']:.2f} degrees and "
-            f"{guess['radius_guess']:.2f} mm. CPU time: "
-            f"{sum(row['cpu_seconds'] for row in rows):.0f} s.",
+            f"{guess['radius_guess']:.2f} mm.",
             "",
-            "Rank correlation (1: the same ranking, -1: the opposite one; in brackets the chance "
-            "that a random ranking agrees as well):",
+            *(
+                f"- No {OBJECTIVES[name]} at {row['specularity']:g}: {row[f'{name}_failure']}."
+                for row in rows
+                for name in OBJECTIVES
+                if row[name] is None
+            ),
+            "",
+            "Rank correlation over the coatings that have a score (1: the same ranking, -1: the "
+            "opposite one; in brackets the chance that a random ranking agrees as well):",
             "",
             _cells("", *titles),
             _cells(*["---"] * (1 + len(titles))),
@@ -207,8 +226,8 @@ def _cells(*texts: str) -> str:
     return "| " + " | ".join(texts) + " |"
 
 
-def _line(row: dict[str, float]) -> str:
-    return ", ".join(f"{name} {value:.4g}" for name, value in row.items())
+def _line(row: Row) -> str:
+    return ", ".join(f"{n} {v:.4g}" for n, v in row.items() if isinstance(v, float))
 
 
 def _options() -> argparse.Namespace:
