@@ -4,12 +4,18 @@ PYTHON ?=
 VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.set-up
+BLENDER_PYTHON ?=
+BLENDER_VENV := .venv-blender
+BLENDER_STAMP := $(BLENDER_VENV)/.set-up
 
-.PHONY: help setup demo test lint types import-rules pytest format bench lock clean
+.PHONY: help setup demo test lint types import-rules pytest studio-tests extension setup-blender \
+    format bench lock clean
 
 help:
 	@echo "make demo     press a ball into a GelSight Mini and write the picture and a report"
-	@echo "make test     lint, types, import rules and tests"
+	@echo "make test     lint, types, import rules and tests, those of the Blender extension too"
+	@echo "make studio-tests   only the tests of the Blender extension"
+	@echo "make extension      build and validate the Blender extension: dist/optisense_studio.zip"
 	@echo "make bench    measure speed and accuracy (minutes)"
 	@echo "make setup    only the set-up: .venv and the libLLVM the renderer needs"
 	@echo "make format   let ruff tidy the code"
@@ -39,6 +45,19 @@ import-rules: setup
 pytest: setup types lint import-rules
 	$(BIN)/python -m pytest
 
+setup-blender: $(BLENDER_STAMP)
+
+$(BLENDER_STAMP): requirements-blender.lock scripts/setup_blender.sh
+	@BLENDER_PYTHON="$(BLENDER_PYTHON)" sh scripts/setup_blender.sh
+
+# Blender may hang at its end when a test goes wrong, hence the limit.
+studio-tests: setup setup-blender
+	timeout 600 $(BLENDER_VENV)/bin/python -m pytest tests/studio
+
+extension: setup setup-blender
+	$(BIN)/optisense studio --zip dist/optisense_studio.zip
+	$(BLENDER_VENV)/bin/python scripts/validate_extension.py dist/optisense_studio.zip
+
 format: setup
 	$(BIN)/ruff check --fix .
 	$(BIN)/ruff format .
@@ -49,6 +68,8 @@ bench: setup
 lock:
 	uv pip compile pyproject.toml --extra dev --universal --python-version 3.11 \
 	    --generate-hashes --no-emit-index-url --upgrade --output-file requirements.lock
+	uv pip compile requirements-blender.in --universal --python-version 3.11 \
+	    --generate-hashes --no-emit-index-url --upgrade --output-file requirements-blender.lock
 
 clean:
-	rm -rf $(VENV) demo-output build dist .mypy_cache .pytest_cache .ruff_cache .import_linter_cache
+	rm -rf $(VENV) $(BLENDER_VENV) demo-output build dist .mypy_cache .pytest_cache .ruff_cache .import_linter_cache

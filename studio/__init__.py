@@ -7,7 +7,7 @@ imports bpy, numpy and the standard library only.
 
 from __future__ import annotations
 
-from .engine import catalogue, preferences, session, starting
+from .engine import catalogue, preferences, session
 from .evaluate import operator as evaluate_operator
 from .evaluate import prop as evaluate_prop
 from .evaluate import ui as evaluate_ui
@@ -23,6 +23,7 @@ from .optimise import prop as optimise_prop
 from .optimise import ui as optimise_ui
 from .scene import cages, object_properties, properties
 from .sensor import operator as sensor_operator
+from .sensor import starting
 from .sensor import ui as sensor_ui
 from .shapes import cage_operator, reference_operator
 from .shapes import ui as shape_ui

@@ -22,6 +22,7 @@ from optisense.cli.new import new
 from optisense.cli.render import render
 from optisense.cli.report import report
 from optisense.cli.search import search
+from optisense.cli.studio import studio
 from optisense.cli.task import task_app
 from optisense.cli.tolerance import tolerance
 
@@ -45,6 +46,7 @@ app.command()(apply)
 app.command()(report)
 app.command()(tolerance)
 app.command()(export)
+app.command()(studio)
 app.command()(engine)
 app.command()(doctor)
 app.add_typer(cage_app, name="cage")

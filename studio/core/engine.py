@@ -88,6 +88,7 @@ class Engine:
         self._lines: queue.SimpleQueue[str | None] = queue.SimpleQueue()
         self._out: queue.SimpleQueue[str | None] = queue.SimpleQueue()
         self._gone = False
+        self._refusal: EngineError | None = None
         environment = {
             name: value
             for name, value in os.environ.items()
@@ -116,7 +117,14 @@ class Engine:
             ) from error
         for work in (self._read, self._read_log, self._write):
             threading.Thread(target=work, daemon=True).start()
-        self.send("hello", protocol=PROTOCOL, client=CLIENT, folder=folder, on_result=self._greeted)
+        self.send(
+            "hello",
+            protocol=PROTOCOL,
+            client=CLIENT,
+            folder=folder,
+            on_result=self._greeted,
+            on_error=self._refused,
+        )
 
     @property
     def alive(self) -> bool:
@@ -207,6 +215,18 @@ class Engine:
     def _greeted(self, result: dict[str, Any]) -> None:
         self.version = result.get("version")
 
+    def _refused(self, error: EngineError) -> None:
+        """It does not speak this protocol: everybody who waits is told that."""
+        self._refusal = error
+        self.kill()
+        self._fail_all(error)
+
+    def _fail_all(self, error: EngineError) -> None:
+        waiting, self._requests = list(self._requests.values()), {}
+        for request in waiting:
+            request.done = True
+            request.on_error(error)
+
     def _take(self, line: str) -> None:
         try:
             message = json.loads(line)
@@ -239,10 +259,7 @@ class Engine:
                 "hint": "Your scene is unharmed; the next request starts the engine again",
             }
         )
-        waiting, self._requests = list(self._requests.values()), {}
-        for request in waiting:
-            request.done = True
-            request.on_error(error)
+        self._fail_all(self._refusal or error)
 
     def _read(self) -> None:
         assert self._process.stdout is not None

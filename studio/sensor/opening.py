@@ -25,6 +25,32 @@ def new_stage() -> Path:
     return Path(session.folder()) / f"stage-{uuid.uuid4().hex[:8]}"
 
 
+def open_source(scene: bpy.types.Scene, source: str, folder: str, *, wait: bool) -> bool:
+    """Open a built-in sensor or the user's folder, as the job that the panels show.
+
+    Args:
+        scene: where to.
+        source: as the engine names designs.
+        folder: the user's folder; empty for a built-in sensor, which is not saved yet.
+        wait: until it is there.
+
+    Raises:
+        EngineError: there is no engine.
+    """
+    name, stage = scene.name, new_stage()
+
+    def written(_: dict[str, Any]) -> None:
+        scene = bpy.data.scenes.get(name)
+        if scene is not None:
+            open_stage(scene, stage, wait=wait, folder=folder)
+
+    # Written out first: the engine reads what users have, and writes what this reads.
+    done = session.start_job(
+        "Opening the sensor", "save", written, wait=wait, design=source, to=str(stage)
+    )
+    return done and not session.state().problem
+
+
 def open_stage(
     scene: bpy.types.Scene,
     stage: Path,

@@ -10,7 +10,7 @@ from bpy.props import StringProperty
 
 from ..core.engine import EngineError
 from ..engine import catalogue, handing, polls, session
-from .opening import new_stage, open_stage
+from .opening import open_source
 
 
 class _Opens:
@@ -19,27 +19,14 @@ class _Opens:
     def _open(
         self, context: bpy.types.Context, source: str, folder: str, *, wait: bool
     ) -> set[str]:
-        name = context.scene.name
         try:
-            stage = new_stage()
+            done = open_source(context.scene, source, folder, wait=wait)
         except EngineError as error:
             session.say(error)
-            self.report({"ERROR"}, error.text())
-            return {"CANCELLED"}
-
-        def written(_: dict[str, Any]) -> None:
-            scene = bpy.data.scenes.get(name)
-            if scene is not None:
-                open_stage(scene, stage, wait=wait, folder=folder)
-
-        # Written out first: the engine reads what users have, and writes what this reads.
-        session.start_job(
-            "Opening the sensor", "save", written, wait=wait, design=source, to=str(stage)
-        )
-        if wait and session.state().problem:
+            done = False
+        if not done:
             self.report({"ERROR"}, session.state().problem)
-            return {"CANCELLED"}
-        return {"FINISHED"}
+        return {"FINISHED"} if done else {"CANCELLED"}
 
 
 class OPTISENSE_OT_new(_Opens, bpy.types.Operator):

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import bpy
+from bpy.props import BoolProperty
 from bpy_extras import view3d_utils
 from mathutils import Vector
 
@@ -21,6 +22,13 @@ class OPTISENSE_OT_simulate(bpy.types.Operator):
     bl_idname = "optisense.simulate"
     bl_label = "Simulate"
 
+    wait: BoolProperty(
+        name="Wait",
+        description="Return when the picture is there; a click never waits",
+        default=True,
+        options={"HIDDEN", "SKIP_SAVE"},
+    )
+
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         return polls.has_design(cls, context) and polls.is_idle(cls, context)
@@ -29,7 +37,7 @@ class OPTISENSE_OT_simulate(bpy.types.Operator):
         return self._start(context, wait=False)
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        return self._start(context, wait=True)
+        return self._start(context, wait=self.wait)
 
     def _start(self, context: bpy.types.Context, *, wait: bool) -> set[str]:
         try:

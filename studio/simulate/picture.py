@@ -39,8 +39,13 @@ def show_icon(name: str, pixels: NDArray[np.float32]) -> None:
     preview.image_pixels_float.foreach_set(np.ascontiguousarray(pixels, np.float32).ravel())
 
 
+def has(name: str) -> bool:
+    """Whether `show_icon` was given a picture of this name."""
+    return _previews is not None and name in _previews
+
+
 def icon(name: str = IMAGE) -> int:
-    """A picture of `show_icon` as an icon; 0 where there is none."""
+    """A picture of `show_icon` as an icon; 0 where there is none, or no window."""
     preview = None if _previews is None else _previews.get(name)
     return 0 if preview is None else preview.icon_id
 

@@ -1,0 +1,186 @@
+"""The Blender extension as a zip, and the Blender that it goes into."""
+
+from __future__ import annotations
+
+import os
+import re
+import subprocess
+import sys
+import sysconfig
+import tomllib
+import zipfile
+from collections.abc import Iterator
+from pathlib import Path
+from shutil import which
+
+from optisense.errors import OutputError, SetupError
+
+MANIFEST = "blender_manifest.toml"
+OLDEST = (4, 2)
+"""Extensions came with Blender 4.2."""
+
+HOW_TO_GET = (
+    "Get Blender 4.2 or newer from https://www.blender.org/download, then name it: "
+    "optisense studio --blender /path/to/blender"
+)
+
+PLACES = {
+    "linux": (
+        "/usr/bin/blender",
+        "/usr/local/bin/blender",
+        "/snap/bin/blender",
+        "/opt/blender*/blender",
+        "~/blender*/blender",
+        "~/Downloads/blender-*/blender",
+        "~/.local/share/Steam/steamapps/common/Blender/blender",
+    ),
+    "darwin": (
+        "/Applications/Blender*.app/Contents/MacOS/Blender",
+        "~/Applications/Blender*.app/Contents/MacOS/Blender",
+    ),
+    "win32": (
+        "C:/Program Files/Blender Foundation/Blender*/blender.exe",
+        "C:/Program Files (x86)/Steam/steamapps/common/Blender/blender.exe",
+    ),
+}
+"""Where Blender usually is, by `sys.platform`."""
+
+
+def source_folder() -> Path:
+    """The extension's files: beside the package in a checkout, else where the wheel put them.
+
+    Raises:
+        SetupError: they are in neither place.
+    """
+    beside = Path(__file__).parents[2] / "studio"
+    installed = Path(sysconfig.get_path("data")) / "share" / "optisense" / "studio"
+    for folder in (beside, installed):
+        if (folder / MANIFEST).is_file():
+            return folder
+    raise SetupError(
+        "the Blender extension is not part of this installation",
+        where=str(installed),
+        hint="Install OptiSense Studio again",
+    )
+
+
+def version_of(folder: Path) -> str:
+    """The extension's version, from its manifest."""
+    with (folder / MANIFEST).open("rb") as file:
+        return str(tomllib.load(file)["version"])
+
+
+def write_zip(path: Path) -> None:
+    """Write the extension as the zip that Blender installs; the same files give the same bytes.
+
+    Raises:
+        OutputError: the file can't be written.
+    """
+    folder = source_folder()
+    temporary = path.with_name(f".{path.name}.{os.getpid()}.tmp")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with zipfile.ZipFile(temporary, "w", zipfile.ZIP_DEFLATED) as archive:
+            for file in _files(folder):
+                entry = zipfile.ZipInfo(file.relative_to(folder).as_posix(), (2026, 1, 1, 0, 0, 0))
+                entry.compress_type = zipfile.ZIP_DEFLATED
+                entry.external_attr = 0o644 << 16
+                archive.writestr(entry, file.read_bytes())
+        temporary.replace(path)
+    except OSError as error:
+        raise OutputError(
+            f"can't write the extension: {error.strerror or error}",
+            where=str(path),
+            hint="Name another file",
+        ) from error
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+def _files(folder: Path) -> Iterator[Path]:
+    for path in sorted(folder.rglob("*")):
+        parts = path.relative_to(folder).parts
+        hidden = any(part.startswith(".") or part == "__pycache__" for part in parts)
+        ours = path.suffix == ".py" or path.name == MANIFEST
+        if path.is_file() and ours and not hidden:
+            yield path
+
+
+def find_blender(named: Path | None = None) -> tuple[Path, str]:
+    """The Blender to use and its version.
+
+    Args:
+        named: by the user; else the search path and the usual places are looked through.
+
+    Raises:
+        SetupError: there is none, it does not start, or it is too old.
+    """
+    if named is not None:
+        found = which(str(named.expanduser())) or which(named.expanduser() / "blender")
+        if found is None:
+            raise SetupError(f"'{named}' is no program", hint="Name Blender's executable file")
+        return Path(found), _fitting(Path(found))
+    problem: SetupError | None = None
+    for candidate in _candidates():
+        try:
+            return candidate, _fitting(candidate)
+        except SetupError as error:
+            problem = problem or error
+    raise problem or SetupError("no Blender was found", hint=HOW_TO_GET)
+
+
+def _candidates() -> Iterator[Path]:
+    on_path = which("blender")
+    if on_path:
+        yield Path(on_path)
+    for pattern in PLACES.get(sys.platform, ()):
+        path = Path(pattern).expanduser()
+        yield from sorted(Path(path.anchor).glob(str(path.relative_to(path.anchor))), reverse=True)
+
+
+def _fitting(blender: Path) -> str:
+    """The version of a Blender that is new enough."""
+    try:
+        text = subprocess.run(
+            [str(blender), "--version"], capture_output=True, text=True, timeout=60, check=False
+        ).stdout
+    except (OSError, subprocess.TimeoutExpired) as error:
+        raise SetupError(f"Blender does not start: {error}", where=str(blender)) from error
+    match = re.search(r"Blender (\d+)\.(\d+)(?:\.(\d+))?", text)
+    if match is None:
+        raise SetupError("this program is no Blender", where=str(blender), hint=HOW_TO_GET)
+    if (int(match[1]), int(match[2])) < OLDEST:
+        raise SetupError(
+            f"Blender {match[1]}.{match[2]} is too old", where=str(blender), hint=HOW_TO_GET
+        )
+    return match[0].removeprefix("Blender ")
+
+
+def install(blender: Path, archive: Path, environment: dict[str, str]) -> None:
+    """Install the extension for the user and enable it, in place of an older one.
+
+    Args:
+        blender: the program.
+        archive: the extension's zip.
+        environment: for Blender; the extension keeps from it where the engine is.
+
+    Raises:
+        SetupError: Blender refuses it.
+    """
+    command = ["--command", "extension", "install-file", "-r", "user_default", "--enable"]
+    done = subprocess.run(
+        [str(blender), *command, str(archive)],
+        capture_output=True,
+        text=True,
+        timeout=300,
+        check=False,
+        env=environment,
+    )
+    if done.returncode != 0:
+        lines = (done.stderr + done.stdout).strip().splitlines()
+        raise SetupError(
+            "Blender could not install the extension",
+            where=lines[-1] if lines else str(blender),
+            hint=f"Install it by hand: in Blender, Edit > Preferences > Get Extensions > "
+            f"Install from Disk, with {archive}",
+        )

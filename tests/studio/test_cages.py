@@ -1,0 +1,132 @@
+"""Cages: parts follow live, bounds and blends, and the same shape as the engine's."""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Callable
+from typing import Any
+
+import bmesh
+import bpy
+import numpy as np
+import pytest
+
+from studio.core.mesh_file import Mesh
+from studio.engine import handing, session
+from studio.scene import cages
+from studio.scene.build import add_part
+from studio.scene.collections import object_of, objects_of
+from studio.scene.gather import gather_document
+
+
+def heights(name: str) -> Any:
+    part = object_of(bpy.context.scene, "PART", name)
+    return cages.shown_vertices(part.data)[:, 2]
+
+
+def test_parts_follow_while_points_are_being_edited(mini: Any, select: Callable[..., None]) -> None:
+    cage = objects_of(mini, "CAGE")[0]
+    select(object_of(mini, "PART", "skin"))
+    bpy.ops.optisense.edit_shape()
+    assert cage.mode == "EDIT"
+    mesh = bmesh.from_edit_mesh(cage.data)
+    mesh.verts.ensure_lookup_table()
+    mesh.verts[14].co.z += 6.0
+    bmesh.update_edit_mesh(cage.data)
+    bpy.context.view_layer.update()
+    assert heights("skin").max() == pytest.approx(6.0 / 4, abs=1e-5)  # weight (1/2) (1/2) 1
+    bpy.ops.optisense.edit_shape()
+    assert cage.mode == "OBJECT"
+    point = gather_document(mini)["cages"]["skin"]["points"][14]
+    assert point == {"x": 0.0, "y": 0.0, "z": 6.0}
+
+
+def test_the_shape_is_the_engines(mini: Any) -> None:
+    cage = objects_of(mini, "CAGE")[0]
+    rng = np.random.default_rng(3)
+    shown = cages.shown_points(cage)
+    cages.set_points(cage, shown + rng.uniform(-0.4, 0.4, shown.shape))
+    cages.follow(mini, cage)
+    answer = session.ask_and_wait("open", design=handing.design(mini), name="bent")
+    for name in ("skin", "gel"):
+        engines = np.load(answer["shapes"][name]["vertices"])
+        ours = cages.shown_vertices(object_of(mini, "PART", name).data)
+        assert np.allclose(ours, engines, atol=2e-5)
+
+
+def test_ten_thousand_vertices_thirty_times_a_second(
+    mini: Any, select: Callable[..., None]
+) -> None:
+    side = np.linspace(-5.0, 5.0, 101)
+    x, y = (each.ravel() for each in np.meshgrid(side, side, indexing="ij"))
+    vertices = np.stack([x, y, np.zeros_like(x)], axis=1)
+    index = np.arange(101 * 101).reshape(101, 101)
+    corner = index[:-1, :-1].ravel(), index[1:, :-1].ravel(), index[1:, 1:].ravel()
+    faces = np.stack(corner, axis=1).astype(np.int32)
+    values = {"role": "mirror", "mesh": "meshes/sheet.obj"}
+    sheet = add_part(mini, "sheet", values, Mesh(vertices, faces))
+    select(sheet)
+    assert bpy.ops.optisense.new_cage(resolution=(3, 3, 3)) == {"FINISHED"}
+    cage = bpy.context.active_object
+    cages.follow(mini, cage)
+    times = []
+    for step in range(15):
+        cage.data.vertices[13].co.z = 0.1 * step
+        start = time.perf_counter()
+        cages.follow(mini, cage)
+        times.append(time.perf_counter() - start)
+    assert np.median(times) < 1 / 30
+    assert heights("sheet").max() > 0.1
+
+
+def test_bounds_and_blend(mini: Any, select: Callable[..., None]) -> None:
+    cage = objects_of(mini, "CAGE")[0]
+    select(cage)
+    with pytest.raises(RuntimeError, match="Set C_min and C_max first"):
+        bpy.ops.optisense.blend()
+    bpy.ops.optisense.set_bound(bound="c_min")
+    cage.data.vertices[14].co.z += 8.0
+    cage.data.update()
+    bpy.ops.optisense.set_bound(bound="c_max")
+    bpy.ops.optisense.blend()
+    cage.optisense.blend = 0.25
+    assert heights("skin").max() == pytest.approx(0.25 * 8.0 / 4, abs=1e-5)
+    values = gather_document(mini)["cages"]["skin"]
+    assert values["blend"] == 0.25 and "points" not in values
+    assert values["c_max"][14]["z"] == 8.0
+    answer = session.ask_and_wait("check", design=handing.design(mini))
+    assert not answer["problems"]
+    cage.data.vertices[14].co.z += 1.0  # a hand leaves the blend
+    cage.data.update()
+    values = gather_document(mini)["cages"]["skin"]
+    assert "blend" not in values and values["points"][14]["z"] == pytest.approx(3.0)
+
+
+def test_back_to_rest_and_without_a_cage(mini: Any, select: Callable[..., None]) -> None:
+    cage = objects_of(mini, "CAGE")[0]
+    cage.data.vertices[14].co.z += 8.0
+    cage.data.update()
+    cages.follow(mini, cage)
+    select(cage)
+    bpy.ops.optisense.rest_cage()
+    assert heights("skin").max() == pytest.approx(0.0, abs=1e-6)
+    bpy.ops.optisense.remove_cage()
+    assert gather_document(mini)["cages"] == {}
+    select(object_of(mini, "PART", "skin"), object_of(mini, "PART", "gel"))
+    assert bpy.ops.optisense.new_cage(resolution=(4, 3, 2)) == {"FINISHED"}
+    values = gather_document(mini)["cages"]["skin"]
+    assert values["parts"] == ["skin", "gel"] and len(values["points"]) == 24
+
+
+def test_a_lost_control_point_is_told(mini: Any) -> None:
+    cage = objects_of(mini, "CAGE")[0]
+    mesh = bmesh.new()
+    mesh.from_mesh(cage.data)
+    mesh.verts.ensure_lookup_table()
+    mesh.verts.remove(mesh.verts[5])
+    mesh.to_mesh(cage.data)
+    mesh.free()
+    with pytest.raises(ValueError, match="26 control points instead of 27"):
+        gather_document(mini)
+    assert json.loads(cage.optisense.data)["resolution"] == [3, 3, 3]

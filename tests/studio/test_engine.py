@@ -1,0 +1,213 @@
+"""Pictures, relighting, scores, searches by the real engine; and what happens when it fails."""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import bpy
+import numpy as np
+import pytest
+
+from studio.core.engine import Engine, EngineError
+from studio.engine import session
+from studio.scene.collections import object_of, objects_of
+from studio.scene.gather import gather_document
+from studio.simulate import picture, relight
+
+
+def shown() -> np.ndarray:
+    image = bpy.data.images[picture.IMAGE]
+    values = np.empty(len(image.pixels), dtype=np.float32)
+    image.pixels.foreach_get(values)
+    width, height = image.size
+    return values.reshape(height, width, 4)
+
+
+def small(scene: Any) -> None:
+    scene.optisense_simulation.size = "160"
+    scene.optisense_simulation.noise = 50.0
+
+
+def test_a_contact_is_seen_and_relighting_is_exact(mini: Any) -> None:
+    small(mini)
+    assert bpy.ops.optisense.simulate() == {"FINISHED"}
+    empty = shown()
+    assert empty.shape == (120, 160, 4)
+    bpy.ops.optisense.add_contact()
+    contact = objects_of(mini, "CONTACT")[0]
+    contact.location = (3.0, 2.0, 0.5)  # above the surface: it is held on it
+    assert bpy.ops.optisense.simulate() == {"FINISHED"}
+    difference = np.abs(shown() - empty)[..., :3].sum(axis=2)
+    row, column = np.unravel_index(difference.argmax(), difference.shape)
+    # Image right is direction x up = -x, row 0 is at the bottom: up and left of the middle.
+    assert row > 60 and column < 80
+    bright = shown()
+    now = bpy.context.window_manager.optisense_picture
+    assert picture.has(picture.IMAGE)
+    assert now.shown and not now.is_draft and "160 x 120" in now.summary
+    for group in ("green", "blue"):
+        mini.optisense.light_groups[group].flux = 0.0
+        _relit()
+    assert now.is_relit
+    only_red = shown()
+    assert only_red[..., 0].max() > 0.3
+    assert only_red[..., 1:3].max() < 0.6 * only_red[..., 0].max()
+    for group in ("green", "blue"):
+        mini.optisense.light_groups[group].flux = 2.1
+        _relit()
+    assert np.abs(shown() - bright).max() < 2 / 255
+    assert bpy.ops.optisense.report.poll()
+
+
+def _relit() -> None:
+    session.engine().wait(relight._open, timeout=60.0)
+
+
+def test_a_simulation_shows_progress_and_can_be_cancelled(mini: Any) -> None:
+    mini.optisense_simulation.noise = 0.5
+    assert bpy.ops.optisense.simulate(wait=False) == {"FINISHED"}
+    now = session.state()
+    assert session.is_busy() and now.busy == "Simulating"
+    with pytest.raises(RuntimeError, match="The engine is busy"):
+        bpy.ops.optisense.simulate()
+    assert bpy.ops.optisense.cancel() == {"FINISHED"}
+    _until(lambda: not session.is_busy())
+    assert now.note == "Cancelled" and not now.problem and not now.busy
+
+
+def _until(done: Callable[[], bool], seconds: float = 60.0) -> None:
+    end = time.monotonic() + seconds
+    while not done():
+        session._engine.poll()
+        assert time.monotonic() < end
+        time.sleep(0.01)
+
+
+def test_the_engine_may_die_midway(mini: Any) -> None:
+    before = gather_document(mini)
+    mini.optisense_simulation.noise = 0.5
+    bpy.ops.optisense.simulate(wait=False)
+    old = session.engine()
+    old.kill()
+    _until(lambda: not session.is_busy())
+    assert "ended unexpectedly" in session.state().problem
+    assert gather_document(mini) == before
+    assert bpy.ops.optisense.check() == {"FINISHED"}  # a new engine does it
+    assert session.engine() is not old
+    assert session.state().note == "The design is in order"
+
+
+def test_no_engine_and_one_that_is_no_engine(
+    mini: Any, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    session.stop()
+    monkeypatch.setenv("PATH", "")
+    monkeypatch.setenv("OPTISENSE_ENGINE", "")
+    with pytest.raises(RuntimeError, match="No engine was found"):
+        bpy.ops.optisense.check()
+    monkeypatch.setenv("OPTISENSE_ENGINE", str(tmp_path / "gone"))
+    with pytest.raises(RuntimeError, match="can't be started"):
+        bpy.ops.optisense.check()
+
+
+def test_an_engine_of_another_version_says_so(tmp_path: Path) -> None:
+    script = tmp_path / "other.py"
+    script.write_text(
+        "import json\n"
+        "asked = json.loads(input())\n"
+        "error = {'kind': 'ProtocolError', 'message': 'this engine speaks protocol 9, not '\n"
+        "         + str(asked['protocol']), 'hint': 'Update the extension'}\n"
+        "print(json.dumps({'id': asked['id'], 'ok': False, 'error': error}), flush=True)\n"
+    )
+    engine = Engine([sys.executable, str(script)], str(tmp_path))
+    errors: list[EngineError] = []
+    request = engine.send("warm", on_error=errors.append, design="gelsight-mini")
+    engine.wait(request, timeout=30.0)
+    assert "speaks protocol 9" in errors[0].message
+    assert errors[0].hint == "Update the extension"
+    engine.stop()
+
+
+def test_the_part_that_is_wrong_is_selected(mini: Any, select: Callable[..., None]) -> None:
+    select()
+    object_of(mini, "PART", "gel").optisense.material = ""
+    bpy.ops.optisense.check()
+    assert "gel" in session.state().problem
+    assert [each.name for each in bpy.context.selected_objects] == ["gel"]
+
+
+def test_shapes_materials_and_lights_make_a_design_in_order(
+    mini: Any, select: Callable[..., None], tmp_path: Path
+) -> None:
+    mirror = tmp_path / "side mirror.obj"
+    mirror.write_text("v 5 13 -9\nv 9 13 -9\nv 9 13 -6\nv 5 13 -6\nf 1 2 3\nf 1 3 4\n")
+    assert bpy.ops.optisense.add_mesh(filepath=str(mirror)) == {"FINISHED"}
+    assert bpy.context.active_object.optisense.kind == "REFERENCE"
+    assert bpy.ops.optisense.set_reference(reference="mirror") == {"FINISHED"}
+    part = object_of(mini, "PART", "side-mirror")
+    select(part)
+    choice = bpy.context.window_manager.optisense_material
+    choice.kind, choice.material = "material", "acrylic"
+    with pytest.raises(RuntimeError, match="needs a material of kind conductor or diffuse"):
+        bpy.ops.optisense.apply_material()
+    choice.material = "mirror-silver"
+    assert bpy.ops.optisense.apply_material() == {"FINISHED"}
+    assert part.optisense.material == "mirror-silver"
+    select(object_of(mini, "PART", "skin"))
+    choice.kind, choice.coating = "coating", "semi-specular"
+    assert bpy.ops.optisense.apply_material() == {"FINISHED"}
+    assert mini.optisense.coating.library == "semi-specular"
+    select()
+    mini.cursor.location = (0.0, 13.0, -7.0)
+    added = bpy.ops.optisense.add_light(model="smd-3528", group="NEW", name="white", count=2)
+    assert added == {"FINISHED"}
+    assert bpy.ops.optisense.check() == {"FINISHED"}
+    assert not session.state().problem, session.state().problem
+    document = gather_document(mini)
+    assert document["parts"]["side-mirror"]["role"] == "mirror"
+    assert len(document["lights"]["white"]["lights"]) == 2
+    choice.kind, choice.material = "material", "acrylic"
+    assert bpy.ops.optisense.preview_material() == {"FINISHED"}
+    assert Path(choice.preview).read_bytes().startswith(b"\x89PNG")
+
+
+def test_scores_rays_a_search_and_its_best_design(
+    mini: Any, select: Callable[..., None], tmp_path: Path
+) -> None:
+    manager = bpy.context.window_manager
+    manager.optisense_evaluation.chosen = {"aoap"}
+    assert bpy.ops.optisense.evaluate() == {"FINISHED"}
+    score = manager.optisense_evaluation.scores[0]
+    assert score.title == "AOAP" and 0.5 < float(score.value) <= 1.0
+    assert "coverage" in score.parts and Path(score.figure).is_file()
+    assert bpy.ops.optisense.show_rays() == {"FINISHED"}
+    assert "100 % hit" in manager.optisense_evaluation.rays
+    rays = next(each for each in mini.objects if each.optisense.key == "ray hit")
+    assert len(rays.data.splines) == 16 * 12
+    document = gather_document(mini)  # rays are not part of the design
+    assert set(document["parts"]) == {"skin", "gel", "tray", "guide"}
+
+    search = mini.optisense_search
+    bpy.ops.optisense.vary(text="cages.skin.points[14].z=0:6:3", label="height")
+    search.study, search.objective = str(tmp_path / "study"), "aoap"
+    search.method, search.budget = "grid", 0
+    assert bpy.ops.optisense.search() == {"FINISHED"}
+    found = manager.optisense_found
+    assert "3 trials" in found.ended
+    assert float(found.best) >= float(found.start)
+    assert picture.has("OptiSense search")
+    ghosts = [each.name for each in mini.objects if each.optisense.key.startswith("ghost")]
+    assert "ghost skin" in ghosts
+    assert bpy.ops.optisense.apply_best() == {"FINISHED"}
+    best = gather_document(mini)["cages"]["skin"]["points"][14]["z"]
+    assert f"{best:.4g}" == found.values.rpartition("= ")[2]
+    assert not [each for each in mini.objects if each.optisense.kind == "SHOWN"]
+    kept = bpy.ops.optisense.keep_variant(filepath=str(tmp_path / "variant"))
+    assert kept == {"FINISHED"} and (tmp_path / "variant" / "design.yaml").is_file()
+    assert bpy.ops.optisense.resume() == {"FINISHED"}
+    assert bpy.ops.optisense.export(filepath=str(tmp_path / "shop")) == {"FINISHED"}
+    assert list((tmp_path / "shop").rglob("*.stl"))

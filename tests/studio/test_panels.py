@@ -1,0 +1,173 @@
+"""Registration, every panel in every state, and why buttons are grey."""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import bpy
+import pytest
+
+import studio
+from studio.engine import catalogue, session
+from studio.scene.collections import object_of, objects_of
+
+sys.path.insert(0, str(Path(__file__).parent))
+
+from recording import Recording, draw, menus, panels
+
+STEPS = [
+    "Sensor",
+    "Shapes",
+    "Materials",
+    "Lights and Camera",
+    "Simulate",
+    "Evaluate",
+    "Optimise",
+    "Report and Export",
+]
+
+
+def draw_all() -> dict[str, Recording]:
+    drawn = {panel.bl_label: draw(panel) for panel in panels()}
+    for menu in menus():
+        assert draw_menu(menu) is not None
+    return {label: layout for label, layout in drawn.items() if layout is not None}
+
+
+def draw_menu(menu: type) -> Recording:
+    from types import SimpleNamespace
+
+    layout = Recording()
+    menu.draw(SimpleNamespace(layout=layout), bpy.context)
+    return layout
+
+
+def test_registers_twice_over_and_leaves_nothing_behind() -> None:
+    studio.unregister()
+    assert not hasattr(bpy.types.Scene, "optisense")
+    assert not hasattr(bpy.types.Object, "optisense")
+    assert not hasattr(bpy.types.WindowManager, "optisense")
+    assert not [name for name in dir(bpy.types) if name.startswith("OPTISENSE_")]
+    handlers = [h for name in dir(bpy.app.handlers) for h in _list(name)]
+    assert not [h for h in handlers if h.__module__.startswith("studio")]
+    studio.register()
+    studio.unregister()
+    studio.register()
+
+
+def _list(name: str) -> list[Any]:
+    handlers = getattr(bpy.app.handlers, name)
+    return handlers if isinstance(handlers, list) else []
+
+
+def test_the_tab_has_the_steps_in_order() -> None:
+    assert [panel.bl_label for panel in panels()] == STEPS
+    assert all(panel.bl_category == "OptiSense" for panel in panels())
+
+
+def test_without_a_sensor_only_its_panel_is_drawn(scene: Any) -> None:
+    drawn = draw_all()
+    assert list(drawn) == ["Sensor"]
+    assert "optisense.open" in drawn["Sensor"].operators
+
+
+def test_without_an_engine_the_panel_says_how_to_get_one(
+    scene: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("OPTISENSE_ENGINE", "")
+    monkeypatch.setenv("PATH", "")
+    assert "optisense studio" in " ".join(draw_all()["Sensor"].texts)
+
+
+def test_every_panel_with_each_kind_of_object(mini: Any, select: Callable[..., None]) -> None:
+    bpy.ops.optisense.add_contact()
+    chosen = [objects_of(mini, kind)[0] for kind in ("LIGHT", "CAMERA", "CAGE", "CONTACT")]
+    chosen += [object_of(mini, "PART", name) for name in ("skin", "gel")]
+    for each in chosen:
+        select(each)
+        assert list(draw_all()) == STEPS
+    select()
+    assert list(draw_all()) == STEPS
+    contact = objects_of(mini, "CONTACT")[0]
+    select(contact)
+    for kind, shown in (("cylinder", "length"), ("plane", "tilt"), ("mesh", "file")):
+        contact.optisense.indenter = kind
+        assert shown in draw_all()["Simulate"].properties
+    group = mini.optisense.light_groups[0]
+    for kind, shown in (("area", "size"), ("ies", "file"), ("spot", "cutoff")):
+        group.emitter = kind
+        assert shown in draw_all()["Lights and Camera"].properties
+    select(object_of(mini, "PART", "gel"))
+    for kind in ("dielectric", "conductor", "diffuse", "absorber"):
+        mini.optisense.materials["silicone-xp565"].kind = kind
+        assert "kind" in draw_all()["Materials"].properties
+
+
+def test_messages_and_progress_are_drawn(mini: Any) -> None:
+    now = session.state()
+    now.busy, now.fraction, now.progress = "Simulating", 0.4, "1.0 million photons"
+    assert "1.0 million photons" in draw_all()["Simulate"].texts
+    now.busy = ""
+    now.problem, now.hint = "The gel leaks", "Close it"
+    texts = draw_all()["Sensor"].texts
+    assert "The gel leaks" in texts and "Close it" in texts
+
+
+def test_menus_are_filled_by_the_engine(scene: Any) -> None:
+    engine = session.engine()
+    end = time.monotonic() + 60.0
+    while not catalogue.entries("methods") or not catalogue.entries("camera"):
+        engine.poll()
+        assert time.monotonic() < end
+        time.sleep(0.01)
+    assert {"rgb2normal", "normdiff", "aoap", "2to3pw"} <= {
+        entry["name"] for entry in catalogue.entries("objectives")
+    }
+    layout = draw_menu(bpy.types.OPTISENSE_MT_new)
+    assert len(layout.operators) == len(catalogue.entries("sensors")) >= 6
+
+
+@pytest.mark.parametrize(
+    ("operator", "why"),
+    [
+        ("simulate", "no sensor yet"),
+        ("evaluate", "no sensor yet"),
+        ("search", "no sensor yet"),
+        ("save", "no sensor yet"),
+        ("clear_contacts", "no contacts"),
+        ("cancel", "Nothing is going on"),
+        ("report", "Simulate a whole picture first"),
+        ("hide_rays", "No rays"),
+        ("show_picture", "Simulate first"),
+    ],
+)
+def test_grey_buttons_say_why(operator: str, why: str, scene: Any) -> None:
+    with pytest.raises(RuntimeError, match=why):
+        getattr(bpy.ops.optisense, operator)()
+
+
+@pytest.mark.parametrize(
+    ("operator", "why"),
+    [
+        ("apply_material", "Select a part first"),
+        ("new_cage", "Select the parts to bend first"),
+        ("edit_shape", "Select a cage"),
+        ("set_reference", "Select a mesh first"),
+        ("set_group", "Select lights first"),
+        ("keep_material", "Select a part first"),
+        ("search", "Choose what may vary first"),
+        ("resume", "There is no study yet"),
+        ("save", "It has no folder yet"),
+    ],
+)
+def test_nothing_selected_is_said(
+    operator: str, why: str, mini: Any, select: Callable[..., None]
+) -> None:
+    select()
+    test_menus_are_filled_by_the_engine(mini)
+    with pytest.raises(RuntimeError, match=why):
+        getattr(bpy.ops.optisense, operator)()

@@ -1,0 +1,166 @@
+"""File -> Blender -> file: every field of every built-in sensor, and every edit undone."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import bpy
+import numpy as np
+import pytest
+
+from studio.engine import handing, session
+from studio.scene import cages
+from studio.scene.collections import ALL, object_of, objects_of
+from studio.scene.gather import gather, gather_document
+
+SENSORS = (
+    "gelbelt",
+    "gelsight360",
+    "gelsight-mini",
+    "gelsight-mini-spherical",
+    "gelsight-svelte",
+)
+
+
+def as_read(design: Any) -> tuple[dict[str, Any], dict[str, Any]]:
+    """A design and its meshes as the engine reads them; an absent list is an empty one."""
+    answer = session.ask_and_wait("open", design=design, name="as-read")
+    document = handing.without_nulls(answer["data"])
+    for cage in document["cages"].values():
+        cage.setdefault("points", [])
+    meshes = {
+        name: (np.load(files["vertices"]), np.load(files["faces"]))
+        for name, files in answer["meshes"].items()
+    }
+    return document, meshes
+
+
+@pytest.mark.parametrize("sensor", SENSORS)
+def test_every_field_of_a_sensor_comes_back(sensor: str, scene: Any, tmp_path: Path) -> None:
+    bpy.ops.optisense.new(sensor=sensor)
+    assert bpy.ops.optisense.save_as(filepath=str(tmp_path / "saved")) == {"FINISHED"}
+    before, meshes_before = as_read(f"builtin:{sensor}")
+    after, meshes_after = as_read(str(tmp_path / "saved"))
+    assert after == before
+    assert list(after["parts"]) == list(before["parts"])
+    assert meshes_after.keys() == meshes_before.keys()
+    for name, (vertices, faces) in meshes_before.items():
+        assert np.array_equal(meshes_after[name][0], vertices), name
+        assert np.array_equal(meshes_after[name][1], faces), name
+
+
+def test_meshes_keep_their_double_precision(scene: Any) -> None:
+    bpy.ops.optisense.new(sensor="gelsight-svelte")
+    _, meshes = gather(bpy.context.scene)
+    vertices = meshes["M1"].vertices
+    assert not np.array_equal(vertices, vertices.astype(np.float32))
+
+
+def test_the_design_lives_in_its_collections(mini: Any) -> None:
+    names = [each.name for each in mini.collection.children]
+    assert all(name in names for name in ALL)
+    system = bpy.data.collections["OpticalSystem"].objects
+    assert {"skin", "gel", "tray", "guide", "camera"} <= {each.name for each in system}
+    assert sum(each.optisense.kind == "LIGHT" for each in system) == 15
+    assert [each.optisense.key for each in bpy.data.collections["Cages"].objects] == ["skin"]
+
+
+def test_opening_again_replaces_the_sensor(mini: Any) -> None:
+    count = len(mini.objects)
+    bpy.ops.optisense.new(sensor="gelsight-mini")
+    assert len(mini.objects) == count
+
+
+def test_a_saved_folder_is_not_overwritten_by_another_sensor(mini: Any, tmp_path: Path) -> None:
+    bpy.ops.optisense.save_as(filepath=str(tmp_path / "a"))
+    assert bpy.ops.optisense.save() == {"FINISHED"}
+    bpy.ops.optisense.new(sensor="gelbelt")
+    with pytest.raises(RuntimeError):
+        bpy.ops.optisense.save_as(filepath=str(tmp_path / "a"))
+    assert bpy.ops.optisense.open(filepath=str(tmp_path / "a" / "design.yaml")) == {"FINISHED"}
+    assert mini.optisense.title == "gelsight-mini"
+
+
+def test_what_is_edited_is_written_and_nothing_else(mini: Any) -> None:
+    before = gather_document(mini)
+    light = objects_of(mini, "LIGHT")[0]
+    light.location.z = -7.0
+    mini.optisense.coating.specularity = 0.3
+    mini.optisense.light_groups["blue"].flux = 1.2
+    camera = objects_of(mini, "CAMERA")[0]
+    camera.optisense.fov = 60.5
+    after = gather_document(mini)
+    assert after["lights"]["red"]["lights"][0]["position"] == [-8.0, 10.575, -7.0]
+    assert after["coating"]["specularity"] == 0.3
+    assert after["lights"]["blue"]["flux"] == 1.2
+    assert after["camera"]["fov"] == 60.5
+    assert np.degrees(camera.data.angle) == pytest.approx(60.5, abs=1e-4)
+    after["lights"]["red"]["lights"][0] = before["lights"]["red"]["lights"][0]
+    after["lights"]["blue"]["flux"] = before["lights"]["blue"]["flux"]
+    after["coating"]["specularity"] = before["coating"]["specularity"]
+    after["camera"]["fov"] = before["camera"]["fov"]
+    assert after == before
+
+
+def test_copies_made_in_blender_join_the_sensor(mini: Any, select: Callable[..., None]) -> None:
+    select(objects_of(mini, "LIGHT")[0])
+    bpy.ops.object.duplicate()
+    bpy.context.active_object.location.x += 2.0
+    select(object_of(mini, "PART", "guide"))
+    bpy.ops.object.duplicate()
+    document, meshes = gather(mini)
+    assert len(document["lights"]["red"]["lights"]) == 6
+    assert len(document["parts"]) == 5
+    files = [part["mesh"] for part in document["parts"].values()]
+    assert len(set(files)) == 5
+    assert list(meshes) == list(document["parts"])
+
+
+def test_a_moved_part_is_written_where_it_is(mini: Any) -> None:
+    tray = object_of(mini, "PART", "tray")
+    _, before = gather(mini)
+    tray.location.z = -1.5
+    _, after = gather(mini)
+    assert np.allclose(after["tray"].vertices, before["tray"].vertices + [0, 0, -1.5], atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    "edit",
+    [
+        lambda scene: bpy.ops.optisense.add_contact(),
+        lambda scene: bpy.ops.optisense.add_light(group="red", count=2),
+        lambda scene: setattr(objects_of(scene, "LIGHT")[3], "location", (1, 2, 3)),
+        lambda scene: setattr(scene.optisense.coating, "specularity", 0.8),
+        lambda scene: setattr(objects_of(scene, "CAMERA")[0].optisense, "fov", 71.0),
+        lambda scene: bpy.data.objects.remove(object_of(scene, "PART", "tray")),
+    ],
+    ids=["contact", "lights", "move", "coating", "camera", "remove"],
+)
+def test_every_edit_can_be_undone(edit: Callable[[Any], Any], mini: Any) -> None:
+    before = gather_document(mini)
+    contacts = len(objects_of(mini, "CONTACT"))
+    edit(mini)
+    bpy.ops.ed.undo_push(message="An edit")
+    scene = bpy.context.scene
+    changed = gather_document(scene) != before or len(objects_of(scene, "CONTACT")) != contacts
+    assert changed
+    bpy.ops.ed.undo()
+    scene = bpy.context.scene
+    assert gather_document(scene) == before
+    assert len(objects_of(scene, "CONTACT")) == contacts
+
+
+def test_undo_of_a_bent_cage_straightens_its_parts(mini: Any) -> None:
+    skin = object_of(mini, "PART", "skin")
+    flat = cages.shown_vertices(skin.data).copy()
+    cage = objects_of(mini, "CAGE")[0]
+    cage.data.vertices[14].co.z += 9.0
+    cage.data.update()
+    bpy.context.view_layer.update()
+    assert cages.shown_vertices(skin.data)[:, 2].max() == pytest.approx(9.0 / 4, abs=1e-5)
+    bpy.ops.ed.undo_push(message="Bend")
+    bpy.ops.ed.undo()
+    skin = object_of(bpy.context.scene, "PART", "skin")
+    assert np.array_equal(cages.shown_vertices(skin.data), flat)
