@@ -48,7 +48,7 @@ def layer_volume(light_design: int, thickness: float, below: float) -> float:
 
 
 def light_design_of(belt: SensorDesign) -> int:
-    return int(belt.description[-1])
+    return int(belt.description.split("light design ")[1][0])
 
 
 class TestShapes:
