@@ -90,11 +90,11 @@ class ImageLayers:
 
 
 def _repeated(mask: NDArray[np.bool_], times: int) -> tuple[mi.UInt32, mi.UInt32]:
-    """Every pixel of a mask ``times`` times, and the number of the sample (from 1)."""
+    """Every pixel of a mask (one or more) ``times`` times, and the number of the sample, from 1."""
     # Made on the device: arrays handed over from numpy differ in alignment, and so would kernels.
     chosen = dr.compress(mi.Bool(mask.ravel()))
     lane = dr.arange(mi.UInt32, dr.width(chosen) * times)
-    count = dr.opaque(mi.UInt32, max(dr.width(chosen), 1))
+    count = dr.opaque(mi.UInt32, dr.width(chosen))
     return dr.gather(mi.UInt32, chosen, lane % count), lane // count + 1
 
 
@@ -159,11 +159,10 @@ def render_field(
         if only_contacts:
             pixel, number = _repeated(mask, inner)
         else:
-            tiers = (
-                _repeated(distance <= 1.0, inner),
-                _repeated(near & (distance > 1.0), outer),
-            )
-            pixel, number = (dr.concat(pair) for pair in zip(*tiers, strict=True))
+            tiers = [_repeated(distance <= 1.0, inner)]
+            if (around := near & (distance > 1.0)).any():
+                tiers.append(_repeated(around, outer))
+            pixel, number = (dr.concat(each) for each in zip(*tiers, strict=True))
         dr.eval(pixel, number)
         sample(pixel, number, True)
         samples = [1, outer, inner]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from optisense import OpticalModel
+from optisense import Contact, OpticalModel, Plane
 from optisense.optics import imaging
 from optisense.sensors import BUILDERS
 
@@ -21,6 +21,14 @@ def test_noise_is_grainy_and_slopes_edges_of_the_mask_and_darkness_are_not() -> 
     assert not found[36:, :50].any()
     assert not found[:, 66:].any()
     assert not imaging._grainy(image.astype(np.float32), np.zeros_like(where)).any()
+
+
+def test_a_contact_may_fill_the_picture() -> None:
+    model = OpticalModel(BUILDERS["gelsight-mini"](), "llvm")
+    plate = Contact(Plane(size=60.0), at=(0.0, 0.0), depth=0.5)
+    image = model.render([plate], resolution=(32, 24), photons=100_000)
+    assert image.contact_mask.all()
+    assert (image.radiance.sum(axis=2) > 0).all()
 
 
 def test_an_untouched_gel_has_less_grain_than_one_camera_sample_a_pixel_would_show() -> None:
