@@ -128,6 +128,7 @@ def test_a_search_in_which_everything_fails_says_why(engine: Any, tmp_path: Path
     assert error["kind"] == "SearchError" and "no luck" in error["message"]
 
 
+@pytest.mark.slow
 def test_a_cancelled_search_keeps_its_trials_and_goes_on_later(
     engine: Any, tmp_path: Path, goal: Callable[..., str]
 ) -> None:
@@ -152,6 +153,7 @@ def test_a_cancelled_search_keeps_its_trials_and_goes_on_later(
     assert not engine.ask("study", study=study)["running"]
 
 
+@pytest.mark.slow
 def test_a_search_ends_with_the_engine_or_outlives_it(
     start: Callable[..., Any], tmp_path: Path, goal: Callable[..., str], gone: Callable[[int], bool]
 ) -> None:
