@@ -82,12 +82,15 @@ def _run(folder: Path, workers: int, budget: int | None) -> dict[str, Any]:
 
 def _listen(go_on: bool) -> None:
     """Turn what comes on standard input into Ctrl-C."""
+    asked = False
     for line in sys.stdin.buffer:
         if line.strip() == b"stop":
+            asked = True
             _thread.interrupt_main()
     if go_on:
         return
-    _thread.interrupt_main()
+    if not asked:
+        _thread.interrupt_main()
     time.sleep(PATIENCE)
     _thread.interrupt_main()
     time.sleep(PATIENCE)

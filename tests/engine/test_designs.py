@@ -1,0 +1,73 @@
+"""Designs are read again only where something changed, and keep the same meshes."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pytest
+
+import optisense as ots
+from optisense.engine.designs import DesignReference, Designs
+from optisense.engine.failures import UnsoundDesignError
+from optisense.errors import DesignError
+from optisense.geometry import TriangleMesh
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    ots.save_design(ots.load("gelsight-mini"), tmp_path / "mini")
+    return tmp_path / "mini"
+
+
+def given(folder: Path, **values: object) -> DesignReference:
+    data = ots.load("gelsight-mini").model_dump(mode="json")
+    return DesignReference(data=data, folder=str(folder), set=values)
+
+
+def test_what_did_not_change_is_the_same_mesh(folder: Path) -> None:
+    """From which an optical model sees that it need not be built again."""
+    designs = Designs()
+    first = designs.read(given(folder))
+    second = designs.read(given(folder, **{"lights.red.flux": 3.0}))
+    third = designs.read(str(folder))
+    assert second.lights["red"].flux == 3.0 and first.lights["red"].flux != 3.0
+    for name, mesh in first.meshes.items():
+        assert second.meshes[name] is mesh
+        assert third.meshes[name] is mesh
+
+
+def test_a_mesh_file_that_changed_is_another_mesh(folder: Path) -> None:
+    designs = Designs()
+    first = designs.read(given(folder))
+    file = folder / "meshes" / "guide.obj"
+    TriangleMesh.box((-9, -7, -20), (9, 7, -19)).save_obj(file)
+    os.utime(file, ns=(1, 1))  # a clock that stands still must not hide it
+    second = designs.read(given(folder))
+    assert second.meshes["guide"] is not first.meshes["guide"]
+    assert second.meshes["gel"] is first.meshes["gel"]
+
+
+def test_values_set_by_a_path_leave_what_is_kept_alone() -> None:
+    designs = Designs()
+    changed = designs.read(DesignReference(source="gelsight-mini", set={"camera.fov": 70.0}))
+    assert changed.camera.fov == 70.0
+    assert designs.read("gelsight-mini").camera.fov != 70.0
+
+
+def test_places_of_errors_are_dotted_paths_for_folders_too(folder: Path) -> None:
+    designs = Designs()
+    design = designs.read(str(folder))
+    assert design.where("lights", "red", "flux") == "lights.red.flux"
+    with pytest.raises(DesignError, match="no built-in sensor"):
+        designs.read("mini")
+
+
+def test_an_unsound_design_tells_all_that_is_wrong(folder: Path) -> None:
+    designs = Designs()
+    board = ots.load("gelsight360").meshes["boards"].vertices[:8].mean(axis=0).tolist()
+    values = {"camera.position": board, "lights.lg1.lights[0].position": board}
+    with pytest.raises(UnsoundDesignError) as caught:
+        designs.must_be_sound(designs.read(DesignReference(source="gelsight360", set=values)))
+    assert len([p for p in caught.value.problems if p.severity == "error"]) == 2
+    assert "and 1 more" in caught.value.message
