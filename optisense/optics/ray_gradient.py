@@ -91,7 +91,7 @@ class DifferentiableRays:
         self._sheets = {name: _Sheet.of(mesh) for name, mesh in moving.items()}
         self._pieces = [self._sheets[p.name].piece(p) if p.name in moving else p for p in pieces]
         same = all(a is b for a, b in zip(self._pieces, scene.pieces, strict=True))
-        self._scene = scene if same else RayScene(self._pieces, table=scene.table)
+        self._scene = scene if same else RayScene(self._pieces, table=scene.table, robust=True)
         self._starts = np.cumsum([0] + [len(p.vertices) for p in self._pieces])
         self._camera = camera
         self._fade = fade

@@ -98,7 +98,8 @@ class RayModel:
     def _fine(self) -> _FineScene:
         fine = self._parts.fine
         pieces = [fine.get(i, piece) for i, piece in enumerate(self._pieces)]
-        return _FineScene(pieces, RayScene(pieces, table=self._table), _sensing_faces(pieces))
+        scene = RayScene(pieces, table=self._table, robust=True)
+        return _FineScene(pieces, scene, _sensing_faces(pieces))
 
     @cached_property
     def _emitter_table(self) -> EmitterTable:
@@ -206,7 +207,7 @@ class RayModel:
         """Where each pixel looks, by ideal refraction and reflection; (h, w, ...) arrays."""
         if contacts:
             placed = [self.place(contact) for contact in contacts]
-            scene = self._with_indenters(self._fine.pieces, placed)
+            scene = self._with_indenters(self._fine.pieces, placed, robust=True)
         else:
             scene = self._fine.scene
         return trace_chief_rays(scene, self.camera(resolution), self._fine.sensing_faces)
@@ -282,11 +283,13 @@ class RayModel:
             mi.Float(np.concatenate([_ball(mesh) for mesh in placed]).astype(np.float32)),
         )
 
-    def _with_indenters(self, fixed: list[Piece], placed: list[TriangleMesh]) -> RayScene:
+    def _with_indenters(
+        self, fixed: list[Piece], placed: list[TriangleMesh], robust: bool = False
+    ) -> RayScene:
         number = len(fixed)
         pieces = [indenter_piece(mesh, self._surfaces[number]) for mesh in placed]
         numbers = [*range(number), *[number] * len(pieces)]
-        return RayScene([*fixed, *pieces], numbers, self._table)
+        return RayScene([*fixed, *pieces], numbers, self._table, robust)
 
 
 class _FineScene(NamedTuple):

@@ -5,11 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from optisense import OpticalModel
 from optisense.optics.camera import RayCamera
 from optisense.optics.chief_rays import ChiefRays, Outcome, trace_chief_rays
 from optisense.optics.ray_scene import Piece, RayScene
 from optisense.optics.reference_scenes import box, diffuse_coating, quad
 from optisense.optics.surfaces import Surface, SurfaceKind
+from optisense.sensors import gelbelt
 
 # Single precision over some 10 mm, and rays that start RAY_OFFSET (0.0002 mm) off each surface.
 PLACE = 2e-3
@@ -120,3 +122,9 @@ def test_face_numbers_are_those_of_the_mesh_hit() -> None:
     )
     off = np.einsum("hwk,hwk->hw", rays.points - corners[..., 0, :], normal)
     assert np.abs(off).max() < PLACE * 64
+
+
+def test_no_ray_slips_through_between_two_triangles() -> None:
+    # Rays of the middle row and column run along edges of this regular mesh.
+    belt = OpticalModel(gelbelt(light_design=2, tessellation=0.7), "llvm")
+    assert belt.chief_rays((320, 240)).hit.all()
