@@ -7,6 +7,7 @@ import bpy
 
 def show_design(scene: bpy.types.Scene) -> None:
     """Let every 3D view of the scene show the roles' colours and the whole sensor."""
+    bpy.context.view_layer.update()  # new objects have no size before
     for window in bpy.context.window_manager.windows:
         if window.scene != scene:
             continue

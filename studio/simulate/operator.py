@@ -86,7 +86,19 @@ class OPTISENSE_OT_show_picture(bpy.types.Operator):
             editor = next((each for each in context.screen.areas if each not in known), area)
             editor.type = "IMAGE_EDITOR"
         editor.spaces.active.image = bpy.data.images[picture.IMAGE]
+        bpy.app.timers.register(_fit_editors, first_interval=0.2)  # when the area has its size
         return {"FINISHED"}
+
+
+def _fit_editors() -> None:
+    """Show the whole picture in every Image Editor that shows it."""
+    image = bpy.data.images.get(picture.IMAGE)
+    for window in bpy.context.window_manager.windows:
+        for area in window.screen.areas:
+            if area.type == "IMAGE_EDITOR" and area.spaces.active.image == image:
+                region = next(each for each in area.regions if each.type == "WINDOW")
+                with bpy.context.temp_override(window=window, area=area, region=region):
+                    bpy.ops.image.view_all(fit_view=True)
 
 
 class OPTISENSE_OT_add_contact(bpy.types.Operator):
