@@ -30,7 +30,7 @@ $(STAMP): pyproject.toml requirements.lock scripts/setup.sh
 demo: setup
 	@$(BIN)/optisense render gelsight-mini --contact sphere:1.5@0,0:0.8 --out demo-output
 
-test: lint types import-rules pytest
+test: lint types import-rules pytest studio-tests
 
 lint: setup
 	$(BIN)/ruff check .
