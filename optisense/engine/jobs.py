@@ -15,7 +15,44 @@ from optisense.engine.protocol import RequestId
 EVENTS_EVERY = 0.1
 """Seconds between two progress events of a request."""
 
+LONGEST_WAIT = 3.0
+"""Seconds that a render waits for short work at each of its safe points."""
+
+GLANCE = 0.002
+"""Seconds that it always leaves to the other threads there."""
+
 Send = Callable[[Mapping[str, Any]], None]
+
+
+class Courtesy:
+    """Lets short work go first.
+
+    The renderer keeps Python's lock while it waits for its kernels. Another thread gets a turn only
+    now and then, and importing a package, which takes hundreds of turns, would take a minute. So a
+    render stops at its safe points until the short work is done.
+    """
+
+    def __init__(self) -> None:
+        """Nothing is being done."""
+        self._count = 0
+        self._changed = threading.Condition()
+
+    def __enter__(self) -> None:
+        """Begin with short work; from any thread."""
+        with self._changed:
+            self._count += 1
+
+    def __exit__(self, *_: object) -> None:
+        """It is done."""
+        with self._changed:
+            self._count -= 1
+            self._changed.notify_all()
+
+    def give_way(self) -> None:
+        """Wait until no short work is being done, or for `LONGEST_WAIT`."""
+        time.sleep(GLANCE)  # the thread that reads requests may have one
+        with self._changed:
+            self._changed.wait_for(lambda: self._count == 0, LONGEST_WAIT)
 
 
 class Job:
@@ -27,8 +64,15 @@ class Job:
         design: what it is about, once that is read; errors find the part in it.
     """
 
-    def __init__(self, number: RequestId, send: Send, draft: bool = False) -> None:
-        """A request that nobody has begun with."""
+    def __init__(
+        self,
+        number: RequestId,
+        send: Send,
+        draft: bool = False,
+        give_way: Callable[[], None] | None = None,
+    ) -> None:
+        """A request that nobody has begun with; `give_way` is called at its safe points."""
+        self._give_way = give_way
         self.id = number
         self.draft = draft
         self.design: SensorDesign | None = None
@@ -49,6 +93,8 @@ class Job:
         Raises:
             Cancelled: it was cancelled.
         """
+        if self._give_way is not None:
+            self._give_way()
         self.check()
         now = time.monotonic()
         if now - self._told >= EVENTS_EVERY:

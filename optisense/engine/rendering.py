@@ -52,6 +52,7 @@ class Warm(OfDesign):
     """See docs/engine.md."""
 
     contacts: bool = False
+    drafts: bool = False
 
 
 class Simulate(OfDesign):
@@ -127,11 +128,13 @@ def warm(session: Session, fields: Warm, job: Job) -> dict[str, Any]:
     model = session.renderer.model(design)
     job.progress(0.2, "building the sensor")
     size = _draft_size(design)
-    tell = _teller(job)
-    model.render((), size, photons=DRAFT_PHOTONS, progress=tell)
+    model.render((), size, photons=DRAFT_PHOTONS, progress=_teller(job))
     if fields.contacts:
         job.progress(0.7, "pressing once")
         model.render(contacts_of(["sphere:1.5@0,0:0.2"]), size, photons=DRAFT_PHOTONS)
+    if fields.drafts:
+        job.progress(0.8, "getting drafts ready")
+        session.renderer.draft_model(design).render((), size, photons=DRAFT_PHOTONS)
     return {"seconds": round(time.perf_counter() - began, 3)}
 
 
@@ -150,7 +153,8 @@ def simulate(session: Session, fields: Simulate, job: Job) -> dict[str, Any]:
         session.designs.must_be_sound(design)
         photons = photons if photons or fields.noise or fields.seconds else PHOTONS
         job.progress(0.0, "building the sensor")
-    model = session.renderer.model(design)
+    renderer = session.renderer
+    model = renderer.draft_model(design) if fields.draft else renderer.model(design)
     image = model.render(
         contacts,
         resolution=size,

@@ -87,7 +87,7 @@ def methods(session: Session, fields: Nothing, job: Job) -> dict[str, Any]:
     return {"methods": [{"name": name, "summary": find(name).summary} for name in names()]}
 
 
-@handles("space", Space, Lane.OWN)
+@handles("space", Space, Lane.QUICK)
 def space(session: Session, fields: Space, job: Job) -> dict[str, Any]:
     """What may change, looked up in a design."""
     from optisense.search import SearchSpace
@@ -101,10 +101,17 @@ def space(session: Session, fields: Space, job: Job) -> dict[str, Any]:
 @handles("search", Search, Lane.OWN)
 def search(session: Session, fields: Search, job: Job) -> dict[str, Any]:
     """Begin a study and follow it to its end."""
+    files = session.files(fields, job.id)
+    with session.courtesy:
+        child = _begun(session, fields, job)
+    return Following(child.folder, job, files, child).result()
+
+
+def _begun(session: Session, fields: Search, job: Job) -> SearchProcess:
+    """The process that runs a new study."""
     from optisense.search import Plan, SearchSpace, Study
     from optisense.search.text import parse_space
 
-    files = session.files(fields, job.id)
     folder = _absolute(fields.study)
     design = design_of(session, fields, job)
     session.designs.must_be_sound(design)
@@ -121,8 +128,7 @@ def search(session: Session, fields: Search, job: Job) -> dict[str, Any]:
     job.check()
     with own_objectives():
         Study.create(folder, design, plan).close()
-    child = SearchProcess(folder, fields.workers, None, fields.go_on)
-    return Following(folder, job, files, child).result()
+    return SearchProcess(folder, fields.workers, None, fields.go_on)
 
 
 @handles("resume", Resume, Lane.OWN)
@@ -130,8 +136,8 @@ def resume(session: Session, fields: Resume, job: Job) -> dict[str, Any]:
     """Go on with a study and follow it to its end."""
     files = session.files(fields, job.id)
     folder = _absolute(fields.study)
-    with _opened(folder) as study:  # says what is wrong with it before a process is started
-        study.lock()
+    with session.courtesy, _opened(folder) as study:
+        study.lock()  # what is wrong with it is told before a process is started
     child = SearchProcess(folder, fields.workers, fields.budget, fields.go_on)
     return Following(folder, job, files, child).result()
 
@@ -143,13 +149,13 @@ def watch(session: Session, fields: OfStudy, job: Job) -> dict[str, Any]:
     return Following(_absolute(fields.study), job, files, None).result()
 
 
-@handles("stop", OfStudy, Lane.OWN)
+@handles("stop", OfStudy, Lane.QUICK)
 def stop(session: Session, fields: OfStudy, job: Job) -> dict[str, Any]:
     """End a search, whoever follows it."""
     return {"stopped": stop_other(_absolute(fields.study))}
 
 
-@handles("study", OfStudy, Lane.OWN)
+@handles("study", OfStudy, Lane.QUICK)
 def about_study(session: Session, fields: OfStudy, job: Job) -> dict[str, Any]:
     """All about a study but its designs."""
     folder = _absolute(fields.study)
@@ -171,7 +177,7 @@ def about_study(session: Session, fields: OfStudy, job: Job) -> dict[str, Any]:
         }
 
 
-@handles("trial", OneTrial, Lane.OWN)
+@handles("trial", OneTrial, Lane.QUICK)
 def trial(session: Session, fields: OneTrial, job: Job) -> dict[str, Any]:
     """One trial as a design."""
     from optisense.search.applied import design_of as design_of_trial
@@ -189,7 +195,7 @@ def trial(session: Session, fields: OneTrial, job: Job) -> dict[str, Any]:
         }
 
 
-@handles("apply", Apply, Lane.OWN)
+@handles("apply", Apply, Lane.QUICK)
 def apply(session: Session, fields: Apply, job: Job) -> dict[str, Any]:
     """Write a trial as a design folder."""
     from optisense.search.applied import design_of as design_of_trial

@@ -125,7 +125,12 @@ class Engine:
         """Put a request into its line."""
         kind = requests.find(request.do, AT_ONCE)
         fields = checked_fields(kind.fields, request)
-        job = Job(request.id, self._channel.send, draft=bool(getattr(fields, "draft", False)))
+        job = Job(
+            request.id,
+            self._channel.send,
+            draft=bool(getattr(fields, "draft", False)),
+            give_way=self.session.courtesy.give_way if kind.lane is Lane.RENDER else None,
+        )
         with self._changed:
             self._open[request.id] = job
         task = _Work(self, kind, fields, job)
@@ -212,6 +217,9 @@ class _Work:
         self._kind = kind
         self._fields = fields
         self.job = job
+        self._short = kind.lane is Lane.QUICK
+        if self._short:
+            engine.session.courtesy.__enter__()
 
     def run(self) -> None:
         """Do it and answer."""
@@ -227,7 +235,7 @@ class _Work:
                 session.renderer.forget()
             self._refuse(as_data(error, self.job.design))
         else:
-            self._engine.answered(self.job, answer(self.job.id, result))
+            self._answer(answer(self.job.id, result))
 
     def give_up(self, kind: str) -> None:
         """Answer without having done it."""
@@ -237,7 +245,12 @@ class _Work:
         self._refuse(error)
 
     def _refuse(self, error: dict[str, Any]) -> None:
-        self._engine.answered(self.job, refusal(self.job.id, error))
+        self._answer(refusal(self.job.id, error))
+
+    def _answer(self, message: Mapping[str, Any]) -> None:
+        if self._short:
+            self._engine.session.courtesy.__exit__()
+        self._engine.answered(self.job, message)
 
 
 def serve() -> None:

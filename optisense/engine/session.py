@@ -11,14 +11,15 @@ from typing import TYPE_CHECKING
 
 from optisense.design import SensorDesign
 from optisense.engine.designs import Designs
-from optisense.engine.failures import Cancelled, ProtocolError
+from optisense.engine.failures import ProtocolError
 from optisense.engine.files import Files
+from optisense.engine.jobs import Courtesy
 from optisense.engine.protocol import Fields
-from optisense.errors import OptiSenseError
 from optisense.geometry import Contact, TriangleMesh
 
 if TYPE_CHECKING:
     from optisense.optics import OpticalModel, TactileImage
+    from optisense.optics.drafts import DraftModel
 
 MOST_IMAGES = 6
 DRAFTS = 1
@@ -71,12 +72,13 @@ class Images:
 
 
 class Renderer:
-    """The one optical model, which takes on whatever design comes; for one thread only."""
+    """The optical models, which take on whatever design comes; for one thread only."""
 
     def __init__(self) -> None:
         """Nothing is loaded yet."""
         self.variant = "auto"
         self._model: OpticalModel | None = None
+        self._drafts: DraftModel | None = None
 
     def model(self, design: SensorDesign) -> OpticalModel:
         """The model of a design; what did not change since the last one is not made again.
@@ -90,18 +92,28 @@ class Renderer:
         if self._model is None:
             self._model = OpticalModel(design, self.variant)
         else:
-            try:
-                self._model.become(design)
-            except (OptiSenseError, Cancelled):
-                raise
-            except BaseException:
-                self._model = None  # half made: never to be used again
-                raise
+            self._model.become(design)
         return self._model
 
+    def draft_model(self, design: SensorDesign) -> OpticalModel:
+        """A model of its own for drafts: the light of whole pictures is kept meanwhile.
+
+        Raises:
+            SetupError, OptiSenseError: as of `model`.
+        """
+        from optisense.optics import OpticalModel as Usual  # first: it checks libLLVM
+        from optisense.optics.drafts import DraftModel
+
+        if self._drafts is None:
+            self._drafts = DraftModel(design, self.variant)
+        else:
+            self._drafts.become(design)
+        made: Usual = self._drafts
+        return made
+
     def forget(self) -> None:
-        """Drop the model after a failure that nobody foresaw."""
-        self._model = None
+        """Drop the models after a failure that nobody foresaw: they may be half made."""
+        self._model = self._drafts = None
 
 
 class Session:
@@ -112,6 +124,7 @@ class Session:
         designs: what was read.
         renderer: the model.
         images: what was rendered.
+        courtesy: lets short work go first.
     """
 
     def __init__(self) -> None:
@@ -120,6 +133,7 @@ class Session:
         self.designs = Designs()
         self.renderer = Renderer()
         self.images = Images()
+        self.courtesy = Courtesy()
 
     def files(self, fields: Fields, number: int | str) -> Files:
         """Where the files of a request go.

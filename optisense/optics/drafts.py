@@ -1,0 +1,158 @@
+"""A model for pictures that follow the hand: coarser in space, and kept from change to change.
+
+Of a small picture of few photons, hardly anything goes into the photons: 10,000 cost what 60,000
+do (benchmarks/engine.py). The rest is what a changed design makes new, so a draft keeps whatever
+it may: shapes of cages that did not move, the cells of surfaces that did not move, and the photon
+guide, which stays right for lights that moved (no direction is left out) and only loses effect.
+"""
+
+from __future__ import annotations
+
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from optisense.design import SensorDesign
+from optisense.geometry import TriangleMesh
+from optisense.optics.cells import SurfaceCells, build_cells
+from optisense.optics.emitters import EmitterTable
+from optisense.optics.field_store import (
+    CELL_SIZE,
+    LEAST_RADIUS,
+    MOST_BYTES,
+    RADIUS,
+    RADIUS_OF_DISTANCE,
+    FieldStore,
+)
+from optisense.optics.light_field import BINS
+from optisense.optics.model import OpticalModel
+from optisense.optics.ray_scene import Piece, RayScene
+from optisense.optics.surfaces import SurfaceKind
+
+COARSER = 2.0
+"""How much larger the cells of a draft are along a side. The kernel stays as wide, so that smooth
+light looks the same; a smoothing costs a sixteenth."""
+
+
+class DraftStore(FieldStore):
+    """Light fields in coarse cells, which takes over what it may from the store before it."""
+
+    def __init__(
+        self,
+        scene: RayScene,
+        opaque: list[Piece],
+        table: EmitterTable,
+        seen: NDArray[np.floating],
+        coloured: bool,
+        metallic: bool,
+        before: DraftStore | None,
+    ) -> None:
+        """As of `FieldStore`; `before` is the store of the design before, if there is one."""
+        super().__init__(scene, opaque, table, seen, coloured, metallic)
+        if before is None or not _same_shapes(opaque, before._opaque):
+            return
+        if table.groups == before._table.groups:
+            self._cells = before._cells
+        if table.count == before._table.count:
+            self._guide = before._guide
+
+    @property
+    def cells(self) -> SurfaceCells:
+        """The cells over all opaque surfaces of the sensor."""
+        if self._cells is None:
+            points, triangles = _joined(self._opaque)
+            a, b, c = (points[triangles[:, k]] for k in range(3))
+            area = np.linalg.norm(np.cross(b - a, c - a), axis=1).sum() / 2
+            entry = BINS * self._table.groups * 16 * (2 if self._coloured else 1)
+            size = COARSER * max(CELL_SIZE, float(np.sqrt(1.3 * area * entry / MOST_BYTES)))
+            near = RADIUS_OF_DISTANCE * self._nearest_lamp(points, triangles)
+            radius = max(min(RADIUS, near), LEAST_RADIUS, 1.5 * size)
+            self._cells = build_cells(points, triangles, size, radius)
+        return self._cells
+
+
+class DraftModel(OpticalModel):
+    """An `OpticalModel` for drafts: the same picture, a little blurred, several times sooner where
+    designs differ by little.
+    """
+
+    def __init__(self, design: SensorDesign, variant: str = "auto") -> None:
+        """As of `OpticalModel`."""
+        self._rest: dict[str, TriangleMesh] = {}
+        self._bent: dict[str, TriangleMesh] = {}
+        self._before: DraftStore | None = None
+        self._seen: NDArray[np.floating] | None = None
+        super().__init__(self._straightened(design), variant)
+
+    def become(self, design: SensorDesign) -> None:
+        """As of `OpticalModel`."""
+        straight, old = self._straightened(design), self.design
+        self._before = self.__dict__.get("_store", self._before)
+        surface = self.__dict__.get("surface")
+        super().become(straight)
+        if not _all_but_lights_same(old, straight):
+            self._seen = None
+        elif surface is not None:  # what the camera sees does not depend on the lights
+            self.surface = surface
+
+    @cached_property
+    def _store(self) -> FieldStore:
+        if self._seen is None:
+            rays = self.chief_rays((96, 72))
+            self._seen = rays.points[rays.hit]
+        return DraftStore(
+            self.scene,
+            [piece for piece in self._pieces if piece.surface.kind is SurfaceKind.OPAQUE],
+            self._emitter_table,
+            self._seen,
+            self._coloured,
+            self._metallic,
+            self._before,
+        )
+
+    def _straightened(self, design: SensorDesign) -> SensorDesign:
+        """The same sensor without cages: its meshes as they are bent, the same objects as before
+        where nothing moved, by which a model knows what it need not build again.
+        """
+        shapes = design.deformed_meshes()
+        for name, mesh in shapes.items():
+            known = self._bent.get(name)
+            if (
+                known is not None
+                and self._rest[name] is design.meshes[name]
+                and np.array_equal(known.vertices, mesh.vertices)
+            ):
+                shapes[name] = known
+        self._rest, self._bent = dict(design.meshes), shapes
+        straight = design.copy()
+        straight.cages = {}
+        straight.meshes.clear()
+        straight.meshes.update(shapes)
+        return straight
+
+
+def _all_but_lights_same(one: SensorDesign, other: SensorDesign) -> bool:
+    """Whether designs without cages have the same shapes, materials and camera."""
+    return (
+        one.meshes == other.meshes  # the same objects
+        and (one.parts, one.materials, one.camera) == (other.parts, other.materials, other.camera)
+    )
+
+
+def _joined(pieces: list[Piece]) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    """All vertices (n, 3) mm and triangles (m, 3) of some pieces."""
+    starts = np.cumsum([0, *(len(piece.vertices) for piece in pieces)])
+    points = np.concatenate([np.asarray(piece.vertices, dtype=np.float64) for piece in pieces])
+    triangles = [
+        np.asarray(piece.faces, dtype=np.int64) + start
+        for piece, start in zip(pieces, starts, strict=False)
+    ]
+    return points, np.concatenate(triangles)
+
+
+def _same_shapes(one: list[Piece], other: list[Piece]) -> bool:
+    return len(one) == len(other) and all(
+        a is b or (np.array_equal(a.vertices, b.vertices) and np.array_equal(a.faces, b.faces))
+        for a, b in zip(one, other, strict=True)
+    )

@@ -1,0 +1,84 @@
+"""Drafts are the same picture, coarser: compared with the ordinary model."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import optisense as ots
+from optisense.design import SensorDesign
+from optisense.optics import OpticalModel
+from optisense.optics.drafts import DraftModel
+
+SIZE = (64, 48)
+PHOTONS = 400_000
+PRESS = [ots.Contact(ots.Sphere(radius=1.5), at=(0, 0), depth=0.6)]
+
+SAME = 0.1
+"""Of the mean radiance of a block of 16 x 16 pixels: noise of both, and the blur of a draft."""
+
+
+def blocks(radiance: np.ndarray) -> np.ndarray:
+    """(12, 3): means over blocks of 16 x 16 pixels."""
+    return radiance.reshape(3, 16, 4, 16, 3).mean(axis=(1, 3)).reshape(-1, 3)
+
+
+@pytest.fixture(scope="module")
+def mini() -> SensorDesign:
+    return ots.load("gelsight-mini")
+
+
+@pytest.fixture(scope="module")
+def moved(mini: SensorDesign) -> SensorDesign:
+    return ots.set_value(mini, "lights.red.lights[0].position.x", 6.0)
+
+
+@pytest.fixture(scope="module")
+def ordinary(mini: SensorDesign) -> OpticalModel:
+    return OpticalModel(mini)
+
+
+@pytest.fixture
+def draft(mini: SensorDesign) -> DraftModel:
+    return DraftModel(mini)
+
+
+def agree(one: OpticalModel, other: OpticalModel) -> None:
+    a, b = (blocks(model.render(PRESS, SIZE, photons=PHOTONS).radiance) for model in (one, other))
+    np.testing.assert_allclose(a, b, atol=SAME * b.mean(axis=0).max())
+
+
+def test_a_draft_is_the_same_picture(draft: DraftModel, ordinary: OpticalModel) -> None:
+    agree(draft, ordinary)
+
+
+def test_a_moved_light_is_seen_by_a_draft_that_keeps_cells_and_guide(
+    draft: DraftModel, ordinary: OpticalModel, mini: SensorDesign, moved: SensorDesign
+) -> None:
+    draft.render((), SIZE, photons=20_000)
+    cells, guide, surface = draft._store.cells, draft.guide(), draft.surface
+    draft.become(moved)
+    assert draft._store.cells is cells and draft.guide() is guide and draft.surface is surface
+    ordinary.become(moved)
+    agree(draft, ordinary)
+    ordinary.become(mini)
+
+
+def test_a_moved_camera_or_a_bent_skin_makes_anew_what_depends_on_it(
+    draft: DraftModel, ordinary: OpticalModel, mini: SensorDesign
+) -> None:
+    draft.render((), SIZE, photons=20_000)
+    cells = draft._store.cells
+    nearer = ots.set_value(mini, "camera.position.z", mini.camera.position[2] + 2.0)
+    draft.become(nearer)
+    rays, same = draft.chief_rays(SIZE), OpticalModel(nearer).chief_rays(SIZE)
+    np.testing.assert_allclose(rays.points, same.points, atol=1e-4)
+    assert draft._store.cells is cells
+    bent = ots.set_value(mini, "cages.skin.points[14].z", 1.0)
+    draft.become(bent)
+    assert draft._store.cells is not cells
+    ordinary.become(bent)
+    np.testing.assert_allclose(
+        draft.chief_rays(SIZE).points, ordinary.chief_rays(SIZE).points, atol=1e-4
+    )
+    ordinary.become(mini)
