@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shutil
 import tempfile
+import traceback
 from collections.abc import Callable
 from typing import Any
 
@@ -241,10 +242,15 @@ def _failed(error: EngineError) -> None:
 def _tick() -> float | None:
     if _engine is None:
         return None
-    if _engine.poll():
-        redraw()
-    for each in _each_tick:
-        each()
+    try:
+        if _engine.poll():
+            redraw()
+        for each in _each_tick:
+            each()
+    except Exception as error:  # Blender would never call a timer again that raised
+        traceback.print_exc()
+        state().problem = f"Unexpected {type(error).__name__}: {error}"
+        state().hint = "This is a defect of the extension; the console shows where it is"
     return None if _engine.ended else TICK
 
 

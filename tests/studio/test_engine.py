@@ -104,7 +104,7 @@ def test_the_engine_may_die_midway(mini: Any) -> None:
 def test_no_engine_and_one_that_is_no_engine(
     mini: Any, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
-    session.stop()
+    monkeypatch.setattr(session, "_engine", None)
     monkeypatch.setenv("PATH", "")
     monkeypatch.setenv("OPTISENSE_ENGINE", "")
     with pytest.raises(RuntimeError, match="No engine was found"):
@@ -112,6 +112,30 @@ def test_no_engine_and_one_that_is_no_engine(
     monkeypatch.setenv("OPTISENSE_ENGINE", str(tmp_path / "gone"))
     with pytest.raises(RuntimeError, match="can't be started"):
         bpy.ops.optisense.check()
+
+
+def test_a_defect_in_an_answer_does_not_stop_the_rest(
+    mini: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fails(_: Any) -> None:
+        raise KeyError("files")
+
+    came: list[Any] = []
+    engine = session.engine()
+    engine.send("sensors", on_result=fails)
+    engine.send("methods", on_result=came.append)
+    _tick_until(lambda: bool(session.state().problem))
+    assert "Unexpected KeyError" in session.state().problem
+    _tick_until(lambda: bool(came))
+
+
+def _tick_until(done: Callable[[], bool], seconds: float = 60.0) -> None:
+    """As Blender's timer would do in a window."""
+    end = time.monotonic() + seconds
+    while not done():
+        assert session._tick() is not None
+        assert time.monotonic() < end
+        time.sleep(0.01)
 
 
 def test_an_engine_of_another_version_says_so(tmp_path: Path) -> None:
