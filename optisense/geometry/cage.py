@@ -38,6 +38,8 @@ _VALUES_AT_ONCE = 4_000_000
 
 _digests: weakref.WeakKeyDictionary[TriangleMesh, bytes] = weakref.WeakKeyDictionary()
 _kept: OrderedDict[tuple[bytes, bytes, Resolution], FloatArray] = OrderedDict()
+_last: weakref.WeakKeyDictionary[TriangleMesh, tuple[object, TriangleMesh]]
+_last = weakref.WeakKeyDictionary()
 _lock = threading.Lock()
 
 
@@ -88,6 +90,9 @@ def deformed(
 ) -> TriangleMesh:
     """A mesh as its cage bends it; shading normals are dropped.
 
+    The same mesh bent in the same way twice running is the same object, so that what was worked
+    out about it serves again.
+
     The weights are kept for the next call with a mesh of the same vertices, whichever object
     that is; of a fine cage around a large mesh they would be too many, and each call works
     them out. Not for use with `mesh.vertices` changed in place.
@@ -102,6 +107,20 @@ def deformed(
         DesignError: a vertex lies outside the box.
     """
     controls = np.asarray(points, dtype=np.float64).reshape(-1, 3)
+    key = np.asarray(box, dtype=np.float64).tobytes(), resolution, controls.tobytes()
+    with _lock:
+        last = _last.get(mesh)
+    if last is not None and last[0] == key:
+        return last[1]
+    bent = _bent(mesh, box, resolution, controls)
+    with _lock:
+        _last[mesh] = key, bent
+    return bent
+
+
+def _bent(
+    mesh: TriangleMesh, box: ArrayLike, resolution: Resolution, controls: FloatArray
+) -> TriangleMesh:
     if len(mesh.vertices) * len(controls) <= MOST_KEPT_WEIGHTS:
         return mesh.with_vertices(deform(kept_weights(mesh, box, resolution), controls))
     share = shares(mesh.vertices, box)

@@ -172,3 +172,15 @@ class TestOneToOne:
                 certain += 1
                 assert np.linalg.det(jacobians(inside(), BOX, (3, 3, 3), points)).min() > 0.0
         assert 0 < certain < 60
+
+
+def test_a_shape_asked_for_twice_is_one_object_and_another_shape_is_not() -> None:
+    mesh = TriangleMesh.grid((2.0, 2.0), (4, 4))
+    box = mesh.bounds + np.array([[-1.0], [1.0]])
+    points = cage_points(box, (3, 3, 3))
+    once = deformed(mesh, box, (3, 3, 3), points)
+    assert deformed(mesh, box, (3, 3, 3), points.copy()) is once
+    points[13, 2] += 0.5
+    other = deformed(mesh, box, (3, 3, 3), points)
+    assert other is not once
+    assert other.vertices[:, 2].max() > once.vertices[:, 2].max()
