@@ -36,14 +36,14 @@ USUAL_WIDTH = 320
 REFINED = 8.0 / 320.0
 """How far around a contact, as a part of the image width."""
 
-GRAIN_SAMPLES = 8
-"""So many more camera samples, or as many as double the work, where the rest of an image is grainy:
+GRAIN_SAMPLES = 4
+"""So many more camera samples, or as many as half the work again, where the rest of it is grainy:
 where neighbouring cells of the light field differ much, one sample, which reads one of them, shows
 which.
 """
-GRAIN = 0.02
-"""Deviation from the neighbours, relative, above which an image is grainy: a camera's own noise is
-about 0.01."""
+GRAIN = 0.03
+"""Deviation from the neighbours, relative, above which an image is grainy: a few times a camera's
+own noise, which is about 0.01."""
 CROSS = np.array([[0, 1, 0], [1, 0, 1], [0, 1, 0]], dtype=np.float32) / 4
 DARK = 0.02
 """Of the mean: what is darker may be grainy."""
@@ -173,8 +173,8 @@ def render_field(
         layers = film.layers(width, height)
         grainy = _grainy(layers.sum(axis=(0, 3)), ~near & rays.hit)
         if grainy.any():
-            affordable = round(dr.width(far) / int(grainy.sum()))
-            pixel, number = _repeated(grainy, min(GRAIN_SAMPLES, max(2, affordable)))
+            affordable = dr.width(far) // (2 * int(grainy.sum()))
+            pixel, number = _repeated(grainy, min(GRAIN_SAMPLES, max(1, affordable)))
             dr.eval(pixel, number)
             sample(pixel, number, False)
             layers = None
