@@ -1,7 +1,9 @@
 """The engine as a child process: JSON lines out, JSON lines in, nothing ever waits.
 
-Threads only move lines between pipes and queues. Whoever owns an `Engine` calls `poll` now and
-then, on a thread of its choice, and callbacks run there.
+Whoever owns an `Engine` calls `poll` now and then, and callbacks run there. There are no threads:
+Blender looks up its context without holding Python's lock while an operator runs, and crashes now
+and then where another Python thread runs meanwhile. So the engine answers into a file, which can be
+read without waiting on every system, and requests wait here while its pipe is full.
 """
 
 from __future__ import annotations
@@ -9,20 +11,21 @@ from __future__ import annotations
 import contextlib
 import json
 import os
-import queue
 import subprocess
 import sys
-import threading
+import tempfile
 import time
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 PROTOCOL = 1
 CLIENT = "optisense-blender 0.1.0"
 SHUTDOWN_SECONDS = 2.0
 LOG_LINES = 40
+PIECE = 1 << 16
 
 Answer = Callable[[dict[str, Any]], None]
 
@@ -67,6 +70,33 @@ def _nothing(_: Any) -> None:
     pass
 
 
+class _Lines:
+    """The lines that a process writes into a file, as they come."""
+
+    def __init__(self, folder: str, prefix: str) -> None:
+        handle, name = tempfile.mkstemp(prefix=prefix, suffix=".log", dir=folder)
+        self.end = os.fdopen(handle, "wb")
+        self._path = Path(name)
+        self._read = 0
+        self._rest = b""
+
+    def new(self) -> list[str]:
+        """The lines that were finished since the last time."""
+        with contextlib.suppress(OSError), self._path.open("rb") as file:
+            file.seek(self._read)
+            came = file.read()
+            self._read += len(came)
+            self._rest += came
+        *lines, self._rest = self._rest.split(b"\n")
+        return [line.decode("utf-8", "replace").rstrip("\r") for line in lines]
+
+    def close(self) -> None:
+        """It will not be asked for more."""
+        self.end.close()
+        with contextlib.suppress(OSError):
+            self._path.unlink()
+
+
 class Engine:
     """One running engine.
 
@@ -85,8 +115,8 @@ class Engine:
         self.log: deque[str] = deque(maxlen=LOG_LINES)
         self._requests: dict[int, Request] = {}
         self._number = 0
-        self._lines: queue.SimpleQueue[str | None] = queue.SimpleQueue()
-        self._out: queue.SimpleQueue[str | None] = queue.SimpleQueue()
+        self._lines: deque[str] = deque()
+        self._unsent = bytearray()
         self._gone = False
         self._refusal: EngineError | None = None
         environment = {
@@ -95,18 +125,19 @@ class Engine:
             # Blender's own Python must not leak into the user's.
             if name not in ("PYTHONHOME", "PYTHONPATH") or not _inside_blender()
         }
+        self._answers, self._errors = _Lines(folder, "answers-"), _Lines(folder, "engine-")
         try:
             self._process = subprocess.Popen(
                 command,
+                bufsize=0,
                 stdin=subprocess.PIPE,
-                stdout=subprocess.PIPE,
-                stderr=subprocess.PIPE,
-                encoding="utf-8",
-                errors="replace",
+                stdout=self._answers.end,
+                stderr=self._errors.end,
                 env=environment,
                 creationflags=getattr(subprocess, "CREATE_NO_WINDOW", 0),
             )
         except OSError as error:
+            self._close_files()
             raise EngineError(
                 {
                     "kind": "EngineGone",
@@ -115,8 +146,10 @@ class Engine:
                     "hint": "Set its path in the preferences of the extension",
                 }
             ) from error
-        for work in (self._read, self._read_log, self._write):
-            threading.Thread(target=work, daemon=True).start()
+        assert self._process.stdin is not None
+        self._pipe = self._process.stdin
+        if os.name != "nt":  # Windows waits when a request is larger than its pipe
+            os.set_blocking(self._pipe.fileno(), False)
         self.send(
             "hello",
             protocol=PROTOCOL,
@@ -155,7 +188,8 @@ class Engine:
         request = Request(self._number, what, on_result, on_error, on_event)
         self._requests[request.number] = request
         line = json.dumps({"id": request.number, "do": what, **fields}, allow_nan=False)
-        self._out.put(line)
+        self._unsent += line.encode() + b"\n"
+        self._write()
         return request
 
     def cancel(self, request: Request) -> None:
@@ -165,17 +199,18 @@ class Engine:
 
     def poll(self) -> bool:
         """Run the callbacks of all that came in; whether anything did."""
-        any_came = False
-        while True:
-            try:
-                line = self._lines.get_nowait()
-            except queue.Empty:
-                return any_came
-            any_came = True
-            if line is None:
-                self._ended()
-            else:
-                self._take(line)
+        if self._gone:
+            return False
+        self._write()
+        over = self._process.poll() is not None  # asked first: all that it wrote is read below
+        self._lines.extend(self._answers.new())
+        self.log.extend(self._errors.new())
+        any_came = bool(self._lines)
+        while self._lines:  # a callback may poll too, and take the rest
+            self._take(self._lines.popleft())
+        if over and not self._gone:
+            self._ended()
+        return any_came or over
 
     def wait(self, request: Request, timeout: float = 600.0) -> None:
         """Poll until a request has its answer; for scripts and tests.
@@ -194,13 +229,15 @@ class Engine:
         """End the process: ask, then insist."""
         if self._process.poll() is None:
             self.send("shutdown")
-        self._out.put(None)
+        with contextlib.suppress(OSError):
+            self._pipe.close()
         try:
             self._process.wait(SHUTDOWN_SECONDS)
         except subprocess.TimeoutExpired:
             self._process.kill()
             self._process.wait(SHUTDOWN_SECONDS)
         self._gone = True
+        self._close_files()
 
     def abandon(self) -> None:
         """Tell everybody who waits for a dead engine, whether or not its pipe is drained."""
@@ -250,6 +287,9 @@ class Engine:
         self._gone = True
         with contextlib.suppress(subprocess.TimeoutExpired):
             self._process.wait(SHUTDOWN_SECONDS)
+        with contextlib.suppress(OSError):
+            self._pipe.close()
+        self._close_files()
         last = self.log[-1] if self.log else None
         error = EngineError(
             {
@@ -261,24 +301,20 @@ class Engine:
         )
         self._fail_all(self._refusal or error)
 
-    def _read(self) -> None:
-        assert self._process.stdout is not None
-        for line in self._process.stdout:
-            self._lines.put(line)
-        self._lines.put(None)
-
-    def _read_log(self) -> None:
-        assert self._process.stderr is not None
-        for line in self._process.stderr:
-            self.log.append(line.rstrip())
-
     def _write(self) -> None:
-        assert self._process.stdin is not None
-        with contextlib.suppress(OSError, ValueError):
-            while (line := self._out.get()) is not None:
-                self._process.stdin.write(line + "\n")
-                self._process.stdin.flush()
-            self._process.stdin.close()
+        """As much of the requests as the pipe takes now."""
+        try:
+            while self._unsent:
+                taken = self._pipe.write(self._unsent[:PIECE])
+                if not taken:
+                    return
+                del self._unsent[:taken]
+        except (OSError, ValueError):  # it is gone; `poll` tells those who wait
+            self._unsent.clear()
+
+    def _close_files(self) -> None:
+        self._answers.close()
+        self._errors.close()
 
 
 def _inside_blender() -> bool:

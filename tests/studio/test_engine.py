@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+import threading
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -85,6 +86,21 @@ def _until(done: Callable[[], bool], seconds: float = 60.0) -> None:
         session._engine.poll()
         assert time.monotonic() < end
         time.sleep(0.01)
+
+
+def test_requests_larger_than_a_pipe_arrive_and_no_thread_is_needed(mini: Any) -> None:
+    engine = session.engine()
+    answers: list[Any] = []
+    long = "x" * 400_000
+    requests = [
+        engine.send(long, on_result=answers.append, on_error=answers.append) for _ in range(3)
+    ]
+    # Blender crashes now and then where a Python thread runs beside it.
+    assert threading.enumerate() == [threading.main_thread()]
+    for request in requests:
+        engine.wait(request, timeout=60.0)
+    assert [each.kind for each in answers] == ["ProtocolError"] * 3
+    assert session.ask_and_wait("sensors")["sensors"]
 
 
 def test_the_engine_may_die_midway(mini: Any) -> None:
