@@ -27,13 +27,16 @@ def inside(points: ArrayLike, mesh: TriangleMesh) -> NDArray[np.bool_]:
     if len(near) == 0:
         return result
     frame = _frame()
-    corners = mesh.triangles @ frame.T
-    lowest, highest = corners.min(axis=1), corners.max(axis=1)
+    turned = mesh.vertices @ frame.T
+    a, b, c = (turned[mesh.faces[:, corner]] for corner in range(3))
+    lowest = np.minimum(np.minimum(a, b), c)
+    highest = np.maximum(np.maximum(a, b), c)
     for index, place in zip(near, places[near] @ frame.T, strict=True):
         beside = (lowest[:, 0] <= place[0]) & (highest[:, 0] >= place[0])
         beside &= (lowest[:, 1] <= place[1]) & (highest[:, 1] >= place[1])
         beside &= highest[:, 2] >= place[2]
-        crossings = _crossings(corners[beside] - place)
+        corners = np.stack([a[beside], b[beside], c[beside]], axis=1)
+        crossings = _crossings(corners - place)
         turns = _turns(mesh, places[index]) if crossings is None else crossings
         result[index] = turns != 0
     return result

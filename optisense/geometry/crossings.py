@@ -14,6 +14,11 @@ TOUCH = 1e-4
 """mm: faces that reach through one another by less only touch."""
 
 _PAIRS_AT_ONCE = 500_000
+_BLOCK = 64
+"""Faces that are looked at together first."""
+
+_DENSE = 1_000_000
+"""Up to so many pairs of boxes are compared one by one; a tree takes longer to build."""
 
 
 class Crossings(NamedTuple):
@@ -35,7 +40,7 @@ def self_crossings(mesh: TriangleMesh, limit: int | None = None) -> Crossings:
         mesh: a mesh whose neighbours share vertices (see `TriangleMesh.welded`).
         limit: stop looking once this many are found; None finds all.
     """
-    one, other = _near_pairs(mesh, mesh)
+    one, other = near_pairs(mesh, mesh)
     once = one < other
     return _crossings(mesh, mesh, one[once], other[once], limit)
 
@@ -46,25 +51,28 @@ def crossings(first: TriangleMesh, second: TriangleMesh, limit: int | None = Non
     Args:
         limit: stop looking once this many are found; None finds all.
     """
-    return _crossings(first, second, *_near_pairs(first, second), limit)
+    return _crossings(first, second, *near_pairs(first, second), limit)
 
 
-def _near_pairs(
+def near_pairs(
     first: TriangleMesh, second: TriangleMesh
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Pairs of faces whose boxes meet; faces without area are left out."""
-    low_1, high_1 = first.triangles.min(axis=1), first.triangles.max(axis=1)
-    low_2, high_2 = second.triangles.min(axis=1), second.triangles.max(axis=1)
-    kept_1 = np.flatnonzero(
-        (first.face_areas > 0.0)
-        & ((low_1 <= high_2.max(axis=0)) & (high_1 >= low_2.min(axis=0))).all(axis=1)
-    )
-    kept_2 = np.flatnonzero(
-        (second.face_areas > 0.0)
-        & ((low_2 <= high_1.max(axis=0)) & (high_2 >= low_1.min(axis=0))).all(axis=1)
-    )
+    low_1, high_1 = first.face_bounds
+    low_2, high_2 = second.face_bounds
+    blocks_1, blocks_2 = _block_boxes(low_1, high_1), _block_boxes(low_2, high_2)
+    near = _meeting(*blocks_1, *blocks_2)
+    near_1, near_2 = np.flatnonzero(near.any(axis=1)), np.flatnonzero(near.any(axis=0))
+    kept_1 = _faces_of(near_1, low_1, high_1, blocks_2, near_2)
+    kept_2 = _faces_of(near_2, low_2, high_2, blocks_1, near_1)
+    kept_1 = kept_1[first.face_areas[kept_1] > 0.0]
+    kept_2 = kept_2[second.face_areas[kept_2] > 0.0]
     if len(kept_1) == 0 or len(kept_2) == 0:
         return np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64)
+    if len(kept_1) * len(kept_2) <= _DENSE:
+        meet = _meeting(low_1[kept_1], high_1[kept_1], low_2[kept_2], high_2[kept_2])
+        one, other = np.nonzero(meet)
+        return kept_1[one], kept_2[other]
     third, x, y = np.argsort(np.ptp(first.bounds, axis=0))
     tree = shapely.STRtree(
         shapely.box(low_2[kept_2, x], low_2[kept_2, y], high_2[kept_2, x], high_2[kept_2, y])
@@ -72,8 +80,44 @@ def _near_pairs(
     boxes = shapely.box(low_1[kept_1, x], low_1[kept_1, y], high_1[kept_1, x], high_1[kept_1, y])
     one, other = tree.query(boxes)
     one, other = kept_1[one], kept_2[other]
-    meet = (low_1[one, third] <= high_2[other, third]) & (high_1[one, third] >= low_2[other, third])
-    return one[meet].astype(np.int64), other[meet].astype(np.int64)
+    meets = (low_1[one, third] <= high_2[other, third]) & (
+        high_1[one, third] >= low_2[other, third]
+    )
+    return one[meets].astype(np.int64), other[meets].astype(np.int64)
+
+
+def _block_boxes(low: FloatArray, high: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """The boxes of blocks of faces; those that follow one another mostly lie together."""
+    starts = np.arange(0, len(low), _BLOCK)
+    return np.minimum.reduceat(low, starts), np.maximum.reduceat(high, starts)
+
+
+def _meeting(
+    low_1: FloatArray, high_1: FloatArray, low_2: FloatArray, high_2: FloatArray
+) -> NDArray[np.bool_]:
+    """(n, k): which of n boxes meet which of k others."""
+    meet = np.ones((len(low_1), len(low_2)), dtype=bool)
+    for axis in range(3):
+        meet &= low_1[:, None, axis] <= high_2[:, axis]
+        meet &= high_1[:, None, axis] >= low_2[:, axis]
+    return meet
+
+
+def _faces_of(
+    near: NDArray[np.intp],
+    low: FloatArray,
+    high: FloatArray,
+    others: tuple[FloatArray, FloatArray],
+    near_others: NDArray[np.intp],
+) -> NDArray[np.int64]:
+    """The faces of the blocks `near` that meet the box around the other mesh's near blocks."""
+    faces = (near[:, None] * _BLOCK + np.arange(_BLOCK)).ravel().astype(np.int64)
+    faces = faces[faces < len(low)]
+    if len(faces) == 0:
+        return faces
+    other_low, other_high = others[0][near_others], others[1][near_others]
+    meets = (low[faces] <= other_high.max(axis=0)) & (high[faces] >= other_low.min(axis=0))
+    return faces[meets.all(axis=1)]
 
 
 def _crossings(

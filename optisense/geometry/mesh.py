@@ -128,6 +128,12 @@ class TriangleMesh:
         return self.vertices[self.faces]
 
     @cached_property
+    def face_bounds(self) -> tuple[FloatArray, FloatArray]:
+        """(m, 3), (m, 3) float64, mm: the lowest and highest corner of each face's box."""
+        a, b, c = (self.vertices[self.faces[:, corner]] for corner in range(3))
+        return np.minimum(np.minimum(a, b), c), np.maximum(np.maximum(a, b), c)
+
+    @cached_property
     def face_vectors(self) -> FloatArray:
         """(m, 3) float64, mm^2: face normals times twice the face areas."""
         a, b, c = self.triangles[:, 0], self.triangles[:, 1], self.triangles[:, 2]
