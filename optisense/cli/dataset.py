@@ -8,9 +8,14 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from optisense.cli.console import ends_well, messages, output
-from optisense.cli.options import DesignArgument, parse_exposure, parse_resolution, parse_variant
+from optisense.cli.options import (
+    DesignArgument,
+    VariantOption,
+    parse_exposure,
+    parse_resolution,
+)
+from optisense.cli.output_folder import ensure_writable
 from optisense.cli.progress import counting_bar
-from optisense.cli.render import ensure_writable
 
 if TYPE_CHECKING:
     from optisense.tasks import Dataset
@@ -85,9 +90,7 @@ def dataset(
             metavar="field|sppm", help="sppm is slow, and exact where plates cover the gel."
         ),
     ] = "field",
-    variant: Annotated[
-        str, typer.Option(metavar="auto|llvm|cuda", help="Processor (llvm) or GPU (cuda).")
-    ] = "auto",
+    variant: VariantOption = "auto",
 ) -> None:
     """Make a dataset of random contacts: pictures, depth, normals, masks and labels.
 
@@ -95,7 +98,6 @@ def dataset(
     settings is left alone.
     """
     brightness = parse_exposure(exposure)
-    parse_variant(variant)
     size = None if resolution is None else parse_resolution(resolution)
     depths = parse_range(depth, "--depth")
     rotations = parse_range(rotation, "--rotation")

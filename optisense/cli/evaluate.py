@@ -17,8 +17,15 @@ from optisense.cli.console import (
     messages,
     output,
 )
-from optisense.cli.options import DesignArgument, parse_resolution, parse_variant
-from optisense.cli.render import ensure_writable
+from optisense.cli.options import (
+    DesignArgument,
+    ScorePhotonsOption,
+    ScoreResolutionOption,
+    SettingOption,
+    VariantOption,
+    score_settings,
+)
+from optisense.cli.output_folder import ensure_writable
 
 if TYPE_CHECKING:
     from optisense.objectives import Objective
@@ -43,28 +50,9 @@ def evaluate(
             show_default=False,
         ),
     ] = None,
-    setting: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--set",
-            metavar="NAME=VALUE",
-            help="A setting of the objectives, such as depth=0.5, noise=0.2 or half_lines=true. "
-            "May be given several times.",
-            show_default=False,
-        ),
-    ] = None,
-    resolution: Annotated[
-        str | None,
-        typer.Option(
-            metavar="WIDTHxHEIGHT",
-            help="Pixels of images and rays. 640 across, in the camera's shape, when left out.",
-            show_default=False,
-        ),
-    ] = None,
-    photons: Annotated[
-        int | None,
-        typer.Option(min=1, metavar="N", help="Photons to trace.", show_default="5 million"),
-    ] = None,
+    setting: SettingOption = None,
+    resolution: ScoreResolutionOption = None,
+    photons: ScorePhotonsOption = None,
     seed: Annotated[
         int,
         typer.Option(
@@ -88,26 +76,16 @@ def evaluate(
     as_json: Annotated[
         bool, typer.Option("--json", help="Print JSON with all parts instead of a table.")
     ] = False,
-    variant: Annotated[
-        str,
-        typer.Option(
-            metavar="auto|llvm|cuda", help="Render on the processor (llvm) or a GPU (cuda)."
-        ),
-    ] = "auto",
+    variant: VariantOption = "auto",
 ) -> None:
     """Score a sensor: how well its images tell the shape of what touches it.
 
     Objectives share images and rays. One that fails says why, the others go on, and the exit
     code is 1.
     """
-    parse_variant(variant)
     if report and out is None:
         raise typer.BadParameter("needs a folder: --out DIR", param_hint="--report")
-    settings = parse_settings(setting)
-    settings |= {} if photons is None else {"photons": photons}
-    if resolution is not None:
-        size = parse_resolution(resolution)
-        settings |= {"resolution": size, "ray_resolution": size}
+    settings = score_settings(setting, photons, resolution)
 
     from optisense.objectives import BUILT_IN, Settings
     from optisense.objectives.registry import resolve
@@ -151,30 +129,6 @@ def evaluate(
         raise typer.Exit(EXIT_INTERRUPTED)
     if scored.failed():
         raise typer.Exit(EXIT_FAILURE)
-
-
-def parse_settings(texts: list[str] | None) -> dict[str, Any]:
-    """Read the values of ``--set``, as those of a design file are read: 1e-3 is a number.
-
-    Raises:
-        typer.BadParameter: one of them is not NAME=VALUE.
-    """
-    from optisense.design.yaml_reader import parse_yaml
-    from optisense.errors import OptiSenseError
-
-    settings = {}
-    for text in texts or []:
-        name, equals, value = text.partition("=")
-        if not equals or not name.strip():
-            raise typer.BadParameter(f"'{text}' is not NAME=VALUE", param_hint="--set")
-        try:
-            read, _ = parse_yaml(f"value: {value}", "--set")
-            settings[name.strip().replace("-", "_")] = read["value"]
-        except OptiSenseError:
-            raise typer.BadParameter(
-                f"the value in '{text}' can't be read", param_hint="--set"
-            ) from None
-    return settings
 
 
 def _score(

@@ -9,7 +9,7 @@ import typer
 
 from optisense.cli.console import ends_well, messages, output
 from optisense.cli.options import DesignArgument
-from optisense.cli.render import ensure_writable
+from optisense.cli.output_folder import ensure_writable
 
 FORMATS = ("stl", "obj", "3mf", "step")
 

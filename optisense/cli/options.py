@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
@@ -32,6 +32,57 @@ ContactOption = Annotated[
 ]
 
 MAX_PIXELS = 100_000_000
+
+
+def parse_variant(text: str) -> str:
+    """Read ``auto``, ``llvm`` or ``cuda``.
+
+    Raises:
+        typer.BadParameter: anything else.
+    """
+    if text not in ("auto", "llvm", "cuda"):
+        raise typer.BadParameter(f"'{text}' is none of auto, llvm, cuda", param_hint="--variant")
+    return text
+
+
+VariantOption = Annotated[
+    str,
+    typer.Option(
+        metavar="auto|llvm|cuda",
+        help="Render on the processor (llvm) or a GPU (cuda).",
+        callback=parse_variant,
+    ),
+]
+
+WorkersOption = Annotated[int, typer.Option(min=1, metavar="N", help="Processes on this machine.")]
+
+SettingOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--set",
+        metavar="NAME=VALUE",
+        help="A setting of the objectives, such as depth=0.5, noise=0.2 or photons=1000000. "
+        "May be given several times.",
+        show_default=False,
+    ),
+]
+
+ScoreResolutionOption = Annotated[
+    str | None,
+    typer.Option(
+        "--resolution",
+        metavar="WIDTHxHEIGHT",
+        help="Pixels of images and rays. 640 across, in the camera's shape, when left out.",
+        show_default=False,
+    ),
+]
+
+ScorePhotonsOption = Annotated[
+    int | None,
+    typer.Option(
+        "--photons", min=1, metavar="N", help="Photons to trace.", show_default="5 million"
+    ),
+]
 
 
 def parse_resolution(text: str) -> tuple[int, int]:
@@ -72,17 +123,6 @@ def parse_exposure(text: str) -> float | Literal["auto"]:
     return value
 
 
-def parse_variant(text: str) -> str:
-    """Read ``auto``, ``llvm`` or ``cuda``.
-
-    Raises:
-        typer.BadParameter: anything else.
-    """
-    if text not in ("auto", "llvm", "cuda"):
-        raise typer.BadParameter(f"'{text}' is none of auto, llvm, cuda", param_hint="--variant")
-    return text
-
-
 def parse_contacts(texts: list[str] | None) -> list[Contact]:
     """Read the values of ``--contact``.
 
@@ -92,3 +132,43 @@ def parse_contacts(texts: list[str] | None) -> list[Contact]:
     from optisense.geometry import parse_contact
 
     return [parse_contact(text) for text in texts or []]
+
+
+def parse_settings(texts: list[str] | None) -> dict[str, Any]:
+    """Read the values of ``--set``, as those of a design file are read: 1e-3 is a number.
+
+    Raises:
+        typer.BadParameter: one of them is not NAME=VALUE.
+    """
+    from optisense.design.yaml_reader import parse_yaml
+    from optisense.errors import OptiSenseError
+
+    settings = {}
+    for text in texts or []:
+        name, equals, value = text.partition("=")
+        if not equals or not name.strip():
+            raise typer.BadParameter(f"'{text}' is not NAME=VALUE", param_hint="--set")
+        try:
+            read, _ = parse_yaml(f"value: {value}", "--set")
+            settings[name.strip().replace("-", "_")] = read["value"]
+        except OptiSenseError:
+            raise typer.BadParameter(
+                f"the value in '{text}' can't be read", param_hint="--set"
+            ) from None
+    return settings
+
+
+def score_settings(
+    setting: list[str] | None, photons: int | None, resolution: str | None
+) -> dict[str, Any]:
+    """The settings of objectives that `--set`, `--photons` and `--resolution` name.
+
+    Raises:
+        typer.BadParameter: one of them can't be read.
+    """
+    settings = parse_settings(setting)
+    if photons is not None:
+        settings["photons"] = photons
+    if resolution is not None:
+        settings["resolution"] = settings["ray_resolution"] = parse_resolution(resolution)
+    return settings

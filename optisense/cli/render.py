@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tempfile
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -15,12 +14,12 @@ from optisense.cli.interrupt import held_interrupt
 from optisense.cli.options import (
     ContactOption,
     DesignArgument,
+    VariantOption,
     parse_contacts,
     parse_exposure,
     parse_resolution,
-    parse_variant,
 )
-from optisense.errors import OutputError
+from optisense.cli.output_folder import ensure_writable
 
 if TYPE_CHECKING:
     from optisense.optics import Progress as RenderProgress
@@ -83,12 +82,7 @@ def render(
             help="Brightness of the picture: a factor on the radiance, or found by itself.",
         ),
     ] = "auto",
-    variant: Annotated[
-        str,
-        typer.Option(
-            metavar="auto|llvm|cuda", help="Render on the processor (llvm) or a GPU (cuda)."
-        ),
-    ] = "auto",
+    variant: VariantOption = "auto",
 ) -> None:
     """Render what the sensor's camera sees, with or without contacts.
 
@@ -97,7 +91,6 @@ def render(
     """
     size = None if resolution is None else parse_resolution(resolution)
     brightness = parse_exposure(exposure)
-    parse_variant(variant)
     if noise is not None and seconds is not None:
         raise typer.BadParameter("give one of them, not both", param_hint="--noise, --seconds")
     contacts = parse_contacts(contact)
@@ -144,29 +137,6 @@ def render(
         messages.print("interrupted: the files hold what was finished until then")
     if interrupt.requested:
         raise typer.Exit(EXIT_INTERRUPTED)
-
-
-def ensure_writable(folder: Path) -> None:
-    """Make the folder if need be, and try whether a file can be written into it.
-
-    Raises:
-        OutputError: it can't, found out before the work instead of after it.
-    """
-    if folder.exists() and not folder.is_dir():
-        raise OutputError(
-            "the output folder is a file", where=str(folder), hint="Name a folder after --out"
-        )
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryFile(dir=folder) as trial:
-            trial.write(bytes(4096))
-            trial.flush()
-    except OSError as error:
-        raise OutputError(
-            f"the output folder can't be written: {error.strerror or error}",
-            where=str(folder),
-            hint="Choose another folder after --out, or free space on this disk",
-        ) from error
 
 
 @contextmanager

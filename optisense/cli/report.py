@@ -45,7 +45,7 @@ def report(
 
     A search may still be running: the page shows the trials so far.
     """
-    from optisense.cli.render import ensure_writable
+    from optisense.cli.output_folder import ensure_writable
     from optisense.report.study import write_study_report
     from optisense.search import Study
 

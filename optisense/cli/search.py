@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from optisense.cli.console import EXIT_INTERRUPTED, ends_well, messages, output
-from optisense.cli.evaluate import parse_settings
-from optisense.cli.options import parse_variant
+from optisense.cli.options import SettingOption, VariantOption, WorkersOption, parse_settings
 from optisense.cli.search_result import print_result, summary
 from optisense.cli.searching import search_progress
 
@@ -68,9 +67,7 @@ def search(
             show_default=False,
         ),
     ] = None,
-    workers: Annotated[
-        int, typer.Option(min=1, metavar="N", help="Processes on this machine.")
-    ] = 1,
+    workers: WorkersOption = 1,
     cluster: Annotated[
         str | None,
         typer.Option(
@@ -98,16 +95,7 @@ def search(
             show_default="0",
         ),
     ] = None,
-    setting: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--set",
-            metavar="NAME=VALUE",
-            help="A setting of the objectives, such as photons=1000000 or depth=0.5. May be given "
-            "several times.",
-            show_default=False,
-        ),
-    ] = None,
+    setting: SettingOption = None,
     option: Annotated[
         list[str] | None,
         typer.Option(
@@ -147,12 +135,7 @@ def search(
             min=2, metavar="N", help="Manufactured sensors a trial, with --error.", show_default="8"
         ),
     ] = None,
-    variant: Annotated[
-        str,
-        typer.Option(
-            metavar="auto|llvm|cuda", help="Render on the processor (llvm) or a GPU (cuda)."
-        ),
-    ] = "auto",
+    variant: VariantOption = "auto",
     as_json: Annotated[
         bool, typer.Option("--json", help="Print the result as JSON instead of text.")
     ] = False,
@@ -166,7 +149,6 @@ def search(
     if methods:
         _print_methods()
         return
-    parse_variant(variant)
     if out is None:
         raise typer.BadParameter("name a folder for the study", param_hint="--out")
 

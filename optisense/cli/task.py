@@ -14,12 +14,12 @@ from optisense.cli.console import ends_well, messages, output
 from optisense.cli.dataset import parse_range
 from optisense.cli.options import (
     DesignArgument,
+    VariantOption,
     parse_contacts,
     parse_resolution,
-    parse_variant,
 )
+from optisense.cli.output_folder import ensure_writable
 from optisense.cli.progress import counting_bar
-from optisense.cli.render import ensure_writable
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -84,9 +84,6 @@ OutOption = Annotated[
     ),
 ]
 JsonOption = Annotated[bool, typer.Option("--json", help="Print JSON instead of a table.")]
-VariantOption = Annotated[
-    str, typer.Option(metavar="auto|llvm|cuda", help="Processor (llvm) or GPU (cuda).")
-]
 
 PHOTONS = 5_000_000
 SAMPLES = 200
@@ -221,7 +218,6 @@ def reconstruction(
     variant: VariantOption = "auto",
 ) -> None:
     """Shapes from pictures: errors of normals (degrees) and depth (mm) on unseen objects."""
-    parse_variant(variant)
     depths = parse_range(depth, "--depth")
     size = None if resolution is None else parse_resolution(resolution)
     contacts = dict(zip(thing or [], parse_contacts(thing), strict=True)) or None
@@ -289,7 +285,6 @@ def _perceive(
     variant: str,
 ) -> None:
     """Run tasks one after the other; several have a folder each."""
-    parse_variant(variant)
 
     from optisense.sensors import load
 

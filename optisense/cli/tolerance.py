@@ -10,8 +10,15 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from optisense.cli.console import EXIT_INTERRUPTED, ends_well, messages, output
-from optisense.cli.evaluate import parse_settings
-from optisense.cli.options import DesignArgument, parse_resolution
+from optisense.cli.options import (
+    DesignArgument,
+    ScorePhotonsOption,
+    ScoreResolutionOption,
+    SettingOption,
+    WorkersOption,
+    score_settings,
+)
+from optisense.cli.output_folder import ensure_writable
 from optisense.cli.progress import counting_bar
 
 if TYPE_CHECKING:
@@ -51,34 +58,14 @@ def tolerance(
         int,
         typer.Option(min=8, metavar="N", help="About how many manufactured sensors to try."),
     ] = 120,
-    workers: Annotated[
-        int, typer.Option(min=1, metavar="N", help="Processes on this machine.")
-    ] = 1,
+    workers: WorkersOption = 1,
     seed: Annotated[
         int,
         typer.Option(min=0, max=2**32 - 1, metavar="N", help="The same seed: the same sensors."),
     ] = 0,
-    setting: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--set",
-            metavar="NAME=VALUE",
-            help="A setting of the objectives, such as depth=0.5. May be given several times.",
-            show_default=False,
-        ),
-    ] = None,
-    resolution: Annotated[
-        str | None,
-        typer.Option(
-            metavar="WIDTHxHEIGHT",
-            help="Pixels of images and rays. 640 across, in the camera's shape, when left out.",
-            show_default=False,
-        ),
-    ] = None,
-    photons: Annotated[
-        int | None,
-        typer.Option(min=1, metavar="N", help="Photons to trace.", show_default="5 million"),
-    ] = None,
+    setting: SettingOption = None,
+    resolution: ScoreResolutionOption = None,
+    photons: ScorePhotonsOption = None,
     out: Annotated[
         Path | None,
         typer.Option(
@@ -99,13 +86,8 @@ def tolerance(
     """
     if report and out is None:
         raise typer.BadParameter("needs a folder: --out DIR", param_hint="--report")
-    settings = parse_settings(setting)
-    settings |= {} if photons is None else {"photons": photons}
-    if resolution is not None:
-        size = parse_resolution(resolution)
-        settings |= {"resolution": size, "ray_resolution": size}
+    settings = score_settings(setting, photons, resolution)
 
-    from optisense.cli.render import ensure_writable
     from optisense.search.text import parse_errors
     from optisense.search.tolerance import tolerance as find_tolerance
     from optisense.sensors import load
