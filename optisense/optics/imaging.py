@@ -139,11 +139,11 @@ def render_field(
     def sample(pixel: mi.UInt32, number: mi.UInt32, thorough: bool) -> None:
         spots = film_samples(pixel, width, number, seed_of(seed, 3))
         own = seed_of(seed, 4, int(thorough))
-        main, reflected = find_visible_points(scenes.full, camera, pixel, spots, own)
+        main, reflected = find_visible_points(scenes.full, camera, pixel, number, spots, own)
         film.count(pixel)
         for points, close in ((main, thorough), (reflected, False)):
             if points is not None:
-                light = shade(field, scenes, points, own, close)
+                light = shade(field, scenes, points, close)
                 film.add(points, light)
                 film.add_light(points, emitters, areas)
 

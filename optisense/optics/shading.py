@@ -310,7 +310,7 @@ def within(towards: mi.Vector3f, spread2: mi.Float, state: mi.UInt32) -> mi.Vect
 
 
 def shade(
-    field: LightField, scenes: ContactScenes, points: VisiblePoints, seed: int, thorough: bool
+    field: LightField, scenes: ContactScenes, points: VisiblePoints, thorough: bool
 ) -> list[mi.Color3f]:
     """Radiance of visible points towards the eye, for each light group with lights of 1 mW.
 
@@ -326,9 +326,7 @@ def shade(
         # would have met.
         onward = scenes.fixed.intersect(points.point, -points.towards_eye, raised)
         base = dr.select(raised & onward.valid, onward.point, points.point)
-    random = mi.sample_tea_32(
-        dr.arange(mi.UInt32, dr.width(points.point)), dr.opaque(mi.UInt32, seed)
-    )[0]
+    random = points.random
     cell, shift, active = _interpolating_cell(field.cells, base, active, random)
     start = leave(points.point, points.face_normal, points.face_normal)
     coating = coating_of(table, points.surface, active, field.metallic)

@@ -63,8 +63,9 @@ def render_sppm(
     areas = [emitter.area for emitter in table.emitters]
     done = emitted = 0
     for number in range(passes):
-        film = film_samples(pixel, width, dr.opaque(mi.UInt32, number + 1), seed)
-        main, reflected = find_visible_points(scene, camera, pixel, film, seed + 2 * number)
+        sample = dr.opaque(mi.UInt32, number + 1)
+        film = film_samples(pixel, width, sample, seed)
+        main, reflected = find_visible_points(scene, camera, pixel, sample, film, seed)
         photons = trace_photons(
             scene, table, guide, per_light, seed, first=number * per_light, coloured=coloured
         )

@@ -38,6 +38,7 @@ class VisiblePoints:
 
     ``weight`` multiplies the radiance that leaves the point along ``towards_eye``; ``light`` is
     the number + 1 of a light that the path ends on instead (its emission is seen), else 0.
+    ``random`` are random bits of the path's own.
     """
 
     pixel: mi.UInt32
@@ -49,6 +50,7 @@ class VisiblePoints:
     towards_eye: mi.Vector3f
     surface: mi.UInt32
     light: mi.UInt32
+    random: mi.UInt32
 
 
 @dr.syntax
@@ -164,37 +166,56 @@ def film_samples(pixel: mi.UInt32, width: int, sample: mi.UInt32, seed: int) -> 
 
 
 def find_visible_points(
-    scene: RayScene, camera: RayCamera, pixel: mi.UInt32, film: mi.Point2f, seed: int
+    scene: RayScene,
+    camera: RayCamera,
+    pixel: mi.UInt32,
+    number: mi.UInt32,
+    film: mi.Point2f,
+    seed: int,
 ) -> tuple[VisiblePoints, VisiblePoints | None]:
-    """Main and reflected visible points of film positions (the second are fewer, or none)."""
-    count = dr.width(film)
+    """Main and reflected visible points of film positions (the second are fewer, or none).
+
+    What is drawn at random follows from pixel, ``number`` of the sample and seed alone, so that
+    each path is the same whichever others are traced with it.
+    """
     origin, direction = camera.rays(film.x, film.y)
-    rng = mi.PCG32(size=count, initstate=dr.opaque(mi.UInt64, seed))
+    stream = mi.sample_tea_32(number, dr.opaque(mi.UInt32, seed))[0]
+    own, other = mi.sample_tea_32(pixel, stream)
     depth = dr.opaque(mi.UInt32, MAX_DEPTH)
     tables = (scene.scene, scene.rows, scene.corners, scene.table)
-    start = dr.full(mi.Bool, True, count)
+    start = dr.full(mi.Bool, True, dr.width(film))
     out = _follow(
-        *tables, origin, direction, mi.Color3f(1), start, rng, True, True, scene.rough, depth
+        *tables,
+        origin,
+        direction,
+        mi.Color3f(1),
+        start,
+        _generator(own),
+        True,
+        True,
+        scene.rough,
+        depth,
     )
-    dr.eval(out, rng)
-    main = VisiblePoints(pixel, *out[:8])
+    dr.eval(out, own, other)
+    main = VisiblePoints(pixel, *out[:8], own)
     total, branch_origin, branch_direction = out[8:]
     lanes = dr.compress(dr.max(total) > 1e-5)
     if dr.width(lanes) == 0:
         return main, None
+    other = dr.gather(mi.UInt32, other, lanes)
     branch = _follow(
         *tables,
         dr.gather(mi.Point3f, branch_origin, lanes),
         dr.gather(mi.Vector3f, branch_direction, lanes),
         dr.gather(mi.Color3f, total, lanes),
         dr.full(mi.Bool, True, dr.width(lanes)),
-        mi.PCG32(size=dr.width(lanes), initstate=dr.opaque(mi.UInt64, seed + 1)),
+        _generator(other),
         False,
         False,
         scene.rough,
         depth,
     )
-    dr.eval(branch)
+    dr.eval(branch, other)
     kept = dr.compress(branch[0] | (branch[7] > 0))
     if dr.width(kept) == 0:
         return main, None
@@ -203,7 +224,7 @@ def find_visible_points(
         alone
     ):  # Dr.Jit compiles other kernels for arrays of one entry: add one that counts for nothing
         kept = dr.repeat(kept, 2)
-    picked = [dr.gather(type(value), value, kept) for value in branch[:8]]
+    picked: list[Any] = [dr.gather(type(value), value, kept) for value in (*branch[:8], other)]
     pixels = dr.gather(mi.UInt32, pixel, dr.gather(mi.UInt32, lanes, kept))
     reflected = VisiblePoints(pixels, *picked)
     if alone:
@@ -212,3 +233,10 @@ def find_visible_points(
         reflected.light = dr.select(first, reflected.light, 0)
     dr.eval(reflected)
     return main, reflected
+
+
+def _generator(bits: mi.UInt32) -> mi.PCG32:
+    """Random numbers that follow from these bits and not from the place in an array."""
+    random = mi.PCG32()
+    random.seed(mi.UInt64(bits), mi.UInt64(bits))
+    return random

@@ -181,10 +181,10 @@ def test_what_a_camera_sees_through_interfaces_is_weighted_by_fresnel_and_index(
     inside = np.array([k[1] for k in known])
     # Through a plate, and into a block whose bottom is coated.
     plate = box("plate", (-40, -40, 1), (40, 40, 3), GLASS)
-    main, _ = find_visible_points(RayScene([plate, floor(GREY, 40)]), camera, pixel, film, 0)
+    main, _ = find_visible_points(RayScene([plate, floor(GREY, 40)]), camera, pixel, pixel, film, 0)
     assert np.asarray(main.weight)[0] == pytest.approx((1 - reflectance) ** 2, rel=1e-4)
     block = box("block", (-40, -40, 0), (40, 40, 3), GLASS, without=["-z"])
-    main, _ = find_visible_points(RayScene([block, floor(GREY, 40)]), camera, pixel, film, 0)
+    main, _ = find_visible_points(RayScene([block, floor(GREY, 40)]), camera, pixel, pixel, film, 0)
     # Radiance in glass is n^2 times that outside.
     assert np.asarray(main.weight)[0] == pytest.approx((1 - reflectance) / 1.5**2, rel=1e-4)
     reach = 7 * np.tan(angle) + 3 * np.tan(inside)

@@ -170,9 +170,8 @@ def test_only_contacts_lights_what_the_whole_image_shows_there_and_nothing_else(
     mask = only.contact_mask
     np.testing.assert_array_equal(mask, whole.contact_mask)
     assert (only.radiance[~mask] == 0).all()
-    mean = whole.radiance[mask].mean(axis=0)
-    assert np.abs(only.radiance[mask].mean(axis=0) / mean - 1).max() < 0.005
-    assert np.sqrt(((only.radiance - whole.radiance)[mask] ** 2).mean()) < 0.05 * mean.mean()
+    # What a pixel shows does not depend on which others are rendered.
+    np.testing.assert_allclose(only.radiance[mask], whole.radiance[mask], rtol=1e-4, atol=1e-9)
 
 
 def test_ground_truth_of_a_ball_is_a_sphere() -> None:

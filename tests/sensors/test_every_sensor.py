@@ -90,18 +90,9 @@ def test_every_indenter_shows(
         "plane": Plane(size=4.0),
         "mesh": MeshIndenter(brick),
     }[kind]
-    place = _best_lit(model, untouched)
-    image = model.render([Contact(indenter, point=place, depth=0.6)], **SMALL)
+    middle = model.nine_contacts()[4].point
+    image = model.render([Contact(indenter, point=middle, depth=0.6)], **SMALL)
     pressed = image.contact_mask
     assert pressed.sum() > 20
     change = np.abs(image.radiance - untouched.radiance).max(axis=2)
-    assert np.median(change[pressed]) > 3.0 * np.median(change[~pressed])
-
-
-def _best_lit(model: OpticalModel, untouched: TactileImage) -> tuple[float, float, float]:
-    """Of nine places the one that is brightest when nothing is pressed in."""
-    places = [contact.point for contact in model.nine_contacts()]
-    radiance = np.nan_to_num(untouched.radiance.sum(axis=2))
-    points = np.nan_to_num(untouched.points, nan=1e6)
-    near = [np.linalg.norm(points - place, axis=2) < 1.0 for place in places]
-    return places[int(np.argmax([np.median(radiance[pixels]) for pixels in near]))]
+    assert np.median(change[pressed]) > 5.0 * np.median(change[~pressed])
