@@ -8,7 +8,7 @@ BLENDER_PYTHON ?=
 BLENDER_VENV := .venv-blender
 BLENDER_STAMP := $(BLENDER_VENV)/.set-up
 
-.PHONY: help setup demo test lint types import-rules pytest studio-tests extension setup-blender \
+.PHONY: help setup demo test lint types import-rules docs pytest studio-tests extension setup-blender \
     format bench lock clean
 
 help:
@@ -16,6 +16,7 @@ help:
 	@echo "make test     lint, types, import rules and tests, those of the Blender extension too"
 	@echo "make studio-tests   only the tests of the Blender extension"
 	@echo "make extension      build and validate the Blender extension: dist/optisense_studio.zip"
+	@echo "make docs     build the documentation as a site, and check its links: site/index.html"
 	@echo "make bench    measure speed and accuracy (minutes)"
 	@echo "make setup    only the set-up: .venv and the libLLVM the renderer needs"
 	@echo "make format   let ruff tidy the code"
@@ -30,7 +31,7 @@ $(STAMP): pyproject.toml requirements.lock scripts/setup.sh
 demo: setup
 	@$(BIN)/optisense render gelsight-mini --contact sphere:1.5@0,0:0.8 --out demo-output
 
-test: lint types import-rules pytest studio-tests
+test: lint types import-rules docs pytest studio-tests
 
 lint: setup
 	$(BIN)/ruff check .
@@ -41,6 +42,10 @@ types: setup
 
 import-rules: setup
 	$(BIN)/lint-imports
+
+docs: setup
+	$(BIN)/sphinx-build -q -W --keep-going -c docs -b html . site
+	@echo "the documentation: site/index.html"
 
 pytest: setup types lint import-rules
 	$(BIN)/python -m pytest
@@ -72,4 +77,4 @@ lock:
 	    --generate-hashes --no-emit-index-url --upgrade --output-file requirements-blender.lock
 
 clean:
-	rm -rf $(VENV) $(BLENDER_VENV) demo-output build dist .mypy_cache .pytest_cache .ruff_cache .import_linter_cache
+	rm -rf $(VENV) $(BLENDER_VENV) demo-output site build dist .mypy_cache .pytest_cache .ruff_cache .import_linter_cache
