@@ -93,8 +93,14 @@ def expand(
         if handles:
             return design, [_of_handle(design, handle, spec, path) for handle in handles]
         steps = parse_path(path)
-        if len(steps) == 3 and steps[0] == "cages" and steps[2] in ("points", "blend"):
-            return _of_cage(design, str(steps[1]), str(steps[2]), path, spec)
+        if len(steps) > 2 and steps[0] == "cages" and steps[2] in ("points", "blend"):
+            axes = steps[3:]
+            if not axes:
+                return _of_cage(design, str(steps[1]), str(steps[2]), path, spec)
+            if len(axes) == 1 and axes[0] in ("x", "y", "z"):
+                whole, chosen = path.rpartition(".")[0], replace(as_points(spec), axes=str(axes[0]))
+                design, found = _of_cage(design, str(steps[1]), str(steps[2]), whole, chosen)
+                return design, [replace(each, asked=path) for each in found]
         if isinstance(spec, CagePoints):
             raise SearchError("these are no control points", hint="Vary cages.NAME.points")
         single = _of_value(path, get_value(design, path), spec)
@@ -193,8 +199,7 @@ def _of_cage(
     design: SensorDesign, name: str, field: str, path: str, spec: Specification
 ) -> tuple[SensorDesign, list[Parameter]]:
     cage: Cage = get_value(design, f"cages.{name}")
-    if isinstance(spec, Choice | Integer):
-        raise SearchError("control points take a range of numbers", hint="Give LOW:HIGH")
+    given = as_points(spec)
     if field == "blend":
         if cage.c_min is None or cage.c_max is None:
             raise SearchError(
@@ -208,20 +213,25 @@ def _of_cage(
             return ready, [replace(each, asked=path) for each in _of_value(path, share, spec)]
         shares = _shares(cage)
         ready = _with_blend(design, name, [Share(x=x, y=y, z=z) for x, y, z in shares.tolist()])
-        return ready, _points(cage, path, shares, as_points(spec), free=_span(cage) != 0.0)
+        return ready, _points(cage, path, shares, given, free=_span(cage) != 0.0)
     if cage.blend is not None:
         points = cage.current_points()
         change = {"blend": None, "points": _as_dicts(points)}
         design = set_value(design, f"cages.{name}", {**cage.model_dump(mode="json"), **change})
     points = as_array(design.cages[name].points)
-    return design, _points(cage, path, points, as_points(spec), mirror=np.array(cage.box))
+    return design, _points(cage, path, points, given, mirror=np.array(cage.box))
 
 
 def as_points(spec: Specification) -> CagePoints:
-    """Bounds or a reach for all control points, unless points are named already."""
+    """Bounds or a reach for all control points, unless points are named already.
+
+    Raises:
+        SearchError: these are options or whole numbers.
+    """
     if isinstance(spec, CagePoints):
         return spec
-    assert isinstance(spec, Continuous | Around)
+    if isinstance(spec, Choice | Integer):
+        raise SearchError("control points take a range of numbers", hint="Give LOW:HIGH")
     return CagePoints(spec)
 
 

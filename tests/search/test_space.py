@@ -82,6 +82,21 @@ class TestCages:
         with pytest.raises(SearchError, match="no point 27"):
             SearchSpace({"cages.M1.points": CagePoints(Around(1.0), points=(27,))}).bind(svelte)
 
+    def test_each_axis_may_have_a_reach_of_its_own(self, svelte: SensorDesign) -> None:
+        reaches = {"x": 8.0, "y": 1.0, "z": 2.0}
+        space = SearchSpace(
+            {f"cages.M1.points.{axis}": Around(reach) for axis, reach in reaches.items()}
+        ).bind(svelte)
+        assert space.size == 81
+        ends = [
+            as_array(space.apply(bound).cages["M1"].points) for bound in (space.lower, space.upper)
+        ]
+        assert np.allclose(ends[1] - ends[0], 2.0 * np.array(list(reaches.values())))
+        blend = SearchSpace({"cages.M1.blend.x": (0.0, 1.0)}).bind(svelte)
+        assert blend.names == [f"cages.M1.blend[{k}].x" for k in range(27)]
+        with pytest.raises(SearchError, match="range of numbers"):
+            SearchSpace({"cages.M1.points.x": ["a", "b"]}).bind(svelte)
+
     def test_mirrored_points_move_as_mirror_images(self, svelte: SensorDesign) -> None:
         """Half the parameters; every shape in the space is symmetric."""
         spec = CagePoints(Around(2.0), symmetry="y")
