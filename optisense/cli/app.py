@@ -15,6 +15,7 @@ from optisense.cli.dataset import dataset
 from optisense.cli.doctor import doctor
 from optisense.cli.engine import engine
 from optisense.cli.evaluate import evaluate
+from optisense.cli.experiment import experiment
 from optisense.cli.export import export
 from optisense.cli.leaving import run_and_leave
 from optisense.cli.library import library_app
@@ -45,6 +46,7 @@ app.command()(search)
 app.command()(apply)
 app.command()(report)
 app.command()(tolerance)
+app.command()(experiment)
 app.command()(export)
 app.command()(studio)
 app.command()(engine)

@@ -1,0 +1,144 @@
+"""``optisense experiment``: the paper's tables and figures, made again."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from optisense.cli.console import EXIT_INTERRUPTED, ends_well, messages, output
+
+if TYPE_CHECKING:
+    from optisense.experiments import Experiment
+
+
+@ends_well
+def experiment(
+    name: Annotated[
+        str | None,
+        typer.Argument(
+            metavar="[NAME|all]",
+            help="Which; lists them when left out.",
+            show_default=False,
+        ),
+    ] = None,
+    quick: Annotated[
+        bool, typer.Option("--quick", help="Less of everything: minutes, and less sure.")
+    ] = False,
+    out: Annotated[
+        Path,
+        typer.Option(
+            "--out", "-o", metavar="DIR", help="Folder of results; what is in it is not done again."
+        ),
+    ] = Path("experiments"),
+    seeds: Annotated[
+        int | None,
+        typer.Option(
+            min=1,
+            metavar="N",
+            help="Repeat what has chance in it with so many seeds.",
+            show_default="3, or 2 with --quick",
+        ),
+    ] = None,
+    workers: Annotated[
+        int | None,
+        typer.Option(
+            min=1, metavar="N", help="Processes on this machine.", show_default="one a processor"
+        ),
+    ] = None,
+    page: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE",
+            help="Also collect the results on one page (Markdown), with files beside it.",
+            show_default=False,
+        ),
+    ] = None,
+) -> None:
+    """Make tables and figures of the OptiSense paper again, and say what agrees.
+
+    Stopped or killed at any moment, the same command goes on: every single evaluation is kept.
+    """
+    if name is None:
+        _print_list()
+        return
+
+    from optisense.cli.output_folder import ensure_writable
+    from optisense.experiments import find, run, write_page
+    from optisense.experiments.bench import Bench
+    from optisense.search.executors import processors
+
+    chosen = find(name)
+    for each in chosen:
+        each.settings(quick, seeds)
+    ensure_writable(out)
+    if page is not None:
+        ensure_writable(page.parent)
+    count = min(processors(), MOST_WORKERS) if workers is None else workers
+    for each in chosen:
+        with _progress_bar(each.name) as show:
+            bench = Bench(out, count, show)
+            try:
+                result = run(each, bench, quick, seeds)
+            except KeyboardInterrupt:
+                messages.print(
+                    f"interrupted: what is finished is kept in {out}; the same command goes on"
+                )
+                raise typer.Exit(EXIT_INTERRUPTED) from None
+        _print_result(each, result, out)
+    if page is not None:
+        write_page(page, out, chosen)
+        output.print(f"page: {page}", markup=False)
+
+
+MOST_WORKERS = 8
+"""Unless the user says otherwise: each takes two gigabytes."""
+
+
+def _print_list() -> None:
+    from rich.table import Table
+
+    from optisense.experiments import EXPERIMENTS
+
+    table = Table(box=None, pad_edge=False, show_header=False)
+    for each in EXPERIMENTS.values():
+        table.add_row(each.name, each.about)
+    table.add_row("all", "all of them")
+    output.print(table)
+
+
+def _print_result(experiment: Experiment, result: dict[str, Any], out: Path) -> None:
+    """The verdicts, one a line."""
+    output.print(f"[bold]{experiment.title}[/bold]")
+    for claim in result["claims"]:
+        output.print(f"  {claim['verdict']:<15} {claim['says']}", markup=False)
+        output.print(f"                  {claim['here']}", markup=False)
+    if result["gaps"]:
+        output.print(f"  {len(result['gaps'])} without a score; see the text", markup=False)
+    output.print(f"  results: {out / experiment.name}", markup=False)
+
+
+@contextmanager
+def _progress_bar(what: str) -> Iterator[Callable[[int, int, str], None]]:
+    """A bar on standard error; silent when that is no terminal."""
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+
+    with Progress(
+        TextColumn(what),
+        BarColumn(bar_width=32),
+        MofNCompleteColumn(),
+        TimeElapsedColumn(),
+        TextColumn("{task.fields[label]}"),
+        console=messages,
+        transient=True,
+        disable=not messages.is_terminal,
+    ) as bar:
+        task = bar.add_task(what, total=None, label="")
+
+        def show(done: int, count: int, label: str) -> None:
+            bar.update(task, completed=done, total=count, label=label)
+
+        yield show

@@ -1,0 +1,351 @@
+"""The questions that experiments ask: scores, pictures, tasks, searches, and what they take.
+
+Each function here is the work of units (see `optisense.experiments.unit`): it gets plain values and
+returns plain values. A model is kept from one unit to the next of the same sensor, in a way that
+the answer does not depend on what was asked before.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from optisense.design import SensorDesign, set_value
+from optisense.experiments.unit import Found
+from optisense.geometry import Contact, parse_contact
+from optisense.objectives import Evaluation, Score, Settings, evaluate
+from optisense.search.models import RAYS_ONLY, ModelKeeper
+from optisense.sensors import BUILDERS
+
+if TYPE_CHECKING:
+    from optisense.optics import OpticalModel
+
+Plain = Mapping[str, Any]
+
+NINE = "nine balls"
+"""As contacts: the balls that objectives press."""
+
+SMALL = 80, 60
+"""Pixels of an image that only tells how bright a sensor is."""
+
+_keepers: dict[tuple[Any, ...], ModelKeeper] = {}
+
+
+def sensor(name: str, change: Plain | None = None, **dimensions: Any) -> dict[str, Any]:
+    """A design as plain values: a built-in sensor with some dimensions, and what is set in it.
+
+    Args:
+        name: of the sensor.
+        change: values by dotted path (see `optisense.set_value`); where the value is a dict, the
+            values of a search's trial that varied this path from 0 to 1.
+        dimensions: arguments of its builder.
+    """
+    return {"sensor": name, "dimensions": dimensions, "change": dict(change or {})}
+
+
+def design_of(plain: Plain) -> SensorDesign:
+    """The design that plain values describe (see `sensor`).
+
+    Raises:
+        OptiSenseError: it can't be built.
+    """
+    return _changed(_base(plain), plain)
+
+
+def scores(inputs: Plain, folder: Path) -> Found:
+    """Scores of a design: `design`, `objectives`, `settings` of these.
+
+    With `exposure_share` the images are so many times as bright as the exposure that suits the
+    untouched sensor makes them. An objective that fails leaves a gap among `scores` and its reason
+    among `failures`.
+    """
+    model = _model(inputs["design"], lit=not set(inputs["objectives"]) <= RAYS_ONLY)
+    settings = _tuples(inputs["settings"])
+    if "exposure_share" in inputs:
+        settings["exposure"] = inputs["exposure_share"] * _usual_exposure(model, settings)
+    return Found(_scores(evaluate(model, list(inputs["objectives"]), **settings)))
+
+
+def relit_scores(inputs: Plain, folder: Path) -> Found:
+    """Scores under several colourings of light groups, from one rendering of each group.
+
+    `design`, `groups` (the light groups), `colourings` (a letter of R, G, B for each of them),
+    `objectives`, `settings` of the images, `own` settings of the objectives.
+    """
+    from optisense.objectives.relighting import Relighting
+
+    model = _model(inputs["design"], lit=True)
+    relighting = Relighting(Evaluation(model, Settings(**_tuples(inputs["settings"]))))
+    found, own = {}, inputs["own"]
+    for letters in inputs["colourings"]:
+        design = coloured(model.design, inputs["groups"], letters)
+        evaluation = relighting.lit(design, whole=False)
+        found[letters] = _scores(evaluate(evaluation, list(inputs["objectives"]), **own))
+    failures = {
+        f"{letters} {name}": reason
+        for letters, each in found.items()
+        for name, reason in each["failures"].items()
+    }
+    return Found({"colourings": found, "failures": failures})
+
+
+def variants_of_score(inputs: Plain, folder: Path) -> Found:
+    """One objective with several settings of its own, of the same images.
+
+    `design`, `objective`, `variants` (settings by name), `settings` of the images.
+    """
+    model = _model(inputs["design"], lit=True)
+    evaluation = Evaluation(model, Settings(**_tuples(inputs["settings"])))
+    found = {
+        name: evaluate(evaluation, inputs["objective"], **own)
+        for name, own in inputs["variants"].items()
+    }
+    scored = any(score.failure is None for score in found.values())
+    pixels = [int(press.mask.sum()) for press in evaluation.presses] if scored else []
+    return Found({**_scores(found), "pixels": pixels})
+
+
+def picture(inputs: Plain, folder: Path) -> Found:
+    """What the camera sees: `design`, `contacts`, `resolution`, `photons`, `seed`.
+
+    Contacts are texts as on the command line, or `NINE` with `depth`; an indenter named
+    ``object:NAME`` is one of `optisense.experiments.objects`. Also tells how bright the picture is,
+    before exposure: `radiance`, the mean over the sensing surface and the channels.
+    """
+    model = _model(inputs["design"], lit=True)
+    contacts: list[Contact]
+    if inputs["contacts"] == NINE:
+        contacts = model.nine_contacts(depth=inputs.get("depth", 0.3))
+    else:
+        contacts = [_contact(text) for text in inputs["contacts"]]
+    image = model.render(
+        contacts, tuple(inputs["resolution"]), inputs["photons"], seed=inputs["seed"]
+    )
+    if image.interrupted:
+        raise KeyboardInterrupt
+    lit = image.radiance[np.isfinite(image.radiance)]
+    values = {
+        "radiance": float(lit.mean()) if lit.size else 0.0,
+        "pixels_in_contact": int(image.contact_mask.sum()),
+    }
+    return Found(values, {"picture": image.picture()})
+
+
+def perception(inputs: Plain, folder: Path) -> Found:
+    """How well the quantities of tasks are read: `design`, `tasks` (a resolution for each name),
+    `samples`, `seed`, `photons`. Samples are kept in the folder, one by one.
+    """
+    from optisense.tasks import CylinderRadius, Misalignment, SampleSettings, perceive
+
+    known = {"misalignment": Misalignment, "cylinder-radius": CylinderRadius}
+    model = _model(inputs["design"], lit=True)
+    found = {}
+    for name, resolution in inputs["tasks"].items():
+        settings = SampleSettings(
+            count=inputs["samples"],
+            seed=inputs["seed"],
+            resolution=tuple(resolution),
+            photons=inputs["photons"],
+        )
+        result = perceive(known[name](), model, settings, folder=folder / name)
+        found[name] = {
+            "error": result.reading.error,
+            "guess": result.reading.guess,
+            "snr": result.snr if math.isfinite(result.snr) else None,
+        }
+    return Found(found)
+
+
+def searched(inputs: Plain, folder: Path) -> Found:
+    """A search, kept as a study in the folder: `design`, `space`, `objectives`, `method`, `budget`,
+    `seed`, `options`, `settings`.
+
+    Tells the start, the best trial with the values that make it, the best score after each trial,
+    and, with `all` set, the scores of every trial.
+    """
+    from optisense.search import search
+
+    study = folder / "study"
+    result = search(
+        design_of(inputs["design"]),
+        _space(inputs["space"]),
+        list(inputs["objectives"]),
+        method=inputs["method"],
+        budget=inputs.get("budget"),
+        seed=inputs["seed"],
+        options=inputs.get("options"),
+        settings=_tuples(inputs["settings"]),
+        out=study,
+        resume=(study / "study.json").is_file(),
+    )
+    if result.interrupted:
+        raise KeyboardInterrupt
+    trials = [trial for trial in result.trials if not trial.is_start]
+    scored = [trial.score if trial.failure is None else math.nan for trial in trials]
+    first = result.start.score
+    course = np.fmax.accumulate([first, *scored]).tolist()
+    found: dict[str, Any] = {
+        "start": {**result.start.scores, "parts": _small(result.start.parts)},
+        "best": {**result.best.scores, "parts": _small(result.best.parts)},
+        "values": result.best.values,
+        "course": course,
+        "failed": sum(trial.failure is not None for trial in trials),
+    }
+    if inputs.get("all"):
+        found["trials"] = [[list(trial.values.values()), dict(trial.scores)] for trial in trials]
+    result.study.close()
+    return Found(found)
+
+
+def image_times(inputs: Plain, folder: Path) -> Found:
+    """How long an image takes: `design`, `resolution`, `photons`, `seeds`, `ball` (radius, depth).
+
+    For each seed an image with new light and one more with the same light; before them one that is
+    not counted, for which kernels are compiled and the photon guide is learned. The noise is what
+    two seeds differ by in the contact, in relation to the mean there, over the square root of 2.
+    """
+    import time
+
+    from optisense.geometry import Sphere
+    from optisense.optics import OpticalModel
+
+    radius, depth = inputs["ball"]
+    began = time.perf_counter()
+    model = OpticalModel(design_of(inputs["design"]))
+    contact = model.nine_contacts(Sphere(radius), depth)[4]
+    images, times = [], {"new_light": [], "light_kept": []}  # type: ignore[var-annotated]
+    size, photons = tuple(inputs["resolution"]), inputs["photons"]
+    model.render([contact], size, photons, seed=10_000)
+    first = time.perf_counter() - began
+    for seed in inputs["seeds"]:
+        for name in times:
+            clock, spent = time.perf_counter(), time.process_time()
+            image = model.render([contact], size, photons, seed=seed)
+            if image.interrupted:
+                raise KeyboardInterrupt
+            times[name].append([time.perf_counter() - clock, time.process_time() - spent])
+        images.append(image)
+    noises = [
+        _difference(one.radiance, other.radiance, one.contact_mask & other.contact_mask)
+        for one, other in itertools.pairwise(images)
+    ]
+    return Found(
+        {
+            "first": first,
+            **times,
+            "noise": noises,
+            "photons": images[0].settings["photons"],
+            "pixels_in_contact": int(images[0].contact_mask.sum()),
+        }
+    )
+
+
+def coloured(design: SensorDesign, groups: Sequence[str], letters: str) -> SensorDesign:
+    """A design whose light groups are red, green or blue."""
+    shares = {"R": (1.0, 0.0, 0.0), "G": (0.0, 1.0, 0.0), "B": (0.0, 0.0, 1.0)}
+    for name, letter in zip(groups, letters, strict=True):
+        design = set_value(design, f"lights.{name}.colour", shares[letter])
+    return design
+
+
+def _difference(one: Any, other: Any, mask: Any) -> float:
+    a, b = one[mask].astype(np.float64), other[mask].astype(np.float64)
+    lit = (a + b).sum(axis=0) > 0.0
+    return float(np.sqrt(((a - b)[:, lit] ** 2).mean() / 2.0) / (0.5 * (a + b)[:, lit].mean()))
+
+
+def _usual_exposure(model: OpticalModel, settings: Plain) -> float:
+    """Of the untouched sensor, by a small image under the same light."""
+    from optisense.optics.response import auto_exposure
+
+    image = model.render((), SMALL, settings["photons"], seed=settings["seed"])
+    if image.interrupted:
+        raise KeyboardInterrupt
+    return auto_exposure(image.radiance)
+
+
+def _base(plain: Plain) -> SensorDesign:
+    builder: Callable[..., SensorDesign] = BUILDERS[plain["sensor"]]
+    return builder(**_tuples(plain["dimensions"]))
+
+
+def _changed(design: SensorDesign, plain: Plain) -> SensorDesign:
+    from optisense.search import SearchSpace
+
+    for path, value in plain["change"].items():
+        if isinstance(value, Mapping):  # the values of a search's trial
+            space = SearchSpace({path: (0.0, 1.0)}).bind(design, tried=False)
+            design = space.apply(np.array([value[name] for name in space.names]))
+        else:
+            design = set_value(design, path, tuple(value) if isinstance(value, list) else value)
+    return design
+
+
+def _model(plain: Plain, lit: bool) -> OpticalModel:
+    """A model of a design; the one given before must not be used any more."""
+    from optisense.objectives.score import json_ready
+
+    key = (plain["sensor"], repr(json_ready(plain["dimensions"])), lit)
+    if key not in _keepers:
+        _keepers.clear()  # two models are more than many machines have memory for
+        _keepers[key] = ModelKeeper(_base(plain), lit=lit)
+    keeper = _keepers[key]
+    return keeper.model(_changed(keeper.first, plain))
+
+
+def _contact(text: str) -> Contact:
+    from optisense.experiments.objects import OBJECTS
+
+    kind, _, place = text.partition("@")
+    if not kind.startswith("object:"):
+        return parse_contact(text)
+    usual = parse_contact(f"sphere:1@{place}")
+    return Contact(
+        OBJECTS[kind.removeprefix("object:")](),
+        at=usual.at,
+        depth=usual.depth,
+        rotation=usual.rotation,
+    )
+
+
+def _scores(found: Mapping[str, Score]) -> dict[str, Any]:
+    return {
+        "scores": {n: None if s.failure is not None else s.value for n, s in found.items()},
+        "failures": {n: s.failure for n, s in found.items() if s.failure is not None},
+        "parts": {n: _small({n: s.parts}).get(n, {}) for n, s in found.items()},
+    }
+
+
+def _small(parts: Mapping[str, Mapping[str, Any]]) -> dict[str, dict[str, float]]:
+    """The single numbers among the parts of scores."""
+    return {
+        name: {
+            key: value
+            for key, value in own.items()
+            if isinstance(value, int | float) and not isinstance(value, bool)
+        }
+        for name, own in parts.items()
+    }
+
+
+def _space(plain: Plain) -> dict[str, Any]:
+    """Bounds are pairs of numbers; options stay lists."""
+    return {
+        path: tuple(spec) if not isinstance(spec[0], str) else list(spec)
+        for path, spec in plain.items()
+    }
+
+
+def _tuples(values: Plain) -> dict[str, Any]:
+    """Lists as tuples, which builders and settings want."""
+    return {
+        name: tuple(tuple(v) if isinstance(v, list) else v for v in value)
+        if isinstance(value, list)
+        else value
+        for name, value in values.items()
+    }

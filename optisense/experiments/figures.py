@@ -1,0 +1,78 @@
+"""What the pictures of experiments have in common."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from optisense.experiments.spread import Spread
+from optisense.report.drawing import AMBER, BLUE, GREY, RED
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+COLOURS = (BLUE, RED, AMBER, GREY, "#3c8d5a", "#6c4ab0", "#222222", "#b06a9a")
+"""Of lines, in this order."""
+
+
+def line(
+    axes: Axes, points: Mapping[str, Spread], label: str = "", colour: str = BLUE, mark: str = "o-"
+) -> None:
+    """Means with their standard deviations over seeds; `points` by the x value as text."""
+    there = {x: each for x, each in points.items() if each["mean"] is not None}
+    if not there:
+        return
+    axes.errorbar(
+        [float(x) for x in there],
+        [each["mean"] for each in there.values()],
+        [each["standard_deviation"] or 0.0 for each in there.values()],
+        fmt=mark,
+        color=colour,
+        label=label or None,
+        capsize=3,
+        markersize=4,
+        linewidth=1.3,
+    )
+
+
+def bars(axes: Axes, values: Mapping[str, Spread], colour: str = BLUE) -> None:
+    """One bar a name, with its standard deviation."""
+    there = {name: each for name, each in values.items() if each["mean"] is not None}
+    axes.bar(
+        list(there),
+        [each["mean"] for each in there.values()],
+        yerr=[each["standard_deviation"] or 0.0 for each in there.values()],
+        color=colour,
+        capsize=3,
+        width=0.6,
+    )
+
+
+def finish(axes: Axes, title: str, x: str = "", y: str = "", legend: bool = False) -> None:
+    """Title, axes and grid."""
+    axes.set_title(title, fontsize=10)
+    axes.set_xlabel(x, fontsize=9)
+    axes.set_ylabel(y, fontsize=9)
+    axes.tick_params(labelsize=8)
+    axes.grid(alpha=0.25)
+    if legend and axes.get_legend_handles_labels()[0]:
+        axes.legend(fontsize=8)
+
+
+def image(axes: Axes, picture: NDArray[np.uint8] | None, title: str) -> None:
+    """A picture, or an empty frame where there is none."""
+    axes.set_xticks([])
+    axes.set_yticks([])
+    axes.set_title(title, fontsize=9)
+    if picture is not None:
+        axes.imshow(picture)
+    else:
+        axes.text(0.5, 0.5, "none", ha="center", va="center", transform=axes.transAxes)
+
+
+def flat_axes(axes: Any) -> Sequence[Axes]:
+    """All axes of `Figure.subplots` in one row."""
+    return list(np.atleast_1d(axes).ravel())

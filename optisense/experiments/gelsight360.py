@@ -1,0 +1,309 @@
+"""GelSight360: colours of its lights, shape of its tip, shape of its resin.
+
+The OptiSense paper, case study III: the table of five colourings by NormDiff and RGB2Normal, tips 0
+(flat) to 10 (conical) by 2to3PW, resins 0 (even shell) to 10 (almost flat) by both scores.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from optisense.experiments.claims import Table
+from optisense.experiments.evaluations import (
+    relit_scores,
+    scores,
+    searched,
+    sensor,
+    variants_of_score,
+)
+from optisense.experiments.experiment import Experiment, Finding, Pictures, Steps, Values
+from optisense.experiments.figures import COLOURS, finish, line
+from optisense.experiments.gelsight360_claims import PAPER, claims
+from optisense.experiments.mini_shapes import OBJECTIVES
+from optisense.experiments.spread import number, shown, spread
+from optisense.experiments.unit import Record, Unit
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+SENSOR = "gelsight360"
+GROUPS = [f"lg{number}" for number in range(1, 9)]
+
+
+BLIND = {
+    "as scored": {},
+    "noise 10 % instead of 30 %": {"noise": 0.1},
+    "noise 3 %": {"noise": 0.03},
+    "only the polar angle": {"phi_weight": 0.0},
+    "colours of the picture": {"colours": "picture"},
+}
+"""Ways to look at NormDiff; what the paper's weights and colours are is not given."""
+
+OTHERWISE: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {
+    "GelSight360 as it is": ({}, {}),
+    "without the ring at its foot": ({}, {"base_ring": ""}),
+    "with a grey, diffuse coating": ({}, {"coating": "diffuse-grey"}),
+    "with two groups lit only, lg1 red and lg5 green": (
+        {f"lights.lg{k}.flux": 1e-6 for k in (2, 3, 4, 6, 7, 8)},
+        {"light_colours": "RGGGGGGG", "base_ring": ""},
+    ),
+}
+
+
+def steps(settings: Values) -> Steps:
+    """Colourings from layers, all of them if asked; tips; resins; what lowers NormDiff."""
+    seeds = range(settings["seeds"])
+    images = {key: settings[key] for key in ("resolution", "photons")}
+    judged = {**images, "least_pixels": settings["least_pixels"]}
+    goals = list(OBJECTIVES)
+    table = [
+        Unit(
+            relit_scores,
+            {
+                "design": sensor(SENSOR),
+                "groups": GROUPS,
+                "colourings": list(PAPER),
+                "objectives": goals,
+                "settings": {**images, "seed": seed},
+                "own": {"least_pixels": settings["least_pixels"]},
+            },
+            f"the paper's colourings, seed {seed}",
+        )
+        for seed in seeds
+    ]
+    everything = [
+        Unit(
+            searched,
+            {
+                "design": sensor(SENSOR),
+                "space": {"lights.lg*.colour": ["R", "G", "B"]},
+                "objectives": goals,
+                "method": "light-colours",
+                "seed": 0,
+                "settings": {
+                    "photons": settings["all_photons"],
+                    "resolution": settings["resolution"],
+                    "least_pixels": settings["least_pixels"],
+                },
+                "all": True,
+            },
+            "all 6,561 colourings",
+        )
+    ]
+    if not settings["all_photons"]:
+        everything = []
+    tips = [
+        Unit(
+            scores,
+            {
+                "design": sensor(SENSOR, tip_design=float(tip)),
+                "objectives": ["2to3pw"],
+                "settings": {"ray_resolution": settings["ray_resolution"]},
+            },
+            f"tip {tip}",
+        )
+        for tip in settings["tips"]
+    ]
+    resins = [
+        Unit(
+            scores,
+            {
+                "design": sensor(SENSOR, resin_design=float(resin)),
+                "objectives": goals,
+                "settings": {
+                    **judged,
+                    "resolution": settings["resin_resolution"],
+                    "seed": seed,
+                },
+            },
+            f"resin {resin}, seed {seed}",
+        )
+        for resin in settings["resins"]
+        for seed in seeds
+    ]
+    why = [
+        Unit(
+            variants_of_score,
+            {
+                "design": sensor(SENSOR, change, **dimensions),
+                "objective": "normdiff",
+                "variants": BLIND,
+                "settings": {**images, "seed": 0},
+            },
+            f"NormDiff {name}",
+        )
+        for name, (change, dimensions) in OTHERWISE.items()
+    ]
+    records = yield [*everything, *table, *resins, *why, *tips]
+    answers = iter(records)
+    overall = [next(answers) for _ in everything]
+    rows = [next(answers) for _ in table]
+    numbers: Values = {
+        "colourings": _colourings(rows),
+        "all": _all(overall[0]) if overall and overall[0].failure is None else None,
+        "resins": {name: {} for name in goals},
+    }
+    for resin in settings["resins"]:
+        found = [next(answers).values.get("scores", {}) for _ in seeds]
+        for name in goals:
+            numbers["resins"][name][str(resin)] = spread([each.get(name) for each in found])
+    numbers["why"] = {}
+    for name in OTHERWISE:
+        record = next(answers)
+        numbers["why"][name] = {
+            "scores": record.values.get("scores", {}),
+            "pixels": min(record.values.get("pixels") or [0]),
+        }
+    numbers["tips"] = {
+        str(tip): spread([next(answers).values.get("scores", {}).get("2to3pw")])
+        for tip in settings["tips"]
+    }
+    return Finding(numbers)
+
+
+def _colourings(records: list[Record]) -> Values:
+    found: Values = {}
+    for letters in PAPER:
+        rows = [
+            record.values.get("colourings", {}).get(letters, {}).get("scores", {})
+            for record in records
+        ]
+        found[letters] = {name: spread([row.get(name) for row in rows]) for name in OBJECTIVES}
+    return found
+
+
+def _all(record: Record) -> Values:
+    """The best of all colourings by each objective, and where the others lie."""
+    shares = {"1,0,0": "R", "0,1,0": "G", "0,0,1": "B"}
+    trials = [
+        ("".join(shares.get(str(v), str(v)[0].upper()) for v in values), own)
+        for values, own in record.values["trials"]
+    ]
+    found: Values = {"colourings": len(trials)}
+    for name in OBJECTIVES:
+        there = [(own[name], letters) for letters, own in trials if own.get(name) is not None]
+        ordered = sorted(value for value, _ in there)
+        found[name] = {
+            "best": max(there)[1],
+            "score": max(there)[0],
+            "median": ordered[len(ordered) // 2],
+            "worst": ordered[0],
+            "ranks": {
+                letters: 1 + sum(value < other for other, _ in there)
+                for value, letters in there
+                if letters in PAPER
+            },
+        }
+    return found
+
+
+def tables(numbers: Values) -> list[Table]:
+    """Colourings, the best of all, tips, resins, and what lowers NormDiff."""
+    found = [
+        Table(
+            "Colourings of the paper's table (the paper's own scores in brackets)",
+            ["colouring", *OBJECTIVES.values()],
+            [
+                [letters, *(f"{shown(each[n], 4)} ({PAPER[letters][n]:g})" for n in OBJECTIVES)]
+                for letters, each in numbers["colourings"].items()
+            ],
+        )
+    ]
+    if numbers["all"]:
+        every = numbers["all"]
+        found.append(
+            Table(
+                f"All {every['colourings']:,} colourings, one seed",
+                ["objective", "best", "its score", "median", "worst", "rank of RGBRGBRG"],
+                [
+                    [
+                        title,
+                        every[name]["best"],
+                        *(number(every[name][key], 4) for key in ("score", "median", "worst")),
+                        f"{every[name]['ranks'].get('RGBRGBRG', 0):,}",
+                    ]
+                    for name, title in OBJECTIVES.items()
+                ],
+            )
+        )
+    found.append(
+        Table(
+            "Tips by 2to3PW (no chance in it)",
+            ["tip", "2to3PW"],
+            [[tip, number(each["mean"])] for tip, each in numbers["tips"].items()],
+        )
+    )
+    resins = numbers["resins"]
+    found.append(
+        Table(
+            "Resins",
+            ["resin", *OBJECTIVES.values()],
+            [
+                [resin, *(shown(resins[name][resin]) for name in OBJECTIVES)]
+                for resin in resins["normdiff"]
+            ],
+        )
+    )
+    found.append(
+        Table(
+            "What lowers NormDiff (one seed)",
+            ["sensor", *BLIND, "pixels of the smallest contact"],
+            [
+                [
+                    name,
+                    *(number(each["scores"].get(way)) for way in BLIND),
+                    str(each["pixels"]),
+                ]
+                for name, each in numbers["why"].items()
+            ],
+        )
+    )
+    return found
+
+
+def draw(numbers: Values, pictures: Pictures) -> Figure:
+    """Ours against the paper's table; tips; resins by both."""
+    from optisense.report.drawing import new_figure
+
+    figure = new_figure(11.0, 6.4)
+    axes = list(figure.subplots(2, 3).ravel())
+    for place, (name, title) in enumerate(OBJECTIVES.items()):
+        for colour, (letters, each) in zip(COLOURS, numbers["colourings"].items(), strict=False):
+            if each[name]["mean"] is not None:
+                axes[place].errorbar(
+                    PAPER[letters][name],
+                    each[name]["mean"],
+                    each[name]["standard_deviation"] or 0.0,
+                    fmt="o",
+                    color=colour,
+                    label=letters,
+                    capsize=3,
+                )
+        finish(axes[place], f"{title} of five colourings", "paper", "here", legend=place == 1)
+        line(axes[3 + place], numbers["resins"][name], "", COLOURS[place])
+        finish(axes[3 + place], f"{title} of resins", "0 even shell, 10 almost flat inside")
+    line(axes[2], numbers["tips"], "", COLOURS[2])
+    finish(axes[2], "2to3PW of tips", "0 flat, 5 hemisphere, 10 conical")
+    _draw_all(axes[5], numbers)
+    return figure
+
+
+def _draw_all(axes: Any, numbers: Values) -> None:
+    """The scores of NormDiff with other noise, of the sensors in the table."""
+    for colour, (name, each) in zip(COLOURS, numbers["why"].items(), strict=False):
+        ways = ("as scored", "noise 10 % instead of 30 %", "noise 3 %")
+        values = [each["scores"].get(way) for way in ways]
+        if None not in values:
+            axes.plot([30, 10, 3], values, "o-", color=colour, label=name[:32])
+    finish(axes, "NormDiff over its noise", "noise, % of the colour", legend=True)
+
+
+EXPERIMENT = Experiment(
+    name="gelsight360",
+    title="GelSight360: colours, tip and resin",
+    about="five colourings and all 6,561; tips by 2to3PW; resins by NormDiff and RGB2Normal",
+    steps=steps,
+    claims=claims,
+    tables=tables,
+    draw=draw,
+)

@@ -1,0 +1,89 @@
+"""The things that the paper presses into GelBelt and GelSight Svelte, in outline: mm."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from optisense.geometry import MeshIndenter, TriangleMesh
+from optisense.geometry.mesh import grid_faces
+
+SCREW_RADIUS, SCREW_PITCH, THREAD_DEPTH, SCREW_LENGTH = 3.0, 1.0, 0.6, 16.0
+"""An M6 screw, lying on its side; along x."""
+
+BOARD_PITCH, HOLE, BOARD_SIDE = 2.54, 1.3, 20.0
+"""A breadboard: square holes in a grid of a tenth of an inch."""
+
+TOOTH_PITCH, TOOTH_HEIGHT, RACK_LENGTH, RACK_WIDTH = 3.14, 2.25, 22.0, 8.0
+"""A rack of module 1: trapezoidal teeth, 20 degrees flank."""
+
+STUD_PITCH, STUD_RADIUS, STUD_HEIGHT = 8.0, 2.4, 1.7
+"""A toy brick, studs towards the sensor."""
+
+SAMPLES_A_MM = 12
+"""Of heights, along each axis."""
+
+
+def screw() -> MeshIndenter:
+    """A screw on its side: a cylinder whose radius follows a helix."""
+    along = np.linspace(-SCREW_LENGTH / 2, SCREW_LENGTH / 2, SAMPLES_A_MM * int(SCREW_LENGTH) + 1)
+    around = np.linspace(-0.5 * np.pi, 0.5 * np.pi, 121)
+    x, angle = np.meshgrid(along, around, indexing="ij")
+    turn = (x / SCREW_PITCH + angle / (2.0 * np.pi)) % 1.0
+    radius = SCREW_RADIUS - THREAD_DEPTH * np.abs(2.0 * turn - 1.0)
+    points = np.stack([x, radius * np.sin(angle), -radius * np.cos(angle)], axis=-1)
+    return _indenter(points)
+
+
+def breadboard() -> MeshIndenter:
+    """A plate with a grid of square holes."""
+    steps = int(BOARD_SIDE * SAMPLES_A_MM)
+    x, y = _grid(BOARD_SIDE, BOARD_SIDE, steps, steps)
+    inside = np.maximum(*(np.abs((v / BOARD_PITCH) % 1.0 - 0.5) for v in (x, y))) * BOARD_PITCH
+    depth = np.clip((0.5 * HOLE - inside) / 0.15, 0.0, 1.0) * 0.8
+    return _indenter(np.stack([x, y, depth], axis=-1))
+
+
+def rack() -> MeshIndenter:
+    """Teeth of a rack across x."""
+    x, y = _grid(RACK_LENGTH, RACK_WIDTH, int(RACK_LENGTH * SAMPLES_A_MM), 16)
+    away = np.abs((x / TOOTH_PITCH) % 1.0 - 0.5) * TOOTH_PITCH
+    flank = TOOTH_HEIGHT * np.tan(np.radians(20.0))
+    depth = np.clip((away - (0.25 * TOOTH_PITCH - 0.5 * flank)) / flank, 0.0, 1.0) * TOOTH_HEIGHT
+    return _indenter(np.stack([x, y, depth], axis=-1))
+
+
+def brick() -> MeshIndenter:
+    """A brick with two rows of three studs."""
+    length, width = 3 * STUD_PITCH - 0.2, 2 * STUD_PITCH - 0.2
+    x, y = _grid(length, width, int(length * SAMPLES_A_MM), int(width * SAMPLES_A_MM))
+    centre_x = (np.round(x / STUD_PITCH)) * STUD_PITCH
+    centre_y = (np.floor(y / STUD_PITCH) + 0.5) * STUD_PITCH
+    away = np.hypot(x - centre_x, y - centre_y)
+    depth = np.clip((away - STUD_RADIUS) / 0.1, 0.0, 1.0) * STUD_HEIGHT
+    return _indenter(np.stack([x, y, depth], axis=-1))
+
+
+OBJECTS: dict[str, Callable[[], MeshIndenter]] = {
+    "screw": screw,
+    "breadboard": breadboard,
+    "rack": rack,
+    "brick": brick,
+}
+
+
+def _grid(length: float, width: float, columns: int, rows: int) -> tuple[np.ndarray, np.ndarray]:
+    x = np.linspace(-length / 2, length / 2, columns + 1)
+    y = np.linspace(-width / 2, width / 2, rows + 1)
+    first, second = np.meshgrid(x, y, indexing="ij")
+    return first, second
+
+
+def _indenter(points: np.ndarray) -> MeshIndenter:
+    """Of a grid of points (a, b, 3), seen from below; facets keep their own normals."""
+    faces = grid_faces(*points.shape[:2])
+    mesh = TriangleMesh(points.reshape(-1, 3), faces)
+    if mesh.face_normals[:, 2].sum() > 0.0:
+        mesh = mesh.flipped()
+    return MeshIndenter(mesh.vertex_normals())

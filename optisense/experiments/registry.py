@@ -1,0 +1,47 @@
+"""The experiments by name."""
+
+from __future__ import annotations
+
+from optisense.design.near import suggestion
+from optisense.errors import ExperimentError
+from optisense.experiments import (
+    gelbelt_lights,
+    gelsight360,
+    mini_shapes,
+    robustness,
+    speed,
+    svelte_mirror,
+    tasks,
+)
+from optisense.experiments.experiment import Experiment
+
+EXPERIMENTS: dict[str, Experiment] = {
+    module.EXPERIMENT.name: module.EXPERIMENT
+    for module in (
+        mini_shapes,
+        gelbelt_lights,
+        gelsight360,
+        svelte_mirror,
+        tasks,
+        speed,
+        robustness,
+    )
+}
+"""In the order of the page."""
+
+ALL = "all"
+
+
+def find(name: str) -> list[Experiment]:
+    """The experiment of a name, or all.
+
+    Raises:
+        ExperimentError: there is none of this name; names the near match.
+    """
+    if name == ALL:
+        return list(EXPERIMENTS.values())
+    if name not in EXPERIMENTS:
+        raise ExperimentError(
+            f"there is no experiment '{name}'", hint=suggestion(name, [*EXPERIMENTS, ALL], limit=20)
+        )
+    return [EXPERIMENTS[name]]

@@ -1,0 +1,183 @@
+"""How long a tactile image takes, beside the times that the OptiSense paper gives.
+
+The paper: 6 s for GelSight Mini on an Apple M2, 8.9 s for GelBelt, 8.7 s for GelSight360; it gives
+neither the resolution, nor the photons, nor the noise, nor a time for GelSight Svelte.
+"""
+
+from __future__ import annotations
+
+import os
+import platform
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from optisense.experiments.claims import Claim, Table
+from optisense.experiments.evaluations import image_times, sensor
+from optisense.experiments.experiment import Experiment, Finding, Pictures, Steps, Values
+from optisense.experiments.figures import finish
+from optisense.experiments.spread import number, shown, spread
+from optisense.experiments.unit import Unit
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+PAPER = {"gelsight-mini": 6.0, "gelbelt": 8.9, "gelsight360": 8.7, "gelsight-svelte": None}
+"""Seconds an image."""
+
+KINDS = {"new_light": "new light", "light_kept": "light kept"}
+BUSY = 1.3
+"""Where wall time times processors is so many times the processor time, something else ran too."""
+
+
+def steps(settings: Values) -> Steps:
+    """Each sensor at each resolution, one after the other."""
+    asked = {
+        (name, f"{size[0]}x{size[1]}"): Unit(
+            image_times,
+            {
+                "design": sensor(name),
+                "resolution": size,
+                "photons": settings["photons"],
+                "seeds": list(range(max(2, settings["seeds"]))),
+                "ball": settings["ball"],
+            },
+            f"{name} {size[0]}x{size[1]}",
+            alone=True,
+        )
+        for name in PAPER
+        for size in settings["resolutions"]
+    }
+    records = yield list(asked.values())
+    found: Values = {"times": {}, "machine": _machine()}
+    for (name, size), record in zip(asked, records, strict=True):
+        values = record.values
+        if record.failure is not None:
+            continue
+        row: Values = {
+            "noise": spread([100.0 * noise for noise in values["noise"]]),
+            "photons": values["photons"],
+            "first": values["first"],
+        }
+        for kind in KINDS:
+            row[kind] = spread([wall for wall, _ in values[kind]])
+            row[f"{kind}_processor"] = spread([cpu for _, cpu in values[kind]])
+        found["times"].setdefault(name, {})[size] = row
+    return Finding(found)
+
+
+def _machine() -> Values:
+    model = platform.processor() or platform.machine()
+    info = Path("/proc/cpuinfo")
+    if info.is_file():
+        names = [x.split(":", 1)[1] for x in info.read_text().splitlines() if "model name" in x]
+        model = names[0].strip() if names else model
+    return {"processor": model, "processors": os.cpu_count()}
+
+
+def claims(numbers: Values) -> list[Claim]:
+    """The paper's times."""
+    found = []
+    for name, seconds in PAPER.items():
+        for size, row in numbers["times"].get(name, {}).items():
+            if seconds is None:
+                continue
+            mean = row["new_light"]["mean"]
+            found.append(
+                Claim(
+                    f"An image of {name} takes {seconds:g} s.",
+                    f"{shown(row['new_light'])} s at {size} with {row['photons']:,} photons and "
+                    f"{number(row['noise']['mean'], 2)} % noise; {shown(row['light_kept'])} s more "
+                    "of the same sensor",
+                    None if mean is None else mean <= seconds,
+                    "Times hang on the machine, and on what else it does: see the processor "
+                    "seconds. Not being slower counts as agreement.",
+                )
+            )
+    return found
+
+
+def notes(numbers: Values) -> list[str]:
+    """The machine, and whether it was busy."""
+    about = numbers["machine"]
+    busy = [
+        f"{name} {size}"
+        for name, sizes in numbers["times"].items()
+        for size, row in sizes.items()
+        if row["new_light"]["mean"] * (about["processors"] or 1)
+        > BUSY * row["new_light_processor"]["mean"] + 1.0
+    ]
+    text = (
+        f"{about['processor']}, {about['processors']} processors. *New light* traces all photons "
+        "anew, as for another design of the lights; *light kept* is a further contact on the same "
+        "sensor. *First* is the first image of a process, with its scene, kernels and the guide of "
+        "the photons. The noise is what two seeds differ by in the contact."
+    )
+    if busy:
+        text += f" The machine was busy, or idle in part, during: {', '.join(busy)}."
+    return [text]
+
+
+def tables(numbers: Values) -> list[Table]:
+    """All times."""
+    rows = []
+    for name, sizes in numbers["times"].items():
+        for size, row in sizes.items():
+            rows.append(
+                [
+                    name,
+                    size,
+                    f"{row['photons']:,}",
+                    f"{shown(row['noise'], 2)} %",
+                    *(
+                        f"{shown(row[kind])} s ({number(row[f'{kind}_processor']['mean'])} s)"
+                        for kind in KINDS
+                    ),
+                    f"{number(row['first'])} s",
+                    "not given" if PAPER[name] is None else f"{PAPER[name]:g} s",
+                ]
+            )
+    heads = ["sensor", "pixels", "photons", "noise", *KINDS.values(), "first", "paper"]
+    return [Table("An image; in brackets processor seconds of all threads", heads, rows)]
+
+
+def draw(numbers: Values, pictures: Pictures) -> Figure:
+    """Bars beside the paper's."""
+    from optisense.report.drawing import AMBER, BLUE, GREY, new_figure
+
+    figure = new_figure(9.0, 3.8)
+    axes = figure.subplots()
+    labels = [(name, size) for name, sizes in numbers["times"].items() for size in sizes]
+    for offset, (kind, colour) in enumerate(zip(KINDS, (BLUE, AMBER), strict=True)):
+        found = [numbers["times"][name][size][kind] for name, size in labels]
+        axes.bar(
+            [k + 0.27 * offset for k in range(len(labels))],
+            [each["mean"] for each in found],
+            0.25,
+            yerr=[each["standard_deviation"] or 0.0 for each in found],
+            color=colour,
+            label=KINDS[kind],
+            capsize=3,
+        )
+    axes.bar(
+        [k + 0.54 for k in range(len(labels))],
+        [PAPER[name] or 0.0 for name, _ in labels],
+        0.25,
+        color=GREY,
+        label="paper (its own machine)",
+    )
+    axes.set_xticks([k + 0.27 for k in range(len(labels))])
+    axes.set_xticklabels([f"{name}\n{size}" for name, size in labels])
+    finish(axes, "Seconds an image", y="s", legend=True)
+    return figure
+
+
+EXPERIMENT = Experiment(
+    name="speed",
+    title="Speed",
+    about="image times of the four sensors beside the paper's 6 to 9 s",
+    steps=steps,
+    claims=claims,
+    tables=tables,
+    draw=draw,
+    notes=notes,
+)

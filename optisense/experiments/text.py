@@ -1,0 +1,145 @@
+"""The text of an experiment, made of its recorded result, and the page that collects all."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from optisense.errors import ExperimentError
+from optisense.experiments.claims import AGREES, DISAGREES, OPEN
+
+if TYPE_CHECKING:
+    from optisense.experiments.experiment import Experiment
+
+MOST_GAPS = 6
+"""Gaps that are told one by one."""
+
+
+def chapter(experiment: Experiment, result: Mapping[str, Any], picture: str) -> str:
+    """Markdown of one experiment.
+
+    Args:
+        experiment: which.
+        result: the content of its result.json.
+        picture: where the picture is, seen from the text.
+    """
+    numbers = result["numbers"]
+    parts = [f"## {experiment.title}", f"![{experiment.title}]({picture})"]
+    if result["quick"]:
+        parts.append("**A quick run:** less of everything, so less sure.")
+    parts += [_verdicts(result["claims"]), *experiment.notes(numbers)]
+    parts += [table.markdown() for table in experiment.tables(numbers)]
+    if result["gaps"]:
+        parts.append(_gaps(result["gaps"]))
+    parts.append(_how(experiment.name, result))
+    return "\n\n".join(parts) + "\n"
+
+
+def _verdicts(claims: list[Mapping[str, Any]]) -> str:
+    lines = ["| the paper | here | |", "| --- | --- | --- |"]
+    lines += [f"| {claim['says']} | {claim['here']} | **{claim['verdict']}** |" for claim in claims]
+    for claim in claims:
+        if claim["why"] and not claim["holds"]:
+            lines += ["", f"*{claim['says']}* {claim['verdict'].capitalize()}: {claim['why']}"]
+    return "\n".join(lines)
+
+
+def _gaps(gaps: list[Mapping[str, str]]) -> str:
+    lines = [f"Without a score ({len(gaps)}):", ""]
+    lines += [f"- {gap['what']}: {gap['reason'].rstrip('.')}." for gap in gaps[:MOST_GAPS]]
+    if len(gaps) > MOST_GAPS:
+        lines.append(f"- and {len(gaps) - MOST_GAPS} more, in the result file.")
+    return "\n".join(lines)
+
+
+def _how(name: str, result: Mapping[str, Any]) -> str:
+    seconds = result["seconds"]
+    seeds = result["settings"].get("seeds")
+    over = f", {seeds} seeds" if seeds else ""
+    return (
+        f"Made by `optisense experiment {name}{' --quick' if result['quick'] else ''}`: "
+        f"{result['units']} evaluations{over}, {seconds['processor'] / 60:.1f} processor minutes. "
+        "± is the standard deviation over seeds."
+    )
+
+
+def read_result(folder: Path) -> dict[str, Any]:
+    """The recorded result of an experiment.
+
+    Raises:
+        ExperimentError: there is none, or it can't be read.
+    """
+    from optisense.experiments.experiment import RESULT
+
+    path = folder / RESULT
+    try:
+        read: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
+        return read
+    except (OSError, ValueError) as error:
+        raise ExperimentError(
+            f"the result can't be read: {error}", where=str(path), hint="Run the experiment again"
+        ) from error
+
+
+def write_page(page: Path, results: Path, experiments: list[Experiment]) -> None:
+    """One page of all experiments, with results and pictures in a folder beside it.
+
+    Args:
+        page: the Markdown file; the folder has its name without the suffix.
+        results: folder of all results.
+        experiments: those on the page, in this order.
+
+    Raises:
+        ExperimentError: an experiment has no result.
+        OutputError: something can't be written.
+    """
+    from optisense.experiments.experiment import PICTURE, RESULT
+    from optisense.report.files import write_whole
+
+    beside = page.with_suffix("")
+    beside.mkdir(parents=True, exist_ok=True)
+    chapters, rows, counts = [], [], dict.fromkeys((AGREES, DISAGREES, OPEN), 0)
+    for experiment in experiments:
+        result = read_result(results / experiment.name)
+        name = experiment.name
+        write_whole(beside / f"{name}.json", (results / name / RESULT).read_text("utf-8"))
+        shutil.copyfile(results / name / PICTURE, beside / f"{name}.png")
+        chapters.append(chapter(experiment, result, f"{beside.name}/{name}.png"))
+        verdicts = [claim["verdict"] for claim in result["claims"]]
+        for verdict in verdicts:
+            counts[verdict] += 1
+        told = ", ".join(f"{verdicts.count(v)} {v}" for v in counts if v in verdicts)
+        rows.append(f"| [{experiment.title}](#{_anchor(experiment.title)}) | {told} |")
+    head = [
+        "# The paper's tables and figures, made again",
+        "Written by `optisense experiment all --page FILE`; do not edit.",
+        INTRODUCTION,
+        "\n".join(["| experiment | the paper's statements |", "| --- | --- |", *rows]),
+        f"In all: {', '.join(f'{count} {verdict}' for verdict, count in counts.items())}.",
+    ]
+    write_whole(page, "\n\n".join([*head, *(text.rstrip() for text in chapters)]) + "\n")
+
+
+def _anchor(title: str) -> str:
+    kept = "".join(c for c in title.lower() if c.isalnum() or c in " -")
+    return kept.replace(" ", "-")
+
+
+INTRODUCTION = """\
+Each experiment of the OptiSense paper by one command, on our own models of its four sensors. The
+geometry of three of them is partly [assumed](sensors.md), and nothing was tuned towards the paper's
+figures: where a statement does not hold here, the text says so, and what explains it. Verdicts are
+worked out from the numbers. *Cannot be told* means that the differences are within what seeds
+scatter by.
+
+```console
+$ optisense experiment
+$ optisense experiment mini-shapes --quick --out results
+$ optisense experiment all --out results
+```
+
+A run that was stopped goes on where it was with the same command: what is finished in the folder
+is not done again."""

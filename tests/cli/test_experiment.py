@@ -1,0 +1,65 @@
+"""`optisense experiment`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from optisense.cli import app
+from optisense.experiments import EXPERIMENTS
+
+runner = CliRunner()
+
+
+def test_without_a_name_it_lists_all() -> None:
+    result = runner.invoke(app, ["experiment"])
+    assert result.exit_code == 0
+    for name in (*EXPERIMENTS, "all"):
+        assert name in result.stdout
+
+
+def test_an_unknown_name_is_told_with_the_nearest(tmp_path: Path) -> None:
+    result = runner.invoke(app, ["experiment", "sveltemirror", "--out", str(tmp_path / "out")])
+    assert result.exit_code == 2
+    assert "no experiment 'sveltemirror'" in result.stderr
+    assert "svelte-mirror" in result.stderr
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_folder_that_cannot_be_written_is_told_before_any_work(tmp_path: Path) -> None:
+    file = tmp_path / "file"
+    file.touch()
+    for options in (["--out", str(file)], ["--page", str(file / "page.md")]):
+        if "--page" in options:
+            options += ["--out", str(tmp_path / "out")]
+        result = runner.invoke(app, ["experiment", "speed", *options])
+        assert result.exit_code != 0
+        assert "error:" in result.stderr
+    assert not (tmp_path / "out" / "units").exists()
+
+
+def test_no_seeds_make_no_sense() -> None:
+    assert runner.invoke(app, ["experiment", "speed", "--seeds", "0"]).exit_code == 2
+
+
+@pytest.mark.slow
+def test_ctrl_c_keeps_what_is_finished(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    from optisense.experiments import unit
+
+    done = []
+    real = unit.work_out
+
+    def second_is_stopped(each: unit.Unit, folder: Path) -> None:
+        if done:
+            raise KeyboardInterrupt
+        done.append(each.key)
+        real(each, folder)
+
+    monkeypatch.setattr("optisense.experiments.bench.work_out", second_is_stopped)
+    command = ["experiment", "gelbelt-lights", "--quick", "--seeds", "1", "--workers", "1"]
+    result = runner.invoke(app, [*command, "--out", str(tmp_path)])
+    assert result.exit_code == 130
+    assert "the same command goes on" in result.stderr
+    assert [path.stem for path in (tmp_path / "units").glob("*.json")] == done

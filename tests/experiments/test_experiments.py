@@ -1,0 +1,192 @@
+"""Each experiment's numbers, verdicts, tables, picture and text, from answers of known truth."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from optisense.errors import ExperimentError
+from optisense.experiments import EXPERIMENTS, Experiment, Finding, Record, find, write_page
+from optisense.experiments.experiment import PICTURE, RESULT, TEXT, gaps, write
+from optisense.objectives.score import json_ready
+
+Answered = Callable[..., tuple[Finding, list[Record]]]
+"""See conftest.py."""
+
+EVERY = pytest.mark.parametrize("experiment", EXPERIMENTS.values(), ids=list(EXPERIMENTS))
+
+
+def result_of(experiment: Experiment, numbers: dict[str, Any], quick: bool) -> dict[str, Any]:
+    plain: dict[str, Any] = json_ready(
+        {
+            "experiment": experiment.name,
+            "title": experiment.title,
+            "quick": quick,
+            "settings": experiment.settings(quick),
+            "versions": {},
+            "seconds": {"units": 1.0, "processor": 2.0, "this_run": 1.0},
+            "units": 5,
+            "numbers": numbers,
+            "claims": [claim.to_plain() for claim in experiment.claims(numbers)],
+            "gaps": [],
+        }
+    )
+    return plain
+
+
+def verdicts(name: str, score: Any, answered: Answered) -> dict[str, str]:
+    """By the beginning of the statements."""
+    experiment = EXPERIMENTS[name]
+    finding, _ = answered(experiment, experiment.settings(), score)
+    return {claim.says: claim.verdict for claim in experiment.claims(finding.numbers)}
+
+
+@EVERY
+@pytest.mark.parametrize("quick", [False, True], ids=["full", "quick"])
+def test_answers_become_a_folder(
+    experiment: Experiment, quick: bool, answered: Answered, tmp_path: Path
+) -> None:
+    finding, _ = answered(experiment, experiment.settings(quick))
+    result = result_of(experiment, finding.numbers, quick)
+    folder = tmp_path / experiment.name
+    write(experiment, result, finding.pictures, folder)
+    assert json.loads((folder / RESULT).read_text()) == result
+    assert (folder / PICTURE).read_bytes().startswith(b"\x89PNG")
+    text = (folder / TEXT).read_text()
+    assert text.startswith(f"## {experiment.title}\n")
+    assert "nan" not in re.sub(r"[a-z]*nan[a-z]+", "", text)
+    for claim in result["claims"]:
+        assert f"| {claim['says']} | {claim['here']} | **{claim['verdict']}** |" in text
+
+
+@EVERY
+def test_where_everything_fails_nothing_is_claimed(
+    experiment: Experiment, answered: Answered, tmp_path: Path
+) -> None:
+    finding, records = answered(experiment, experiment.settings(), failure="all is dark")
+    found = [claim.verdict for claim in experiment.claims(finding.numbers)]
+    assert set(found) <= {"cannot be told"}
+    assert {gap["reason"] for gap in gaps(records)} == {"all is dark"}
+    result = result_of(experiment, finding.numbers, False)
+    write(experiment, result, finding.pictures, tmp_path / "failed")
+
+
+@EVERY
+def test_units_of_other_seeds_are_other_questions(experiment: Experiment) -> None:
+    first = next(experiment.steps(experiment.settings(seeds=1)))
+    more = next(experiment.steps(experiment.settings(seeds=3)))
+    assert {unit.key for unit in first} <= {unit.key for unit in more} or experiment.name == "speed"
+    assert len(first) <= len(more)
+
+
+def peak_at(best: float) -> Any:
+    def score(objective: str, design: dict[str, Any], seed: int) -> float:
+        value = design["change"].get("coating.specularity", 0.0)
+        return -((value - best) ** 2) + 0.001 * seed
+
+    return score
+
+
+def test_mini_shapes_agrees_where_the_best_coating_is_the_papers(answered: Answered) -> None:
+    found = verdicts("mini-shapes", peak_at(0.2), answered)
+    chosen = {says: verdict for says, verdict in found.items() if "specularity" in says}
+    assert set(chosen.values()) == {"agrees"} and len(chosen) == 4
+
+
+def test_mini_shapes_disagrees_where_it_is_not(answered: Answered) -> None:
+    found = verdicts("mini-shapes", peak_at(0.8), answered)
+    assert {v for says, v in found.items() if "specularity" in says} == {"disagrees"}
+
+
+def test_mini_shapes_cannot_tell_where_all_coatings_are_alike(answered: Answered) -> None:
+    found = verdicts("mini-shapes", lambda objective, design, seed: 0.01 * seed, answered)
+    assert {v for says, v in found.items() if "cylinder a spec" in says} == {"cannot be told"}
+
+
+@pytest.mark.parametrize(("winner", "verdict"), [(3, "agrees"), (2, "disagrees")])
+def test_gelbelts_lights(winner: int, verdict: str, answered: Answered) -> None:
+    def score(objective: str, design: dict[str, Any], seed: int) -> float:
+        return float(design["dimensions"]["light_design"] == winner) + 0.001 * seed
+
+    found = verdicts("gelbelt-lights", score, answered)
+    assert {v for says, v in found.items() if says.startswith("Design 3")} == {verdict}
+    assert found["Light from the sides of the acrylic (design 1) hardly reaches the belt."] == (
+        "disagrees"  # the made-up pictures are equally bright
+    )
+
+
+def test_gelsight360_in_the_papers_order_and_in_the_opposite_one(answered: Answered) -> None:
+    from optisense.experiments.gelsight360_claims import PAPER
+
+    def papers(sign: float) -> Any:
+        def score(objective: str, design: dict[str, Any], seed: int) -> float:
+            if objective == "2to3pw":
+                return -sign * abs(design["dimensions"]["tip_design"] - 6)
+            row = PAPER.get(design.get("colouring", ""), {"rgb2normal": 0.9, "normdiff": -20.0})
+            return sign * row[objective] + 1e-4 * seed
+
+        return score
+
+    same = verdicts("gelsight360", papers(1.0), answered)
+    other = verdicts("gelsight360", papers(-1.0), answered)
+    for says in same:
+        if "order" in says or "RGBRGBRG" in says or says.startswith("Of the tips"):
+            assert (same[says], other[says]) == ("agrees", "disagrees"), says
+
+
+def test_svelte_is_held_against_the_papers_two_numbers(answered: Answered) -> None:
+    def first_mirror(objective: str, design: dict[str, Any], seed: int) -> float:
+        return 0.63 if design["change"] else 0.24
+
+    found = list(verdicts("svelte-mirror", first_mirror, answered).values())
+    assert found[:2] == ["agrees", "agrees"]
+    found = list(verdicts("svelte-mirror", lambda *_: 0.4, answered).values())
+    assert found[:2] == ["disagrees", "disagrees"]
+
+
+def test_robustness_counts_geometries(answered: Answered) -> None:
+    def hangs_on_the_guide(objective: str, design: dict[str, Any], seed: int) -> float:
+        shiny = design["change"].get("coating.specularity", 0.0) > 0.5
+        thick = design["dimensions"].get("guide_thickness", 4.0) > 5.0
+        return float(shiny == thick) + 0.001 * seed
+
+    experiment = EXPERIMENTS["robustness"]
+    settings = {**experiment.settings(), "draws": 0}
+    finding, _ = answered(experiment, settings, hangs_on_the_guide)
+    claim = next(c for c in experiment.claims(finding.numbers) if "cylindrical" in c.says)
+    assert claim.verdict == "cannot be told"
+    assert claim.here == "holds in 6 of 7 geometries; not with guide_thickness 6"
+
+
+def test_the_page_collects_results_beside_it(answered: Answered, tmp_path: Path) -> None:
+    several = list(EXPERIMENTS.values())[:2]
+    for each in several:
+        finding, _ = answered(each, each.settings(True))
+        result = result_of(each, finding.numbers, True)
+        write(each, result, finding.pictures, tmp_path / "out" / each.name)
+    page = tmp_path / "docs" / "experiments.md"
+    page.parent.mkdir()
+    write_page(page, tmp_path / "out", several)
+    text = page.read_text()
+    for target in re.findall(r"!\[[^]]*\]\(([^)]+)\)", text):
+        assert (page.parent / target).is_file()
+    assert sorted(p.name for p in (page.parent / "experiments").iterdir()) == sorted(
+        f"{each.name}.{kind}" for each in several for kind in ("json", "png")
+    )
+    with pytest.raises(ExperimentError, match="can't be read"):
+        write_page(page, tmp_path / "nothing", several)
+
+
+def test_names_and_near_names() -> None:
+    assert find("all") == list(EXPERIMENTS.values())
+    assert find("speed") == [EXPERIMENTS["speed"]]
+    with pytest.raises(ExperimentError, match="no experiment 'mini-shape'") as error:
+        find("mini-shape")
+    assert "mini-shapes" in str(error.value.hint)
+    with pytest.raises(ExperimentError, match="0 seeds"):
+        EXPERIMENTS["speed"].settings(seeds=0)
