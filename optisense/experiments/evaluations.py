@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from optisense.design import SensorDesign, set_value
 from optisense.experiments.unit import Found
@@ -108,6 +109,37 @@ def variants_of_score(inputs: Plain, folder: Path) -> Found:
     scored = any(score.failure is None for score in found.values())
     pixels = [int(press.mask.sum()) for press in evaluation.presses] if scored else []
     return Found({**_scores(found), "pixels": pixels})
+
+
+def stretch(inputs: Plain, folder: Path) -> Found:
+    """How much longer than wide a small round thing appears: `design`, `ray_resolution`.
+
+    Neighbouring pixels span a parallelogram on the surface; the ratio of the half axes of the
+    ellipse that belongs to it is 1 where shapes are kept. Tells the median over pixels and the
+    ratio that a tenth of them exceeds.
+    """
+    rays = _model(inputs["design"], lit=False).chief_rays(tuple(inputs["ray_resolution"]))
+    points = rays.points.astype(np.float64)
+    right = (points[:, 1:] - points[:, :-1])[:-1]
+    down = (points[1:] - points[:-1])[:, :-1]
+    whole = rays.hit[:-1, :-1] & rays.hit[:-1, 1:] & rays.hit[1:, :-1]
+    ratios = axes_ratio(right[whole], down[whole])
+    return Found(
+        {"median": float(np.median(ratios)), "tenth": float(np.percentile(ratios, 90))}
+        if len(ratios)
+        else {"median": None, "tenth": None}
+    )
+
+
+def axes_ratio(first: NDArray[np.float64], second: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(n,): the larger singular value of the maps with columns (n, 3) over the smaller one."""
+    a, b = (first**2).sum(axis=1), (second**2).sum(axis=1)
+    c = (first * second).sum(axis=1)
+    root = np.sqrt((0.5 * (a - b)) ** 2 + c**2)
+    middle = 0.5 * (a + b)
+    small = np.maximum(middle - root, 1e-12 * middle)
+    ratio: NDArray[np.float64] = np.sqrt((middle + root) / small)
+    return ratio
 
 
 def picture(inputs: Plain, folder: Path) -> Found:

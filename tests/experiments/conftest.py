@@ -47,6 +47,8 @@ def values(unit: Unit, score: Score) -> dict[str, Any]:
     if kind == "variants_of_score":
         found = {name: score(asked["objective"], design, seed) for name in asked["variants"]}
         return {"scores": found, "failures": {}, "pixels": [60, 80]}
+    if kind == "stretch":
+        return {"median": 2.0 if design["change"] else 3.0, "tenth": 5.0}
     if kind == "picture":
         return {"radiance": 1.0 + 0.1 * seed, "pixels_in_contact": 100}
     if kind == "perception":

@@ -144,7 +144,7 @@ def test_svelte_is_held_against_the_papers_two_numbers(answered: Answered) -> No
         return 0.63 if design["change"] else 0.24
 
     found = list(verdicts("svelte-mirror", first_mirror, answered).values())
-    assert found[:2] == ["agrees", "agrees"]
+    assert found == ["agrees", "agrees", "agrees"]
     found = list(verdicts("svelte-mirror", lambda *_: 0.4, answered).values())
     assert found[:2] == ["disagrees", "disagrees"]
 

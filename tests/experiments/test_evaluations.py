@@ -1,0 +1,177 @@
+"""What units ask of sensors, in small: real answers, in the form that experiments read."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import optisense as ots
+from optisense.experiments.evaluations import (
+    NINE,
+    axes_ratio,
+    design_of,
+    image_times,
+    perception,
+    picture,
+    relit_scores,
+    scores,
+    searched,
+    sensor,
+    stretch,
+    variants_of_score,
+)
+from optisense.experiments.objects import OBJECTS
+
+IMAGES = {"resolution": [160, 120], "photons": 60_000, "seed": 3}
+GOALS = ["rgb2normal", "normdiff"]
+
+
+def test_a_design_is_its_dimensions_and_what_is_set_in_it() -> None:
+    design = design_of(sensor("gelsight-mini", {"coating.specularity": 0.3}, gel_size=[20.0, 18.0]))
+    assert design.coating.specularity == 0.3
+    assert np.ptp(design.meshes["gel"].bounds, axis=0)[:2] == pytest.approx([20.0, 18.0])
+
+
+def test_scores_are_those_of_evaluate_whatever_was_asked_before(tmp_path: Path) -> None:
+    asked = {"objectives": GOALS, "settings": IMAGES}
+    shiny = sensor("gelsight-mini", {"coating.specularity": 0.3})
+    found = [
+        scores({"design": design, **asked}, tmp_path).values["scores"]
+        for design in (shiny, sensor("gelsight-mini"), shiny)
+    ]
+    plain = ots.evaluate(ots.load("gelsight-mini"), GOALS, **_tuples(IMAGES))
+    assert found[1] == {name: score.value for name, score in plain.items()}
+    assert found[0] == found[2] != found[1]
+
+
+def test_a_darker_exposure_judges_what_would_be_overexposed(tmp_path: Path) -> None:
+    design = sensor("gelsight-mini", {"coating.specularity": 0.8})
+    asked = {"design": design, "objectives": ["normdiff"], "settings": IMAGES}
+    bright = scores({**asked, "exposure_share": 4.0}, tmp_path).values
+    dark = scores({**asked, "exposure_share": 0.25}, tmp_path).values
+    assert "overexposed" in bright["failures"]["normdiff"]
+    assert bright["scores"]["normdiff"] is None
+    assert dark["scores"]["normdiff"] < 0.0
+
+
+def test_relit_scores_are_those_of_a_design_with_these_colours(tmp_path: Path) -> None:
+    groups = ["red", "green", "blue"]
+    asked = {"objectives": ["normdiff"], "settings": IMAGES}
+    relit = relit_scores(
+        {
+            "design": sensor("gelsight-mini"),
+            "groups": groups,
+            "colourings": ["RGB", "GGB"],
+            "own": {"least_pixels": 20},
+            **asked,
+        },
+        tmp_path,
+    ).values["colourings"]
+    design = sensor("gelsight-mini", {"lights.red.colour": [0.0, 1.0, 0.0]})
+    again = scores({"design": design, **asked}, tmp_path).values["scores"]["normdiff"]
+    assert relit["GGB"]["scores"]["normdiff"] == pytest.approx(again, rel=1e-5)
+    assert relit["RGB"]["scores"]["normdiff"] > again  # two colours tell less than three
+
+
+def test_less_noise_confuses_less(tmp_path: Path) -> None:
+    variants = {"much": {"noise": 0.3}, "little": {"noise": 0.03}}
+    found = variants_of_score(
+        {
+            "design": sensor("gelsight-mini"),
+            "objective": "normdiff",
+            "variants": variants,
+            "settings": IMAGES,
+        },
+        tmp_path,
+    ).values
+    assert found["scores"]["little"] > found["scores"]["much"]
+    assert len(found["pixels"]) == 9
+
+
+@pytest.mark.parametrize("name", list(OBJECTS))
+def test_objects_leave_their_mark(name: str, tmp_path: Path) -> None:
+    asked: dict[str, Any] = {"design": sensor("gelbelt"), **IMAGES}
+    found = picture({**asked, "contacts": [f"object:{name}@0,0:0.5"]}, tmp_path)
+    assert found.pictures["picture"].shape == (120, 160, 3)
+    assert found.values["pixels_in_contact"] > 20
+    assert found.values["radiance"] > 0.0
+
+
+def test_nine_balls_are_seen(tmp_path: Path) -> None:
+    asked: dict[str, Any] = {"design": sensor("gelsight-mini"), **IMAGES}
+    assert picture({**asked, "contacts": NINE}, tmp_path).values["pixels_in_contact"] > 90
+
+
+def test_a_camera_straight_above_keeps_shapes_and_a_slant_stretches_them(tmp_path: Path) -> None:
+    design = sensor("gelsight-mini")
+    straight = stretch({"design": design, "ray_resolution": [32, 24]}, tmp_path).values
+    assert straight["median"] == pytest.approx(1.0, abs=0.1)
+    angles = np.radians([0.0, 30.0, 60.0])  # a plane tilted about one axis: 1 / cos
+    first = np.column_stack([1.0 / np.cos(angles), 0.0 * angles, 0.0 * angles])
+    second = np.tile([0.0, 1.0, 0.0], (3, 1))
+    assert axes_ratio(first, second) == pytest.approx(1.0 / np.cos(angles))
+    sheared = axes_ratio(np.array([[1.0, 0.0, 0.0]]), np.array([[1.0, 1.0, 0.0]]))
+    assert sheared == pytest.approx((1.0 + np.sqrt(5.0)) ** 2 / 4.0)  # golden ratio squared
+
+
+@pytest.mark.slow
+def test_tasks_are_read_and_samples_kept(tmp_path: Path) -> None:
+    asked: Mapping[str, Any] = {
+        "design": sensor("gelsight-mini"),
+        "tasks": {"misalignment": [16, 12], "cylinder-radius": [48, 36]},
+        "samples": 10,
+        "seed": 1,
+        "photons": 60_000,
+    }
+    first = perception(asked, tmp_path).values
+    kept = {path: path.read_bytes() for path in tmp_path.rglob("samples.csv")}
+    assert len(kept) == 2
+    assert perception(asked, tmp_path).values == first
+    assert {path: path.read_bytes() for path in kept} == kept
+    for own in first.values():
+        assert 0.0 < own["error"] < 3.0 * own["guess"]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("method", ["cma-es", "gradient"])
+def test_a_searched_mirror_can_be_built_again(method: str, tmp_path: Path) -> None:
+    asked: dict[str, Any] = {
+        "design": sensor("gelsight-svelte"),
+        "space": {"cages.M1.blend": [0.0, 1.0]},
+        "objectives": ["aoap"],
+        "method": method,
+        "budget": 6,
+        "seed": 2,
+        "settings": {"ray_resolution": [32, 24]},
+    }
+    found = searched(asked, tmp_path).values
+    assert found["course"][0] == found["start"]["aoap"]
+    assert found["course"] == sorted(found["course"])
+    better = sensor("gelsight-svelte", {"cages.M1.blend": found["values"]})
+    again = scores(
+        {"design": better, "objectives": ["aoap"], "settings": asked["settings"]}, tmp_path
+    ).values
+    assert again["scores"]["aoap"] == pytest.approx(found["best"]["aoap"], rel=1e-6)
+    assert searched(asked, tmp_path).values == found  # from the study that is there
+
+
+@pytest.mark.slow
+def test_times_of_images(tmp_path: Path) -> None:
+    asked: dict[str, Any] = {
+        "design": sensor("gelsight-mini"),
+        "resolution": [80, 60],
+        "photons": 60_000,
+        "seeds": [0, 1],
+        "ball": [1.5, 0.5],
+    }
+    found = image_times(asked, tmp_path).values
+    assert len(found["new_light"]) == len(found["light_kept"]) == 2
+    assert found["first"] > 0.0 and 0.0 < found["noise"][0] < 1.0
+
+
+def _tuples(values: Mapping[str, Any]) -> dict[str, Any]:
+    return {k: tuple(v) if isinstance(v, list) else v for k, v in values.items()}
