@@ -118,7 +118,9 @@ def _print_result(experiment: Experiment, result: dict[str, Any], out: Path) -> 
         output.print(f"                  {claim['here']}", markup=False)
     if result["gaps"]:
         output.print(f"  {len(result['gaps'])} without a score; see the text", markup=False)
-    output.print(f"  results: {out / experiment.name}", markup=False)
+    minutes = result["seconds"]["this_run"] / 60.0
+    told = f"  {result['units']} evaluations, {minutes:.1f} minutes"
+    output.print(f"{told}; results: {out / experiment.name}", markup=False)
 
 
 @contextmanager

@@ -76,7 +76,8 @@ def relit_scores(inputs: Plain, folder: Path) -> Found:
     """Scores under several colourings of light groups, from one rendering of each group.
 
     `design`, `groups` (the light groups), `colourings` (a letter of R, G, B for each of them),
-    `objectives`, `settings` of the images, `own` settings of the objectives.
+    `objectives`, `settings` of the images, `own` settings of the objectives; and, where there are
+    `normdiff_variants`, NormDiff with each of these settings.
     """
     from optisense.objectives.relighting import Relighting
 
@@ -87,6 +88,10 @@ def relit_scores(inputs: Plain, folder: Path) -> Found:
         design = coloured(model.design, inputs["groups"], letters)
         evaluation = relighting.lit(design, whole=False)
         found[letters] = _scores(evaluate(evaluation, list(inputs["objectives"]), **own))
+        found[letters]["normdiff_variants"] = {
+            name: _scores({"": evaluate(evaluation, "normdiff", **variant)})["scores"][""]
+            for name, variant in inputs.get("normdiff_variants", {}).items()
+        }
     failures = {
         f"{letters} {name}": reason
         for letters, each in found.items()

@@ -151,11 +151,11 @@ def write(
         OutputError: they can't be written.
     """
     from optisense.experiments.text import chapter
-    from optisense.report.files import write_whole
+    from optisense.writing import write_text
 
     folder.mkdir(parents=True, exist_ok=True)
     temporary = folder / f".{PICTURE}"
     experiment.draw(dict(result["numbers"]), pictures).savefig(temporary, dpi=DOTS_PER_INCH)
     temporary.replace(folder / PICTURE)
-    write_whole(folder / TEXT, chapter(experiment, result, PICTURE))
+    write_text(folder / TEXT, chapter(experiment, result, PICTURE))
     write_json(folder / RESULT, result)

@@ -20,38 +20,70 @@ from optisense.experiments.experiment import Experiment, Finding, Pictures, Step
 from optisense.experiments.figures import COLOURS, finish, line
 from optisense.experiments.gelsight360_claims import PAPER, claims
 from optisense.experiments.mini_shapes import OBJECTIVES
-from optisense.experiments.spread import number, shown, spread
+from optisense.experiments.spread import number, shown, spearman, spread
 from optisense.experiments.unit import Record, Unit
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 SENSOR = "gelsight360"
+ANY_JUMP = 1e9
+"""Of 2to3PW: no triangle is left out."""
+
 GROUPS = [f"lg{number}" for number in range(1, 9)]
 
 
-BLIND = {
+BLIND: dict[str, dict[str, Any]] = {
     "as scored": {},
-    "noise 10 % instead of 30 %": {"noise": 0.1},
-    "noise 3 %": {"noise": 0.03},
+    "noise of 15 % to either side": {"noise": 0.15},
+    "noise of 3 %": {"noise": 0.03},
     "only the polar angle": {"phi_weight": 0.0},
+    "only the polar angle, 15 %": {"phi_weight": 0.0, "noise": 0.15},
     "colours of the picture": {"colours": "picture"},
 }
-"""Ways to look at NormDiff; what the paper's weights and colours are is not given."""
+"""Ways to look at NormDiff: the paper gives neither the weights of its two angles, nor whether its
+noise of 30 % is to either side or from end to end."""
 
 OTHERWISE: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {
-    "GelSight360 as it is": ({}, {}),
+    "as it is": ({}, {}),
     "without the ring at its foot": ({}, {"base_ring": ""}),
     "with a grey, diffuse coating": ({}, {"coating": "diffuse-grey"}),
-    "with two groups lit only, lg1 red and lg5 green": (
+    "with two groups lit only": (
         {f"lights.lg{k}.flux": 1e-6 for k in (2, 3, 4, 6, 7, 8)},
         {"light_colours": "RGGGGGGG", "base_ring": ""},
     ),
+    "at half the resolution": ({}, {}),
+    "with a tenth of the photons": ({}, {}),
 }
+"""Sensors and images whose NormDiff is looked at: what is set, and the dimensions."""
+
+
+def _ways(least_pixels: int) -> dict[str, dict[str, Any]]:
+    return {way: {**own, "least_pixels": least_pixels} for way, own in BLIND.items()}
+
+
+def _why_unit(name: str, images: Values, least_pixels: int) -> Unit:
+    """NormDiff of one of `OTHERWISE`, in all ways of `BLIND`."""
+    change, dimensions = OTHERWISE[name]
+    width, height = images["resolution"]
+    if "resolution" in name:
+        images = {**images, "resolution": [width // 2, height // 2]}
+    if "photons" in name:
+        images = {**images, "photons": images["photons"] // 10}
+    return Unit(
+        variants_of_score,
+        {
+            "design": sensor(SENSOR, change, **dimensions),
+            "objective": "normdiff",
+            "variants": _ways(least_pixels),
+            "settings": {**images, "seed": 0},
+        },
+        f"NormDiff {name}",
+    )
 
 
 def steps(settings: Values) -> Steps:
-    """Colourings from layers, all of them if asked; tips; resins; what lowers NormDiff."""
+    """Colourings from layers, all of them if asked; tips; resins; what NormDiff hangs on."""
     seeds = range(settings["seeds"])
     images = {key: settings[key] for key in ("resolution", "photons")}
     judged = {**images, "least_pixels": settings["least_pixels"]}
@@ -66,6 +98,7 @@ def steps(settings: Values) -> Steps:
                 "objectives": goals,
                 "settings": {**images, "seed": seed},
                 "own": {"least_pixels": settings["least_pixels"]},
+                "normdiff_variants": _ways(settings["least_pixels"]),
             },
             f"the paper's colourings, seed {seed}",
         )
@@ -98,11 +131,12 @@ def steps(settings: Values) -> Steps:
             {
                 "design": sensor(SENSOR, tip_design=float(tip)),
                 "objectives": ["2to3pw"],
-                "settings": {"ray_resolution": settings["ray_resolution"]},
+                "settings": {"ray_resolution": settings["ray_resolution"], **jump},
             },
             f"tip {tip}",
         )
         for tip in settings["tips"]
+        for jump in ({}, {"jump": ANY_JUMP})
     ]
     resins = [
         Unit(
@@ -121,19 +155,7 @@ def steps(settings: Values) -> Steps:
         for resin in settings["resins"]
         for seed in seeds
     ]
-    why = [
-        Unit(
-            variants_of_score,
-            {
-                "design": sensor(SENSOR, change, **dimensions),
-                "objective": "normdiff",
-                "variants": BLIND,
-                "settings": {**images, "seed": 0},
-            },
-            f"NormDiff {name}",
-        )
-        for name, (change, dimensions) in OTHERWISE.items()
-    ]
+    why = [_why_unit(name, images, settings["least_pixels"]) for name in settings["why"]]
     records = yield [*everything, *table, *resins, *why, *tips]
     answers = iter(records)
     overall = [next(answers) for _ in everything]
@@ -148,16 +170,17 @@ def steps(settings: Values) -> Steps:
         for name in goals:
             numbers["resins"][name][str(resin)] = spread([each.get(name) for each in found])
     numbers["why"] = {}
-    for name in OTHERWISE:
+    for name in settings["why"]:
         record = next(answers)
         numbers["why"][name] = {
             "scores": record.values.get("scores", {}),
             "pixels": min(record.values.get("pixels") or [0]),
         }
-    numbers["tips"] = {
-        str(tip): spread([next(answers).values.get("scores", {}).get("2to3pw")])
-        for tip in settings["tips"]
-    }
+    numbers["tips"], numbers["tips_with_leaps"] = {}, {}
+    for tip in settings["tips"]:
+        for column in ("tips", "tips_with_leaps"):
+            score = next(answers).values.get("scores", {}).get("2to3pw")
+            numbers[column][str(tip)] = spread([score])
     return Finding(numbers)
 
 
@@ -169,6 +192,11 @@ def _colourings(records: list[Record]) -> Values:
             for record in records
         ]
         found[letters] = {name: spread([row.get(name) for row in rows]) for name in OBJECTIVES}
+        variants = [
+            record.values.get("colourings", {}).get(letters, {}).get("normdiff_variants", {})
+            for record in records
+        ]
+        found[letters]["ways"] = {way: spread([row.get(way) for row in variants]) for way in BLIND}
     return found
 
 
@@ -198,7 +226,7 @@ def _all(record: Record) -> Values:
 
 
 def tables(numbers: Values) -> list[Table]:
-    """Colourings, the best of all, tips, resins, and what lowers NormDiff."""
+    """Colourings, the best of all, tips, resins, and what NormDiff hangs on."""
     found = [
         Table(
             "Colourings of the paper's table (the paper's own scores in brackets)",
@@ -209,6 +237,17 @@ def tables(numbers: Values) -> list[Table]:
             ],
         )
     ]
+    found.append(
+        Table(
+            "The same by NormDiff in other ways; last, the rank correlation with the paper's",
+            ["colouring", *BLIND],
+            [
+                [letters, *(shown(each["ways"][way]) for way in BLIND)]
+                for letters, each in numbers["colourings"].items()
+            ]
+            + [["correlation", *(_correlation(numbers["colourings"], way) for way in BLIND)]],
+        )
+    )
     if numbers["all"]:
         every = numbers["all"]
         found.append(
@@ -229,8 +268,11 @@ def tables(numbers: Values) -> list[Table]:
     found.append(
         Table(
             "Tips by 2to3PW (no chance in it)",
-            ["tip", "2to3PW"],
-            [[tip, number(each["mean"])] for tip, each in numbers["tips"].items()],
+            ["tip", "2to3PW", "with triangles that leap"],
+            [
+                [tip, number(each["mean"]), number(numbers["tips_with_leaps"][tip]["mean"])]
+                for tip, each in numbers["tips"].items()
+            ],
         )
     )
     resins = numbers["resins"]
@@ -246,7 +288,7 @@ def tables(numbers: Values) -> list[Table]:
     )
     found.append(
         Table(
-            "What lowers NormDiff (one seed)",
+            "What NormDiff hangs on (one seed)",
             ["sensor", *BLIND, "pixels of the smallest contact"],
             [
                 [
@@ -259,6 +301,14 @@ def tables(numbers: Values) -> list[Table]:
         )
     )
     return found
+
+
+def _correlation(colourings: Values, way: str) -> str:
+    rows = [
+        (PAPER[name]["normdiff"], each["ways"][way]["mean"]) for name, each in colourings.items()
+    ]
+    there = [(paper, mean) for paper, mean in rows if mean is not None]
+    return number(spearman([p for p, _ in there], [m for _, m in there])[0], 2)
 
 
 def draw(numbers: Values, pictures: Pictures) -> Figure:
@@ -291,10 +341,10 @@ def draw(numbers: Values, pictures: Pictures) -> Figure:
 def _draw_all(axes: Any, numbers: Values) -> None:
     """The scores of NormDiff with other noise, of the sensors in the table."""
     for colour, (name, each) in zip(COLOURS, numbers["why"].items(), strict=False):
-        ways = ("as scored", "noise 10 % instead of 30 %", "noise 3 %")
+        ways = ("as scored", "noise of 15 % to either side", "noise of 3 %")
         values = [each["scores"].get(way) for way in ways]
         if None not in values:
-            axes.plot([30, 10, 3], values, "o-", color=colour, label=name[:32])
+            axes.plot([30, 15, 3], values, "o-", color=colour, label=name)
     finish(axes, "NormDiff over its noise", "noise, % of the colour", legend=True)
 
 

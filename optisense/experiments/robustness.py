@@ -101,6 +101,7 @@ def _mini_margins(records: Sequence[Record], settings: Values) -> dict[str, floa
 
 
 def _belt_units(dimensions: Dimensions, settings: Values, seed: int) -> list[Unit]:
+    belt = {**settings, "resolution": settings["belt_resolution"]}
     designs = [sensor("gelbelt", light_design=number, **dimensions) for number in (3, 2, 1)]
     light = [
         Unit(
@@ -116,7 +117,7 @@ def _belt_units(dimensions: Dimensions, settings: Values, seed: int) -> list[Uni
         )
         for design in (designs[0], designs[2])
     ]
-    return [*(_score(design, settings, seed) for design in designs[:2]), *light]
+    return [*(_score(design, belt, seed) for design in designs[:2]), *light]
 
 
 def _belt_margins(records: Sequence[Record], settings: Values) -> dict[str, float | None]:

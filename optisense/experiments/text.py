@@ -97,7 +97,7 @@ def write_page(page: Path, results: Path, experiments: list[Experiment]) -> None
         OutputError: something can't be written.
     """
     from optisense.experiments.experiment import PICTURE, RESULT
-    from optisense.report.files import write_whole
+    from optisense.writing import write_text
 
     beside = page.with_suffix("")
     beside.mkdir(parents=True, exist_ok=True)
@@ -105,7 +105,7 @@ def write_page(page: Path, results: Path, experiments: list[Experiment]) -> None
     for experiment in experiments:
         result = read_result(results / experiment.name)
         name = experiment.name
-        write_whole(beside / f"{name}.json", (results / name / RESULT).read_text("utf-8"))
+        write_text(beside / f"{name}.json", (results / name / RESULT).read_text("utf-8"))
         shutil.copyfile(results / name / PICTURE, beside / f"{name}.png")
         chapters.append(chapter(experiment, result, f"{beside.name}/{name}.png"))
         verdicts = [claim["verdict"] for claim in result["claims"]]
@@ -120,7 +120,7 @@ def write_page(page: Path, results: Path, experiments: list[Experiment]) -> None
         "\n".join(["| experiment | the paper's statements |", "| --- | --- |", *rows]),
         f"In all: {', '.join(f'{count} {verdict}' for verdict, count in counts.items())}.",
     ]
-    write_whole(page, "\n\n".join([*head, *(text.rstrip() for text in chapters)]) + "\n")
+    write_text(page, "\n\n".join([*head, *(text.rstrip() for text in chapters)]) + "\n")
 
 
 def _anchor(title: str) -> str:

@@ -173,6 +173,6 @@ def write_json(path: Path, values: Mapping[str, Any]) -> None:
     Raises:
         OutputError: it can't be written.
     """
-    from optisense.report.files import write_whole
+    from optisense.writing import write_text
 
-    write_whole(path, json.dumps(json_ready(values), indent=1, allow_nan=False) + "\n")
+    write_text(path, json.dumps(json_ready(values), indent=1, allow_nan=False) + "\n")
