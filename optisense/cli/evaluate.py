@@ -26,6 +26,7 @@ from optisense.cli.options import (
     score_settings,
 )
 from optisense.cli.output_folder import ensure_writable
+from optisense.writing import write_text
 
 if TYPE_CHECKING:
     from optisense.objectives import Objective
@@ -152,11 +153,10 @@ def _score(
 
 def _write(scored: Scored, folder: Path, objectives: list[Objective]) -> None:
     """The JSON file, and the page if there are objectives to explain in it."""
-    from optisense.report.files import write_whole
     from optisense.report.scores import write_score_report
 
     text = json.dumps(scored.to_dict(), indent=2, allow_nan=False) + "\n"
-    write_whole(folder / JSON_FILE, text)
+    write_text(folder / JSON_FILE, text)
     if objectives:
         write_score_report(folder / REPORT_FILE, scored, objectives)
 

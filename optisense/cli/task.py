@@ -367,10 +367,11 @@ def _print_reconstruction(result: ReconstructionResult) -> None:
 
 
 def _write(folder: Path, values: dict[str, Any], figure: Figure) -> None:
-    from optisense.tasks.records import write_json, write_whole
+    from optisense.writing import write_json, written_whole
 
     write_json(folder / RESULT, values)
-    write_whole(folder / FIGURE, lambda path: figure.savefig(path, dpi=110))
+    with written_whole(folder / FIGURE) as path:
+        figure.savefig(path, dpi=110)
 
 
 def _print_json(values: dict[str, Any]) -> None:

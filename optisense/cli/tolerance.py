@@ -20,6 +20,7 @@ from optisense.cli.options import (
 )
 from optisense.cli.output_folder import ensure_writable
 from optisense.cli.progress import counting_bar
+from optisense.writing import write_text
 
 if TYPE_CHECKING:
     from optisense.search.sensitivity import Estimate
@@ -123,10 +124,9 @@ def tolerance(
 
 
 def _write(found: Tolerance, folder: Path, text: str, report: bool) -> None:
-    from optisense.report.files import write_whole
     from optisense.report.tolerance import write_tolerance_report
 
-    write_whole(folder / JSON_FILE, text + "\n")
+    write_text(folder / JSON_FILE, text + "\n")
     if report:
         write_tolerance_report(folder / REPORT_FILE, found)
 

@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-import contextlib
-import os
 from pathlib import Path
 from typing import Any
-from uuid import uuid4
 
 from pydantic import ValidationError
 
@@ -20,6 +17,7 @@ from optisense.design.yaml_reader import Lines, read_yaml
 from optisense.design.yaml_writer import to_yaml
 from optisense.errors import DesignError, MeshError, OutputError
 from optisense.geometry import TriangleMesh
+from optisense.writing import written_together
 
 DESIGN_FILE = "design.yaml"
 HEAD = "Sensor design. Lengths in mm, angles in degrees, powers in mW."
@@ -79,30 +77,12 @@ def save_design(design: SensorDesign, folder: str | Path) -> None:
     saved = design.copy()
     for name, file in meshes.items():
         saved.parts[name].mesh = file
-    staged: list[tuple[Path, Path]] = []
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        written: set[str] = set()
-        for name, file in meshes.items():
-            if file not in written:
-                written.add(file)
-                design.meshes[name].save_obj(_stage(folder, file, staged))
+    with written_together("the design") as stage:
+        for file, name in {file: name for name, file in meshes.items()}.items():
+            design.meshes[name].save_obj(stage(_within(folder, file)))
         for file, data in _ies_files(design).items():
-            _stage(folder, file, staged).write_bytes(data)
-        text = to_yaml(saved, HEAD)
-        _stage(folder, DESIGN_FILE, staged).write_text(text, encoding="utf-8")
-        for temporary, final in staged:
-            temporary.replace(final)
-    except OSError as error:
-        raise OutputError(
-            f"can't write the design: {error.strerror or error}",
-            where=str(error.filename or folder),
-            hint="Check that the folder can be written and the disk is not full",
-        ) from error
-    finally:
-        for temporary, _ in staged:
-            with contextlib.suppress(OSError):
-                temporary.unlink(missing_ok=True)
+            stage(_within(folder, file)).write_bytes(data)
+        stage(_within(folder, DESIGN_FILE)).write_text(to_yaml(saved, HEAD), encoding="utf-8")
 
 
 def _check_version(data: dict[str, Any], lines: Lines, source: str) -> None:
@@ -203,8 +183,8 @@ def _same(one: TriangleMesh, other: TriangleMesh) -> bool:
     )
 
 
-def _stage(folder: Path, relative: str, staged: list[tuple[Path, Path]]) -> Path:
-    """A temporary file beside the final one; both are inside the folder, links followed."""
+def _within(folder: Path, relative: str) -> Path:
+    """A file in the folder, links followed."""
     final = folder / relative
     final.parent.mkdir(parents=True, exist_ok=True)
     if not final.parent.resolve().is_relative_to(folder.resolve()):
@@ -213,6 +193,4 @@ def _stage(folder: Path, relative: str, staged: list[tuple[Path, Path]]) -> Path
             where=str(folder),
             hint="Remove the link in the folder",
         )
-    temporary = final.with_name(f".{final.name}.{os.getpid()}-{uuid4().hex[:8]}.tmp")
-    staged.append((temporary, final))
-    return temporary
+    return final

@@ -7,15 +7,13 @@ the user's configuration folder ($XDG_CONFIG_HOME, or ~/.config).
 
 from __future__ import annotations
 
-import contextlib
 import os
 from pathlib import Path
-from uuid import uuid4
 
 from optisense.design.yaml_writer import to_yaml
-from optisense.errors import OutputError
 from optisense.library.entries import AnyEntry
 from optisense.library.reading import Kind
+from optisense.writing import written_together
 
 HEADS: dict[Kind, str] = {
     "material": "Optical material. Indices at 630, 528 and 465 nm for R, G, B.",
@@ -57,26 +55,9 @@ def write_own(kind: Kind, name: str, entry: AnyEntry, ies: bytes | None = None) 
         OutputError: the folder can't be written.
     """
     file = own_folder() / f"{kind}s" / f"{name}.yaml"
-    try:
-        file.parent.mkdir(parents=True, exist_ok=True)
+    hint = "Name a folder that you may write to in the environment variable OPTISENSE_LIBRARY"
+    with written_together("your library", hint) as stage:
         if ies is not None:
-            _write_whole(file.with_suffix(".ies"), ies)
-        _write_whole(file, to_yaml(entry, HEADS[kind]).encode())
-    except OSError as error:
-        raise OutputError(
-            f"can't write into your library: {error.strerror or error}",
-            where=str(error.filename or file.parent),
-            hint="Name a folder that you may write to in the environment variable "
-            "OPTISENSE_LIBRARY",
-        ) from error
+            stage(file.with_suffix(".ies")).write_bytes(ies)
+        stage(file).write_text(to_yaml(entry, HEADS[kind]), encoding="utf-8")
     return file
-
-
-def _write_whole(file: Path, data: bytes) -> None:
-    temporary = file.with_name(f".{file.name}.{os.getpid()}-{uuid4().hex[:8]}.tmp")
-    try:
-        temporary.write_bytes(data)
-        temporary.replace(file)
-    finally:
-        with contextlib.suppress(OSError):
-            temporary.unlink(missing_ok=True)

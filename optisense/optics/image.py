@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
+import errno
 import json
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -14,8 +14,9 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from optisense.errors import OutputError, RenderError
+from optisense.errors import RenderError
 from optisense.optics.response import auto_exposure, picture
+from optisense.writing import written_together
 
 
 @dataclass
@@ -80,7 +81,7 @@ class TactileImage:
     def save(self, folder: str | Path, exposure: float | str = "auto") -> None:
         """Write image.png, radiance.exr, normals.npy, contact_mask.npy, layers/*.exr and run.json.
 
-        Each file is written under a temporary name and then renamed.
+        They are written under temporary names and appear when all are whole.
 
         Raises:
             OutputError: a file can't be written, for instance because the disk is full.
@@ -89,34 +90,21 @@ class TactileImage:
         self.settings["exposure"] = (
             auto_exposure(self.radiance) if exposure == "auto" else float(exposure)
         )
-        try:
-            (out / "layers").mkdir(parents=True, exist_ok=True)
-            _write(out / "image.png", lambda p: _bitmap(self.picture(exposure), p))
-            _write(out / "radiance.exr", lambda p: _bitmap(self.radiance, p))
+        with written_together("the results") as stage:
+            _bitmap(self.picture(exposure), stage(out / "image.png"))
+            _bitmap(self.radiance, stage(out / "radiance.exr"))
             for name, layer in self.layers.items():
-                _write(out / "layers" / f"{name}.exr", partial(_bitmap, layer))
-            _write(out / "normals.npy", lambda p: np.save(p, self.normals))
-            _write(out / "contact_mask.npy", lambda p: np.save(p, self.contact_mask))
+                _bitmap(layer, stage(out / "layers" / f"{name}.exr"))
+            np.save(stage(out / "normals.npy"), self.normals)
+            np.save(stage(out / "contact_mask.npy"), self.contact_mask)
             text = json.dumps(self.settings, indent=2) + "\n"
-            _write(out / "run.json", lambda p: p.write_text(text, encoding="utf-8"))
-        except (OSError, RuntimeError) as error:
-            raise OutputError(
-                f"the results can't be written: {getattr(error, 'strerror', None) or error}",
-                where=str(out),
-                hint="Free space on this disk or choose another folder",
-            ) from error
+            stage(out / "run.json").write_text(text, encoding="utf-8")
 
 
 def _bitmap(values: NDArray[Any], path: Path) -> None:
-    mi.Bitmap(np.ascontiguousarray(values)).write(str(path))
-
-
-def _write(path: Path, writer: Callable[[Path], Any]) -> None:
-    temporary = path.with_name(f".{path.stem}.{os.getpid()}{path.suffix}")
     try:
-        writer(temporary)
-        if temporary.stat().st_size == 0:
-            raise OSError(28, "no space left on the device")
-        temporary.replace(path)
-    finally:
-        temporary.unlink(missing_ok=True)
+        mi.Bitmap(np.ascontiguousarray(values)).write(str(path))
+    except RuntimeError as error:
+        raise OSError(errno.EIO, str(error), str(path)) from error
+    if path.stat().st_size == 0:  # it says nothing when the disk is full
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(path))

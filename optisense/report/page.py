@@ -17,9 +17,10 @@ from optisense.design import LightGroup, SensorDesign
 from optisense.geometry import Contact, TriangleMesh
 from optisense.optics.response import auto_exposure, encode
 from optisense.report import tables
-from optisense.report.files import template, write_whole
+from optisense.report.files import template
 from optisense.report.pictures import data_uri, mask_overlay, normal_colours
 from optisense.report.scene_view import scene_data
+from optisense.writing import write_text
 
 
 class RenderedImage(Protocol):
@@ -80,7 +81,7 @@ def write_report(
     """
     path = Path(path)
     page = render_page(design, image, contacts, exposure=exposure, indenters=indenters)
-    write_whole(path, page)
+    write_text(path, page)
     return path
 
 

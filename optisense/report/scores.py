@@ -16,7 +16,8 @@ from optisense.design.section_drawing import section_svg
 from optisense.objectives.registry import Objective
 from optisense.objectives.score import Score, shown_number
 from optisense.objectives.scored import Scored
-from optisense.report.files import template, write_whole
+from optisense.report.files import template
+from optisense.writing import write_text
 
 DOTS_PER_INCH = 110
 
@@ -38,7 +39,7 @@ def write_score_report(path: str | Path, scored: Scored, objectives: list[Object
     Raises:
         OutputError: the file can't be written.
     """
-    write_whole(Path(path), render_scores(scored, objectives))
+    write_text(Path(path), render_scores(scored, objectives))
     return Path(path)
 
 

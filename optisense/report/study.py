@@ -19,10 +19,11 @@ from optisense.errors import OptiSenseError
 from optisense.report import study_figures
 from optisense.report.before_after import Look
 from optisense.report.drawing import figure_uri
-from optisense.report.files import template, write_whole
+from optisense.report.files import template
 from optisense.report.pictures import data_uri
 from optisense.search.study import Study, beside, best_of, front_among
 from optisense.search.trial import Trial
+from optisense.writing import write_text
 
 MOST_TRIALS = 200
 """Trials in the table: the best ones."""
@@ -52,7 +53,7 @@ def write_study_report(
     Raises:
         OutputError: the file can't be written.
     """
-    write_whole(Path(path), render_study(study, looks))
+    write_text(Path(path), render_study(study, looks))
     return Path(path)
 
 

@@ -13,9 +13,10 @@ from markupsafe import Markup
 
 from optisense import __version__
 from optisense.report.drawing import AMBER, BLUE, GREY, RED, figure_uri, new_figure
-from optisense.report.files import template, write_whole
+from optisense.report.files import template
 from optisense.search.sensitivity import Estimate
 from optisense.search.tolerance import Spreading, Tolerance
+from optisense.writing import write_text
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -27,7 +28,7 @@ def write_tolerance_report(path: str | Path, tolerance: Tolerance) -> Path:
     Raises:
         OutputError: the file can't be written.
     """
-    write_whole(Path(path), render_tolerance(tolerance))
+    write_text(Path(path), render_tolerance(tolerance))
     return Path(path)
 
 

@@ -32,8 +32,9 @@ from optisense.tasks.dataset import (
     write_picture,
 )
 from optisense.tasks.draws import ContactDraw, DrawnContact, Places
-from optisense.tasks.records import Table, read_json, refuse_differences, write_json, write_whole
+from optisense.tasks.records import KEPT, Table, read_json, refuse_differences, write_whole
 from optisense.tasks.untouched import UntouchedSurface
+from optisense.writing import write_json
 
 if TYPE_CHECKING:
     from optisense.optics import OpticalModel, TactileImage
@@ -224,7 +225,7 @@ class _Maker:
             "units": {"length": "mm", "angle": "degrees", "radiance": "mW/(mm^2 sr)"},
             "columns": NUMBER_COLUMNS,
         }
-        write_json(info_file, info)
+        write_json(info_file, info, "the results", KEPT)
         return exposure
 
     def _common(self) -> dict[str, Any]:

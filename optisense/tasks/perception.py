@@ -20,9 +20,10 @@ from optisense.geometry import Contact
 from optisense.objectives.score import json_ready
 from optisense.tasks.camera_noise import MEASURED_NOISE, add_camera_noise
 from optisense.tasks.generation import design_values, mesh_digests
-from optisense.tasks.records import Table, read_json, refuse_differences, write_json
+from optisense.tasks.records import KEPT, Table, read_json, refuse_differences
 from optisense.tasks.regression import FOLDS, ForestReading, read_by_forest
 from optisense.tasks.snr import NEIGHBOURS, signal_to_noise
+from optisense.writing import write_json
 
 if TYPE_CHECKING:
     from optisense.optics import OpticalModel, TactileImage
@@ -303,7 +304,7 @@ def _open_table(
     if (folder / SETTINGS).exists():
         refuse_differences("samples", folder, read_json(folder / SETTINGS), now)
     else:
-        write_json(folder / SETTINGS, now)
+        write_json(folder / SETTINGS, now, "the results", KEPT)
     return Table(folder / SAMPLES, names)
 
 

@@ -17,6 +17,9 @@ from pathlib import Path
 from typing import Any
 
 from optisense.errors import OutputError, TaskError
+from optisense.writing import written_whole
+
+KEPT = "Free space on this disk or choose another folder; finished samples are kept"
 
 MOST_SHOWN = 5
 """Differences between settings that a message lists."""
@@ -28,20 +31,8 @@ def write_whole(path: Path, writer: Callable[[Path], object]) -> None:
     Raises:
         OutputError: it can't be written.
     """
-    temporary = path.with_name(f".{path.stem}.{os.getpid()}{path.suffix}")
-    try:
+    with written_whole(path, "the results", KEPT) as temporary:
         writer(temporary)
-        temporary.replace(path)
-    except OSError as error:
-        raise _cannot_write(path, error) from error
-    finally:
-        temporary.unlink(missing_ok=True)
-
-
-def write_json(path: Path, values: Mapping[str, Any]) -> None:
-    """Write a JSON file, whole or not at all."""
-    text = json.dumps(values, indent=2, ensure_ascii=False) + "\n"
-    write_whole(path, lambda file: file.write_text(text, encoding="utf-8"))
 
 
 def read_json(path: Path) -> dict[str, Any]:
@@ -195,7 +186,5 @@ def _line(values: Sequence[str]) -> str:
 
 def _cannot_write(path: Path, error: OSError) -> OutputError:
     return OutputError(
-        f"can't write the results: {error.strerror or error}",
-        where=str(path),
-        hint="Free space on this disk or choose another folder; finished samples are kept",
+        f"the results can't be written: {error.strerror or error}", where=str(path), hint=KEPT
     )

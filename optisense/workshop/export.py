@@ -2,20 +2,18 @@
 
 from __future__ import annotations
 
-import contextlib
-import os
 import re
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from uuid import uuid4
 
 from optisense.design import SensorDesign
-from optisense.errors import DesignError, OutputError
+from optisense.errors import DesignError
 from optisense.workshop.bill_of_materials import bill_of_materials
 from optisense.workshop.mesh_formats import obj_bytes, stl_bytes, three_mf_bytes
 from optisense.workshop.placement import placement_csv, placements
 from optisense.workshop.shapes import Shape, shapes
 from optisense.workshop.step_format import require_step, write_step
+from optisense.writing import written_together
 
 FORMATS = ("stl", "obj", "3mf", "step")
 """A file for each part as STL and OBJ, one file for all parts as 3MF and STEP."""
@@ -98,25 +96,8 @@ def _bytes_writer(data: bytes) -> Writer:
 
 def _write_all(folder: Path, writers: dict[str, Writer]) -> list[Path]:
     """Write each file under a temporary name, and rename them when all are there."""
-    mark = f"{os.getpid()}-{uuid4().hex[:8]}"
-    staged: list[tuple[Path, Path]] = []
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        for file, write in writers.items():
-            final = folder / file
-            temporary = folder / f".{mark}.{file}"
-            staged.append((temporary, final))
-            write(temporary)
-        for temporary, final in staged:
-            temporary.replace(final)
-    except OSError as error:
-        raise OutputError(
-            f"can't write for the workshop: {error.strerror or error}",
-            where=str(error.filename or folder),
-            hint="Check that the folder can be written and the disk is not full",
-        ) from error
-    finally:
-        for temporary, _ in staged:
-            with contextlib.suppress(OSError):
-                temporary.unlink(missing_ok=True)
-    return [final for _, final in staged]
+    finals = [folder / file for file in writers]
+    with written_together("the workshop's files") as stage:
+        for final, write in zip(finals, writers.values(), strict=True):
+            write(stage(final))
+    return finals

@@ -75,4 +75,4 @@ def test_the_file_is_written_whole_or_not_at_all(image: TactileImage, tmp_path: 
     assert path.read_text(encoding="utf-8").rstrip().endswith("</html>")
     assert [file.name for file in tmp_path.iterdir()] == ["report.html"]
     with pytest.raises(OutputError, match="can't be written"):
-        write_report(tmp_path / "missing" / "report.html", gelsight_mini(), image, [BALL])
+        write_report(path / "report.html", gelsight_mini(), image, [BALL])

@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-import contextlib
-import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
-from uuid import uuid4
 
-from optisense.errors import OutputError
 from optisense.library.entries import AnyEntry, LightEntry
 from optisense.library.previews.camera import draw_camera
 from optisense.library.previews.light import draw_light
 from optisense.library.previews.material import draw_material
+from optisense.writing import written_whole
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -48,17 +45,5 @@ def save(figure: Figure, path: Path) -> None:
     Raises:
         OutputError: it can't be written.
     """
-    temporary = path.with_name(f".{path.name}.{os.getpid()}-{uuid4().hex[:8]}.tmp")
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
+    with written_whole(path, "the picture", "Choose another file after --out") as temporary:
         figure.savefig(temporary, format="png", dpi=DOTS_PER_INCH)
-        temporary.replace(path)
-    except OSError as error:
-        raise OutputError(
-            f"can't write the picture: {error.strerror or error}",
-            where=str(path),
-            hint="Choose another file after --out",
-        ) from error
-    finally:
-        with contextlib.suppress(OSError):
-            temporary.unlink(missing_ok=True)

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
-from uuid import uuid4
 
 from optisense.design.yaml_writer import to_yaml
-from optisense.errors import OutputError
 from optisense.sensors.from_meshes.recipe import Recipe, Shape
+from optisense.writing import write_text
 
 RECIPE_FILE = "recipe.yaml"
 """What the recipe of a design is called in its folder."""
@@ -29,19 +28,7 @@ def save_recipe(recipe: Recipe, path: str | Path) -> None:
     for shape in _shapes(moved):
         if shape.file is not None:
             shape.file = _from(recipe.folder / shape.file, path.parent)
-    temporary = path.with_name(f".{path.name}.{os.getpid()}-{uuid4().hex[:8]}.tmp")
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        temporary.write_text(to_yaml(moved, HEAD), encoding="utf-8")
-        temporary.replace(path)
-    except OSError as error:
-        raise OutputError(
-            f"can't write the recipe: {error.strerror or error}",
-            where=str(path),
-            hint="Check that the folder can be written and the disk is not full",
-        ) from error
-    finally:
-        temporary.unlink(missing_ok=True)
+    write_text(path, to_yaml(moved, HEAD), "the recipe")
 
 
 def _shapes(recipe: Recipe) -> list[Shape]:

@@ -1,0 +1,91 @@
+"""Files that are written whole or not at all: under a temporary name first, then renamed."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+from uuid import uuid4
+
+from optisense.errors import OutputError
+
+FREE_SPACE = "Free space on this disk or choose another folder"
+
+
+@contextmanager
+def written_together(what: str, hint: str = FREE_SPACE) -> Iterator[Callable[[Path], Path]]:
+    """Files that appear all at once, when the block has ended well.
+
+    Yields:
+        A function that takes where a file shall be, makes its folder, and returns the temporary
+        path to write to, in the same folder and with the same suffix.
+
+    Args:
+        what: for the message, such as "the design".
+        hint: what the user may do when it fails.
+
+    Raises:
+        OutputError: for any `OSError`; no temporary file is left behind.
+    """
+    staged: list[tuple[Path, Path]] = []
+
+    def stage(final: Path) -> Path:
+        final.parent.mkdir(parents=True, exist_ok=True)
+        name = f".{final.stem}.{os.getpid()}-{uuid4().hex[:8]}{final.suffix}"
+        staged.append((final.with_name(name), final))
+        return staged[-1][0]
+
+    try:
+        yield stage
+        for temporary, final in staged:
+            temporary.replace(final)
+    except OSError as error:
+        # A failed rename names the temporary file: the user knows only the other.
+        names = {str(temporary): str(final) for temporary, final in staged}
+        named = str(error.filename or (staged[-1][0] if staged else ""))
+        raise OutputError(
+            f"{what} can't be written: {error.strerror or error}",
+            where=names.get(named, named) or None,
+            hint=hint,
+        ) from error
+    finally:
+        for temporary, _ in staged:
+            with contextlib.suppress(OSError):
+                temporary.unlink(missing_ok=True)
+
+
+@contextmanager
+def written_whole(path: Path, what: str = "the file", hint: str = FREE_SPACE) -> Iterator[Path]:
+    """The same for one file: yields the temporary path to write to.
+
+    Raises:
+        OutputError: as `written_together`.
+    """
+    with written_together(what, hint) as stage:
+        yield stage(path)
+
+
+def write_text(path: Path, text: str, what: str = "the file", hint: str = FREE_SPACE) -> None:
+    """Write a text file (UTF-8), whole.
+
+    Raises:
+        OutputError: as `written_together`.
+    """
+    with written_whole(path, what, hint) as temporary:
+        temporary.write_text(text, encoding="utf-8")
+
+
+def write_json(
+    path: Path, values: Mapping[str, Any], what: str = "the file", hint: str = FREE_SPACE
+) -> None:
+    """Write a JSON file, whole.
+
+    Raises:
+        OutputError: as `written_together`.
+    """
+    text = json.dumps(values, indent=2, ensure_ascii=False)
+    write_text(path, text + "\n", what, hint)

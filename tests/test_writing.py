@@ -1,0 +1,55 @@
+"""Files appear whole and together, or not at all."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from optisense.errors import OutputError
+from optisense.writing import write_json, write_text, written_together, written_whole
+
+
+def test_files_appear_together_when_all_are_written(tmp_path: Path) -> None:
+    one, other = tmp_path / "one.txt", tmp_path / "deep" / "other.npz"
+    one.write_text("before")
+    with written_together("the results") as stage:
+        stage(one).write_text("after")
+        temporary = stage(other)
+        assert temporary.parent == other.parent and temporary.suffix == ".npz"
+        temporary.write_bytes(b"data")
+        assert one.read_text() == "before" and not other.exists()
+    assert one.read_text() == "after" and other.read_bytes() == b"data"
+    assert sorted(path.name for path in tmp_path.rglob("*")) == ["deep", "one.txt", "other.npz"]
+
+
+@pytest.mark.parametrize("error", [ValueError("a defect"), KeyboardInterrupt()])
+def test_what_was_there_stays_when_something_goes_wrong(
+    tmp_path: Path, error: BaseException
+) -> None:
+    path = tmp_path / "one.txt"
+    path.write_text("before")
+    with pytest.raises(type(error)), written_whole(path) as temporary:
+        temporary.write_text("half of i")
+        raise error
+    assert path.read_text() == "before"
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_the_user_is_told_what_where_and_what_to_do(tmp_path: Path) -> None:
+    file = tmp_path / "file"
+    write_text(file, "text")
+    with pytest.raises(OutputError, match="the scores can't be written") as caught:
+        write_json(file / "scores.json", {}, "the scores", "Name another folder")
+    assert str(file) in str(caught.value.where) and caught.value.hint == "Name another folder"
+    with pytest.raises(OutputError) as caught:  # a rename that fails
+        write_text(tmp_path, "text")
+    assert caught.value.where == str(tmp_path)
+    assert [path.name for path in tmp_path.iterdir()] == ["file"]
+
+
+def test_json_reads_back(tmp_path: Path) -> None:
+    values = {"name": "größe", "numbers": [1, 2.5, None]}
+    write_json(tmp_path / "values.json", values)
+    assert json.loads((tmp_path / "values.json").read_text("utf-8")) == values
