@@ -17,9 +17,10 @@ from optisense import __version__
 from optisense.errors import ExperimentError
 from optisense.experiments.bench import Bench
 from optisense.experiments.claims import Claim, Table
-from optisense.experiments.unit import Record, Unit, write_json
+from optisense.experiments.unit import Record, Unit
 from optisense.objectives.score import json_ready
 from optisense.search.settings import package_versions
+from optisense.writing import write_json, write_text, written_whole
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -151,11 +152,8 @@ def write(
         OutputError: they can't be written.
     """
     from optisense.experiments.text import chapter
-    from optisense.writing import write_text
 
-    folder.mkdir(parents=True, exist_ok=True)
-    temporary = folder / f".{PICTURE}"
-    experiment.draw(dict(result["numbers"]), pictures).savefig(temporary, dpi=DOTS_PER_INCH)
-    temporary.replace(folder / PICTURE)
+    with written_whole(folder / PICTURE, "a picture") as temporary:
+        experiment.draw(dict(result["numbers"]), pictures).savefig(temporary, dpi=DOTS_PER_INCH)
     write_text(folder / TEXT, chapter(experiment, result, PICTURE))
     write_json(folder / RESULT, result)

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from optisense.errors import ExperimentError
 from optisense.experiments.claims import AGREES, DISAGREES, OPEN
+from optisense.writing import write_text
 
 if TYPE_CHECKING:
     from optisense.experiments.experiment import Experiment
@@ -97,7 +98,6 @@ def write_page(page: Path, results: Path, experiments: list[Experiment]) -> None
         OutputError: something can't be written.
     """
     from optisense.experiments.experiment import PICTURE, RESULT
-    from optisense.writing import write_text
 
     beside = page.with_suffix("")
     beside.mkdir(parents=True, exist_ok=True)

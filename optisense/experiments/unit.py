@@ -22,6 +22,7 @@ from optisense import __version__
 from optisense.errors import ExperimentError, OptiSenseError, OutputError, SetupError
 from optisense.objectives.score import json_ready
 from optisense.search.settings import package_versions
+from optisense.writing import write_json, written_together
 
 UNITS = "units"
 """Folder, within that of all results, of what units found."""
@@ -157,22 +158,10 @@ def work_out(unit: Unit, folder: Path) -> None:
         "pictures": sorted(found.pictures),
     }
     path = home / f"{unit.key}.json"
-    if found.pictures:
-        temporary = home / f".{unit.key}.tmp.npz"
-        pictures: dict[str, Any] = dict(found.pictures)
-        np.savez_compressed(temporary, **pictures)
-        temporary.replace(path.with_suffix(".npz"))
-    write_json(path, record)
+    with written_together("a result") as stage:  # renamed in this order
+        if found.pictures:
+            pictures: dict[str, Any] = dict(found.pictures)
+            np.savez_compressed(stage(path.with_suffix(".npz")), **pictures)
+        write_json(stage(path), json_ready(record))
     if not any(own.iterdir()):
         own.rmdir()
-
-
-def write_json(path: Path, values: Mapping[str, Any]) -> None:
-    """Plain values as a file, whole or not at all.
-
-    Raises:
-        OutputError: it can't be written.
-    """
-    from optisense.writing import write_text
-
-    write_text(path, json.dumps(json_ready(values), indent=1, allow_nan=False) + "\n")
