@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator, Sequence
-from typing import TYPE_CHECKING, Any, TypeVar, cast
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,6 +32,10 @@ BLUR_REACH = 4.0
 
 GAP = 0.5
 """mm that must be free between contacts which share an image."""
+
+MOST_SATURATED = 0.02
+"""Automatic exposure lets so many of a contact's pixels be overexposed: a person who sets up a
+shiny sensor turns the exposure down until the highlights on what is pressed in are small."""
 
 
 class Evaluation:
@@ -84,12 +89,12 @@ class Evaluation:
 
     @property
     def exposure(self) -> float:
-        """The factor from radiance to what the camera reads; 1 fills its wells."""
-        from optisense.optics.response import auto_exposure
+        """The factor from radiance to what the camera reads; 1 fills its wells.
 
+        Automatic: see `exposure_for`.
+        """
         if self.settings.exposure == "auto":
-            radiance = self.untouched.radiance
-            return self._once("exposure", lambda: auto_exposure(radiance))
+            return self._once("exposure", self._auto_exposure)
         return float(self.settings.exposure)
 
     @property
@@ -129,7 +134,8 @@ class Evaluation:
         return [Contact(ball, at=at, depth=self.settings.depth) for at in self.settings.places]
 
     def each_press(self) -> Iterator[tuple[Press, TactileImage]]:
-        """Each press, not checked yet, with the image that it is seen in; rendered one by one.
+        """Each press, neither exposed (its response is 0) nor checked yet, with the image that it
+        is seen in; rendered one by one.
 
         For those who need an image's layers; they are not kept here.
 
@@ -137,8 +143,8 @@ class Evaluation:
             ObjectiveError: the camera does not see a place.
         """
         contacts, surface = self.contacts, self.model.surface
-        untouched = self.untouched.radiance
         before = self.model.chief_rays(self.resolution).normals
+        dark = np.broadcast_to(np.float32(0.0), before.shape)
         frames = [_frame(contact, surface) for contact in contacts]
         together = self.settings.together and self._are_apart([each["place"] for each in frames])
         groups = [contacts] if together else [[contact] for contact in contacts]
@@ -154,7 +160,7 @@ class Evaluation:
             press = Press(
                 number=number + 1,
                 mask=mask,
-                response=self._response(image, untouched),
+                response=dark,
                 normals=image.normals,
                 points=image.points,
                 before=before,
@@ -163,14 +169,30 @@ class Evaluation:
             press.check_seen()
             yield press, image
 
+    def _unexposed(self) -> list[_Unexposed]:
+        self.untouched  # noqa: B018  light is traced for it, which progress counts first
+        return [
+            _Unexposed(press, image.contact_mask, image.radiance)
+            for press, image in self.each_press()
+        ]
+
+    def _auto_exposure(self) -> float:
+        seen = self._once("pressed images", self._unexposed)
+        return exposure_for(
+            self.untouched.radiance, [each.radiance[each.press.mask] for each in seen]
+        )
+
     def _presses(self) -> list[Press]:
         presses = []
-        for press, _ in self.each_press():
+        for each in self._once("pressed images", self._unexposed):
+            press = replace(each.press, response=self._response(each.touched, each.radiance))
             press.check()
             presses.append(press)
         return presses
 
-    def _response(self, image: TactileImage, untouched: NDArray[np.float32]) -> NDArray[np.float32]:
+    def _response(
+        self, touched: NDArray[np.bool_], radiance: NDArray[np.float32]
+    ) -> NDArray[np.float32]:
         """(h, w, 3): the camera sensor's response, 0 to 1; the untouched one outside contacts.
 
         Overexposure spreads as far as its blur reaches, so only what lies that near to a contact
@@ -178,12 +200,12 @@ class Evaluation:
         """
         from optisense.optics.response import BLUR_OF_WIDTH, saturate
 
-        exposure, touched = np.float32(self.exposure), image.contact_mask
+        exposure, untouched = np.float32(self.exposure), self.untouched.radiance
         response = self._once("untouched response", lambda: saturate(untouched * exposure)).copy()
         if touched.any():
             reach = int(BLUR_REACH * BLUR_OF_WIDTH * touched.shape[1]) + 2
             changed, needed = _around(touched, reach), _around(touched, 2 * reach)
-            part = np.where(touched[needed][..., None], image.radiance[needed], untouched[needed])
+            part = np.where(touched[needed][..., None], radiance[needed], untouched[needed])
             inner = tuple(
                 slice(small.start - large.start, small.stop - large.start)
                 for small, large in zip(changed, needed, strict=True)
@@ -217,6 +239,36 @@ class Evaluation:
         if image.interrupted:
             raise KeyboardInterrupt
         return image
+
+
+class _Unexposed(NamedTuple):
+    """A press with the pixels (h, w) that contacts touch in its image, and its radiance there."""
+
+    press: Press
+    touched: NDArray[np.bool_]
+    radiance: NDArray[np.float32]
+
+
+def exposure_for(untouched: NDArray[np.float32], contacts: Iterable[NDArray[np.float32]]) -> float:
+    """The factor from radiance to what the camera reads that suits a sensor and its contacts.
+
+    The untouched sensor is exposed well (`auto_exposure`), unless more than `MOST_SATURATED` of
+    the pixels of a contact would be overexposed; then as little less as is needed.
+
+    Args:
+        untouched: (h, w, 3) radiance.
+        contacts: (n, 3) radiance of the pixels of each contact.
+    """
+    from optisense.optics.response import KNEE, auto_exposure
+
+    exposure = auto_exposure(untouched)
+    for radiance in contacts:
+        brightest = radiance.max(axis=1)
+        kept = min(len(brightest) - 1, int((1.0 - MOST_SATURATED) * len(brightest)))
+        level = float(np.partition(brightest, kept)[kept])
+        if level * exposure > KNEE:
+            exposure = KNEE / level
+    return exposure
 
 
 def _frame(contact: Contact, surface: SensingSurface) -> dict[str, NDArray[np.float64]]:

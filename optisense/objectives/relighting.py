@@ -15,9 +15,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from optisense.errors import ObjectiveError
-from optisense.objectives.evaluation import Evaluation
+from optisense.objectives.evaluation import Evaluation, exposure_for
 from optisense.objectives.press import Press
-from optisense.optics.response import BLUR_OF_WIDTH, KNEE, auto_exposure, saturate
+from optisense.optics.response import BLUR_OF_WIDTH, KNEE, saturate
 
 if TYPE_CHECKING:
     from optisense.design import SensorDesign
@@ -38,11 +38,12 @@ class _Seen:
     """One press with what is needed to light it again.
 
     Attributes:
-        press: at full size, but for its response, which is that of `small`.
-        small: cut to the box of its contact, under the lights that it was rendered with.
+        press: at full size, not exposed.
+        small: cut to the box of its contact, not exposed either.
         box: rows and columns of that box.
         around: of the box with all pixels whose overexposure can spread into it.
         touched: (h', w') within `around`, pixels of the press's own image.
+        own: (n,), which of these are the press's (its image may show others beside it).
         layers: (groups, 3, n) radiance for 1 mW a channel of the pixels of `touched`.
     """
 
@@ -51,6 +52,7 @@ class _Seen:
     box: tuple[slice, slice]
     around: tuple[slice, slice]
     touched: ByteMask
+    own: ByteMask
     layers: Layers
 
 
@@ -85,7 +87,7 @@ class Relighting:
 
     @property
     def cut_presses(self) -> list[Press]:
-        """The presses under the lights that they were rendered with, cut to their boxes."""
+        """The presses cut to their boxes, not exposed: where they are and what is true there."""
         return [seen.small for seen in self._seen]
 
     @cached_property
@@ -117,7 +119,7 @@ class Relighting:
 
     def exposure(self, flux: ArrayLike) -> float:
         """The factor from radiance to what the camera reads, under these lights."""
-        return self._exposure(self.untouched(flux))
+        return self._exposure(self.untouched(flux), self._contacts(flux))
 
     def presses(self, flux: ArrayLike, *, whole: bool = False) -> list[Press]:
         """The presses under lights (groups, 3) mW.
@@ -130,11 +132,11 @@ class Relighting:
         Raises:
             ObjectiveError: a press is overexposed or black under these lights.
         """
-        background = self.untouched(flux)
-        exposure = self._exposure(background)
+        background, contacts = self.untouched(flux), self._contacts(flux)
+        exposure = self._exposure(background, contacts)
         found = []
-        for seen in self._seen:
-            response = self._response(seen, background, exposure, flux, whole)
+        for seen, contact in zip(self._seen, contacts, strict=True):
+            response = self._response(seen, background, contact, exposure, whole)
             press = replace(seen.press if whole else seen.small, response=response)
             press.check()
             found.append(press)
@@ -166,28 +168,37 @@ class Relighting:
             name: getattr(press, name)[box].copy()
             for name in ("mask", "response", "normals", "points", "before")
         }
-        small = replace(press, **cut)
-        return _Seen(replace(press, response=small.response), small, box, around, touched, layers)
+        own = press.mask[around][touched]
+        return _Seen(press, replace(press, **cut), box, around, touched, own, layers)
+
+    def _contacts(self, flux: ArrayLike) -> list[NDArray[np.float32]]:
+        """(n, 3) for each press: the radiance of what contacts touch in its image."""
+        return [_mixed(seen.layers, flux).T for seen in self._seen]
 
     def _as_image(self, planes: NDArray[np.float32]) -> NDArray[np.float32]:
         """(h, w, 3), a view of planes (3, h * w)."""
         return np.moveaxis(planes.reshape(3, *self._shape), 0, -1)
 
-    def _exposure(self, untouched: NDArray[np.float32]) -> float:
+    def _exposure(
+        self, untouched: NDArray[np.float32], contacts: list[NDArray[np.float32]]
+    ) -> float:
         given = self.settings.exposure
-        return auto_exposure(untouched) if given == "auto" else float(given)
+        if given != "auto":
+            return float(given)
+        pairs = zip(self._seen, contacts, strict=True)
+        return exposure_for(untouched, [contact[seen.own] for seen, contact in pairs])
 
     def _response(
         self,
         seen: _Seen,
         background: NDArray[np.float32],
+        contact: NDArray[np.float32],
         exposure: float,
-        flux: ArrayLike,
         whole: bool,
     ) -> NDArray[np.float32]:
         """The camera's response: of the whole image, or of the box of the contact."""
         radiance = background[seen.around].copy()
-        radiance[seen.touched] = _mixed(seen.layers, flux).T
+        radiance[seen.touched] = contact
         exposed = radiance * np.float32(exposure)
         if whole:
             image = background * np.float32(exposure)
@@ -226,6 +237,9 @@ class _Relit(Evaluation):
     def untouched(self) -> TactileImage:
         """The image of the untouched sensor under these lights."""
         return self._once("untouched image", lambda: self._relighting.image(self._flux))
+
+    def _auto_exposure(self) -> float:
+        return self._relighting.exposure(self._flux)
 
     def _presses(self) -> list[Press]:
         return self._relighting.presses(self._flux, whole=self._whole)

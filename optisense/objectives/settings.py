@@ -36,7 +36,8 @@ class Settings:
         depth: to which it presses.
         places: (u, v) on the sensing surface; nine that cover it evenly if None.
         together: press at all places in one image, where contacts do not overlap.
-        exposure: factor on the radiance; "auto" exposes the untouched sensor well and keeps that.
+        exposure: factor on the radiance; "auto" exposes the untouched sensor well and keeps that,
+            or less where contacts would be overexposed (`evaluation.exposure_for`).
     """
 
     resolution: tuple[int, int] | None = None
@@ -111,6 +112,6 @@ def _pairs(places: Any) -> tuple[tuple[float, float], ...]:
     return tuple((float(u), float(v)) for u, v in places)
 
 
-def size_for(camera: tuple[int, int]) -> tuple[int, int]:
-    """(width, height) of images and rays for a camera of that many pixels."""
-    return ACROSS, max(1, round(ACROSS * camera[1] / camera[0]))
+def size_for(camera: tuple[int, int], across: int = ACROSS) -> tuple[int, int]:
+    """(width, height) of images and rays, `across` wide, for a camera of that many pixels."""
+    return across, max(1, round(across * camera[1] / camera[0]))

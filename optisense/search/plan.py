@@ -10,16 +10,23 @@ from typing import Any
 
 from optisense.design import SensorDesign
 from optisense.errors import SearchError
+from optisense.objectives.settings import size_for
 from optisense.search.constraints import Constraint, UserRule
 from optisense.search.difference import fingerprint
 from optisense.search.evaluation import DesignEvaluator, Goal, goal_name, placed
 from optisense.search.making import SAMPLES, MakingErrors
 from optisense.search.methods import Problem, find, make
+from optisense.search.models import RAYS_ONLY
 from optisense.search.settings import StudySettings
 from optisense.search.space import SearchSpace
 
 ONLY_HERE = "function:"
 """Begins the name of a goal or rule that is a function of the program and in no file."""
+
+RAYS_ACROSS = 320
+"""Chief rays across the image unless `ray_resolution` is given: a quarter of the rays that a single
+evaluation traces. Over shapes of GelSight Svelte's mirror they rank alike (Spearman 0.99) and AOAP
+differs by 0.0001 +- 0.0002."""
 
 
 @dataclass(frozen=True)
@@ -46,7 +53,12 @@ class Plan:
             ObjectiveError: an objective or a setting is unknown.
         """
         bound = self.space.bind(design)
-        evaluator = DesignEvaluator(bound, self.goals, self.settings, apart=self.apart)
+        settings = dict(self.settings or {})
+        if RAYS_ONLY & {goal_name(goal) for goal in self.goals}:
+            settings.setdefault(
+                "ray_resolution", list(size_for(design.camera.resolution, RAYS_ACROSS))
+            )
+        evaluator = DesignEvaluator(bound, self.goals, settings, apart=self.apart)
         if self.errors is not None:
             self.errors.bind(design)
         budget = self.budget
@@ -70,7 +82,7 @@ class Plan:
             options=options,
             budget=budget,
             seed=self.seed,
-            settings=dict(self.settings or {}),
+            settings=settings,
             apart=self.apart,
             rules=rules,
             files=file_prints([*objectives, *rules]),

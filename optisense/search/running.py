@@ -8,7 +8,7 @@ import time
 from collections import Counter
 from collections.abc import Callable, Sequence
 from concurrent.futures import Future
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Any
 
@@ -158,6 +158,7 @@ class Run:
         self._finished: queue.SimpleQueue[tuple[int, Future[Outcome]]] = queue.SimpleQueue()
         self._done = self._failed = self._new = 0
         self._reasons: Counter[str] = Counter()
+        self._scored: dict[bytes, Outcome] = {}
         self._best = self._start_score = math.nan
         self._began = self._told = time.monotonic()
 
@@ -224,9 +225,12 @@ class Run:
         self._work(runner, rows)
 
     def _work(self, runner: Runner, rows: Sequence[Row]) -> None:
-        """Work out the rows that are not finished, and write each as it finishes."""
+        """Work out the rows that are not finished, and write each as it finishes.
+
+        A point that was scored before keeps its score: a grid holds the start, and choices and
+        whole numbers repeat.
+        """
         by_number = {row.number: row for row in rows if row.outcome is None}
-        jobs = [(row.number, row.vector, self.study.settings.seed) for row in by_number.values()]
 
         def finished(number: int, outcome: Outcome) -> None:
             self.study.store.finish(number, outcome)
@@ -234,6 +238,13 @@ class Run:
             self._new += 1
             self._report("trials")
 
+        jobs = []
+        for row in by_number.values():
+            known = self._scored.get(row.vector.tobytes())
+            if known is None:
+                jobs.append((row.number, row.vector, self.study.settings.seed))
+            else:
+                finished(row.number, replace(known, seconds=0.0))
         self._each(runner, jobs, finished)
 
     def _work_fresh(self, runner: Runner, jobs: Sequence[tuple[Trial, int]]) -> list[Outcome]:
@@ -296,6 +307,7 @@ class Run:
             if outcome.failure is not None:
                 self._reasons[outcome.failure] += 1
         if not outcome.failed:
+            self._scored[row.vector.tobytes()] = outcome
             self._best = score if math.isnan(self._best) else max(self._best, score)
         enough = ALL_FAIL_WITH_START if math.isnan(self._start_score) else ALL_FAIL
         if self._failed == self._done >= min(enough, self.limit):

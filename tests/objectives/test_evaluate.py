@@ -15,8 +15,9 @@ import pytest
 from optisense import OpticalModel, Score, evaluate, load
 from optisense.design import set_value
 from optisense.errors import ObjectiveError
-from optisense.objectives import BUILT_IN, Evaluation, Objective, Settings
-from optisense.optics.response import saturate
+from optisense.objectives import BUILT_IN, Evaluation, Objective, Press, Settings
+from optisense.objectives.evaluation import MOST_SATURATED, exposure_for
+from optisense.optics.response import auto_exposure, saturate
 
 SMALL: dict[str, Any] = {
     "resolution": (160, 120),
@@ -95,14 +96,17 @@ def test_contacts_that_overlap_are_not_put_in_one_image(model: OpticalModel) -> 
 
 @pytest.mark.parametrize("together", [False, True])
 def test_what_the_camera_reads_is_the_whole_image_saturated(
-    model: OpticalModel, together: bool
+    model: OpticalModel, together: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     # Near the wells' limit, so that overexposure spreads from the contacts.
+    monkeypatch.setattr(Press, "check", lambda press: None)
     settings = {**SMALL, "places": ((0.0, 0.0), (-7.0, 4.0)), "together": together}
     judged = Evaluation(model, Settings(**settings, exposure=1200.0))
     background = judged.untouched.radiance
     overexposed = 0
-    for press, image in judged.each_press():
+    pairs = list(judged.each_press())
+    monkeypatch.setattr(judged, "each_press", lambda: iter(pairs))  # else they differ by rounding
+    for press, (_, image) in zip(judged.presses, pairs, strict=True):
         touched = image.contact_mask[..., None]
         whole = np.where(touched, image.radiance, background) * judged.exposure
         overexposed += int((whole > 1).sum())
@@ -304,3 +308,18 @@ def test_a_sensor_with_one_colour_confuses_more_than_one_with_three(
     grey = evaluate(OpticalModel(design, "llvm"), "normdiff", **SMALL)
     coloured = evaluate(evaluation, "normdiff")
     assert grey.value < 1.2 * coloured.value < 0
+
+
+def test_automatic_exposure_leaves_a_contact_its_highlights_and_no_more() -> None:
+    """Nothing else changes the exposure: not a contact that is dimmer than the wells are deep."""
+    random = np.random.default_rng(1)
+    untouched = random.uniform(0.5, 1.0, (40, 50, 3)).astype(np.float32)
+    dim = random.uniform(0.0, 1.0, (500, 3)).astype(np.float32)
+    usual = auto_exposure(untouched)
+    assert exposure_for(untouched, []) == usual
+    assert exposure_for(untouched, [dim]) == usual
+    shiny, shinier = 8.0 * dim, 30.0 * dim
+    found = exposure_for(untouched, [dim, shinier, shiny])
+    assert found == exposure_for(untouched, [shinier, dim])
+    overexposed = (found * shinier.max(axis=1) > 1.0).mean()
+    assert 0.5 * MOST_SATURATED < overexposed <= MOST_SATURATED

@@ -41,6 +41,21 @@ def test_grid_scores_every_combination(mini: SensorDesign, goals: ModuleType) ->
     assert len(result.trials) == 1 + 15
 
 
+def test_no_point_is_scored_twice(mini: SensorDesign, goals: ModuleType) -> None:
+    """A grid holds the start; whole numbers and options repeat."""
+    asked: list[float] = []
+
+    def counted(design: SensorDesign) -> float:
+        asked.append(design.coating.specularity)
+        return -design.coating.specularity
+
+    assert mini.coating.specularity == 0.0
+    result = search(mini, {"coating.specularity": (0.0, 1.0, 5)}, counted, method="grid")
+    assert [trial.score for trial in result.trials] == [0.0, 0.0, -0.25, -0.5, -0.75, -1.0]
+    assert sorted(set(asked)) == [0.0, 0.25, 0.5, 0.75, 1.0]
+    assert asked[:5] == [0.0, 0.25, 0.5, 0.75, 1.0]  # the rest is with fresh seeds
+
+
 def test_progress_tells_of_best_rate_and_time_left(mini: SensorDesign, goals: ModuleType) -> None:
     seen: list[Progress] = []
     search(mini, SPACE, goals.nearness, budget=40, progress=seen.append)

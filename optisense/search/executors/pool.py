@@ -70,8 +70,13 @@ class _Worker:
 class ProcessPool(Runner):
     """Workers on this machine, each with its share of the processor's threads."""
 
-    def __init__(self, evaluator: Evaluator, workers: int) -> None:
+    def __init__(self, evaluator: Evaluator, workers: int, threads: int | None = None) -> None:
         """Start the workers; they get ready in the background.
+
+        Args:
+            evaluator: works out the trials.
+            workers: processes.
+            threads: of each worker's renderer; its share of the processors if None.
 
         Raises:
             SearchError: there are less than one, or the evaluator can't be given to them.
@@ -81,7 +86,7 @@ class ProcessPool(Runner):
         self.workers = workers
         self.window = 4 * workers
         self._blob = packed(evaluator)
-        self._threads = max(1, processors() // workers)
+        self._threads = threads or max(1, processors() // workers)
         self._waiting: deque[_Task] = deque()
         self._changed = threading.Condition()
         self._closed = False
