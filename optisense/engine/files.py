@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-import contextlib
-import os
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
-from uuid import uuid4
 
 import numpy as np
 from numpy.typing import NDArray
 
 from optisense.errors import OutputError
 from optisense.geometry import TriangleMesh
+from optisense.writing import written_whole
 
 
 class Files:
@@ -71,17 +69,6 @@ class Files:
 
     def _write(self, rest: str, write: Callable[[Path], object]) -> str:
         path = self.path(rest)
-        temporary = path.with_name(f".{path.name}.{os.getpid()}-{uuid4().hex[:8]}.tmp")
-        try:
+        with written_whole(path) as temporary:
             write(temporary)
-            temporary.replace(path)
-        except OSError as error:
-            raise OutputError(
-                f"a file can't be written: {error.strerror or error}",
-                where=str(path),
-                hint="Free space on this disk, or name another folder",
-            ) from error
-        finally:
-            with contextlib.suppress(OSError):
-                temporary.unlink(missing_ok=True)
         return str(path)

@@ -9,9 +9,9 @@ from datetime import UTC, datetime
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
-from uuid import uuid4
 
-from optisense.errors import OutputError, SearchError
+from optisense.errors import SearchError
+from optisense.writing import write_text
 
 STUDY_VERSION = 1
 STUDY_FILE = "study.json"
@@ -85,15 +85,7 @@ class StudySettings:
         Raises:
             OutputError: it can't be written.
         """
-        temporary = folder / f".{STUDY_FILE}.{uuid4().hex[:8]}.tmp"
-        try:
-            temporary.write_text(self.to_text(), encoding="utf-8")
-            temporary.replace(folder / STUDY_FILE)
-        except OSError as error:
-            temporary.unlink(missing_ok=True)
-            raise OutputError(
-                f"the study can't be written: {error.strerror or error}", where=str(folder)
-            ) from error
+        write_text(folder / STUDY_FILE, self.to_text(), "the study")
 
     @staticmethod
     def load(folder: Path) -> StudySettings:
