@@ -31,9 +31,6 @@ Plain = Mapping[str, Any]
 NINE = "nine balls"
 """As contacts: the balls that objectives press."""
 
-SMALL = 80, 60
-"""Pixels of an image that only tells how bright a sensor is."""
-
 _keepers: dict[tuple[Any, ...], ModelKeeper] = {}
 
 
@@ -61,15 +58,11 @@ def design_of(plain: Plain) -> SensorDesign:
 def scores(inputs: Plain, folder: Path) -> Found:
     """Scores of a design: `design`, `objectives`, `settings` of these.
 
-    With `exposure_share` the images are so many times as bright as the exposure that suits the
-    untouched sensor makes them. An objective that fails leaves a gap among `scores` and its reason
-    among `failures`.
+    An objective that fails leaves a gap among `scores` and its reason among `failures`.
     """
     model = _model(inputs["design"], lit=not set(inputs["objectives"]) <= RAYS_ONLY)
-    settings = _tuples(inputs["settings"])
-    if "exposure_share" in inputs:
-        settings["exposure"] = inputs["exposure_share"] * _usual_exposure(model, settings)
-    return Found(_scores(evaluate(model, list(inputs["objectives"]), **settings)))
+    found = evaluate(model, list(inputs["objectives"]), **_tuples(inputs["settings"]))
+    return Found(_scores(found))
 
 
 def relit_scores(inputs: Plain, folder: Path) -> Found:
@@ -294,16 +287,6 @@ def _difference(one: Any, other: Any, mask: Any) -> float:
     a, b = one[mask].astype(np.float64), other[mask].astype(np.float64)
     lit = (a + b).sum(axis=0) > 0.0
     return float(np.sqrt(((a - b)[:, lit] ** 2).mean() / 2.0) / (0.5 * (a + b)[:, lit].mean()))
-
-
-def _usual_exposure(model: OpticalModel, settings: Plain) -> float:
-    """Of the untouched sensor, by a small image under the same light."""
-    from optisense.optics.response import auto_exposure
-
-    image = model.render((), SMALL, settings["photons"], seed=settings["seed"])
-    if image.interrupted:
-        raise KeyboardInterrupt
-    return auto_exposure(image.radiance)
 
 
 def _base(plain: Plain) -> SensorDesign:

@@ -50,7 +50,6 @@ def steps(settings: Values) -> Steps:
             {
                 "design": sensor(SENSOR, change, light_design=design),
                 "objectives": list(OBJECTIVES),
-                "exposure_share": settings["exposure_share"],
                 "settings": {**images, "seed": seed},
             },
             label,

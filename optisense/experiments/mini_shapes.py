@@ -44,7 +44,6 @@ def score_units(
             {
                 "design": sensor(name, {**(change or {}), "coating.specularity": value}),
                 "objectives": list(OBJECTIVES),
-                "exposure_share": settings["exposure_share"],
                 "settings": {
                     "resolution": settings["resolution"],
                     "photons": settings["photons"],

@@ -379,7 +379,6 @@ def _score(design: Values, settings: Values, seed: int) -> Unit:
         {
             "design": design,
             "objectives": list(OBJECTIVES),
-            "exposure_share": settings["exposure_share"],
             "settings": {
                 "resolution": settings["resolution"],
                 "photons": settings["photons"],

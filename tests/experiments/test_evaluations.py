@@ -27,6 +27,9 @@ from optisense.experiments.evaluations import (
 from optisense.experiments.objects import OBJECTS
 
 IMAGES = {"resolution": [160, 120], "photons": 60_000, "seed": 3}
+SAME = 1e-6
+"""Sums over threads differ by rounding."""
+
 GOALS = ["rgb2normal", "normdiff"]
 
 
@@ -36,6 +39,7 @@ def test_a_design_is_its_dimensions_and_what_is_set_in_it() -> None:
     assert np.ptp(design.meshes["gel"].bounds, axis=0)[:2] == pytest.approx([20.0, 18.0])
 
 
+@pytest.mark.slow
 def test_scores_are_those_of_evaluate_whatever_was_asked_before(tmp_path: Path) -> None:
     asked = {"objectives": GOALS, "settings": IMAGES}
     shiny = sensor("gelsight-mini", {"coating.specularity": 0.3})
@@ -44,20 +48,21 @@ def test_scores_are_those_of_evaluate_whatever_was_asked_before(tmp_path: Path) 
         for design in (shiny, sensor("gelsight-mini"), shiny)
     ]
     plain = ots.evaluate(ots.load("gelsight-mini"), GOALS, **_tuples(IMAGES))
-    assert found[1] == {name: score.value for name, score in plain.items()}
-    assert found[0] == found[2] != found[1]
+    assert found[1] == pytest.approx({name: score.value for name, score in plain.items()}, rel=SAME)
+    assert found[0] == pytest.approx(found[2], rel=SAME)
+    assert found[0]["normdiff"] != pytest.approx(found[1]["normdiff"], rel=1e-3)
 
 
-def test_a_darker_exposure_judges_what_would_be_overexposed(tmp_path: Path) -> None:
-    design = sensor("gelsight-mini", {"coating.specularity": 0.8})
-    asked = {"design": design, "objectives": ["normdiff"], "settings": IMAGES}
-    bright = scores({**asked, "exposure_share": 4.0}, tmp_path).values
-    dark = scores({**asked, "exposure_share": 0.25}, tmp_path).values
-    assert "overexposed" in bright["failures"]["normdiff"]
-    assert bright["scores"]["normdiff"] is None
-    assert dark["scores"]["normdiff"] < 0.0
+@pytest.mark.slow
+def test_an_objective_that_fails_leaves_a_gap_with_its_reason(tmp_path: Path) -> None:
+    settings = {**IMAGES, "exposure": 1e6}
+    design = sensor("gelsight-mini")
+    found = scores({"design": design, "objectives": GOALS, "settings": settings}, tmp_path).values
+    assert found["scores"] == dict.fromkeys(GOALS)
+    assert all("overexposed" in reason for reason in found["failures"].values())
 
 
+@pytest.mark.slow
 def test_relit_scores_are_those_of_a_design_with_these_colours(tmp_path: Path) -> None:
     groups = ["red", "green", "blue"]
     asked = {"objectives": ["normdiff"], "settings": IMAGES}
