@@ -44,9 +44,9 @@ BLEND = {"cages.M1.blend": (0.0, 1.0)}
 COATINGS = {"coating.specularity": (0.0, 1.0, 11)}
 COATING_WORKERS = 2
 OVERHEAD_TRIALS = 3000
-RAY_SECONDS, RENDERED_SECONDS = 6.0, 12.0
+RAY_SECONDS, RENDERED_SECONDS = 5.0, 9.0
 """How long trials are counted, once each worker has finished WARM of them."""
-WARM = 2
+WARM = 1
 """Trials of each worker that are left out, while it builds its model and compiles."""
 
 MIRROR_BUDGET = 5000
