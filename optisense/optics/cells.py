@@ -1,4 +1,4 @@
-"""A mesh cut into the cells of a uniform grid, with a smoothing kernel among them."""
+"""A mesh cut into the cells of a uniform grid."""
 
 from __future__ import annotations
 
@@ -19,10 +19,11 @@ REACH = 3
 
 @dataclass
 class SurfaceCells:
-    """Cells of a uniform 3-D grid that surfaces pass through, and a smoothing kernel among them.
+    """Cells of a uniform 3-D grid that surfaces pass through.
 
-    ``index`` is the number + 1 of the cell at each grid place (0: none); ``axes`` (3, 3) the
-    frame of the bins.
+    ``index`` is the number + 1 of the cell at each grid place (0: none); ``centres`` (cells, 3)
+    mm, ``normals`` (cells, 3) and ``areas`` (cells,) mm^2 are those of the surface in each;
+    ``axes`` (3, 3) the frame of the bins.
     """
 
     lower: mi.Point3f
@@ -32,9 +33,8 @@ class SurfaceCells:
     cells: int
     planes: mi.Float
     centres: FloatArray
-    near_start: mi.UInt32
-    near_cell: mi.UInt32
-    near_weight: mi.Float
+    normals: FloatArray
+    areas: FloatArray
     axes: FloatArray
 
 
@@ -59,14 +59,8 @@ def surface_samples(
     return points, normals[owner], (area / count)[owner]
 
 
-def build_cells(
-    vertices: FloatArray, faces: NDArray[np.integer], size: float, radius: float
-) -> SurfaceCells:
-    """Cells of ``size`` mm over a mesh, smoothed by Epanechnikov's kernel of ``radius`` mm.
-
-    The kernel is normalised by the surface's area under it, so edges and oblique cells lose
-    nothing.
-    """
+def build_cells(vertices: FloatArray, faces: NDArray[np.integer], size: float) -> SurfaceCells:
+    """Cells of ``size`` mm over a mesh."""
     vertices = np.asarray(vertices, dtype=np.float64)
     points, normals, areas = surface_samples(vertices, faces, size / 5)
     # Off any round number, so that a plane does not run along the border between two cells.
@@ -80,24 +74,11 @@ def build_cells(
     def mean_of(values: FloatArray) -> FloatArray:
         return np.stack([np.bincount(owner, areas * values[:, k], cells) for k in range(3)], 1)
 
-    area = np.bincount(owner, areas, cells)
+    area = np.bincount(owner, areas, cells).astype(np.float64)
     centre = mean_of(points) / area[:, None]
     normal = mean_of(normals)
     normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-12)
     index = _index(used, counts)
-
-    near = (
-        cKDTree(centre)
-        .sparse_distance_matrix(cKDTree(centre), radius, output_type="coo_matrix")
-        .tocsr()
-    )
-    near.setdiag(1e-9)
-    near.sort_indices()
-    rows = np.repeat(np.arange(cells), np.diff(near.indptr))
-    columns = near.indices
-    alike = np.einsum("ij,ij->i", normal[rows], normal[columns]) > 0.5
-    weight = np.maximum(1 - near.data**2 / radius**2, 0.0) * alike
-    weight /= np.bincount(rows, weight * area[columns], cells)[rows]
 
     lower3, counts3 = mi.Point3f(*lower.tolist()), mi.Vector3u(*counts.tolist())
     dr.make_opaque(lower3, counts3)
@@ -112,9 +93,8 @@ def build_cells(
         cells=cells,
         planes=mi.Float(four.ravel()),
         centres=centre,
-        near_start=mi.UInt32(near.indptr.astype(np.uint32)),
-        near_cell=mi.UInt32(columns.astype(np.uint32)),
-        near_weight=mi.Float(weight.astype(np.float32)),
+        normals=normal,
+        areas=area,
         axes=_frame(normal.sum(axis=0)),
     )
 

@@ -15,17 +15,8 @@ from numpy.typing import NDArray
 
 from optisense.design import SensorDesign
 from optisense.geometry import TriangleMesh
-from optisense.optics.cells import SurfaceCells, build_cells
 from optisense.optics.emitters import EmitterTable
-from optisense.optics.field_store import (
-    CELL_SIZE,
-    LEAST_RADIUS,
-    MOST_BYTES,
-    RADIUS,
-    RADIUS_OF_DISTANCE,
-    FieldStore,
-)
-from optisense.optics.light_field import BINS
+from optisense.optics.field_store import CELL_SIZE, FieldStore
 from optisense.optics.model import OpticalModel
 from optisense.optics.ray_scene import Piece, RayScene
 from optisense.optics.surfaces import SurfaceKind
@@ -37,6 +28,8 @@ light looks the same; a smoothing costs a sixteenth."""
 
 class DraftStore(FieldStore):
     """Light fields in coarse cells, which takes over what it may from the store before it."""
+
+    cell_size = COARSER * CELL_SIZE
 
     def __init__(
         self,
@@ -53,23 +46,9 @@ class DraftStore(FieldStore):
         if before is None or not _same_shapes(opaque, before._opaque):
             return
         if table.groups == before._table.groups:
-            self._cells = before._cells
+            self._kernels = before._kernels
         if table.count == before._table.count:
             self._guide = before._guide
-
-    @property
-    def cells(self) -> SurfaceCells:
-        """The cells over all opaque surfaces of the sensor."""
-        if self._cells is None:
-            points, triangles = _joined(self._opaque)
-            a, b, c = (points[triangles[:, k]] for k in range(3))
-            area = np.linalg.norm(np.cross(b - a, c - a), axis=1).sum() / 2
-            entry = BINS * self._table.groups * 16 * (2 if self._coloured else 1)
-            size = COARSER * max(CELL_SIZE, float(np.sqrt(1.3 * area * entry / MOST_BYTES)))
-            near = RADIUS_OF_DISTANCE * self._nearest_lamp(points, triangles)
-            radius = max(min(RADIUS, near), LEAST_RADIUS, 1.5 * size)
-            self._cells = build_cells(points, triangles, size, radius)
-        return self._cells
 
 
 class DraftModel(OpticalModel):
@@ -138,17 +117,6 @@ def _all_but_lights_same(one: SensorDesign, other: SensorDesign) -> bool:
         one.meshes == other.meshes  # the same objects
         and (one.parts, one.materials, one.camera) == (other.parts, other.materials, other.camera)
     )
-
-
-def _joined(pieces: list[Piece]) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-    """All vertices (n, 3) mm and triangles (m, 3) of some pieces."""
-    starts = np.cumsum([0, *(len(piece.vertices) for piece in pieces)])
-    points = np.concatenate([np.asarray(piece.vertices, dtype=np.float64) for piece in pieces])
-    triangles = [
-        np.asarray(piece.faces, dtype=np.int64) + start
-        for piece, start in zip(pieces, starts, strict=False)
-    ]
-    return points, np.concatenate(triangles)
 
 
 def _same_shapes(one: list[Piece], other: list[Piece]) -> bool:

@@ -13,24 +13,19 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from optisense.optics.cells import SurfaceCells, build_cells, cells_near, surface_samples
+from optisense.optics.cells import SurfaceCells, build_cells, cells_near
 from optisense.optics.emitters import EmitterTable
 from optisense.optics.guide import Guide, even_guide, learn_guide
 from optisense.optics.light_field import BINS, FieldTally, LightField
 from optisense.optics.photons import Target, trace_photons, trace_pilot
 from optisense.optics.ray_scene import Piece, RayScene
 from optisense.optics.sampling import seed_of
+from optisense.optics.smoothing import Kernels
 
 PASS_PHOTONS = 500_000
 PILOT_PHOTONS = 300_000
 CELL_SIZE = 0.3
 """mm; larger where the tally would outgrow its memory."""
-RADIUS = 0.9
-"""mm of the smoothing kernel, where lamps are some mm away (see benchmarks)."""
-RADIUS_OF_DISTANCE = 0.2
-"""Of the distance to the nearest lamp: nearer lamps make light that varies faster. Under a point
-light the smoothed field is then 1 % low at most."""
-LEAST_RADIUS = 0.3
 MOST_BYTES = 300e6
 SEEN_MARGIN = 2.0
 """mm around what the camera sees that photons are sent to: an indenter's flank catches light
@@ -47,6 +42,8 @@ class _Running:
 
 class FieldStore:
     """Traces photons pass by pass and keeps what it finds."""
+
+    cell_size = CELL_SIZE
 
     def __init__(
         self,
@@ -67,7 +64,7 @@ class FieldStore:
         self._metallic = metallic
         self._opaque = opaque
         self._guide: Guide | None = None
-        self._cells: SurfaceCells | None = None
+        self._kernels: Kernels | None = None
         self._running: dict[tuple[int, int], _Running] = {}
         self._done: dict[tuple[int, int, int], LightField] = {}
 
@@ -97,7 +94,12 @@ class FieldStore:
     @property
     def cells(self) -> SurfaceCells:
         """The cells over all opaque surfaces of the sensor."""
-        if self._cells is None:
+        return self.kernels.cells
+
+    @property
+    def kernels(self) -> Kernels:
+        """These cells, and how light is smoothed among them."""
+        if self._kernels is None:
             vertices, faces, start = [], [], 0
             for piece in self._opaque:
                 vertices.append(np.asarray(piece.vertices, dtype=np.float64))
@@ -107,20 +109,19 @@ class FieldStore:
             a, b, c = (points[triangles[:, k]] for k in range(3))
             area = np.linalg.norm(np.cross(b - a, c - a), axis=1).sum() / 2
             entry = BINS * self._table.groups * 16 * (2 if self._coloured else 1)
-            size = max(CELL_SIZE, float(np.sqrt(1.3 * area * entry / MOST_BYTES)))
-            near = RADIUS_OF_DISTANCE * self._nearest_lamp(points, triangles)
-            radius = max(min(RADIUS, near), LEAST_RADIUS, 1.5 * size)
-            self._cells = build_cells(points, triangles, size, radius)
-        return self._cells
+            least = float(np.sqrt(1.3 * area * entry / MOST_BYTES))
+            scale = self.cell_size / CELL_SIZE
+            cells = build_cells(points, triangles, max(self.cell_size, scale * least))
+            self._kernels = Kernels(cells, self._lamp_distance(cells.centres))
+        return self._kernels
 
-    def _nearest_lamp(self, points: NDArray[np.floating], triangles: NDArray[np.integer]) -> float:
-        """Distance (mm) from the opaque surfaces to the nearest lamp's window."""
-        places, _, _ = surface_samples(points, triangles, 1.0)
-        tree = cKDTree(places)
-        return min(
-            float(tree.query(lamp.position)[0]) - max(lamp.size) / 2
-            for lamp in self._table.emitters
-        )
+    def _lamp_distance(self, points: NDArray[np.floating]) -> NDArray[np.floating]:
+        """(n,) mm from points to the nearest lamp's window."""
+        lamps = self._table.emitters
+        places = np.array([lamp.position for lamp in lamps])
+        nearest, which = cKDTree(places).query(points)
+        half = np.array([max(lamp.size) / 2 for lamp in lamps])
+        return np.asarray(nearest - half[which])
 
     def field(
         self,
@@ -154,7 +155,7 @@ class FieldStore:
             or (wanted is None and seconds is None)
         ):
             running = _Running(
-                FieldTally(self.cells, self._table.groups, self._coloured, self._metallic),
+                FieldTally(self.kernels, self._table.groups, self._coloured, self._metallic),
                 per_light,
             )
             self._running = {key: running}

@@ -134,18 +134,26 @@ def render_field(
     began = time.perf_counter()
     field, interrupted = light
     width, height = camera.width, camera.height
-    film = Film(width * height, field.groups)
+    # What interfaces reflect towards the eye is little: it is not sampled again where it is grainy.
+    film, mirrored = (Film(width * height, field.groups) for _ in range(2))
 
-    def sample(pixel: mi.UInt32, number: mi.UInt32, thorough: bool) -> None:
+    def sample(pixel: mi.UInt32, number: mi.UInt32, thorough: bool, again: bool = False) -> None:
         spots = film_samples(pixel, width, number, seed_of(seed, 3))
         own = seed_of(seed, 4, int(thorough))
-        main, reflected = find_visible_points(scenes.full, camera, pixel, number, spots, own)
+        main, reflected = find_visible_points(
+            scenes.full, camera, pixel, number, spots, own, only_main=again
+        )
         film.count(pixel)
-        for points, close in ((main, thorough), (reflected, False)):
-            if points is not None:
-                light = shade(field, scenes, points, close)
-                film.add(points, light)
-                film.add_light(points, emitters, areas)
+        film.add(main, shade(field, scenes, main, thorough, False))
+        film.add_light(main, emitters, areas)
+        if not again:
+            mirrored.count(pixel)
+        if reflected is not None:
+            mirrored.add(reflected, shade(field, scenes, reflected, False, True))
+            mirrored.add_light(reflected, emitters, areas)
+
+    def developed() -> NDArray[np.float32]:
+        return film.layers(width, height) + mirrored.layers(width, height)
 
     region_image = np.where(rays.hit, rays.region, 0)
     mask = region_image == Region.INDENTER
@@ -170,16 +178,16 @@ def render_field(
     layers = None
     if dr.width(far) and not only_contacts:
         sample(far, dr.zeros(mi.UInt32, dr.width(far)), False)
-        layers = film.layers(width, height)
+        layers = developed()
         grainy = _grainy(layers.sum(axis=(0, 3)), ~near & rays.hit)
         if grainy.any():
             affordable = dr.width(far) // (2 * int(grainy.sum()))
             pixel, number = _repeated(grainy, min(GRAIN_SAMPLES, max(1, affordable)))
             dr.eval(pixel, number)
-            sample(pixel, number, False)
+            sample(pixel, number, False, again=True)
             layers = None
     if layers is None:
-        layers = film.layers(width, height)
+        layers = developed()
     return ImageLayers(
         radiance=layers,
         normals=masked(rays.normals, rays.hit),

@@ -17,9 +17,11 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
+from optisense.optics.beams import Beams, collect_beams
 from optisense.optics.cells import SurfaceCells, cell_at
 from optisense.optics.exchange import irradiance_table
 from optisense.optics.photons import GROUP_MASK, PhotonMap
+from optisense.optics.smoothing import Kernels, smooth
 
 FloatArray = NDArray[np.floating]
 
@@ -60,7 +62,7 @@ class LightField:
 
     ``moments``: flux density across the light (mW/mm^2) times the direction towards the light
     (3), flux density (1). ``colours``: the flux density per channel R, G, B where surfaces are
-    coloured, else the same array.
+    coloured, else the same array. ``beams``: the same light in short lists.
     """
 
     cells: SurfaceCells
@@ -72,6 +74,7 @@ class LightField:
     metallic: bool
     centres: mi.Float
     irradiance: mi.Float
+    beams: Beams
     photons: int
     noise: float
 
@@ -80,10 +83,11 @@ class FieldTally:
     """Sums of landings per cell, direction bin and light group, over photon passes."""
 
     def __init__(
-        self, cells: SurfaceCells, groups: int, coloured: bool, metallic: bool = True
+        self, kernels: Kernels, groups: int, coloured: bool, metallic: bool = True
     ) -> None:
         self.metallic = metallic
-        self.cells = cells
+        self.kernels = kernels
+        self.cells = cells = kernels.cells
         self.groups = groups
         self.coloured = coloured
         self.passes = 0
@@ -128,15 +132,8 @@ class FieldTally:
         """
         if self.passes < 2:
             return float("inf")
-        one = dr.opaque(mi.UInt32, 1)
-        bins = dr.zeros(mi.UInt32, 1)
-        means = []
-        for k, half in enumerate(self.halves):
-            four = dr.zeros(mi.Float, dr.width(half) * 4)
-            dr.scatter(four, half, dr.arange(mi.UInt32, dr.width(half)) * 4)
-            count = (self.passes + 1 - k) // 2
-            smooth = _smooth(self.cells, four, bins, one, self.groups)
-            means.append(np.asarray(smooth).reshape(-1, self.groups, 4)[:, :, 0] / count)
+        matrix = self.kernels.smoothing(self.photons).matrix
+        means = [matrix @ landed for landed in self._landed()]
         mean = (means[0] + means[1]) / 2
         # Half the difference of two halves has the deviation of their mean.
         spread = ((means[0] - means[1]) / 2) ** 2
@@ -145,6 +142,14 @@ class FieldTally:
         if not lit.any():
             return 0.0
         return float(np.sqrt((spread[:, lit] / scale[lit] ** 2).mean()))
+
+    def _landed(self) -> list[FloatArray]:
+        """(cells, groups) mW on each cell, by the odd and by the even passes."""
+        counts = ((self.passes + 1) // 2, max(self.passes // 2, 1))
+        return [
+            np.asarray(half, dtype=np.float64).reshape(-1, self.groups) / count
+            for half, count in zip(self.halves, counts, strict=True)
+        ]
 
     def smoothed(self) -> LightField:
         """The field so far; only bins that hold light are kept."""
@@ -157,12 +162,19 @@ class FieldTally:
         if len(used) == 0:
             used = np.zeros(1, dtype=np.int64)
         bins = mi.UInt32(used.astype(np.uint32))
-        every = dr.opaque(mi.UInt32, BINS)
-        scale = dr.opaque(mi.Float, 1 / self.passes)
-        moments = _smooth(self.cells, self.moments, bins, every, self.groups) * scale
+        kernel = self.kernels.smoothing(self.photons)
+        landed = sum(np.asarray(half, dtype=np.float64) for half in self.halves)
+        factors = self.kernels.sharpening(np.reshape(landed, (-1, self.groups)), self.photons)
+        rest = (
+            bins,
+            dr.opaque(mi.UInt32, BINS),
+            self.groups,
+            mi.Float((factors / self.passes).ravel().astype(np.float32)),
+        )
+        moments = smooth(kernel, self.cells.cells, self.moments, *rest)
         colours = moments
         if self.coloured:
-            colours = _smooth(self.cells, self.colours, bins, every, self.groups) * scale
+            colours = smooth(kernel, self.cells.cells, self.colours, *rest)
         table = irradiance_table(
             moments, self.cells.cells, dr.opaque(mi.UInt32, len(used)), self.groups
         )
@@ -177,28 +189,16 @@ class FieldTally:
             metallic=self.metallic,
             centres=bin_centres(self.cells, used),
             irradiance=table,
+            beams=collect_beams(
+                moments,
+                colours,
+                self.coloured,
+                used,
+                BANDS,
+                SECTORS,
+                self.cells.cells * self.groups,
+                self.groups,
+            ),
             photons=self.photons,
             noise=self.noise(),
         )
-
-
-@dr.syntax
-def _smooth(
-    cells: SurfaceCells, values: mi.Float, bins: mi.UInt32, stride: mi.UInt32, groups: int
-) -> mi.Float:
-    """Kernel-weighted sums over neighbouring cells of the chosen bins, four floats an entry."""
-    used = dr.width(bins)
-    lane = dr.arange(mi.UInt32, cells.cells * used * groups)
-    group = lane % groups
-    rest = lane // groups
-    slot = dr.gather(mi.UInt32, bins, rest % used) * groups + group
-    cell = rest // used
-    j = dr.gather(mi.UInt32, cells.near_start, cell)
-    end = dr.gather(mi.UInt32, cells.near_start, cell + 1)
-    total = mi.Vector4f(0)
-    while j < end:
-        other = dr.gather(mi.UInt32, cells.near_cell, j)
-        weight = dr.gather(mi.Float, cells.near_weight, j)
-        total += weight * dr.gather(mi.Vector4f, values, other * (stride * groups) + slot)
-        j += 1
-    return dr.ravel(total)

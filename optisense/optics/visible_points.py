@@ -172,8 +172,10 @@ def find_visible_points(
     number: mi.UInt32,
     film: mi.Point2f,
     seed: int,
+    only_main: bool = False,
 ) -> tuple[VisiblePoints, VisiblePoints | None]:
-    """Main and reflected visible points of film positions (the second are fewer, or none).
+    """Main and reflected visible points of film positions (the second are fewer, or none, as they
+    are with ``only_main``).
 
     What is drawn at random follows from pixel, ``number`` of the sample and seed alone, so that
     each path is the same whichever others are traced with it.
@@ -197,8 +199,10 @@ def find_visible_points(
         depth,
     )
     dr.eval(out, own, other)
-    main = VisiblePoints(pixel, *out[:8], own)
+    main = VisiblePoints(*(pixel, *out[:8], own))
     total, branch_origin, branch_direction = out[8:]
+    if only_main:
+        return main, None
     lanes = dr.compress(dr.max(total) > 1e-5)
     if dr.width(lanes) == 0:
         return main, None

@@ -16,8 +16,7 @@ from optisense.objectives.projection_warping import projection_warping, triangle
 from optisense.optics.camera import RayCamera
 from optisense.optics.chief_rays import ChiefRays, Outcome, trace_chief_rays
 from optisense.optics.ray_scene import Piece, RayScene
-from optisense.optics.reference_scenes import diffuse_coating
-from optisense.optics.surfaces import Region, Surface
+from optisense.optics.surfaces import Region, Surface, SurfaceKind
 
 DISTANCE, FOV = 10.0, 60.0
 SLOPE = np.tan(np.radians(FOV) / 2)
@@ -35,7 +34,7 @@ class PlateModel:
 
     def chief_rays(self, resolution: tuple[int, int]) -> ChiefRays:
         camera = RayCamera((0, 0, DISTANCE), (0, 0, -1), (0, 1, 0), FOV, *resolution, False)
-        coating = Surface(**{**diffuse_coating(0.5).__dict__, "region": Region.SENSING})
+        coating = Surface(SurfaceKind.OPAQUE, reflectance=(0.5,) * 3, region=Region.SENSING)
         piece = Piece("plate", self.sensing.vertices, self.sensing.faces, coating)
         return trace_chief_rays(RayScene([piece]), camera, np.arange(len(self.sensing.faces)))
 

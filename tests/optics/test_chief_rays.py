@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from reference_scenes import box, diffuse_coating, quad
 
 from optisense import OpticalModel
 from optisense.optics.camera import RayCamera
 from optisense.optics.chief_rays import ChiefRays, Outcome, trace_chief_rays
 from optisense.optics.ray_scene import Piece, RayScene
-from optisense.optics.reference_scenes import box, diffuse_coating, quad
 from optisense.optics.surfaces import Surface, SurfaceKind
 from optisense.sensors import gelbelt
 

@@ -6,13 +6,7 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 import pytest
-
-from optisense.optics.camera import RayCamera
-from optisense.optics.emitters import Emitter, Intensity, Shape
-from optisense.optics.guide import even_guide
-from optisense.optics.photons import trace_photons
-from optisense.optics.ray_scene import Piece, RayScene
-from optisense.optics.reference_scenes import (
+from reference_scenes import (
     ReferenceScene,
     box,
     diffuse_coating,
@@ -20,6 +14,12 @@ from optisense.optics.reference_scenes import (
     isotropic,
     quad,
 )
+
+from optisense.optics.camera import RayCamera
+from optisense.optics.emitters import Emitter, Intensity, Shape
+from optisense.optics.guide import even_guide
+from optisense.optics.photons import trace_photons
+from optisense.optics.ray_scene import Piece, RayScene
 from optisense.optics.surfaces import Surface, SurfaceKind
 from optisense.optics.visible_points import find_visible_points
 

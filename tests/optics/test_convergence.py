@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from reference_scenes import ReferenceScene, diffuse_coating, isotropic, quad
 
 from optisense.optics.camera import RayCamera
 from optisense.optics.emitters import Emitter, Shape
 from optisense.optics.guide import even_guide
-from optisense.optics.reference_scenes import ReferenceScene, diffuse_coating, isotropic, quad
 from optisense.optics.sppm import render_sppm
 
 SLOPE = (-0.85, -0.42)

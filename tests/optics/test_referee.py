@@ -10,14 +10,14 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-
-from optisense.optics.reference_scenes import (
+from reference_scenes import (
     Colour,
     ReferenceScene,
     diffuse_coating,
     metal_coating,
     referee_scene,
 )
+
 from optisense.optics.surfaces import Surface
 
 NO_SLAB, SLAB, SLAB_POINT = 0.24287, 0.26653, 0.531

@@ -1,7 +1,5 @@
 """Small scenes with known answers, and the ways to render one: photon mapping, the pooled light
 field, Mitsuba's path.
-
-Tests and benchmarks share them.
 """
 
 from __future__ import annotations

@@ -1,0 +1,158 @@
+"""The kernel that a light field is smoothed with, and how wide it is.
+
+Its radius follows the distance of each cell to the nearest lamp, as light near a lamp varies
+faster, and shrinks as photons grow, so that what the field blurs goes away with its noise.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import csr_matrix
+from scipy.spatial import cKDTree
+
+from optisense.optics.cells import SurfaceCells
+
+FloatArray = NDArray[np.floating]
+
+RADIUS = 0.9
+"""mm of the kernel, where lamps are some mm away (see benchmarks)."""
+RADIUS_OF_DISTANCE = 0.2
+"""Of the distance to the nearest lamp: nearer lamps make light that varies faster. What is left of
+the blur under a point light is then far below 1 % (see `sharpening`)."""
+LEAST_RADIUS = 1.5
+"""Of the side of a cell, however near a lamp is."""
+SHRINKS_FROM = 5_000_000
+"""Photons from which on the kernel shrinks."""
+SHRINKS_AS = 1 / 6
+"""Power of the photons by which the radius falls: noise and bias both go to zero (Knaus and
+Zwicker 2011)."""
+SHRINKS_TO = 1.0
+"""Of the side of a cell, at which the kernel holds the cell and its neighbours."""
+WIDER = 2.0
+"""How much wider than the kernel that of the sharpening is."""
+MOST_SHARPENED = 0.25
+"""Change of a cell's light by the sharpening, at most."""
+
+
+@dataclass
+class Smoothing:
+    """Kernel-weighted sums among cells: rows of a sparse matrix, by start, neighbour and weight."""
+
+    start: mi.UInt32
+    cell: mi.UInt32
+    weight: mi.Float
+    matrix: csr_matrix
+
+
+class Kernels:
+    """The kernels of a surface's cells, for any number of photons."""
+
+    def __init__(self, cells: SurfaceCells, lamp_distance: FloatArray) -> None:
+        """``lamp_distance`` (cells,) mm: how far the nearest lamp is."""
+        self.cells = cells
+        size = 1 / float(cells.inverse_size[0])
+        self._least = SHRINKS_TO * size
+        self._widest = np.clip(
+            RADIUS_OF_DISTANCE * np.asarray(lamp_distance), LEAST_RADIUS * size, RADIUS
+        )
+        if LEAST_RADIUS * size > RADIUS:
+            self._widest[:] = LEAST_RADIUS * size
+        self._known: dict[float, Smoothing] = {}
+
+    def radii(self, photons: int) -> FloatArray:
+        """(cells,) mm: the kernel's radius in each cell in a field of so many photons."""
+        shrunk = self._widest * min(1.0, (SHRINKS_FROM / max(photons, 1)) ** SHRINKS_AS)
+        return np.maximum(shrunk, np.minimum(self._least, self._widest))
+
+    def smoothing(self, photons: int) -> Smoothing:
+        """The kernel for a field of so many photons."""
+        key = float(min(1.0, SHRINKS_FROM / max(photons, 1)))
+        if key not in self._known:
+            matrix = kernel_matrix(self.cells, self.radii(photons))
+            self._known = {
+                key: Smoothing(
+                    start=mi.UInt32(matrix.indptr.astype(np.uint32)),
+                    cell=mi.UInt32(matrix.indices.astype(np.uint32)),
+                    weight=mi.Float(matrix.data.astype(np.float32)),
+                    matrix=matrix,
+                )
+            }
+        return self._known[key]
+
+    @cached_property
+    def _wide(self) -> csr_matrix:
+        return kernel_matrix(self.cells, WIDER * self._widest)
+
+    def sharpening(self, landed: FloatArray, photons: int) -> FloatArray:
+        """Factors (cells, groups) that undo most of what the kernel blurs.
+
+        A kernel takes from peaks and gives to hollows, by what it makes of a smooth estimate of
+        the light, too: multiplicative bias correction (Jones, Linton and Nielsen 1995). The
+        estimate is smoothed more widely, so that it brings little noise.
+
+        Args:
+            landed: (cells, groups) mW on each cell.
+            photons: of the field.
+        """
+        smooth = self._wide @ landed
+        again = self.smoothing(photons).matrix @ (smooth * self.cells.areas[:, None])
+        factor = np.divide(smooth, again, out=np.ones_like(smooth), where=again > 0)
+        return np.clip(factor, 1 - MOST_SHARPENED, 1 + MOST_SHARPENED)
+
+
+def kernel_matrix(cells: SurfaceCells, radii: FloatArray) -> csr_matrix:
+    """Epanechnikov's kernel around each cell, (cells, cells): sums of mW on cells to mW/mm^2.
+
+    It is normalised by the surface's area under it, so edges and oblique cells lose nothing;
+    surfaces that look elsewhere do not count.
+    """
+    tree = cKDTree(cells.centres)
+    near = tree.sparse_distance_matrix(tree, float(radii.max()), output_type="coo_matrix").tocsr()
+    near.setdiag(1e-9)
+    near.sort_indices()
+    rows = np.repeat(np.arange(cells.cells), np.diff(near.indptr))
+    columns = near.indices
+    normals = cells.normals
+    alike = np.einsum("ij,ij->i", normals[rows], normals[columns]) > 0.5
+    weight = np.maximum(1 - (near.data / radii[rows]) ** 2, 0.0) * alike
+    kept = weight > 0
+    rows, columns, weight = rows[kept], columns[kept], weight[kept]
+    weight /= np.bincount(rows, weight * cells.areas[columns], cells.cells)[rows]
+    return csr_matrix((weight, (rows, columns)), shape=(cells.cells, cells.cells))
+
+
+@dr.syntax
+def smooth(
+    kernel: Smoothing,
+    cells: int,
+    values: mi.Float,
+    bins: mi.UInt32,
+    stride: mi.UInt32,
+    groups: int,
+    factors: mi.Float,
+) -> mi.Float:
+    """Kernel-weighted sums over neighbouring cells of the chosen bins, four floats an entry.
+
+    ``factors`` (cells times groups) multiply the sums.
+    """
+    used = dr.width(bins)
+    lane = dr.arange(mi.UInt32, cells * used * groups)
+    group = lane % groups
+    rest = lane // groups
+    slot = dr.gather(mi.UInt32, bins, rest % used) * groups + group
+    cell = rest // used
+    j = dr.gather(mi.UInt32, kernel.start, cell)
+    end = dr.gather(mi.UInt32, kernel.start, cell + 1)
+    total = mi.Vector4f(0)
+    while j < end:
+        other = dr.gather(mi.UInt32, kernel.cell, j)
+        weight = dr.gather(mi.Float, kernel.weight, j)
+        total += weight * dr.gather(mi.Vector4f, values, other * (stride * groups) + slot)
+        j += 1
+    return dr.ravel(total * dr.gather(mi.Float, factors, cell * groups + group))

@@ -1,0 +1,62 @@
+"""Weak bins of the light field taken together show what the bins one by one show."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from optisense import OpticalModel
+from optisense.optics import beams
+from optisense.sensors import BUILDERS
+
+MEAN = 0.001
+"""Relative, of each light group's mean over the picture."""
+PER_PIXEL = 0.01
+"""RMS, relative to that mean."""
+
+
+@pytest.mark.parametrize("name", ["gelbelt", "gelsight-mini"])
+def test_merged_beams_give_the_picture_of_all_bins(
+    name: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """GelBelt's coating is part metal, which tells directions apart; the Mini's is diffuse."""
+    model = OpticalModel(BUILDERS[name](), "llvm")
+    size = {"resolution": (120, 90), "photons": 200_000}
+    merged = model.render(**size)
+    count = len(field_of(model).beams.ways)
+    monkeypatch.setattr(beams, "STRONG", -1.0)
+    model._store.forget_light(model._coloured, model._metallic)
+    apart = model.render(**size)
+    assert len(field_of(model).beams.ways) > 1.1 * count
+    for group, layer in apart.layers.items():
+        mean = layer.mean()
+        assert merged.layers[group].mean() == pytest.approx(mean, rel=MEAN)
+        seen = layer > 0
+        off = (merged.layers[group] - layer)[seen]
+        assert np.sqrt((off**2).mean()) < PER_PIXEL * layer[seen].mean()
+
+
+def test_no_light_is_lost_in_merging() -> None:
+    model = OpticalModel(BUILDERS["gelsight-mini"](), "llvm")
+    model.render(resolution=(16, 12), photons=100_000)
+    field = field_of(model)
+    moments = np.asarray(field.moments).reshape(field.cells.cells, -1, field.groups, 4)
+    starts = np.asarray(field.beams.starts)
+    ways = np.asarray(field.beams.ways).reshape(-1, 4)
+    fluxes = np.asarray(field.beams.fluxes).reshape(-1, 4)
+    entry = np.repeat(np.arange(len(starts) - 1), np.diff(starts))
+    groups = np.ascontiguousarray(fluxes[:, 3]).view(np.uint32)
+    np.testing.assert_array_equal(groups, entry % field.groups)
+    flux = np.bincount(entry, fluxes[:, 0], len(starts) - 1)
+    np.testing.assert_allclose(flux, moments[..., 3].sum(axis=1).ravel(), rtol=1e-4)
+    for k in range(3):
+        vector = np.bincount(entry, fluxes[:, 0] * ways[:, k] * ways[:, 3], len(starts) - 1)
+        np.testing.assert_allclose(
+            vector, moments[..., k].sum(axis=1).ravel(), rtol=1e-3, atol=1e-4 * flux.max()
+        )
+
+
+def field_of(model: OpticalModel):  # type: ignore[no-untyped-def]
+    """The one light field that a model keeps."""
+    (field,) = model._store._done.values()
+    return field
