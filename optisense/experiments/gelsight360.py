@@ -162,7 +162,7 @@ def steps(settings: Values) -> Steps:
     rows = [next(answers) for _ in table]
     numbers: Values = {
         "colourings": _colourings(rows),
-        "all": _all(overall[0]) if overall and overall[0].failure is None else None,
+        "all": every_colouring(overall[0]) if overall and overall[0].failure is None else None,
         "resins": {name: {} for name in goals},
     }
     for resin in settings["resins"]:
@@ -200,7 +200,7 @@ def _colourings(records: list[Record]) -> Values:
     return found
 
 
-def _all(record: Record) -> Values:
+def every_colouring(record: Record) -> Values:
     """The best of all colourings by each objective, and where the others lie."""
     shares = {"1,0,0": "R", "0,1,0": "G", "0,0,1": "B"}
     trials = [

@@ -31,6 +31,8 @@ def chapter(experiment: Experiment, result: Mapping[str, Any], picture: str) -> 
     parts = [f"## {experiment.title}", f"![{experiment.title}]({picture})"]
     if result["quick"]:
         parts.append("**A quick run:** less of everything, so less sure.")
+    if result["settings"].get("seeds") == 1:
+        parts.append("**One seed:** nothing tells what chance does to the differences.")
     parts += [_verdicts(result["claims"]), *experiment.notes(numbers)]
     parts += [table.markdown() for table in experiment.tables(numbers)]
     if result["gaps"]:
@@ -59,7 +61,7 @@ def _gaps(gaps: list[Mapping[str, str]]) -> str:
 def _how(name: str, result: Mapping[str, Any]) -> str:
     seconds = result["seconds"]
     seeds = result["settings"].get("seeds")
-    over = f", {seeds} seeds" if seeds else ""
+    over = f", {seeds} seed{'s' if seeds > 1 else ''}" if seeds else ""
     return (
         f"Made by `optisense experiment {name}{' --quick' if result['quick'] else ''}`: "
         f"{result['units']} evaluations{over}, {seconds['processor'] / 60:.1f} processor minutes. "

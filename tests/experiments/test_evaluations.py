@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 import optisense as ots
+from optisense.experiments import Record
 from optisense.experiments.evaluations import (
     NINE,
     axes_ratio,
@@ -24,6 +25,7 @@ from optisense.experiments.evaluations import (
     stretch,
     variants_of_score,
 )
+from optisense.experiments.gelsight360 import every_colouring
 from optisense.experiments.objects import OBJECTS
 
 IMAGES = {"resolution": [160, 120], "photons": 60_000, "seed": 3}
@@ -162,6 +164,24 @@ def test_a_searched_mirror_can_be_built_again(method: str, tmp_path: Path) -> No
     ).values
     assert again["scores"]["aoap"] == pytest.approx(found["best"]["aoap"], rel=1e-6)
     assert searched(asked, tmp_path).values == found  # from the study that is there
+
+
+@pytest.mark.slow
+def test_all_colourings_are_told_by_their_letters(tmp_path: Path) -> None:
+    asked: dict[str, Any] = {
+        "design": sensor("gelsight-mini"),
+        "space": {"lights.*.colour": ["R", "G", "B"]},
+        "objectives": GOALS,
+        "method": "light-colours",
+        "seed": 0,
+        "settings": {"resolution": [160, 120], "photons": 60_000, "least_pixels": 5},
+        "all": True,
+    }
+    record = Record("all", searched(asked, tmp_path).values, None, 0.0, 0.0)
+    found = every_colouring(record)
+    assert found["colourings"] == 27
+    assert sorted(found["normdiff"]["best"]) == ["B", "G", "R"]  # three tell more than two
+    assert found["normdiff"]["worst"] < found["normdiff"]["median"] < found["normdiff"]["score"]
 
 
 @pytest.mark.slow
