@@ -99,16 +99,10 @@ def own_objectives() -> Iterator[None]:
     Objectives of one name in two files must not get into each other's way in a process that lives
     for days, and a file that was edited must count as it is now.
     """
-    from optisense.objectives import registry
+    from optisense.objectives.registry import forgetting
 
-    with _registering:
-        registry.names()  # the built-in ones are loaded once only
-        before = dict(registry._registry)
-        try:
-            yield
-        finally:
-            registry._registry.clear()
-            registry._registry.update(before)
+    with _registering, forgetting():
+        yield
 
 
 def _figure(score: Score, files: Files) -> str | None:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from importlib import import_module
 from importlib.metadata import entry_points
@@ -123,6 +124,22 @@ def names() -> list[str]:
     _load_built_in()
     offered = [point.name for point in entry_points(group=ENTRY_POINTS)]
     return [*BUILT_IN, *sorted({*_registry, *offered} - set(BUILT_IN))]
+
+
+@contextmanager
+def forgetting() -> Iterator[None]:
+    """What is registered meanwhile is forgotten afterwards, and what was registered before is back.
+
+    For processes that live long and run other people's files: a file that changed may then register
+    its name again, from another place.
+    """
+    _load_built_in()
+    before = dict(_registry)
+    try:
+        yield
+    finally:
+        _registry.clear()
+        _registry.update(before)
 
 
 def from_file(path: Path, function: str | None = None) -> Objective:

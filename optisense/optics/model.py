@@ -9,6 +9,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
+import drjit as dr
 import numpy as np
 
 from optisense.errors import RenderError
@@ -70,6 +71,12 @@ class OpticalModel(RayModel):
         super()._recoat()
         if "_store" in self.__dict__:
             self._store.forget_light(self._coloured, self._metallic)
+
+    def forget_light(self) -> None:
+        """Drop the light fields, hundreds of MB; the next image traces its light anew."""
+        if "_store" in self.__dict__:
+            self._store.forget_light(self._coloured, self._metallic)
+            dr.flush_malloc_cache()
 
     def guide(self) -> Guide:
         """The photon guide, learned from a pilot pass on first use."""

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 import queue
+import re
 import time
-from collections import Counter
 from collections.abc import Callable, Sequence
 from concurrent.futures import Future
 from dataclasses import dataclass, field, replace
@@ -147,7 +147,12 @@ class Run:
         self._evaluator: Evaluator = self.method.evaluator(usual)
         if settings.errors is not None:
             if self._evaluator is not usual:
-                raise SearchError(f"{settings.method} can't search with errors of making")
+                raise SearchError(
+                    f"{settings.method} can't search with errors of making: it scores in a way of "
+                    "its own",
+                    hint="Use cma-es, grid or random; or search without errors and look at the "
+                    "winner with `optisense tolerance`",
+                )
             from optisense.search.robust import RobustEvaluator
 
             errors = MakingErrors.from_plain(settings.errors)
@@ -157,7 +162,7 @@ class Run:
         self._notes: list[str] = []
         self._finished: queue.SimpleQueue[tuple[int, Future[Outcome]]] = queue.SimpleQueue()
         self._done = self._failed = self._new = 0
-        self._reasons: Counter[str] = Counter()
+        self._reasons: dict[str, list[str]] = {}
         self._scored: dict[bytes, Outcome] = {}
         self._best = self._start_score = math.nan
         self._began = self._told = time.monotonic()
@@ -305,15 +310,16 @@ class Run:
             self._done += 1
             self._failed += outcome.failed
             if outcome.failure is not None:
-                self._reasons[outcome.failure] += 1
+                self._reasons.setdefault(_kind(outcome.failure), []).append(outcome.failure)
         if not outcome.failed:
             self._scored[row.vector.tobytes()] = outcome
             self._best = score if math.isnan(self._best) else max(self._best, score)
         enough = ALL_FAIL_WITH_START if math.isnan(self._start_score) else ALL_FAIL
         if self._failed == self._done >= min(enough, self.limit):
-            reason, times = self._reasons.most_common(1)[0]
+            reasons = max(self._reasons.values(), key=len)
             raise SearchError(
-                f"all {self._done} trials so far have failed, {times} of them because: {reason}",
+                f"all {self._done} trials so far have failed, {len(reasons)} of them because: "
+                f"{reasons[0]}",
                 hint="Change the bounds, or see with `optisense evaluate` whether the design can "
                 "be scored at all",
             )
@@ -357,6 +363,11 @@ class Run:
                 facts=self.method.describe(),
             )
         )
+
+
+def _kind(reason: str) -> str:
+    """A reason without its numbers, by which like ones are counted."""
+    return re.sub(r"-?[0-9]+([.][0-9]+)?", "", reason)
 
 
 def _outcome(done: Future[Outcome]) -> Outcome:

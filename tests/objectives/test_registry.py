@@ -10,7 +10,8 @@ import pytest
 
 import optisense
 from optisense.errors import ObjectiveError
-from optisense.objectives import BUILT_IN, find, names, registry
+from optisense.objectives import BUILT_IN, find, names
+from optisense.objectives.registry import forgetting
 
 OWN = '''
 import optisense
@@ -27,11 +28,8 @@ def plain(evaluation):
 
 @pytest.fixture(autouse=True)
 def registry_as_before() -> Iterator[None]:
-    names()
-    before = dict(registry._registry)
-    yield
-    registry._registry.clear()
-    registry._registry.update(before)
+    with forgetting():
+        yield
 
 
 @pytest.fixture
@@ -166,3 +164,16 @@ def test_a_broken_package_breaks_only_its_own_objective(installed: Path) -> None
     with pytest.raises(ObjectiveError, match=r"broken-one.*sensor-scores"):
         find("broken-one")
     assert find("aoap").name == "aoap"
+
+
+def test_what_is_registered_meanwhile_is_forgotten(tmp_path: Path) -> None:
+    """Another file may then take the name; what was there before stays."""
+    text = OWN.replace("own-depth", "passing")
+    files = [tmp_path / "one.py", tmp_path / "two.py"]
+    for file in files:
+        file.write_text(text)
+        with forgetting():
+            assert find(f"{file}:own_depth").name == "passing"
+            assert "passing" in names()
+        assert "passing" not in names()
+    assert find("aoap").title == "AOAP"

@@ -31,8 +31,9 @@ if TYPE_CHECKING:
 MOST_USUAL = 20_000
 """Colourings that are tried where the user names no number."""
 
-KEPT_SEEDS = 4
-"""Images are kept for so many seeds: the study's, and the fresh ones that the best get."""
+KEPT_SEEDS = 3
+"""Images are kept for so many seeds: the fresh ones that the best get when the study's own has
+done its work."""
 
 
 class LightColours(Combinations):
@@ -101,6 +102,7 @@ class _Lit:
     ) -> None:
         shared, self._own = split_settings(settings, objectives)
         self._relighting = Relighting(Evaluation(model, Settings(**shared, seed=seed)))
+        model.forget_light()  # the layers hold all that is needed of it
         self._objectives = objectives
         self._quick: dict[str, RelitScore] = {}
 
