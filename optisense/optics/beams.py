@@ -59,7 +59,8 @@ def collect_beams(
     four = slots[corner[:, None] + np.array([0, 1, sectors, sectors + 1])]
     # Blocks without any light are not looked at.
     four = four[(four != NO_SLOT).any(axis=1)]
-    field = (moments, colours, mi.UInt32(four.ravel()))
+    # Copied: arrays handed over from numpy differ in alignment, and so would kernels.
+    field = (moments, colours, mi.UInt32(four.ravel()) + dr.opaque(mi.UInt32, 0))
     sizes = (dr.opaque(mi.UInt32, len(four)), dr.opaque(mi.UInt32, len(used)))
     nowhere = dr.zeros(mi.Float, 4)
     lane = dr.arange(mi.UInt32, entries)

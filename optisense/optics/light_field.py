@@ -32,6 +32,7 @@ LEAST_COSINE = 0.02
 BANDS = 16
 SECTORS = 16
 BINS = BANDS * SECTORS
+BINS_IN_STEPS_OF = 32
 # Where a bin of no light is told from one of little.
 DARK = 1e-7
 
@@ -158,10 +159,8 @@ class FieldTally:
         value = dr.gather(mi.Float, self.moments, lanes * 4 + 3)
         dr.scatter_add(total, value, (lanes // self.groups) % BINS)
         power = np.asarray(total)
-        used = np.flatnonzero(power > DARK * power.sum())
-        if len(used) == 0:
-            used = np.zeros(1, dtype=np.int64)
-        bins = mi.UInt32(used.astype(np.uint32))
+        used = _padded(np.flatnonzero(power > DARK * power.sum()))
+        bins = mi.UInt32(used.astype(np.uint32)) + dr.opaque(mi.UInt32, 0)
         kernel = self.kernels.smoothing(self.photons)
         landed = sum(np.asarray(half, dtype=np.float64) for half in self.halves)
         factors = self.kernels.sharpening(np.reshape(landed, (-1, self.groups)), self.photons)
@@ -169,7 +168,8 @@ class FieldTally:
             bins,
             dr.opaque(mi.UInt32, BINS),
             self.groups,
-            mi.Float((factors / self.passes).ravel().astype(np.float32)),
+            # Copied: arrays handed over from numpy differ in alignment, and so would kernels.
+            mi.Float((factors / self.passes).ravel().astype(np.float32)) + dr.opaque(mi.Float, 0),
         )
         moments = smooth(kernel, self.cells.cells, self.moments, *rest)
         colours = moments
@@ -202,3 +202,10 @@ class FieldTally:
             photons=self.photons,
             noise=self.noise(),
         )
+
+
+def _padded(used: NDArray[np.integer]) -> NDArray[np.integer]:
+    """These bins, and dark ones to make their number one of a few: kernels are compiled for it."""
+    wanted = max(-(-len(used) // BINS_IN_STEPS_OF) * BINS_IN_STEPS_OF, BINS_IN_STEPS_OF)
+    dark = np.setdiff1d(np.arange(BINS), used)
+    return np.sort(np.concatenate([used, dark[: wanted - len(used)]]))

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import drjit as dr
 import mitsuba as mi
@@ -77,9 +78,9 @@ class Kernels:
             matrix = kernel_matrix(self.cells, self.radii(photons))
             self._known = {
                 key: Smoothing(
-                    start=mi.UInt32(matrix.indptr.astype(np.uint32)),
-                    cell=mi.UInt32(matrix.indices.astype(np.uint32)),
-                    weight=mi.Float(matrix.data.astype(np.float32)),
+                    start=_copied(mi.UInt32, matrix.indptr),
+                    cell=_copied(mi.UInt32, matrix.indices),
+                    weight=_copied(mi.Float, matrix.data),
                     matrix=matrix,
                 )
             }
@@ -125,6 +126,12 @@ def kernel_matrix(cells: SurfaceCells, radii: FloatArray) -> csr_matrix:
     rows, columns, weight = rows[kept], columns[kept], weight[kept]
     weight /= np.bincount(rows, weight * cells.areas[columns], cells.cells)[rows]
     return csr_matrix((weight, (rows, columns)), shape=(cells.cells, cells.cells))
+
+
+def _copied(kind: Any, values: FloatArray | NDArray[np.integer]) -> Any:
+    """Values on the device: arrays handed over from numpy differ in alignment, and so would
+    kernels."""
+    return kind(values.astype(np.float32 if kind is mi.Float else np.uint32)) + dr.opaque(kind, 0)
 
 
 @dr.syntax
