@@ -27,7 +27,7 @@ from .sensor import starting
 from .sensor import ui as sensor_ui
 from .shapes import cage_operator, reference_operator
 from .shapes import ui as shape_ui
-from .simulate import drafts, picture, relight
+from .simulate import drafts, indenters, picture, relight
 from .simulate import operator as simulate_operator
 from .simulate import prop as simulate_prop
 from .simulate import ui as simulate_ui
@@ -43,6 +43,7 @@ MODULES = (
     simulate_prop,
     relight,
     drafts,
+    indenters,
     evaluate_prop,
     optimise_prop,
     following,

@@ -19,6 +19,9 @@ MANIFEST = "blender_manifest.toml"
 OLDEST = (4, 2)
 """Extensions came with Blender 4.2."""
 
+NOT_THERE = "should have been installed but not found"
+"""What Blender says when it has installed nothing after all."""
+
 HOW_TO_GET = (
     "Get Blender 4.2 or newer from https://www.blender.org/download, then name it: "
     "optisense studio --blender /path/to/blender"
@@ -176,7 +179,8 @@ def install(blender: Path, archive: Path, environment: dict[str, str]) -> None:
         check=False,
         env=environment,
     )
-    if done.returncode != 0:
+    # Blender ends with 0 even where its own Python could not unpack the extension.
+    if done.returncode != 0 or NOT_THERE in done.stdout + done.stderr:
         lines = (done.stderr + done.stdout).strip().splitlines()
         raise SetupError(
             "Blender could not install the extension",

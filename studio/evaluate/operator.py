@@ -5,12 +5,36 @@ from __future__ import annotations
 from typing import Any
 
 import bpy
+from bpy.props import StringProperty
 
 from ..core.engine import EngineError
-from ..engine import handing, polls, session
+from ..engine import catalogue, handing, polls, session
 from . import rays
 
 RAYS = (16, 12)
+
+
+class OPTISENSE_OT_choose_objective(bpy.types.Operator):
+    """Score the sensor by this objective, or no longer"""
+
+    bl_idname = "optisense.choose_objective"
+    bl_label = "Choose Objective"
+    bl_options = {"INTERNAL"}
+
+    objective: StringProperty(name="Objective")
+
+    @classmethod
+    def description(cls, context: bpy.types.Context, values: bpy.types.OperatorProperties) -> str:
+        entries = {name: text for name, _, text in catalogue.items("objectives")}
+        return entries.get(values.objective) or str(cls.__doc__)
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        values = context.window_manager.optisense_evaluation
+        if self.objective not in {name for name, _, _ in catalogue.items("objectives")}:
+            self.report({"ERROR"}, f"There is no objective '{self.objective}'")
+            return {"CANCELLED"}
+        values.chosen = set(values.chosen) ^ {self.objective}
+        return {"FINISHED"}
 
 
 class OPTISENSE_OT_evaluate(bpy.types.Operator):
@@ -140,14 +164,11 @@ class OPTISENSE_OT_hide_rays(bpy.types.Operator):
         return {"FINISHED"}
 
 
-CLASSES = (OPTISENSE_OT_evaluate, OPTISENSE_OT_show_rays, OPTISENSE_OT_hide_rays)
+CLASSES = (
+    OPTISENSE_OT_choose_objective,
+    OPTISENSE_OT_evaluate,
+    OPTISENSE_OT_show_rays,
+    OPTISENSE_OT_hide_rays,
+)
 
-
-def register() -> None:
-    for each in CLASSES:
-        bpy.utils.register_class(each)
-
-
-def unregister() -> None:
-    for each in reversed(CLASSES):
-        bpy.utils.unregister_class(each)
+register, unregister = bpy.utils.register_classes_factory(CLASSES)

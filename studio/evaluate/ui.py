@@ -19,7 +19,14 @@ class OPTISENSE_PT_evaluate(SidebarPanel, bpy.types.Panel):
         values = context.window_manager.optisense_evaluation
         column = layout.column(align=True)
         if catalogue.entries("objectives"):
-            column.prop(values, "chosen")
+            for name, title, _ in catalogue.items("objectives"):
+                is_chosen = name in values.chosen
+                column.operator(
+                    "optisense.choose_objective",
+                    text=title,
+                    icon="CHECKBOX_HLT" if is_chosen else "CHECKBOX_DEHLT",
+                    depress=is_chosen,
+                ).objective = name
         else:
             column.label(text="Waiting for the engine ...")
         layout.prop(values, "own")
@@ -53,9 +60,4 @@ def _score(layout: bpy.types.UILayout, score: bpy.types.PropertyGroup) -> None:
         layout.template_icon(icon_value=icon, scale=9.0)
 
 
-def register() -> None:
-    bpy.utils.register_class(OPTISENSE_PT_evaluate)
-
-
-def unregister() -> None:
-    bpy.utils.unregister_class(OPTISENSE_PT_evaluate)
+register, unregister = bpy.utils.register_classes_factory((OPTISENSE_PT_evaluate,))

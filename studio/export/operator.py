@@ -105,12 +105,4 @@ class OPTISENSE_OT_export(bpy.types.Operator):
 
 CLASSES = (OPTISENSE_OT_report, OPTISENSE_OT_export)
 
-
-def register() -> None:
-    for each in CLASSES:
-        bpy.utils.register_class(each)
-
-
-def unregister() -> None:
-    for each in reversed(CLASSES):
-        bpy.utils.unregister_class(each)
+register, unregister = bpy.utils.register_classes_factory(CLASSES)

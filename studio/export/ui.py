@@ -20,9 +20,4 @@ class OPTISENSE_PT_export(SidebarPanel, bpy.types.Panel):
         show_job(self.layout, "Writing")
 
 
-def register() -> None:
-    bpy.utils.register_class(OPTISENSE_PT_export)
-
-
-def unregister() -> None:
-    bpy.utils.unregister_class(OPTISENSE_PT_export)
+register, unregister = bpy.utils.register_classes_factory((OPTISENSE_PT_export,))

@@ -74,12 +74,4 @@ def _camera(layout: bpy.types.UILayout, camera: bpy.types.PropertyGroup) -> None
 
 CLASSES = (OPTISENSE_UL_light_groups, OPTISENSE_PT_lights)
 
-
-def register() -> None:
-    for each in CLASSES:
-        bpy.utils.register_class(each)
-
-
-def unregister() -> None:
-    for each in reversed(CLASSES):
-        bpy.utils.unregister_class(each)
+register, unregister = bpy.utils.register_classes_factory(CLASSES)

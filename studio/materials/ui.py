@@ -67,9 +67,4 @@ def _material(column: bpy.types.UILayout, material: bpy.types.PropertyGroup) -> 
         column.prop(material, "roughness")
 
 
-def register() -> None:
-    bpy.utils.register_class(OPTISENSE_PT_materials)
-
-
-def unregister() -> None:
-    bpy.utils.unregister_class(OPTISENSE_PT_materials)
+register, unregister = bpy.utils.register_classes_factory((OPTISENSE_PT_materials,))

@@ -69,12 +69,4 @@ class OPTISENSE_PT_optimise(SidebarPanel, bpy.types.Panel):
 
 CLASSES = (OPTISENSE_UL_vary, OPTISENSE_PT_optimise)
 
-
-def register() -> None:
-    for each in CLASSES:
-        bpy.utils.register_class(each)
-
-
-def unregister() -> None:
-    for each in reversed(CLASSES):
-        bpy.utils.unregister_class(each)
+register, unregister = bpy.utils.register_classes_factory(CLASSES)

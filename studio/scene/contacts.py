@@ -3,17 +3,26 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import bmesh
 import bpy
+import numpy as np
 from mathutils import Matrix, Vector
 
+from ..core.mesh_file import Mesh
 from ..core.numbers import short
 from .collections import CONTACTS, collection, next_order, objects_of
 
 COLOUR = (0.48, 0.37, 0.07, 1.0)
+
+file_meshes: dict[str, Mesh] = {}
+"""Meshes of indenter files, by path, in the files' own units; those that are known."""
+
+when_file_unknown: list[Callable[[str], None]] = []
+"""Called with the path of an indenter's file whose mesh has to be drawn and is not known."""
 
 
 def add_contact(
@@ -78,6 +87,13 @@ def redraw(contact: bpy.types.Object) -> None:
         bmesh.ops.create_grid(shape, x_segments=1, y_segments=1, size=values.size / 2, matrix=tilt)
         lowest = min((vertex.co.z for vertex in shape.verts), default=0.0)
         bmesh.ops.translate(shape, verts=shape.verts, vec=(0.0, 0.0, -lowest - values.depth))
+    elif values.file:
+        file = file_of(values)
+        if file in file_meshes:
+            _add_file_mesh(shape, file_meshes[file], values.scale, values.depth)
+        else:
+            for each in when_file_unknown:
+                each(file)
     bmesh.ops.rotate(
         shape, verts=shape.verts, cent=(0.0, 0.0, 0.0),
         matrix=Matrix.Rotation(math.radians(values.rotation), 3, "Z"),
@@ -86,6 +102,26 @@ def redraw(contact: bpy.types.Object) -> None:
     shape.free()
     contact.data.shade_smooth()
     contact.data.update()
+
+
+def file_of(values: bpy.types.PropertyGroup) -> str:
+    """The absolute path of a contact's mesh file."""
+    return str(Path(bpy.path.abspath(values.file)).resolve())
+
+
+def _add_file_mesh(shape: bmesh.types.BMesh, mesh: Mesh, scale: float, depth: float) -> None:
+    """As the engine presses it: the middle of its lowest points at the contact's place."""
+    points = np.asarray(mesh.vertices) * scale
+    bottom = points[:, 2].min()
+    lowest = points[points[:, 2] <= bottom + 1e-6 * np.ptp(points, axis=0).max()]
+    middle = (lowest.min(axis=0) + lowest.max(axis=0)) / 2
+    corners = [
+        shape.verts.new(point) for point in (points - [*middle[:2], bottom + depth]).tolist()
+    ]
+    for face in np.asarray(mesh.faces).tolist():
+        three = [corners[each] for each in face]
+        if len(set(face)) == 3 and shape.faces.get(three) is None:
+            shape.faces.new(three)
 
 
 def contact_values(contact: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> dict[str, Any]:
@@ -107,8 +143,7 @@ def contact_values(contact: bpy.types.Object, depsgraph: bpy.types.Depsgraph) ->
             tilt_x=short(values.tilt[0]), tilt_y=short(values.tilt[1]), size=short(values.size)
         )
     else:
-        file = str(Path(bpy.path.abspath(values.file)).resolve())
-        indenter.update(file=file, scale=short(values.scale))
+        indenter.update(file=file_of(values), scale=short(values.scale))
     return {
         "indenter": indenter,
         "point": [short(value) for value in place],

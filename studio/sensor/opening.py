@@ -13,6 +13,7 @@ from ..core import mesh_file
 from ..engine import handing, session
 from ..lights.windows import ask_for_windows
 from ..scene.build import build
+from ..scene.startup import clear_startup
 from ..scene.views import show_design
 
 
@@ -76,6 +77,7 @@ def open_stage(
             return
         document = handing.without_nulls(result["data"])
         parts = document["parts"].items()
+        clear_startup(scene)
         build(scene, document, {key: mesh_file.read(stage / part["mesh"]) for key, part in parts})
         scene.optisense.folder = folder or str(stage)
         scene.optisense.is_saved = bool(folder)

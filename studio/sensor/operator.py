@@ -78,6 +78,9 @@ class OPTISENSE_OT_open(_Opens, bpy.types.Operator):
         return polls.is_idle(cls, context) and polls.in_object_mode(cls, context)
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        design = context.scene.optisense
+        if design.is_saved:
+            self.filepath = str(Path(design.folder) / "design.yaml")
         context.window_manager.fileselect_add(self)
         return {"RUNNING_MODAL"}
 
@@ -214,12 +217,4 @@ CLASSES = (
     OPTISENSE_OT_cancel,
 )
 
-
-def register() -> None:
-    for each in CLASSES:
-        bpy.utils.register_class(each)
-
-
-def unregister() -> None:
-    for each in reversed(CLASSES):
-        bpy.utils.unregister_class(each)
+register, unregister = bpy.utils.register_classes_factory(CLASSES)

@@ -40,9 +40,4 @@ class OPTISENSE_PT_sensor(SidebarPanel, bpy.types.Panel):
         show_messages(layout)
 
 
-def register() -> None:
-    bpy.utils.register_class(OPTISENSE_PT_sensor)
-
-
-def unregister() -> None:
-    bpy.utils.unregister_class(OPTISENSE_PT_sensor)
+register, unregister = bpy.utils.register_classes_factory((OPTISENSE_PT_sensor,))

@@ -64,9 +64,4 @@ def _cage(layout: bpy.types.UILayout, cage: bpy.types.Object, values: dict) -> N
     row.operator("optisense.remove_cage", text="", icon="X")
 
 
-def register() -> None:
-    bpy.utils.register_class(OPTISENSE_PT_shapes)
-
-
-def unregister() -> None:
-    bpy.utils.unregister_class(OPTISENSE_PT_shapes)
+register, unregister = bpy.utils.register_classes_factory((OPTISENSE_PT_shapes,))

@@ -86,9 +86,4 @@ def _light_levels(layout: bpy.types.UILayout, scene: bpy.types.Scene) -> None:
         row.prop(group, "colour", text="")
 
 
-def register() -> None:
-    bpy.utils.register_class(OPTISENSE_PT_simulate)
-
-
-def unregister() -> None:
-    bpy.utils.unregister_class(OPTISENSE_PT_simulate)
+register, unregister = bpy.utils.register_classes_factory((OPTISENSE_PT_simulate,))

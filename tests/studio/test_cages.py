@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import time
 from collections.abc import Callable
 from typing import Any
 
@@ -55,9 +54,7 @@ def test_the_shape_is_the_engines(mini: Any) -> None:
         assert np.allclose(ours, engines, atol=2e-5)
 
 
-def test_ten_thousand_vertices_thirty_times_a_second(
-    mini: Any, select: Callable[..., None]
-) -> None:
+def test_ten_thousand_vertices_follow_a_cage(mini: Any, select: Callable[..., None]) -> None:
     side = np.linspace(-5.0, 5.0, 101)
     x, y = (each.ravel() for each in np.meshgrid(side, side, indexing="ij"))
     vertices = np.stack([x, y, np.zeros_like(x)], axis=1)
@@ -70,14 +67,12 @@ def test_ten_thousand_vertices_thirty_times_a_second(
     assert bpy.ops.optisense.new_cage(resolution=(3, 3, 3)) == {"FINISHED"}
     cage = bpy.context.active_object
     cages.follow(mini, cage)
-    times = []
-    for step in range(15):
-        cage.data.vertices[13].co.z = 0.1 * step
-        start = time.perf_counter()
-        cages.follow(mini, cage)
-        times.append(time.perf_counter() - start)
-    assert np.median(times) < 1 / 30
-    assert heights("sheet").max() > 0.1
+    cage.data.vertices[13].co.z = 1.5
+    cages.follow(mini, cage)
+    bulge = heights("sheet").reshape(101, 101)
+    assert bulge[50, 50] == pytest.approx(1.5 / 8, abs=1e-5)  # weight (1/2) (1/2) (1/2)
+    assert bulge.max() == bulge[50, 50] and bulge[0, 0] < bulge[20, 20] < bulge[50, 50]
+    assert np.allclose(bulge, bulge.T, atol=1e-6) and np.allclose(bulge, bulge[::-1], atol=1e-6)
 
 
 def test_bounds_and_blend(mini: Any, select: Callable[..., None]) -> None:

@@ -251,3 +251,26 @@ def test_scores_rays_a_search_and_its_best_design(
     assert bpy.ops.optisense.resume() == {"FINISHED"}
     assert bpy.ops.optisense.export(filepath=str(tmp_path / "shop")) == {"FINISHED"}
     assert list((tmp_path / "shop").rglob("*.stl"))
+
+
+def test_an_indenter_from_a_file_is_drawn_as_it_presses(mini: Any, tmp_path: Path) -> None:
+    path = tmp_path / "wedge.obj"
+    path.write_text(
+        "v 4 4 2\nv 6 4 2\nv 5 4 7\nv 4 8 2\nv 6 8 2\nv 5 8 7\n"
+        "f 1 2 3\nf 6 5 4\nf 1 4 5\nf 1 5 2\nf 2 5 6\nf 2 6 3\nf 3 6 4\nf 3 4 1\n"
+    )
+    bpy.ops.optisense.add_contact()
+    contact = objects_of(mini, "CONTACT")[0]
+    contact.optisense.depth = 0.4
+    contact.optisense.scale = 0.5
+    contact.optisense.file = str(path)
+    contact.optisense.indenter = "mesh"
+    engine = session.engine()
+    end = time.monotonic() + 60.0
+    while len(contact.data.vertices) != 6:
+        engine.poll()
+        assert time.monotonic() < end
+        time.sleep(0.01)
+    points = np.array([vertex.co for vertex in contact.data.vertices])
+    assert np.allclose(points.min(axis=0), [-0.5, -1.0, -0.4], atol=1e-6)
+    assert np.allclose(points.max(axis=0), [0.5, 1.0, 2.1], atol=1e-6)
