@@ -160,7 +160,7 @@ def test_robustness_counts_geometries(answered: Answered) -> None:
     finding, _ = answered(experiment, settings, hangs_on_the_guide)
     claim = next(c for c in experiment.claims(finding.numbers) if "cylindrical" in c.says)
     assert claim.verdict == "cannot be told"
-    assert claim.here == "holds in 6 of 7 geometries; not with guide_thickness 6"
+    assert claim.here == "holds in 8 of 9 geometries; not with guide_thickness 6"
 
 
 def test_the_page_collects_results_beside_it(answered: Answered, tmp_path: Path) -> None:
