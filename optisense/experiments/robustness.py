@@ -36,7 +36,7 @@ LOW, HIGH = "0.2", "0.6"
 """Specularities of the Mini's coating that are compared."""
 
 PRESS_DEPTH = "press_depth"
-"""mm, of the objectives' balls: the paper gives none. No dimension of the sensor, but assumed too."""
+"""mm, of the objectives' balls: not a dimension of the sensor, but the paper gives none."""
 
 TIMES = 2.0
 """AOAP must grow so many times by the search (in the paper: 2.7 times)."""
