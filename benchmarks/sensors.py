@@ -136,8 +136,8 @@ def table(found: dict[str, Any]) -> str:
         "Seconds, and in brackets processor seconds of all threads; medians. A ball of radius "
         f"{RADIUS} mm, {DEPTH} mm deep, in the middle of what the camera sees, at "
         f"{RESOLUTION[0]}x{RESOLUTION[1]}, with as many photons as bring the noise in the contact "
-        f"to {100 * WANTED_NOISE:g} %. The first image in a new process goes from command to files, "
-        "with as many photons as `optisense render` takes unasked. Targets: load and check "
+        f"to {100 * WANTED_NOISE:g} %. The first image in a new process goes from command to "
+        "files, with as many photons as `optisense render` takes unasked. Targets: load and check "
         f"{TARGETS['load_and_check']:g} s, image {TARGETS['image']:g} s, first image "
         f"{TARGETS['first_image']:g} s.", "",
         "| " + " | ".join(head) + " |", "|" + "---|" * len(head),
