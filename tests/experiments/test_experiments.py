@@ -163,6 +163,25 @@ def test_robustness_counts_geometries(answered: Answered) -> None:
     assert claim.here == "holds in 8 of 9 geometries; not with guide_thickness 6"
 
 
+def test_a_slow_image_on_a_busy_machine_tells_nothing(answered: Answered) -> None:
+    experiment = EXPERIMENTS["speed"]
+    finding, _ = answered(experiment, experiment.settings())
+    numbers = finding.numbers
+    numbers["machine"]["processors"] = 2
+
+    def verdict(seconds: float, processor: float) -> str:
+        for sizes in numbers["times"].values():
+            for row in sizes.values():
+                row["new_light"]["mean"] = seconds
+                row["new_light_processor"]["mean"] = processor
+        (said,) = {claim.verdict for claim in experiment.claims(numbers)}
+        return said
+
+    assert verdict(2.0, 3.9) == "agrees"
+    assert verdict(20.0, 39.0) == "disagrees"
+    assert verdict(20.0, 4.0) == "cannot be told"
+
+
 def test_the_page_collects_results_beside_it(answered: Answered, tmp_path: Path) -> None:
     several = list(EXPERIMENTS.values())[:2]
     for each in several:
