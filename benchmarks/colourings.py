@@ -10,6 +10,7 @@ import argparse
 import json
 import math
 import os
+import resource
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -22,16 +23,17 @@ import optisense
 from benchmarks.results import machine
 from optisense.design import SensorDesign, set_value
 from optisense.objectives import Evaluation, Settings
-from optisense.objectives.relighting import Relighting
 from optisense.optics import OpticalModel
-from optisense.search import Result, Trial, search
+from optisense.search import Plan, Result, SearchSpace, Study, Trial
+from optisense.search.evaluation import Evaluator
+from optisense.search.executors import SerialRunner
+from optisense.search.rescoring import fresh_seeds
+from optisense.search.running import Run
 
 FOLDER = Path(__file__).parent
 OBJECTIVES = ("rgb2normal", "normdiff")
 COLOURS = {"lights.lg*.colour": ["R", "G", "B"]}
 DRAWN = 5
-SEEDS = (101, 102, 103, 104)
-"""Of the images whose scatter is the noise."""
 OTHER_SEED = 999
 """Of the colourings' own renderings."""
 TARGET_SECONDS = 600.0
@@ -54,14 +56,14 @@ def main() -> None:
     about = machine()
     design = optisense.load("gelsight360")
     began, spent = time.perf_counter(), time.process_time()
-    result = search(
-        design,
-        COLOURS,
-        list(OBJECTIVES),
+    plan = Plan(
+        space=SearchSpace(COLOURS),
+        goals=OBJECTIVES,
         method="light-colours",
         settings={"photons": photons},
-        out=options.out,
     )
+    runner = KeptRunner()
+    result = Run(Study.create(options.out, design, plan), runner.begin).go()
     total, processor = time.perf_counter() - began, time.process_time() - spent
     trials = [trial for trial in result.trials if not trial.is_start]
     seconds = [trial.outcome.seconds for trial in result.trials]
@@ -75,6 +77,7 @@ def main() -> None:
             "layers": round(seconds[0], 1),
             "a_colouring": round(float(np.median(seconds[1:])), 4),
         },
+        "memory_gb": round(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 2**20, 2),
         "best": {name: _best(trials, name) for name in OBJECTIVES},
         "of_the_paper": _of_the_paper(trials),
         "after_fresh_seeds": {
@@ -87,7 +90,8 @@ def main() -> None:
     if not options.dry:
         write(found)
     console.print(f"{len(trials):,} colourings in {total:.0f} s, {processor:.0f} s of processors")
-    for row in compared(result, trials, photons, console):
+    assert runner.evaluator is not None
+    for row in compared(result, runner.evaluator, trials, photons, console):
         found["rendered_by_themselves"].append(row)
         if not options.dry:
             write(found)
@@ -129,34 +133,52 @@ def _of_the_paper(trials: list[Trial]) -> dict[str, Scores]:
     return {each: dict(known[each].scores) for each in PAPERS}
 
 
+class KeptRunner:
+    """Keeps the evaluator of a study, with the layers that it has rendered."""
+
+    evaluator: Evaluator | None = None
+
+    def begin(self, evaluator: Evaluator) -> SerialRunner:
+        """A runner in this process."""
+        self.evaluator = evaluator
+        return SerialRunner(evaluator)
+
+
 def compared(
-    result: Result, trials: list[Trial], photons: int, console: Console
+    result: Result, evaluator: Evaluator, trials: list[Trial], photons: int, console: Console
 ) -> Iterator[dict[str, Any]]:
-    """Five colourings, drawn at random: scored from layers and rendered by themselves."""
+    """Five colourings, drawn at random: scored from layers and rendered by themselves.
+
+    The noise of an objective is the standard deviation over seeds, pooled over the five.
+    """
     drawn = np.random.default_rng(5).choice(len(trials), DRAWN, replace=False)
     chosen = [trials[number] for number in drawn]
-    scatter: list[list[Scores]] = [[] for _ in chosen]
-    model = OpticalModel(result.study.space.design)
-    for seed in SEEDS:
-        relighting = Relighting(Evaluation(model, Settings(photons=photons, seed=seed)))
-        for number, trial in enumerate(chosen):
-            scatter[number].append(scores_of(relighting.lit(trial.design)))
-        console.print(f"seed {seed}: five colourings from layers")
+    seeds = fresh_seeds(result.study.settings.seed)
+    scatter = [
+        [dict(trial.scores), *(dict(evaluator(trial.vector, seed).scores) for seed in seeds)]
+        for trial in chosen
+    ]
+    noise = {
+        name: math.sqrt(
+            float(np.mean([np.var([each[name] for each in of], ddof=1) for of in scatter]))
+        )
+        for name in OBJECTIVES
+    }
+    console.print(f"five colourings from the layers of {1 + len(seeds)} seeds")
     for number, (trial, samples) in enumerate(zip(chosen, scatter, strict=True)):
         own = rendered(trial.design, photons, OTHER_SEED)
         again = rendered(trial.design, photons, result.study.settings.seed) if not number else {}
         row: dict[str, Any] = {"colouring": letters(trial)}
         for name in OBJECTIVES:
             values = np.array([each[name] for each in samples])
-            noise = float(values.std(ddof=1))
             row[name] = {
                 "in_the_search": trial.scores[name],
                 "rendered_with_the_same_seed": again.get(name),
-                "from_layers_other_seeds": float(values.mean()),
-                "noise": noise,
+                "from_layers": float(values.mean()),
+                "noise": noise[name],
                 "rendered_with_another_seed": own[name],
                 "difference_in_noises": abs(own[name] - float(values.mean()))
-                / (noise * math.sqrt(1.0 + 1.0 / len(values))),
+                / (noise[name] * math.sqrt(1.0 + 1.0 / len(values))),
             }
         console.print(f"{letters(trial)} rendered by itself")
         yield row
@@ -186,8 +208,8 @@ def markdown(runs: dict[str, Any]) -> str:
         "Processor time is that of all threads; on a machine with nothing else to do the wall",
         "time is below it.",
         "",
-        "| photons | wall time | processor time | of it the layers | a colouring | load at start |",
-        "|---|---|---|---|---|---|",
+        "| photons | wall time | processor time | of it the layers | a colouring | memory | load |",
+        "|---|---|---|---|---|---|---|",
     ]
     for found in runs.values():
         seconds, about = found["seconds"], found["machine"]
@@ -196,6 +218,7 @@ def markdown(runs: dict[str, Any]) -> str:
             f"| {found['photons_an_image']:,} | {seconds['all']:.0f} s | "
             f"{seconds['processor']:.0f} s | {_or_dash(seconds.get('layers'), ' s')} | "
             f"{_or_dash(None if each is None else 1000 * each, ' ms')} | "
+            f"{found.get('memory_gb', '-')} GB | "
             f"{about['load_at_start']} on {about['cores']} cores |"
         )
     about = next(iter(runs.values()))["machine"]
@@ -234,9 +257,10 @@ def _agreement(found: dict[str, Any]) -> list[str]:
         f"## Rendered by themselves, {found['photons_an_image']:,} photons",
         "",
         "Colourings drawn at random, each rendered by itself with another seed, against the",
-        f"mean over {len(SEEDS)} seeds from layers. The noise is the standard deviation over these",
-        "seeds; the difference is in units of the noise of both together. The last column is a",
-        "rendering with the seed of the search.",
+        "mean over four seeds from layers. The noise is the standard deviation over these",
+        "seeds, pooled over the five; the difference is in units of the noise of both together,",
+        "where three or more would be one chance in a hundred. The last column is a rendering",
+        "with the seed of the search.",
         "",
         "| colouring | objective | from layers | noise | rendered | difference in noises | in the "
         "search | same seed |",
@@ -247,7 +271,7 @@ def _agreement(found: dict[str, Any]) -> list[str]:
             one = row[name]
             again = one["rendered_with_the_same_seed"]
             lines.append(
-                f"| {row['colouring']} | {name} | {one['from_layers_other_seeds']:.4f} | "
+                f"| {row['colouring']} | {name} | {one['from_layers']:.4f} | "
                 f"{one['noise']:.4f} | {one['rendered_with_another_seed']:.4f} | "
                 f"{one['difference_in_noises']:.1f} | {one['in_the_search']:.6f} | "
                 f"{'' if again is None else f'{again:.6f}'} |"
