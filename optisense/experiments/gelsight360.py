@@ -18,7 +18,7 @@ from optisense.experiments.evaluations import (
 )
 from optisense.experiments.experiment import Experiment, Finding, Pictures, Steps, Values
 from optisense.experiments.figures import COLOURS, finish, line
-from optisense.experiments.gelsight360_claims import PAPER, claims
+from optisense.experiments.gelsight360_claims import LITTLE_NOISE, PAPER, claims
 from optisense.experiments.mini_shapes import OBJECTIVES
 from optisense.experiments.spread import number, shown, spearman, spread
 from optisense.experiments.unit import Record, Unit
@@ -36,7 +36,7 @@ GROUPS = [f"lg{number}" for number in range(1, 9)]
 BLIND: dict[str, dict[str, Any]] = {
     "as scored": {},
     "noise of 15 % to either side": {"noise": 0.15},
-    "noise of 3 %": {"noise": 0.03},
+    LITTLE_NOISE: {"noise": 0.03},
     "only the polar angle": {"phi_weight": 0.0},
     "only the polar angle, 15 %": {"phi_weight": 0.0, "noise": 0.15},
     "colours of the picture": {"colours": "picture"},
@@ -341,7 +341,7 @@ def draw(numbers: Values, pictures: Pictures) -> Figure:
 def _draw_all(axes: Any, numbers: Values) -> None:
     """The scores of NormDiff with other noise, of the sensors in the table."""
     for colour, (name, each) in zip(COLOURS, numbers["why"].items(), strict=False):
-        ways = ("as scored", "noise of 15 % to either side", "noise of 3 %")
+        ways = ("as scored", "noise of 15 % to either side", LITTLE_NOISE)
         values = [each["scores"].get(way) for way in ways]
         if None not in values:
             axes.plot([30, 15, 3], values, "o-", color=colour, label=name)
