@@ -7,14 +7,19 @@ STAMP := $(VENV)/.set-up
 BLENDER_PYTHON ?=
 BLENDER_VENV := .venv-blender
 BLENDER_STAMP := $(BLENDER_VENV)/.set-up
+BLENDER ?=
+PICTURES ?=
+WINDOW_STAMP := .blender-window/.set-up
 
-.PHONY: help setup demo test lint types import-rules docs pytest studio-tests extension setup-blender \
+.PHONY: help setup demo test lint types import-rules docs pytest studio-tests test-blender \
+    studio-window-test extension setup-blender \
     format bench lock clean
 
 help:
 	@echo "make demo     press a ball into a GelSight Mini and write the picture and a report"
 	@echo "make test     lint, types, import rules and tests, those of the Blender extension too"
 	@echo "make studio-tests   only the tests of the Blender extension"
+	@echo "make test-blender   the same on Blender 4.2, 4.5 and 5.0, and by mouse and keys in a window"
 	@echo "make extension      build and validate the Blender extension: dist/optisense_studio.zip"
 	@echo "make docs     build the documentation as a site, and check its links: site/index.html"
 	@echo "make bench    measure speed and accuracy (minutes)"
@@ -59,6 +64,26 @@ $(BLENDER_STAMP): requirements-blender.lock scripts/setup_blender.sh
 studio-tests: setup setup-blender
 	timeout 600 $(BLENDER_VENV)/bin/python -m pytest tests/studio
 
+# Older and newer Blenders, each in an environment of its own, and the window test.
+OTHER_BLENDERS := 4.2 5.0
+test-blender: studio-tests $(OTHER_BLENDERS:%=studio-tests-%) studio-window-test
+
+studio-tests-%: setup .venv-blender-%/.set-up
+	timeout 600 .venv-blender-$*/bin/python -m pytest tests/studio
+
+.PRECIOUS: .venv-blender-%/.set-up
+.venv-blender-%/.set-up: scripts/setup_blender.sh
+	@BLENDER_PYTHON="$(BLENDER_PYTHON)" sh scripts/setup_blender.sh $*
+
+# BLENDER=/path/to/blender takes that one; else one is fetched into .blender-window.
+# PICTURES=docs/images/studio keeps a picture of each step.
+studio-window-test: setup $(if $(BLENDER),,$(WINDOW_STAMP))
+	OPTISENSE_WINDOW_BLENDER="$(or $(BLENDER),.blender-window/blender)" \
+	    OPTISENSE_WINDOW_PICTURES="$(PICTURES)" timeout 900 $(BIN)/python -m pytest tests/window
+
+$(WINDOW_STAMP): scripts/setup_blender_window.sh
+	@sh scripts/setup_blender_window.sh
+
 extension: setup setup-blender
 	$(BIN)/optisense studio --zip dist/optisense_studio.zip
 	$(BLENDER_VENV)/bin/python scripts/validate_extension.py dist/optisense_studio.zip
@@ -77,4 +102,4 @@ lock:
 	    --generate-hashes --no-emit-index-url --upgrade --output-file requirements-blender.lock
 
 clean:
-	rm -rf $(VENV) $(BLENDER_VENV) demo-output site build dist .mypy_cache .pytest_cache .ruff_cache .import_linter_cache
+	rm -rf $(VENV) $(BLENDER_VENV) $(BLENDER_VENV)-* .blender-window demo-output site build dist .mypy_cache .pytest_cache .ruff_cache .import_linter_cache

@@ -1,9 +1,11 @@
 #!/bin/sh
 # Set up .venv-blender: Blender as a Python module, in which the extension's tests run. It needs
 # Python 3.11 on Linux, which is what those modules are built for, and some libraries of a desktop.
+# With a version as argument (4.2, 5.0) it sets up that Blender in .venv-blender-VERSION.
 set -eu
 cd "$(dirname "$0")/.."
-venv=.venv-blender
+version=${1:-}
+venv=.venv-blender${version:+-$version}
 unset PYTHONHOME PYTHONPATH VIRTUAL_ENV
 
 say() { printf '%s\n' "$*"; }
@@ -25,8 +27,13 @@ if ! "$venv/bin/python" -c "$fits; import pip" >/dev/null 2>&1; then
     "$python" -m venv --clear "$venv"
 fi
 say "Installing Blender's Python module into $venv (350 MB the first time) ..."
-"$venv/bin/python" -m pip install --quiet --disable-pip-version-check --no-input \
-    --require-hashes --requirement requirements-blender.lock
+install() { "$venv/bin/python" -m pip install --quiet --disable-pip-version-check --no-input "$@"; }
+if [ -n "$version" ]; then
+    pytest=$(sed -n 's/^\(pytest==[^ ]*\).*/\1/p' requirements-blender.lock)
+    install "bpy==$version.*" "$pytest"
+else
+    install --require-hashes --requirement requirements-blender.lock
+fi
 
 # --- libraries of a desktop that the module links to -------------------------------------------
 loads() { timeout 120 "$venv/bin/python" -c 'import bpy' >/dev/null 2>&1; }

@@ -17,6 +17,8 @@ def show_design(scene: bpy.types.Scene) -> None:
             space = area.spaces.active
             space.shading.color_type = "OBJECT"
             space.shading.show_backface_culling = False
+            # Parts touch: outlines would be drawn wherever two faces at one place alternate.
+            space.shading.show_object_outline = False
             space.clip_start, space.clip_end = 0.1, 10_000.0
             region = next(each for each in area.regions if each.type == "WINDOW")
             with bpy.context.temp_override(window=window, area=area, region=region):

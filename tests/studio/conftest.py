@@ -9,6 +9,7 @@ import atexit
 import importlib.util
 import os
 import shlex
+import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -16,6 +17,8 @@ from typing import Any
 import pytest
 
 ROOT = Path(__file__).parents[2]
+
+_status: int | None = None
 
 if importlib.util.find_spec("bpy") is None:
     collect_ignore_glob = ["test_*.py"]
@@ -26,6 +29,21 @@ else:
         "OPTISENSE_ENGINE",
         shlex.join([str(ROOT / ".venv" / "bin" / "python"), "-m", "optisense.cli", "engine"]),
     )
+
+
+@pytest.hookimpl(trylast=True)
+def pytest_unconfigure(config: pytest.Config) -> None:
+    """Leave without Blender's own end, at which the module of Blender 4.2 crashes."""
+    if "bpy" in sys.modules and _status is not None:
+        sys.stdout.flush()
+        sys.stderr.flush()
+        os._exit(_status)
+
+
+def pytest_sessionfinish(session: pytest.Session, exitstatus: int) -> None:
+    """Keep how it went."""
+    global _status
+    _status = int(exitstatus)
 
 
 @pytest.fixture(scope="session", autouse=True)

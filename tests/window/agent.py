@@ -1,0 +1,191 @@
+"""Runs inside Blender, told by `blender -P`: reports what Blender holds. It never does anything.
+
+Each line on a local socket is a Python expression, or `at X Y` and an expression that waits until
+Blender knows that the mouse is there; the answer is a line of JSON.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import importlib
+import json
+import os
+import socket
+from typing import Any
+
+import bpy
+from bpy_extras import view3d_utils
+from mathutils import Vector
+
+SOON = 0.005
+
+
+def window() -> bpy.types.Window:
+    """The main window."""
+    return bpy.context.window_manager.windows[0]
+
+
+def area(kind: str) -> bpy.types.Area:
+    """The first editor of a kind, whichever window it is in."""
+    return next(
+        each
+        for one in bpy.context.window_manager.windows
+        for each in one.screen.areas
+        if each.type == kind
+    )
+
+
+def region(kind: str, part: str) -> bpy.types.Region:
+    """A part of the first editor of a kind."""
+    return next(each for each in area(kind).regions if each.type == part)
+
+
+def place(kind: str, part: str) -> list[int]:
+    """Left, top, width and height of a part of an editor, in pixels from the screen's top left."""
+    found, first = region(kind, part), window()
+    own = next(
+        each
+        for each in bpy.context.window_manager.windows
+        if area(kind) in each.screen.areas.values()
+    )
+    left, bottom = own.x + found.x, own.y + found.y
+    return [left, first.y + first.height - bottom - found.height, found.width, found.height]
+
+
+def chosen_file() -> str:
+    """What is chosen where a file is asked for."""
+    browser = area("FILE_BROWSER")
+    own = next(
+        each for each in bpy.context.window_manager.windows if browser in each.screen.areas.values()
+    )
+    with bpy.context.temp_override(window=own, area=browser):
+        found = bpy.context.active_file
+    return found.name if found else ""
+
+
+def on_screen(point: Any) -> list[float]:
+    """Where a point of the scene is drawn, in pixels from the window's top left."""
+    view = region("VIEW_3D", "WINDOW")
+    space = area("VIEW_3D").spaces.active.region_3d
+    spot = view3d_utils.location_3d_to_region_2d(view, space, Vector(point))
+    return [view.x + spot.x, window().height - view.y - spot.y]
+
+
+def under() -> str:
+    """The button under the pointer in the sidebar: an operator's name, a property's, or nothing."""
+    sidebar = region("VIEW_3D", "UI")
+    with bpy.context.temp_override(window=window(), area=area("VIEW_3D"), region=sidebar):
+        found = getattr(bpy.context, "property", None)
+        if found is not None:
+            return found[1].rpartition(".")[2]
+        if not bpy.ops.ui.copy_python_command_button.poll():
+            return ""
+        bpy.context.window_manager.clipboard = ""
+        bpy.ops.ui.copy_python_command_button()
+        return bpy.context.window_manager.clipboard
+
+
+def part(name: str) -> Any:
+    """A module of the extension, as Blender has loaded it."""
+    return importlib.import_module(f"bl_ext.user_default.optisense_studio.{name}")
+
+
+frames = [0]
+"""How often the 3D view was drawn."""
+
+
+def _count() -> None:
+    frames[0] += 1
+
+
+def scene() -> bpy.types.Scene:
+    """The scene that is shown."""
+    return window().scene
+
+
+def kinds(kind: str) -> list[Any]:
+    """The sensor's objects of a kind."""
+    return [each for each in scene().objects if each.optisense.kind == kind]
+
+
+def state() -> Any:
+    """What the extension's panels show."""
+    return bpy.context.window_manager.optisense
+
+
+def _poll() -> float:
+    """Answer what was asked; without a thread, which Blender's context does not bear."""
+    with contextlib.suppress(BlockingIOError):
+        _listener.connection = _listener.server.accept()[0]
+        _listener.connection.setblocking(False)
+    with contextlib.suppress(BlockingIOError, AttributeError):
+        _listener.rest += _listener.connection.recv(65536)
+    if _listener.waiting is not None:
+        x, y, text = _listener.waiting
+        if _listener.came:  # and was handled, for timers come before that
+            _listener.waiting, _listener.came = None, False
+            _say(_answer(text))
+        elif _has_come(x, y):
+            _listener.came = True
+    while _listener.waiting is None and b"\n" in _listener.rest:
+        line, _, _listener.rest = _listener.rest.partition(b"\n")
+        text = line.decode()
+        if text.startswith("at "):
+            _, x, y, text = text.split(" ", 3)
+            _listener.waiting = (int(x), int(y), text)
+        else:
+            _say(_answer(text))
+    return SOON
+
+
+def _say(line: str) -> None:
+    _listener.connection.sendall(line.encode() + b"\n")
+
+
+def _answer(text: str) -> str:
+    known = {**globals(), "manager": bpy.context.window_manager}
+    try:
+        return json.dumps({"value": eval(text, known)})
+    except Exception as error:
+        return json.dumps({"error": f"{type(error).__name__}: {error}"})
+
+
+class OPTISENSE_TEST_OT_pointer(bpy.types.Operator):  # noqa: N801
+    """Finds out where Blender believes the mouse to be"""
+
+    bl_idname = "optisense_test.pointer"
+    bl_label = "Pointer"
+    seen = (0, 0)
+
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        type(self).seen = (event.mouse_x, context.window.height - event.mouse_y)
+        return {"CANCELLED"}
+
+
+def _has_come(x: int, y: int) -> bool:
+    with bpy.context.temp_override(window=window()):
+        bpy.ops.optisense_test.pointer("INVOKE_DEFAULT")
+    seen = OPTISENSE_TEST_OT_pointer.seen
+    return abs(seen[0] - x) <= 1 and abs(seen[1] - y) <= 1
+
+
+class Listener:
+    """The socket that questions come by."""
+
+    connection: socket.socket
+    rest = b""
+    waiting: tuple[int, int, str] | None = None
+    came = False
+
+    def __init__(self) -> None:
+        self.server = socket.socket(socket.AF_UNIX)
+        self.server.bind(os.environ["OPTISENSE_AGENT"])
+        self.server.listen()
+        self.server.setblocking(False)
+
+
+_listener = Listener()
+bpy.types.SpaceView3D.draw_handler_add(_count, (), "WINDOW", "POST_PIXEL")
+bpy.utils.register_class(OPTISENSE_TEST_OT_pointer)
+bpy.context.preferences.system.viewport_aa = "OFF"  # there is only a processor to draw with
+bpy.app.timers.register(_poll, first_interval=SOON, persistent=True)

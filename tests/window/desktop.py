@@ -1,0 +1,68 @@
+"""A virtual display with a mouse and a keyboard."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import time
+from pathlib import Path
+from shutil import which
+
+from PIL import ImageGrab
+
+SIZE = (1280, 860)
+
+
+class Desktop:
+    """A display of its own; what it shows is drawn by the processor."""
+
+    def __init__(self) -> None:
+        for program in ("Xvfb", "xdotool"):
+            assert which(program), f"{program} is missing: sh scripts/setup_blender_window.sh"
+        read, write = os.pipe()
+        self._server = subprocess.Popen(
+            ["Xvfb", "-displayfd", str(write), "-screen", "0", f"{SIZE[0]}x{SIZE[1]}x24",
+             "-noreset", "-nolisten", "tcp", "+extension", "GLX"],
+            pass_fds=[write],
+            stderr=subprocess.DEVNULL,
+        )  # fmt: skip
+        os.close(write)
+        with os.fdopen(read) as told:
+            self.name = f":{told.readline().strip()}"
+
+    def _do(self, *words: object) -> None:
+        subprocess.run(
+            ["xdotool", *map(str, words)],
+            env={**os.environ, "DISPLAY": self.name},
+            check=True,
+            capture_output=True,
+        )
+
+    def move(self, x: float, y: float) -> None:
+        """Move the mouse to a pixel, counted from the top left."""
+        self._do("mousemove", "--sync", round(x), round(y))
+
+    def click(self, x: float, y: float, *, button: int = 1, times: int = 1) -> None:
+        """Click somewhere, as a hand does: first there, then down, then up."""
+        self.move(x, y)
+        time.sleep(0.05)
+        self._do("click", "--repeat", times, "--delay", 60, button)
+
+    def keys(self, *names: str) -> None:
+        """Press keys, one after the other."""
+        for name in names:
+            self._do("key", "--delay", 30, name)
+
+    def write(self, text: str) -> None:
+        """Type a text."""
+        self._do("type", "--delay", 15, text)
+
+    def picture(self, path: Path) -> None:
+        """Keep what the display shows."""
+        path.parent.mkdir(parents=True, exist_ok=True)
+        ImageGrab.grab(xdisplay=self.name).convert("RGB").save(path, optimize=True)
+
+    def close(self) -> None:
+        """Take the display away."""
+        self._server.terminate()
+        self._server.wait(10)

@@ -1,0 +1,173 @@
+"""From a new Mini to a better one that is saved and opened again, all by mouse and keys.
+
+The steps build on one another, as a user's do; pictures of them go to the folder that
+OPTISENSE_WINDOW_PICTURES names.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+import yaml
+
+from .bench import Bench, install
+from .conftest import BLENDER
+from .desktop import Desktop
+
+MOVED = 1.5
+"""mm, how far a light is moved."""
+
+FIELDS_OF_VIEW = (50.0, 60.0, 70.0)
+"""Degrees, what the search tries; all see less than the whole surface or beyond its edge."""
+
+
+@pytest.fixture(scope="module")
+def bench(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Bench]:
+    """Blender with the extension, installed as a user does."""
+    blender, home = Path(os.environ[BLENDER]).resolve(), tmp_path_factory.mktemp("home")
+    install(blender, home)
+    desktop = Desktop()
+    sitting = Bench(blender, desktop, home)
+    try:
+        yield sitting
+    finally:
+        sitting.close()
+        desktop.close()
+
+
+def photograph(bench: Bench, name: str) -> None:
+    """Keep a picture of this step for the documentation, where that is wanted."""
+    folder = os.environ.get("OPTISENSE_WINDOW_PICTURES")
+    if folder:
+        bench.drawn()
+        bench.desktop.picture(Path(folder) / f"{name}.png")
+
+
+def test_the_tab_is_there(bench: Bench) -> None:
+    bench.greet()
+    bench.open_tab()
+    bench.find("optisense.open", across=0.25)
+
+
+def test_a_new_mini(bench: Bench) -> None:
+    bench.until("bool(part('engine.catalogue').entries('sensors'))")
+    names = bench.see("[each['name'] for each in part('engine.catalogue').entries('sensors')]")
+    x, y = bench.find("optisense.open", across=0.25)
+    bench.choose((x, y - 22), names.index("gelsight-mini"))
+    bench.until("scene().optisense.is_open and not state().busy")
+    assert bench.see("scene().optisense.title") == "gelsight-mini"
+    assert len(bench.see("[light.name for light in kinds('LIGHT')]")) == 15
+    bench.press("optisense.add_contact", across=0.75)
+    bench.until("len(kinds('CONTACT')) == 1")
+    photograph(bench, "1-new-mini")
+
+
+def test_a_light_is_moved(bench: Bench) -> None:
+    for name in bench.see("[light.name for light in kinds('LIGHT')]"):
+        spot = bench.see(f"on_screen(bpy.data.objects[{name!r}].matrix_world.translation)")
+        bench.desktop.click(*spot)
+        bench.see("1")
+        if bench.see("bpy.context.view_layer.objects.active.name") == name:
+            break
+    else:
+        raise AssertionError("no light can be clicked on")
+    before = bench.see(f"list(bpy.data.objects[{name!r}].location)")
+    bench.desktop.keys("g", "z", "minus", *(str(MOVED).replace(".", " period ").split()), "Return")
+    bench.until(f"bpy.data.objects[{name!r}].location.z < {before[2] - 0.1}")
+    after = bench.see(f"list(bpy.data.objects[{name!r}].location)")
+    assert after == pytest.approx([before[0], before[1], before[2] - MOVED], abs=1e-4)
+    photograph(bench, "2-light-moved")
+
+
+def test_a_picture_appears(bench: Bench) -> None:
+    bench.press("optisense.simulate")
+    bench.until("state().busy == 'Simulating'")
+    bench.until("state().fraction > 0.0 or not state().busy")
+    photograph(bench, "3-simulating")
+    bench.rest()
+    assert bench.see("manager.optisense_picture.shown and not manager.optisense_picture.is_draft")
+    width, height = bench.see("list(bpy.data.images['OptiSense picture'].size)")
+    assert (width, height) == (320, 240)
+    red, green, blue = bench.see(
+        "[sum(list(bpy.data.images['OptiSense picture'].pixels)[c::4]) for c in range(3)]"
+    )
+    assert min(red, green, blue) > 0.05 * width * height
+    photograph(bench, "4-picture")
+
+
+def test_scores_appear(bench: Bench) -> None:
+    for name in ("aoap", "2to3pw"):
+        bench.press(f'choose_objective(objective="{name}")')
+    bench.until("manager.optisense_evaluation.chosen == {'aoap', '2to3pw'}")
+    bench.press("optisense.evaluate")
+    bench.until("len(manager.optisense_evaluation.scores) == 2")
+    bench.rest()
+    scores = bench.see("{s.name: float(s.value) for s in manager.optisense_evaluation.scores}")
+    assert 0.5 < scores["aoap"] <= 1.0 and scores["2to3pw"] > 0.0, scores
+    bench.press("optisense.show_rays", across=0.25)
+    bench.until("any(each.optisense.key == 'ray hit' for each in scene().objects)")
+    bench.rest()
+    photograph(bench, "5-evaluated")
+
+
+def test_it_is_saved(bench: Bench) -> None:
+    bench.press("optisense.save_as", across=0.85)
+    bench.choose_file()
+    bench.until("scene().optisense.is_saved")
+    bench.rest()
+    written = yaml.safe_load((bench.home / "gelsight-mini" / "design.yaml").read_text())
+    assert len(written["lights"]) == 3
+
+
+def test_a_small_grid_finds_the_best_of_three(bench: Bench) -> None:
+    bench.press("optisense.hide_rays", across=0.75)
+    bench.until("not kinds('SHOWN')")
+    camera = bench.see("kinds('CAMERA')[0].name")
+    bench.desktop.click(*bench.see(f"on_screen(bpy.data.objects[{camera!r}].matrix_world"
+                                   ".translation)"))  # fmt: skip
+    bench.until(f"bpy.context.view_layer.objects.active.name == {camera!r}")
+    bench.open_panel_below("optisense.show_rays", "optisense.vary_remove")
+    x, y = bench.find("optisense.vary_remove", across=0.98)
+    labels = bench.see("[each.label for each in part('core.vary').for_camera()]")
+    bench.choose((x - 100, y), labels.index("Field of view"))
+    bench.until("len(scene().optisense_search.vary) == 1")
+    grid = "camera.fov=" + ",".join(f"{each:g}" for each in FIELDS_OF_VIEW)
+    bench.enter("text", grid, times=2)
+    bench.until(f"scene().optisense_search.vary[0].text == {grid!r}")
+    bench.enter("method", "grid")
+    bench.until("scene().optisense_search.method == 'grid'")
+    bench.press("optisense.search", across=0.25)
+    bench.until("state().busy == 'Searching'")
+    bench.rest()
+    assert "3 trials" in bench.see("manager.optisense_found.ended")
+    photograph(bench, "6-searched")
+
+
+def test_the_best_is_applied_saved_and_opened_again(bench: Bench) -> None:
+    best = float(bench.see("manager.optisense_found.values").rpartition("=")[2])
+    assert best in FIELDS_OF_VIEW
+    before = bench.see("kinds('CAMERA')[0].optisense.fov")
+    bench.press("optisense.apply_best", across=0.25)
+    bench.until("not state().busy and abs(kinds('CAMERA')[0].optisense.fov - "
+                f"{before}) > 1e-3")  # fmt: skip
+    assert bench.see("kinds('CAMERA')[0].optisense.fov") == pytest.approx(best, abs=1e-4)
+    bench.press("optisense.save(", across=0.5)
+    bench.until("'Saved in' in state().note")
+    folder = bench.home / "gelsight-mini"
+    written = yaml.safe_load((folder / "design.yaml").read_text())
+    assert written["camera"]["fov"] == best
+    bench.press("optisense.open", across=0.25)
+    bench.choose_file("design.yaml")
+    bench.until("not state().busy")
+    assert not bench.see("state().problem"), bench.said()
+    assert bench.see("scene().optisense.folder") == str(folder)
+    assert bench.see("kinds('CAMERA')[0].optisense.fov") == pytest.approx(best, abs=1e-4)
+    lights = bench.see("[list(each.location) for each in kinds('LIGHT')]")
+    assert sum(math.isclose(z, lights[0][2] - MOVED, abs_tol=1e-3) for _, _, z in lights) == 1
+    bench.press("optisense.show_picture")
+    bench.until("any(each.type == 'IMAGE_EDITOR' for each in window().screen.areas)")
+    photograph(bench, "7-opened-again")
