@@ -44,9 +44,12 @@ def chapter(experiment: Experiment, result: Mapping[str, Any], picture: str) -> 
 def _verdicts(claims: list[Mapping[str, Any]]) -> str:
     lines = ["| the paper | here | |", "| --- | --- | --- |"]
     lines += [f"| {claim['says']} | {claim['here']} | **{claim['verdict']}** |" for claim in claims]
+    reasons: dict[str, list[str]] = {}
     for claim in claims:
         if claim["why"] and not claim["holds"]:
-            lines += ["", f"*{claim['says']}* {claim['verdict'].capitalize()}: {claim['why']}"]
+            reasons.setdefault(claim["why"], []).append(f"*{claim['says']}*")
+    for why, statements in reasons.items():
+        lines += ["", f"{' '.join(statements)} {why}"]
     return "\n".join(lines)
 
 
@@ -113,16 +116,21 @@ def write_page(page: Path, results: Path, experiments: list[Experiment]) -> None
         verdicts = [claim["verdict"] for claim in result["claims"]]
         for verdict in verdicts:
             counts[verdict] += 1
-        told = ", ".join(f"{verdicts.count(v)} {v}" for v in counts if v in verdicts)
+        told = ", ".join(_counted(verdicts.count(v), v) for v in counts if v in verdicts)
         rows.append(f"| [{experiment.title}](#{_anchor(experiment.title)}) | {told} |")
     head = [
         "# The paper's tables and figures, made again",
         "Written by `optisense experiment all --page FILE`; do not edit.",
         INTRODUCTION,
         "\n".join(["| experiment | the paper's statements |", "| --- | --- |", *rows]),
-        f"In all: {', '.join(f'{count} {verdict}' for verdict, count in counts.items())}.",
+        f"In all: {', '.join(_counted(count, verdict) for verdict, count in counts.items())}.",
     ]
     write_text(page, "\n\n".join([*head, *(text.rstrip() for text in chapters)]) + "\n")
+
+
+def _counted(number: int, verdict: str) -> str:
+    """Such as ``1 agrees``, ``3 agree``."""
+    return f"{number} {verdict if number == 1 or verdict == OPEN else verdict.removesuffix('s')}"
 
 
 def _anchor(title: str) -> str:
