@@ -187,7 +187,7 @@ class Bench:
         """Open the panel whose title comes below a button, where it is closed."""
         x, y = self.find(above, across=0.25)
         self.desktop.click(x, y + 40)
-        self.find(inside, across=0.98)
+        self.find(inside, across=0.7)
 
     def choose_file(self, name: str = "") -> None:
         """Click on a file where one is asked for, if a name is given, and then on the button."""

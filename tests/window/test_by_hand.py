@@ -21,6 +21,9 @@ from .desktop import Desktop
 MOVED = 1.5
 """mm, how far a light is moved."""
 
+VARY_ABOVE, FIRST_ABOVE = 161, 133
+"""Pixels from the field *Trials* up to the menu *Vary* and to the first row of its list."""
+
 FIELDS_OF_VIEW = (50.0, 60.0, 70.0)
 """Degrees, what the search tries; all see less than the whole surface or beyond its edge."""
 
@@ -130,13 +133,13 @@ def test_a_small_grid_finds_the_best_of_three(bench: Bench) -> None:
     bench.desktop.click(*bench.see(f"on_screen(bpy.data.objects[{camera!r}].matrix_world"
                                    ".translation)"))  # fmt: skip
     bench.until(f"bpy.context.view_layer.objects.active.name == {camera!r}")
-    bench.open_panel_below("optisense.show_rays", "optisense.vary_remove")
-    x, y = bench.find("optisense.vary_remove", across=0.98)
+    bench.open_panel_below("optisense.show_rays", "budget")
+    x, y = bench.find("budget", across=0.7)
     labels = bench.see("[each.label for each in part('core.vary').for_camera()]")
-    bench.choose((x - 100, y), labels.index("Field of view"))
+    bench.choose((x - 60, y - VARY_ABOVE), labels.index("Field of view"))
     bench.until("len(scene().optisense_search.vary) == 1")
     grid = "camera.fov=" + ",".join(f"{each:g}" for each in FIELDS_OF_VIEW)
-    bench.enter("text", grid, times=2)
+    bench.write_at((x, y - FIRST_ABOVE), grid)
     bench.until(f"scene().optisense_search.vary[0].text == {grid!r}")
     bench.enter("method", "grid")
     bench.until("scene().optisense_search.method == 'grid'")
