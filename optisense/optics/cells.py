@@ -13,6 +13,9 @@ from scipy.spatial import cKDTree
 
 FloatArray = NDArray[np.floating]
 
+SAMPLES_ACROSS = 7
+"""Samples of the surface along the side of a cell: they tell its area to some per cent."""
+
 REACH = 3
 """A point this many grid places off the surface still finds the nearest cell."""
 
@@ -49,10 +52,12 @@ def surface_samples(
     area = np.linalg.norm(cross, axis=1) / 2
     count = np.maximum(1, np.ceil(area / spacing**2)).astype(int)
     owner = np.repeat(np.arange(len(faces)), count)
-    order = np.arange(len(owner)) - np.repeat(np.cumsum(count) - count, count)
-    # The R2 sequence (Roberts 2018), folded into the triangle by the square-root map.
-    u = np.mod(0.5 + 0.7548776662466927 * (order + 1), 1.0)
-    v = np.mod(0.5 + 0.5698402909980532 * (order + 1), 1.0)
+    # The R2 sequence (Roberts 2018), folded into the triangle by the square-root map. One sequence
+    # goes through all faces: begun anew in each it would favour the same corner of small ones, and
+    # heap up area in the middle of a fan.
+    order = np.arange(1, len(owner) + 1)
+    u = np.mod(0.5 + 0.7548776662466927 * order, 1.0)
+    v = np.mod(0.5 + 0.5698402909980532 * order, 1.0)
     root = np.sqrt(u)[:, None]
     points = a[owner] * (1 - root) + (b[owner] * (1 - v)[:, None] + c[owner] * v[:, None]) * root
     normals = cross / np.maximum(2 * area, 1e-30)[:, None]
@@ -62,7 +67,7 @@ def surface_samples(
 def build_cells(vertices: FloatArray, faces: NDArray[np.integer], size: float) -> SurfaceCells:
     """Cells of ``size`` mm over a mesh."""
     vertices = np.asarray(vertices, dtype=np.float64)
-    points, normals, areas = surface_samples(vertices, faces, size / 5)
+    points, normals, areas = surface_samples(vertices, faces, size / SAMPLES_ACROSS)
     # Off any round number, so that a plane does not run along the border between two cells.
     lower = points.min(axis=0) - (0.37 + REACH) * size
     counts = np.floor((points.max(axis=0) - lower) / size).astype(int) + 1 + REACH
