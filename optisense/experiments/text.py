@@ -42,15 +42,20 @@ def chapter(experiment: Experiment, result: Mapping[str, Any], picture: str) -> 
 
 
 def _verdicts(claims: list[Mapping[str, Any]]) -> str:
-    lines = ["| the paper | here | |", "| --- | --- | --- |"]
-    lines += [f"| {claim['says']} | {claim['here']} | **{claim['verdict']}** |" for claim in claims]
+    """A table of statements, and what explains those that don't hold: each reason once."""
+    lines = ["| | the paper | here | |", "| --- | --- | --- | --- |"]
     reasons: dict[str, list[str]] = {}
-    for claim in claims:
+    for number, claim in enumerate(claims, 1):
+        lines.append(f"| {number} | {claim['says']} | {claim['here']} | **{claim['verdict']}** |")
         if claim["why"] and not claim["holds"]:
-            reasons.setdefault(claim["why"], []).append(f"*{claim['says']}*")
-    for why, statements in reasons.items():
-        lines += ["", f"{' '.join(statements)} {why}"]
+            reasons.setdefault(claim["why"], []).append(str(number))
+    for why, numbers in reasons.items():
+        lines += ["", f"*To {_listed(numbers)}.* {why}"]
     return "\n".join(lines)
+
+
+def _listed(words: list[str]) -> str:
+    return " and ".join(part for part in (", ".join(words[:-1]), words[-1]) if part)
 
 
 def _gaps(gaps: list[Mapping[str, str]]) -> str:
