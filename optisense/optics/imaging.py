@@ -106,7 +106,9 @@ def _grainy(image: NDArray[np.float32], where: NDArray[np.bool_]) -> NDArray[np.
         return where
     inner = ndimage.binary_erosion(where) & (image > DARK * image[where].mean())
     mean = ndimage.convolve(image, CROSS, mode="nearest")
-    off = np.where(inner, (image - mean) / np.maximum(np.abs(mean), 1e-30), 0.0)
+    # A lit pixel among black ones is as far off as can be told.
+    least = np.maximum(0.01 * np.abs(image), np.finfo(np.float32).tiny)
+    off = np.where(inner, (image - mean) / np.maximum(np.abs(mean), least), 0.0)
     share = ndimage.uniform_filter(inner.astype(np.float32), GRAIN_REACH)
     square = ndimage.uniform_filter((off**2).astype(np.float32), GRAIN_REACH)
     return where & (square > GRAIN**2 * np.maximum(share, 1e-6))
