@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import re
 import subprocess
 import sys
@@ -13,7 +12,8 @@ from collections.abc import Iterator
 from pathlib import Path
 from shutil import which
 
-from optisense.errors import OutputError, SetupError
+from optisense.errors import SetupError
+from optisense.writing import written_whole
 
 MANIFEST = "blender_manifest.toml"
 OLDEST = (4, 2)
@@ -80,24 +80,15 @@ def write_zip(path: Path) -> None:
         OutputError: the file can't be written.
     """
     folder = source_folder()
-    temporary = path.with_name(f".{path.name}.{os.getpid()}.tmp")
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        with zipfile.ZipFile(temporary, "w", zipfile.ZIP_DEFLATED) as archive:
-            for file in _files(folder):
-                entry = zipfile.ZipInfo(file.relative_to(folder).as_posix(), (2026, 1, 1, 0, 0, 0))
-                entry.compress_type = zipfile.ZIP_DEFLATED
-                entry.external_attr = 0o644 << 16
-                archive.writestr(entry, file.read_bytes())
-        temporary.replace(path)
-    except OSError as error:
-        raise OutputError(
-            f"can't write the extension: {error.strerror or error}",
-            where=str(path),
-            hint="Name another file",
-        ) from error
-    finally:
-        temporary.unlink(missing_ok=True)
+    with (
+        written_whole(path, "the extension", "Name another file") as temporary,
+        zipfile.ZipFile(temporary, "w", zipfile.ZIP_DEFLATED) as archive,
+    ):
+        for file in _files(folder):
+            entry = zipfile.ZipInfo(file.relative_to(folder).as_posix(), (2026, 1, 1, 0, 0, 0))
+            entry.compress_type = zipfile.ZIP_DEFLATED
+            entry.external_attr = 0o644 << 16
+            archive.writestr(entry, file.read_bytes())
 
 
 def _files(folder: Path) -> Iterator[Path]:
