@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import re
 import shlex
 import subprocess
@@ -62,3 +63,12 @@ def test_make_targets_exist(page: Path) -> None:
     for block in blocks(page, "console"):
         for target in re.findall(r"^\$ make ([a-z-]+)", block, re.MULTILINE):
             assert re.search(rf"^{target}:", makefile, re.MULTILINE), target
+
+
+def test_the_reference_lists_every_public_name() -> None:
+    text = (ROOT / "docs" / "api.md").read_text(encoding="utf-8")
+    packages = re.findall(r"^\.\. automodule:: (\S+)$", text, re.MULTILINE)
+    assert len(packages) > 8
+    for package in packages:  # the site shows what `dir` tells, also of names imported on first use
+        module = importlib.import_module(package)
+        assert set(getattr(module, "__all__", [])) <= set(dir(module)), package

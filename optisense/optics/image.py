@@ -79,7 +79,7 @@ class TactileImage:
         return bytes(stream.raw_buffer())
 
     def save(self, folder: str | Path, exposure: float | str = "auto") -> None:
-        """Write image.png, radiance.exr, normals.npy, contact_mask.npy, layers/*.exr and run.json.
+        """Write image.png, radiance.exr, normals.npy, contact_mask.npy, `layers/*.exr`, run.json.
 
         They are written under temporary names and appear when all are whole.
 

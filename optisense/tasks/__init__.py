@@ -70,3 +70,7 @@ def __getattr__(name: str) -> object:
     value: object = getattr(import_module(f"optisense.tasks.{_HOMES[name]}"), name)
     globals()[name] = value
     return value
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)
