@@ -17,7 +17,7 @@ WINDOW_STAMP := .blender-window/.set-up
 
 help:
 	@echo "make demo     press a ball into a GelSight Mini and write the picture and a report"
-	@echo "make test     lint, types, import rules and tests, those of the Blender extension too"
+	@echo "make test     lint, types, import rules, documentation and tests, the Blender extension too"
 	@echo "make studio-tests   only the tests of the Blender extension"
 	@echo "make test-blender   the same on Blender 4.2, 4.5 and 5.0, and by mouse and keys in a window"
 	@echo "make extension      build and validate the Blender extension: dist/optisense_studio.zip"
