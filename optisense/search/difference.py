@@ -25,8 +25,7 @@ def fingerprint(design: SensorDesign) -> str:
     for name in sorted(design.meshes):
         mesh = design.meshes[name]
         digest.update(name.encode())
-        digest.update(np.ascontiguousarray(mesh.vertices, "<f8").tobytes())
-        digest.update(np.ascontiguousarray(mesh.faces, "<i4").tobytes())
+        _digest(mesh, digest)
     for group in design.lights.values():
         if isinstance(group.emitter, IesEmitter):
             digest.update(group.emitter.path().read_bytes())
@@ -41,6 +40,29 @@ def differences(old: SensorDesign, new: SensorDesign) -> list[str]:
             said = _compare_meshes(old.meshes[name], new.meshes[name])
             if said:
                 found.append(f"mesh of part '{name}': {said}")
+    return found
+
+
+def notes(design: SensorDesign) -> dict[str, Any]:
+    """What is written down of a design (JSON-ready), to tell later where it was edited."""
+    return {
+        "values": _values(design),
+        "meshes": {
+            name: [len(mesh.vertices), len(mesh.faces), _print_of(mesh)]
+            for name, mesh in sorted(design.meshes.items())
+        },
+    }
+
+
+def differences_from(noted: dict[str, Any], new: SensorDesign) -> list[str]:
+    """What has changed in a design since its `notes` were written."""
+    found = plain_differences(noted["values"], _values(new))
+    now = notes(new)["meshes"]
+    for name, (vertices, faces, mark) in noted["meshes"].items():
+        if name in now and now[name][2] != mark:
+            same = now[name][:2] == [vertices, faces]
+            said = "vertices moved" if same else f"{faces} triangles -> {now[name][1]} triangles"
+            found.append(f"mesh of part '{name}': {said}")
     return found
 
 
@@ -88,6 +110,17 @@ def _short(value: Any) -> str:
     if isinstance(value, dict):
         return "a section"
     return f"{value:.10g}" if isinstance(value, float) else str(value)
+
+
+def _print_of(mesh: TriangleMesh) -> str:
+    digest = hashlib.sha256()
+    _digest(mesh, digest)
+    return digest.hexdigest()
+
+
+def _digest(mesh: TriangleMesh, digest: hashlib._Hash) -> None:
+    digest.update(np.ascontiguousarray(mesh.vertices, "<f8").tobytes())
+    digest.update(np.ascontiguousarray(mesh.faces, "<i4").tobytes())
 
 
 def _compare_meshes(old: TriangleMesh, new: TriangleMesh) -> str | None:

@@ -25,7 +25,13 @@ from optisense.design import SensorDesign, load_design, save_design
 from optisense.errors import OutputError, SearchError
 from optisense.library import with_own_lights
 from optisense.search.constraints import Constraint
-from optisense.search.difference import differences, fingerprint, plain_differences
+from optisense.search.difference import (
+    differences,
+    differences_from,
+    fingerprint,
+    notes,
+    plain_differences,
+)
 from optisense.search.dominance import front as front_of
 from optisense.search.evaluation import DesignEvaluator, Goal
 from optisense.search.plan import ONLY_HERE, Plan, file_prints, known_goals, known_rules
@@ -96,6 +102,8 @@ class Study:
             settings = replace(settings, fingerprint=fingerprint(design))
             store = Store(place / STORE_FILE, settings.names, new=True)
             store.set_fact("settings", settings.fingerprint_of_all())
+            store.set_fact("study", settings.comparable())
+            store.set_fact("design", notes(design))
             study = Study(place, settings, design, plan.goals, plan.space.constraints, store)
             settings.save(place)  # last: from here on it is a study
         return study
@@ -120,31 +128,22 @@ class Study:
         """
         place = Path(folder)
         settings = StudySettings.load(place)
-        own = load_design(place / DESIGN_FOLDER)
-        if fingerprint(own) != settings.fingerprint:
-            raise SearchError(
-                "the study's own copy of the design was edited since its trials were made",
-                where=str(place / DESIGN_FOLDER),
-                hint="Undo the change, or begin a new study of the edited design",
-            )
-        if design is not None:
-            changed = differences(own, with_own_lights(design))
-            if changed:
-                raise SearchError(
-                    f"the design is not the one of this study any more:\n{_listed(changed)}",
-                    where=str(place),
-                    hint="Undo the changes, or begin a new study with another --out",
-                )
         if not (place / STORE_FILE).is_file():
             raise SearchError(f"the study has no {STORE_FILE}", where=str(place))
         store = Store(place / STORE_FILE, settings.names, new=False)
-        if store.fact("settings") != settings.fingerprint_of_all():
+        try:
+            own = _as_begun(place, settings, store)
+            if design is not None:
+                changed = differences(own, with_own_lights(design))
+                if changed:
+                    raise SearchError(
+                        f"the design is not the one of this study any more:\n{_listed(changed)}",
+                        where=str(place),
+                        hint="Undo the changes, or begin a new study with another --out",
+                    )
+        except BaseException:
             store.close()
-            raise SearchError(
-                f"{STUDY_FILE} was edited since the study was begun",
-                where=str(place / STUDY_FILE),
-                hint="Undo the change, or begin a new study",
-            )
+            raise
         known = known_goals(settings, goals)
         return Study(place, settings, own, known, known_rules(settings, rules), store)
 
@@ -371,6 +370,36 @@ def _kept(folder: Path, design: SensorDesign) -> SensorDesign:
         ) from error
     save_design(design, folder / DESIGN_FOLDER)
     return load_design(folder / DESIGN_FOLDER)
+
+
+def _as_begun(folder: Path, settings: StudySettings, store: Store) -> SensorDesign:
+    """The study's own design, where neither it nor the settings were edited since it was begun.
+
+    Raises:
+        SearchError: one of them was; says what.
+    """
+    if store.fact("settings") != settings.fingerprint_of_all():
+        begun = store.fact("study")
+        raise SearchError(
+            f"{STUDY_FILE} was edited since the study was begun"
+            + _told(plain_differences(begun, settings.comparable()) if begun else []),
+            where=str(folder / STUDY_FILE),
+            hint="Undo the change, or begin a new study",
+        )
+    own = load_design(folder / DESIGN_FOLDER)
+    if fingerprint(own) != settings.fingerprint:
+        noted = store.fact("design")
+        raise SearchError(
+            "the study's own copy of the design was edited since its trials were made"
+            + _told(differences_from(noted, own) if noted else []),
+            where=str(folder / DESIGN_FOLDER),
+            hint="Undo the change, or begin a new study of the edited design",
+        )
+    return own
+
+
+def _told(changed: list[str]) -> str:
+    return f":\n{_listed(changed)}" if changed else ""
 
 
 def _listed(changed: list[str]) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -132,6 +133,32 @@ def test_an_edited_design_is_refused(study: Path, tmp_path: Path) -> None:
     result = run(tmp_path, "--resume", "--out", study)
     assert result.exit_code == 2
     assert "-> 12" in result.output
+
+
+def test_a_study_that_was_edited_is_refused_with_the_difference(
+    study: Path, tmp_path: Path
+) -> None:
+    copy = tmp_path / "study"
+    shutil.copytree(study, copy)
+    design = copy / "design"
+    edited = ots.set_value(ots.load_design(design), "lights.red.flux", 12.0)
+    edited.meshes["gel"].vertices[0] += 0.01
+    ots.save_design(edited, design)
+    result = run("--resume", "--out", copy)
+    assert result.exit_code == 2
+    flux = ots.load("gelsight-mini").lights["red"].flux
+    assert f"lights.red.flux: {flux:g} -> 12" in result.output
+    assert "mesh of part 'gel': vertices moved" in result.output
+    assert len(result.output.splitlines()) < 8  # no more than what was edited
+
+    shutil.rmtree(design)
+    shutil.copytree(study / "design", design)
+    assert run("--resume", "--out", copy).exit_code == 0
+    settings = copy / "study.json"
+    settings.write_text(settings.read_text().replace('"method": "grid"', '"method": "random"'))
+    result = run("--resume", "--out", copy)
+    assert result.exit_code == 2
+    assert "method: grid -> random" in result.output
 
 
 @pytest.mark.parametrize(
