@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -67,7 +68,7 @@ def experiment(
         return
 
     from optisense.cli.output_folder import ensure_writable
-    from optisense.experiments import find, run, write_page
+    from optisense.experiments import find, prepare, run, write_page
     from optisense.experiments.bench import Bench
     from optisense.search.executors import processors
 
@@ -78,21 +79,24 @@ def experiment(
     if page is not None:
         ensure_writable(page.parent)
     count = min(processors(), MOST_WORKERS) if workers is None else workers
-    for each in chosen:
-        with _progress_bar(each.name) as show:
-            bench = Bench(out, count, show)
-            try:
-                result = run(each, bench, quick, seeds)
-            except KeyboardInterrupt:
-                messages.print(
-                    f"interrupted: what is finished is kept in {out}; the same command goes on"
-                )
-                raise typer.Exit(EXIT_INTERRUPTED) from None
-        _print_result(each, result, out)
+    try:
+        if len(chosen) > 1:
+            with _progress(name) as show:
+                prepare(chosen, Bench(out, count, show), quick, seeds)
+        for each in chosen:
+            with _progress(each.name) as show:
+                result = run(each, Bench(out, count, show), quick, seeds)
+            _print_result(each, result, out)
+    except KeyboardInterrupt:
+        messages.print(f"interrupted: what is finished is kept in {out}; the same command goes on")
+        raise typer.Exit(EXIT_INTERRUPTED) from None
     if page is not None:
         write_page(page, out, chosen)
         output.print(f"page: {page}", markup=False)
 
+
+LOG_EVERY = 30.0
+"""Seconds between lines of progress where there is no terminal."""
 
 MOST_WORKERS = 8
 """Unless the user says otherwise: each takes two gigabytes."""
@@ -118,14 +122,17 @@ def _print_result(experiment: Experiment, result: dict[str, Any], out: Path) -> 
         output.print(f"                  {claim['here']}", markup=False)
     if result["gaps"]:
         output.print(f"  {len(result['gaps'])} without a score; see the text", markup=False)
-    minutes = result["seconds"]["this_run"] / 60.0
-    told = f"  {result['units']} evaluations, {minutes:.1f} minutes"
+    minutes = result["seconds"]["processor"] / 60.0
+    told = f"  {result['units']} evaluations, {minutes:.1f} processor minutes"
     output.print(f"{told}; results: {out / experiment.name}", markup=False)
 
 
 @contextmanager
-def _progress_bar(what: str) -> Iterator[Callable[[int, int, str], None]]:
-    """A bar on standard error; silent when that is no terminal."""
+def _progress(what: str) -> Iterator[Callable[[int, int, str], None]]:
+    """On standard error: a bar on a terminal, elsewhere a line now and then."""
+    if not messages.is_terminal:
+        yield _Lines(what)
+        return
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
     with Progress(
@@ -136,7 +143,6 @@ def _progress_bar(what: str) -> Iterator[Callable[[int, int, str], None]]:
         TextColumn("{task.fields[label]}"),
         console=messages,
         transient=True,
-        disable=not messages.is_terminal,
     ) as bar:
         task = bar.add_task(what, total=None, label="")
 
@@ -144,3 +150,19 @@ def _progress_bar(what: str) -> Iterator[Callable[[int, int, str], None]]:
             bar.update(task, completed=done, total=count, label=label)
 
         yield show
+
+
+class _Lines:
+    """A line for a log, such as ``all: 120 of 431, 14.2 min, cylinder, seed 1``."""
+
+    def __init__(self, what: str) -> None:
+        self._what = what
+        self._began = self._told = time.monotonic()
+
+    def __call__(self, done: int, count: int, label: str) -> None:
+        now = time.monotonic()
+        if not label or now - self._told < LOG_EVERY:
+            return
+        self._told = now
+        minutes = (now - self._began) / 60.0
+        messages.print(f"{self._what}: {done} of {count}, {minutes:.1f} min, {label}", markup=False)

@@ -6,7 +6,7 @@ they find, and holds these against the paper's statements. Settings are in a YAM
 
 from optisense.experiments.bench import Bench
 from optisense.experiments.claims import Claim, Table
-from optisense.experiments.experiment import Experiment, Finding, run
+from optisense.experiments.experiment import Experiment, Finding, prepare, run
 from optisense.experiments.registry import EXPERIMENTS, find
 from optisense.experiments.text import write_page
 from optisense.experiments.unit import Found, Record, Unit
@@ -22,6 +22,7 @@ __all__ = [
     "Table",
     "Unit",
     "find",
+    "prepare",
     "run",
     "write_page",
 ]

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from optisense.errors import ExperimentError
+from optisense.experiments.shares import shares
 from optisense.experiments.unit import Record, Unit, kept, work_out
 from optisense.search.executors import ProcessPool
 from optisense.search.outcome import Outcome
@@ -20,6 +21,10 @@ Tell = Callable[[int, int, str], None]
 
 TICK = 0.2
 """Seconds between looks at the keyboard while other processes work."""
+
+
+Finished = queue.SimpleQueue[tuple[list[Unit], Future[Outcome]]]
+"""Shares of units that processes are done with."""
 
 
 class Bench:
@@ -51,41 +56,42 @@ class Bench:
         }
         done = len(set(keys)) - len(missing)
         self._tell(done, done + len(missing), "")
-        shared = [unit for unit in missing.values() if not unit.alone]
-        if self.workers > 1 and len(shared) > 1:
-            done = self._by_pool(shared, done, done + len(missing))
-            shared = []
-        for unit in [*shared, *(unit for unit in missing.values() if unit.alone)]:
+        together = shares(unit for unit in missing.values() if not unit.alone)
+        if self.workers > 1 and len(together) > 1:
+            done = self._by_pool(together, done, done + len(missing))
+            together = []
+        alone = [unit for unit in missing.values() if unit.alone]
+        for unit in [*(unit for share in together for unit in share), *alone]:
             self._tell(done, len(set(keys)), unit.label)
             work_out(unit, self.folder)
             done += 1
             self._tell(done, len(set(keys)), unit.label)
         return [self._kept(unit) for unit in units]
 
-    def _by_pool(self, units: Sequence[Unit], done: int, count: int) -> int:
-        finished: queue.SimpleQueue[tuple[Unit, Future[Outcome]]] = queue.SimpleQueue()
+    def _by_pool(self, together: Sequence[list[Unit]], done: int, count: int) -> int:
+        finished: Finished = queue.SimpleQueue()
 
-        def hand_over(unit: Unit, future: Future[Outcome]) -> None:
-            finished.put((unit, future))
+        def hand_over(share: list[Unit], future: Future[Outcome]) -> None:
+            finished.put((share, future))
 
-        with ProcessPool(_Worker(units, self.folder), min(self.workers, len(units))) as pool:
-            for number, unit in enumerate(units):
+        worker = _Worker(together, self.folder)
+        with ProcessPool(worker, min(self.workers, len(together))) as pool:
+            for number, share in enumerate(together):
                 future = pool.submit(np.array([float(number)]), 0)
-                future.add_done_callback(lambda f, unit=unit: hand_over(unit, f))  # type: ignore[misc]
-            for _ in units:
-                unit, future = self._wait(finished)
+                future.add_done_callback(lambda f, share=share: hand_over(share, f))  # type: ignore[misc]
+            for _ in together:
+                share, future = self._wait(finished)
                 outcome = future.result()
                 if outcome.failure is not None:
-                    raise ExperimentError(f"{unit.label} can't be worked out: {outcome.failure}")
-                done += 1
-                self._tell(done, count, unit.label)
+                    names = " or ".join(unit.label for unit in share)
+                    raise ExperimentError(f"{names} can't be worked out: {outcome.failure}")
+                done += len(share)
+                self._tell(done, count, share[-1].label)
         return done
 
     @staticmethod
-    def _wait(
-        finished: queue.SimpleQueue[tuple[Unit, Future[Outcome]]],
-    ) -> tuple[Unit, Future[Outcome]]:
-        """The next finished unit; Ctrl-C gets through."""
+    def _wait(finished: Finished) -> tuple[list[Unit], Future[Outcome]]:
+        """The next finished share; Ctrl-C gets through."""
         while True:
             try:
                 return finished.get(timeout=TICK)
@@ -102,15 +108,17 @@ class Bench:
 
 
 class _Worker:
-    """What a process of the pool calls: works out a unit by its number."""
+    """What a process of the pool calls: works out a share of units by its number."""
 
     renders = True
 
-    def __init__(self, units: Sequence[Unit], folder: Path) -> None:
-        self._units = list(units)
+    def __init__(self, together: Sequence[list[Unit]], folder: Path) -> None:
+        self._shares = list(together)
         self._folder = folder
 
     def __call__(self, vector: NDArray[np.float64], seed: int) -> Outcome:
-        """See `optisense.search.evaluation.Evaluator`; what was found is in the unit's file."""
-        work_out(self._units[int(vector[0])], self._folder)
+        """See `optisense.search.evaluation.Evaluator`; what was found is in the units' files."""
+        for unit in self._shares[int(vector[0])]:
+            if kept(unit, self._folder) is None:  # it may be there: of a process that died
+                work_out(unit, self._folder)
         return Outcome({})

@@ -7,7 +7,6 @@ the answer does not depend on what was asked before.
 
 from __future__ import annotations
 
-import itertools
 import math
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
@@ -32,6 +31,8 @@ NINE = "nine balls"
 """As contacts: the balls that objectives press."""
 
 _keepers: dict[tuple[Any, ...], ModelKeeper] = {}
+_current: dict[tuple[Any, ...], tuple[str, OpticalModel]] = {}
+"""The model that a keeper gave last, with its change as text."""
 
 
 def sensor(name: str, change: Plain | None = None, **dimensions: Any) -> dict[str, Any]:
@@ -61,7 +62,7 @@ def scores(inputs: Plain, folder: Path) -> Found:
     An objective that fails leaves a gap among `scores` and its reason among `failures`.
     """
     model = _model(inputs["design"], lit=not set(inputs["objectives"]) <= RAYS_ONLY)
-    found = evaluate(model, list(inputs["objectives"]), **_tuples(inputs["settings"]))
+    found = evaluate(model, list(inputs["objectives"]), **tuples(inputs["settings"]))
     return Found(_scores(found))
 
 
@@ -75,7 +76,7 @@ def relit_scores(inputs: Plain, folder: Path) -> Found:
     from optisense.objectives.relighting import Relighting
 
     model = _model(inputs["design"], lit=True)
-    relighting = Relighting(Evaluation(model, Settings(**_tuples(inputs["settings"]))))
+    relighting = Relighting(Evaluation(model, Settings(**tuples(inputs["settings"]))))
     found, own = {}, inputs["own"]
     for letters in inputs["colourings"]:
         design = coloured(model.design, inputs["groups"], letters)
@@ -99,7 +100,7 @@ def variants_of_score(inputs: Plain, folder: Path) -> Found:
     `design`, `objective`, `variants` (settings by name), `settings` of the images.
     """
     model = _model(inputs["design"], lit=True)
-    evaluation = Evaluation(model, Settings(**_tuples(inputs["settings"])))
+    evaluation = Evaluation(model, Settings(**tuples(inputs["settings"])))
     found = {
         name: evaluate(evaluation, inputs["objective"], **own)
         for name, own in inputs["variants"].items()
@@ -209,7 +210,7 @@ def searched(inputs: Plain, folder: Path) -> Found:
         budget=inputs.get("budget"),
         seed=inputs["seed"],
         options=inputs.get("options"),
-        settings=_tuples(inputs["settings"]),
+        settings=tuples(inputs["settings"]),
         out=study,
         resume=(study / "study.json").is_file(),
     )
@@ -232,49 +233,6 @@ def searched(inputs: Plain, folder: Path) -> Found:
     return Found(found)
 
 
-def image_times(inputs: Plain, folder: Path) -> Found:
-    """How long an image takes: `design`, `resolution`, `photons`, `seeds`, `ball` (radius, depth).
-
-    For each seed an image with new light and one more with the same light; before them one that is
-    not counted, for which kernels are compiled and the photon guide is learned. The noise is what
-    two seeds differ by in the contact, in relation to the mean there, over the square root of 2.
-    """
-    import time
-
-    from optisense.geometry import Sphere
-    from optisense.optics import OpticalModel
-
-    radius, depth = inputs["ball"]
-    began = time.perf_counter()
-    model = OpticalModel(design_of(inputs["design"]))
-    contact = model.nine_contacts(Sphere(radius), depth)[4]
-    images, times = [], {"new_light": [], "light_kept": []}  # type: ignore[var-annotated]
-    size, photons = tuple(inputs["resolution"]), inputs["photons"]
-    model.render([contact], size, photons, seed=10_000)
-    first = time.perf_counter() - began
-    for seed in inputs["seeds"]:
-        for name in times:
-            clock, spent = time.perf_counter(), time.process_time()
-            image = model.render([contact], size, photons, seed=seed)
-            if image.interrupted:
-                raise KeyboardInterrupt
-            times[name].append([time.perf_counter() - clock, time.process_time() - spent])
-        images.append(image)
-    noises = [
-        _difference(one.radiance, other.radiance, one.contact_mask & other.contact_mask)
-        for one, other in itertools.pairwise(images)
-    ]
-    return Found(
-        {
-            "first": first,
-            **times,
-            "noise": noises,
-            "photons": images[0].settings["photons"],
-            "pixels_in_contact": int(images[0].contact_mask.sum()),
-        }
-    )
-
-
 def coloured(design: SensorDesign, groups: Sequence[str], letters: str) -> SensorDesign:
     """A design whose light groups are red, green or blue."""
     shares = {"R": (1.0, 0.0, 0.0), "G": (0.0, 1.0, 0.0), "B": (0.0, 0.0, 1.0)}
@@ -283,15 +241,9 @@ def coloured(design: SensorDesign, groups: Sequence[str], letters: str) -> Senso
     return design
 
 
-def _difference(one: Any, other: Any, mask: Any) -> float:
-    a, b = one[mask].astype(np.float64), other[mask].astype(np.float64)
-    lit = (a + b).sum(axis=0) > 0.0
-    return float(np.sqrt(((a - b)[:, lit] ** 2).mean() / 2.0) / (0.5 * (a + b)[:, lit].mean()))
-
-
 def _base(plain: Plain) -> SensorDesign:
     builder: Callable[..., SensorDesign] = BUILDERS[plain["sensor"]]
-    return builder(**_tuples(plain["dimensions"]))
+    return builder(**tuples(plain["dimensions"]))
 
 
 def _changed(design: SensorDesign, plain: Plain) -> SensorDesign:
@@ -307,15 +259,22 @@ def _changed(design: SensorDesign, plain: Plain) -> SensorDesign:
 
 
 def _model(plain: Plain, lit: bool) -> OpticalModel:
-    """A model of a design; the one given before must not be used any more."""
+    """A model of a design; the one given before must not be used any more.
+
+    The design asked for last comes with the light that was traced for it.
+    """
     from optisense.objectives.score import json_ready
 
     key = (plain["sensor"], repr(json_ready(plain["dimensions"])), lit)
     if key not in _keepers:
         _keepers.clear()  # two models are more than many machines have memory for
+        _current.clear()
         _keepers[key] = ModelKeeper(_base(plain), lit=lit)
-    keeper = _keepers[key]
-    return keeper.model(_changed(keeper.first, plain))
+    keeper, change = _keepers[key], repr(json_ready(plain["change"]))
+    if key not in _current or _current[key][0] != change:
+        _current.pop(key, None)
+        _current[key] = (change, keeper.model(_changed(keeper.first, plain)))
+    return _current[key][1]
 
 
 def _contact(text: str) -> Contact:
@@ -361,7 +320,7 @@ def _space(plain: Plain) -> dict[str, Any]:
     }
 
 
-def _tuples(values: Plain) -> dict[str, Any]:
+def tuples(values: Plain) -> dict[str, Any]:
     """Lists as tuples, which builders and settings want."""
     return {
         name: tuple(tuple(v) if isinstance(v, list) else v for v in value)

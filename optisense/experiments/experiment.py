@@ -89,6 +89,22 @@ class Experiment:
         return chosen
 
 
+def prepare(
+    experiments: Sequence[Experiment], bench: Bench, quick: bool = False, seeds: int | None = None
+) -> None:
+    """Work out what several experiments ask first, all in one go.
+
+    Running each of them then finds its answers kept. Processes start once, and units of one sensor
+    share its scene and light, whichever experiment asks for them.
+
+    Raises:
+        OptiSenseError: a unit can't be worked out, or its answer not kept.
+    """
+    bench.run(
+        [unit for each in experiments for unit in next(each.steps(each.settings(quick, seeds)))]
+    )
+
+
 def run(
     experiment: Experiment, bench: Bench, quick: bool = False, seeds: int | None = None
 ) -> Values:
@@ -100,11 +116,13 @@ def run(
     settings = experiment.settings(quick, seeds)
     began = time.perf_counter()
     records: list[Record] = []
+    units: list[Unit] = []
     steps = experiment.steps(settings)
     batch = next(steps)
     while True:
         answers = bench.run(batch)
         records += answers
+        units += batch
         try:
             batch = steps.send(answers)
         except StopIteration as end:
@@ -123,6 +141,10 @@ def run(
                 "this_run": round(time.perf_counter() - began, 1),
             },
             "units": len(records),
+            "spent": {
+                unit.key: [record.seconds, record.processor_seconds, unit.alone]
+                for unit, record in zip(units, records, strict=True)
+            },
             "numbers": finding.numbers,
             "claims": [claim.to_plain() for claim in experiment.claims(finding.numbers)],
             "gaps": gaps(records),

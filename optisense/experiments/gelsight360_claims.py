@@ -106,15 +106,19 @@ def _alike(colourings: Values) -> Claim:
 
 
 def _tips(tips: Values, with_leaps: Values) -> list[Claim]:
-    top, _ = best(tips)
+    top, alike = best(tips)
     near = {str(PAPERS_TIP + step) for step in (-1, 0, 1)}
-    leaping = with_leaps[top]["mean"] if top is not None else None
     score = None if top is None else float(tips[top]["mean"])
+    told: bool | None = None
+    if top is not None:
+        told = top in near or (None if near & set(alike) else False)
     return [
         Claim(
             f"Of the tips 0 (flat) to 10 (conical), {PAPERS_TIP} has the best 2to3PW.",
-            "no scores" if top is None else f"tip {top}",
-            None if top is None else top in near,
+            "no scores"
+            if top is None
+            else f"tip {top} ({shown(tips[top])}); alike: {_all_but(alike, top)}",
+            told,
             "What lies between the ends of the family is our choice, and so are height and width "
             "of the tip. 2to3PW grows with the evenness of the whole picture, so the wall and the "
             "field of the camera count as much as the tip does. A neighbour of the paper's number "
@@ -122,7 +126,10 @@ def _tips(tips: Values, with_leaps: Values) -> list[Claim]:
         ),
         Claim(
             f"Its 2to3PW is {PAPERS_TIP_SCORE:g}.",
-            f"{number(score)}; {number(leaping)} with triangles that leap over a fold or a gap",
+            "no scores"
+            if top is None
+            else f"{shown(tips[top])}; {shown(with_leaps[top])} with triangles that leap over a "
+            "fold or a gap",
             None if score is None else abs(score - PAPERS_TIP_SCORE) <= 0.5 * PAPERS_TIP_SCORE,
             "A ratio as small as the paper's means that areas scatter by many times their mean, as "
             "they do where some triangles are huge: at grazing rays, and where neighbouring pixels "

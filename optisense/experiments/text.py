@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import shutil
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -112,12 +112,14 @@ def write_page(page: Path, results: Path, experiments: list[Experiment]) -> None
     beside = page.with_suffix("")
     beside.mkdir(parents=True, exist_ok=True)
     chapters, rows, counts = [], [], dict.fromkeys((AGREES, DISAGREES, OPEN), 0)
+    spent: dict[str, list[float]] = {}
     for experiment in experiments:
         result = read_result(results / experiment.name)
         name = experiment.name
         write_text(beside / f"{name}.json", (results / name / RESULT).read_text("utf-8"))
         shutil.copyfile(results / name / PICTURE, beside / f"{name}.png")
         chapters.append(chapter(experiment, result, f"{beside.name}/{name}.png"))
+        spent |= result["spent"]
         verdicts = [claim["verdict"] for claim in result["claims"]]
         for verdict in verdicts:
             counts[verdict] += 1
@@ -129,8 +131,26 @@ def write_page(page: Path, results: Path, experiments: list[Experiment]) -> None
         INTRODUCTION,
         "\n".join(["| experiment | the paper's statements |", "| --- | --- |", *rows]),
         f"In all: {', '.join(_counted(count, verdict) for verdict, count in counts.items())}.",
+        _took(spent.values()),
     ]
     write_text(page, "\n\n".join([*head, *(text.rstrip() for text in chapters)]) + "\n")
+
+
+def _took(spent: Iterable[Sequence[float]]) -> str:
+    """What all evaluations took; each counts once, however many experiments ask for it.
+
+    Args:
+        spent: wall seconds, processor seconds and whether nothing ran beside it.
+    """
+    rows = list(spent)
+    shared = sum(wall for wall, _, alone in rows if not alone)
+    alone = sum(wall for wall, _, alone in rows if alone)
+    processor = sum(seconds for _, seconds, _ in rows)
+    return (
+        f"{len(rows)} evaluations, by the times kept with them: {processor / 60:.0f} processor "
+        f"minutes, which two processes side by side take {(shared / 2 + alone) / 60:.0f} minutes "
+        "for."
+    )
 
 
 def _counted(number: int, verdict: str) -> str:

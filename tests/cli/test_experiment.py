@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import pytest
 from typer.testing import CliRunner
 
 from optisense.cli import app
-from optisense.experiments import EXPERIMENTS
+from optisense.experiments import EXPERIMENTS, Unit
 
 runner = CliRunner()
 
@@ -42,6 +43,38 @@ def test_a_folder_that_cannot_be_written_is_told_before_any_work(tmp_path: Path)
 
 def test_no_seeds_make_no_sense() -> None:
     assert runner.invoke(app, ["experiment", "speed", "--seeds", "0"]).exit_code == 2
+
+
+def test_all_are_prepared_in_one_go_and_lines_tell_where_there_is_no_terminal(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from optisense.search.executors.pool import ProcessPool
+
+    asked: list[str] = []
+
+    def fail(unit: Unit, folder: Path) -> None:
+        asked.append(unit.label)
+        if unit.alone:  # all that is asked first and shares the machine has been asked
+            raise KeyboardInterrupt
+        kept_failure(unit, folder)
+
+    monkeypatch.setattr("optisense.experiments.bench.work_out", fail)
+    monkeypatch.setattr("optisense.cli.experiment.LOG_EVERY", 0.0)
+    monkeypatch.setattr(ProcessPool, "__init__", lambda *_: pytest.fail("one process is asked for"))
+    command = ["experiment", "all", "--quick", "--workers", "1", "--out", str(tmp_path)]
+    result = runner.invoke(app, command)
+    assert result.exit_code == 130
+    for words in ("cylinder, specularity", "light design", "resin 0", "CMA-ES", "tasks on", "tip"):
+        assert any(words in label for label in asked)
+    assert f"all: {len(asked) - 1} of " in result.stderr
+
+
+def kept_failure(unit: Unit, folder: Path) -> None:
+    """As `work_out` does where the work fails."""
+    record = {"values": {}, "failure": "made up", "seconds": 1.0, "processor_seconds": 1.0}
+    path = folder / "units" / f"{unit.key}.json"
+    path.parent.mkdir(exist_ok=True)
+    path.write_text(json.dumps({**record, "pictures": []}))
 
 
 @pytest.mark.slow

@@ -56,8 +56,9 @@ def values(unit: Unit, score: Score) -> dict[str, Any]:
     if kind == "searched":
         return searched(asked, score)
     assert kind == "image_times"
-    times = [[2.0 + 0.1 * k, 3.9] for k in range(len(asked["seeds"]))]
-    noise = [0.03] * (len(times) - 1)
+    sizes = len(asked["resolutions"])
+    times = [[[2.0 + 0.1 * k, 3.9]] * sizes for k in range(len(asked["seeds"]))]
+    noise = [[0.03] * sizes] * (len(times) - 1)
     about = {"photons": 5_000_000, "first": 6.0, "noise": noise, "pixels_in_contact": 99}
     return {**about, "new_light": times, "light_kept": times}
 

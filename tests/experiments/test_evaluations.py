@@ -15,7 +15,6 @@ from optisense.experiments.evaluations import (
     NINE,
     axes_ratio,
     design_of,
-    image_times,
     perception,
     picture,
     relit_scores,
@@ -27,6 +26,7 @@ from optisense.experiments.evaluations import (
 )
 from optisense.experiments.gelsight360 import every_colouring
 from optisense.experiments.objects import OBJECTS
+from optisense.experiments.timing import image_times
 
 IMAGES = {"resolution": [160, 120], "photons": 60_000, "seed": 3}
 SAME = 1e-6
@@ -188,14 +188,18 @@ def test_all_colourings_are_told_by_their_letters(tmp_path: Path) -> None:
 def test_times_of_images(tmp_path: Path) -> None:
     asked: dict[str, Any] = {
         "design": sensor("gelsight-mini"),
-        "resolution": [80, 60],
+        "resolutions": [[80, 60], [120, 90]],
         "photons": 60_000,
         "seeds": [0, 1],
         "ball": [1.5, 0.5],
     }
     found = image_times(asked, tmp_path).values
-    assert len(found["new_light"]) == len(found["light_kept"]) == 2
-    assert found["first"] > 0.0 and 0.0 < found["noise"][0] < 1.0
+    for kind in ("new_light", "light_kept"):
+        assert np.shape(found[kind]) == (2, 2, 2)  # seeds, resolutions, wall and processor
+    light = np.subtract(found["new_light"], found["light_kept"])
+    assert light[:, 0] == pytest.approx(light[:, 1])
+    assert (light[..., 1] > 0.0).all()  # processor seconds
+    assert found["first"] > 0.0 and all(0.0 < noise < 1.0 for noise in found["noise"][0])
 
 
 def _tuples(values: Mapping[str, Any]) -> dict[str, Any]:

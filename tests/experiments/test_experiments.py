@@ -30,7 +30,11 @@ def result_of(experiment: Experiment, numbers: dict[str, Any], quick: bool) -> d
             "settings": experiment.settings(quick),
             "versions": {},
             "seconds": {"units": 1.0, "processor": 2.0, "this_run": 1.0},
-            "units": 5,
+            "units": 2,
+            "spent": {
+                "shared by two": [60.0, 55.0, False],
+                f"of {experiment.name}": [30.0, 59.0, True],
+            },
             "numbers": numbers,
             "claims": [claim.to_plain() for claim in experiment.claims(numbers)],
             "gaps": [],
@@ -192,6 +196,8 @@ def test_the_page_collects_results_beside_it(answered: Answered, tmp_path: Path)
     page.parent.mkdir()
     write_page(page, tmp_path / "out", several)
     text = page.read_text()
+    assert "3 evaluations" in text and "3 processor minutes" in text  # 55 s + 2 x 59 s
+    assert "take 2 minutes" in text  # 60 s / 2 + 2 x 30 s, to the minute
     for target in re.findall(r"!\[[^]]*\]\(([^)]+)\)", text):
         assert (page.parent / target).is_file()
     assert sorted(p.name for p in (page.parent / "experiments").iterdir()) == sorted(

@@ -1,0 +1,241 @@
+"""What is asked of each geometry of a sensor, and the margins of the paper's conclusions there."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from optisense.experiments import (
+    gelbelt_lights,
+    gelsight360,
+    gelsight360_claims,
+    svelte_mirror,
+)
+from optisense.experiments.evaluations import NINE, picture, relit_scores, scores, sensor
+from optisense.experiments.experiment import Values
+from optisense.experiments.mini_shapes import OBJECTIVES
+from optisense.experiments.unit import Record, Unit
+
+LOW, HIGH = "0.2", "0.6"
+"""Specularities of the Mini's coating that are compared."""
+
+PRESS_DEPTH = "press_depth"
+"""mm, of the objectives' balls: not a dimension of the sensor, but the paper gives none."""
+
+TIMES = 2.0
+"""AOAP must grow so many times by the search (in the paper: 2.7 times)."""
+
+Dimensions = Mapping[str, Any]
+"""Arguments of a sensor's builder."""
+
+
+@dataclass(frozen=True)
+class Question:
+    """What is asked of one geometry of a sensor, and the margins that follow.
+
+    Attributes:
+        sensor: a built-in one.
+        conclusions: what the paper says, by a short name.
+        units: of dimensions, settings and a seed.
+        margins: by the conclusions' names, of the records of these units.
+        has_chance: whether seeds matter.
+    """
+
+    sensor: str
+    conclusions: Mapping[str, str]
+    units: Callable[[Dimensions, Values, int], list[Unit]]
+    margins: Callable[[Sequence[Record], Values], dict[str, float | None]]
+    has_chance: bool = True
+
+
+def _mini_units(dimensions: Dimensions, settings: Values, seed: int) -> list[Unit]:
+    own = {key: value for key, value in dimensions.items() if key != PRESS_DEPTH}
+    if PRESS_DEPTH in dimensions:
+        settings = {**settings, "depth": dimensions[PRESS_DEPTH]}
+    designs = [
+        sensor("gelsight-mini-cylindrical", {"coating.specularity": float(value)}, **own)
+        for value in (LOW, HIGH)
+    ]
+    settings = {**settings, "photons": settings["mini_photons"]}
+    return [_score(design, settings, seed) for design in designs]
+
+
+def _mini_margins(records: Sequence[Record], settings: Values) -> dict[str, float | None]:
+    low, high = records
+    return {f"mini {name}": _difference(low, high, name) for name in OBJECTIVES}
+
+
+def _belt_units(dimensions: Dimensions, settings: Values, seed: int) -> list[Unit]:
+    belt = {**settings, "resolution": settings["belt_resolution"]}
+    designs = [sensor("gelbelt", light_design=number, **dimensions) for number in (3, 2, 1)]
+    light = [
+        Unit(
+            picture,
+            {
+                "design": design,
+                "contacts": NINE,
+                "resolution": [120, 90],
+                "photons": settings["photons"],
+                "seed": seed,
+            },
+            "light",
+        )
+        for design in (designs[0], designs[2])
+    ]
+    return [*(_score(design, belt, seed) for design in designs[:2]), *light]
+
+
+def _belt_margins(records: Sequence[Record], settings: Values) -> dict[str, float | None]:
+    third, second, bright, dark = records
+    found = {f"belt {name}": _difference(third, second, name) for name in OBJECTIVES}
+    lit = [record.values.get("radiance") for record in (bright, dark)]
+    found["belt light"] = (
+        None if lit[0] is None or lit[1] is None else gelbelt_lights.DARK - lit[1] / lit[0]
+    )
+    return found
+
+
+def _colour_units(dimensions: Dimensions, settings: Values, seed: int) -> list[Unit]:
+    return [
+        Unit(
+            relit_scores,
+            {
+                "design": sensor("gelsight360", **dimensions),
+                "groups": gelsight360.GROUPS,
+                "colourings": list(gelsight360_claims.PAPER),
+                "objectives": ["normdiff"],
+                "settings": {
+                    "resolution": settings["fingertip_resolution"],
+                    "photons": settings["photons"],
+                    "seed": seed,
+                },
+                "own": {"least_pixels": settings["least_pixels"]},
+            },
+            "colourings",
+        )
+    ]
+
+
+def _colour_margins(records: Sequence[Record], settings: Values) -> dict[str, float | None]:
+    found = records[0].values.get("colourings", {})
+
+    def score(letters: str) -> float | None:
+        value = found.get(letters, {}).get("scores", {}).get("normdiff")
+        return None if value is None else float(value)
+
+    first, other = score("RGBRGBRG"), score("GRRGGRRG")
+    return {"colours": None if first is None or other is None else first - other}
+
+
+def _tip_units(dimensions: Dimensions, settings: Values, seed: int) -> list[Unit]:
+    return [
+        Unit(
+            scores,
+            {
+                "design": sensor("gelsight360", tip_design=float(tip), **dimensions),
+                "objectives": ["2to3pw"],
+                "settings": {"ray_resolution": gelsight360.ray_grid(settings, seed)},
+            },
+            f"tip {tip}",
+        )
+        for tip in settings["tips"]
+    ]
+
+
+def _tip_margins(records: Sequence[Record], settings: Values) -> dict[str, float | None]:
+    near: list[float] = []
+    far: list[float] = []
+    for tip, record in zip(settings["tips"], records, strict=True):
+        value = record.values.get("scores", {}).get("2to3pw")
+        if value is not None:
+            (near if abs(tip - gelsight360_claims.PAPERS_TIP) <= 1 else far).append(float(value))
+    return {"tip": max(near) - max(far) if near and far else None}
+
+
+def _mirror_units(dimensions: Dimensions, settings: Values, seed: int) -> list[Unit]:
+    return [
+        svelte_mirror.search_unit(
+            "gradient",
+            settings["mirror_trials"],
+            0,
+            settings["mirror_resolution"],
+            sensor("gelsight-svelte", **dimensions),
+        )
+    ]
+
+
+def _mirror_margins(records: Sequence[Record], settings: Values) -> dict[str, float | None]:
+    values = records[0].values
+    if "best" not in values:
+        return {"mirror": None}
+    return {"mirror": values["best"]["aoap"] - TIMES * values["start"]["aoap"]}
+
+
+def _score(design: Values, settings: Values, seed: int) -> Unit:
+    return Unit(
+        scores,
+        {
+            "design": design,
+            "objectives": list(OBJECTIVES),
+            "settings": {
+                "resolution": settings["resolution"],
+                "photons": settings["photons"],
+                "seed": seed,
+                **({"depth": settings["depth"]} if "depth" in settings else {}),
+            },
+        },
+        f"seed {seed}",
+    )
+
+
+def _difference(one: Record, other: Record, name: str) -> float | None:
+    values = [record.values.get("scores", {}).get(name) for record in (one, other)]
+    return None if None in values else float(values[0]) - float(values[1])
+
+
+QUESTIONS = (
+    Question(
+        "gelsight-mini-cylindrical",
+        {
+            f"mini {name}": f"On the cylindrical Mini a specularity of {LOW} is better than {HIGH} "
+            f"by {title}."
+            for name, title in OBJECTIVES.items()
+        },
+        _mini_units,
+        _mini_margins,
+    ),
+    Question(
+        "gelbelt",
+        {
+            **{
+                f"belt {name}": f"GelBelt's light design 3 is better than 2 by {title}."
+                for name, title in OBJECTIVES.items()
+            },
+            "belt light": "GelBelt's light design 1 brings less than "
+            f"{100 * gelbelt_lights.DARK:g} % of design 3's light to the belt.",
+        },
+        _belt_units,
+        _belt_margins,
+    ),
+    Question(
+        "gelsight360",
+        {"colours": "GelSight360's colouring RGBRGBRG is better than the original by NormDiff."},
+        _colour_units,
+        _colour_margins,
+    ),
+    Question(
+        "gelsight360",
+        {"tip": "GelSight360's tip with the best 2to3PW is 6, or next to it."},
+        _tip_units,
+        _tip_margins,
+    ),
+    Question(
+        "gelsight-svelte",
+        {"mirror": f"Bending GelSight Svelte's mirror makes AOAP {TIMES:g} times as large."},
+        _mirror_units,
+        _mirror_margins,
+        has_chance=False,
+    ),
+)
+CONCLUSIONS = {name: text for question in QUESTIONS for name, text in question.conclusions.items()}
