@@ -141,10 +141,11 @@ def _score(
 ) -> None:
     """Score with one seed, objective by objective, so that Ctrl-C keeps what is finished."""
     from optisense.objectives import Evaluation, Settings
+    from optisense.objectives.registry import pixels_read
     from optisense.objectives.run import run_objective, split_settings
 
     shared, own = split_settings(settings, objectives)
-    evaluation = Evaluation(model, Settings(**shared), show)
+    evaluation = Evaluation(model, Settings(**shared), show, pixels_read(objectives, own))
     scores = scored.add(evaluation)
     for each in objectives:
         show(0.0, each.title)

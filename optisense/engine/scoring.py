@@ -60,7 +60,7 @@ def objectives(session: Session, fields: Nothing, job: Job) -> dict[str, Any]:
 def evaluate(session: Session, fields: Evaluate, job: Job) -> dict[str, Any]:
     """Score a design, objective by objective."""
     from optisense.objectives import Evaluation, Settings
-    from optisense.objectives.registry import resolve
+    from optisense.objectives.registry import pixels_read, resolve
     from optisense.objectives.run import run_objective, split_settings
 
     files = session.files(fields, job.id)
@@ -77,7 +77,7 @@ def evaluate(session: Session, fields: Evaluate, job: Job) -> dict[str, Any]:
     def tell(fraction: float, text: str) -> None:
         job.progress((done + min(max(fraction, 0.0), 1.0)) / len(wanted), text)
 
-    evaluation = Evaluation(model, settings, tell)
+    evaluation = Evaluation(model, settings, tell, pixels_read(wanted, own))
     rows = []
     for each in wanted:
         tell(0.0, each.title)

@@ -10,7 +10,7 @@ import numpy as np
 
 from optisense.errors import ObjectiveError
 from optisense.objectives import figures
-from optisense.objectives.registry import objective
+from optisense.objectives.registry import no_pixels, objective
 
 if TYPE_CHECKING:
     from optisense.objectives.evaluation import Evaluation
@@ -19,7 +19,7 @@ COVERAGE_WEIGHT = 0.01
 """k1 of the paper. Coverage hardly counts at this weight: look at it beside the value."""
 
 
-@objective("aoap", title="AOAP", draw=figures.draw_aoap, beside=("coverage",))
+@objective("aoap", title="AOAP", draw=figures.draw_aoap, beside=("coverage",), reads=no_pixels)
 def aoap(
     evaluation: Evaluation, *, coverage_weight: float = COVERAGE_WEIGHT
 ) -> tuple[float, dict[str, Any], dict[str, Any]]:

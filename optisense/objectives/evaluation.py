@@ -5,13 +5,14 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
 from optisense.design import SensorDesign
-from optisense.errors import OptiSenseError
+from optisense.errors import ObjectiveError, OptiSenseError
 from optisense.geometry import Contact, SensingSurface, Sphere, locate
 from optisense.objectives.press import Press
 from optisense.objectives.settings import Settings, size_for
@@ -23,6 +24,9 @@ _T = TypeVar("_T")
 
 Tell = Callable[[float, str], None]
 """Called with a fraction 0..1 of the rendering that is done, and with what is being done."""
+
+Reads = Callable[[Press], NDArray[np.bool_]]
+"""The pixels (h, w) of a press, not exposed, that objectives read one by one."""
 
 FIRST_IMAGE = 0.4
 """How much of all rendering the first image is, since light is traced for it."""
@@ -48,10 +52,23 @@ class Evaluation:
     """
 
     def __init__(
-        self, model: OpticalModel, settings: Settings | None = None, tell: Tell | None = None
+        self,
+        model: OpticalModel,
+        settings: Settings | None = None,
+        tell: Tell | None = None,
+        reads: Reads | None = None,
     ) -> None:
-        """Judge a model; nothing is rendered yet."""
+        """Judge a model; nothing is rendered yet.
+
+        Args:
+            model: the sensor's.
+            settings: of images and rays.
+            tell: called while images are rendered.
+            reads: which pixels of a press the objectives read one by one, if not all. The others
+                decide about the exposure only, and are rendered roughly (`registry.pixels_read`).
+        """
         self.model = model
+        self._reads = reads
         self.settings = settings or Settings()
         self.seconds: dict[str, float] = {}
         self._tell = tell or (lambda fraction, text: None)
@@ -149,25 +166,53 @@ class Evaluation:
         together = self.settings.together and self._are_apart([each["place"] for each in frames])
         groups = [contacts] if together else [[contact] for contact in contacts]
         part = (1.0 - FIRST_IMAGE) / len(groups)
-        image: TactileImage | None = None
-        for number, frame in enumerate(frames):
-            if image is None or not together:
-                group = contacts if together else [contacts[number]]
-                image = self._render(group, FIRST_IMAGE + (not together) * number * part, part)
-            mask = image.contact_mask
+
+        def press_of(number: int, seen: ChiefRays | TactileImage) -> Press:
+            mask = seen.contact_mask
             if together:
-                mask = mask & (_nearest(image.points, mask, frames) == number)
-            press = Press(
+                mask = mask & (_nearest(seen.points, mask, frames) == number)
+            return Press(
                 number=number + 1,
                 mask=mask,
                 response=dark,
-                normals=image.normals,
-                points=image.points,
+                normals=seen.normals,
+                points=seen.points,
                 before=before,
-                **frame,
+                **frames[number],
             )
+
+        image: TactileImage | None = None
+        for number in range(len(frames)):
+            if image is None or not together:
+                numbers = range(len(frames)) if together else (number,)
+                careful = None if self._reads is None else partial(self._careful, press_of, numbers)
+                image = self._render(
+                    [contacts[each] for each in numbers],
+                    FIRST_IMAGE + (not together) * number * part,
+                    part,
+                    careful,
+                )
+            press = press_of(number, image)
             press.check_seen()
             yield press, image
+
+    def _careful(
+        self, press_of: Callable[[int, ChiefRays], Press], numbers: Iterable[int], rays: ChiefRays
+    ) -> NDArray[np.bool_]:
+        """(h, w): the pixels of an image's presses that objectives read one by one.
+
+        All where an objective can't say, since it can't judge the press: it will tell why.
+        """
+        assert self._reads is not None
+        found = []
+        for number in numbers:
+            press = press_of(number, rays)
+            try:
+                press.check_seen()
+                found.append(self._reads(press))
+            except ObjectiveError:
+                return np.ones_like(press.mask)
+        return np.logical_or.reduce(found)
 
     def _unexposed(self) -> list[_Unexposed]:
         self.untouched  # noqa: B018  light is traced for it, which progress counts first
@@ -220,7 +265,13 @@ class Evaluation:
         distances = np.linalg.norm(points[:, None] - points, axis=2)
         return bool((distances + np.eye(len(points)) * 2 * width > width).all())
 
-    def _render(self, contacts: Sequence[Contact], done: float, part: float) -> TactileImage:
+    def _render(
+        self,
+        contacts: Sequence[Contact],
+        done: float,
+        part: float,
+        careful: Callable[[ChiefRays], NDArray[np.bool_]] | None = None,
+    ) -> TactileImage:
         """One image, which takes the progress from `done` by `part`.
 
         Raises:
@@ -235,6 +286,7 @@ class Evaluation:
             seed=self.settings.seed,
             progress=lambda progress: self._tell(done + part * progress.fraction, what),
             only_contacts=bool(contacts),
+            careful=careful,
         )
         if image.interrupted:
             raise KeyboardInterrupt

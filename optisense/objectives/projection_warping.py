@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from optisense.errors import ObjectiveError
 from optisense.objectives import figures
-from optisense.objectives.registry import objective
+from optisense.objectives.registry import no_pixels, objective
 
 if TYPE_CHECKING:
     from optisense.objectives.evaluation import Evaluation
@@ -38,7 +38,13 @@ class TriangleAreas(NamedTuple):
     leaping: int
 
 
-@objective("2to3pw", title="2to3PW", draw=figures.draw_projection_warping, beside=("mean_area",))
+@objective(
+    "2to3pw",
+    title="2to3PW",
+    draw=figures.draw_projection_warping,
+    beside=("mean_area",),
+    reads=no_pixels,
+)
 def projection_warping(
     evaluation: Evaluation, *, jump: float = JUMP
 ) -> tuple[float, dict[str, Any], dict[str, Any]]:

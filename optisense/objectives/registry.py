@@ -3,20 +3,25 @@
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import partial
 from importlib import import_module
 from importlib.metadata import entry_points
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
 
 from optisense.design.near import suggestion
 from optisense.errors import ObjectiveError
 from optisense.objectives.score import Drawing
 
 if TYPE_CHECKING:
-    from optisense.objectives.evaluation import Evaluation
+    from optisense.objectives.evaluation import Evaluation, Reads
+    from optisense.objectives.press import Press
 
     Function = Callable[..., Any]
 
@@ -39,6 +44,8 @@ class Objective:
         title: how people write the name.
         draw: makes the figure of a score, or None.
         beside: names of parts to show beside the value wherever it stands.
+        reads: takes a `Press`, not exposed, and the settings as keyword arguments, and returns the
+            pixels (h, w) that are read one by one; all of the contact's where it is None.
     """
 
     name: str
@@ -46,6 +53,7 @@ class Objective:
     title: str
     draw: Drawing | None = None
     beside: tuple[str, ...] = ()
+    reads: Callable[..., Any] | None = None
 
     def __call__(self, evaluation: Evaluation, **settings: Any) -> Any:
         """Call the function itself, without any checks of what it returns."""
@@ -77,6 +85,7 @@ def objective(
     title: str | None = None,
     draw: Drawing | None = None,
     beside: tuple[str, ...] = (),
+    reads: Callable[..., Any] | None = None,
 ) -> Callable[[_F], _F]:
     """Register a function as an objective; higher values must be better.
 
@@ -85,16 +94,43 @@ def objective(
         title: how people write the name; the name itself if left out.
         draw: makes a figure of the score; a plain one if left out.
         beside: names of parts to show beside the value wherever it stands.
+        reads: which pixels of a press are read one by one, if not all (see `Objective`).
 
     Raises:
         ObjectiveError: the name is taken or malformed, or the function takes no evaluation.
     """
 
     def register(function: _F) -> _F:
-        _register(Objective(name, function, title or name, draw, beside))
+        _register(Objective(name, function, title or name, draw, beside, reads))
         return function
 
     return register
+
+
+def pixels_read(
+    objectives: Iterable[Objective], settings: Mapping[str, Mapping[str, Any]]
+) -> Reads | None:
+    """The pixels of a press that objectives read one by one, together; None if that is all.
+
+    Args:
+        objectives: that will share an evaluation.
+        settings: own ones of each, by its name.
+    """
+    found = []
+    for each in objectives:
+        if each.reads is None:
+            return None
+        found.append(partial(each.reads, **{**each.settings, **settings.get(each.name, {})}))
+
+    def reads(press: Press) -> NDArray[np.bool_]:
+        return np.logical_or.reduce([read(press) for read in found])
+
+    return reads
+
+
+def no_pixels(press: Press, **settings: Any) -> NDArray[np.bool_]:
+    """(h, w): none, for objectives that look at rays only."""
+    return np.zeros_like(press.mask)
 
 
 def find(name: str) -> Objective:

@@ -47,7 +47,26 @@ class Fit:
     linearity: float
 
 
-@objective("rgb2normal", title="RGB2Normal", draw=figures.draw_rgb2normal, beside=("worst_line",))
+def on_lines(
+    press: Press, *, directions: int, half_lines: bool, least_pixels: int, colours: str
+) -> NDArray[np.bool_]:
+    """(h, w): the pixels of all lines of a press, which are all that is read; see `rgb2normal`.
+
+    Raises:
+        ObjectiveError: as `lines_of`.
+    """
+    return np.logical_or.reduce(
+        list(lines_of(press, directions, half_lines, least_pixels).values())
+    )
+
+
+@objective(
+    "rgb2normal",
+    title="RGB2Normal",
+    draw=figures.draw_rgb2normal,
+    beside=("worst_line",),
+    reads=on_lines,
+)
 def rgb2normal(
     evaluation: Evaluation,
     *,

@@ -15,7 +15,7 @@ from optisense.design.near import suggestion
 from optisense.errors import ObjectiveError, OptiSenseError, SetupError
 from optisense.objectives.evaluation import Evaluation, Tell
 from optisense.objectives.files import place_of
-from optisense.objectives.registry import Objective, resolve
+from optisense.objectives.registry import Objective, pixels_read, resolve
 from optisense.objectives.score import Score, json_ready
 from optisense.objectives.settings import Settings, is_number
 
@@ -81,7 +81,8 @@ def evaluate(
             )
         evaluation = sensor
     else:
-        evaluation = Evaluation(_model(sensor), replace(Settings(), **shared), tell)
+        reads = pixels_read(wanted, own)
+        evaluation = Evaluation(_model(sensor), replace(Settings(), **shared), tell, reads)
     scores = {each.name: run_objective(each, evaluation, own[each.name]) for each in wanted}
     if isinstance(objectives, str | Objective):
         return scores[wanted[0].name]

@@ -54,6 +54,11 @@ class ChiefRays:
         """(h, w): which pixels see the sensing surface."""
         return self.outcome == Outcome.HIT
 
+    @property
+    def contact_mask(self) -> NDArray[np.bool_]:
+        """(h, w): which pixels see an indenter."""
+        return self.hit & (self.region == Region.INDENTER)
+
 
 @dr.syntax
 def _trace(

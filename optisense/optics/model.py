@@ -19,7 +19,7 @@ from optisense.optics.chief_rays import ChiefRays, sees_nothing, trace_chief_ray
 from optisense.optics.field_store import FieldStore
 from optisense.optics.guide import Guide
 from optisense.optics.image import TactileImage
-from optisense.optics.imaging import ImageLayers, render_field
+from optisense.optics.imaging import Careful, ImageLayers, render_field
 from optisense.optics.ray_model import RayModel
 from optisense.optics.shading import ContactScenes
 from optisense.optics.surfaces import SurfaceKind
@@ -93,6 +93,7 @@ class OpticalModel(RayModel):
         progress: Callable[[Progress], None] | None = None,
         estimator: str = "field",
         only_contacts: bool = False,
+        careful: Careful | None = None,
     ) -> TactileImage:
         """What the camera sees while ``contacts`` press in.
 
@@ -109,6 +110,8 @@ class OpticalModel(RayModel):
                 for checking).
             only_contacts: light only the pixels that see an indenter and leave the others dark,
                 several times sooner; for scores that read nothing else.
+            careful: with ``only_contacts``, which pixels (h, w) of the chief rays are read; the
+                other ones of contacts get a few camera samples only.
 
         Returns:
             The image; ``interrupted`` is set if Ctrl-C ended the tracing early.
@@ -154,6 +157,7 @@ class OpticalModel(RayModel):
                 self._parts.light_areas,
                 seed,
                 only_contacts,
+                careful,
             )
             layers.light_seconds = lit - built
         ended = time.perf_counter()

@@ -17,6 +17,8 @@ from optisense.design import set_value
 from optisense.errors import ObjectiveError
 from optisense.objectives import BUILT_IN, Evaluation, Objective, Press, Settings
 from optisense.objectives.evaluation import MOST_SATURATED, exposure_for
+from optisense.objectives.registry import find, pixels_read
+from optisense.objectives.rgb2normal import lines_of
 from optisense.optics.response import auto_exposure, saturate
 
 SMALL: dict[str, Any] = {
@@ -85,6 +87,36 @@ def test_places_in_one_image_score_as_one_by_one(
     for one, other in zip(together.parts["places"], alone.parts["places"], strict=True):
         assert one["pixels"] == other["pixels"]
         assert one["score"] == pytest.approx(other["score"], abs=0.02)
+
+
+@pytest.mark.parametrize(("specularity", "apart"), [(0.0, 1e-6), (0.6, 0.003)])
+def test_pixels_that_are_not_read_make_no_difference(specularity: float, apart: float) -> None:
+    """RGB2Normal reads lines across the contacts. The rest of them, rendered roughly where nobody
+    reads it, can change no more than the exposure, where highlights bind it.
+    """
+    sensor = OpticalModel(set_value(load("gelsight-mini"), "coating.specularity", specularity))
+    alone = evaluate(sensor, "rgb2normal", **SMALL)
+    shared = evaluate(sensor, ["rgb2normal", "aoap", "normdiff"], **SMALL)["rgb2normal"]
+    assert alone.value == pytest.approx(shared.value, abs=apart)
+    assert alone.parts["worst_line"] == pytest.approx(shared.parts["worst_line"], abs=4 * apart)
+
+
+def test_lines_are_rendered_in_full_and_the_rest_roughly(model: OpticalModel) -> None:
+    """The same samples on the lines as where all is read, and more noise beside them."""
+    reads = pixels_read([find("rgb2normal"), find("aoap")], {"rgb2normal": {"directions": 4}})
+    careful = Evaluation(model, Settings(**SMALL), reads=reads).presses
+    for some, all_of in zip(careful, Evaluation(model, Settings(**SMALL)).presses, strict=True):
+        line = np.logical_or.reduce(list(lines_of(all_of, 4).values()))
+        np.testing.assert_allclose(some.response[line], all_of.response[line], rtol=1e-4)
+        beside = all_of.mask & ~line
+        off = some.response[beside] / all_of.response[beside] - 1.0
+        assert 0.002 < np.abs(off).mean() < 0.1
+        assert np.array_equal(some.mask, all_of.mask)
+
+
+def test_an_objective_that_does_not_say_what_it_reads_gets_all() -> None:
+    assert pixels_read([find("rgb2normal"), own(len)], {}) is None
+    assert pixels_read([find("normdiff")], {}) is None
 
 
 def test_contacts_that_overlap_are_not_put_in_one_image(model: OpticalModel) -> None:

@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any
 from optisense.design import SensorDesign
 from optisense.errors import SearchError
 from optisense.objectives import Evaluation, Objective, Score, Settings
+from optisense.objectives.registry import pixels_read
 from optisense.objectives.relighting import Relighting
 from optisense.objectives.relit_scores import RelitScore, has_quick_form, quick_form
 from optisense.objectives.run import run_objective, split_settings
@@ -101,7 +102,9 @@ class _Lit:
         seed: int,
     ) -> None:
         shared, self._own = split_settings(settings, objectives)
-        self._relighting = Relighting(Evaluation(model, Settings(**shared, seed=seed)))
+        reads = pixels_read(objectives, self._own)
+        given = Settings(**shared, seed=seed)
+        self._relighting = Relighting(Evaluation(model, given, reads=reads))
         model.forget_light()  # the layers hold all that is needed of it
         self._objectives = objectives
         self._quick: dict[str, RelitScore] = {}
