@@ -23,7 +23,9 @@ from optisense.cli.options import (
     ScoreResolutionOption,
     SettingOption,
     VariantOption,
+    out_option,
     score_settings,
+    seed_option,
 )
 from optisense.cli.output_folder import ensure_writable
 from optisense.writing import write_text
@@ -54,22 +56,12 @@ def evaluate(
     setting: SettingOption = None,
     resolution: ScoreResolutionOption = None,
     photons: ScorePhotonsOption = None,
-    seed: Annotated[
-        int,
-        typer.Option(
-            min=0, max=2**32 - 1, metavar="N", help="The same seed gives the same scores."
-        ),
-    ] = 0,
+    seed: Annotated[int, seed_option("The same seed gives the same scores.")] = 0,
     seeds: Annotated[
         int,
         typer.Option(min=1, metavar="N", help="Score with so many seeds, and tell the spread."),
     ] = 1,
-    out: Annotated[
-        Path | None,
-        typer.Option(
-            "--out", "-o", metavar="DIR", help="Folder for scores.json.", show_default=False
-        ),
-    ] = None,
+    out: Annotated[Path | None, out_option("Folder for scores.json.")] = None,
     report: Annotated[
         bool,
         typer.Option("--report", help="Also write scores.html, with figures, into the folder."),

@@ -56,6 +56,19 @@ VariantOption = Annotated[
 
 WorkersOption = Annotated[int, typer.Option(min=1, metavar="N", help="Processes on this machine.")]
 
+MOST_SEED = 2**32 - 1
+
+
+def seed_option(text: str, **more: Any) -> Any:
+    """``--seed N``; ``text`` says what is the same with the same seed."""
+    return typer.Option("--seed", min=0, max=MOST_SEED, metavar="N", help=text, **more)
+
+
+def out_option(text: str, metavar: str = "DIR") -> Any:
+    """``--out DIR``, of commands that may also do without; ``text`` says what goes there."""
+    return typer.Option("--out", "-o", metavar=metavar, help=text, show_default=False)
+
+
 SettingOption = Annotated[
     list[str] | None,
     typer.Option(

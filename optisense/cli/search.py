@@ -9,7 +9,14 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from optisense.cli.console import EXIT_INTERRUPTED, ends_well, messages, output
-from optisense.cli.options import SettingOption, VariantOption, WorkersOption, parse_settings
+from optisense.cli.options import (
+    SettingOption,
+    VariantOption,
+    WorkersOption,
+    out_option,
+    parse_settings,
+    seed_option,
+)
 from optisense.cli.search_result import print_result, summary
 from optisense.cli.searching import search_progress
 
@@ -76,24 +83,12 @@ def search(
             show_default=False,
         ),
     ] = None,
-    out: Annotated[
-        Path | None,
-        typer.Option(
-            "--out", "-o", metavar="STUDY", help="The study's folder.", show_default=False
-        ),
-    ] = None,
+    out: Annotated[Path | None, out_option("The study's folder.", "STUDY")] = None,
     resume: Annotated[
         bool, typer.Option("--resume", help="Go on with the study in --out.")
     ] = False,
     seed: Annotated[
-        int | None,
-        typer.Option(
-            min=0,
-            max=2**32 - 1,
-            metavar="N",
-            help="The same seed gives the same search.",
-            show_default="0",
-        ),
+        int | None, seed_option("The same seed gives the same search.", show_default="0")
     ] = None,
     setting: SettingOption = None,
     option: Annotated[

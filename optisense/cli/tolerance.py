@@ -15,8 +15,11 @@ from optisense.cli.options import (
     ScorePhotonsOption,
     ScoreResolutionOption,
     SettingOption,
+    VariantOption,
     WorkersOption,
+    out_option,
     score_settings,
+    seed_option,
 )
 from optisense.cli.output_folder import ensure_writable
 from optisense.cli.progress import counting_bar
@@ -60,25 +63,18 @@ def tolerance(
         typer.Option(min=8, metavar="N", help="About how many manufactured sensors to try."),
     ] = 120,
     workers: WorkersOption = 1,
-    seed: Annotated[
-        int,
-        typer.Option(min=0, max=2**32 - 1, metavar="N", help="The same seed: the same sensors."),
-    ] = 0,
+    seed: Annotated[int, seed_option("The same seed gives the same sensors.")] = 0,
     setting: SettingOption = None,
     resolution: ScoreResolutionOption = None,
     photons: ScorePhotonsOption = None,
-    out: Annotated[
-        Path | None,
-        typer.Option(
-            "--out", "-o", metavar="DIR", help="Folder for tolerance.json.", show_default=False
-        ),
-    ] = None,
+    out: Annotated[Path | None, out_option("Folder for tolerance.json.")] = None,
     report: Annotated[
         bool, typer.Option("--report", help="Also write tolerance.html, with figures, into it.")
     ] = False,
     as_json: Annotated[
         bool, typer.Option("--json", help="Print JSON with every score instead of tables.")
     ] = False,
+    variant: VariantOption = "auto",
 ) -> None:
     """Tell how a design's score spreads when sensors come out a little other than designed.
 
@@ -106,6 +102,7 @@ def tolerance(
             seed=seed,
             workers=workers,
             settings=settings,
+            variant=variant,
             progress=show,
         )
     text = json.dumps(found.to_dict(), indent=2, allow_nan=False)

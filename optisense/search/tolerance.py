@@ -137,6 +137,7 @@ def tolerance(
     seed: int = 0,
     workers: int = 1,
     settings: Mapping[str, Any] | None = None,
+    variant: str = "auto",
     progress: Tell | None = None,
 ) -> Tolerance:
     """Try sensors with errors of making, all with the same seed of the light.
@@ -149,6 +150,7 @@ def tolerance(
         seed: of the errors and of the light.
         workers: processes on this machine; 1 works in this one.
         settings: of the objectives.
+        variant: of the renderer: "auto", "llvm" or "cuda".
         progress: called now and then.
 
     Returns:
@@ -167,7 +169,7 @@ def tolerance(
         making = errors if isinstance(errors, MakingErrors) else MakingErrors(errors)
     bound = making.bind(design)
     goals: list[Goal] = list(objective) if isinstance(objective, list | tuple) else [objective]  # type: ignore[list-item]
-    evaluator = DesignEvaluator(bound.space, goals, settings)
+    evaluator = DesignEvaluator(bound.space, goals, settings, variant=variant)
     count = 1 if len(making.sources) == 1 else 1 + len(making.sources)
     rows = max(LEAST_ROWS, round(sensors / count))
     points = bound.points(paired_errors(bound, rows, seed))
