@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from optisense.errors import ContactError
-from optisense.geometry.indenters import Indenter
+from optisense.geometry.indenters import FACET_ERROR, Indenter
 from optisense.geometry.mesh import TriangleMesh
 from optisense.geometry.rays import ray_hits
 from optisense.geometry.surface import SensingSurface, SurfacePoint
@@ -80,7 +80,10 @@ def locate(contact: Contact, surface: SensingSurface) -> SurfacePoint:
 
 
 def place(
-    contact: Contact, surface: SensingSurface, gel: TriangleMesh | None = None
+    contact: Contact,
+    surface: SensingSurface,
+    gel: TriangleMesh | None = None,
+    facet_error: float = FACET_ERROR,
 ) -> TriangleMesh:
     """The indenter's mesh in the design's frame, pressed in.
 
@@ -91,6 +94,7 @@ def place(
         contact: the contact.
         surface: the sensing surface.
         gel: the elastomer under it, closed; None leaves the depth unchecked.
+        facet_error: mm, largest distance of the mesh from the indenter's exact shape.
 
     Returns:
         The part of the indenter that can reach the surface, mm; faces and shading normals point
@@ -113,7 +117,7 @@ def place(
     pose = np.eye(4)
     pose[:3, :3] = _axes(spot.inward, surface, contact.rotation)
     pose[:3, 3] = spot.point + contact.depth * spot.inward
-    return contact.indenter.mesh(reach).transformed(pose)
+    return contact.indenter.mesh(reach, facet_error).transformed(pose)
 
 
 def available_depth(point: ArrayLike, inward: ArrayLike, gel: TriangleMesh) -> float:

@@ -44,6 +44,8 @@ class FieldStore:
     """Traces photons pass by pass and keeps what it finds."""
 
     cell_size = CELL_SIZE
+    least_passes = 2
+    """Of photons; the noise is told from the difference of two."""
 
     def __init__(
         self,
@@ -139,9 +141,15 @@ class FieldStore:
         Returns the field and whether Ctrl-C ended it early.
         """
         lights = self._table.count
-        size = PASS_PHOTONS if photons is None else min(PASS_PHOTONS, -(-photons // 2))
+        size = (
+            PASS_PHOTONS if photons is None else min(PASS_PHOTONS, -(-photons // self.least_passes))
+        )
         per_light = max(1, size // lights)
-        wanted = None if photons is None else max(2, round(photons / (per_light * lights)))
+        wanted = (
+            None
+            if photons is None
+            else max(self.least_passes, round(photons / (per_light * lights)))
+        )
         cap = max(2, most // (per_light * lights))
         key = (seed, per_light)
         if wanted is not None and noise is None and seconds is None:

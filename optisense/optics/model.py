@@ -54,6 +54,9 @@ class OpticalModel(RayModel):
     coating's specularity only rewrites its row of the surface table.
     """
 
+    is_draft = False
+    """Whether images may be coarse for the sake of speed."""
+
     @cached_property
     def _store(self) -> FieldStore:
         opaque = [p for p in self._pieces if p.surface.kind is SurfaceKind.OPAQUE]
@@ -158,6 +161,7 @@ class OpticalModel(RayModel):
                 seed,
                 only_contacts,
                 careful,
+                self.is_draft,
             )
             layers.light_seconds = lit - built
         ended = time.perf_counter()

@@ -20,6 +20,7 @@ from optisense.geometry import (
     TriangleMesh,
     nine_places,
 )
+from optisense.geometry.indenters import FACET_ERROR
 from optisense.optics.assembly import Assembly, assemble, coating_surface, indenter_piece
 from optisense.optics.camera import RayCamera
 from optisense.optics.chief_rays import ChiefRays, pixel_areas, sees_nothing, trace_chief_rays
@@ -39,6 +40,9 @@ class RayModel:
     What is made once is kept: the resolved media, the scenes, the surface tables. A changed
     design redoes only what depends on the change.
     """
+
+    facet_error = FACET_ERROR
+    """mm, how far indenters' meshes may be off their exact shapes."""
 
     def __init__(self, design: SensorDesign, variant: str = "auto") -> None:
         """Resolve media and build the scene.
@@ -260,11 +264,11 @@ class RayModel:
             ContactError: the contact is off the surface or deeper than the gel.
         """
         if not self.gels:
-            return geometry.place(contact, self.surface)
+            return geometry.place(contact, self.surface, facet_error=self.facet_error)
         errors = []
         for gel in self.gels:
             try:
-                return geometry.place(contact, self.surface, gel)
+                return geometry.place(contact, self.surface, gel, self.facet_error)
             except ContactError as error:
                 errors.append(error)
         raise errors[0]

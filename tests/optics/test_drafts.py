@@ -64,6 +64,34 @@ def test_a_moved_light_is_seen_by_a_draft_that_keeps_cells_and_guide(
     ordinary.become(mini)
 
 
+def test_few_photons_show_what_a_moved_light_does(
+    draft: DraftModel, ordinary: OpticalModel, mini: SensorDesign, moved: SensorDesign
+) -> None:
+    changes = []
+    for model, photons in ((draft, 60_000), (ordinary, PHOTONS)):
+        before = blocks(model.render(PRESS, SIZE, photons=photons).radiance)
+        model.become(moved)
+        changes.append(blocks(model.render(PRESS, SIZE, photons=photons).radiance) - before)
+        model.become(mini)
+    rough, true = (change[:, 0] for change in changes)
+    assert np.corrcoef(rough, true)[0, 1] > 0.9
+    assert np.abs(changes[0][:, 1:]).max() < 0.3 * np.abs(true).max()  # only red was moved
+
+
+def test_a_contact_is_placed_anew_where_it_or_the_surface_moved(
+    draft: DraftModel, mini: SensorDesign, moved: SensorDesign
+) -> None:
+    placed, fixed = draft.place(PRESS[0]), draft._fixed
+    draft.become(moved)
+    assert draft.place(PRESS[0]) is placed and draft._fixed is fixed
+    aside = ots.Contact(ots.Sphere(radius=1.5), at=(2, 0), depth=0.6)
+    shift = draft.place(aside).bounds - placed.bounds
+    np.testing.assert_allclose(np.linalg.norm(shift, axis=1), 2.0, atol=1e-6)
+    draft.become(ots.set_value(mini, "cages.skin.points[14].z", 1.0))
+    assert draft.place(PRESS[0]).bounds[1, 2] > placed.bounds[1, 2] + 0.1
+    assert draft._fixed is not fixed
+
+
 def test_a_moved_camera_or_a_bent_skin_makes_anew_what_depends_on_it(
     draft: DraftModel, ordinary: OpticalModel, mini: SensorDesign
 ) -> None:
