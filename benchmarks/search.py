@@ -20,11 +20,11 @@ from rich.console import Console
 
 import optisense
 from benchmarks.results import machine
+from benchmarks.workers import workers
 from optisense.design import SensorDesign
 from optisense.search import Around, Outcome, Plan, SearchSpace, Study, run_study
 from optisense.search.evaluation import Evaluator
 from optisense.search.executors import ProcessPool, Runner, SerialRunner
-from optisense.search.executors.pool import processors
 from optisense.search.running import Run
 
 FOLDER = Path(__file__).parent
@@ -38,16 +38,9 @@ MIRROR = {
 """All 81 numbers of the cage of GelSight Svelte's mirror, mm: towards the skin and back, across
 (the housing leaves 1.1 mm), and along the finger."""
 
-BLEND = {"cages.M1.blend": (0.0, 1.0)}
-"""Between the flat and the most curved mirror: no part cuts through another, no trial fails."""
-
 COATINGS = {"coating.specularity": (0.0, 1.0, 11)}
 COATING_WORKERS = 2
 OVERHEAD_TRIALS = 3000
-RAY_SECONDS, RENDERED_SECONDS = 5.0, 9.0
-"""How long trials are counted, once each worker has finished WARM of them."""
-WARM = 1
-"""Trials of each worker that are left out, while it builds its model and compiles."""
 
 MIRROR_BUDGET = 5000
 MIRROR_SECONDS = 300.0
@@ -122,51 +115,6 @@ def overhead() -> dict[str, Any]:
         "this_process": seconds(lambda _: SerialRunner(Nothing())),
         "two_workers": seconds(lambda _: ProcessPool(Nothing(), 2)),
     }
-
-
-def workers() -> dict[str, Any]:
-    """Trials a second of two worker processes and of one, each with one renderer thread; and of
-    one process that has the threads of all processors, as `--workers 1` has.
-    """
-    mini, svelte = optisense.load("gelsight-mini"), optisense.load("gelsight-svelte")
-    smooth = SearchSpace({"coating.specularity": (0.0, 0.3), "lights.*.flux": (1.0, 2.0)})
-    light = {"photons": 500_000, "resolution": (320, 240)}
-    cases: dict[str, Any] = {
-        "chief_rays": (svelte, SearchSpace(BLEND), "aoap", {}, RAY_SECONDS, 1.8),
-        "rendered": (mini, smooth, "rgb2normal", light, RENDERED_SECONDS, 1.6),
-    }
-    found: dict[str, Any] = {}
-    for name, (design, space, goal, settings, seconds, target) in cases.items():
-        plan = Plan(space=space, goals=[goal], method="random", budget=10_000, settings=settings)
-        one, two = (_trials_a_second(design, plan, seconds, count, 1) for count in (1, 2))
-        threads = processors()
-        whole = _trials_a_second(design, plan, seconds, 1, threads)
-        found[name] = {
-            "objective": goal,
-            "trials_a_second": {"one": one, "two": two, f"one_with_{threads}_threads": whole},
-            "two_to_one": round(two / one, 3),
-            "two_to_one_with_all_threads": round(two / whole, 3),
-            "target": target,
-        }
-    return found
-
-
-def _trials_a_second(
-    design: SensorDesign, plan: Plan, seconds: float, count: int, threads: int
-) -> float:
-    study = Study.create(None, design, plan)
-    warm = 1 + WARM * count
-    counted: list[float] = []
-
-    def stop(progress: Any) -> None:
-        times = sorted(row.finished or 0.0 for row in study.store.rows() if row.outcome)
-        if len(times) > warm and times[-1] - times[warm] > seconds:
-            counted.extend(times[warm:])
-            raise KeyboardInterrupt
-
-    Run(study, lambda evaluator: ProcessPool(evaluator, count, threads=threads), stop).go()
-    study.close()
-    return round((len(counted) - 1) / (counted[-1] - counted[0]), 3)
 
 
 def coatings() -> dict[str, Any]:
@@ -259,7 +207,8 @@ def _table(found: dict[str, Any]) -> str:
             row = found["workers"][name]
             lines.append(
                 f"| Trials of two worker processes to one's, {title} | {row['two_to_one']:.2f} "
-                f"({row['two_to_one_with_all_threads']:.2f} to one with the threads of both) | "
+                f"({row['two_to_one_with_all_threads']:.2f} to one with the threads of both; "
+                f"{row['two_to_one_by_processor_time']:.2f} by processor time) | "
                 f"{row['target']} or more |"
             )
     if "coatings" in found:

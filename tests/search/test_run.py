@@ -7,13 +7,15 @@ import math
 import sqlite3
 from pathlib import Path
 from types import ModuleType
+from typing import Any
 
 import numpy as np
 import pytest
 
 from optisense.design import SensorDesign, save_design, set_value
 from optisense.errors import OutputError, SearchError
-from optisense.search import Progress, SearchSpace, Study, search
+from optisense.search import Plan, Progress, SearchSpace, Study, search
+from optisense.search.plan import PHOTONS
 from optisense.search.run import run_study
 from optisense.search.store import START, STORE_VERSION
 
@@ -349,3 +351,25 @@ class TestFolder:
         kept = len(again.trials)
         assert kept >= 6
         assert len(run_study(again, limit=kept + 20).trials) == kept + 21
+
+
+@pytest.mark.parametrize(
+    ("goals", "method", "given", "settings"),
+    [
+        (["rgb2normal"], "cma-es", {}, {"photons": PHOTONS}),
+        (["rgb2normal"], "cma-es", {"photons": 10}, {"photons": 10}),
+        (["aoap"], "cma-es", {}, {"ray_resolution": [320, 240]}),
+        (["rgb2normal"], "light-colours", {}, {}),
+        ([lambda design: 0.0], "cma-es", {}, {}),
+    ],
+)
+def test_trials_take_less_light_than_a_single_evaluation(
+    mini: SensorDesign,
+    goals: list[Any],
+    method: str,
+    given: dict[str, Any],
+    settings: dict[str, Any],
+) -> None:
+    space = SearchSpace({"lights.red.flux": (1.0, 2.0, 3)})
+    plan = Plan(space=space, goals=goals, method=method, settings=given)
+    assert plan.settings_for(mini).settings == settings

@@ -53,11 +53,13 @@ class Method(ABC):
         name: on the command line.
         summary: what it does, in one line.
         several: whether it looks for the best trade-offs between several goals.
+        renders_once: whether all trials of a seed share their images.
     """
 
     name: ClassVar[str]
     summary: ClassVar[str]
     several: ClassVar[bool] = False
+    renders_once: ClassVar[bool] = False
 
     def __init__(self, problem: Problem) -> None:
         self.problem = problem

@@ -46,6 +46,7 @@ class LightColours(Combinations):
 
     name = "light-colours"
     summary = "colours and powers of light groups, thousands from one rendering"
+    renders_once = True
 
     def __init__(self, problem: Problem) -> None:
         super().__init__(problem, _levels(problem.space))
