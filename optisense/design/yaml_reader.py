@@ -87,7 +87,11 @@ class _Reader:
         while isinstance(event, yaml.StreamStartEvent | yaml.DocumentStartEvent):
             event = next(self._events)
         if not isinstance(event, yaml.MappingStartEvent):
-            raise self._error("holds no 'key: value' lines at its top", where=f"{self._source}:1")
+            raise self._error(
+                "holds no 'key: value' lines at its top",
+                where=f"{self._source}:1",
+                hint="Is this the right file?",
+            )
         data = self._value(event, ())
         for event in self._events:
             if isinstance(event, yaml.DocumentStartEvent):

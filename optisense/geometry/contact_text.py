@@ -21,7 +21,7 @@ from optisense.geometry.contact import Contact
 from optisense.geometry.indenters import Cylinder, Indenter, MeshIndenter, Plane, Sphere
 
 _KINDS = ("sphere", "cylinder", "plane", "mesh")
-_FORM = "write it as KIND:SIZE@U,V:DEPTH, for example sphere:1.5@0,0:0.8"
+_FORM = "write it as KIND:SIZE@U,V:DEPTH, for example sphere:1.5@0,0:0.8, in mm without the unit"
 
 
 def parse_contact(text: str) -> Contact:
@@ -89,5 +89,6 @@ def _numbers(text: str, name: str, counts: tuple[int, ...]) -> list[float]:
         values = []
     if len(values) not in counts:
         wanted = " or ".join(str(count) for count in counts)
-        raise ContactError(f"{name} needs {wanted} numbers, not '{text}'", hint=_FORM)
+        kind = "number" if wanted == "1" else "numbers"
+        raise ContactError(f"{name} needs {wanted} {kind}, not '{text}'", hint=_FORM)
     return values
