@@ -38,6 +38,9 @@ DRAFT_WIDTH = 160
 MOST_PIXELS = 20_000_000
 """Of an image; more is a slip, and would take all memory."""
 
+LEVELS = (np.arange(256) / 255.0).astype(np.float32)
+"""What the 256 levels of a picture are from 0 to 1."""
+
 ImageFile = Literal["picture", "pixels", "radiance", "layers", "normals", "points", "mask"]
 
 
@@ -303,9 +306,9 @@ def write_image(
 def blender_pixels(picture: NDArray[np.uint8]) -> NDArray[np.float32]:
     """(h, w, 4) of a picture (h, w, 3): 0 to 1, opaque, row 0 at the bottom."""
     height, width = picture.shape[:2]
-    pixels = np.ones((height, width, 4), dtype=np.float32)
-    np.multiply(picture[::-1], np.float32(1.0 / 255.0), out=pixels[..., :3], dtype=np.float32)
-    return pixels
+    opaque = np.full((height, width, 4), 255, dtype=np.uint8)
+    opaque[..., :3] = picture[::-1]
+    return LEVELS[opaque]
 
 
 def _teller(job: Job) -> Callable[[Progress], None]:

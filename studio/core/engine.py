@@ -170,6 +170,11 @@ class Engine:
         return self._gone
 
     @property
+    def waiting(self) -> bool:
+        """Whether it owes an answer."""
+        return bool(self._requests)
+
+    @property
     def pid(self) -> int:
         """The process's number."""
         return self._process.pid

@@ -14,7 +14,8 @@ from bpy.props import BoolProperty, FloatProperty, PointerProperty, StringProper
 from ..core.engine import Answer, Engine, EngineError, Request
 from .preferences import HOW_TO_GET, engine_command
 
-TICK = 0.05
+TICK, BRISK = 0.05, 0.01
+"""Seconds between two looks at the engine: as a rule, and while it owes an answer."""
 
 _engine: Engine | None = None
 _folder: str | None = None
@@ -251,7 +252,9 @@ def _tick() -> float | None:
         traceback.print_exc()
         state().problem = f"Unexpected {type(error).__name__}: {error}"
         state().hint = "This is a defect of the extension; the console shows where it is"
-    return None if _engine.ended else TICK
+    if _engine.ended:
+        return None
+    return BRISK if _engine.waiting else TICK
 
 
 def register() -> None:

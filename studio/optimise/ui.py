@@ -23,14 +23,14 @@ class OPTISENSE_PT_optimise(SidebarPanel, bpy.types.Panel):
     bl_idname = "OPTISENSE_PT_optimise"
     bl_label = "Optimise"
     bl_order = 7
-    bl_options = {"DEFAULT_CLOSED"}
 
     def draw(self, context: bpy.types.Context) -> None:
         layout = self.layout
         search = context.scene.optisense_search
         found = context.window_manager.optisense_found
         row = layout.row(align=True)
-        row.menu("OPTISENSE_MT_vary", icon="ADD")
+        menu = row.operator("wm.call_menu", text="Vary ...", icon="ADD")
+        menu.name = "OPTISENSE_MT_vary"
         row.operator("optisense.vary_remove", text="", icon="REMOVE")
         layout.template_list("OPTISENSE_UL_vary", "", search, "vary", search, "vary_index", rows=3)
         column = layout.column()

@@ -15,6 +15,7 @@ from ..lights.windows import ask_for_windows
 from ..scene.build import build
 from ..scene.startup import clear_startup
 from ..scene.views import show_design
+from .warming import warm_up
 
 
 def new_stage() -> Path:
@@ -83,6 +84,8 @@ def open_stage(
         scene.optisense.is_saved = bool(folder)
         show_design(scene)
         ask_for_windows(scene)
+        if not bpy.app.background:  # scripts say themselves what they want
+            warm_up(scene)
         warnings = result.get("warnings") or []
         session.state().note = "; ".join(each.get("message", "") for each in warnings)
         if then is not None:

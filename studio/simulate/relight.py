@@ -25,8 +25,7 @@ def wanted() -> None:
     now = bpy.context.window_manager.optisense_picture
     if now.shown and now.image and session.running() is not None:
         _wanted = True
-        if bpy.app.background:
-            _ask()
+        _ask()
 
 
 def lights(scene: bpy.types.Scene) -> dict[str, Any]:

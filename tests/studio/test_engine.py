@@ -17,6 +17,7 @@ from studio.core.engine import Engine, EngineError
 from studio.engine import session
 from studio.scene.collections import object_of, objects_of
 from studio.scene.gather import gather_document
+from studio.sensor.warming import warm_up
 from studio.simulate import picture, relight
 
 
@@ -62,6 +63,16 @@ def test_a_contact_is_seen_and_relighting_is_exact(mini: Any) -> None:
         _relit()
     assert np.abs(shown() - bright).max() < 2 / 255
     assert bpy.ops.optisense.report.poll()
+
+
+def test_an_opened_sensor_warms_the_engine_up_and_the_last_one_counts(mini: Any) -> None:
+    first, last = warm_up(mini), warm_up(mini)
+    engine = session.engine()
+    assert first is not None and last is not None and engine.waiting
+    engine.wait(first)
+    engine.wait(last)
+    assert not session.state().busy and not session.state().problem
+    assert bpy.ops.optisense.check() == {"FINISHED"}
 
 
 def _relit() -> None:

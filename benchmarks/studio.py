@@ -1,0 +1,142 @@
+"""How long a user of the studio waits: first picture, drafts, relighting, cages.
+
+    .venv-blender/bin/python benchmarks/studio.py [--drafts 20]
+
+Everything goes through the extension, as by hand, with Blender as a Python module; only drawing the
+window is left out. Wall time is what a user waits; processor time is that of Blender and the engine
+together, which another load on the machine changes less.
+"""
+
+from __future__ import annotations
+
+import argparse
+import atexit
+import os
+import shlex
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import bpy
+import numpy as np
+
+ROOT = Path(__file__).parents[1]
+SIDE = 101
+"""Vertices along a side of the mesh in a cage: 10,201."""
+
+
+def processor_seconds(pid: int) -> float:
+    """What this process and the engine have used so far; NaN where the system does not tell."""
+    stat = Path(f"/proc/{pid}/stat")
+    if not stat.exists():
+        return float("nan")
+    user, system = stat.read_text().rsplit(")", 1)[1].split()[11:13]
+    return (int(user) + int(system)) / os.sysconf("SC_CLK_TCK") + time.process_time()
+
+
+def measured(what: str, times: int, target: str, work: Callable[[int], None], pid: int) -> None:
+    """Do something several times and print a row of the table."""
+    used, began = processor_seconds(pid), time.perf_counter()
+    for step in range(times):
+        work(step)
+    wall = (time.perf_counter() - began) / times
+    used = (processor_seconds(pid) - used) / times
+    rate = f"{1 / wall:6.1f} /s"
+    print(f"{what:42s} {wall:7.3f} s {used:7.3f} s {rate:>10s}   {target}", flush=True)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser()
+    parser.add_argument("--drafts", type=int, default=20)
+    given = parser.parse_args()
+    sys.path.insert(0, str(ROOT))
+    os.environ.setdefault(
+        "OPTISENSE_ENGINE",
+        shlex.join([str(ROOT / ".venv" / "bin" / "python"), "-m", "optisense.cli", "engine"]),
+    )
+    import studio
+    from studio.engine import session
+    from studio.scene import cages
+    from studio.scene.collections import objects_of
+    from studio.sensor.warming import warm_up
+    from studio.simulate import drafts, relight
+
+    studio.register()
+    atexit.register(studio.unregister)
+    bpy.ops.wm.read_homefile(use_empty=True)
+    scene = bpy.context.scene
+    pid = session.engine().pid
+
+    def answered(request: Any) -> None:
+        """As Blender's timer does it in a window."""
+        while request is None or not request.done:
+            time.sleep(session._tick() or 0.0)
+
+    print(f"{'':42s} {'wall':>9s} {'processor':>9s} {'':10s}   target")
+    opened = "Mini opened and the engine warm"
+    bpy.ops.optisense.new(sensor="gelsight-mini")
+    measured(opened, 1, "", lambda _: answered(warm_up(scene)), pid)
+    bpy.ops.optisense.add_contact()
+    measured("click to first picture", 1, "3 s", lambda _: bpy.ops.optisense.simulate(), pid)
+
+    def relit(step: int) -> None:
+        scene.optisense.light_groups[0].flux = 1.0 + 0.1 * (step % 10)
+        answered(relight._open)
+
+    relit(0)
+    measured("relighting, 320 x 240", 60, "30 /s", relit, pid)
+    light = objects_of(scene, "LIGHT")[0]
+    scene.optisense_simulation.draft = True
+
+    def dragged(step: int) -> None:
+        light.location.x += 0.05
+        bpy.context.view_layer.update()
+        drafts.wanted()
+        drafts._ask()
+        answered(drafts._open)
+
+    for step in range(3):
+        dragged(step)
+    measured("draft, a light dragged, 160 x 120", given.drafts, "5 /s", dragged, pid)
+    scene.optisense_simulation.draft = False
+    cage = _caged_sheet(scene)
+
+    def bent(step: int) -> None:
+        cage.data.vertices[13].co.z = 0.1 * (step % 10)
+        cage.data.update()
+        bpy.context.view_layer.update()  # the handler lets the sheet follow
+
+    bent(0)
+    sheet = scene.objects["sheet"].data
+    before = cages.shown_vertices(sheet).copy()
+    measured("cage edit, 10,201 vertices", 100, "30 /s", bent, pid)
+    assert not np.array_equal(cages.shown_vertices(sheet), before)
+    session.stop()
+
+
+def _caged_sheet(scene: Any) -> Any:
+    """A mirror of many vertices in a cage of 27 points."""
+    from studio.core.mesh_file import Mesh
+    from studio.scene.build import add_part
+
+    side = np.linspace(-5.0, 5.0, SIDE)
+    x, y = (each.ravel() for each in np.meshgrid(side, side, indexing="ij"))
+    index = np.arange(SIDE * SIDE).reshape(SIDE, SIDE)
+    a, b, c, d = index[:-1, :-1], index[1:, :-1], index[1:, 1:], index[:-1, 1:]
+    faces = np.concatenate(
+        [np.stack([p.ravel() for p in three], axis=1) for three in ((a, b, c), (a, c, d))]
+    )
+    mesh = Mesh(np.stack([x, y, np.zeros_like(x)], axis=1), faces.astype(np.int32))
+    sheet = add_part(scene, "sheet", {"role": "mirror", "mesh": "meshes/sheet.obj"}, mesh)
+    for each in scene.objects:
+        each.select_set(False)
+    sheet.select_set(True)
+    bpy.context.view_layer.objects.active = sheet
+    bpy.ops.optisense.new_cage(resolution=(3, 3, 3))
+    return bpy.context.active_object
+
+
+if __name__ == "__main__":
+    main()
