@@ -183,17 +183,11 @@ def _print_table(scored: Scored) -> None:
 @contextmanager
 def _progress_bar() -> Iterator[Callable[[float, str], None]]:
     """A bar on standard error; silent when that is no terminal."""
-    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+    from rich.progress import TextColumn, TimeElapsedColumn
 
-    with Progress(
-        TextColumn("scoring"),
-        BarColumn(bar_width=32),
-        TextColumn("{task.fields[note]}"),
-        TimeElapsedColumn(),
-        console=messages,
-        transient=True,
-        disable=not messages.is_terminal,
-    ) as bar:
+    from optisense.cli.progress import passing_bar
+
+    with passing_bar("scoring", TextColumn("{task.fields[note]}"), TimeElapsedColumn()) as bar:
         task = bar.add_task("score", total=1.0, note="")
 
         def show(fraction: float, note: str) -> None:

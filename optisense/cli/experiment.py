@@ -133,17 +133,12 @@ def _progress(what: str) -> Iterator[Callable[[int, int, str], None]]:
     if not messages.is_terminal:
         yield _Lines(what)
         return
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+    from rich.progress import MofNCompleteColumn, TextColumn, TimeElapsedColumn
 
-    with Progress(
-        TextColumn(what),
-        BarColumn(bar_width=32),
-        MofNCompleteColumn(),
-        TimeElapsedColumn(),
-        TextColumn("{task.fields[label]}"),
-        console=messages,
-        transient=True,
-    ) as bar:
+    from optisense.cli.progress import passing_bar
+
+    label = TextColumn("{task.fields[label]}")
+    with passing_bar(what, MofNCompleteColumn(), TimeElapsedColumn(), label) as bar:
         task = bar.add_task(what, total=None, label="")
 
         def show(done: int, count: int, label: str) -> None:

@@ -142,18 +142,12 @@ def render(
 @contextmanager
 def _progress_bar() -> Iterator[Callable[[RenderProgress], None]]:
     """A bar on standard error with photons, noise and time; silent when that is no terminal."""
-    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+    from rich.progress import TextColumn, TimeElapsedColumn
 
-    with Progress(
-        TextColumn("rendering"),
-        BarColumn(bar_width=32),
-        TextColumn("{task.percentage:>3.0f} %"),
-        TextColumn("{task.fields[note]}"),
-        TimeElapsedColumn(),
-        console=messages,
-        transient=True,
-        disable=not messages.is_terminal,
-    ) as bar:
+    from optisense.cli.progress import passing_bar
+
+    percent, note = TextColumn("{task.percentage:>3.0f} %"), TextColumn("{task.fields[note]}")
+    with passing_bar("rendering", percent, note, TimeElapsedColumn()) as bar:
         task = bar.add_task("render", total=1.0, note="preparing the scene")
 
         def show(progress: RenderProgress) -> None:

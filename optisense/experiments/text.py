@@ -177,4 +177,4 @@ $ optisense experiment all --out results
 ```
 
 A run that was stopped goes on where it was with the same command: what is finished in the folder
-is not done again."""
+is not done again. All in one go is shorter than one by one: experiments share sensors and light."""
