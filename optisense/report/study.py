@@ -21,6 +21,7 @@ from optisense.report.before_after import Look
 from optisense.report.drawing import figure_uri
 from optisense.report.files import template
 from optisense.report.pictures import data_uri
+from optisense.search.methods import find
 from optisense.search.study import Study, beside, best_of, front_among
 from optisense.search.trial import Trial
 from optisense.writing import write_text
@@ -66,7 +67,11 @@ def render_study(study: Study, looks: Mapping[str, Look] | None = None) -> str:
     several = len(names) > 1
     front = front_among([t for t in trials if not t.is_start], names) if several else []
     strongest = [each.number for each in study_figures.influences(trials, names[0])]
-    drawn = study_figures.parameters(trials, names[0], best)
+    weighed = names if find(study.settings.method).several else names[:1]
+    drawn = {
+        name: study_figures.parameters(trials, name, _best_by(trials, name) if number else best)
+        for number, name in enumerate(weighed)
+    }
     environment = Environment(
         loader=DictLoader({"study": template("study.html.j2")}),
         autoescape=True,
@@ -77,12 +82,12 @@ def render_study(study: Study, looks: Mapping[str, Look] | None = None) -> str:
     return environment.get_template("study").render(
         title=study.space.design.name,
         description=study.space.design.description,
-        objective=names[0],
+        goal=" and ".join(weighed),
         headline=_headline(study, trials, best),
         unfinished=_unfinished(study, trials),
         robust=_robust(study),
         convergence=figure_uri(study_figures.convergence(trials, names)) if scored else "",
-        parameters="" if drawn is None else figure_uri(drawn),
+        parameters=[(name, figure_uri(each)) for name, each in drawn.items() if each is not None],
         shown_parameters=min(len(strongest), study_figures.MOST_PANELS),
         all_parameters=study.space.size,
         front=figure_uri(study_figures.front(trials, front, names, best)) if front else "",
@@ -102,6 +107,11 @@ def render_study(study: Study, looks: Mapping[str, Look] | None = None) -> str:
     )
 
 
+def _best_by(trials: Sequence[Trial], name: str) -> Trial | None:
+    fine = [trial for trial in trials if math.isfinite(trial.scores.get(name, math.nan))]
+    return max(fine, key=lambda trial: trial.scores[name], default=None)
+
+
 def _headline(study: Study, trials: Sequence[Trial], best: Trial | None) -> list[tuple[str, str]]:
     settings = study.settings
     facts = [("method", settings.method), ("objectives", ", ".join(settings.names))]
@@ -114,7 +124,8 @@ def _headline(study: Study, trials: Sequence[Trial], best: Trial | None) -> list
     spent = sum(trial.outcome.seconds for trial in trials)
     facts.append(("computing time", f"{spent:,.0f} s" if spent >= 10 else f"{spent:.2g} s"))
     if best is not None:
-        facts.append(("best", f"trial {best.number}"))
+        by = f" by {study.objective}" if len(settings.names) > 1 else ""
+        facts.append((f"best{by}", f"trial {best.number}"))
     return facts
 
 

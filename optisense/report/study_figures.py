@@ -25,6 +25,9 @@ MOST_PANELS = 12
 """Parameters that are drawn: those that go most with the score."""
 
 COLUMNS = 4
+MOST_NUMBERED = 8
+"""Trials of a front that have their number beside them."""
+
 LONGEST = 34
 """Letters of a parameter's name in a small panel."""
 
@@ -149,6 +152,7 @@ def parameters(trials: Sequence[Trial], name: str, best: Trial | None) -> Figure
                 column, scores, c=order, s=8, cmap="viridis", alpha=0.6, linewidths=0
             )
             axes.axvline(parameter.start, color=GREY, lw=1, ls="--")
+            axes.locator_params(axis="x", nbins=5)
         if best is not None:
             axes.axvline(best.vector[each.number], color=RED, lw=1)
         axes.set_title(f"{_short(parameter.name, LONGEST)}\n{each.strength:.2f}", fontsize=8)
@@ -181,7 +185,17 @@ def front(
             *edge.T, style, color=BLUE, ms=5, lw=1.2, drawstyle="steps-pre", label=label, zorder=3
         )
     start = next((trial for trial in trials if trial.is_start), None)
-    for trial, colour, mark, label in ((start, GREY, "s", "the start"), (best, RED, "*", "best")):
+    for each in _spread_out(chosen, one):
+        axes.annotate(
+            str(each.number),
+            (each.scores[one], each.scores[other]),
+            (5, 5),
+            textcoords="offset points",
+            fontsize=8,
+            color=BLUE,
+        )
+    marks = ((start, GREY, "s", "the start"), (best, RED, "*", f"best by {one}"))
+    for trial, colour, mark, label in marks:
         if trial is not None and np.isfinite([trial.scores[one], trial.scores[other]]).all():
             size = 14 if mark == "*" else 7
             axes.plot(
@@ -202,6 +216,15 @@ def front(
     axes.grid(alpha=0.25)
     axes.legend(fontsize=9)
     return figure
+
+
+def _spread_out(trials: Sequence[Trial], name: str) -> list[Trial]:
+    """Some of many trials, from the lowest score to the highest."""
+    if not trials:
+        return []
+    ordered = sorted(trials, key=lambda trial: trial.scores[name])
+    places = np.linspace(0, len(ordered) - 1, min(MOST_NUMBERED, len(ordered))).round()
+    return [ordered[place] for place in sorted({int(place) for place in places})]
 
 
 def sections(before: SensorDesign, after: SensorDesign) -> Figure:

@@ -62,9 +62,13 @@ def test_scores_before_and_after_are_told(result: Result, page: str) -> None:
 
 
 def test_every_figure_is_there(page: str) -> None:
-    """Convergence, both objectives, parameters, and one picture; all inside the page."""
+    """Convergence, both objectives, parameters against each of them, and one picture; all inside
+    the page.
+    """
     images = re.findall(r'<img [^>]*src="([^"]*)"', page)
-    assert len(images) == 4
+    assert len(images) == 5
+    assert 'alt="parameters against opposite"' in page
+    assert "search for steep and opposite</h1>" in page
     assert all(image.startswith("data:image/png;base64,") for image in images)
     assert page.count("<svg") == 2
     assert not re.search(r'(src|href)="(?!data:)', page)
