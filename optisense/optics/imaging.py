@@ -19,6 +19,7 @@ from optisense.optics.camera import RayCamera
 from optisense.optics.chief_rays import ChiefRays
 from optisense.optics.emitters import Emitter
 from optisense.optics.film import Film
+from optisense.optics.lattice import agreed, between_rays, fill
 from optisense.optics.light_field import LightField
 from optisense.optics.sampling import seed_of
 from optisense.optics.shading import ContactScenes, shade
@@ -41,6 +42,9 @@ USUAL_WIDTH = 320
 REFINED = 8.0 / 320.0
 """How far around a contact, as a part of the image width."""
 
+MANY_BEAMS = 1.5e7
+"""Beams to sum in an image, about two tenths of a second's work, above which only every second
+pixel is shaded where it is smooth."""
 GRAIN_SAMPLES = 4
 """So many more camera samples, or as many as half the work again, where the rest of it is grainy:
 where neighbouring cells of the light field differ much, one sample, which reads one of them, shows
@@ -191,18 +195,45 @@ def render_field(
         dr.eval(pixel, number)
         sample(pixel, number, True)
         samples = [1, outer, inner]
-    far = dr.compress(mi.Bool((~near).ravel()))
+    far = ~near
     layers = None
-    if dr.width(far) and not only_contacts:
-        sample(far, dr.zeros(mi.UInt32, dr.width(far)), False)
+    if far.any() and not only_contacts:
+        # Beams to go through: where they are many, every second pixel will do, if its neighbours
+        # are like it.
+        beams = dr.width(field.beams.ways) / 4 / field.cells.cells
+        sparse = int(far.sum()) * beams > MANY_BEAMS
+        filled = between_rays(rays, far) if sparse else np.zeros_like(far)
+        first = far & ~filled
+        pixel = dr.compress(mi.Bool(first.ravel()))
+        sample(pixel, dr.zeros(mi.UInt32, dr.width(pixel)), False)
         layers = developed()
-        grainy = _grainy(layers.sum(axis=(0, 3)), ~near & rays.hit & (not draft))
+        step = 2 if sparse else 1
+        grainy = np.zeros_like(far)
+        grainy[::step, ::step] = _grainy(
+            layers[:, ::step, ::step].sum(axis=(0, 3)),
+            (far & rays.hit & (not draft))[::step, ::step],
+        )
         if grainy.any():
-            affordable = dr.width(far) // (2 * int(grainy.sum()))
+            affordable = int(first.sum()) // (2 * int(grainy.sum()))
             pixel, number = _repeated(grainy, min(GRAIN_SAMPLES, max(1, affordable)))
             dr.eval(pixel, number)
             sample(pixel, number, False, again=True)
             layers = None
+        if sparse:
+            if layers is None:
+                layers = developed()
+            alike = agreed(layers, filled)
+            if (apart := filled & ~alike).any():
+                # Once in their middle as the others, and once more where those beside them were
+                # sampled again.
+                again = apart & np.kron(grainy[::2, ::2], np.ones((2, 2), bool))[:height, :width]
+                tiers = [_repeated(each, 1) for each in (apart, again) if each.any()]
+                tiers[0] = tiers[0][0], dr.zeros(mi.UInt32, dr.width(tiers[0][0]))
+                pixel, number = (dr.concat(each) for each in zip(*tiers, strict=True))
+                dr.eval(pixel, number)
+                sample(pixel, number, False)
+                layers = developed()
+            fill(layers, alike)
     if layers is None:
         layers = developed()
     return ImageLayers(
