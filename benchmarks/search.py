@@ -119,13 +119,23 @@ def overhead() -> dict[str, Any]:
 
 def coatings() -> dict[str, Any]:
     """A grid of 11 coatings of GelSight Mini by RGB2Normal."""
-    began = time.perf_counter()
+    began, spent = time.perf_counter(), time.process_time() + _children()
     plan = Plan(space=SearchSpace(COATINGS), goals=["rgb2normal"], method="grid")
     study = Study.create(None, optisense.load("gelsight-mini"), plan)
     result = run_study(study, workers=COATING_WORKERS)
     seconds = time.perf_counter() - began
+    spent = time.process_time() + _children() - spent
+    fresh = sum(len(trial.fresh) for trial in result.trials)
     scores = {f"{t.vector[0]:g}": _or_none(t.score) for t in result.trials if not t.is_start}
-    return {"seconds": round(seconds, 1), "target_seconds": 120.0, "scores": scores}
+    return {
+        "seconds": round(seconds, 1),
+        "target_seconds": 120.0,
+        "processor_seconds": round(spent, 1),
+        "scored": len(scores),
+        "scored_again_with_fresh_seeds": fresh,
+        "photons": study.settings.settings["photons"],
+        "scores": scores,
+    }
 
 
 def gradient() -> dict[str, Any]:
@@ -213,7 +223,8 @@ def _table(found: dict[str, Any]) -> str:
             )
     if "coatings" in found:
         lines.append(
-            f"| 11 coatings by RGB2Normal | {found['coatings']['seconds']:.0f} s | 120 s or less |"
+            f"| 11 coatings by RGB2Normal, and the best and the start again with fresh seeds | "
+            f"{found['coatings']['seconds']:.0f} s | 120 s or less |"
         )
     if "mirror" in found:
         row = found["mirror"]
