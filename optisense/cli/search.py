@@ -219,7 +219,10 @@ def _begun(out: Path, design: str | None, budget: int | None, given: dict[str, A
     for key, name in (("space", "--vary"), ("goals", "--objective")):
         if key not in given:
             raise typer.BadParameter("must be given at least once", param_hint=name)
-    space = SearchSpace(given.pop("space"), given.pop("rules", ()))
+    rules = given.pop("rules", ())
+    for rule in rules:
+        rule.load()  # a missing file is told now, not by trials that fail
+    space = SearchSpace(given.pop("space"), rules)
     return Study.create(out, load(design), Plan(space=space, budget=budget, **given))
 
 

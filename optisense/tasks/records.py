@@ -130,13 +130,25 @@ def differences(before: Mapping[str, Any], now: Mapping[str, Any], prefix: str =
     """What differs between two nested mappings, as "path: was A, is B", in the order of `now`."""
     found: list[str] = []
     for key in [*now, *(key for key in before if key not in now)]:
-        path = f"{prefix}{key}"
-        old, new = before.get(key, _NOTHING), now.get(key, _NOTHING)
-        if isinstance(old, Mapping) and isinstance(new, Mapping):
-            found += differences(old, new, path + ".")
-        elif _plain(old) != _plain(new):
-            found.append(f"{path} was {_shown(old)}, is {_shown(new)}")
+        found += _difference(before.get(key, _NOTHING), now.get(key, _NOTHING), f"{prefix}{key}")
     return found
+
+
+def _difference(old: object, new: object, path: str) -> list[str]:
+    """The same of two values; short lists of plain values are told as a whole."""
+    old, new = _plain(old), _plain(new)
+    if isinstance(old, dict) and isinstance(new, dict):
+        return differences(old, new, path + ".")
+    if old == new:
+        return []
+    if isinstance(old, list) and isinstance(new, list) and _alike_and_nested(old, new):
+        pairs = enumerate(zip(old, new, strict=True))
+        return [text for k, (a, b) in pairs for text in _difference(a, b, f"{path}[{k}]")]
+    return [f"{path} was {_shown(old)}, is {_shown(new)}"]
+
+
+def _alike_and_nested(one: list[Any], other: list[Any]) -> bool:
+    return len(one) == len(other) and any(isinstance(value, dict | list) for value in one)
 
 
 def refuse_differences(

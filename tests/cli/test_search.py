@@ -61,6 +61,17 @@ def run(*words: object) -> object:
     return CliRunner().invoke(app, ["search", *map(str, words)])
 
 
+def test_a_rule_that_is_not_there_is_told_before_the_first_trial(
+    mine: Path, tmp_path: Path
+) -> None:
+    for rule, said in ((tmp_path / "no.py:f", "no file"), (f"{mine}:none", "no function 'none'")):
+        result = run("gelsight-mini", "--vary", "coating.specularity=0:1", "-b", f"{mine}:near",
+                     "--rule", rule, "--out", tmp_path / "study")  # fmt: skip
+        assert result.exit_code == 2
+        assert said in result.output and "trials" not in result.output
+        assert not (tmp_path / "study").exists()
+
+
 def test_the_study_holds_all_trials(study: Path) -> None:
     opened = Study.open(study)
     assert len(opened.trials) == 12

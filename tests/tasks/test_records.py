@@ -56,6 +56,16 @@ def test_other_columns_are_refused(tmp_path: Path) -> None:
         Table(tmp_path / "t.csv", ("name",))
 
 
+def test_differences_within_lists_name_the_place() -> None:
+    before = {"points": [{"x": 0.0, "z": 1.0}, {"x": 0.0, "z": 2.0}], "size": [64, 48]}
+    now = {"points": [{"x": 0.0, "z": 1.0}, {"x": 0.0, "z": 2.5}], "size": (80, 48)}
+    assert differences(before, now) == [
+        "points[1].z was 2.0, is 2.5",
+        "size was [64, 48], is [80, 48]",
+    ]
+    assert differences(before, {**before, "points": before["points"][:1]})[0].startswith("points ")
+
+
 def test_differences_name_the_path_and_both_values() -> None:
     before = {"a": 1, "b": {"c": [1, 2], "d": "x"}, "gone": True}
     now = {"a": 1, "b": {"c": (1, 2), "d": "y"}, "new": None}
