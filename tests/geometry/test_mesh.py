@@ -7,6 +7,7 @@ import pytest
 
 from optisense.errors import MeshError
 from optisense.geometry import TriangleMesh
+from optisense.geometry.mesh_files import _parse_obj, _parse_plain_obj
 
 
 def box(divisions: tuple[int, int, int] = (2, 3, 1)) -> TriangleMesh:
@@ -74,6 +75,39 @@ def test_malformed_obj_names_the_place(tmp_path: Path, text: str, expected: str)
     (tmp_path / "bad.obj").write_text(text)
     with pytest.raises(MeshError, match=expected):
         TriangleMesh.load(tmp_path / "bad.obj")
+
+
+SQUARE = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 .5e0\n"
+UP = "vn 0 0 1\n" * 4
+
+
+@pytest.mark.parametrize(
+    ("text", "plain"),
+    [
+        ("# mm\no part\n" + SQUARE + "s off\nf 1 2 3\nf 1 3 4\n", True),
+        (SQUARE + UP + "f 1//1 2//2 3//3\nf 1//1 3//3 4//4\n", True),
+        (SQUARE + "vn 0 0 1\nf 1//1 2//1 3//1\n", True),
+        (SQUARE + "f 1 2 3 4\n", False),
+        (SQUARE + "f -4 -3 -2\n", False),
+        (SQUARE + "f 1/1 2/1 3/1\n", False),
+        (SQUARE + "f 1 2 3 # the first\n", False),
+        (SQUARE + "f 1 2 \\\n3\n", False),
+        (SQUARE + " f 1 2 3\n", False),
+        (SQUARE.replace("1 1 0", "1 1 0 1 0 0") + "f 1 2 3\n", False),
+        (SQUARE + UP + "f 1//1 2//2 3//3\nf 1 3 4\n", False),
+    ],
+)
+def test_plain_files_are_read_at_once_as_they_are_line_by_line(text: str, plain: bool) -> None:
+    at_once = _parse_plain_obj(text.encode())
+    assert (at_once is not None) == plain
+    by_line = _parse_obj(text.encode(), Path("square.obj"))
+    assert len(by_line.faces) > 0
+    if at_once is not None:
+        np.testing.assert_array_equal(at_once.vertices, by_line.vertices)
+        np.testing.assert_array_equal(at_once.faces, by_line.faces)
+        assert (at_once.normals is None) == (by_line.normals is None)
+        if at_once.normals is not None:
+            np.testing.assert_array_equal(at_once.normals, by_line.normals)
 
 
 def test_unreadable_files_are_mesh_errors(tmp_path: Path) -> None:
