@@ -23,6 +23,11 @@ def is_idle(operator: type[bpy.types.Operator], context: bpy.types.Context) -> b
     return True
 
 
+def may_ask(operator: type[bpy.types.Operator], context: bpy.types.Context) -> bool:
+    """There is a sensor, and the engine has nothing long to do."""
+    return has_design(operator, context) and is_idle(operator, context)
+
+
 def in_object_mode(operator: type[bpy.types.Operator], context: bpy.types.Context) -> bool:
     """Nothing is being edited."""
     if context.mode != "OBJECT":

@@ -45,7 +45,7 @@ class OPTISENSE_OT_evaluate(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        if not (polls.has_design(cls, context) and polls.is_idle(cls, context)):
+        if not polls.may_ask(cls, context):
             return False
         if not chosen(context):
             cls.poll_message_set("Choose an objective first")
@@ -115,7 +115,7 @@ class OPTISENSE_OT_show_rays(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        return polls.has_design(cls, context) and polls.is_idle(cls, context)
+        return polls.may_ask(cls, context)
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         name = context.scene.name

@@ -65,7 +65,7 @@ class OPTISENSE_OT_export(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        return polls.has_design(cls, context) and polls.is_idle(cls, context)
+        return polls.may_ask(cls, context)
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         self.filepath = str(Path.home() / f"{context.scene.optisense.title or 'sensor'}-workshop")

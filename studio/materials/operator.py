@@ -157,7 +157,7 @@ class OPTISENSE_OT_keep_material(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        if not (polls.has_design(cls, context) and polls.is_idle(cls, context)):
+        if not polls.may_ask(cls, context):
             return False
         active = context.active_object
         if active is None or active.optisense.kind != "PART":

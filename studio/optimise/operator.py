@@ -104,10 +104,6 @@ class OPTISENSE_OT_vary_remove(bpy.types.Operator):
         return {"FINISHED"}
 
 
-def _may_search(operator: type[bpy.types.Operator], context: bpy.types.Context) -> bool:
-    return polls.has_design(operator, context) and polls.is_idle(operator, context)
-
-
 def _study(context: bpy.types.Context) -> str:
     """The folder of the study as an absolute path; empty where none is named."""
     text = context.scene.optisense_search.study
@@ -131,7 +127,7 @@ class OPTISENSE_OT_search(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        if not _may_search(cls, context):
+        if not polls.may_ask(cls, context):
             return False
         search = context.scene.optisense_search
         if not vary.texts_of(search.vary):
@@ -191,7 +187,7 @@ class _WithStudy:
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        if not _may_search(cls, context):
+        if not polls.may_ask(cls, context):
             return False
         if not context.scene.optisense_search.study:
             cls.poll_message_set("There is no study yet: search first, or name its folder")

@@ -128,7 +128,7 @@ class OPTISENSE_OT_save(_Saves, bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        if not (polls.has_design(cls, context) and polls.is_idle(cls, context)):
+        if not polls.may_ask(cls, context):
             return False
         if not context.scene.optisense.is_saved:
             cls.poll_message_set("It has no folder yet: use Save As")
@@ -149,7 +149,7 @@ class OPTISENSE_OT_save_as(_Saves, bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        return polls.has_design(cls, context) and polls.is_idle(cls, context)
+        return polls.may_ask(cls, context)
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         self.filepath = str(Path.home() / (context.scene.optisense.title or "sensor"))
@@ -168,7 +168,7 @@ class OPTISENSE_OT_check(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        return polls.has_design(cls, context) and polls.is_idle(cls, context)
+        return polls.may_ask(cls, context)
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         def checked(result: dict[str, Any]) -> None:

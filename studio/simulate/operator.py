@@ -31,7 +31,7 @@ class OPTISENSE_OT_simulate(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        return polls.has_design(cls, context) and polls.is_idle(cls, context)
+        return polls.may_ask(cls, context)
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         return self._start(context, wait=False)
