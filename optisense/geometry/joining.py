@@ -133,7 +133,9 @@ def _curved_moves(
 ) -> tuple[FloatArray, float]:
     """Move vertices near the other surface to `distance` below it; also the widest gap, mm."""
     vertex = mover.faces[pairs[:, 0]].astype(np.int64)
-    task = np.unique(np.column_stack([vertex.ravel(), np.repeat(pairs[:, 1], 3)]), axis=0)
+    size = len(fixed.faces)
+    keys = np.unique(vertex.ravel() * size + np.repeat(pairs[:, 1], 3))
+    task = np.column_stack([keys // size, keys % size])
     points = mover.vertices[task[:, 0]]
     nearest = closest_on_triangles(points, fixed.triangles[task[:, 1]])
     apart = np.linalg.norm(points - nearest, axis=1)

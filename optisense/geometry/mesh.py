@@ -223,9 +223,14 @@ class TriangleMesh:
         Shading normals are dropped.
         """
         cells = np.round(self.vertices / distance).astype(np.int64)
-        _, first, inverse = np.unique(cells, axis=0, return_index=True, return_inverse=True)
+        order = np.lexsort(cells.T)  # several times faster than to sort whole rows
+        begins = np.ones(len(cells), dtype=bool)
+        begins[1:] = (np.diff(cells[order], axis=0) != 0).any(axis=1)
+        first = order[begins]
         rank = np.argsort(np.argsort(first))  # keep the vertices in their old order
-        faces = rank[inverse.reshape(-1)][self.faces]
+        faces = np.empty(len(cells), dtype=np.int64)
+        faces[order] = rank[np.cumsum(begins) - 1]
+        faces = faces[self.faces]
         whole = (
             (faces[:, 0] != faces[:, 1])
             & (faces[:, 1] != faces[:, 2])
