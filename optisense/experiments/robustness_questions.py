@@ -56,12 +56,16 @@ def _mini_units(dimensions: Dimensions, settings: Values, seed: int) -> list[Uni
     own = {key: value for key, value in dimensions.items() if key != PRESS_DEPTH}
     if PRESS_DEPTH in dimensions:
         settings = {**settings, "depth": dimensions[PRESS_DEPTH]}
-    designs = [
-        sensor("gelsight-mini-cylindrical", {"coating.specularity": float(value)}, **own)
+    settings = {**settings, "photons": settings["mini_photons"]}
+    return [
+        _score(
+            sensor("gelsight-mini-cylindrical", {"coating.specularity": float(value)}, **own),
+            settings,
+            seed,
+            f"specularity {value}",
+        )
         for value in (LOW, HIGH)
     ]
-    settings = {**settings, "photons": settings["mini_photons"]}
-    return [_score(design, settings, seed) for design in designs]
 
 
 def _mini_margins(records: Sequence[Record], settings: Values) -> dict[str, float | None]:
@@ -71,22 +75,23 @@ def _mini_margins(records: Sequence[Record], settings: Values) -> dict[str, floa
 
 def _belt_units(dimensions: Dimensions, settings: Values, seed: int) -> list[Unit]:
     belt = {**settings, "resolution": settings["belt_resolution"]}
-    designs = [sensor("gelbelt", light_design=number, **dimensions) for number in (3, 2, 1)]
+    designs = {number: sensor("gelbelt", light_design=number, **dimensions) for number in (3, 2, 1)}
     light = [
         Unit(
             picture,
             {
-                "design": design,
+                "design": designs[number],
                 "contacts": NINE,
                 "resolution": [120, 90],
                 "photons": settings["photons"],
                 "seed": seed,
             },
-            "light",
+            f"light of design {number}",
         )
-        for design in (designs[0], designs[2])
+        for number in (3, 1)
     ]
-    return [*(_score(design, belt, seed) for design in designs[:2]), *light]
+    scored = [_score(designs[n], belt, seed, f"light design {n}") for n in (3, 2)]
+    return [*scored, *light]
 
 
 def _belt_margins(records: Sequence[Record], settings: Values) -> dict[str, float | None]:
@@ -175,7 +180,7 @@ def _mirror_margins(records: Sequence[Record], settings: Values) -> dict[str, fl
     return {"mirror": values["best"]["aoap"] - TIMES * values["start"]["aoap"]}
 
 
-def _score(design: Values, settings: Values, seed: int) -> Unit:
+def _score(design: Values, settings: Values, seed: int, what: str) -> Unit:
     return Unit(
         scores,
         {
@@ -188,7 +193,7 @@ def _score(design: Values, settings: Values, seed: int) -> Unit:
                 **({"depth": settings["depth"]} if "depth" in settings else {}),
             },
         },
-        f"seed {seed}",
+        f"{what}, seed {seed}",
     )
 
 

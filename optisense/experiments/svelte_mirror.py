@@ -205,8 +205,9 @@ def claims(numbers: Values) -> list[Claim]:
             if before["mean"] is None or after["mean"] is None
             else bool(after["mean"] - 1.0 <= LESS * (before["mean"] - 1.0)),
             "AOAP looks at how steeply each ray meets the skin, and counts rays that do not arrive "
-            "as 0; it does not look at how neighbouring rays spread. The search gains most by "
-            "letting more of the picture see the skin, which stretches it across the finger. The "
+            "as 0; it does not look at how neighbouring rays spread. A search also "
+            "gains by letting more of the picture see the skin (see the table), which stretches it "
+            "across the finger. The "
             "paper shows this on the middle of a simplified surface.",
         )
     )

@@ -172,9 +172,8 @@ def _follows(agreement: Values, name: str, title: str) -> Claim:
         "Tasks press large, gently tilted things in the middle and read mean colours; the "
         "objectives press steep little balls at nine places. A coating may serve one better than "
         "the other. NormDiff counts colours alike that differ by 30 %, far more than the camera "
-        "noise of the tasks, and shiny coatings, whose colours change quickly with the tilt, do "
-        "well by it. Coatings whose presses are overexposed have no score, and are those that "
-        "the tasks find worst.",
+        "noise of the tasks, and so rewards colours that change quickly with the tilt more than "
+        "steady ones. A coating without a score is left out of the correlation.",
     )
 
 
