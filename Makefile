@@ -79,7 +79,7 @@ studio-tests-%: setup .venv-blender-%/.set-up
 # PICTURES=docs/images/studio keeps a picture of each step.
 studio-window-test: setup $(if $(BLENDER),,$(WINDOW_STAMP))
 	OPTISENSE_WINDOW_BLENDER="$(or $(BLENDER),.blender-window/blender)" \
-	    OPTISENSE_WINDOW_PICTURES="$(PICTURES)" timeout 900 $(BIN)/python -m pytest tests/window
+	    OPTISENSE_WINDOW_PICTURES="$(PICTURES)" timeout 2400 $(BIN)/python -m pytest tests/window
 
 $(WINDOW_STAMP): scripts/setup_blender_window.sh
 	@sh scripts/setup_blender_window.sh

@@ -1,7 +1,9 @@
-"""Runs inside Blender, told by `blender -P`: reports what Blender holds. It never does anything.
+"""Runs inside Blender, told by `blender -P`: reports what Blender holds. All that it does is to
+move the mouse where it looks for a button.
 
-Each line on a local socket is a Python expression, or `at X Y` and an expression that waits until
-Blender knows that the mouse is there; the answer is a line of JSON.
+Each line on a local socket is a Python expression, or `scan X TOP END STEP` and a name: the mouse
+goes down the sidebar until it is over a button of that name, and the answer is how far down that
+is, or null. Answers are lines of JSON.
 """
 
 from __future__ import annotations
@@ -11,6 +13,7 @@ import importlib
 import json
 import os
 import socket
+from collections.abc import Generator
 from typing import Any
 
 import bpy
@@ -18,6 +21,8 @@ from bpy_extras import view3d_utils
 from mathutils import Vector
 
 SOON = 0.005
+MOST_TURNS = 200
+"""Of the timer, until the mouse is where it was sent."""
 
 
 def window() -> bpy.types.Window:
@@ -77,7 +82,7 @@ def under() -> str:
     with bpy.context.temp_override(window=window(), area=area("VIEW_3D"), region=sidebar):
         found = getattr(bpy.context, "property", None)
         if found is not None:
-            return found[1].rpartition(".")[2]
+            return found[1]
         if not bpy.ops.ui.copy_python_command_button.poll():
             return ""
         bpy.context.window_manager.clipboard = ""
@@ -120,22 +125,38 @@ def _poll() -> float:
         _listener.connection.setblocking(False)
     with contextlib.suppress(BlockingIOError, AttributeError):
         _listener.rest += _listener.connection.recv(65536)
-    if _listener.waiting is not None:
-        x, y, text = _listener.waiting
-        if _listener.came:  # and was handled, for timers come before that
-            _listener.waiting, _listener.came = None, False
-            _say(_answer(text))
-        elif _has_come(x, y):
-            _listener.came = True
-    while _listener.waiting is None and b"\n" in _listener.rest:
+    while _listener.scan is None and b"\n" in _listener.rest:
         line, _, _listener.rest = _listener.rest.partition(b"\n")
         text = line.decode()
-        if text.startswith("at "):
-            _, x, y, text = text.split(" ", 3)
-            _listener.waiting = (int(x), int(y), text)
+        if text.startswith("scan "):
+            _, x, top, end, step, what = text.split(" ", 5)
+            _listener.scan = _scan(int(x), range(int(top), int(end), int(step)), what)
         else:
             _say(_answer(text))
+    if _listener.scan is not None:
+        try:
+            next(_listener.scan)
+        except StopIteration as found:
+            _listener.scan = None
+            _say(json.dumps({"value": found.value}))
+        except Exception as error:
+            _listener.scan = None
+            _say(json.dumps({"error": f"{type(error).__name__}: {error}"}))
     return SOON
+
+
+def _scan(x: int, rows: range, what: str) -> Generator[None, None, int | None]:
+    """The first row where a button is; goes on at each turn of the timer."""
+    for y in rows:
+        window().cursor_warp(x, window().height - y)
+        for _ in range(MOST_TURNS):
+            yield
+            if _has_come(x, y):
+                break
+        yield  # timers come before what the mouse touches is told
+        if what in under():
+            return y
+    return None
 
 
 def _say(line: str) -> None:
@@ -174,8 +195,7 @@ class Listener:
 
     connection: socket.socket
     rest = b""
-    waiting: tuple[int, int, str] | None = None
-    came = False
+    scan: Generator[None, None, int | None] | None = None
 
     def __init__(self) -> None:
         self.server = socket.socket(socket.AF_UNIX)

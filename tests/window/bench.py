@@ -13,14 +13,17 @@ from typing import Any
 
 from .desktop import SIZE, Desktop
 
-PATIENCE = 120.0
+PATIENCE = 300.0
 """Seconds after which something that does not happen has failed the test."""
 
 ROW = 14
 """Pixels between places where a button is looked for; buttons are at least 18 high."""
 
-SCROLLED, FAR_DOWN = 9, 90
-"""Clicks of the wheel to see other buttons; more than these, and the sidebar is at its end."""
+SCROLLED, CLICK = 9, 40
+"""Clicks of the wheel to see other buttons, and how many pixels a click moves them."""
+
+PAGES = 15
+"""Most of them that the sidebar has, in steps of so many clicks."""
 
 
 class Bench:
@@ -43,7 +46,7 @@ class Bench:
             "OPTISENSE_AGENT": str(address),
         }
         environment.pop("OPTISENSE_ENGINE", None)  # it knows that from when it was installed
-        self._last = self._down = 0
+        self._last = 0
         self._log = (home / "blender.log").open("ab")
         self.process = subprocess.Popen(
             [blender, "--window-geometry", "0", "0", str(SIZE[0]), str(SIZE[1]),
@@ -128,40 +131,50 @@ class Bench:
         raise AssertionError("there is no tab OptiSense")
 
     def find(self, what: str, *, across: float = 0.5) -> tuple[int, int]:
-        """Look for a button, from where the mouse is down and then from the top.
+        """Look for a button: where it was seen last, from where the mouse is down, then everywhere.
 
         Args:
             what: in its operator's or property's name.
             across: where to look, 0 is the sidebar's left edge and 1 its right one.
         """
         left, top, width, height = self.sidebar()
-        x = round(left + width * across)
-        rows = list(range(top + 6, top + height - 6, ROW))
-        first = next((n for n, y in enumerate(rows) if y > self._last - ROW), 0)
-        for turn in range(12):
-            for y in rows[first:] + rows[:first] if turn == 0 else rows:
-                # Seen again after what moved has been drawn: the wheel is quicker than the sidebar.
-                if self._is_under(what, x, y) and self._stays(what, x, y):
-                    self._last = y
-                    return x, y
-            self.scroll(+SCROLLED if self._down < FAR_DOWN else -FAR_DOWN)
+        x, end = round(left + width * across), top + height - 6
+        y = self._seen(what, x, max(self._last - ROW, top + 6), end)
+        if y is None:
+            self.to_top()
+        for _ in range(PAGES):
+            y = self._seen(what, x, top + 6, end) if y is None else y
+            if y is not None:
+                self._last = y
+                return x, y
+            self.scroll(SCROLLED)
         raise AssertionError(f"no button '{what}' in the sidebar")
 
-    def _stays(self, what: str, x: int, y: int) -> bool:
-        self.drawn()
-        return self._is_under(what, x, y - 1) and self._is_under(what, x, y)
+    def _seen(self, what: str, x: int, top: int, end: int) -> int | None:
+        """How far down a button is in a part of the sidebar that is in view."""
+        y = self.see(f"scan {x} {top} {end} {ROW} {what}")
+        if y is not None:
+            self.drawn()  # the wheel is quicker than the sidebar: it may have moved meanwhile
+            y = self.see(f"scan {x} {y - 3} {y + 2 * ROW} 3 {what}")
+        return None if y is None else int(y)
 
-    def _is_under(self, what: str, x: int, y: int) -> bool:
-        self.desktop.move(x, y)
-        return what in self.see(f"at {x} {y} under()")
+    def to_top(self) -> None:
+        """Show the sidebar's first panel, by the key Home over it."""
+        left, top, width, _ = self.sidebar()
+        self.desktop.move(left + width / 2, top + 6)
+        self.see("1")
+        self.desktop.keys("Home")
+        self._last = 0
+        self.drawn()
 
     def scroll(self, clicks: int) -> None:
         """Turn the mouse's wheel over the sidebar; down is positive."""
         left, top, width, height = self.sidebar()
-        self._down = max(0, self._down + clicks)
         self.desktop.click(
             left + width / 2, top + height / 2, button=5 if clicks > 0 else 4, times=abs(clicks)
         )
+        self.see("1")
+        self.drawn()
 
     def press(self, what: str, *, across: float = 0.5) -> None:
         """Find a button and click on it."""
@@ -174,20 +187,29 @@ class Bench:
         self.see("1")
         self.desktop.keys("Home", *["Down"] * number, "Return")
 
-    def enter(self, what: str, text: str, *, times: int = 1) -> None:
-        """Click into a field, type a text in place of the one that is there, and press Enter."""
+    def enter(self, what: str, text: str) -> None:
+        """Find a field, and type a text in place of the one that is there."""
         x, y = self.find(what, across=0.7)
-        self.desktop.click(x, y + 2, times=times)
+        self.enter_at((x, y + 3), text)
+
+    def enter_at(self, spot: tuple[int, int], text: str, *, times: int = 1) -> None:
+        """The same where a field is known to be; in a list it takes two clicks."""
+        self.desktop.click(*spot, times=times)
         self.see("1")
         self.desktop.keys("ctrl+a")
         self.desktop.write(text)
         self.desktop.keys("Return")
 
-    def open_panel_below(self, above: str, inside: str) -> None:
-        """Open the panel whose title comes below a button, where it is closed."""
-        x, y = self.find(above, across=0.25)
-        self.desktop.click(x, y + 40)
-        self.find(inside, across=0.7)
+    def bring(self, what: str, down: float, *, across: float = 0.5) -> tuple[int, int]:
+        """Scroll until a button is so far down the sidebar, 0 is its top and 1 its end."""
+        _, top, _, height = self.sidebar()
+        for _ in range(3):
+            y = self.find(what, across=across)[1]
+            clicks = round((y - top - down * height) / CLICK)
+            if clicks == 0:
+                break
+            self.scroll(clicks)
+        return self.find(what, across=across)
 
     def choose_file(self, name: str = "") -> None:
         """Click on a file where one is asked for, if a name is given, and then on the button."""

@@ -11,6 +11,8 @@ from shutil import which
 from PIL import ImageGrab
 
 SIZE = (1280, 860)
+PAGE = (1000, 1000)
+"""Pixels of a picture on a page, at most."""
 
 
 class Desktop:
@@ -60,7 +62,9 @@ class Desktop:
     def picture(self, path: Path) -> None:
         """Keep what the display shows."""
         path.parent.mkdir(parents=True, exist_ok=True)
-        ImageGrab.grab(xdisplay=self.name).convert("RGB").save(path, optimize=True)
+        picture = ImageGrab.grab(xdisplay=self.name).convert("RGB")
+        picture.thumbnail(PAGE)
+        picture.save(path, quality=82, optimize=True)
 
     def close(self) -> None:
         """Take the display away."""

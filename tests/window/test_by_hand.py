@@ -21,8 +21,8 @@ from .desktop import Desktop
 MOVED = 1.5
 """mm, how far a light is moved."""
 
-VARY_ABOVE, FIRST_ABOVE = 161, 133
-"""Pixels from the field *Trials* up to the menu *Vary* and to the first row of its list."""
+FIRST_ROW = 37
+"""Pixels from the top of the button *Vary* to the middle of the first row of the list below it."""
 
 FIELDS_OF_VIEW = (50.0, 60.0, 70.0)
 """Degrees, what the search tries; all see less than the whole surface or beyond its edge."""
@@ -47,7 +47,7 @@ def photograph(bench: Bench, name: str) -> None:
     folder = os.environ.get("OPTISENSE_WINDOW_PICTURES")
     if folder:
         bench.drawn()
-        bench.desktop.picture(Path(folder) / f"{name}.png")
+        bench.desktop.picture(Path(folder) / f"{name}.jpg")
 
 
 def test_the_tab_is_there(bench: Bench) -> None:
@@ -88,9 +88,7 @@ def test_a_light_is_moved(bench: Bench) -> None:
 
 def test_a_picture_appears(bench: Bench) -> None:
     bench.press("optisense.simulate")
-    bench.until("state().busy == 'Simulating'")
-    bench.until("state().fraction > 0.0 or not state().busy")
-    photograph(bench, "3-simulating")
+    bench.until("state().busy == 'Simulating' or manager.optisense_picture.shown")
     bench.rest()
     assert bench.see("manager.optisense_picture.shown and not manager.optisense_picture.is_draft")
     width, height = bench.see("list(bpy.data.images['OptiSense picture'].size)")
@@ -99,7 +97,8 @@ def test_a_picture_appears(bench: Bench) -> None:
         "[sum(list(bpy.data.images['OptiSense picture'].pixels)[c::4]) for c in range(3)]"
     )
     assert min(red, green, blue) > 0.05 * width * height
-    photograph(bench, "4-picture")
+    bench.bring("optisense.show_picture", 0.95)
+    photograph(bench, "3-picture")
 
 
 def test_scores_appear(bench: Bench) -> None:
@@ -114,7 +113,8 @@ def test_scores_appear(bench: Bench) -> None:
     bench.press("optisense.show_rays", across=0.25)
     bench.until("any(each.optisense.key == 'ray hit' for each in scene().objects)")
     bench.rest()
-    photograph(bench, "5-evaluated")
+    bench.bring("optisense.show_rays", 0.95, across=0.25)
+    photograph(bench, "4-evaluated")
 
 
 def test_it_is_saved(bench: Bench) -> None:
@@ -133,13 +133,12 @@ def test_a_small_grid_finds_the_best_of_three(bench: Bench) -> None:
     bench.desktop.click(*bench.see(f"on_screen(bpy.data.objects[{camera!r}].matrix_world"
                                    ".translation)"))  # fmt: skip
     bench.until(f"bpy.context.view_layer.objects.active.name == {camera!r}")
-    bench.open_panel_below("optisense.show_rays", "budget")
-    x, y = bench.find("budget", across=0.7)
     labels = bench.see("[each.label for each in part('core.vary').for_camera()]")
-    bench.choose((x - 60, y - VARY_ABOVE), labels.index("Field of view"))
+    x, y = bench.find("OPTISENSE_MT_vary")
+    bench.choose((x, y), labels.index("Field of view"))
     bench.until("len(scene().optisense_search.vary) == 1")
     grid = "camera.fov=" + ",".join(f"{each:g}" for each in FIELDS_OF_VIEW)
-    bench.write_at((x, y - FIRST_ABOVE), grid)
+    bench.enter_at((x, y + FIRST_ROW), grid, times=2)
     bench.until(f"scene().optisense_search.vary[0].text == {grid!r}")
     bench.enter("method", "grid")
     bench.until("scene().optisense_search.method == 'grid'")
@@ -147,7 +146,8 @@ def test_a_small_grid_finds_the_best_of_three(bench: Bench) -> None:
     bench.until("state().busy == 'Searching'")
     bench.rest()
     assert "3 trials" in bench.see("manager.optisense_found.ended")
-    photograph(bench, "6-searched")
+    bench.bring("optisense.apply_best", 0.95, across=0.25)
+    photograph(bench, "5-searched")
 
 
 def test_the_best_is_applied_saved_and_opened_again(bench: Bench) -> None:
@@ -173,4 +173,4 @@ def test_the_best_is_applied_saved_and_opened_again(bench: Bench) -> None:
     assert sum(math.isclose(z, lights[0][2] - MOVED, abs_tol=1e-3) for _, _, z in lights) == 1
     bench.press("optisense.show_picture")
     bench.until("any(each.type == 'IMAGE_EDITOR' for each in window().screen.areas)")
-    photograph(bench, "7-opened-again")
+    photograph(bench, "6-opened-again")
