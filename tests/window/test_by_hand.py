@@ -134,10 +134,10 @@ def test_a_small_grid_finds_the_best_of_three(bench: Bench) -> None:
                                    ".translation)"))  # fmt: skip
     bench.until(f"bpy.context.view_layer.objects.active.name == {camera!r}")
     labels = bench.see("[each.label for each in part('core.vary').for_camera()]")
-    x, y = bench.find("OPTISENSE_MT_vary")
-    bench.choose((x, y), labels.index("Field of view"))
+    bench.choose(bench.bring("OPTISENSE_MT_vary", 0.3), labels.index("Field of view"))
     bench.until("len(scene().optisense_search.vary) == 1")
     grid = "camera.fov=" + ",".join(f"{each:g}" for each in FIELDS_OF_VIEW)
+    x, y = bench.find("OPTISENSE_MT_vary")
     bench.enter_at((x, y + FIRST_ROW), grid, times=2)
     bench.until(f"scene().optisense_search.vary[0].text == {grid!r}")
     bench.enter("method", "grid")
