@@ -3,9 +3,10 @@
 Light arriving at the sensing surface varies slowly from place to place; what varies within a
 tenth of a millimetre in a contact is the surface's tilt and what it hides. So photons are
 traced once a design, without contacts, and pooled where they land: each cell and bin of
-directions keeps the flux through a plane *across the light* (a photon's power over the cosine
-of its landing) and the mean direction. What a contact makes of it is ``shading.py``'s part. The
-cost of an image then does not depend on the number of photons.
+directions (bins overlap, see `_dither`) keeps the flux through a plane *across the
+light* (a photon's power over the cosine of its landing) and the mean direction. What a contact
+makes of it is ``shading.py``'s part. The cost of an image then does not depend on the number of
+photons.
 """
 
 from __future__ import annotations
@@ -21,6 +22,7 @@ from optisense.optics.beams import Beams, collect_beams
 from optisense.optics.cells import SurfaceCells, cell_at
 from optisense.optics.exchange import irradiance_table
 from optisense.optics.photons import GROUP_MASK, PhotonMap
+from optisense.optics.sampling import unit_float
 from optisense.optics.smoothing import Kernels, smooth
 
 FloatArray = NDArray[np.floating]
@@ -37,13 +39,35 @@ BINS_IN_STEPS_OF = 32
 DARK = 1e-7
 
 
-def direction_bin(cells: SurfaceCells, direction: mi.Vector3f) -> mi.UInt32:
-    """Equal-area bin (of BINS on the sphere) of a unit direction."""
+def direction_bin(
+    cells: SurfaceCells, direction: mi.Vector3f, bands_off: mi.Float, sectors_off: mi.Float
+) -> mi.UInt32:
+    """Equal-area bin (of BINS on the sphere) of a unit direction, or the one so many bands and
+    sectors beside it.
+    """
     x, y, z = (dr.dot(direction, mi.Vector3f(*map(float, row))) for row in cells.axes)
-    band = dr.minimum(mi.UInt32(dr.maximum((z + 1) * (BANDS / 2), 0)), BANDS - 1)
-    turn = dr.atan2(y, x) * (1 / dr.two_pi)
+    place = (z + 1) * (BANDS / 2) + bands_off
+    # Beyond a pole: back from it.
+    place = dr.select(place > BANDS, 2 * BANDS - place, dr.abs(place))
+    band = dr.minimum(mi.UInt32(place), BANDS - 1)
+    turn = dr.atan2(y, x) * (1 / dr.two_pi) + sectors_off / SECTORS
     turn -= dr.floor(turn)
     return band * SECTORS + dr.minimum(mi.UInt32(turn * SECTORS), SECTORS - 1)
+
+
+def _dither(place: mi.Vector4f, direction: mi.Vector3f) -> list[mi.Float]:
+    """Offsets in bands and sectors, of a triangular density over -1 .. 1, for landings.
+
+    With sharp bins, a lamp would be counted once or twice by a point off the surface, depending on
+    how near a bin's edge it lies, where its light is only somewhat stronger than below. So each bin
+    takes from its neighbours, weighted by a quadratic B-spline, and the sum over bins hardly
+    depends on where they lie. The offsets follow from the landing, as landings are in no order.
+    """
+    first, second, third = (
+        dr.reinterpret_array(mi.UInt32, value) for value in (place.x, place.y, direction.x)
+    )
+    both = mi.sample_tea_32(first ^ (third * 747796405), second)
+    return [unit_float(one) + unit_float(one * 277803737) - 1 for one in both]
 
 
 def bin_centres(cells: SurfaceCells, bins: NDArray[np.integer]) -> mi.Float:
@@ -108,7 +132,8 @@ class FieldTally:
         cell, found = cell_at(self.cells, mi.Point3f(place.x, place.y, place.z), mi.Bool(True))
         direction = mi.Vector3f(travel.x, travel.y, travel.z)
         across = dr.rcp(dr.maximum(travel.w, LEAST_COSINE))
-        entry = (cell * BINS + direction_bin(self.cells, -direction)) * self.groups + group
+        bin_ = direction_bin(self.cells, -direction, *_dither(place, direction))
+        entry = (cell * BINS + bin_) * self.groups + group
         if self.coloured:
             power = dr.gather(mi.Vector4f, photons.power, index)
             for k in range(3):

@@ -232,10 +232,7 @@ def _sum_chosen(
     while active & (k < bins):
         there = _place(
             cells,
-            moments,
             centres,
-            bins,
-            groups,
             fixed,
             curved,
             points,
@@ -278,10 +275,7 @@ def _sum_chosen(
 @dr.syntax
 def _place(
     cells: SurfaceCells,
-    moments: mi.Float,
     centres: mi.Float,
-    bins: mi.UInt32,
-    groups: int,
     fixed: mi.Scene,
     curved: bool,
     points: VisiblePoints,
@@ -293,22 +287,14 @@ def _place(
 ) -> mi.UInt32:
     """The cell where bin ``k`` is looked up for points.
 
-    On an indenter that is where the bin's line through the point (along the mean direction of
-    all groups' light) goes on to meet the undeformed surface, found on the planes of two cells
-    in turn; on a curved surface, lines that graze these planes are followed by a ray.
+    On an indenter that is where the line through the point along the bin's middle goes on to meet
+    the undeformed surface, found on the planes of two cells in turn; on a curved surface, lines
+    that graze these planes are followed by a ray. (The middle of what light the bin holds would
+    not do: where a lamp straddles two bins, its halves would be read at places that do not belong
+    together.)
     """
-    lit = mi.Vector4f(0)
-    for g in range(groups):
-        lit += dr.gather(mi.Vector4f, moments, (cell * bins + k) * groups + g, active & raised)
     middle = dr.gather(mi.Vector4f, centres, k)
-    known = lit.w > 0
-    towards = dr.normalize(
-        mi.Vector3f(
-            dr.select(known, lit.x, middle.x),
-            dr.select(known, lit.y, middle.y),
-            dr.select(known, lit.z, middle.z),
-        )
-    )
+    towards = mi.Vector3f(middle.x, middle.y, middle.z)
     there = mi.UInt32(cell)
     exists = active & raised
     for _ in range(2):
