@@ -3,7 +3,7 @@
 Light arriving at the sensing surface varies slowly from place to place; what varies within a
 tenth of a millimetre in a contact is the surface's tilt and what it hides. So photons are
 traced once a design, without contacts, and pooled where they land: each cell and bin of
-directions (bins overlap, see `_dither`) keeps the flux through a plane *across the
+directions (bins overlap, see `OVERLAP`) keeps the flux through a plane *across the
 light* (a photon's power over the cosine of its landing) and the mean direction. What a contact
 makes of it is ``shading.py``'s part. The cost of an image then does not depend on the number of
 photons.
@@ -35,6 +35,13 @@ BANDS = 16
 SECTORS = 16
 BINS = BANDS * SECTORS
 BINS_IN_STEPS_OF = 32
+OVERLAP = 1.0
+"""Bins by which light strays to its neighbours (triangular): each bin holds what a quadratic
+B-spline weights. With sharp edges, a lamp would be counted once or twice by a point above the
+surface, depending on how near an edge it lies, where its light is only somewhat stronger than
+below; the sum over such bins hardly depends on where they lie."""
+OVERLAP_OF_METAL = 0.5
+"""The same where a coating is part metal, which tells directions apart: a compromise."""
 # Where a bin of no light is told from one of little.
 DARK = 1e-7
 
@@ -55,19 +62,16 @@ def direction_bin(
     return band * SECTORS + dr.minimum(mi.UInt32(turn * SECTORS), SECTORS - 1)
 
 
-def _dither(place: mi.Vector4f, direction: mi.Vector3f) -> list[mi.Float]:
-    """Offsets in bands and sectors, of a triangular density over -1 .. 1, for landings.
+def _dither(place: mi.Vector4f, direction: mi.Vector3f, reach: mi.Float) -> list[mi.Float]:
+    """Offsets in bands and sectors, of a triangular density over -reach .. reach, for landings.
 
-    With sharp bins, a lamp would be counted once or twice by a point off the surface, depending on
-    how near a bin's edge it lies, where its light is only somewhat stronger than below. So each bin
-    takes from its neighbours, weighted by a quadratic B-spline, and the sum over bins hardly
-    depends on where they lie. The offsets follow from the landing, as landings are in no order.
+    They follow from the landing, as landings are in no order.
     """
     first, second, third = (
         dr.reinterpret_array(mi.UInt32, value) for value in (place.x, place.y, direction.x)
     )
     both = mi.sample_tea_32(first ^ (third * 747796405), second)
-    return [unit_float(one) + unit_float(one * 277803737) - 1 for one in both]
+    return [reach * (unit_float(one) + unit_float(one * 277803737) - 1) for one in both]
 
 
 def bin_centres(cells: SurfaceCells, bins: NDArray[np.integer]) -> mi.Float:
@@ -132,7 +136,8 @@ class FieldTally:
         cell, found = cell_at(self.cells, mi.Point3f(place.x, place.y, place.z), mi.Bool(True))
         direction = mi.Vector3f(travel.x, travel.y, travel.z)
         across = dr.rcp(dr.maximum(travel.w, LEAST_COSINE))
-        bin_ = direction_bin(self.cells, -direction, *_dither(place, direction))
+        reach = dr.opaque(mi.Float, OVERLAP_OF_METAL if self.metallic else OVERLAP)
+        bin_ = direction_bin(self.cells, -direction, *_dither(place, direction, reach))
         entry = (cell * BINS + bin_) * self.groups + group
         if self.coloured:
             power = dr.gather(mi.Vector4f, photons.power, index)
