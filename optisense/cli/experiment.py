@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -95,9 +94,6 @@ def experiment(
         output.print(f"page: {page}", markup=False)
 
 
-LOG_EVERY = 30.0
-"""Seconds between lines of progress where there is no terminal."""
-
 MOST_WORKERS = 8
 """Unless the user says otherwise: each takes two gigabytes."""
 
@@ -130,12 +126,12 @@ def _print_result(experiment: Experiment, result: dict[str, Any], out: Path) -> 
 @contextmanager
 def _progress(what: str) -> Iterator[Callable[[int, int, str], None]]:
     """On standard error: a bar on a terminal, elsewhere a line now and then."""
+    from optisense.cli.progress import LogLines, passing_bar
+
     if not messages.is_terminal:
-        yield _Lines(what)
+        yield LogLines(what)
         return
     from rich.progress import MofNCompleteColumn, TextColumn, TimeElapsedColumn
-
-    from optisense.cli.progress import passing_bar
 
     label = TextColumn("{task.fields[label]}")
     with passing_bar(what, MofNCompleteColumn(), TimeElapsedColumn(), label) as bar:
@@ -145,19 +141,3 @@ def _progress(what: str) -> Iterator[Callable[[int, int, str], None]]:
             bar.update(task, completed=done, total=count, label=label)
 
         yield show
-
-
-class _Lines:
-    """A line for a log, such as ``all: 120 of 431, 14.2 min, cylinder, seed 1``."""
-
-    def __init__(self, what: str) -> None:
-        self._what = what
-        self._began = self._told = time.monotonic()
-
-    def __call__(self, done: int, count: int, label: str) -> None:
-        now = time.monotonic()
-        if not label or now - self._told < LOG_EVERY:
-            return
-        self._told = now
-        minutes = (now - self._began) / 60.0
-        messages.print(f"{self._what}: {done} of {count}, {minutes:.1f} min, {label}", markup=False)

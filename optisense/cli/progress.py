@@ -1,7 +1,8 @@
-"""Progress bars."""
+"""Progress on standard error: bars on a terminal, lines in a log."""
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
@@ -10,6 +11,9 @@ from optisense.cli.console import messages
 
 if TYPE_CHECKING:
     from rich.progress import Progress, ProgressColumn
+
+LINE_EVERY = 30.0
+"""Seconds between lines where standard error is no terminal."""
 
 
 @contextmanager
@@ -35,7 +39,12 @@ def passing_bar(what: str, *columns: ProgressColumn) -> Iterator[Progress]:
 
 @contextmanager
 def counting_bar(what: str) -> Iterator[Callable[[int, int], None]]:
-    """A bar that counts finished pieces of work: ``show(done, count)``."""
+    """A bar that counts finished pieces of work, ``show(done, count)``; lines where there is no
+    terminal.
+    """
+    if not messages.is_terminal:
+        yield LogLines(what)
+        return
     from rich.progress import (
         MofNCompleteColumn,
         TextColumn,
@@ -51,3 +60,22 @@ def counting_bar(what: str) -> Iterator[Callable[[int, int], None]]:
             bar.update(task, completed=done, total=count)
 
         yield show
+
+
+class LogLines:
+    """A line now and then, for a log: ``all: 120 of 431, 14.2 min, cylinder, seed 1``."""
+
+    def __init__(self, what: str) -> None:
+        """``what`` begins each line."""
+        self._what = what
+        self._began = self._told = time.monotonic()
+
+    def __call__(self, done: int, count: int | None, note: str = "") -> None:
+        """Tell it, if the last line is some time ago."""
+        now = time.monotonic()
+        if now - self._told < LINE_EVERY:
+            return
+        self._told = now
+        parts = [f"{done} of {count}" if count else f"{done}"]
+        parts.append(f"{(now - self._began) / 60.0:.1f} min")
+        messages.print(f"{self._what}: {', '.join(parts + [note] * bool(note))}", markup=False)

@@ -3,18 +3,15 @@
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
 from optisense.cli.console import messages
+from optisense.cli.progress import LogLines, passing_bar
 
 if TYPE_CHECKING:
     from optisense.search import Progress
-
-LINE_EVERY = 30.0
-"""Seconds between lines where standard error is no terminal, such as a log file."""
 
 
 @contextmanager
@@ -22,28 +19,17 @@ def search_progress(method: str) -> Iterator[Callable[[Progress], None]]:
     """A bar with the best score so far, trials an hour and the time left; lines now and then
     where standard error is no terminal.
     """
-    from rich.progress import BarColumn, MofNCompleteColumn, TextColumn
-    from rich.progress import Progress as Bar
+    if not messages.is_terminal:
+        line = LogLines(method)
+        yield lambda progress: line(progress.done, progress.total, note(progress))
+        return
+    from rich.progress import MofNCompleteColumn, TextColumn
 
-    with Bar(
-        TextColumn(method),
-        BarColumn(bar_width=24),
-        MofNCompleteColumn(),
-        TextColumn("{task.fields[note]}"),
-        console=messages,
-        transient=True,
-        disable=not messages.is_terminal,
-    ) as bar:
+    with passing_bar(method, MofNCompleteColumn(), TextColumn("{task.fields[note]}")) as bar:
         task = bar.add_task("search", total=None, note="getting ready")
-        last = time.monotonic()
 
         def show(progress: Progress) -> None:
-            nonlocal last
             bar.update(task, completed=progress.done, total=progress.total, note=note(progress))
-            if not messages.is_terminal and time.monotonic() - last > LINE_EVERY:
-                last = time.monotonic()
-                line = f"{progress.done}/{progress.total}  {note(progress)}"
-                messages.print(line, markup=False)
 
         yield show
 

@@ -59,7 +59,7 @@ def test_all_are_prepared_in_one_go_and_lines_tell_where_there_is_no_terminal(
         kept_failure(unit, folder)
 
     monkeypatch.setattr("optisense.experiments.bench.work_out", fail)
-    monkeypatch.setattr("optisense.cli.experiment.LOG_EVERY", 0.0)
+    monkeypatch.setattr("optisense.cli.progress.LINE_EVERY", 0.0)
     monkeypatch.setattr(ProcessPool, "__init__", lambda *_: pytest.fail("one process is asked for"))
     command = ["experiment", "all", "--quick", "--workers", "1", "--out", str(tmp_path)]
     result = runner.invoke(app, command)
