@@ -15,6 +15,7 @@ from .export import operator as export_operator
 from .export import ui as export_ui
 from .lights import operator as light_operator
 from .lights import ui as light_ui
+from .materials import gallery
 from .materials import operator as material_operator
 from .materials import ui as material_ui
 from .optimise import following
@@ -50,6 +51,7 @@ MODULES = (
     sensor_operator,
     reference_operator,
     cage_operator,
+    gallery,
     material_operator,
     light_operator,
     simulate_operator,

@@ -12,14 +12,15 @@ from ..engine import catalogue, handing, polls, session
 from ..scene.build import add_material, set_coating
 from ..scene.gather import coating_values, free_name, material_values
 from ..scene.kinds import KINDS_OF_ROLE
+from . import gallery
 
 
 def _materials(values: Any, context: bpy.types.Context | None) -> catalogue.Items:
-    return catalogue.items("material")
+    return gallery.items("material")
 
 
 def _coatings(values: Any, context: bpy.types.Context | None) -> catalogue.Items:
-    return catalogue.items("coating")
+    return gallery.items("coating")
 
 
 class OPTISENSE_PG_material_choice(bpy.types.PropertyGroup):
@@ -86,6 +87,26 @@ class OPTISENSE_OT_preview_material(bpy.types.Operator):
             name="material",
         )
         return {"FINISHED"} if done else {"CANCELLED"}
+
+
+class OPTISENSE_OT_material_pictures(bpy.types.Operator):
+    """Draw everything of this kind in the library, to choose from pictures"""
+
+    bl_idname = "optisense.material_pictures"
+    bl_label = "Show Pictures"
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        if not _chosen(cls, context):
+            return False
+        if not gallery.missing(_choice(context).kind):
+            cls.poll_message_set("All of them are drawn, or being drawn")
+            return False
+        return True
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        gallery.draw_missing(_choice(context).kind)
+        return {"FINISHED"}
 
 
 class OPTISENSE_OT_apply_material(bpy.types.Operator):
@@ -195,6 +216,7 @@ class OPTISENSE_OT_keep_material(bpy.types.Operator):
             session.say(error)
             self.report({"ERROR"}, error.text())
             return {"CANCELLED"}
+        gallery.forget(kind, name)
         catalogue.refresh_library(session.engine(), kind)
         session.state().note = f"'{name}' is in your library"
         return {"FINISHED"}
@@ -203,6 +225,7 @@ class OPTISENSE_OT_keep_material(bpy.types.Operator):
 CLASSES = (
     OPTISENSE_PG_material_choice,
     OPTISENSE_OT_preview_material,
+    OPTISENSE_OT_material_pictures,
     OPTISENSE_OT_apply_material,
     OPTISENSE_OT_keep_material,
 )

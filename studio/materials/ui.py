@@ -6,6 +6,7 @@ import bpy
 
 from ..engine.layout import SidebarPanel, show_job
 from ..simulate.picture import file_icon
+from . import gallery
 
 
 class OPTISENSE_PT_materials(SidebarPanel, bpy.types.Panel):
@@ -18,7 +19,14 @@ class OPTISENSE_PT_materials(SidebarPanel, bpy.types.Panel):
         choice = context.window_manager.optisense_material
         row = layout.row(align=True)
         row.prop(choice, "kind", expand=True)
-        layout.prop(choice, choice.kind, text="")
+        if gallery.is_begun(choice.kind):
+            layout.template_icon_view(choice, choice.kind, show_labels=True, scale=5.0)
+        row = layout.row(align=True)
+        row.prop(choice, choice.kind, text="")
+        row.operator("optisense.material_pictures", text="", icon="IMGDISPLAY")
+        coming = gallery.waiting(choice.kind)
+        if coming:
+            layout.label(text=f"Drawing {coming} more", icon="SORTTIME")
         row = layout.row(align=True)
         row.operator("optisense.preview_material", text="Preview", icon="SHADING_RENDERED")
         row.operator("optisense.apply_material", icon="MATERIAL")

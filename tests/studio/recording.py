@@ -67,6 +67,10 @@ class Recording:
         assert icon_value > 0
         self.texts.append("<picture>")
 
+    def template_icon_view(self, data: Any, name: str, **_: Any) -> None:
+        self.prop(data, name)
+        self.texts.append("<pictures>")
+
     def progress(self, factor: float = 0.0, text: str = "", **_: Any) -> None:
         assert 0.0 <= factor <= 1.0
         self.texts.append(text)

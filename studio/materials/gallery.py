@@ -1,0 +1,79 @@
+"""Pictures of what the library holds, drawn by the engine when they are first asked for."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from ..core.engine import EngineError
+from ..engine import catalogue, session
+from ..simulate.picture import file_icon
+
+_files: dict[tuple[str, str], str] = {}
+_asked: set[tuple[str, str]] = set()
+_items: dict[str, list[tuple[Any, ...]]] = {}
+
+
+def items(kind: str) -> catalogue.Items | list[tuple[Any, ...]]:
+    """A kind of the library as choices of a menu, with those pictures that are drawn."""
+    plain = catalogue.items(kind)
+    if not is_begun(kind):
+        return plain
+    # Kept, as Blender asks for.
+    _items[kind] = [
+        (name, title, text, file_icon(picture(kind, name)), number)
+        for number, (name, title, text) in enumerate(plain)
+    ]
+    return _items[kind]
+
+
+def picture(kind: str, name: str) -> str:
+    """The file of an entry's picture; empty while there is none."""
+    return _files.get((kind, name), "")
+
+
+def is_begun(kind: str) -> bool:
+    """Whether a picture of this kind is drawn."""
+    return any(each == kind for each, _ in _files)
+
+
+def missing(kind: str) -> list[str]:
+    """Entries of this kind that have no picture, and none on its way."""
+    names = [row["name"] for row in catalogue.entries(kind)]
+    return [name for name in names if (kind, name) not in _asked]
+
+
+def draw_missing(kind: str) -> None:
+    """Ask for the pictures that are missing; each is shown when it is there."""
+    for name in missing(kind):
+        _asked.add((kind, name))
+
+        def drawn(result: dict[str, Any], name: str = name) -> None:
+            _files[kind, name] = result["files"]["picture"]
+            session.redraw()
+
+        def failed(error: EngineError, name: str = name) -> None:
+            _asked.discard((kind, name))
+            session.say(error)
+
+        session.ask("preview", drawn, failed, kind=kind, entry=name, name=f"{kind}-{name}")
+
+
+def waiting(kind: str) -> int:
+    """How many pictures are on their way."""
+    return sum(each == kind for each, _ in _asked) - sum(each == kind for each, _ in _files)
+
+
+def forget(kind: str, name: str) -> None:
+    """The entry has changed: its picture is of the one before."""
+    _files.pop((kind, name), None)
+    _asked.discard((kind, name))
+
+
+def register() -> None:
+    unregister()
+
+
+def unregister() -> None:
+    _files.clear()
+    _asked.clear()
+    _items.clear()
