@@ -114,7 +114,8 @@ def _tips(tips: Values, with_leaps: Values) -> list[Claim]:
         told = top in near or (None if near & set(alike) else False)
     return [
         Claim(
-            f"Of the tips 0 (flat) to 10 (conical), {PAPERS_TIP} (or a neighbour) has the best 2to3PW.",
+            f"Of the tips 0 (flat) to 10 (conical), {PAPERS_TIP} (or a neighbour) has the best "
+            "2to3PW.",
             "no scores"
             if top is None
             else f"tip {top} ({shown(tips[top])}); alike: {_all_but(alike, top)}",
