@@ -10,7 +10,8 @@ from ..simulate.picture import file_icon
 
 _files: dict[tuple[str, str], str] = {}
 _asked: set[tuple[str, str]] = set()
-_items: dict[str, list[tuple[Any, ...]]] = {}
+_items: dict[str, tuple[catalogue.Items, list[tuple[Any, ...]]]] = {}
+"""Choices of each kind, and the list that they were made for."""
 
 
 def items(kind: str) -> catalogue.Items | list[tuple[Any, ...]]:
@@ -18,12 +19,16 @@ def items(kind: str) -> catalogue.Items | list[tuple[Any, ...]]:
     plain = catalogue.items(kind)
     if not is_begun(kind):
         return plain
-    # Kept, as Blender asks for.
-    _items[kind] = [
-        (name, title, text, file_icon(picture(kind, name)), number)
-        for number, (name, title, text) in enumerate(plain)
-    ]
-    return _items[kind]
+    # Kept, as Blender asks for, and made anew for another list or picture only: this is asked for
+    # at each drawing of the panel.
+    made_for, found = _items.get(kind, (None, []))
+    if made_for is not plain:
+        found = [
+            (name, title, text, file_icon(picture(kind, name)), number)
+            for number, (name, title, text) in enumerate(plain)
+        ]
+        _items[kind] = plain, found
+    return found
 
 
 def picture(kind: str, name: str) -> str:
@@ -49,6 +54,7 @@ def draw_missing(kind: str) -> None:
 
         def drawn(result: dict[str, Any], name: str = name) -> None:
             _files[kind, name] = result["files"]["picture"]
+            _items.pop(kind, None)
             session.redraw()
 
         def failed(error: EngineError, name: str = name) -> None:
@@ -60,12 +66,13 @@ def draw_missing(kind: str) -> None:
 
 def waiting(kind: str) -> int:
     """How many pictures are on their way."""
-    return sum(each == kind for each, _ in _asked) - sum(each == kind for each, _ in _files)
+    return sum(each == kind for each, _ in _asked - _files.keys())
 
 
 def forget(kind: str, name: str) -> None:
     """The entry has changed: its picture is of the one before."""
     _files.pop((kind, name), None)
+    _items.pop(kind, None)
     _asked.discard((kind, name))
 
 
