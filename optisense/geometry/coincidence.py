@@ -15,6 +15,7 @@ import shapely
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from optisense.geometry.box_pairs import meeting_boxes
 from optisense.geometry.mesh import FloatArray, TriangleMesh
 
 PARALLEL = float(np.cos(np.radians(10.0)))
@@ -195,10 +196,8 @@ def _twins(first: TriangleMesh, second: TriangleMesh, tolerance: float) -> Pairs
 def _in_reach(first: TriangleMesh, second: TriangleMesh, tolerance: float) -> NDArray[np.bool_]:
     """(m,) which faces of `first` meet the bounding box of `second`."""
     low, high = second.bounds[0] - tolerance, second.bounds[1] + tolerance
-    corners = first.triangles
-    reach: NDArray[np.bool_] = ((corners.min(axis=1) <= high) & (corners.max(axis=1) >= low)).all(
-        axis=1
-    )
+    lowest, highest = first.face_bounds
+    reach: NDArray[np.bool_] = ((lowest <= high) & (highest >= low)).all(axis=1)
     return reach
 
 
@@ -212,22 +211,10 @@ def _near_pairs(
     kept_1, kept_2 = np.flatnonzero(reach_1), np.flatnonzero(reach_2)
     if len(kept_1) == 0 or len(kept_2) == 0:
         return np.zeros((0, 2), dtype=np.int64)
-    low_1, high_1 = first.triangles.min(axis=1), first.triangles.max(axis=1)
-    low_2 = second.triangles.min(axis=1) - tolerance
-    high_2 = second.triangles.max(axis=1) + tolerance
-    extent = np.minimum(high_1[kept_1].max(0), high_2[kept_2].max(0)) - np.maximum(
-        low_1[kept_1].min(0), low_2[kept_2].min(0)
-    )
-    third, x, y = np.argsort(extent)
-    tree = shapely.STRtree(_boxes(low_2[kept_2], high_2[kept_2], x, y))
-    one, other = tree.query(_boxes(low_1[kept_1], high_1[kept_1], x, y))
-    one, other = kept_1[one], kept_2[other]
-    meet = (low_1[one, third] <= high_2[other, third]) & (high_1[one, third] >= low_2[other, third])
-    return np.column_stack([one[meet], other[meet]]).astype(np.int64)
-
-
-def _boxes(low: FloatArray, high: FloatArray, x: int, y: int) -> NDArray[Any]:
-    return shapely.box(low[:, x], low[:, y], high[:, x], high[:, y])
+    low_1, high_1 = (corner[kept_1] for corner in first.face_bounds)
+    low_2, high_2 = (corner[kept_2] for corner in second.face_bounds)
+    one, other = meeting_boxes(low_1, high_1, low_2 - tolerance, high_2 + tolerance)
+    return np.column_stack([kept_1[one], kept_2[other]])
 
 
 def _contains(triangles: FloatArray, points: FloatArray, tolerance: float) -> NDArray[np.bool_]:

@@ -5,20 +5,15 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-import shapely
 from numpy.typing import NDArray
 
+from optisense.geometry.box_pairs import meeting_boxes, meeting_each_other
 from optisense.geometry.mesh import FloatArray, TriangleMesh
 
 TOUCH = 1e-4
 """mm: faces that reach through one another by less only touch."""
 
 _PAIRS_AT_ONCE = 500_000
-_BLOCK = 64
-"""Faces that are looked at together first."""
-
-_DENSE = 1_000_000
-"""Up to so many pairs of boxes are compared one by one; a tree takes longer to build."""
 
 
 class Crossings(NamedTuple):
@@ -40,9 +35,9 @@ def self_crossings(mesh: TriangleMesh, limit: int | None = None) -> Crossings:
         mesh: a mesh whose neighbours share vertices (see `TriangleMesh.welded`).
         limit: stop looking once this many are found; None finds all.
     """
-    one, other = near_pairs(mesh, mesh)
-    once = one < other
-    return _crossings(mesh, mesh, one[once], other[once], limit)
+    one, other = meeting_each_other(*mesh.face_bounds)
+    solid = (mesh.face_areas[one] > 0.0) & (mesh.face_areas[other] > 0.0)
+    return _crossings(mesh, mesh, one[solid], other[solid], limit)
 
 
 def crossings(first: TriangleMesh, second: TriangleMesh, limit: int | None = None) -> Crossings:
@@ -58,66 +53,9 @@ def near_pairs(
     first: TriangleMesh, second: TriangleMesh
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Pairs of faces whose boxes meet; faces without area are left out."""
-    low_1, high_1 = first.face_bounds
-    low_2, high_2 = second.face_bounds
-    blocks_1, blocks_2 = _block_boxes(low_1, high_1), _block_boxes(low_2, high_2)
-    near = _meeting(*blocks_1, *blocks_2)
-    near_1, near_2 = np.flatnonzero(near.any(axis=1)), np.flatnonzero(near.any(axis=0))
-    kept_1 = _faces_of(near_1, low_1, high_1, blocks_2, near_2)
-    kept_2 = _faces_of(near_2, low_2, high_2, blocks_1, near_1)
-    kept_1 = kept_1[first.face_areas[kept_1] > 0.0]
-    kept_2 = kept_2[second.face_areas[kept_2] > 0.0]
-    if len(kept_1) == 0 or len(kept_2) == 0:
-        return np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64)
-    if len(kept_1) * len(kept_2) <= _DENSE:
-        meet = _meeting(low_1[kept_1], high_1[kept_1], low_2[kept_2], high_2[kept_2])
-        one, other = np.nonzero(meet)
-        return kept_1[one], kept_2[other]
-    third, x, y = np.argsort(np.ptp(first.bounds, axis=0))
-    tree = shapely.STRtree(
-        shapely.box(low_2[kept_2, x], low_2[kept_2, y], high_2[kept_2, x], high_2[kept_2, y])
-    )
-    boxes = shapely.box(low_1[kept_1, x], low_1[kept_1, y], high_1[kept_1, x], high_1[kept_1, y])
-    one, other = tree.query(boxes)
-    one, other = kept_1[one], kept_2[other]
-    meets = (low_1[one, third] <= high_2[other, third]) & (
-        high_1[one, third] >= low_2[other, third]
-    )
-    return one[meets].astype(np.int64), other[meets].astype(np.int64)
-
-
-def _block_boxes(low: FloatArray, high: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """The boxes of blocks of faces; those that follow one another mostly lie together."""
-    starts = np.arange(0, len(low), _BLOCK)
-    return np.minimum.reduceat(low, starts), np.maximum.reduceat(high, starts)
-
-
-def _meeting(
-    low_1: FloatArray, high_1: FloatArray, low_2: FloatArray, high_2: FloatArray
-) -> NDArray[np.bool_]:
-    """(n, k): which of n boxes meet which of k others."""
-    meet = np.ones((len(low_1), len(low_2)), dtype=bool)
-    for axis in range(3):
-        meet &= low_1[:, None, axis] <= high_2[:, axis]
-        meet &= high_1[:, None, axis] >= low_2[:, axis]
-    return meet
-
-
-def _faces_of(
-    near: NDArray[np.intp],
-    low: FloatArray,
-    high: FloatArray,
-    others: tuple[FloatArray, FloatArray],
-    near_others: NDArray[np.intp],
-) -> NDArray[np.int64]:
-    """The faces of the blocks `near` that meet the box around the other mesh's near blocks."""
-    faces = (near[:, None] * _BLOCK + np.arange(_BLOCK)).ravel().astype(np.int64)
-    faces = faces[faces < len(low)]
-    if len(faces) == 0:
-        return faces
-    other_low, other_high = others[0][near_others], others[1][near_others]
-    meets = (low[faces] <= other_high.max(axis=0)) & (high[faces] >= other_low.min(axis=0))
-    return faces[meets.all(axis=1)]
+    one, other = meeting_boxes(*first.face_bounds, *second.face_bounds)
+    solid = (first.face_areas[one] > 0.0) & (second.face_areas[other] > 0.0)
+    return one[solid], other[solid]
 
 
 def _crossings(
@@ -136,13 +74,16 @@ def _crossings(
     pairs, places, count = [np.zeros((0, 2), dtype=np.int64)], [np.zeros((0, 3))], 0
     for start in range(0, len(one), _PAIRS_AT_ONCE):
         a, b = one[start : start + _PAIRS_AT_ONCE], other[start : start + _PAIRS_AT_ONCE]
-        heights_a, heights_b = _heights(first, a, second, b), _heights(second, b, first, a)
-        through = _reach_through(heights_a) & _reach_through(heights_b)
-        a, b = a[through], b[through]
+        heights_a = _heights(first, a, second, b)
+        through = _reach_through(heights_a)
+        a, b, heights_a = a[through], b[through], heights_a[through]
+        heights_b = _heights(second, b, first, a)
+        through = _reach_through(heights_b)
+        a, b, heights_a, heights_b = a[through], b[through], heights_a[through], heights_b[through]
         line = np.cross(first.face_normals[a], second.face_normals[b])
         line /= np.linalg.norm(line, axis=1, keepdims=True)
-        from_a, to_a, at_a = _cut_out(first.triangles[a], heights_a[through], line)
-        from_b, to_b, _ = _cut_out(second.triangles[b], heights_b[through], line)
+        from_a, to_a, at_a = _cut_out(first.triangles[a], heights_a, line)
+        from_b, to_b, _ = _cut_out(second.triangles[b], heights_b, line)
         low, high = np.maximum(from_a, from_b), np.minimum(to_a, to_b)
         found = high - low > TOUCH
         middle = at_a + (0.5 * (low + high) - np.einsum("ki,ki->k", at_a, line))[:, None] * line

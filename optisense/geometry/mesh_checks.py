@@ -88,9 +88,12 @@ def _directed_edges(mesh: TriangleMesh) -> tuple[NDArray[np.int64], int]:
 
 
 def with_consistent_winding(mesh: TriangleMesh) -> TriangleMesh:
-    """Turn single faces over until neighbours agree, walking from face to face."""
-    from scipy import sparse
-    from scipy.sparse import csgraph
+    """Turn single faces over until neighbours agree, and each shell with its first face.
+
+    A shell that can't be wound so (a Moebius strip) is left as it is.
+    """
+    from scipy.sparse import coo_matrix
+    from scipy.sparse.csgraph import connected_components
 
     forward, size = _directed_edges(mesh)
     first, second = forward // size, forward % size
@@ -98,24 +101,20 @@ def with_consistent_winding(mesh: TriangleMesh) -> TriangleMesh:
     order = np.argsort(edge, kind="stable")
     follows = edge[order][1:] == edge[order][:-1]
     one, other = order[:-1][follows], order[1:][follows]
-    disagrees = {
-        (int(a), int(b)): bool(same)
-        for a, b, same in zip(one // 3, other // 3, forward[one] == forward[other], strict=True)
-    }
-    n_faces = len(mesh.faces)
-    neighbours = sparse.csr_matrix(
-        (np.ones(len(one)), (one // 3, other // 3)), shape=(n_faces, n_faces)
-    )
-    turned = np.zeros(n_faces, dtype=bool)
-    seen = np.zeros(n_faces, dtype=bool)
-    for start in range(n_faces):
-        if seen[start]:
-            continue
-        walk, came_from = csgraph.breadth_first_order(neighbours, start, directed=False)
-        seen[walk] = True
-        for face in walk[1:]:
-            pair = (int(came_from[face]), int(face))
-            turns = disagrees.get(pair, disagrees.get(pair[::-1], False))
-            turned[face] = turned[pair[0]] ^ turns
+    disagree = forward[one] == forward[other]
+    if not disagree.any():
+        return mesh
+    one, other, count = one // 3, other // 3, len(mesh.faces)
+    # Each face stands there twice, as it is and turned over (its number + count), and is linked
+    # with what its neighbours would have to be.
+    turns = count * disagree
+    starts = np.concatenate([one, one + count])
+    ends = np.concatenate([other + turns, other + count - turns])
+    links = coo_matrix((np.ones(len(starts)), (starts, ends)), shape=(2 * count, 2 * count))
+    _, label = connected_components(links, directed=False)
+    as_is, over = label[:count], label[count:]
+    # The two halves of a shell are the same pair of labels; its first face stays as it is.
+    _, leader, shell = np.unique(np.minimum(as_is, over), return_index=True, return_inverse=True)
+    turned = (as_is != as_is[leader[shell]]) & (as_is != over)
     faces = np.where(turned[:, None], mesh.faces[:, ::-1], mesh.faces)
     return mesh.with_faces(faces)

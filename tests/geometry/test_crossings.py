@@ -7,7 +7,7 @@ import pytest
 import trimesh
 
 from optisense.geometry import TriangleMesh
-from optisense.geometry.crossings import crossings, near_pairs, self_crossings
+from optisense.geometry.crossings import crossings, self_crossings
 
 
 def ball(radius: float, centre: tuple[float, float, float] = (0, 0, 0)) -> TriangleMesh:
@@ -51,19 +51,3 @@ def test_solids_that_touch_do_not_cross() -> None:
 
 def test_looking_ends_at_the_limit() -> None:
     assert len(crossings(ball(5.0), ball(5.0, (6, 0, 0)), limit=3).pairs) == 3
-
-
-@pytest.mark.parametrize("at_once", [0, 1_000_000])
-def test_no_near_face_is_left_out(at_once: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    """However faces are grouped to be looked at sooner: as many pairs as by looking at all."""
-    monkeypatch.setattr("optisense.geometry.crossings._DENSE", at_once)
-    random = np.random.default_rng(3)
-    one, other = ball(5.0), ball(4.0, (5.0, 1.0, 2.0))
-    shuffled = one.with_faces(random.permutation(one.faces))
-    corners = shuffled.triangles[:, None], other.triangles[None]
-    low, high = ([each.min(axis=2) for each in corners], [each.max(axis=2) for each in corners])
-    meet = ((low[0] <= high[1]) & (high[0] >= low[1])).all(axis=2)
-    found = near_pairs(shuffled, other)
-    assert set(zip(*(each.tolist() for each in found), strict=True)) == set(
-        zip(*(each.tolist() for each in np.nonzero(meet)), strict=True)
-    )

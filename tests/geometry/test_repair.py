@@ -7,6 +7,7 @@ import pytest
 
 from optisense.errors import MeshError
 from optisense.geometry import TriangleMesh
+from optisense.geometry.mesh_checks import with_consistent_winding
 from optisense.geometry.repair import refuse_bad_sheet, repaired, shells
 
 BLOCK = TriangleMesh.box((0, 0, 0), (10, 8, 4), (3, 3, 3))
@@ -24,6 +25,30 @@ def test_faces_that_look_inward_are_turned_over(which: slice) -> None:
     mesh, notes = repaired(with_some_faces_turned(BLOCK, which), "gel", closed=True)
     assert mesh.volume == pytest.approx(VOLUME)
     assert len(notes) == 1 and "turned over" in notes[0]
+
+
+def test_each_shell_follows_its_first_face() -> None:
+    beside = TriangleMesh.box((20, 0, 0), (21, 1, 1))
+    both = TriangleMesh.joined([BLOCK, beside])
+    random = np.random.default_rng(1)
+    turned = random.random(len(both.faces)) < 0.5
+    turned[[0, len(BLOCK.faces)]] = False, True
+    mixed = both.with_faces(np.where(turned[:, None], both.faces[:, ::-1], both.faces))
+    agreed = with_consistent_winding(mixed)
+    inside_out = np.arange(len(both.faces)) >= len(BLOCK.faces)
+    expected = np.where(inside_out[:, None], -both.face_normals, both.face_normals)
+    assert agreed.face_normals == pytest.approx(expected)
+
+
+def test_a_moebius_strip_stays_as_it_is() -> None:
+    """Three rungs round and a half turn: no winding would suit all its faces."""
+    turn = np.radians([0.0, 120.0, 240.0])
+    around = np.column_stack([np.cos(turn), np.sin(turn), np.zeros(3)])
+    across = 0.3 * np.column_stack([np.cos(turn / 2), np.cos(turn / 2), np.sin(turn / 2)])
+    rungs = np.concatenate([3 * around - across, 3 * around + across])
+    faces = np.array([[0, 1, 3], [1, 4, 3], [1, 2, 4], [2, 5, 4], [2, 3, 5], [3, 0, 5]])
+    strip = TriangleMesh(rungs, faces)
+    assert (with_consistent_winding(strip).faces == faces).all()
 
 
 def test_a_sound_solid_needs_nothing() -> None:

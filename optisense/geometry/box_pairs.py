@@ -1,0 +1,204 @@
+"""Which boxes of two lots meet, found by boxes around boxes."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from optisense.geometry.mesh import FloatArray
+
+_GROUP = 4
+"""Boxes of one level that get a box around them on the next."""
+
+_FEW = 64
+"""A level of so few boxes has no next one."""
+
+_AT_ONCE = 100_000
+"""Pairs that are looked into together, to bound memory."""
+
+_DENSE = 1_000_000
+"""Up to so many pairs are compared one by one at once; to group them takes longer."""
+
+_BLOCK = 64
+"""Boxes that follow one another and are looked at together first: they mostly lie together."""
+
+_SPREADING = (
+    (32, 0x001F00000000FFFF), (16, 0x001F0000FF0000FF), (8, 0x100F00F00F00F00F),
+    (4, 0x10C30C30C30C30C3), (2, 0x1249249249249249),
+)  # fmt: skip
+"""Steps that move the bits of a number apart, two free places between any two."""
+
+IntArray = NDArray[np.int64]
+
+
+class _Boxes(NamedTuple):
+    """Boxes ordered so that neighbours lie together, and boxes around groups of them.
+
+    Attributes:
+        order: (n,) the given number of each box of the lowest level.
+        levels: (low, high) of each level, (k, 3) each, the given boxes first.
+    """
+
+    order: IntArray
+    levels: list[tuple[FloatArray, FloatArray]]
+
+
+def meeting_boxes(
+    low_1: FloatArray, high_1: FloatArray, low_2: FloatArray, high_2: FloatArray
+) -> tuple[IntArray, IntArray]:
+    """Pairs of boxes that meet or touch, in no order.
+
+    Args:
+        low_1, high_1: (n, 3) corners.
+        low_2, high_2: (k, 3) corners of the others.
+
+    Returns:
+        (p,) numbers of the first and (p,) of the second lot.
+    """
+    kept_1, kept_2 = _in_reach(low_1, high_1, low_2, high_2)
+    low_1, high_1, low_2, high_2 = low_1[kept_1], high_1[kept_1], low_2[kept_2], high_2[kept_2]
+    if len(kept_1) * len(kept_2) <= _DENSE:
+        one, other = np.nonzero(_all_meeting(low_1, high_1, low_2, high_2))
+    else:
+        one, other = _descend(_grouped(low_1, high_1), _grouped(low_2, high_2), same=False)
+    return kept_1[one], kept_2[other]
+
+
+def meeting_each_other(low: FloatArray, high: FloatArray) -> tuple[IntArray, IntArray]:
+    """Pairs of boxes of one lot that meet or touch; each pair once, the smaller number first."""
+    if len(low) ** 2 <= _DENSE:
+        one, other = np.nonzero(np.triu(_all_meeting(low, high, low, high), k=1))
+        return one.astype(np.int64), other.astype(np.int64)
+    boxes = _grouped(low, high)
+    one, other = _descend(boxes, boxes, same=True)
+    return np.minimum(one, other), np.maximum(one, other)
+
+
+def _in_reach(
+    low_1: FloatArray, high_1: FloatArray, low_2: FloatArray, high_2: FloatArray
+) -> tuple[IntArray, IntArray]:
+    """Boxes of either lot that may meet one of the other: mostly few, and soon told.
+
+    They meet the box around all blocks of the other lot that meet a block of their own.
+    """
+    if len(low_1) * len(low_2) == 0:
+        return np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64)
+    blocks_1, blocks_2 = _blocks(low_1, high_1), _blocks(low_2, high_2)
+    near = _all_meeting(*blocks_1, *blocks_2)
+    reached = []
+    for low, high, axis, others in ((low_1, high_1, 1, blocks_2), (low_2, high_2, 0, blocks_1)):
+        own, theirs = np.flatnonzero(near.any(axis=axis)), np.flatnonzero(near.any(axis=1 - axis))
+        boxes = (own[:, None] * _BLOCK + np.arange(_BLOCK)).ravel()
+        boxes = boxes[boxes < len(low)].astype(np.int64)
+        if len(theirs):
+            around = others[0][theirs].min(axis=0), others[1][theirs].max(axis=0)
+            boxes = boxes[((low[boxes] <= around[1]) & (high[boxes] >= around[0])).all(axis=1)]
+        reached.append(boxes)
+    return reached[0], reached[1]
+
+
+def _blocks(low: FloatArray, high: FloatArray) -> tuple[FloatArray, FloatArray]:
+    starts = np.arange(0, len(low), _BLOCK)
+    return np.minimum.reduceat(low, starts), np.maximum.reduceat(high, starts)
+
+
+def _all_meeting(
+    low_1: FloatArray, high_1: FloatArray, low_2: FloatArray, high_2: FloatArray
+) -> NDArray[np.bool_]:
+    """(n, k): which of n boxes meet which of k others."""
+    meet = np.ones((len(low_1), len(low_2)), dtype=bool)
+    for axis in range(3):
+        meet &= low_1[:, None, axis] <= high_2[:, axis]
+        meet &= high_1[:, None, axis] >= low_2[:, axis]
+    return meet
+
+
+def _grouped(low: FloatArray, high: FloatArray) -> _Boxes:
+    order = np.argsort(_along_a_curve(0.5 * (low + high)), kind="stable").astype(np.int64)
+    levels = [(low[order], high[order])]
+    while len(levels[-1][0]) > _FEW:
+        below_low, below_high = levels[-1]
+        starts = np.arange(0, len(below_low), _GROUP)
+        levels.append(
+            (np.minimum.reduceat(below_low, starts), np.maximum.reduceat(below_high, starts))
+        )
+    return _Boxes(order, levels)
+
+
+def _along_a_curve(points: FloatArray) -> NDArray[np.uint64]:
+    """(n,) each point's place along a Z-order curve (Morton, 1966), 16 bits an axis."""
+    start, size = points.min(axis=0), np.ptp(points, axis=0).max()
+    cells = ((points - start) * (65535.0 / max(size, 1e-300))).astype(np.uint64)
+    key = np.zeros(len(points), dtype=np.uint64)
+    for axis in range(3):
+        bits = cells[:, axis]
+        for shift, mask in _SPREADING:
+            bits = (bits | (bits << np.uint64(shift))) & np.uint64(mask)
+        key |= bits << np.uint64(axis)
+    return key
+
+
+def _descend(first: _Boxes, second: _Boxes, same: bool) -> tuple[IntArray, IntArray]:
+    """From the outermost boxes down, only into pairs that meet.
+
+    Args:
+        same: both are one lot: each pair is wanted once, and none of a box with itself.
+    """
+    level_1, level_2 = len(first.levels) - 1, len(second.levels) - 1
+    count_1, count_2 = len(first.levels[-1][0]), len(second.levels[-1][0])
+    a, b = np.divmod(np.arange(count_1 * count_2, dtype=np.int64), count_2)
+    found = [(np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64))]
+    waiting = [_those_that_meet(first, second, level_1, level_2, a, b, same)]
+    levels = [(level_1, level_2)]
+    while waiting:
+        (a, b), (level_1, level_2) = waiting.pop(), levels.pop()
+        if level_1 == level_2 == 0:
+            found.append((first.order[a], second.order[b]))
+            continue
+        if len(a) > _AT_ONCE:
+            waiting += [(a[_AT_ONCE:], b[_AT_ONCE:])]
+            levels += [(level_1, level_2)]
+        inner = _children(first, second, level_1, level_2, a[:_AT_ONCE], b[:_AT_ONCE])
+        level_1, level_2 = max(level_1 - 1, 0), max(level_2 - 1, 0)
+        waiting += [_those_that_meet(first, second, level_1, level_2, *inner, same)]
+        levels += [(level_1, level_2)]
+    ones, others = zip(*found, strict=True)
+    return np.concatenate(ones), np.concatenate(others)
+
+
+def _children(
+    first: _Boxes, second: _Boxes, level_1: int, level_2: int, a: IntArray, b: IntArray
+) -> tuple[IntArray, IntArray]:
+    """All pairs of what lies in the pairs of boxes; a box of the lowest level stays itself."""
+    inner = np.arange(_GROUP, dtype=np.int64)
+    below_1 = _GROUP * a[:, None] + inner if level_1 else a[:, None]
+    below_2 = _GROUP * b[:, None] + inner if level_2 else b[:, None]
+    shape = (len(a), below_1.shape[1], below_2.shape[1])
+    one = np.broadcast_to(below_1[:, :, None], shape).reshape(-1)
+    other = np.broadcast_to(below_2[:, None, :], shape).reshape(-1)
+    there = one < len(first.levels[max(level_1 - 1, 0)][0])
+    there &= other < len(second.levels[max(level_2 - 1, 0)][0])
+    return one[there], other[there]
+
+
+def _those_that_meet(
+    first: _Boxes,
+    second: _Boxes,
+    level_1: int,
+    level_2: int,
+    a: IntArray,
+    b: IntArray,
+    same: bool,
+) -> tuple[IntArray, IntArray]:
+    """The pairs of boxes a of one level and b of another that meet, and are wanted."""
+    if same:
+        wanted = a < b if level_1 == 0 else a <= b
+        a, b = a[wanted], b[wanted]
+    (low_1, high_1), (low_2, high_2) = first.levels[level_1], second.levels[level_2]
+    for axis in range(3):
+        meet = low_1[a, axis] <= high_2[b, axis]
+        meet &= high_1[a, axis] >= low_2[b, axis]
+        a, b = a[meet], b[meet]
+    return a, b

@@ -1,0 +1,60 @@
+"""Boxes that meet are found, all of them and no others, however many there are."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from optisense.geometry import box_pairs
+from optisense.geometry.box_pairs import meeting_boxes, meeting_each_other
+from optisense.geometry.mesh import FloatArray
+
+
+def boxes(count: int, size: float, seed: int) -> tuple[FloatArray, FloatArray]:
+    """Boxes of all forms, flat ones too, in a room of 10 x 10 x 1."""
+    random = np.random.default_rng(seed)
+    low = random.uniform(0.0, 1.0, (count, 3)) * (10.0, 10.0, 1.0)
+    return low, low + random.choice((0.0, 0.1, 1.0), (count, 3)) * size
+
+
+def pairs_one_by_one(
+    low_1: FloatArray, high_1: FloatArray, low_2: FloatArray, high_2: FloatArray
+) -> set[tuple[int, int]]:
+    apart = (low_1[:, None] > high_2[None]) | (high_1[:, None] < low_2[None])
+    return {(int(a), int(b)) for a, b in np.argwhere(~apart.any(axis=2))}
+
+
+def as_set(one: FloatArray, other: FloatArray) -> set[tuple[int, int]]:
+    found = list(zip(one.tolist(), other.tolist(), strict=True))
+    assert len(found) == len(set(found))  # none twice
+    return set(found)
+
+
+@pytest.mark.parametrize("counts", [(0, 5), (7, 9), (900, 1), (1, 900), (700, 900), (65, 2000)])
+@pytest.mark.parametrize(("at_once", "dense"), [(50, 0), (100_000, 0), (50, 10_000_000)])
+def test_pairs_are_those_of_comparing_all(
+    counts: tuple[int, int], at_once: int, dense: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(box_pairs, "_AT_ONCE", at_once)
+    monkeypatch.setattr(box_pairs, "_DENSE", dense)
+    one, other = boxes(counts[0], 1.0, 1), boxes(counts[1], 0.5, 2)
+    assert as_set(*meeting_boxes(*one, *other)) == pairs_one_by_one(*one, *other)
+
+
+@pytest.mark.parametrize("count", [3, 64, 65, 1000])
+@pytest.mark.parametrize("dense", [0, 10_000_000])
+def test_pairs_of_one_lot_come_once(
+    count: int, dense: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(box_pairs, "_DENSE", dense)
+    low, high = boxes(count, 1.0, 3)
+    everything = pairs_one_by_one(low, high, low, high)
+    assert as_set(*meeting_each_other(low, high)) == {(a, b) for a, b in everything if a < b}
+
+
+def test_boxes_that_touch_meet_and_equal_points_do_not_hinder() -> None:
+    corner = np.zeros((400, 3))
+    one, other = meeting_boxes(corner, corner + 1.0, corner + 1.0, corner + 2.0)
+    assert len(one) == len(other) == 400 * 400
+    one, other = meeting_boxes(corner, corner + 1.0, corner + 1.0 + 1e-9, corner + 2.0)
+    assert len(one) == 0
