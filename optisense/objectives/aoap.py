@@ -11,6 +11,7 @@ import numpy as np
 from optisense.errors import ObjectiveError
 from optisense.objectives import figures
 from optisense.objectives.registry import no_pixels, objective
+from optisense.objectives.settings import refuse_outside
 
 if TYPE_CHECKING:
     from optisense.objectives.evaluation import Evaluation
@@ -32,6 +33,7 @@ def aoap(
         evaluation: the sensor.
         coverage_weight: k1.
     """
+    refuse_outside("coverage_weight", coverage_weight, 0.0)
     rays = evaluation.chief_rays
     hit = rays.hit
     if not hit.any():

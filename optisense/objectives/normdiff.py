@@ -12,8 +12,9 @@ from numpy.typing import ArrayLike, NDArray
 from optisense.errors import ObjectiveError
 from optisense.objectives import figures
 from optisense.objectives.colour_boxes import ranges_in_boxes
-from optisense.objectives.press import FloatArray, Press, azimuths
+from optisense.objectives.press import FloatArray, Press, azimuths, refuse_kind
 from optisense.objectives.registry import objective
+from optisense.objectives.settings import refuse_outside
 
 if TYPE_CHECKING:
     from optisense.objectives.evaluation import Evaluation
@@ -91,6 +92,11 @@ def normdiff(
         colours: what the noise is added to, "response" or "picture" (see `Press.colours`).
         least_pixels: indented pixels that a press must have.
     """
+    refuse_outside("noise", noise, 0.0, 1.0)
+    refuse_outside("theta_weight", theta_weight, 0.0)
+    refuse_outside("phi_weight", phi_weight, 0.0)
+    refuse_outside("least_pixels", least_pixels, 1)
+    refuse_kind(colours)
     places: list[dict[str, Any]] = []
     maps = []
     for press in evaluation.presses:

@@ -82,7 +82,7 @@ class Press:
             return srgb_curve(chosen)
         if kind == "response":
             return chosen
-        raise ObjectiveError(f"there are no colours '{kind}'", hint="Use picture or response")
+        raise _no_such(kind)
 
     @property
     def name(self) -> str:
@@ -116,6 +116,20 @@ class Press:
             raise ObjectiveError(
                 f"{self.name} is black", hint="Check the lights, or raise the exposure"
             )
+
+
+def refuse_kind(kind: str) -> None:
+    """Check the kind of colours, before anything is rendered for them.
+
+    Raises:
+        ObjectiveError: there is no such kind.
+    """
+    if kind not in ("picture", "response"):
+        raise _no_such(kind)
+
+
+def _no_such(kind: str) -> ObjectiveError:
+    return ObjectiveError(f"there are no colours '{kind}'", hint="Use picture or response")
 
 
 def azimuths(press: Press, normals: NDArray[np.floating]) -> tuple[FloatArray, FloatArray]:

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from optisense.errors import ObjectiveError
 from optisense.objectives import figures
 from optisense.objectives.registry import no_pixels, objective
+from optisense.objectives.settings import refuse_outside
 
 if TYPE_CHECKING:
     from optisense.objectives.evaluation import Evaluation
@@ -57,6 +58,7 @@ def projection_warping(
         jump: an edge so many times as long as its neighbours leaps over a fold or a gap, and its
             triangles are left out.
     """
+    refuse_outside("jump", jump, 1.0, open_low=True)
     rays = evaluation.chief_rays
     found = triangle_areas(rays.points, rays.hit, jump)
     areas = found.areas[np.isfinite(found.areas)].astype(np.float64)

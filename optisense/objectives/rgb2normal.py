@@ -13,8 +13,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from optisense.errors import ObjectiveError
 from optisense.objectives import figures
-from optisense.objectives.press import FloatArray, Press
+from optisense.objectives.press import FloatArray, Press, refuse_kind
 from optisense.objectives.registry import objective
+from optisense.objectives.settings import refuse_outside
 
 if TYPE_CHECKING:
     from optisense.objectives.evaluation import Evaluation
@@ -87,6 +88,9 @@ def rgb2normal(
         colours: what is read, "picture" or "response" (see `Press.colours`).
         least_pixels: that a line must have.
     """
+    _refuse_directions(directions, half_lines)
+    refuse_outside("least_pixels", least_pixels, 3)
+    refuse_kind(colours)
     angles = np.arange(directions) * 360.0 / directions
     places: list[dict[str, Any]] = []
     lines = []
@@ -128,10 +132,7 @@ def lines_of(
     Raises:
         ObjectiveError: the directions have no opposite ones, or a line has too few pixels.
     """
-    if directions < 1 or (directions % 2 and not half_lines):
-        raise ObjectiveError(
-            f"{directions} directions have no opposite ones", hint="Use an even number"
-        )
+    _refuse_directions(directions, half_lines)
     angles = np.arange(directions) * 360.0 / directions
     found = {}
     for angle in (angles if half_lines else angles[: directions // 2]).tolist():
@@ -145,6 +146,13 @@ def lines_of(
             )
         found[angle] = chosen
     return found
+
+
+def _refuse_directions(directions: int, half_lines: bool) -> None:
+    if directions < 1 or (directions % 2 and not half_lines):
+        raise ObjectiveError(
+            f"{directions} directions have no opposite ones", hint="Use an even number from 2"
+        )
 
 
 def line(press: Press, angle: float, half: bool = False) -> NDArray[np.bool_]:

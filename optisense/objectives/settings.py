@@ -81,6 +81,29 @@ def is_number(value: Any) -> bool:
     return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
 
 
+def refuse_outside(
+    name: str, value: float, low: float, high: float = math.inf, *, open_low: bool = False
+) -> None:
+    """Check a setting of an objective before anything is rendered for it.
+
+    Args:
+        name: of the setting.
+        value: that was given.
+        low, high: what it may be from and to.
+        open_low: `low` itself is too small.
+
+    Raises:
+        ObjectiveError: the value is outside.
+    """
+    if low <= value <= high and not (open_low and value == low):
+        return
+    least = f"above {low:g}" if open_low else f"from {low:g}"
+    raise ObjectiveError(
+        f"the setting '{name}' is {value:g}",
+        hint=f"Give a number {least}" + (f" to {high:g}" if math.isfinite(high) else ""),
+    )
+
+
 def _is_whole(value: Any) -> bool:
     return is_number(value) and value == int(value)
 
