@@ -10,7 +10,10 @@ import ctypes
 import json
 import subprocess
 import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import cache, wraps
 from importlib import import_module
 from typing import Any
 
@@ -88,12 +91,39 @@ def use_variant(variant: str = "auto") -> str:
     if variant == "auto" and current in VARIANTS.values():
         name = str(current)
     elif current != name:
-        mitsuba.set_variant(name)
+        with _loops_rewritten_on_first_call():
+            mitsuba.set_variant(name)
     # Where Dr.Jit may merge gathers into packets it writes one of several kernels by chance, and
     # compiles them all in turn; without it the kernels are as fast and always the same.
     drjit = import_renderer("drjit")
     drjit.set_flag(drjit.JitFlag.PacketOps, False)
     return name
+
+
+@contextmanager
+def _loops_rewritten_on_first_call() -> Iterator[None]:
+    """Put off what Dr.Jit's decorator for loops does, to the first call of each function.
+
+    With a variant, Mitsuba loads integrators written in Python, which nothing here uses, and the
+    decorator parses and compiles the source of each anew: a sixth of a second.
+    """
+    drjit = import_renderer("drjit")
+    rewrite = drjit.syntax
+
+    def put_off(function: Callable[..., Any]) -> Callable[..., Any]:
+        rewritten = cache(lambda: rewrite(function))
+
+        @wraps(function)
+        def call(*arguments: Any, **named: Any) -> Any:
+            return rewritten()(*arguments, **named)
+
+        return call
+
+    drjit.syntax = put_off
+    try:
+        yield
+    finally:
+        drjit.syntax = rewrite
 
 
 def cuda_device_found() -> bool:

@@ -83,3 +83,16 @@ def test_a_renderer_that_already_loaded_an_old_library_is_an_error() -> None:
     )
     assert child.returncode == 0, child.stderr
     assert "too old" in child.stdout
+
+
+def test_integrators_written_in_python_still_work() -> None:
+    variant.use_variant()
+    mitsuba, drjit = (variant.import_renderer(name) for name in ("mitsuba", "drjit"))
+    box = mitsuba.load_dict(mitsuba.cornell_box())
+    means = [
+        float(drjit.mean(mitsuba.render(box, integrator=integrator, spp=16).array)[0])
+        for integrator in (
+            mitsuba.load_dict({"type": name, "max_depth": 4}) for name in ("prb", "path")
+        )
+    ]
+    assert means[0] == pytest.approx(means[1], rel=0.02)
