@@ -47,6 +47,25 @@ def test_help_does_not_load_the_renderer_or_numpy() -> None:
     assert child.stdout.strip() == "[]", child.stderr
 
 
+def test_a_command_does_not_wait_for_the_others() -> None:
+    script = (
+        "import sys\n"
+        "from typer.testing import CliRunner\n"
+        "from optisense.cli import app\n"
+        "assert CliRunner().invoke(app, ['render', '--help']).exit_code == 0\n"
+        "commands = {'check', 'search', 'studio', 'library', 'task', 'render'}\n"
+        "print({name for name in commands if f'optisense.cli.{name}' in sys.modules})\n"
+    )
+    child = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True)
+    assert child.stdout.strip() == "{'render'}", child.stderr
+
+
+def test_a_misspelt_command_gets_the_near_match() -> None:
+    code, text = run("rendr")
+    assert code == 2
+    assert "'render'" in text
+
+
 @pytest.mark.parametrize("name", sorted(BUILDERS))
 def test_a_new_design_passes_the_check(name: str, tmp_path: Path) -> None:
     folder = tmp_path / "mine"

@@ -1,0 +1,75 @@
+"""The commands by name. A command's module is imported when the command is asked for: none waits
+for what the others need.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, MutableMapping
+from importlib import import_module
+from typing import Any
+
+import typer
+from typer.core import TyperGroup
+
+_HOMES = {
+    "new": "new",
+    "check": "check",
+    "render": "render",
+    "dataset": "dataset",
+    "evaluate": "evaluate",
+    "search": "search",
+    "apply": "apply",
+    "report": "report",
+    "tolerance": "tolerance",
+    "experiment": "experiment",
+    "export": "export",
+    "studio": "studio",
+    "engine": "engine",
+    "doctor": "doctor",
+    "cage": "cage_app",
+    "library": "library_app",
+    "task": "task_app",
+}
+"""What stands for each command in the module of its name: a function, or a group of commands."""
+
+
+class _Commands(MutableMapping[str, Any]):
+    """Commands as Typer's groups hold them, made on first use."""
+
+    def __init__(self) -> None:
+        self._made: dict[str, Any] = {}
+
+    def __getitem__(self, name: str) -> Any:
+        if name not in self._made and name in _HOMES:
+            self._made[name] = _command(name)
+        return self._made[name]
+
+    def __setitem__(self, name: str, command: Any) -> None:
+        self._made[name] = command
+
+    def __delitem__(self, name: str) -> None:
+        del self._made[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(_HOMES)
+
+    def __len__(self) -> int:
+        return len(_HOMES)
+
+
+class Commands(TyperGroup):
+    """The group of all commands of ``optisense``."""
+
+    def __init__(self, **settings: Any) -> None:
+        super().__init__(**settings)
+        self.commands = _Commands()
+
+
+def _command(name: str) -> Any:
+    home = getattr(import_module(f"optisense.cli.{name}"), _HOMES[name])
+    alone = typer.Typer(add_completion=False, rich_markup_mode="rich")
+    if isinstance(home, typer.Typer):
+        alone.add_typer(home, name=name)
+    else:
+        alone.command(name)(home)
+    return typer.main.get_group(alone).commands[name]
