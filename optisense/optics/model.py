@@ -20,6 +20,7 @@ from optisense.optics.field_store import FieldStore
 from optisense.optics.guide import Guide
 from optisense.optics.image import TactileImage
 from optisense.optics.imaging import Careful, ImageLayers, render_field
+from optisense.optics.interrupts import lets_ctrl_c_through
 from optisense.optics.ray_model import RayModel
 from optisense.optics.shading import ContactScenes
 from optisense.optics.surfaces import SurfaceKind
@@ -85,6 +86,7 @@ class OpticalModel(RayModel):
         """The photon guide, learned from a pilot pass on first use."""
         return self._store.guide
 
+    @lets_ctrl_c_through
     def render(
         self,
         contacts: Sequence[Contact] = (),

@@ -25,6 +25,7 @@ from optisense.optics.assembly import Assembly, assemble, coating_surface, inden
 from optisense.optics.camera import RayCamera
 from optisense.optics.chief_rays import ChiefRays, pixel_areas, sees_nothing, trace_chief_rays
 from optisense.optics.emitters import EmitterTable, emitter_table
+from optisense.optics.interrupts import lets_ctrl_c_through
 from optisense.optics.ray_scene import Piece, RayScene
 from optisense.optics.scattering import surface_table
 from optisense.optics.shading import ContactScenes
@@ -205,6 +206,7 @@ class RayModel:
             origin = np.median(fine.points[fine.hit].astype(float), axis=0)
         return SensingSurface(self.sensing, origin, axes[0], axes[1])
 
+    @lets_ctrl_c_through
     def chief_rays(
         self, resolution: tuple[int, int] | None = None, contacts: Sequence[Contact] = ()
     ) -> ChiefRays:

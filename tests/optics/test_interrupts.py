@@ -1,0 +1,41 @@
+"""Ctrl-C at any moment of a render is Ctrl-C to the caller."""
+
+from __future__ import annotations
+
+import drjit as dr
+import mitsuba as mi
+import pytest
+
+from optisense import OpticalModel, load
+from optisense.optics import photons, shading
+from optisense.optics.interrupts import lets_ctrl_c_through
+
+
+@pytest.mark.parametrize(
+    ("module", "step"), [(photons, "sample_coating"), (shading, "evaluate_coating")]
+)
+def test_ctrl_c_while_a_loop_is_recorded(
+    module: object, step: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def pressed(*args: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(module, step, pressed)
+    model = OpticalModel(load("gelsight-mini"), "llvm")
+    with pytest.raises(KeyboardInterrupt):
+        model.render(resolution=(40, 30), photons=10_000)
+
+
+def test_other_errors_in_a_loop_stay_what_they_are() -> None:
+    @lets_ctrl_c_through
+    @dr.syntax
+    def count() -> mi.UInt32:
+        number = mi.UInt32(0)
+        while number < 3:
+            number += 1
+            raise ValueError("inside")
+        return number
+
+    with pytest.raises(RuntimeError, match="while_loop") as error:
+        count()
+    assert isinstance(error.value.__cause__, ValueError)
