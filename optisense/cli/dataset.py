@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from optisense.cli.console import ends_well, messages, output
+from optisense.cli.console import EXIT_FAILURE, ends_well, messages, output
 from optisense.cli.options import (
     DesignArgument,
     VariantOption,
@@ -149,11 +150,21 @@ def parse_range(text: str, option: str) -> tuple[float, float]:
 
 
 def _say_what_came(made: Dataset, count: int) -> None:
-    failed = sum(int(row["index"]) < count for row in made.failures)
+    """Tell how many samples there are, and why others are not.
+
+    Raises:
+        typer.Exit: there is none.
+    """
+    reasons = Counter(row["reason"] for row in made.failures if int(row["index"]) < count)
     output.print(f"dataset: {made.folder}, {len(made)} samples", markup=False)
-    if failed:
+    if reasons:
+        failed, (reason, times) = reasons.total(), reasons.most_common(1)[0]
+        mostly = "" if times == failed else f", {times} times"
         output.print(
-            f"{failed} contacts could not be made; {made.folder / 'failures.csv'} says why",
+            f"{failed} contacts could not be made: {reason}{mostly} "
+            f"({made.folder / 'failures.csv'} lists them)",
             markup=False,
             style="yellow",
         )
+    if not len(made):
+        raise typer.Exit(EXIT_FAILURE)

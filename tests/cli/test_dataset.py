@@ -64,6 +64,15 @@ def test_bad_input_exits_with_2(arguments: tuple[str, ...], tmp_path: Path) -> N
     assert len(text) > 20
 
 
+def test_where_no_contact_can_be_made_the_reason_is_told(tmp_path: Path) -> None:
+    code, text = run(
+        "gelsight-mini", "--out", str(tmp_path / "d"), "--depth", "9", "-n", "2", *SMALL
+    )
+    assert code == 1
+    assert "2 contacts could not be made: a contact is 9 mm deep, but the gel there is" in text
+    assert "failures.csv" in text
+
+
 COMMAND = (sys.executable, "-m", "optisense.cli", "dataset", "gelsight-mini", *SMALL)
 
 
