@@ -19,6 +19,9 @@ from optisense.library.loader import kind_named
 from optisense.library.own_parts import write_own
 from optisense.library.reading import make_entry
 
+BALL_PIXELS = 160
+"""Width and height of a ball alone."""
+
 
 class OfKind(Fields):
     """See docs/engine.md."""
@@ -37,6 +40,7 @@ class Preview(OfKind):
 
     entry: str | None = None
     value: dict[str, Any] | None = None
+    ball: bool = False
 
 
 class LibraryAdd(OneEntry):
@@ -84,6 +88,17 @@ def preview(session: Session, fields: Preview, job: Job) -> dict[str, Any]:
         assert fields.value is not None
         name = fields.name or f"a {kind_named(fields.kind)}"
         drawn = _made(fields.kind, name, fields.value, " ", "assumed", "being edited")
+    if fields.ball:
+        singular = kind_named(fields.kind)
+        if singular not in ("material", "coating"):
+            raise ProtocolError(
+                f"there is no ball of a {singular}",
+                where="ball",
+                hint="Only materials and coatings are drawn as balls",
+            )
+        material: Any = drawn.value
+        ball = previews.picture_of_ball(material, BALL_PIXELS)
+        return {"files": {"picture": files.picture("preview.png", ball)}}
     path = files.path("preview.png")
     previews.save(previews.draw(name, drawn), path)
     return {"files": {"picture": str(path)}}

@@ -36,6 +36,7 @@ class EngineError(Exception):
     Attributes:
         kind: as of the engine's errors; `EngineGone` where the process ended.
         message, where, hint: what is wrong, the place, what to do.
+        path: the dotted path in the design, if known.
         part: the part of the design that it is about, if known.
     """
 
@@ -45,6 +46,7 @@ class EngineError(Exception):
         self.message: str = str(self)
         self.where: str | None = error.get("where")
         self.hint: str | None = error.get("hint")
+        self.path: str | None = error.get("path")
         self.part: str | None = error.get("part")
 
     def text(self) -> str:

@@ -113,7 +113,7 @@ def curve_picture(scores: Sequence[float | None], size: tuple[int, int]) -> NDAr
         if score is not None:
             best = score if best is None else max(best, score)
             row = _row(score, low, room, height, edge)
-            picture[row - 2 : row + 2, column - 2 : column + 2] = (0.55, 0.75, 0.95, 1.0)
+            picture[row - 3 : row + 3, column - 3 : column + 3] = (0.55, 0.75, 0.95, 1.0)
         column_before = column
     return picture
 

@@ -35,15 +35,20 @@ def paragraph(layout: bpy.types.UILayout, text: str, icon: str = "NONE") -> None
         )
 
 
-def show_job(layout: bpy.types.UILayout, *titles: str) -> None:
-    """The progress of the job, where it is one of these; and a button to cancel it."""
+def show_job(layout: bpy.types.UILayout, *titles: str) -> bool:
+    """The progress of the job, where it is one of these, and a button to cancel it; whether it is.
+
+    It stands in place of the button that began the job: Blender would leave that button grey after
+    the job for as long as the mouse rests on it.
+    """
     now = session.state()
     if now.busy not in titles:
-        return
+        return False
     row = layout.row(align=True)
     text = "Cancelling ..." if now.cancelling else now.progress or f"{now.busy} ..."
     row.progress(factor=now.fraction, text=text)
     row.operator("optisense.cancel", text="", icon="CANCEL")
+    return True
 
 
 def show_messages(layout: bpy.types.UILayout) -> None:

@@ -179,19 +179,19 @@ def is_busy() -> bool:
 
 
 def say(error: EngineError) -> None:
-    """Show an error in the panels, and select the part that it is about."""
+    """Show an error in the panels; select what it is about, and name that."""
     now = state()
-    now.problem = f"{error.message[:1].upper()}{error.message[1:]}"
-    now.hint = ". ".join(text for text in (error.where, error.hint) if text)
-    if error.part:
-        from ..scene.collections import objects_of
+    texts = [error.where, error.hint]
+    if error.part or error.path:
+        from ..scene.offending import offending, select
 
-        for each in bpy.context.scene.objects:
-            each.select_set(False)
-        for each in objects_of(bpy.context.scene, "PART"):
-            if each.optisense.key == error.part and each.visible_get():
-                each.select_set(True)
-                bpy.context.view_layer.objects.active = each
+        scene = bpy.context.scene
+        chosen = select(scene, offending(scene, error.path or "", error.part or ""))
+        if chosen:
+            names = ", ".join(each.name for each in chosen)
+            texts.append(f"Selected: {names}")
+    now.problem = f"{error.message[:1].upper()}{error.message[1:]}"
+    now.hint = ". ".join(text for text in texts if text)
     redraw()
 
 

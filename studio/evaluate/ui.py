@@ -32,13 +32,14 @@ class OPTISENSE_PT_evaluate(SidebarPanel, bpy.types.Panel):
         layout.prop(values, "own")
         row = layout.row()
         row.scale_y = 1.4
-        row.operator("optisense.evaluate", icon="CHECKMARK")
-        show_job(layout, "Evaluating", "Tracing rays")
+        if not show_job(row, "Evaluating"):
+            row.operator("optisense.evaluate", icon="CHECKMARK")
         for score in values.scores:
             _score(layout.box(), score)
         row = layout.row(align=True)
-        row.operator("optisense.show_rays", icon="CURVE_DATA")
-        row.operator("optisense.hide_rays", icon="X")
+        if not show_job(row, "Tracing rays"):
+            row.operator("optisense.show_rays", icon="CURVE_DATA")
+            row.operator("optisense.hide_rays", icon="X")
         if values.rays:
             paragraph(layout, values.rays)
 

@@ -14,10 +14,11 @@ class OPTISENSE_PT_export(SidebarPanel, bpy.types.Panel):
     bl_options = {"DEFAULT_CLOSED"}
 
     def draw(self, context: bpy.types.Context) -> None:
+        if show_job(self.layout, "Writing"):
+            return
         column = self.layout.column(align=True)
         column.operator("optisense.report", icon="TEXT")
         column.operator("optisense.export", icon="EXPORT")
-        show_job(self.layout, "Writing")
 
 
 register, unregister = bpy.utils.register_classes_factory((OPTISENSE_PT_export,))

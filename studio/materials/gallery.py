@@ -61,7 +61,9 @@ def draw_missing(kind: str) -> None:
             _asked.discard((kind, name))
             session.say(error)
 
-        session.ask("preview", drawn, failed, kind=kind, entry=name, name=f"{kind}-{name}")
+        session.ask(
+            "preview", drawn, failed, kind=kind, entry=name, ball=True, name=f"{kind}-{name}"
+        )
 
 
 def waiting(kind: str) -> int:

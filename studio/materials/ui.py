@@ -28,9 +28,9 @@ class OPTISENSE_PT_materials(SidebarPanel, bpy.types.Panel):
         if coming:
             layout.label(text=f"Drawing {coming} more", icon="SORTTIME")
         row = layout.row(align=True)
-        row.operator("optisense.preview_material", text="Preview", icon="SHADING_RENDERED")
-        row.operator("optisense.apply_material", icon="MATERIAL")
-        show_job(layout, "Drawing the material")
+        if not show_job(row, "Drawing the material"):
+            row.operator("optisense.preview_material", text="Preview", icon="SHADING_RENDERED")
+            row.operator("optisense.apply_material", icon="MATERIAL")
         icon = file_icon(choice.preview)
         if icon:
             layout.template_icon(icon_value=icon, scale=7.0)

@@ -13,7 +13,7 @@ from ..scene.collections import collection
 from ..simulate import picture
 
 CURVE = "OptiSense search"
-CURVE_SIZE = (320, 160)
+CURVE_SIZE = (220, 150)
 GHOSTS = "Best so far"
 
 _curve: list[float | None] = []

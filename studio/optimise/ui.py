@@ -47,12 +47,12 @@ class OPTISENSE_PT_optimise(SidebarPanel, bpy.types.Panel):
             column.prop(search, name)
         row = layout.row(align=True)
         row.scale_y = 1.4
-        row.operator("optisense.search", icon="VIEWZOOM")
-        row.operator("optisense.resume", icon="PLAY")
-        show_job(layout, "Searching", "Reading the study", "Applying")
+        if not show_job(row, "Searching", "Reading the study"):
+            row.operator("optisense.search", icon="VIEWZOOM")
+            row.operator("optisense.resume", icon="PLAY")
         curve = icon(CURVE)
         if curve:
-            layout.template_icon(icon_value=curve, scale=7.0)
+            layout.template_icon(icon_value=curve, scale=8.0)
         column = layout.column(align=True)
         column.scale_y = 0.8
         if found.best:
@@ -63,8 +63,9 @@ class OPTISENSE_PT_optimise(SidebarPanel, bpy.types.Panel):
         if found.ended:
             column.label(text=found.ended)
         row = layout.row(align=True)
-        row.operator("optisense.apply_best", icon="CHECKMARK")
-        row.operator("optisense.keep_variant", icon="DUPLICATE")
+        if not show_job(row, "Applying"):
+            row.operator("optisense.apply_best", icon="CHECKMARK")
+            row.operator("optisense.keep_variant", icon="DUPLICATE")
 
 
 CLASSES = (OPTISENSE_UL_vary, OPTISENSE_PT_optimise)

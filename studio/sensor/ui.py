@@ -35,8 +35,9 @@ class OPTISENSE_PT_sensor(SidebarPanel, bpy.types.Panel):
             column.prop(design, "description")
             if design.is_saved:
                 paragraph(layout, design.folder, "FILE_FOLDER")
-            layout.operator("optisense.check", icon="CHECKMARK")
-        show_job(layout, "Opening the sensor", "Saving", "Checking", "Finding nine places")
+            if not show_job(layout, "Checking"):
+                layout.operator("optisense.check", icon="CHECKMARK")
+        show_job(layout, "Opening the sensor", "Saving")
         show_messages(layout)
 
 

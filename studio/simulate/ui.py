@@ -40,8 +40,8 @@ class OPTISENSE_PT_simulate(SidebarPanel, bpy.types.Panel):
         column.prop(settings, "draft")
         row = layout.row()
         row.scale_y = 1.4
-        row.operator("optisense.simulate", icon="RENDER_STILL")
-        show_job(layout, "Simulating")
+        if not show_job(row, "Simulating", "Finding nine places"):
+            row.operator("optisense.simulate", icon="RENDER_STILL")
         now = context.window_manager.optisense_picture
         if not now.shown:
             count = len(objects_of(scene, "CONTACT"))

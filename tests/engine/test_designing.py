@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from PIL import Image
 
 import optisense as ots
 from optisense.design import load_design
@@ -170,6 +171,12 @@ def test_the_library_is_listed_drawn_and_added_to(engine: Any) -> None:
         assert rows and all(row["description"] for row in rows)
     picture = engine.ask("preview", kind="coating", entry="diffuse-grey")["files"]["picture"]
     assert Path(picture).read_bytes().startswith(b"\x89PNG")
+    ball = engine.ask("preview", kind="coating", entry="diffuse-grey", ball=True, name="ball")
+    with Image.open(ball["files"]["picture"]) as drawn_ball:
+        assert drawn_ball.size == (160, 160)
+        middle = np.asarray(drawn_ball.convert("RGB"))[60:100, 60:100]
+        assert 20 < middle.mean() < 235 and middle.std() > 1  # shaded, not a flat patch
+    assert engine.refused("preview", kind="light", entry="smd-3528", ball=True)["where"] == "ball"
     value = engine.ask("entry", kind="coating", entry="diffuse-grey")["entry"]["value"]
     value["specularity"] = 0.25
     added = engine.ask(

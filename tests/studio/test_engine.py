@@ -12,11 +12,13 @@ from typing import Any
 import bpy
 import numpy as np
 import pytest
+from mathutils import Vector
 
 from studio.core.engine import Engine, EngineError
 from studio.engine import session
 from studio.scene.collections import object_of, objects_of
 from studio.scene.gather import gather_document
+from studio.scene.offending import offending
 from studio.sensor.warming import warm_up
 from studio.simulate import picture, relight
 
@@ -189,6 +191,34 @@ def test_the_part_that_is_wrong_is_selected(mini: Any, select: Callable[..., Non
     bpy.ops.optisense.check()
     assert "gel" in session.state().problem
     assert [each.name for each in bpy.context.selected_objects] == ["gel"]
+
+
+def test_the_light_that_is_wrong_is_selected_and_named(
+    mini: Any, select: Callable[..., None]
+) -> None:
+    lights = [each for each in objects_of(mini, "LIGHT") if each.optisense.group == "green"]
+    wall = object_of(mini, "PART", "gel")
+    wall.optisense.role, wall.optisense.material = "blocker", ""
+    middle = sum((wall.matrix_world @ Vector(corner) for corner in wall.bound_box), Vector()) / 8
+    lights[2].location = middle
+    select(wall)
+    bpy.ops.optisense.check()
+    assert "light 2 of group 'green'" in session.state().problem.lower()
+    assert list(bpy.context.selected_objects) == [lights[2]]
+    assert f"Selected: {lights[2].name}" in session.state().hint
+
+
+def test_places_in_the_design_are_found_in_the_scene(mini: Any) -> None:
+    for path, part, expected in (
+        ("lights.red.flux", "", 5),
+        ("lights.red.lights[4]", "gel", 1),
+        ("lights.red.lights[5]", "", 0),
+        ("camera.fov", "", 1),
+        ("coating.eta", "", 1),
+        ("", "gel", 1),
+        ("name", "", 0),
+    ):
+        assert len(offending(mini, path, part)) == expected, path
 
 
 def test_shapes_materials_and_lights_make_a_design_in_order(

@@ -110,8 +110,11 @@ def test_every_panel_with_each_kind_of_object(mini: Any, select: Callable[..., N
 def test_messages_and_progress_are_drawn(mini: Any) -> None:
     now = session.state()
     now.busy, now.fraction, now.progress = "Simulating", 0.4, "1.0 million photons"
-    assert "1.0 million photons" in draw_all()["Simulate"].texts
+    drawn = draw_all()["Simulate"]
+    assert "1.0 million photons" in drawn.texts
+    assert "optisense.simulate" not in drawn.operators and "optisense.cancel" in drawn.operators
     now.busy = ""
+    assert "optisense.simulate" in draw_all()["Simulate"].operators
     now.problem, now.hint = "The gel leaks", "Close it"
     texts = draw_all()["Sensor"].texts
     assert "The gel leaks" in texts and "Close it" in texts

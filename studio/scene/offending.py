@@ -1,0 +1,46 @@
+"""The objects that an error is about."""
+
+from __future__ import annotations
+
+import re
+
+import bpy
+
+from .collections import objects_of
+from .contacts import sensing_surface
+from .gather import part_names
+
+
+def offending(scene: bpy.types.Scene, path: str, part: str) -> list[bpy.types.Object]:
+    """Objects that stand for a place in the design; empty where none does.
+
+    Args:
+        scene: that holds the design.
+        path: dotted, as in `lights.red.lights[0].position`; may be empty.
+        part: the part that the error names; may be empty.
+    """
+    light = re.match(r"lights\.([^.\[]+)(?:\.lights\[(\d+)\])?", path)
+    if light:
+        group = [e for e in objects_of(scene, "LIGHT") if e.optisense.group == light[1]]
+        return group if light[2] is None else group[int(light[2]) :][:1]
+    if path.partition(".")[0] == "camera":
+        return objects_of(scene, "CAMERA")
+    cage = re.match(r"cages\.([^.\[]+)", path)
+    if cage:
+        return [e for e in objects_of(scene, "CAGE") if e.optisense.key == cage[1]]
+    if path.partition(".")[0] == "coating":
+        surface = sensing_surface(scene)
+        return [] if surface is None else [surface]
+    found = part_names(scene).get(part)
+    return [] if found is None else [found]
+
+
+def select(scene: bpy.types.Scene, found: list[bpy.types.Object]) -> list[bpy.types.Object]:
+    """Select nothing but these where any is visible; those that are selected then."""
+    visible = [each for each in found if each.visible_get()]
+    for each in scene.objects if visible else ():
+        each.select_set(False)
+    for each in visible:
+        each.select_set(True)
+        bpy.context.view_layer.objects.active = each
+    return visible
