@@ -32,6 +32,7 @@ from optisense.sensors.gelbelt_checks import (
     LED_LENGTH,
     SENSOR,
     check_camera,
+    check_green,
     check_leds,
     check_numbers,
     check_wheels,
@@ -196,6 +197,7 @@ def gelbelt(
         target = start + BEHIND_ROLLER / incline * (end - start)
         green, shine = _aimed(target, green_angle - deflection, green_distance)
     (x, z), (dx, dz) = green.tolist(), shine.tolist()
+    check_green(left, (x, z))
     row, side = (leds_per_group, led_pitch), half[1] + led_gap
     rows = {
         # The camera looks along +z with +y up, so the picture's right is -x.

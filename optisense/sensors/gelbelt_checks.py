@@ -116,6 +116,18 @@ def check_wheels(
         )
 
 
+def check_green(half: BeltHalf, place: tuple[float, float]) -> None:
+    """The green LEDs, at (x, z) mm beside a half of the belt, must not be inside what turns it."""
+    for number, (x, z) in half.bends.items():
+        radius = float(np.linalg.norm(half.points[half.starts[number]] - (x, z)))
+        require(
+            math.hypot(place[0] - x, place[1] - z) > radius,
+            SENSOR,
+            f"the green LEDs would be inside a wheel of radius {radius:g} mm",
+            "Make roller_radius, wheel_radius or green_distance smaller, or incline larger",
+        )
+
+
 def check_leds(length: float, window_size: tuple[float, float], thickness: float) -> None:
     """The rows (`length` mm) must fit beside what they face, which is `thickness` mm thick."""
     require(

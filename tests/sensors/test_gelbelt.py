@@ -189,6 +189,7 @@ class TestDimensions:
             ({"wheel_distance": 40.0, "light_design": 2}, "flat run", "wheel_distance larger"),
             ({"wheel_distance": 60.0, "light_design": 2}, "cuts into", "wheel_distance"),
             ({"incline": 5.0}, "cuts into the window or the camera's view", "incline"),
+            ({"roller_radius": 40.0}, "inside a wheel of radius 40 mm", "roller_radius"),
             ({"leds_per_group": 12}, "longer than a side of the window", "fewer"),
             ({"fov": 180.0}, "fov is 180", "less than 180"),
             ({"deflection": 70.0}, "deflection is 70", "at most 60"),

@@ -115,7 +115,8 @@ class _Builder(Bench):
             if not part.file.lower().endswith(SUFFIXES):
                 sized[where] = mesh
             self.meshes[name] = mesh
-        self.notes += refuse_odd_units(sized, self.recipe.units)
+        gels = {self.label(name) for name in self.of(Role.ELASTOMER)}
+        self.notes += refuse_odd_units(sized, self.recipe.units, gels)
         for name, mesh in self.meshes.items():
             part, where = self.recipe.parts[name], self.label(name)
             solid = part.role in TRANSPARENT_SOLIDS and part.towards is None

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -155,13 +155,16 @@ def likely_units(size: float) -> list[str]:
     return [unit for unit, scale in MM_PER.items() if SMALLEST <= size * scale <= LARGEST]
 
 
-def refuse_odd_units(meshes: dict[str, TriangleMesh], units: str | None) -> list[str]:
+def refuse_odd_units(
+    meshes: dict[str, TriangleMesh], units: str | None, gels: Collection[str] = ()
+) -> list[str]:
     """Check whether the sizes of parts can be right.
 
     Args:
         meshes: by where each is from, such as 'part gel (gel.stl)', mm; only of files that do
             not know their units.
         units: that were given; None where mm was taken for granted.
+        gels: those of `meshes` that are elastomers, which are as large as the sensor nearly.
 
     Returns:
         What looks odd, a sentence each.
@@ -172,7 +175,7 @@ def refuse_odd_units(meshes: dict[str, TriangleMesh], units: str | None) -> list
     """
     if not meshes:
         return []
-    notes = _odd_parts(meshes, MM_PER[units or "mm"]) if len(meshes) > 1 else []
+    notes = _odd_parts(meshes, MM_PER[units or "mm"], gels) if len(meshes) > 1 else []
     whole = largest_dimension(meshes.values())
     if SMALLEST <= whole <= LARGEST or (units is not None and 0.5 <= whole <= 1000.0):
         return notes
@@ -192,11 +195,12 @@ def refuse_odd_units(meshes: dict[str, TriangleMesh], units: str | None) -> list
     )  # fmt: skip
 
 
-def _odd_parts(meshes: dict[str, TriangleMesh], scale: float) -> list[str]:
+def _odd_parts(meshes: dict[str, TriangleMesh], scale: float, gels: Collection[str]) -> list[str]:
     """Tell parts that are much smaller or larger than the others, and refuse plain slips.
 
     Args:
         scale: mm in the unit of the files.
+        gels: see `refuse_odd_units`.
     """
     notes = []
     sizes = {where: float(np.ptp(mesh.bounds, axis=0).max()) for where, mesh in meshes.items()}
@@ -208,7 +212,7 @@ def _odd_parts(meshes: dict[str, TriangleMesh], scale: float) -> list[str]:
             continue
         others = [u for u in MM_PER if 0.1 < size / scale * MM_PER[u] / typical < 10.0]
         unit = f"units: {others[-1] if ratio <= ODD_PART else others[0]}" if others else "units:"
-        if ratio > ODD_PART:
+        if ratio > ODD_PART or (where in gels and size < SMALLEST):
             raise MeshError(
                 f"it is {size:.4g} mm large, the other parts are {typical:.4g} mm: its file is in "
                 "another unit",

@@ -63,7 +63,22 @@ def place_lights(bench: Bench, name: str, choice: LightChoice) -> LightGroup:
     except ValidationError as error:
         raise design_error(error, {}, where=where, model=LightGroup) from None
     _note_crowded(bench, name, group)
+    if choice.row is not None:
+        _note_beyond(bench, name, group, choice.row.part)
     return group
+
+
+def _note_beyond(bench: Bench, name: str, group: LightGroup, part: str) -> None:
+    """Tell a row that is longer than the side it stands at."""
+    low, high = bench.meshes[part].bounds
+    places = np.array([light.position for light in group.lights])
+    along = int(np.ptp(places, axis=0).argmax())
+    beyond = int(((places[:, along] < low[along]) | (places[:, along] > high[along])).sum())
+    if beyond:
+        bench.notes.append(
+            f"lights {name}: {beyond} of {len(places)} stand beyond the ends of {part}, which is "
+            f"{high[along] - low[along]:.4g} mm long along {'xyz'[along]}"
+        )
 
 
 def _note_crowded(bench: Bench, name: str, group: LightGroup) -> None:

@@ -90,6 +90,12 @@ class TestFiles:
         assert "another unit" in error.message and "part gel (gel.stl)" in str(error.where)
         assert "units: m" in str(error.hint)
 
+    def test_a_gel_in_inches(self, cad: Any) -> None:
+        """Other parts may be as small; a gel of 0.8 mm on a sensor of 24 mm is none."""
+        error = error_of(cad.write(gel=cad.shapes()["gel"].apply_scale(1 / 25.4)))
+        assert "0.7874 mm large" in error.message and "part gel (gel.stl)" in str(error.where)
+        assert "units: inch" in str(error.hint)
+
     def test_one_part_that_may_be_in_inches(self, cad: Any) -> None:
         plate = cad.shapes()["plate"].apply_scale(1 / 25.4)
         notes = design_from_meshes(cad.write(plate=plate)).notes

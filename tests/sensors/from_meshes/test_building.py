@@ -187,6 +187,13 @@ def test_what_looks_odd_is_told(cad: Any) -> None:
     assert any("far away" in note for note in design_from_meshes(cad.write(far)).notes)
 
 
+def test_a_row_longer_than_its_side_is_told(cad: Any) -> None:
+    """Four lights 10 mm apart are 30 mm; the plate is 24 mm long."""
+    notes = design_from_meshes(cad.write(cad.recipe.replace("pitch: 4.5", "pitch: 10"))).notes
+    assert any("lights red: 2 of 4 stand beyond the ends of plate" in note for note in notes)
+    assert not any("beyond" in note for note in design_from_meshes(cad.write()).notes)
+
+
 class TestGuessing:
     def test_names_say_what_is_what(self, cad: Any) -> None:
         cad.write()
