@@ -43,13 +43,12 @@ class SurfaceCells:
 
 def surface_samples(
     vertices: FloatArray, faces: NDArray[np.integer], spacing: float
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Points (n, 3) mm, normals (n, 3), areas (n,) mm^2 spread over a mesh, about one per
-    spacing^2.
+) -> tuple[FloatArray, NDArray[np.integer], FloatArray]:
+    """Points (3, n) mm, the face (n,) that each lies on and its share (n,) mm^2 of the face's
+    area: spread over a mesh, about one per spacing^2.
     """
-    a, b, c = (vertices[faces[:, k]] for k in range(3))
-    cross = np.cross(b - a, c - a)
-    area = np.linalg.norm(cross, axis=1) / 2
+    a, b, c = (vertices[faces[:, k]].T.copy() for k in range(3))
+    area = _twice_areas(vertices, faces)[1] / 2
     count = np.maximum(1, np.ceil(area / spacing**2)).astype(int)
     owner = np.repeat(np.arange(len(faces)), count)
     # The R2 sequence (Roberts 2018), folded into the triangle by the square-root map. One sequence
@@ -58,30 +57,42 @@ def surface_samples(
     order = np.arange(1, len(owner) + 1)
     u = np.mod(0.5 + 0.7548776662466927 * order, 1.0)
     v = np.mod(0.5 + 0.5698402909980532 * order, 1.0)
-    root = np.sqrt(u)[:, None]
-    points = a[owner] * (1 - root) + (b[owner] * (1 - v)[:, None] + c[owner] * v[:, None]) * root
-    normals = cross / np.maximum(2 * area, 1e-30)[:, None]
-    return points, normals[owner], (area / count)[owner]
+    root = np.sqrt(u)
+    points = np.empty((3, len(owner)))
+    for k in range(3):
+        across = b[k][owner] * (1 - v) + c[k][owner] * v
+        points[k] = a[k][owner] * (1 - root) + across * root
+    return points, owner, (area / count)[owner]
+
+
+def _twice_areas(vertices: FloatArray, faces: NDArray[np.integer]) -> tuple[FloatArray, FloatArray]:
+    """Normals of faces as long as twice their areas (m, 3), and these lengths (m,)."""
+    a, b, c = (vertices[faces[:, k]] for k in range(3))
+    cross = np.cross(b - a, c - a)
+    return cross, np.linalg.norm(cross, axis=1)
 
 
 def build_cells(vertices: FloatArray, faces: NDArray[np.integer], size: float) -> SurfaceCells:
     """Cells of ``size`` mm over a mesh."""
     vertices = np.asarray(vertices, dtype=np.float64)
-    points, normals, areas = surface_samples(vertices, faces, size / SAMPLES_ACROSS)
+    points, face, areas = surface_samples(vertices, faces, size / SAMPLES_ACROSS)
     # Off any round number, so that a plane does not run along the border between two cells.
-    lower = points.min(axis=0) - (0.37 + REACH) * size
-    counts = np.floor((points.max(axis=0) - lower) / size).astype(int) + 1 + REACH
-    place = np.floor((points - lower) / size).astype(int)
-    flat = place[:, 0] + counts[0] * (place[:, 1] + counts[1] * place[:, 2])
-    used, owner = np.unique(flat, return_inverse=True)
+    lower = points.min(axis=1) - (0.37 + REACH) * size
+    counts = np.floor((points.max(axis=1) - lower) / size).astype(int) + 1 + REACH
+    x, y, z = (((points[k] - lower[k]) / size).astype(int) for k in range(3))
+    place = x + counts[0] * (y + counts[1] * z)
+    places = int(np.prod(counts))
+    used = np.flatnonzero(np.bincount(place, minlength=places))
     cells = len(used)
 
-    def mean_of(values: FloatArray) -> FloatArray:
-        return np.stack([np.bincount(owner, areas * values[:, k], cells) for k in range(3)], 1)
+    def total(values: FloatArray) -> FloatArray:
+        return np.asarray(np.bincount(place, values, places)[used], dtype=np.float64)
 
-    area = np.bincount(owner, areas, cells).astype(np.float64)
-    centre = mean_of(points) / area[:, None]
-    normal = mean_of(normals)
+    area = total(areas)
+    centre = np.stack([total(areas * points[k]) for k in range(3)], axis=1) / area[:, None]
+    cross, length = _twice_areas(vertices, faces)
+    normals = cross / np.maximum(length, 1e-30)[:, None]
+    normal = np.stack([total(areas * normals[:, k][face]) for k in range(3)], axis=1)
     normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-12)
     index = _index(used, counts)
 
