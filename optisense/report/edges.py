@@ -20,14 +20,16 @@ def feature_edges(mesh: TriangleMesh, crease: float) -> NDArray[np.float64]:
     """
     welded = mesh.welded()
     faces = welded.faces.astype(np.int64)
-    edges = np.sort(faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
-    face_of_edge = np.repeat(np.arange(len(faces)), 3)
-    unique, inverse, counts = np.unique(edges, axis=0, return_inverse=True, return_counts=True)
-    order = np.argsort(inverse.reshape(-1), kind="stable")
-    starts = np.concatenate([[0], np.cumsum(counts)[:-1]])
-    first = face_of_edge[order[starts]]
-    second = face_of_edge[order[np.minimum(starts + 1, len(order) - 1)]]
+    ends = np.roll(faces, -1, axis=1)
+    count = len(welded.vertices)
+    # Edges as one number each: several times faster to sort than pairs.
+    edges = (np.minimum(faces, ends) * count + np.maximum(faces, ends)).reshape(-1)
+    order = np.argsort(edges, kind="stable")
+    unique, starts, counts = np.unique(edges[order], return_index=True, return_counts=True)
+    first = order[starts] // 3
+    second = order[np.minimum(starts + 1, len(order) - 1)] // 3
     normals = welded.face_normals
     cosine = np.einsum("ij,ij->i", normals[first], normals[second])
     is_sharp = (counts != 2) | (cosine < np.cos(np.radians(crease)))
-    return welded.vertices[unique[is_sharp]]
+    sharp = unique[is_sharp]
+    return welded.vertices[np.column_stack([sharp // count, sharp % count])]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any, Literal, Protocol
 
@@ -142,9 +143,11 @@ def _pictures(
         covered = 100 * float(image.contact_mask.mean())
         overlay = mask_overlay(picture, image.contact_mask)
         shown.append(("contact", overlay, "contact", f"{covered:.1f} % of the picture"))
+    with ThreadPoolExecutor() as pool:  # zlib compresses outside Python's lock
+        addresses = list(pool.map(data_uri, [pixels for _, pixels, _, _ in shown]))
     return [
-        {"name": name, "uri": data_uri(pixels), "caption": caption, "note": note}
-        for name, pixels, caption, note in shown
+        {"name": name, "uri": address, "caption": caption, "note": note}
+        for (name, _, caption, note), address in zip(shown, addresses, strict=True)
     ]
 
 
