@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 from typing import Annotated
 
 import typer
@@ -45,6 +46,13 @@ def _options(
     console.set_debug(debug)
 
 
+NEW_OBJECTS = 50_000
+"""Python looks for garbage after so many new objects (700 by default). Modules make hundreds of
+thousands, nearly all of which stay, and looking at them again and again takes a thirtieth of a
+render."""
+
+
 def main() -> None:
     """Run the command line with the process's arguments and exit."""
+    gc.set_threshold(NEW_OBJECTS)
     run_and_leave(app)

@@ -60,6 +60,34 @@ def test_a_command_does_not_wait_for_the_others() -> None:
     assert child.stdout.strip() == "{'render'}", child.stderr
 
 
+@pytest.mark.parametrize(
+    ("arguments", "needless"),
+    [
+        (["check", "gelsight-mini"], {"drjit", "mitsuba", "scipy.spatial", "jinja2"}),
+        (
+            ["render", "gelsight-mini", "--resolution=40x30", "--photons=20000", "--out=here"],
+            {"scipy.optimize", "scipy.stats", "optisense.objectives", "optisense.report.scores"},
+        ),
+    ],
+)
+def test_a_command_loads_only_what_it_needs(
+    arguments: list[str], needless: set[str], tmp_path: Path
+) -> None:
+    needless = needless | {"cma", "dask", "matplotlib", "sklearn", "trimesh", "optisense.search"}
+    script = (
+        "import sys\n"
+        "from typer.testing import CliRunner\n"
+        "from optisense.cli import app\n"
+        f"result = CliRunner().invoke(app, {arguments!r})\n"
+        "assert result.exit_code == 0, result.output\n"
+        f"print(sorted({needless!r} & set(sys.modules)))\n"
+    )
+    child = subprocess.run(
+        [sys.executable, "-c", script], capture_output=True, text=True, cwd=tmp_path
+    )
+    assert child.stdout.strip() == "[]", child.stderr
+
+
 def test_a_misspelt_command_gets_the_near_match() -> None:
     code, text = run("rendr")
     assert code == 2
