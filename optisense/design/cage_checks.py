@@ -13,12 +13,16 @@ from optisense.design.problems import Problem
 from optisense.design.sensor_design import SensorDesign
 from optisense.geometry import TriangleMesh
 from optisense.geometry.cage import cage_points, cage_weights
+from optisense.geometry.coarseness import chord_error
 from optisense.geometry.containment import inside
 from optisense.geometry.folds import find_fold
 from optisense.geometry.meeting import CONTACT, find_meeting, resting_on, touching
 
 AT_REST = 1e-9
 """mm: a control point that is off its place by less has not moved."""
+
+COARSE = 0.1
+"""mm: a mesh whose straight edges are farther off the shape that its cage gives is told."""
 
 FOLDS = {
     "inside out": "is turned inside out by cage '{cage}' near {place}: {count} of its vertices",
@@ -57,6 +61,7 @@ def cage_problems(design: SensorDesign, meshes: Meshes | None = None) -> list[Pr
         parts = [name for name in cage.parts if name in bent and name in design.meshes]
         for name in parts:
             problems += _folds(design, cage_name, name, bent[name])
+            problems += _coarse(design, cage_name, name, bent[name])
         for name in parts:
             for other in bent:
                 pair = frozenset((name, other))
@@ -96,6 +101,23 @@ def _folds(design: SensorDesign, cage_name: str, name: str, bent: TriangleMesh) 
             _where(design, cage_name),
             f"Move {_mover(design, cage_name, name, fold.vertex)} back: control points must not "
             "pass their neighbours",
+        )
+    ]
+
+
+def _coarse(design: SensorDesign, cage_name: str, name: str, bent: TriangleMesh) -> list[Problem]:
+    cage = design.cages[cage_name]
+    off = chord_error(design.meshes[name], bent, cage.box, cage.resolution, cage.current_points())
+    if off.distance <= COARSE:
+        return []
+    return [
+        Problem(
+            f"part '{name}' has too large triangles to follow cage '{cage_name}': near "
+            f"{_text(off.place)} it is {off.distance:.2g} mm off the shape that the cage gives",
+            design.where("parts", name, "mesh"),
+            "Export it from the CAD tool with a finer mesh: only vertices are bent, and between "
+            "them it stays straight",
+            severity="warning",
         )
     ]
 

@@ -53,6 +53,20 @@ class TestChecks:
             problems = cage_problems(set_value(svelte, "cages.M1.blend", value))
             assert not [p for p in problems if "through" in p.message or "inside" in p.message]
 
+    def test_a_part_whose_triangles_are_too_large_to_bend(self, mini: SensorDesign) -> None:
+        """Only the corners of the guide are vertices: raising the middle of its face by 4 mm,
+        which is to lift that face by 1 mm there, lifts nothing."""
+        caged = add_cage(mini, "plate", ["guide"], resolution=(3, 3, 2), margin=0.0)
+        assert cage_problems(caged) == []
+        raised = move_points(caged, "plate", {"1,1,0": (0.0, 0.0, 4.0)})
+        assert np.array_equal(shape(raised, "guide"), shape(caged, "guide"))
+        coarse = [p for p in cage_problems(raised) if "too large triangles" in p.message]
+        assert [p.severity for p in coarse] == ["warning"]
+        assert "'guide'" in coarse[0].message and "1 mm off" in coarse[0].message
+        assert "(0.00, 0.00, -8.25)" in coarse[0].message  # 1 mm above the guide's lower face
+        slight = move_points(caged, "plate", {"1,1,0": (0.0, 0.0, 0.3)})
+        assert cage_problems(slight) == []
+
     def test_a_mirror_pushed_into_the_skin(self, svelte: SensorDesign) -> None:
         pushed = move_points(settle_cage(svelte, "M1"), "M1", {"*,*,2": (12.0, 0.0, 0.0)})
         problems = cage_problems(pushed)
@@ -83,7 +97,10 @@ class TestChecks:
     def test_parts_in_one_cage_go_together(self, mini: SensorDesign) -> None:
         bare = remove_cage(mini, "skin")
         both = add_cage(bare, "stack", ["skin", "gel", "tray", "guide"])
-        assert cage_problems(move_points(both, "stack", {"1,*,*": (0.0, 0.0, 1.0)})) == []
+        problems = cage_problems(move_points(both, "stack", {"1,*,*": (0.0, 0.0, 1.0)}))
+        # The plates have vertices at their corners only and stay flat, which is told.
+        assert [p.message.split("'")[1] for p in problems] == ["tray", "guide"]
+        assert all("too large triangles" in p.message for p in problems)
         alone = add_cage(bare, "skin", ["skin"])
         problems = cage_problems(move_points(alone, "skin", {"1,1,*": (0.0, 0.0, 1.0)}))
         assert "part 'gel'" in problems[0].message

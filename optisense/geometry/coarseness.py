@@ -1,0 +1,62 @@
+"""Whether the triangles of a mesh are small enough to follow its cage."""
+
+from __future__ import annotations
+
+import weakref
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from optisense.geometry.cage import FloatArray, Resolution, cage_weights, deform
+from optisense.geometry.mesh import TriangleMesh
+
+LOOKED_AT = 64
+"""The longest edges of a mesh, which deviate most."""
+
+_longest: weakref.WeakKeyDictionary[TriangleMesh, NDArray[np.int32]] = weakref.WeakKeyDictionary()
+
+
+class ChordError(NamedTuple):
+    """How far a bent mesh is off the shape that its cage gives.
+
+    Attributes:
+        distance: mm, at the middle of the worst edge.
+        place: (3,) mm, where, in the bent shape.
+    """
+
+    distance: float
+    place: FloatArray
+
+
+def chord_error(
+    mesh: TriangleMesh,
+    bent: TriangleMesh,
+    box: ArrayLike,
+    resolution: Resolution,
+    points: ArrayLike,
+) -> ChordError:
+    """How far the middles of long edges are from where the cage would put them.
+
+    Only vertices are bent; between them a mesh stays straight.
+
+    Args:
+        mesh: at rest, mm, with faces.
+        bent: the same faces, bent.
+        box, resolution, points: of the cage.
+    """
+    edges = _longest.get(mesh)
+    if edges is None:
+        edges = _longest.setdefault(mesh, _longest_edges(mesh))
+    middles = mesh.vertices[edges].mean(axis=1)
+    wanted = deform(cage_weights(middles, box, resolution), points)
+    off = np.linalg.norm(bent.vertices[edges].mean(axis=1) - wanted, axis=1)
+    worst = int(np.argmax(off))
+    return ChordError(float(off[worst]), wanted[worst])
+
+
+def _longest_edges(mesh: TriangleMesh) -> NDArray[np.int32]:
+    ends = mesh.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
+    squares = ((mesh.vertices[ends[:, 0]] - mesh.vertices[ends[:, 1]]) ** 2).sum(axis=1)
+    count = min(LOOKED_AT, len(ends))
+    return np.asarray(ends[np.argpartition(-squares, count - 1)[:count]])
