@@ -82,6 +82,7 @@ def main() -> None:
         "rgb2normal_depends_on": [
             *measure_reading(_lit(presses, responses)),
             *measure_presses(model, options.seeds - 1, scatter),
+            measure_without_guide(options.seeds - 1),
         ],
     }
     text = _markdown(found)
@@ -211,6 +212,17 @@ def measure_presses(
     for what, change in changes:
         score = _score(Evaluation(model, Settings(seed=seed, **change)), "rgb2normal")
         yield {"what": what, "value": score.value, **_by_direction(score.parts["directions"])}
+
+
+def measure_without_guide(seed: int) -> dict[str, Any]:
+    """RGB2Normal where the assumed light guide is air: the same LEDs at the same places shine
+    freely at the tray."""
+    design = optisense.load(DESIGN)
+    design.materials["air"] = optisense.library.material("air")
+    design.parts["guide"].material = "air"
+    score = _score(Evaluation(OpticalModel(design), Settings(seed=seed)), "rgb2normal")
+    what = "no light guide: air in its place"
+    return {"what": what, "value": score.value, **_by_direction(score.parts["directions"])}
 
 
 def _pressed(model: OpticalModel, seed: int, together: bool) -> Evaluation:
