@@ -138,7 +138,10 @@ def _fly(
     group = flight.group
     landed = mi.Bool(flight.landed)
     active = mi.Bool(flight.active)
-    rng = mi.PCG32(size=dr.width(flight.number), initstate=seed, initseq=mi.UInt64(flight.number))
+    # By the photon's number alone: with `size` its lane would count too, and after a stage all
+    # photons behind one that ended elsewhere would go other ways. So a small change of the design
+    # changes little but what it touches.
+    rng = mi.PCG32(initstate=seed, initseq=mi.UInt64(flight.number))
     depth = mi.UInt32(0)
     while active & (depth < limit):
         hit = intersect(scene, rows, corners, origin, direction, active)

@@ -110,3 +110,21 @@ def test_a_moved_camera_or_a_bent_skin_makes_anew_what_depends_on_it(
         draft.chief_rays(SIZE).points, ordinary.chief_rays(SIZE).points, atol=1e-4
     )
     ordinary.become(mini)
+
+
+def test_a_small_move_leaves_the_noise_of_all_other_light_as_it_was(
+    draft: DraftModel, mini: SensorDesign
+) -> None:
+    def render(seed: int = 0) -> dict[str, np.ndarray]:
+        return draft.render(PRESS, SIZE, photons=60_000, seed=seed).layers
+
+    def change(one: dict[str, np.ndarray], other: dict[str, np.ndarray], group: str) -> float:
+        return float(np.sqrt(((one[group] - other[group]) ** 2).mean()))
+
+    still, other_seed = render(), render(seed=1)
+    light = mini.lights["red"].lights[0].position
+    draft.become(ots.set_value(mini, "lights.red.lights[0].position.x", light[0] + 0.05))
+    nudged = render()
+    assert change(nudged, still, "red") > 0.0
+    for group in ("green", "blue"):
+        assert change(nudged, still, group) < 0.15 * change(other_seed, still, group)
