@@ -19,6 +19,9 @@ PATIENCE = 300.0
 ROW = 14
 """Pixels between places where a button is looked for; buttons are at least 18 high."""
 
+HEADER = 26
+"""Pixels of a panel's header and the gap below it."""
+
 SCROLLED, CLICK = 9, 40
 """Clicks of the wheel to see other buttons, and how many pixels a click moves them."""
 
@@ -165,6 +168,23 @@ class Bench:
         self.see("1")
         self.desktop.keys("Home")
         self._last = 0
+        self.drawn()
+
+    def to_end(self) -> None:
+        """Show the sidebar's last panel, by the key End over it."""
+        left, top, width, height = self.sidebar()
+        self.desktop.move(left + width / 2, top + height - 6)
+        self.see("1")
+        self.desktop.keys("End")
+        self._last = 0
+        self.drawn()
+
+    def open_last_panel(self) -> None:
+        """Click on the header of the last panel, which is closed at first."""
+        self.to_end()
+        left, top, width, height = self.sidebar()
+        self.desktop.click(left + width / 2, top + height - HEADER / 2)
+        self.see("1")
         self.drawn()
 
     def scroll(self, clicks: int) -> None:

@@ -6,7 +6,6 @@ OPTISENSE_WINDOW_PICTURES names.
 
 from __future__ import annotations
 
-import math
 import os
 from collections.abc import Iterator
 from pathlib import Path
@@ -23,6 +22,12 @@ MOVED = 1.5
 
 FIRST_ROW = 37
 """Pixels from the top of the button *Vary* to the middle of the first row of the list below it."""
+
+ABOVE_BUTTON = 60
+"""Pixels from the button that draws the materials up to the picture of the chosen one."""
+
+LAST_PICTURE = (222, 114)
+"""Pixels from there to the left and up: a picture in the last row of those to choose from."""
 
 FIELDS_OF_VIEW = (50.0, 60.0, 70.0)
 """Degrees, what the search tries; all see less than the whole surface or beyond its edge."""
@@ -86,6 +91,22 @@ def test_a_light_is_moved(bench: Bench) -> None:
     photograph(bench, "2-light-moved")
 
 
+def test_a_material_is_chosen_from_pictures(bench: Bench) -> None:
+    before = bench.see("manager.optisense_material.material")
+    bench.press("optisense.material_pictures", across=0.9)
+    bench.until("part('materials.gallery').is_begun('material')")
+    bench.until("part('materials.gallery').waiting('material') == 0")
+    _, y = bench.bring("optisense.material_pictures", 0.7, across=0.9)
+    left, _, width, _ = bench.sidebar()
+    middle = left + width / 2
+    bench.desktop.click(middle, y - ABOVE_BUTTON)
+    bench.see("1")
+    bench.drawn()
+    photograph(bench, "materials")
+    bench.desktop.click(middle - LAST_PICTURE[0], y - ABOVE_BUTTON - LAST_PICTURE[1])
+    bench.until(f"manager.optisense_material.material != {before!r}")
+
+
 def test_a_picture_appears(bench: Bench) -> None:
     bench.press("optisense.simulate")
     bench.until("state().busy == 'Simulating' or manager.optisense_picture.shown")
@@ -115,6 +136,15 @@ def test_scores_appear(bench: Bench) -> None:
     bench.rest()
     bench.bring("optisense.show_rays", 0.95, across=0.25)
     photograph(bench, "4-evaluated")
+
+
+def test_a_report_is_written(bench: Bench) -> None:
+    bench.open_last_panel()
+    bench.press("optisense.report")
+    bench.choose_file()
+    bench.until("'Written to' in state().note")
+    page = (bench.home / "gelsight-mini.html").read_text()
+    assert page.count("data:image/png") >= 2 and "</html>" in page
 
 
 def test_it_is_saved(bench: Bench) -> None:
@@ -169,8 +199,8 @@ def test_the_best_is_applied_saved_and_opened_again(bench: Bench) -> None:
     assert not bench.see("state().problem"), bench.said()
     assert bench.see("scene().optisense.folder") == str(folder)
     assert bench.see("kinds('CAMERA')[0].optisense.fov") == pytest.approx(best, abs=1e-4)
-    lights = bench.see("[list(each.location) for each in kinds('LIGHT')]")
-    assert sum(math.isclose(z, lights[0][2] - MOVED, abs_tol=1e-3) for _, _, z in lights) == 1
+    heights = sorted(bench.see("[each.location.z for each in kinds('LIGHT')]"))
+    assert heights == pytest.approx([heights[-1] - MOVED, *[heights[-1]] * 14], abs=1e-3)
     bench.press("optisense.show_picture")
     bench.until("any(each.type == 'IMAGE_EDITOR' for each in window().screen.areas)")
     photograph(bench, "6-opened-again")
