@@ -21,6 +21,7 @@ from rich.console import Console
 import optisense
 from benchmarks.results import machine
 from benchmarks.timing import Time, medians, timed
+from optisense import library
 from optisense.objectives import Evaluation, Press, Score, Settings, evaluate, find
 from optisense.objectives.rgb2normal import fit, line, signed_angles
 from optisense.objectives.run import run_objective
@@ -218,7 +219,7 @@ def measure_without_guide(seed: int) -> dict[str, Any]:
     """RGB2Normal where the assumed light guide is air: the same LEDs at the same places shine
     freely at the tray."""
     design = optisense.load(DESIGN)
-    design.materials["air"] = optisense.library.material("air")
+    design.materials["air"] = library.material("air")
     design.parts["guide"].material = "air"
     score = _score(Evaluation(OpticalModel(design), Settings(seed=seed)), "rgb2normal")
     what = "no light guide: air in its place"
