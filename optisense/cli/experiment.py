@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from optisense.cli.console import EXIT_INTERRUPTED, ends_well, messages, output
+from optisense.cli.progress import counting_bar
 
 if TYPE_CHECKING:
     from optisense.experiments import Experiment
@@ -80,10 +79,10 @@ def experiment(
     count = min(processors(), MOST_WORKERS) if workers is None else workers
     try:
         if len(chosen) > 1:
-            with _progress(name) as show:
+            with counting_bar(name, left=False) as show:
                 prepare(chosen, Bench(out, count, show), quick, seeds)
         for each in chosen:
-            with _progress(each.name) as show:
+            with counting_bar(each.name, left=False) as show:
                 result = run(each, Bench(out, count, show), quick, seeds)
             _print_result(each, result, out)
     except KeyboardInterrupt:
@@ -121,23 +120,3 @@ def _print_result(experiment: Experiment, result: dict[str, Any], out: Path) -> 
     minutes = result["seconds"]["processor"] / 60.0
     told = f"  {result['units']} evaluations, {minutes:.1f} processor minutes"
     output.print(f"{told}; results: {out / experiment.name}", markup=False)
-
-
-@contextmanager
-def _progress(what: str) -> Iterator[Callable[[int, int, str], None]]:
-    """On standard error: a bar on a terminal, elsewhere a line now and then."""
-    from optisense.cli.progress import LogLines, passing_bar
-
-    if not messages.is_terminal:
-        yield LogLines(what)
-        return
-    from rich.progress import MofNCompleteColumn, TextColumn, TimeElapsedColumn
-
-    label = TextColumn("{task.fields[label]}")
-    with passing_bar(what, MofNCompleteColumn(), TimeElapsedColumn(), label) as bar:
-        task = bar.add_task(what, total=None, label="")
-
-        def show(done: int, count: int, label: str) -> None:
-            bar.update(task, completed=done, total=count, label=label)
-
-        yield show

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Protocol
 
 from optisense.cli.console import messages
 
@@ -37,10 +37,21 @@ def passing_bar(what: str, *columns: ProgressColumn) -> Iterator[Progress]:
         yield bar
 
 
+class Counter(Protocol):
+    """Told how much is done: pieces finished, of how many if known, and a word on it."""
+
+    def __call__(self, done: int, count: int | None, note: str = "") -> None:
+        """Show it."""
+
+
 @contextmanager
-def counting_bar(what: str) -> Iterator[Callable[[int, int], None]]:
-    """A bar that counts finished pieces of work, ``show(done, count)``; lines where there is no
-    terminal.
+def counting_bar(what: str, *, left: bool = True, note: str = "") -> Iterator[Counter]:
+    """A bar that counts finished pieces of work; lines in a log where there is no terminal.
+
+    Args:
+        what: stands before the bar.
+        left: whether to show the time left, as if all pieces took as long as those so far.
+        note: stands behind the bar until something else is told.
     """
     if not messages.is_terminal:
         yield LogLines(what)
@@ -52,12 +63,14 @@ def counting_bar(what: str) -> Iterator[Callable[[int, int], None]]:
         TimeRemainingColumn,
     )
 
-    columns = (MofNCompleteColumn(), TimeElapsedColumn(), TextColumn("left"), TimeRemainingColumn())
-    with passing_bar(what, *columns) as bar:
-        task = bar.add_task(what, total=None)
+    columns = [MofNCompleteColumn(), TimeElapsedColumn()]
+    if left:
+        columns += [TextColumn("left"), TimeRemainingColumn()]
+    with passing_bar(what, *columns, TextColumn("{task.fields[note]}")) as bar:
+        task = bar.add_task(what, total=None, note=note)
 
-        def show(done: int, count: int) -> None:
-            bar.update(task, completed=done, total=count)
+        def show(done: int, count: int | None, note: str = "") -> None:
+            bar.update(task, completed=done, total=count, note=note)
 
         yield show
 

@@ -7,8 +7,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
-from optisense.cli.console import messages
-from optisense.cli.progress import LogLines, passing_bar
+from optisense.cli.progress import counting_bar
 
 if TYPE_CHECKING:
     from optisense.search import Progress
@@ -16,22 +15,9 @@ if TYPE_CHECKING:
 
 @contextmanager
 def search_progress(method: str) -> Iterator[Callable[[Progress], None]]:
-    """A bar with the best score so far, trials an hour and the time left; lines now and then
-    where standard error is no terminal.
-    """
-    if not messages.is_terminal:
-        line = LogLines(method)
-        yield lambda progress: line(progress.done, progress.total, note(progress))
-        return
-    from rich.progress import MofNCompleteColumn, TextColumn
-
-    with passing_bar(method, MofNCompleteColumn(), TextColumn("{task.fields[note]}")) as bar:
-        task = bar.add_task("search", total=None, note="getting ready")
-
-        def show(progress: Progress) -> None:
-            bar.update(task, completed=progress.done, total=progress.total, note=note(progress))
-
-        yield show
+    """Trials done, with the best score so far, trials an hour and the time left."""
+    with counting_bar(method, left=False, note="getting ready") as show:
+        yield lambda progress: show(progress.done, progress.total, note(progress))
 
 
 def note(progress: Progress) -> str:
