@@ -79,6 +79,7 @@ def open_stage(
         document = handing.without_nulls(result["data"])
         parts = document["parts"].items()
         clear_startup(scene)
+        _picture_is_old()
         build(scene, document, {key: mesh_file.read(stage / part["mesh"]) for key, part in parts})
         scene.optisense.folder = folder or str(stage)
         scene.optisense.is_saved = bool(folder)
@@ -96,3 +97,10 @@ def open_stage(
     return session.start_job(
         "Opening the sensor", "open", opened, wait=wait, design=str(stage), name="opened"
     )
+
+
+def _picture_is_old() -> None:
+    """What is shown is no picture of the sensor that opens, whose lights do not relight it."""
+    now = bpy.context.window_manager.optisense_picture
+    now.image = ""
+    now.is_before = now.shown

@@ -51,6 +51,9 @@ class OPTISENSE_PG_picture(bpy.types.PropertyGroup):
     shown: BoolProperty(options={"SKIP_SAVE"})
     is_draft: BoolProperty(options={"SKIP_SAVE"})
     is_relit: BoolProperty(options={"SKIP_SAVE"})
+    is_before: BoolProperty(
+        description="It is a picture of the sensor that was open before", options={"SKIP_SAVE"}
+    )
     summary: StringProperty(options={"SKIP_SAVE"})
     file: StringProperty(options={"SKIP_SAVE"})
 

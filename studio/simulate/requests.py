@@ -54,7 +54,7 @@ def take(result: dict[str, Any], *, draft: bool) -> None:
     now.image = result["image"]
     now.shown = True
     now.is_draft = draft
-    now.is_relit = False
+    now.is_relit = now.is_before = False
     now.file = result["files"].get("picture", "")
     now.summary = summary(result)
     session.redraw()

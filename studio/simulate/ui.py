@@ -50,6 +50,8 @@ class OPTISENSE_PT_simulate(SidebarPanel, bpy.types.Panel):
         icon = picture.icon()
         if icon:
             layout.template_icon(icon_value=icon, scale=11.0)
+        if now.is_before:
+            layout.label(text="Of the sensor before", icon="INFO")
         kind = "Draft, " if now.is_draft else "Relit, " if now.is_relit else ""
         layout.label(text=kind + now.summary)
         layout.operator("optisense.show_picture", icon="IMAGE_DATA")

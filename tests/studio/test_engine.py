@@ -185,6 +185,20 @@ def test_an_engine_of_another_version_says_so(tmp_path: Path) -> None:
     engine.stop()
 
 
+def test_a_picture_of_the_sensor_before_is_not_relit_and_says_so(mini: Any) -> None:
+    small(mini)
+    assert bpy.ops.optisense.simulate() == {"FINISHED"}
+    before, now = shown(), bpy.context.window_manager.optisense_picture
+    assert not now.is_before and bpy.ops.optisense.report.poll()
+    assert bpy.ops.optisense.new(sensor="gelsight-mini") == {"FINISHED"}
+    mini.optisense.light_groups[0].flux = 0.0
+    session.ask_and_wait("library", kind="coating")  # a relighting would have come before this
+    assert now.is_before and not now.is_relit and np.array_equal(shown(), before)
+    assert not bpy.ops.optisense.report.poll()
+    assert bpy.ops.optisense.simulate() == {"FINISHED"}
+    assert not now.is_before and not np.array_equal(shown(), before)
+
+
 def test_the_part_that_is_wrong_is_selected(mini: Any, select: Callable[..., None]) -> None:
     select()
     object_of(mini, "PART", "gel").optisense.material = ""

@@ -201,6 +201,10 @@ def test_the_best_is_applied_saved_and_opened_again(bench: Bench) -> None:
     assert bench.see("kinds('CAMERA')[0].optisense.fov") == pytest.approx(best, abs=1e-4)
     heights = sorted(bench.see("[each.location.z for each in kinds('LIGHT')]"))
     assert heights == pytest.approx([heights[-1] - MOVED, *[heights[-1]] * 14], abs=1e-3)
+    assert bench.see("manager.optisense_picture.is_before"), "a picture of the sensor before"
+    bench.press("optisense.simulate")
+    bench.until("not manager.optisense_picture.is_before")
+    bench.rest()
     bench.press("optisense.show_picture")
     bench.until("any(each.type == 'IMAGE_EDITOR' for each in window().screen.areas)")
     photograph(bench, "6-opened-again")
