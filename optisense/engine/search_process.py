@@ -100,7 +100,7 @@ class SearchProcess:
 def is_running(folder: Path) -> bool:
     """Whether any process runs a study at present."""
     from optisense.search.store import Lock
-    from optisense.search.study import LOCK_FILE
+    from optisense.search.study_folder import LOCK_FILE
 
     if not (folder / LOCK_FILE).exists():
         return False

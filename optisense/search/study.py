@@ -13,38 +13,34 @@ from __future__ import annotations
 import json
 import math
 import shutil
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from optisense.design import SensorDesign, load_design, save_design
-from optisense.errors import OutputError, SearchError
+from optisense.design import SensorDesign
+from optisense.errors import SearchError
 from optisense.library import with_own_lights
 from optisense.search.constraints import Constraint
-from optisense.search.difference import (
-    differences,
-    differences_from,
-    fingerprint,
-    notes,
-    plain_differences,
-)
+from optisense.search.difference import differences, fingerprint, notes, plain_differences
 from optisense.search.dominance import front as front_of
 from optisense.search.evaluation import DesignEvaluator, Goal
 from optisense.search.plan import ONLY_HERE, Plan, file_prints, known_goals, known_rules
-from optisense.search.settings import STUDY_FILE, StudySettings
+from optisense.search.settings import StudySettings
 from optisense.search.space import SearchSpace
 from optisense.search.store import Lock, Row, Store
+from optisense.search.study_folder import (
+    LOCK_FILE,
+    STORE_FILE,
+    as_begun,
+    check_free,
+    kept,
+    listed,
+    only_whole,
+)
 from optisense.search.trial import Trial
-
-DESIGN_FOLDER = "design"
-STORE_FILE = "trials.sqlite"
-LOCK_FILE = ".lock"
-
-MOST_SHOWN = 8
 
 
 class Study:
@@ -91,14 +87,14 @@ class Study:
         """
         place = None if folder is None else Path(folder)
         if place is not None:
-            _check_free(place)
+            check_free(place)
         design = with_own_lights(design)
         settings = plan.settings_for(design)
         if place is None:
             store = Store(None, settings.names, new=True)
             return Study(None, settings, design, plan.goals, plan.space.constraints, store)
-        with _only_whole(place):
-            design = _kept(place, design)
+        with only_whole(place):
+            design = kept(place, design)
             settings = replace(settings, fingerprint=fingerprint(design))
             store = Store(place / STORE_FILE, settings.names, new=True)
             store.set_fact("settings", settings.fingerprint_of_all())
@@ -132,12 +128,12 @@ class Study:
             raise SearchError(f"the study has no {STORE_FILE}", where=str(place))
         store = Store(place / STORE_FILE, settings.names, new=False)
         try:
-            own = _as_begun(place, settings, store)
+            own = as_begun(place, settings, store)
             if design is not None:
                 changed = differences(own, with_own_lights(design))
                 if changed:
                     raise SearchError(
-                        f"the design is not the one of this study any more:\n{_listed(changed)}",
+                        f"the design is not the one of this study any more:\n{listed(changed)}",
                         where=str(place),
                         hint="Undo the changes, or begin a new study with another --out",
                     )
@@ -161,7 +157,7 @@ class Study:
         changed = plain_differences({key: here[key] for key in there}, there)
         if changed:
             raise SearchError(
-                f"the study was begun otherwise:\n{_listed(changed)}",
+                f"the study was begun otherwise:\n{listed(changed)}",
                 where=str(self.folder or "the study"),
                 hint="Go on with it as it was begun, or begin a new one with another --out",
             )
@@ -322,87 +318,3 @@ def front_among(trials: Sequence[Trial], names: Sequence[str]) -> list[Trial]:
     values = np.array([[trial.scores.get(name, np.nan) for name in names] for trial in trials])
     chosen = [trials[number] for number in front_of(values)]
     return sorted(chosen, key=lambda trial: -trial.score)
-
-
-def _check_free(folder: Path) -> None:
-    """Refuse a folder that holds something already.
-
-    Raises:
-        SearchError: it does.
-        OutputError: it is no folder.
-    """
-    if (folder / STUDY_FILE).exists():
-        raise SearchError(
-            "there is a study in this folder already",
-            where=str(folder),
-            hint="Go on with it by --resume, or name another folder",
-        )
-    if folder.exists() and not folder.is_dir():
-        raise OutputError("this is a file, not a folder", where=str(folder))
-    if folder.is_dir() and any(folder.iterdir()):
-        raise SearchError(
-            "the folder is not empty", where=str(folder), hint="Name a folder that doesn't exist"
-        )
-
-
-@contextmanager
-def _only_whole(folder: Path) -> Iterator[None]:
-    """Whatever is in a folder that was free before is removed again where the work fails."""
-    existed = folder.exists()
-    try:
-        yield
-    except BaseException:
-        if existed:
-            for each in folder.iterdir():
-                shutil.rmtree(each) if each.is_dir() else each.unlink()
-        else:
-            shutil.rmtree(folder, ignore_errors=True)
-        raise
-
-
-def _kept(folder: Path, design: SensorDesign) -> SensorDesign:
-    """The design as it will be read again, so that a resumed study has the very same one."""
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise OutputError(
-            f"the study's folder can't be made: {error.strerror or error}", where=str(folder)
-        ) from error
-    save_design(design, folder / DESIGN_FOLDER)
-    return load_design(folder / DESIGN_FOLDER)
-
-
-def _as_begun(folder: Path, settings: StudySettings, store: Store) -> SensorDesign:
-    """The study's own design, where neither it nor the settings were edited since it was begun.
-
-    Raises:
-        SearchError: one of them was; says what.
-    """
-    if store.fact("settings") != settings.fingerprint_of_all():
-        begun = store.fact("study")
-        raise SearchError(
-            f"{STUDY_FILE} was edited since the study was begun"
-            + _told(plain_differences(begun, settings.comparable()) if begun else []),
-            where=str(folder / STUDY_FILE),
-            hint="Undo the change, or begin a new study",
-        )
-    own = load_design(folder / DESIGN_FOLDER)
-    if fingerprint(own) != settings.fingerprint:
-        noted = store.fact("design")
-        raise SearchError(
-            "the study's own copy of the design was edited since its trials were made"
-            + _told(differences_from(noted, own) if noted else []),
-            where=str(folder / DESIGN_FOLDER),
-            hint="Undo the change, or begin a new study of the edited design",
-        )
-    return own
-
-
-def _told(changed: list[str]) -> str:
-    return f":\n{_listed(changed)}" if changed else ""
-
-
-def _listed(changed: list[str]) -> str:
-    shown = "\n".join(f"  {line}" for line in changed[:MOST_SHOWN])
-    more = len(changed) - MOST_SHOWN
-    return shown + (f"\n  and {more} more" if more > 0 else "")
