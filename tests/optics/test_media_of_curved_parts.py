@@ -1,0 +1,133 @@
+"""Media where parts are curved, coated or mirrored (see `media_chain`)."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from media_chain import ACRYLIC, GEL, area, box, check_chain, in_box
+
+from optisense.geometry import TriangleMesh
+from optisense.geometry.rays import ray_hits
+from optisense.optics.media import Media, Sheet, Solid, resolve_media
+
+
+def dome(radius: float, rings: int, sectors: int, floor: float) -> TriangleMesh:
+    """The closed upper half of a ball that stands on a cylinder from z = `floor` to 0."""
+    polar = np.linspace(0, np.pi / 2, rings + 1)[1:]
+    around = np.linspace(0, 2 * np.pi, sectors, endpoint=False)
+    circle = np.column_stack([np.cos(around), np.sin(around)])
+    levels = [
+        np.column_stack([circle * r, np.full(sectors, z)])
+        for r, z in [
+            *zip(radius * np.sin(polar), radius * np.cos(polar), strict=True),
+            (radius, floor),
+        ]
+    ]
+    vertices = np.concatenate([*levels, [[0, 0, radius], [0, 0, floor]]])
+    top, bottom = len(vertices) - 2, len(vertices) - 1
+    faces = []
+    for k in range(sectors):
+        n = (k + 1) % sectors
+        faces.append((top, k, n))
+        for level in range(len(levels) - 1):
+            a, b = level * sectors, (level + 1) * sectors
+            faces += [(a + k, b + k, b + n), (a + k, b + n, a + n)]
+        faces.append((bottom, b + n, b + k))
+    return TriangleMesh(vertices, np.array(faces))
+
+
+def test_a_curved_shell_shares_its_inner_surface_with_the_core() -> None:
+    core = dome(2.0, 12, 40, -1.0)
+    outer = dome(3.0, 16, 52, -1.0)
+    shell = Solid("shell", outer, "silicone", GEL, priority=0)
+    interfaces = resolve_media([shell, Solid("core", core, "epoxy", 1.54, priority=1)])
+    assert area(interfaces, "core", "shell") == pytest.approx(
+        core.area - core.face_areas[core.face_normals[:, 2] < -0.99].sum()
+    )
+
+    def truth(p: np.ndarray) -> float:
+        for solid, ior in ((core, 1.54), (outer, GEL)):
+            if ray_hits(solid, p, [0.31, 0.22, 0.9]).ray.size % 2:
+                return ior
+        return 1.0
+
+    check_chain(interfaces, truth, count=300, reach=3.0)
+
+
+def test_solids_of_one_curved_surface_in_two_tessellations_touch() -> None:
+    """Chord errors below the tolerance on both sides: neither film nor overlap is left."""
+    floor, ceiling = (
+        box((-5, -5, -3), (5, 5, 0), (60, 1, 1)),
+        box((-5, -5, 0), (5, 5, 3), (84, 1, 1)),
+    )
+
+    def bent(mesh: TriangleMesh) -> TriangleMesh:
+        lift = (2.0 - 0.02 * mesh.vertices[:, 0] ** 2) * (np.abs(mesh.vertices[:, 2]) < 1)
+        return mesh.with_vertices(mesh.vertices + lift[:, None] * [0, 0, 1])
+
+    lower, upper = bent(floor), bent(ceiling)
+    interfaces = resolve_media(
+        [Solid("guide", lower, "acrylic", ACRYLIC), Solid("gel", upper, "silicone", GEL)]
+    )
+    top = lower.face_areas[(lower.face_normals[:, 2] > 0.5)].sum()
+    assert area(interfaces, "guide", "gel") == pytest.approx(top, rel=1e-6)
+    assert sum(f.mesh.area for f in interfaces if f.names == ("gel",)) == pytest.approx(
+        upper.area - top, rel=1e-4
+    )
+
+
+def test_a_coating_replaces_the_gel_faces_under_it() -> None:
+    mesh = box((-3, -3, 0), (3, 3, 2), (6, 6, 2))
+    top = mesh.face_normals[:, 2] > 0.5
+    skin = TriangleMesh(mesh.vertices, mesh.faces[top])
+    other_skin = TriangleMesh.grid((6, 6), (5, 4), height=2.0).flipped()
+    guide = Solid("guide", box((-4, -4, -1), (4, 4, 0)), "acrylic", ACRYLIC)
+
+    def truth(p: np.ndarray) -> float:
+        if in_box(p, (-3, -3, 0), (3, 3, 2)):
+            return GEL
+        return ACRYLIC if in_box(p, (-4, -4, -1), (4, 4, 0)) else 1.0
+
+    for coating in (skin, other_skin):
+        interfaces = resolve_media(
+            [Solid("gel", mesh, "silicone", GEL), guide], [Sheet("skin", coating)]
+        )
+        assert area(interfaces, "gel") == pytest.approx(4 * 12)
+        check_chain(interfaces, truth, stop=skin)
+
+
+def test_a_mirror_between_two_solids_hides_the_faces_of_both() -> None:
+    gel = Solid("gel", box((-3, -3, 0), (3, 3, 2)), "silicone", GEL)
+    guide = Solid("guide", box((-3, -3, -2), (3, 3, 0)), "acrylic", ACRYLIC)
+    mirror = Sheet("mirror", TriangleMesh.grid((2, 2)), "mirror")
+    interfaces = resolve_media([gel, guide], [mirror])
+    assert area(interfaces, "gel", "guide") == pytest.approx(36 - 4)
+    assert area(interfaces, "gel") == area(interfaces, "guide") == pytest.approx(36 + 48)
+
+
+def test_boundaries_are_known_to_hold_only_while_moving_sheets_touch_no_solid() -> None:
+    gel = Solid("gel", box((-3, -3, 0), (3, 3, 2)), "silicone", GEL)
+    skin = Sheet("skin", TriangleMesh.grid((6, 6), height=2.0))
+
+    def mirror(height: float) -> Sheet:
+        return Sheet("mirror", TriangleMesh.grid((2, 2), height=height), "mirror")
+
+    media = Media([gel], [skin, mirror(-1.0)])
+    assert media.holds_for([gel], [skin, mirror(-0.5)])
+    assert media.holds_for([gel], [mirror(-0.5), skin])
+    assert not media.holds_for([gel], [skin, mirror(0.0)])
+    assert not media.holds_for([gel], [mirror(-0.5)])
+    assert not media.holds_for([replace(gel, ior=1.5)], [skin, mirror(-1.0)])
+    assert not Media([gel], [skin, mirror(0.0)]).holds_for([gel], [skin, mirror(-1.0)])
+
+
+def test_shading_normals_live_on_in_cut_faces() -> None:
+    core = dome(2.0, 12, 40, -1.0).vertex_normals()
+    band = box((0, -3, -1), (3, 3, 0.5))
+    interfaces = resolve_media(
+        [Solid("core", core, "epoxy", 1.54, priority=1), Solid("band", band, "silicone", GEL)]
+    )
+    for face in interfaces:
+        if face.names[0] == "core":
+            assert face.mesh.normals is not None
+            np.testing.assert_allclose(np.linalg.norm(face.mesh.normals, axis=1), 1.0)
