@@ -26,6 +26,8 @@ if TYPE_CHECKING:
 
 DIRECTIONS = 8
 """Rays of a camera sample for exchanged light."""
+MOST_PLACES = 8
+"""That scatter exchanged light one after another, at most."""
 
 # Clamped-cosine convolution of bands 0, 1, 2 (Ramamoorthi and Hanrahan 2001, eq. 8).
 BAND_0, BAND_1, BAND_2 = 3.141593, 2.094395, 0.785398
@@ -109,37 +111,58 @@ def _sample(
     directions: mi.UInt32,
 ) -> list[mi.Color3f]:
     totals = [mi.Color3f(0) for _ in range(groups)]
-    # How much of the light the place that is seen sends on, if it is diffuse.
+    # How much of the light the places that are seen send on, if they are diffuse.
     albedo = albedo_of(coating)
+    survival = dr.max(albedo)
     k = mi.UInt32(0)
     while active & (k < directions):
         u = unit_float(random + k * STEPS_2D[0])
         v = unit_float(random * 277803737 + k * STEPS_2D[1])
-        pick = unit_float((random ^ (k * 0x9E3779B9)) * 69069)
-        way, weight = sample_coating(coating, normal, -towards_eye, pick, mi.Point2f(u, v))
-        usable = (dr.dot(way, face_normal) > 0) & (dr.max(weight) > 0)
+        state = (random ^ (k * 0x9E3779B9)) * 69069
+        way, weight = sample_coating(
+            coating, normal, -towards_eye, unit_float(state), mi.Point2f(u, v)
+        )
+        weight *= albedo
+        above = mi.Bool(raised)
         start = leave(point, face_normal, way)
-        pressed = intersect(indenters.scene, indenters.rows, indenters.corners, start, way, usable)
-        from_raised = usable & raised
-        skin = intersect(fixed.scene, fixed.rows, fixed.corners, start, way, from_raised)
-        on_indenter = pressed.valid & (~skin.valid | (pressed.distance < skin.distance))
-        # Light along a line that comes from the skin behind is in the field already.
-        behind = fixed.scene.ray_test(mi.Ray3f(start, -way), coherent=False, active=from_raised)
-        on_skin = skin.valid & ~on_indenter & ~behind
-        if on_indenter | on_skin:
-            seen = dr.select(on_indenter, pressed.point, skin.point)
-            facing = dr.select(on_indenter, pressed.shading_normal, skin.shading_normal)
-            facing *= -dr.sign(dr.dot(way, facing))
-            there, exists = cell_at(cells, skin.point, on_skin)
-            # An indenter's place is lit like its neighbourhood, which is where the point stands.
-            there = dr.select(exists, there, cell)
-            lift = leave(seen, facing, facing)
-            for g in range(groups):
-                light, _mean, towards = irradiance(table, there * groups + g, facing)
-                hidden = indenters.scene.ray_test(
-                    mi.Ray3f(lift, towards), coherent=False, active=mi.Bool(True)
+        walking = (dr.dot(way, face_normal) > 0) & (dr.max(weight) > 0)
+        places = mi.UInt32(0)
+        while walking:
+            pressed = intersect(
+                indenters.scene, indenters.rows, indenters.corners, start, way, mi.Bool(True)
+            )
+            skin = intersect(fixed.scene, fixed.rows, fixed.corners, start, way, above)
+            on_indenter = pressed.valid & (~skin.valid | (pressed.distance < skin.distance))
+            # Light along a line that comes from the skin behind is in the field already.
+            behind = fixed.scene.ray_test(mi.Ray3f(start, -way), coherent=False, active=above)
+            walking = on_indenter | (skin.valid & ~behind)
+            if walking:
+                seen = dr.select(on_indenter, pressed.point, skin.point)
+                facing = dr.select(on_indenter, pressed.shading_normal, skin.shading_normal)
+                facing *= -dr.sign(dr.dot(way, facing))
+                there, exists = cell_at(cells, skin.point, ~on_indenter)
+                # An indenter's place is lit like its neighbourhood, which is where the point
+                # stands.
+                there = dr.select(exists, there, cell)
+                lift = leave(seen, facing, facing)
+                for g in range(groups):
+                    light, _mean, towards = irradiance(table, there * groups + g, facing)
+                    hidden = indenters.scene.ray_test(
+                        mi.Ray3f(lift, towards), coherent=False, active=mi.Bool(True)
+                    )
+                    totals[g] += dr.select(hidden, 0, light) * dr.inv_pi * weight
+                # On from there, like light that is scattered evenly.
+                state = state * 747796405 + 2891336453
+                places += 1
+                walking = (unit_float(state) < survival) & (places < MOST_PLACES)
+                weight *= albedo / survival
+                u = unit_float(state * 277803737)
+                v = unit_float((state ^ 0x9E3779B9) * 69069)
+                way = mi.Frame3f(facing).to_world(
+                    mi.warp.square_to_cosine_hemisphere(mi.Point2f(u, v))
                 )
-                totals[g] += dr.select(hidden, 0, light) * dr.inv_pi * albedo * weight
+                start = lift
+                above = mi.Bool(on_indenter)
         k += 1
     return [total / mi.Float(directions) for total in totals]
 
