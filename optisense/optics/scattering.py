@@ -131,14 +131,29 @@ def _smith(cosine: mi.Float, alpha: mi.Float) -> mi.Float:
 
 
 def evaluate_coating(
-    coating: Coating, normal: mi.Vector3f, towards_light: mi.Vector3f, towards_eye: mi.Vector3f
+    coating: Coating,
+    normal: mi.Vector3f,
+    towards_light: mi.Vector3f,
+    towards_eye: mi.Vector3f,
+    reach: mi.Float | None = None,
 ) -> mi.Color3f:
-    """BSDF times the cosine at the light, for unit directions away from the surface; 0 below it."""
+    """BSDF times the cosine at the light, for unit directions away from the surface; 0 below it.
+
+    With ``reach``, the diffuse lobe's cosine is the mean over light whose cosines are spread evenly
+    so far to both sides, of which only what comes from above counts.
+    """
     cos_i = dr.dot(normal, towards_light)
     cos_o = dr.dot(normal, towards_eye)
     lit = (cos_i > 0) & (cos_o > 0)
+    cos_d = cos_i
+    if reach is not None:
+        part = dr.maximum(cos_i + reach, 0)
+        cos_d = dr.select(cos_i < reach, part * part / (4 * reach), cos_i)
+    diffuse = dr.select(
+        (cos_d > 0) & (cos_o > 0), coating.reflectance * (dr.inv_pi * cos_d), mi.Color3f(0)
+    )
     if not coating.metallic:
-        return dr.select(lit, coating.reflectance * (dr.inv_pi * cos_i), 0.0)
+        return diffuse
     half = dr.normalize(towards_light + towards_eye)
     cos_m = dr.dot(half, normal)
     lobe = (
@@ -148,9 +163,8 @@ def evaluate_coating(
         / (4 * cos_o)
     )
     metal = fresnel_metal(dr.abs(dr.dot(half, towards_light)), coating.metal_eta, coating.metal_k)
-    diffuse = coating.reflectance * ((1 - coating.specularity) * dr.inv_pi * cos_i)
-    value = diffuse + metal * (coating.specularity * lobe)
-    return dr.select(lit, value, 0.0)
+    shiny = dr.select(lit, metal * (coating.specularity * lobe), 0.0)
+    return diffuse * (1 - coating.specularity) + shiny
 
 
 def sample_coating(

@@ -228,6 +228,7 @@ def _sum_chosen(
         steps.append(dr.maximum(expected / chosen, LEAST_STEP))
         state = next_random(state)
         running.append(unit_float(state))
+    upright, _ = plane_of(cells, cell, active)
     k = mi.UInt32(0)
     while active & (k < bins):
         there = _place(
@@ -248,7 +249,11 @@ def _sum_chosen(
             if value.w > 0:
                 towards, cosine = beam(value)
                 reflected = evaluate_coating(
-                    widened(coating, cosine), points.normal, towards, points.towards_eye
+                    widened(coating, cosine),
+                    points.normal,
+                    towards,
+                    points.towards_eye,
+                    horizon(points, towards, spread_of(cosine), upright, raised),
                 )
                 share = value.w * grey(reflected) / steps[g]
                 before = dr.floor(running[g])
@@ -256,8 +261,9 @@ def _sum_chosen(
                 times = dr.floor(running[g]) - before
                 if times > 0:
                     state = next_random(state)
+                    way = above(within(towards, spread_of(cosine), state), points.face_normal)
                     blocked = indenters.ray_test(
-                        mi.Ray3f(start, within(towards, spread_of(cosine), state)),
+                        mi.Ray3f(start, way),
                         coherent=False,
                         active=mi.Bool(True),
                     )
@@ -325,6 +331,29 @@ def beam(value: mi.Vector4f) -> tuple[mi.Vector3f, mi.Float]:
 def spread_of(cosine: mi.Float) -> mi.Float:
     """Squared angular radius R^2 of a disc of this mean cosine, which is 1 - R^2 / 4."""
     return 4 * dr.minimum(1 - cosine, 0.1)
+
+
+def horizon(
+    points: VisiblePoints,
+    towards: mi.Vector3f,
+    spread2: mi.Float,
+    upright: mi.Vector3f,
+    raised: mi.Bool,
+) -> mi.Float:
+    """How far light of a beam is spread in its cosine with the normal of points on an indenter.
+
+    Half of a slab as wide (in deviation) as a disc of squared radius ``spread2``. All light comes
+    from above the undeformed surface (normal ``upright``), which limits it; on the surface itself
+    the mean cosine is the sum's already.
+    """
+    slanted = 1 - dr.square(dr.dot(points.normal, towards))
+    limit = dr.abs(dr.dot(upright, towards))
+    return dr.select(raised, dr.minimum(dr.sqrt(0.75 * spread2 * slanted), limit), 0) + 1e-9
+
+
+def above(direction: mi.Vector3f, normal: mi.Vector3f) -> mi.Vector3f:
+    """A direction, mirrored up if it lies below the plane of a normal."""
+    return direction - normal * (2 * dr.minimum(dr.dot(direction, normal), 0))
 
 
 def passes_near(
