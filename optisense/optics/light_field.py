@@ -87,17 +87,20 @@ def bin_centres(cells: SurfaceCells, bins: NDArray[np.integer]) -> mi.Float:
 
 @dataclass
 class LightField:
-    """The smoothed field: per cell, bin and group four floats; lights of 1 mW.
+    """The smoothed field: values of each cell, bin and group; lights of 1 mW.
 
     ``moments``: flux density across the light (mW/mm^2) times the direction towards the light
-    (3), flux density (1). ``colours``: the flux density per channel R, G, B where surfaces are
-    coloured, else the same array. ``beams``: the same light in short lists.
+    (3), flux density (1). ``heights``: the flux density times the square of the direction's
+    part along the axis of the bins. ``colours``: four floats, the flux density per channel R,
+    G, B where surfaces are coloured, else the same array as ``moments``. ``beams``: the same
+    light in short lists.
     """
 
     cells: SurfaceCells
     bins: int
     groups: int
     moments: mi.Float
+    heights: mi.Float
     colours: mi.Float
     coloured: bool
     metallic: bool
@@ -123,6 +126,7 @@ class FieldTally:
         self.photons = 0
         entries = cells.cells * BINS * groups * 4
         self.moments = dr.zeros(mi.Float, entries)
+        self.heights = dr.zeros(mi.Float, entries // 4)
         self.colours = dr.zeros(mi.Float, entries if coloured else 4)
         # The irradiance of odd and of even passes; their difference tells the noise.
         self.halves = [dr.zeros(mi.Float, cells.cells * groups) for _ in range(2)]
@@ -149,10 +153,12 @@ class FieldTally:
         for k in range(3):
             dr.scatter_add(self.moments, -direction[k] * (scalar * across), entry * 4 + k, found)
         dr.scatter_add(self.moments, scalar * across, entry * 4 + 3, found)
+        height = dr.dot(direction, mi.Vector3f(*map(float, self.cells.axes[2])))
+        dr.scatter_add(self.heights, dr.square(height) * (scalar * across), entry, found)
         dr.scatter_add(self.halves[self.passes % 2], scalar, cell * self.groups + group, found)
         self.passes += 1
         self.photons += photons.emitted
-        dr.eval(self.moments, self.colours, self.halves)
+        dr.eval(self.moments, self.heights, self.colours, self.halves)
 
     def noise(self) -> float:
         """Relative RMS noise of the smoothed irradiance (1 = 100 %), from the difference of
@@ -201,19 +207,21 @@ class FieldTally:
             # Copied: arrays handed over from numpy differ in alignment, and so would kernels.
             mi.Float((factors / self.passes).ravel().astype(np.float32)) + dr.opaque(mi.Float, 0),
         )
-        moments = smooth(kernel, self.cells.cells, self.moments, *rest)
+        moments = dr.ravel(smooth(mi.Vector4f, kernel, self.cells.cells, self.moments, *rest))
+        heights = smooth(mi.Float, kernel, self.cells.cells, self.heights, *rest)
         colours = moments
         if self.coloured:
-            colours = smooth(kernel, self.cells.cells, self.colours, *rest)
+            colours = dr.ravel(smooth(mi.Vector4f, kernel, self.cells.cells, self.colours, *rest))
         table = irradiance_table(
             moments, self.cells.cells, dr.opaque(mi.UInt32, len(used)), self.groups
         )
-        dr.eval(moments, colours, table)
+        dr.eval(moments, heights, colours, table)
         return LightField(
             cells=self.cells,
             bins=len(used),
             groups=self.groups,
             moments=moments,
+            heights=heights,
             colours=colours,
             coloured=self.coloured,
             metallic=self.metallic,

@@ -147,6 +147,7 @@ def evaluate_coating(
     lit = (cos_i > 0) & (cos_o > 0)
     cos_d = cos_i
     if reach is not None:
+        reach = reach + 1e-9
         part = dr.maximum(cos_i + reach, 0)
         cos_d = dr.select(cos_i < reach, part * part / (4 * reach), cos_i)
     diffuse = dr.select(

@@ -10,7 +10,7 @@ comes from there is the field, shaded at that other place.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import drjit as dr
 import mitsuba as mi
@@ -28,6 +28,17 @@ from optisense.optics.scattering import (
     evaluate_coating,
     grey,
     surface_region,
+)
+from optisense.optics.spread import (
+    above,
+    beam,
+    passes_near,
+    reach,
+    round_spread,
+    spread,
+    squared_radius,
+    widened,
+    within,
 )
 from optisense.optics.surfaces import Region
 from optisense.optics.visible_points import VisiblePoints
@@ -85,19 +96,19 @@ def _sum_all(
         if dr.hint(contacts, mode="scalar"):
             near = mi.Bool(False)
             if dr.hint(single, mode="scalar"):
-                near = passes_near(first_ball, start, towards, spread_of(cosine))
+                near = passes_near(first_ball, start, towards, squared_radius(cosine))
             else:
                 n = mi.UInt32(0)
                 while n < ball_count:
                     ball = dr.gather(mi.Vector4f, balls, n)
-                    near |= passes_near(ball, start, towards, spread_of(cosine))
+                    near |= passes_near(ball, start, towards, squared_radius(cosine))
                     n += 1
             if seen & near:
                 open_rays = mi.Float(0)
                 for _ in range(SHADOW_RAYS):
                     state = next_random(state)
                     blocked = indenters.ray_test(
-                        mi.Ray3f(start, within(towards, spread_of(cosine), state)),
+                        mi.Ray3f(start, within(round_spread(towards, cosine), state)),
                         coherent=False,
                         active=mi.Bool(True),
                     )
@@ -145,12 +156,12 @@ def _sum_roughly(
         near = mi.Bool(False)
         if dr.hint(contacts, mode="scalar"):
             if dr.hint(single, mode="scalar"):
-                near = passes_near(first_ball, start, towards, spread_of(cosine))
+                near = passes_near(first_ball, start, towards, squared_radius(cosine))
             else:
                 n = mi.UInt32(0)
                 while n < ball_count:
                     ball = dr.gather(mi.Vector4f, balls, n)
-                    near |= passes_near(ball, start, towards, spread_of(cosine))
+                    near |= passes_near(ball, start, towards, squared_radius(cosine))
                     n += 1
             # Beams are in the order of groups: one running sum does for all of them.
             doubt = dr.select(group == last, doubt, 0)
@@ -172,7 +183,7 @@ def _sum_roughly(
             towards, cosine, flux, group = beam_at(beams, picked[g])
             state = next_random(state)
             blocked = indenters.ray_test(
-                mi.Ray3f(start, within(towards, spread_of(cosine), state)),
+                mi.Ray3f(start, within(round_spread(towards, cosine), state)),
                 coherent=False,
                 active=asked,
             )
@@ -192,7 +203,7 @@ def beam_at(beams: Beams, number: mi.UInt32) -> tuple[mi.Vector3f, mi.Float, mi.
 @dr.syntax
 def _sum_chosen(
     cells: SurfaceCells,
-    tables: tuple[mi.Float, mi.Float],
+    tables: tuple[mi.Float, mi.Float, mi.Float],
     centres: mi.Float,
     table: mi.Float,
     bins: mi.UInt32,
@@ -216,19 +227,20 @@ def _sum_chosen(
     These are drawn in proportion to what they bring, evenly spaced in the running sum (systematic
     sampling), so that where nothing is hidden, the sum is exact to half a step.
     """
-    moments, colours = tables
+    moments, heights, colours = tables
     totals = [mi.Color3f(0) for _ in range(groups)]
     state = mi.UInt32(random)
     steps = []
     running = []
     for g in range(groups):
         # About what the bins bring in all: how far apart the shadow rays are in the running sum.
-        light, mean, _ = irradiance(table, cell * groups + g, points.normal)
-        expected = (light + LEAST_LIGHT * mean) * grey(albedo_of(coating)) * dr.inv_pi
+        falling, mean, _ = irradiance(table, cell * groups + g, points.normal)
+        expected = (falling + LEAST_LIGHT * mean) * grey(albedo_of(coating)) * dr.inv_pi
         steps.append(dr.maximum(expected / chosen, LEAST_STEP))
         state = next_random(state)
         running.append(unit_float(state))
     upright, _ = plane_of(cells, cell, active)
+    axis = mi.Vector3f(*[float(part) for part in cells.axes[2]])
     k = mi.UInt32(0)
     while active & (k < bins):
         there = _place(
@@ -248,12 +260,12 @@ def _sum_chosen(
             value = dr.gather(mi.Vector4f, moments, entry, active)
             if value.w > 0:
                 towards, cosine = beam(value)
+                height = dr.gather(mi.Float, heights, entry) / value.w
+                light = spread(axis, towards, cosine, height)
+                # On the undeformed surface the mean cosine is the sum's already.
+                straying = dr.select(raised, reach(light, points.normal, upright), 0)
                 reflected = evaluate_coating(
-                    widened(coating, cosine),
-                    points.normal,
-                    towards,
-                    points.towards_eye,
-                    horizon(points, towards, spread_of(cosine), upright, raised),
+                    widened(coating, cosine), points.normal, towards, points.towards_eye, straying
                 )
                 share = value.w * grey(reflected) / steps[g]
                 before = dr.floor(running[g])
@@ -261,7 +273,7 @@ def _sum_chosen(
                 times = dr.floor(running[g]) - before
                 if times > 0:
                     state = next_random(state)
-                    way = above(within(towards, spread_of(cosine), state), points.face_normal)
+                    way = above(within(light, state), points.face_normal)
                     blocked = indenters.ray_test(
                         mi.Ray3f(start, way),
                         coherent=False,
@@ -321,78 +333,9 @@ def _place(
     return dr.select(exists, there, cell)
 
 
-def beam(value: mi.Vector4f) -> tuple[mi.Vector3f, mi.Float]:
-    """Mean direction of an entry of the field, and the mean cosine with it of the entry's light."""
-    mean = mi.Vector3f(value.x, value.y, value.z)
-    length = dr.norm(mean)
-    return mean / length, dr.minimum(length / value.w, 1.0)
-
-
-def spread_of(cosine: mi.Float) -> mi.Float:
-    """Squared angular radius R^2 of a disc of this mean cosine, which is 1 - R^2 / 4."""
-    return 4 * dr.minimum(1 - cosine, 0.1)
-
-
-def horizon(
-    points: VisiblePoints,
-    towards: mi.Vector3f,
-    spread2: mi.Float,
-    upright: mi.Vector3f,
-    raised: mi.Bool,
-) -> mi.Float:
-    """How far light of a beam is spread in its cosine with the normal of points on an indenter.
-
-    Half of a slab as wide (in deviation) as a disc of squared radius ``spread2``. All light comes
-    from above the undeformed surface (normal ``upright``), which limits it; on the surface itself
-    the mean cosine is the sum's already.
-    """
-    slanted = 1 - dr.square(dr.dot(points.normal, towards))
-    limit = dr.abs(dr.dot(upright, towards))
-    return dr.select(raised, dr.minimum(dr.sqrt(0.75 * spread2 * slanted), limit), 0) + 1e-9
-
-
-def above(direction: mi.Vector3f, normal: mi.Vector3f) -> mi.Vector3f:
-    """A direction, mirrored up if it lies below the plane of a normal."""
-    return direction - normal * (2 * dr.minimum(dr.dot(direction, normal), 0))
-
-
-def passes_near(
-    ball: mi.Vector4f, start: mi.Point3f, towards: mi.Vector3f, spread2: mi.Float
-) -> mi.Bool:
-    """Whether a beam from ``start`` may touch a ball (centre, radius)."""
-    offset = mi.Vector3f(ball.x - start.x, ball.y - start.y, ball.z - start.z)
-    along = dr.dot(offset, towards)
-    # The margin covers the spread of the beam over the way to the ball.
-    reach = ball.w + along * dr.sqrt(spread2)
-    gap2 = dr.squared_norm(offset) - along * along
-    return (along > -ball.w) & (gap2 < reach * reach)
-
-
-def widened(coating: Coating, cosine: mi.Float) -> Coating:
-    """A coating as it reflects light that is spread about its mean direction.
-
-    The diffuse lobe is linear in direction, so the mean cosine makes it exact. The metallic lobe is
-    blurred as if by light from a disc: the half vector moves half as far as the light, which adds
-    R^2 / 8 to alpha^2.
-    """
-    reflectance = coating.reflectance * cosine
-    if not coating.metallic:
-        return replace(coating, reflectance=reflectance)
-    alpha = dr.sqrt(coating.alpha * coating.alpha + spread_of(cosine) * 0.125)
-    return replace(coating, reflectance=reflectance, alpha=alpha)
-
-
 def next_random(state: mi.UInt32) -> mi.UInt32:
     """The next state of a small generator (the step of PCG)."""
     return state * 747796405 + 2891336453
-
-
-def within(towards: mi.Vector3f, spread2: mi.Float, state: mi.UInt32) -> mi.Vector3f:
-    """A direction drawn evenly from the disc about ``towards``."""
-    radius = dr.sqrt(spread2 * unit_float((state ^ 0x9E3779B9) * 69069))
-    sin_a, cos_a = dr.sincos(unit_float(state * 277803737) * dr.two_pi)
-    frame = mi.Frame3f(towards)
-    return dr.normalize(towards + frame.s * (radius * cos_a) + frame.t * (radius * sin_a))
 
 
 def shade(
@@ -421,7 +364,7 @@ def shade(
     cell, shift, active = _interpolating_cell(field.cells, base, active, random)
     start = leave(points.point, points.face_normal, points.face_normal)
     coating = coating_of(table, points.surface, active, field.metallic)
-    tables = (field.moments, field.colours)
+    tables = (field.moments, field.heights, field.colours)
     bins = dr.opaque(mi.UInt32, field.bins)
     indenters = scenes.indenters
     if thorough:

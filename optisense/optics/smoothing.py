@@ -136,6 +136,7 @@ def _copied(kind: Any, values: FloatArray | NDArray[np.integer]) -> Any:
 
 @dr.syntax
 def smooth(
+    kind: Any,
     kernel: Smoothing,
     cells: int,
     values: mi.Float,
@@ -143,8 +144,9 @@ def smooth(
     stride: mi.UInt32,
     groups: int,
     factors: mi.Float,
-) -> mi.Float:
-    """Kernel-weighted sums over neighbouring cells of the chosen bins, four floats an entry.
+) -> Any:
+    """Kernel-weighted sums over neighbouring cells of the chosen bins, each entry of a ``kind``
+    (`mi.Float` or a vector).
 
     ``factors`` (cells times groups) multiply the sums.
     """
@@ -156,10 +158,10 @@ def smooth(
     cell = rest // used
     j = dr.gather(mi.UInt32, kernel.start, cell)
     end = dr.gather(mi.UInt32, kernel.start, cell + 1)
-    total = mi.Vector4f(0)
+    total = kind(0)
     while j < end:
         other = dr.gather(mi.UInt32, kernel.cell, j)
         weight = dr.gather(mi.Float, kernel.weight, j)
-        total += weight * dr.gather(mi.Vector4f, values, other * (stride * groups) + slot)
+        total += weight * dr.gather(kind, values, other * (stride * groups) + slot)
         j += 1
-    return dr.ravel(total * dr.gather(mi.Float, factors, cell * groups + group))
+    return total * dr.gather(mi.Float, factors, cell * groups + group)
