@@ -22,19 +22,20 @@ from optisense.optics.cells import SurfaceCells
 FloatArray = NDArray[np.floating]
 
 RADIUS = 0.9
-"""mm of the kernel, where lamps are some mm away (see benchmarks)."""
+"""mm of the kernel of USUAL_PHOTONS, where lamps are some mm away (see benchmarks)."""
 RADIUS_OF_DISTANCE = 0.2
 """Of the distance to the nearest lamp: nearer lamps make light that varies faster. What is left of
 the blur under a point light is then far below 1 % (see `sharpening`)."""
 LEAST_RADIUS = 1.5
 """Of the side of a cell, however near a lamp is."""
-SHRINKS_FROM = 5_000_000
-"""Photons from which on the kernel shrinks."""
+USUAL_PHOTONS = 5_000_000
 SHRINKS_AS = 1 / 6
 """Power of the photons by which the radius falls: noise and bias both go to zero (Knaus and
 Zwicker 2011)."""
 SHRINKS_TO = 1.0
 """Of the side of a cell, at which the kernel holds the cell and its neighbours."""
+WIDEST = 1.5
+"""Of that radius: the kernel of the fewest photons."""
 WIDER = 2.0
 """How much wider than the kernel that of the sharpening is."""
 MOST_SHARPENED = 0.25
@@ -59,21 +60,21 @@ class Kernels:
         self.cells = cells
         size = 1 / float(cells.inverse_size[0])
         self._least = SHRINKS_TO * size
-        self._widest = np.clip(
+        self._usual = np.clip(
             RADIUS_OF_DISTANCE * np.asarray(lamp_distance), LEAST_RADIUS * size, RADIUS
         )
         if LEAST_RADIUS * size > RADIUS:
-            self._widest[:] = LEAST_RADIUS * size
+            self._usual[:] = LEAST_RADIUS * size
         self._known: dict[float, Smoothing] = {}
 
     def radii(self, photons: int) -> FloatArray:
         """(cells,) mm: the kernel's radius in each cell in a field of so many photons."""
-        shrunk = self._widest * min(1.0, (SHRINKS_FROM / max(photons, 1)) ** SHRINKS_AS)
-        return np.maximum(shrunk, np.minimum(self._least, self._widest))
+        shrunk = self._usual * _narrowing(photons)
+        return np.maximum(shrunk, np.minimum(self._least, self._usual))
 
     def smoothing(self, photons: int) -> Smoothing:
         """The kernel for a field of so many photons."""
-        key = float(min(1.0, SHRINKS_FROM / max(photons, 1)))
+        key = _narrowing(photons)
         if key not in self._known:
             matrix = kernel_matrix(self.cells, self.radii(photons))
             self._known = {
@@ -88,7 +89,7 @@ class Kernels:
 
     @cached_property
     def _wide(self) -> csr_matrix:
-        return kernel_matrix(self.cells, WIDER * self._widest)
+        return kernel_matrix(self.cells, WIDER * self._usual)
 
     def sharpening(self, landed: FloatArray, photons: int) -> FloatArray:
         """Factors (cells, groups) that undo most of what the kernel blurs.
@@ -105,6 +106,10 @@ class Kernels:
         again = self.smoothing(photons).matrix @ (smooth * self.cells.areas[:, None])
         factor = np.divide(smooth, again, out=np.ones_like(smooth), where=again > 0)
         return np.clip(factor, 1 - MOST_SHARPENED, 1 + MOST_SHARPENED)
+
+
+def _narrowing(photons: int) -> float:
+    return float(min(WIDEST, (USUAL_PHOTONS / max(photons, 1)) ** SHRINKS_AS))
 
 
 def kernel_matrix(cells: SurfaceCells, radii: FloatArray) -> csr_matrix:
