@@ -24,7 +24,7 @@ from optisense.optics.smoothing import Kernels
 
 PASS_PHOTONS = 500_000
 PILOT_PHOTONS = 300_000
-CELL_SIZE = 0.3
+CELL_SIZE = 0.4
 """mm; larger where the tally would outgrow its memory."""
 MOST_BYTES = 300e6
 SEEN_MARGIN = 2.0

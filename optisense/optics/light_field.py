@@ -207,11 +207,13 @@ class FieldTally:
             # Copied: arrays handed over from numpy differ in alignment, and so would kernels.
             mi.Float((factors / self.passes).ravel().astype(np.float32)) + dr.opaque(mi.Float, 0),
         )
-        moments = dr.ravel(smooth(mi.Vector4f, kernel, self.cells.cells, self.moments, *rest))
-        heights = smooth(mi.Float, kernel, self.cells.cells, self.heights, *rest)
-        colours = moments
+        tables, kinds = [self.moments, self.heights], [mi.Vector4f, mi.Float]
         if self.coloured:
-            colours = dr.ravel(smooth(mi.Vector4f, kernel, self.cells.cells, self.colours, *rest))
+            tables.append(self.colours)
+            kinds.append(mi.Vector4f)
+        sums = smooth(kernel, self.cells.cells, tables, kinds, *rest)
+        moments, heights = dr.ravel(sums[0]), sums[1]
+        colours = dr.ravel(sums[2]) if self.coloured else moments
         table = irradiance_table(
             moments, self.cells.cells, dr.opaque(mi.UInt32, len(used)), self.groups
         )

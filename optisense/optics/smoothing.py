@@ -141,17 +141,17 @@ def _copied(kind: Any, values: FloatArray | NDArray[np.integer]) -> Any:
 
 @dr.syntax
 def smooth(
-    kind: Any,
     kernel: Smoothing,
     cells: int,
-    values: mi.Float,
+    tables: list[mi.Float],
+    kinds: list[Any],
     bins: mi.UInt32,
     stride: mi.UInt32,
     groups: int,
     factors: mi.Float,
-) -> Any:
-    """Kernel-weighted sums over neighbouring cells of the chosen bins, each entry of a ``kind``
-    (`mi.Float` or a vector).
+) -> list[Any]:
+    """Kernel-weighted sums over neighbouring cells of the chosen bins, for tables whose entries are
+    of these kinds (`mi.Float` or a vector).
 
     ``factors`` (cells times groups) multiply the sums.
     """
@@ -163,10 +163,12 @@ def smooth(
     cell = rest // used
     j = dr.gather(mi.UInt32, kernel.start, cell)
     end = dr.gather(mi.UInt32, kernel.start, cell + 1)
-    total = kind(0)
+    totals = [kind(0) for kind in kinds]
     while j < end:
-        other = dr.gather(mi.UInt32, kernel.cell, j)
+        other = dr.gather(mi.UInt32, kernel.cell, j) * (stride * groups) + slot
         weight = dr.gather(mi.Float, kernel.weight, j)
-        total += weight * dr.gather(kind, values, other * (stride * groups) + slot)
+        for i in range(len(kinds)):
+            totals[i] += weight * dr.gather(kinds[i], tables[i], other)
         j += 1
-    return total * dr.gather(mi.Float, factors, cell * groups + group)
+    factor = dr.gather(mi.Float, factors, cell * groups + group)
+    return [total * factor for total in totals]
