@@ -45,7 +45,7 @@ from optisense.optics.visible_points import VisiblePoints
 
 LEAST_LIGHT = 0.2
 """Part of the mean irradiance below which the spacing of shadow rays does not go."""
-CHOSEN_BINS = 32.0
+CHOSEN_BINS = 16.0
 """Shadow rays of each light group for a camera sample near a contact."""
 LEAST_STEP = 1e-20
 """Of that spacing, where there is no light."""
@@ -315,7 +315,7 @@ def _place(
     towards = mi.Vector3f(middle.x, middle.y, middle.z)
     there = mi.UInt32(cell)
     exists = active & raised
-    for _ in range(2):
+    for _ in range(2 if curved else 1):
         normal, offset = plane_of(cells, there, exists)
         facing = dr.dot(normal, towards)
         exists &= facing > LEAST_COSINE
