@@ -23,7 +23,7 @@ from optisense.optics.cells import SurfaceCells, cell_at
 from optisense.optics.exchange import irradiance_table
 from optisense.optics.photons import GROUP_MASK, PhotonMap
 from optisense.optics.sampling import unit_float
-from optisense.optics.smoothing import Kernels, smooth
+from optisense.optics.smoothing import WIDEST, WIDEST_OF_METAL, Kernels, smooth
 
 FloatArray = NDArray[np.floating]
 
@@ -118,6 +118,7 @@ class FieldTally:
         self, kernels: Kernels, groups: int, coloured: bool, metallic: bool = True
     ) -> None:
         self.metallic = metallic
+        self.widest = WIDEST_OF_METAL if metallic else WIDEST
         self.kernels = kernels
         self.cells = cells = kernels.cells
         self.groups = groups
@@ -169,7 +170,7 @@ class FieldTally:
         """
         if self.passes < 2:
             return float("inf")
-        matrix = self.kernels.smoothing(self.photons).matrix
+        matrix = self.kernels.smoothing(self.photons, self.widest).matrix
         means = [matrix @ landed for landed in self._landed()]
         mean = (means[0] + means[1]) / 2
         # Half the difference of two halves has the deviation of their mean.
@@ -197,9 +198,11 @@ class FieldTally:
         power = np.asarray(total)
         used = _padded(np.flatnonzero(power > DARK * power.sum()))
         bins = mi.UInt32(used.astype(np.uint32)) + dr.opaque(mi.UInt32, 0)
-        kernel = self.kernels.smoothing(self.photons)
+        kernel = self.kernels.smoothing(self.photons, self.widest)
         landed = sum(np.asarray(half, dtype=np.float64) for half in self.halves)
-        factors = self.kernels.sharpening(np.reshape(landed, (-1, self.groups)), self.photons)
+        factors = self.kernels.sharpening(
+            np.reshape(landed, (-1, self.groups)), self.photons, self.widest
+        )
         rest = (
             bins,
             dr.opaque(mi.UInt32, BINS),

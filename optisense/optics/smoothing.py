@@ -36,6 +36,9 @@ SHRINKS_TO = 1.0
 """Of the side of a cell, at which the kernel holds the cell and its neighbours."""
 WIDEST = 1.5
 """Of that radius: the kernel of the fewest photons."""
+WIDEST_OF_METAL = 1.0
+"""The same where a coating is part metal, which shows from how many directions light comes that a
+kernel brings together."""
 WIDER = 2.0
 """How much wider than the kernel that of the sharpening is."""
 MOST_SHARPENED = 0.25
@@ -67,16 +70,16 @@ class Kernels:
             self._usual[:] = LEAST_RADIUS * size
         self._known: dict[float, Smoothing] = {}
 
-    def radii(self, photons: int) -> FloatArray:
+    def radii(self, photons: int, widest: float = WIDEST) -> FloatArray:
         """(cells,) mm: the kernel's radius in each cell in a field of so many photons."""
-        shrunk = self._usual * _narrowing(photons)
+        shrunk = self._usual * _scale(photons, widest)
         return np.maximum(shrunk, np.minimum(self._least, self._usual))
 
-    def smoothing(self, photons: int) -> Smoothing:
+    def smoothing(self, photons: int, widest: float = WIDEST) -> Smoothing:
         """The kernel for a field of so many photons."""
-        key = _narrowing(photons)
+        key = _scale(photons, widest)
         if key not in self._known:
-            matrix = kernel_matrix(self.cells, self.radii(photons))
+            matrix = kernel_matrix(self.cells, self.radii(photons, widest))
             self._known = {
                 key: Smoothing(
                     start=_copied(mi.UInt32, matrix.indptr),
@@ -91,7 +94,7 @@ class Kernels:
     def _wide(self) -> csr_matrix:
         return kernel_matrix(self.cells, WIDER * self._usual)
 
-    def sharpening(self, landed: FloatArray, photons: int) -> FloatArray:
+    def sharpening(self, landed: FloatArray, photons: int, widest: float = WIDEST) -> FloatArray:
         """Factors (cells, groups) that undo most of what the kernel blurs.
 
         A kernel takes from peaks and gives to hollows, by what it makes of a smooth estimate of
@@ -103,13 +106,13 @@ class Kernels:
             photons: of the field.
         """
         smooth = self._wide @ landed
-        again = self.smoothing(photons).matrix @ (smooth * self.cells.areas[:, None])
+        again = self.smoothing(photons, widest).matrix @ (smooth * self.cells.areas[:, None])
         factor = np.divide(smooth, again, out=np.ones_like(smooth), where=again > 0)
         return np.clip(factor, 1 - MOST_SHARPENED, 1 + MOST_SHARPENED)
 
 
-def _narrowing(photons: int) -> float:
-    return float(min(WIDEST, (USUAL_PHOTONS / max(photons, 1)) ** SHRINKS_AS))
+def _scale(photons: int, widest: float) -> float:
+    return float(min(widest, (USUAL_PHOTONS / max(photons, 1)) ** SHRINKS_AS))
 
 
 def kernel_matrix(cells: SurfaceCells, radii: FloatArray) -> csr_matrix:

@@ -76,10 +76,21 @@ def test_even_light_stays_even_up_to_the_edge(kernels) -> None:  # type: ignore[
 
 
 def test_a_kernel_is_narrower_near_a_lamp_and_no_wider_than_a_cell_allows(kernels) -> None:  # type: ignore[no-untyped-def]
-    from optisense.optics.smoothing import LEAST_RADIUS, RADIUS, Kernels
+    from optisense.optics.smoothing import LEAST_RADIUS, RADIUS, USUAL_PHOTONS, Kernels
 
     distance = np.linspace(0.0, 20.0, kernels.cells.cells)
-    radii = Kernels(kernels.cells, distance).radii(1)
+    cell = 1 / float(kernels.cells.inverse_size[0])
+    radii = Kernels(kernels.cells, distance).radii(USUAL_PHOTONS)
     assert np.all(np.diff(radii) >= 0)
-    assert radii[0] == pytest.approx(LEAST_RADIUS * 0.3)
+    assert radii[0] == pytest.approx(LEAST_RADIUS * cell)
     assert radii[-1] == pytest.approx(RADIUS)
+
+
+def test_a_kernel_widens_as_photons_grow_few_up_to_a_limit(kernels) -> None:  # type: ignore[no-untyped-def]
+    from optisense.optics.smoothing import USUAL_PHOTONS, WIDEST, WIDEST_OF_METAL
+
+    usual = kernels.radii(USUAL_PHOTONS)
+    assert kernels.radii(USUAL_PHOTONS // 4) == pytest.approx(usual * 4 ** (1 / 6))
+    assert kernels.radii(1) == pytest.approx(usual * WIDEST)
+    assert kernels.radii(1, WIDEST_OF_METAL) == pytest.approx(usual)
+    assert np.all(kernels.radii(8 * USUAL_PHOTONS) < usual)
