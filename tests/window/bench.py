@@ -22,6 +22,9 @@ ROW = 14
 HEADER = 26
 """Pixels of a panel's header and the gap below it."""
 
+TRIES = 4
+"""How often something is done again that came to nothing because Blender was still drawing."""
+
 SCROLLED, CLICK = 9, 40
 """Clicks of the wheel to see other buttons, and how many pixels a click moves them."""
 
@@ -179,13 +182,18 @@ class Bench:
         self._last = 0
         self.drawn()
 
-    def open_last_panel(self) -> None:
-        """Click on the header of the last panel, which is closed at first."""
-        self.to_end()
-        left, top, width, height = self.sidebar()
-        self.desktop.click(left + width / 2, top + height - HEADER / 2)
-        self.see("1")
-        self.drawn()
+    def open_last_panel(self, what: str) -> None:
+        """Click on the header of the last panel, which is closed at first, until a button shows."""
+        for _ in range(TRIES):
+            self.to_end()
+            left, top, width, height = self.sidebar()
+            x, end = round(left + width / 2), top + height
+            if self._seen(what, x, end - 5 * HEADER, end - 6) is not None:
+                return
+            self.desktop.click(x, end - HEADER / 2)
+            self.see("1")
+            self.drawn()
+        raise AssertionError(f"the last panel does not open: no '{what}'")
 
     def scroll(self, clicks: int) -> None:
         """Turn the mouse's wheel over the sidebar; down is positive."""

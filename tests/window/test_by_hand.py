@@ -139,7 +139,7 @@ def test_scores_appear(bench: Bench) -> None:
 
 
 def test_a_report_is_written(bench: Bench) -> None:
-    bench.open_last_panel()
+    bench.open_last_panel("optisense.report")
     bench.press("optisense.report")
     bench.choose_file()
     bench.until("'Written to' in state().note")
