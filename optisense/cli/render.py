@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 REPORT = "report.html"
 PICTURE = "image.png"
-ONE_PICTURE = 1_500_000
+ONE_PICTURE = 1_000_000
 """Photons for a single picture. A program that keeps its model pays once and takes more."""
 
 
@@ -51,7 +51,7 @@ def render(
         typer.Option(
             min=1,
             metavar="N",
-            help="Photons to trace: 1.5 million when no limit is given, enough for a good picture.",
+            help="Photons to trace: 1 million when no limit is given, enough for a good picture.",
             show_default=False,
         ),
     ] = None,

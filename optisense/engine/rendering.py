@@ -29,7 +29,7 @@ from optisense.geometry import locate
 if TYPE_CHECKING:
     from optisense.optics import Progress, TactileImage
 
-PHOTONS = 1_500_000
+PHOTONS = 1_000_000
 """Of an image where nothing is asked, as of `optisense render`."""
 
 DRAFT_PHOTONS = 60_000

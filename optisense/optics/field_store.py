@@ -26,7 +26,7 @@ PASS_PHOTONS = 500_000
 PILOT_PHOTONS = 300_000
 CELL_SIZE = 0.4
 """mm; larger where the tally would outgrow its memory."""
-MOST_BYTES = 300e6
+MOST_BYTES = 375e6
 SEEN_MARGIN = 2.0
 """mm around what the camera sees that photons are sent to: an indenter's flank catches light
 that would land there.
@@ -110,7 +110,7 @@ class FieldStore:
             points, triangles = np.concatenate(vertices), np.concatenate(faces)
             a, b, c = (points[triangles[:, k]] for k in range(3))
             area = np.linalg.norm(np.cross(b - a, c - a), axis=1).sum() / 2
-            entry = BINS * self._table.groups * 16 * (2 if self._coloured else 1)
+            entry = BINS * self._table.groups * (36 if self._coloured else 20)
             least = float(np.sqrt(1.3 * area * entry / MOST_BYTES))
             scale = self.cell_size / CELL_SIZE
             cells = build_cells(points, triangles, max(self.cell_size, scale * least))
