@@ -16,7 +16,7 @@ import mitsuba as mi
 
 from optisense.optics.cells import SurfaceCells, cell_at
 from optisense.optics.ray_scene import RayScene, intersect, leave
-from optisense.optics.sampling import STEPS_2D, unit_float
+from optisense.optics.sampling import STEPS_2D, next_random, unit_float
 from optisense.optics.scattering import Coating, albedo_of, sample_coating
 
 if TYPE_CHECKING:
@@ -152,7 +152,7 @@ def _sample(
                     )
                     totals[g] += dr.select(hidden, 0, light) * dr.inv_pi * weight
                 # On from there, like light that is scattered evenly.
-                state = state * 747796405 + 2891336453
+                state = next_random(state)
                 places += 1
                 walking = (unit_float(state) < survival) & (places < MOST_PLACES)
                 weight *= albedo / survival

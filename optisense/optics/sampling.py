@@ -26,6 +26,11 @@ def unit_float(bits: mi.UInt32) -> mi.Float:
     return mi.Float(bits >> 8) * 2**-24
 
 
+def next_random(state: mi.UInt32) -> mi.UInt32:
+    """The next state of a small generator (the step of PCG)."""
+    return state * 747796405 + 2891336453
+
+
 def sequence_4d(index: mi.UInt32, stream: mi.UInt32, seed: mi.UInt32) -> tuple[mi.Float, ...]:
     """Four coordinates in [0, 1) of element ``index`` of the sequence numbered by ``stream``
     and ``seed``.
