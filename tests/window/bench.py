@@ -22,6 +22,9 @@ ROW = 14
 HEADER = 26
 """Pixels of a panel's header and the gap below it."""
 
+MARGIN = 8
+"""Pixels from the sidebar's edge to a place without buttons."""
+
 TRIES = 4
 """How often something is done again that came to nothing because Blender was still drawing."""
 
@@ -176,7 +179,7 @@ class Bench:
     def to_end(self) -> None:
         """Show the sidebar's last panel, by the key End over it."""
         left, top, width, height = self.sidebar()
-        self.desktop.move(left + width / 2, top + height - 6)
+        self.desktop.move(left + MARGIN, top + height / 2)  # a button there would take the key
         self.see("1")
         self.desktop.keys("End")
         self._last = 0
@@ -190,9 +193,12 @@ class Bench:
             x, end = round(left + width / 2), top + height
             if self._seen(what, x, end - 5 * HEADER, end - 6) is not None:
                 return
-            self.desktop.click(x, end - HEADER / 2)
-            self.see("1")
+            self.desktop.move(x, end - HEADER / 2)
             self.drawn()
+            if not self.see("under()"):  # else it has not come to its end yet
+                self.desktop.click(x, end - HEADER / 2)
+                self.see("1")
+                self.drawn()
         raise AssertionError(f"the last panel does not open: no '{what}'")
 
     def scroll(self, clicks: int) -> None:
