@@ -178,7 +178,7 @@ class Bench:
 
     def to_end(self) -> None:
         """Show the sidebar's last panel, by the key End over it."""
-        left, top, width, height = self.sidebar()
+        left, top, _, height = self.sidebar()
         self.desktop.move(left + MARGIN, top + height / 2)  # a button there would take the key
         self.see("1")
         self.desktop.keys("End")
