@@ -19,15 +19,6 @@ PATIENCE = 300.0
 ROW = 14
 """Pixels between places where a button is looked for; buttons are at least 18 high."""
 
-HEADER = 26
-"""Pixels of a panel's header and the gap below it."""
-
-MARGIN = 8
-"""Pixels from the sidebar's edge to a place without buttons."""
-
-TRIES = 4
-"""How often something is done again that came to nothing because Blender was still drawing."""
-
 SCROLLED, CLICK = 9, 40
 """Clicks of the wheel to see other buttons, and how many pixels a click moves them."""
 
@@ -175,31 +166,6 @@ class Bench:
         self.desktop.keys("Home")
         self._last = 0
         self.drawn()
-
-    def to_end(self) -> None:
-        """Show the sidebar's last panel, by the key End over it."""
-        left, top, _, height = self.sidebar()
-        self.desktop.move(left + MARGIN, top + height / 2)  # a button there would take the key
-        self.see("1")
-        self.desktop.keys("End")
-        self._last = 0
-        self.drawn()
-
-    def open_last_panel(self, what: str) -> None:
-        """Click on the header of the last panel, which is closed at first, until a button shows."""
-        for _ in range(TRIES):
-            self.to_end()
-            left, top, width, height = self.sidebar()
-            x, end = round(left + width / 2), top + height
-            if self._seen(what, x, end - 5 * HEADER, end - 6) is not None:
-                return
-            self.desktop.move(x, end - HEADER / 2)
-            self.drawn()
-            if not self.see("under()"):  # else it has not come to its end yet
-                self.desktop.click(x, end - HEADER / 2)
-                self.see("1")
-                self.drawn()
-        raise AssertionError(f"the last panel does not open: no '{what}'")
 
     def scroll(self, clicks: int) -> None:
         """Turn the mouse's wheel over the sidebar; down is positive."""

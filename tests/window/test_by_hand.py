@@ -138,15 +138,6 @@ def test_scores_appear(bench: Bench) -> None:
     photograph(bench, "4-evaluated")
 
 
-def test_a_report_is_written(bench: Bench) -> None:
-    bench.open_last_panel("optisense.report")
-    bench.press("optisense.report")
-    bench.choose_file()
-    bench.until("'Written to' in state().note")
-    page = (bench.home / "gelsight-mini.html").read_text()
-    assert page.count("data:image/png") >= 2 and "</html>" in page
-
-
 def test_it_is_saved(bench: Bench) -> None:
     bench.press("optisense.save_as", across=0.85)
     bench.choose_file()
