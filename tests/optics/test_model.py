@@ -27,8 +27,8 @@ GUIDED_OTHERWISE = 0.02
 
 IN_CONTACT = {"gelsight-mini": 0.03, "gelsight-mini-cylindrical": 0.06}
 """Field against photon mapping, relative, over the whole contact: of green, and of red and blue
-together, which mirror each other. On the cylinder photon mapping's own noise is 1 %, and the field
-2.5 % brighter in red and blue."""
+together, which mirror each other. On the cylinder photon mapping's own noise is 2 %, and the field
+2.5 % brighter in red and blue (of twelve seeds)."""
 
 PER_PIXEL = {"gelsight-mini": 0.07, "gelsight-mini-cylindrical": 0.2}
 """RMS over the contact's pixels, photon mapping's own noise taken off. Measured: flat 0.01 to 0.04;
@@ -207,15 +207,18 @@ def test_the_light_field_agrees_with_photon_mapping(name: str, specularity: floa
     of = model(name, specularity)
     field = of.render([BALL], resolution=PIXELS, photons=2_000_000)
     mapped = [
-        of.render([BALL], resolution=PIXELS, photons=8_000_000, seed=seed, estimator="sppm")
-        for seed in (1, 2)
+        of.render([BALL], resolution=PIXELS, photons=4_000_000, seed=seed, estimator="sppm")
+        for seed in (1, 2, 3, 4)
     ]
     inside = field.contact_mask
-    expected = (mirrored_means(mapped[0]) + mirrored_means(mapped[1])) / 2
+    expected = np.mean([mirrored_means(image) for image in mapped], axis=0)
     assert mirrored_means(field) == pytest.approx(expected, rel=IN_CONTACT[name])
     for number, group in enumerate(field.layers):
         ours = field.layers[group][..., number].astype(float)
-        one, two = (image.layers[group][..., number].astype(float) for image in mapped)
+        one, two = (
+            np.mean([image.layers[group][..., number] for image in half], axis=0, dtype=float)
+            for half in (mapped[:2], mapped[2:])
+        )
         theirs = (one + two) / 2
         scale = theirs[inside].mean()
         assert ours[~inside].mean() == pytest.approx(theirs[~inside].mean(), rel=OUTSIDE)
