@@ -1,0 +1,94 @@
+"""How light of a beam is spread: moments of drawn directions, and means over what is above a
+horizon."""
+
+from __future__ import annotations
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+import pytest
+
+from optisense.optics.scattering import Coating, evaluate_coating
+from optisense.optics.spread import Spread, above, reach, spread, within
+
+COUNT = 200_000
+TOWARDS = np.array([0.6, 0.0, 0.8])
+ALONG = np.array([0.0, 1.0, 0.0])
+UP = np.array([-0.8, 0.0, 0.6])
+VARIANCES = 0.012, 0.002
+"""Radians squared, along and up: discs of 13 and 5 degrees."""
+
+
+def light() -> Spread:
+    return Spread(
+        mi.Vector3f(TOWARDS), mi.Vector3f(ALONG), mi.Vector3f(UP),
+        mi.Float(VARIANCES[0]), mi.Float(VARIANCES[1]),
+    )  # fmt: skip
+
+
+def drawn() -> np.ndarray:
+    """(COUNT, 3) directions of this light."""
+    state = mi.sample_tea_32(dr.arange(mi.UInt32, COUNT), 7)[0]
+    return np.asarray(within(light(), state)).T
+
+
+def test_drawn_directions_have_the_variances_of_the_light() -> None:
+    ways = drawn()
+    # `within` goes aside in the plane across, and the angle's tangent has a little more variance.
+    assert np.var(ways @ ALONG) == pytest.approx(VARIANCES[0], rel=0.03)
+    assert np.var(ways @ UP) == pytest.approx(VARIANCES[1], rel=0.03)
+
+
+def test_the_moments_of_a_field_tell_the_variances() -> None:
+    ways = drawn()
+    mean = ways.mean(axis=0)
+    cosine = np.linalg.norm(mean)
+    height = (ways[:, 2] ** 2).mean()
+    found = spread(
+        mi.Vector3f(0, 0, 1), mi.Vector3f(mean / cosine), mi.Float(cosine), mi.Float(height)
+    )
+    assert found.variance_along[0] == pytest.approx(VARIANCES[0], rel=0.05)
+    assert found.variance_up[0] == pytest.approx(VARIANCES[1], rel=0.05)
+    assert abs(np.asarray(found.along)[:, 0] @ ALONG) == pytest.approx(1, abs=1e-3)
+    assert abs(np.asarray(found.up)[:, 0] @ UP) == pytest.approx(1, abs=1e-3)
+
+
+@pytest.mark.parametrize("lean", np.radians([-8.0, -3.0, 0.0, 3.0, 8.0, 40.0]))
+@pytest.mark.parametrize("side", [ALONG, UP], ids=["along", "up"])
+def test_light_about_the_horizon_counts_with_what_is_above_it(
+    side: np.ndarray, lean: float
+) -> None:
+    normal = np.cos(lean) * side + np.sin(lean) * TOWARDS
+    truth = np.maximum(drawn() @ normal, 0).mean()
+    everywhere = mi.Vector3f(TOWARDS)
+    straying = reach(light(), mi.Vector3f(normal), everywhere)
+    coating = Coating(
+        reflectance=mi.Color3f(np.pi),
+        metal_eta=mi.Color3f(1),
+        metal_k=mi.Color3f(0),
+        specularity=mi.Float(0),
+        alpha=mi.Float(0.1),
+        metallic=False,
+    )
+    got = evaluate_coating(
+        coating, mi.Vector3f(normal), mi.Vector3f(TOWARDS), mi.Vector3f(normal), straying
+    )
+    # A slab stands for an ellipse: their halves' means are 0.433 and 0.424 deviations.
+    deviation = np.sqrt(VARIANCES[0 if side is ALONG else 1])
+    assert got.x[0] == pytest.approx(truth, rel=0.015, abs=0.03 * deviation)
+
+
+def test_light_of_the_undeformed_surface_is_above_it_whole() -> None:
+    upright = mi.Vector3f(np.cos(0.02) * UP + np.sin(0.02) * TOWARDS)
+    straying = reach(light(), upright, upright)
+    assert straying[0] <= np.sin(0.02) + 1e-6
+
+
+def test_directions_below_a_plane_are_mirrored_up() -> None:
+    normal = mi.Vector3f(0, 0, 1)
+    assert np.asarray(above(mi.Vector3f(0.6, 0, -0.8), normal)).ravel() == pytest.approx(
+        [0.6, 0, 0.8]
+    )
+    assert np.asarray(above(mi.Vector3f(0.6, 0, 0.8), normal)).ravel() == pytest.approx(
+        [0.6, 0, 0.8]
+    )
