@@ -253,7 +253,9 @@ class OPTISENSE_OT_apply_best(_WithStudy, bpy.types.Operator):
             scene = bpy.data.scenes.get(name)
             if scene is not None:
                 following.clear_ghosts(scene)
-                open_stage(scene, stage, wait=wait, folder=folder if saved else "")
+                open_stage(
+                    scene, stage, wait=wait, folder=folder if saved else "", keep_contacts=True
+                )
 
         done = session.start_job(
             "Applying", "apply", applied, wait=wait, study=_study(context), to=str(stage)

@@ -11,22 +11,30 @@ from ..core.mesh_file import Mesh
 from . import kinds
 from .cages import add_cage
 from .cameras import add_camera
-from .collections import ALL, OPTICAL_SYSTEM, clear, collection, next_order
+from .collections import ALL, OPTICAL_SYSTEM, clear, collection, next_order, objects_of
+from .contacts import stay_on_surface
 from .lamps import add_light
 from .meshes import new_mesh
 
 MILLIMETRE = 0.001
 
 
-def build(scene: bpy.types.Scene, document: dict[str, Any], meshes: dict[str, Mesh]) -> None:
+def build(
+    scene: bpy.types.Scene,
+    document: dict[str, Any],
+    meshes: dict[str, Mesh],
+    *,
+    keep_contacts: bool = False,
+) -> None:
     """Put a design into a scene, in place of the one that was there.
 
     Args:
         scene: what else is in it stays.
         document: what `design.yaml` holds.
         meshes: the parts at rest, by name, mm.
+        keep_contacts: the contacts of the design before press on this one.
     """
-    clear(scene)
+    clear(scene, *(["CONTACT"] if keep_contacts else []))
     scene.unit_settings.system = "METRIC"
     scene.unit_settings.scale_length = MILLIMETRE
     scene.unit_settings.length_unit = "MILLIMETERS"
@@ -42,6 +50,8 @@ def build(scene: bpy.types.Scene, document: dict[str, Any], meshes: dict[str, Me
         add_material(design, name, values)
     for name, values in document["parts"].items():
         add_part(scene, name, values, meshes[name])
+    for contact in objects_of(scene, "CONTACT"):
+        stay_on_surface(scene, contact)
     design.light_groups.clear()
     for name, values in document["lights"].items():
         group = add_light_group(design, name, values)

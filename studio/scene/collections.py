@@ -39,9 +39,11 @@ def next_order(scene: bpy.types.Scene, kind: str) -> int:
     return max((each.optisense.order for each in objects_of(scene, kind)), default=-1) + 1
 
 
-def clear(scene: bpy.types.Scene) -> None:
-    """Remove the design from a scene: its objects and what only they used."""
-    for each in list(_ours(scene)):
+def clear(scene: bpy.types.Scene, *but: str) -> None:
+    """Remove the design from a scene: its objects, all but those of some kinds, and what only they
+    used.
+    """
+    for each in [one for one in _ours(scene) if one.optisense.kind not in but]:
         data = each.data
         bpy.data.objects.remove(each, do_unlink=True)
         if data is not None and data.users == 0:

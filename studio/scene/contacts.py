@@ -45,6 +45,14 @@ def add_contact(
     turn = Vector(outward).to_track_quat("Z", "Y").to_matrix().to_4x4()
     contact.matrix_world = Matrix.Translation(point) @ turn
     collection(scene, CONTACTS).objects.link(contact)
+    stay_on_surface(scene, contact)
+    redraw(contact)
+    return contact
+
+
+def stay_on_surface(scene: bpy.types.Scene, contact: bpy.types.Object) -> None:
+    """Hold a contact on the sensing surface that the scene has now, at the nearest place."""
+    contact.constraints.clear()
     surface = sensing_surface(scene)
     if surface is not None:
         stay = contact.constraints.new("SHRINKWRAP")
@@ -53,8 +61,6 @@ def add_contact(
         stay.shrinkwrap_type = "NEAREST_SURFACE"
         stay.use_track_normal = True
         stay.track_axis = "TRACK_NEGATIVE_Z"  # the surface's normals point inward
-    redraw(contact)
-    return contact
 
 
 def sensing_surface(scene: bpy.types.Scene) -> bpy.types.Object | None:

@@ -59,6 +59,7 @@ def open_stage(
     *,
     wait: bool,
     folder: str = "",
+    keep_contacts: bool = False,
     then: Callable[[bpy.types.Scene], None] | None = None,
 ) -> bool:
     """Open what the engine wrote into a stage, as the job that the panels show.
@@ -68,6 +69,7 @@ def open_stage(
         stage: the folder.
         wait: until it is there.
         folder: the user's own folder of it; empty where it is not saved.
+        keep_contacts: the contacts of the sensor before press on this one.
         then: called when it is open.
     """
     name = scene.name
@@ -80,7 +82,8 @@ def open_stage(
         parts = document["parts"].items()
         clear_startup(scene)
         _picture_is_old()
-        build(scene, document, {key: mesh_file.read(stage / part["mesh"]) for key, part in parts})
+        meshes = {key: mesh_file.read(stage / part["mesh"]) for key, part in parts}
+        build(scene, document, meshes, keep_contacts=keep_contacts)
         scene.optisense.folder = folder or str(stage)
         scene.optisense.is_saved = bool(folder)
         show_design(scene)

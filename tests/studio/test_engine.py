@@ -320,7 +320,12 @@ def test_scores_rays_a_search_and_its_best_design(
     assert picture.has("OptiSense search")
     ghosts = [each.name for each in mini.objects if each.optisense.key.startswith("ghost")]
     assert "ghost skin" in ghosts
+    bpy.ops.optisense.add_contact()
+    pressed = [each.name for each in mini.objects if each.optisense.kind == "CONTACT"]
     assert bpy.ops.optisense.apply_best() == {"FINISHED"}
+    contacts = [each for each in mini.objects if each.optisense.kind == "CONTACT"]
+    assert pressed and [each.name for each in contacts] == pressed
+    assert contacts[0].constraints[0].target == mini.objects["skin"]  # that of the new design
     best = gather_document(mini)["cages"]["skin"]["points"][14]["z"]
     assert f"{best:.4g}" == found.values.rpartition("= ")[2]
     assert not [each for each in mini.objects if each.optisense.kind == "SHOWN"]
