@@ -28,6 +28,7 @@ TARGETS = {
 }
 NAMES = {
     "image_320x240": "Image 320x240, warm, new photons",
+    "image_320x240_many": "The same with 5 million photons",
     "image_640x480": "Image 640x480, warm, new photons",
     "model_set_up": "Model set-up (scene, photon guide)",
     "other_contact_new_light": "Other contact, new photons",

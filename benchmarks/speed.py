@@ -5,17 +5,28 @@ from __future__ import annotations
 import sys
 import tempfile
 from collections.abc import Callable
+from functools import partial
 from statistics import median
 from typing import Any
 
-from benchmarks.case import CONTACT_TEXT, DESIGN, RESOLUTION, Case, ball, relative_error
+from benchmarks.case import (
+    CONTACT_TEXT,
+    DESIGN,
+    PHOTONS,
+    RESOLUTION,
+    Case,
+    ball,
+    relative_error,
+)
 from benchmarks.rays import photon_rates
 from benchmarks.reference import Reference
 from benchmarks.timing import Time, medians, run_child, timed
-from optisense.optics import OpticalModel
+from optisense.optics import OpticalModel, TactileImage
 
 RUNS = 7
 LARGE = (640, 480)
+MANY_PHOTONS = 5_000_000
+"""What a program that keeps its model traces, unless it asks for another number."""
 OTHER_PLACES = [(2.0, 1.0), (-3.0, 2.0), (1.0, -3.0), (-4.0, -2.0), (4.0, 3.0)]
 """Surface coordinates (mm) of other contacts."""
 COMMAND = ["-m", "optisense.cli", "render", DESIGN, "--contact", CONTACT_TEXT, "--out"]
@@ -25,10 +36,11 @@ def measure_speed(case: Case, reference: Reference, tell: Callable[[str], None])
     """All rows of the speed table, as a dictionary ready for JSON."""
     tell("speed: set-up")
     model = OpticalModel(case.model.design)  # compiles what a first model compiles
-    model.render([ball()], resolution=RESOLUTION)
+    _render(model, 0)
     setup = timed(lambda: _fresh_model(case))
     tell("speed: warm images")
     warm = warm_images(case, reference)
+    finer = warm_images(case, reference, MANY_PHOTONS)
     large = _new_light(case, LARGE, RUNS - 2)
     tell("speed: other contacts, other flux, other specularity")
     kept = _kept_light(case)
@@ -39,6 +51,7 @@ def measure_speed(case: Case, reference: Reference, tell: Callable[[str], None])
     cold = _cold()
     return {
         "image_320x240": warm,
+        "image_320x240_many": finer,
         "image_640x480": large,
         "model_set_up": _plain(setup),
         **kept,
@@ -52,21 +65,30 @@ def _plain(time: Time) -> dict[str, float]:
     return {"wall_s": round(time.wall, 4), "cpu_s": round(time.cpu, 4)}
 
 
+def _render(
+    model: OpticalModel,
+    seed: int,
+    place: tuple[float, float] = (0.0, 0.0),
+    resolution: tuple[int, int] = RESOLUTION,
+) -> TactileImage:
+    return model.render([ball(*place)], resolution=resolution, seed=seed, photons=PHOTONS)
+
+
 def _fresh_model(case: Case) -> None:
     """A model with its scene and its photon guide."""
     OpticalModel(case.model.design).guide()
 
 
-def warm_images(case: Case, reference: Reference) -> dict[str, Any]:
+def warm_images(case: Case, reference: Reference, photons: int = PHOTONS) -> dict[str, Any]:
     """Images of the case, each from photons of its own (another seed)."""
-    case.model.render([ball()], resolution=RESOLUTION, seed=99)
+    case.model.render([ball()], resolution=RESOLUTION, seed=99, photons=photons)
     times, errors, parts, ratios, image = [], [], [], [], None
     for seed in range(RUNS):
         images: list[Any] = []
         times.append(
             timed(
                 lambda seed=seed, images=images: images.append(  # type: ignore[misc]
-                    case.model.render([ball()], resolution=RESOLUTION, seed=seed)
+                    case.model.render([ball()], resolution=RESOLUTION, seed=seed, photons=photons)
                 )
             )
         )
@@ -92,10 +114,9 @@ def warm_images(case: Case, reference: Reference) -> dict[str, Any]:
 
 
 def _new_light(case: Case, resolution: tuple[int, int], runs: int) -> dict[str, Any]:
-    case.model.render([ball()], resolution=resolution, seed=99)
+    _render(case.model, 99, resolution=resolution)
     times = [
-        timed(lambda seed=seed: case.model.render([ball()], resolution=resolution, seed=seed))  # type: ignore[misc]
-        for seed in range(runs)
+        timed(partial(_render, case.model, seed, resolution=resolution)) for seed in range(runs)
     ]
     return _plain(medians(times))
 
@@ -106,18 +127,14 @@ def _kept_light(case: Case) -> dict[str, Any]:
     The ratio of the second to an image of the first contact is what a change of contact costs.
     """
     first = [
-        timed(lambda s=s: case.model.render([ball()], resolution=RESOLUTION, seed=200 + s))  # type: ignore[misc]
-        for s in range(len(OTHER_PLACES))
+        timed(partial(_render, case.model, 200 + number)) for number in range(len(OTHER_PLACES))
     ]
     other = [
-        timed(lambda s=s, p=p: case.model.render([ball(*p)], resolution=RESOLUTION, seed=300 + s))  # type: ignore[misc]
-        for s, p in enumerate(OTHER_PLACES)
+        timed(partial(_render, case.model, 300 + number, place))
+        for number, place in enumerate(OTHER_PLACES)
     ]
-    case.model.render([ball()], resolution=RESOLUTION, seed=99)
-    kept = [
-        timed(lambda p=p: case.model.render([ball(*p)], resolution=RESOLUTION, seed=99))  # type: ignore[misc]
-        for p in OTHER_PLACES
-    ]
+    _render(case.model, 99)
+    kept = [timed(partial(_render, case.model, 99, place)) for place in OTHER_PLACES]
     one, two, three = medians(first), medians(other), medians(kept)
     return {
         "other_contact_new_light": {**_plain(two), "ratio_to_first": round(two.wall / one.wall, 3)},
@@ -133,7 +150,7 @@ def _changes(case: Case) -> dict[str, Any]:
     model = OpticalModel(case.model.design)
 
     def render() -> None:
-        model.render([ball()], resolution=RESOLUTION, seed=99)
+        _render(model, 99)
 
     def change(path: str, value: float) -> None:
         model.update(path, value)
