@@ -52,4 +52,4 @@ class Film:
         """(groups, h, w, 3): sums over the number of samples."""
         share = 1 / np.maximum(np.asarray(self.counts), 1).reshape(height, width, 1)
         out = [np.asarray(total).reshape(height, width, 3) * share for total in self.sums]
-        return np.stack(out).astype(np.float32)
+        return np.stack(out).astype(np.float32, copy=False)

@@ -153,7 +153,8 @@ def render_field(
     began = time.perf_counter()
     field, interrupted = light
     width, height = camera.width, camera.height
-    # What interfaces reflect towards the eye is little: it is not sampled again where it is grainy.
+    # What interfaces reflect towards the eye is little: it is sampled once in a pixel or in those
+    # beside it.
     film, mirrored = (Film(width * height, field.groups) for _ in range(2))
 
     def sample(pixel: mi.UInt32, number: mi.UInt32, thorough: bool, again: bool = False) -> None:
@@ -170,9 +171,6 @@ def render_field(
         if reflected is not None:
             mirrored.add(reflected, shade(field, scenes, reflected, False, True))
             mirrored.add_light(reflected, emitters, areas)
-
-    def developed() -> NDArray[np.float32]:
-        return film.layers(width, height) + mirrored.layers(width, height)
 
     region_image = np.where(rays.hit, rays.region, 0)
     mask = region_image == Region.INDENTER
@@ -206,7 +204,9 @@ def render_field(
         first = far & ~filled
         pixel = dr.compress(mi.Bool(first.ravel()))
         sample(pixel, dr.zeros(mi.UInt32, dr.width(pixel)), False)
-        layers = developed()
+        reflections = mirrored.layers(width, height)
+        fill(reflections, filled)
+        layers = film.layers(width, height) + reflections
         step = 2 if sparse else 1
         grainy = np.zeros_like(far)
         grainy[::step, ::step] = _grainy(
@@ -221,7 +221,7 @@ def render_field(
             layers = None
         if sparse:
             if layers is None:
-                layers = developed()
+                layers = film.layers(width, height) + reflections
             alike = agreed(layers, filled)
             if (apart := filled & ~alike).any():
                 # Once in their middle as the others, and once more where those beside them were
@@ -231,11 +231,11 @@ def render_field(
                 tiers[0] = tiers[0][0], dr.zeros(mi.UInt32, dr.width(tiers[0][0]))
                 pixel, number = (dr.concat(each) for each in zip(*tiers, strict=True))
                 dr.eval(pixel, number)
-                sample(pixel, number, False)
-                layers = developed()
+                sample(pixel, number, False, again=True)
+                layers = film.layers(width, height) + reflections
             fill(layers, alike)
     if layers is None:
-        layers = developed()
+        layers = film.layers(width, height) + mirrored.layers(width, height)
     return ImageLayers(
         radiance=layers,
         normals=masked(rays.normals, rays.hit),
