@@ -71,8 +71,11 @@ def main() -> None:
 
     def answered(request: Any) -> None:
         """As Blender's timer does it in a window."""
-        while request is None or not request.done:
-            time.sleep(session._tick() or 0.0)
+        while True:
+            pause = session._tick() or 0.0
+            if request is not None and request.done:
+                return
+            time.sleep(pause)
 
     print(f"{'':42s} {'wall':>9s} {'processor':>9s} {'':10s}   target")
     opened = "Mini opened and the engine warm"

@@ -22,7 +22,7 @@ from optisense.optics.model import OpticalModel
 from optisense.optics.ray_scene import Piece, RayScene
 from optisense.optics.surfaces import SurfaceKind
 
-COARSER = 4.0
+COARSER = 3.0
 """How much larger the cells of a draft are along a side. Of as few photons as a draft has, wider
 cells make a picture that is nearer to the whole one (9 % instead of 14 % with cells half as wide),
 and a smoothing costs a small part."""
