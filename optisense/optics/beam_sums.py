@@ -32,7 +32,6 @@ def sum_all(
     random: mi.UInt32,
 ) -> list[mi.Color3f]:
     """Every beam of the field, for points on the undeformed surface."""
-    first_ball = dr.gather(mi.Vector4f, balls, mi.UInt32(0))
     totals = [mi.Color3f(0) for _ in range(groups)]
     state = mi.UInt32(random)
     j = dr.gather(mi.UInt32, beams.starts, cell * groups, active)
@@ -44,21 +43,14 @@ def sum_all(
         )
         seen = dr.max(reflected) > 0
         if dr.hint(contacts, mode="scalar"):
-            near = mi.Bool(False)
-            if dr.hint(single, mode="scalar"):
-                near = passes_near(first_ball, start, towards, squared_radius(cosine))
-            else:
-                n = mi.UInt32(0)
-                while n < ball_count:
-                    ball = dr.gather(mi.Vector4f, balls, n)
-                    near |= passes_near(ball, start, towards, squared_radius(cosine))
-                    n += 1
+            near = _near_indenters(balls, ball_count, single, start, towards, cosine)
             if seen & near:
+                light = round_spread(towards, cosine)
                 open_rays = mi.Float(0)
                 for _ in range(SHADOW_RAYS):
                     state = next_random(state)
                     blocked = indenters.ray_test(
-                        mi.Ray3f(start, within(round_spread(towards, cosine), state)),
+                        mi.Ray3f(start, within(light, state)),
                         coherent=False,
                         active=mi.Bool(True),
                     )
@@ -89,7 +81,6 @@ def sum_roughly(
 ) -> list[mi.Color3f]:
     """As ``sum_all``, with one shadow ray for all beams of a group that pass near indenters, drawn
     in proportion to what they bring: for points of which little reaches the eye."""
-    first_ball = dr.gather(mi.Vector4f, balls, mi.UInt32(0))
     totals = [mi.Color3f(0) for _ in range(groups)]
     doubtful = [mi.Color3f(0) for _ in range(groups)]
     doubt = mi.Float(0)
@@ -105,14 +96,7 @@ def sum_roughly(
         )
         near = mi.Bool(False)
         if dr.hint(contacts, mode="scalar"):
-            if dr.hint(single, mode="scalar"):
-                near = passes_near(first_ball, start, towards, squared_radius(cosine))
-            else:
-                n = mi.UInt32(0)
-                while n < ball_count:
-                    ball = dr.gather(mi.Vector4f, balls, n)
-                    near |= passes_near(ball, start, towards, squared_radius(cosine))
-                    n += 1
+            near = _near_indenters(balls, ball_count, single, start, towards, cosine)
             # Beams are in the order of groups: one running sum does for all of them.
             doubt = dr.select(group == last, doubt, 0)
             last = mi.UInt32(group)
@@ -139,6 +123,29 @@ def sum_roughly(
             )
             totals[g] += dr.select(blocked, 0, doubtful[g])
     return totals
+
+
+@dr.syntax
+def _near_indenters(
+    balls: mi.Float,
+    ball_count: mi.UInt32,
+    single: bool,
+    start: mi.Point3f,
+    towards: mi.Vector3f,
+    cosine: mi.Float,
+) -> mi.Bool:
+    """Whether beams may touch one of the balls; without a loop where there is a ``single`` one."""
+    near = mi.Bool(False)
+    if dr.hint(single, mode="scalar"):
+        ball = dr.gather(mi.Vector4f, balls, mi.UInt32(0))
+        near = passes_near(ball, start, towards, squared_radius(cosine))
+    else:
+        n = mi.UInt32(0)
+        while n < ball_count:
+            ball = dr.gather(mi.Vector4f, balls, n)
+            near |= passes_near(ball, start, towards, squared_radius(cosine))
+            n += 1
+    return near
 
 
 def beam_at(beams: Beams, number: mi.UInt32) -> tuple[mi.Vector3f, mi.Float, mi.Color3f, mi.UInt32]:
