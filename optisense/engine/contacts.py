@@ -2,13 +2,34 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from typing import Annotated, Any, Literal
 
+import numpy as np
+from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field
 
-from optisense.errors import ContactError
-from optisense.geometry import Contact, Cylinder, Indenter, MeshIndenter, Plane, Sphere
+from optisense.engine.failures import WrongContactError
+from optisense.errors import ContactError, MeshError, OptiSenseError
+from optisense.geometry import (
+    Contact,
+    Cylinder,
+    Indenter,
+    MeshIndenter,
+    Plane,
+    Sphere,
+    TriangleMesh,
+)
 from optisense.geometry.contact_text import parse_contact
+
+ROUNDED = 1e-3
+"""mm by which a point that a pixel sees may lie beside the mesh that it sees."""
+
+FloatArray = NDArray[np.float32] | NDArray[np.float64]
+
+Place = Callable[[Contact], TriangleMesh]
+"""Presses a contact in: `OpticalModel.place`."""
 
 
 class _Given(BaseModel):
@@ -103,15 +124,55 @@ def contacts_of(given: list[AnyContact]) -> list[Contact]:
     """The contacts; an error says which one it is.
 
     Raises:
-        ContactError: as of `contact_of`.
+        WrongContactError: as of `contact_of`.
     """
     found = []
     for number, each in enumerate(given):
         try:
             found.append(contact_of(each))
-        except ContactError as error:
-            where = error.where or f"contacts[{number}]"
-            raise ContactError(error.message, where=where, hint=error.hint) from None
+        except OptiSenseError as error:
+            raise WrongContactError(error, number) from None
+    return found
+
+
+@contextmanager
+def telling_which(contacts: Sequence[Contact], place: Place) -> Iterator[None]:
+    """What is done with all contacts at once: an error about one of them says which one.
+
+    Args:
+        contacts: all.
+        place: presses one in, and raises what is wrong with it.
+
+    Raises:
+        WrongContactError: in place of the error that one of them causes by itself.
+    """
+    try:
+        yield
+    except (ContactError, MeshError):
+        for number, each in enumerate(contacts):
+            try:
+                place(each)
+            except OptiSenseError as error:
+                raise WrongContactError(error, number) from None
+        raise
+
+
+def unseen(
+    placed: Iterable[TriangleMesh], points: FloatArray, touched: NDArray[np.bool_]
+) -> list[int]:
+    """Which contacts no pixel sees, so that a picture does not show them; the first is 0.
+
+    Args:
+        placed: the mesh of each where it presses.
+        points: (h, w, 3) mm, what each pixel sees.
+        touched: (h, w) where a pixel sees an indenter.
+    """
+    seen = points[touched]
+    found = []
+    for number, mesh in enumerate(placed):
+        lower, upper = mesh.vertices.min(axis=0) - ROUNDED, mesh.vertices.max(axis=0) + ROUNDED
+        if not ((seen >= lower) & (seen <= upper)).all(axis=1).any():
+            found.append(number)
     return found
 
 

@@ -33,6 +33,21 @@ class Cancelled(BaseException):
     """
 
 
+class WrongContactError(OptiSenseError):
+    """An error about one of a request's contacts.
+
+    Attributes:
+        number: which one, the first is 0.
+        kind: of the error, as the protocol names it.
+    """
+
+    def __init__(self, error: OptiSenseError, number: int) -> None:
+        where = error.where or f"contacts[{number}]"
+        super().__init__(error.message, where=where, hint=error.hint)
+        self.number = number
+        self.kind = type(error).__name__
+
+
 class UnsoundDesignError(OptiSenseError):
     """A design that `check` refuses, with all that it found."""
 
@@ -62,6 +77,9 @@ def as_data(
         row = _row("DesignError", error.message, error.where, error.hint, known, design)
         row["problems"] = [problem_row(problem, design) for problem in error.problems]
         return row
+    if isinstance(error, WrongContactError):
+        row = _row(error.kind, error.message, error.where, error.hint, known, design)
+        return row | {"contact": error.number}
     if isinstance(error, OptiSenseError):
         kind = type(error).__name__
         return _row(kind, error.message, error.where, error.hint, known, design)
@@ -159,5 +177,6 @@ def _row(
         "hint": hint,
         "path": path,
         "part": part_of(message, path, known, design),
+        "contact": None,
         "problems": [],
     }

@@ -1,10 +1,9 @@
-"""Requests that render: images, drafts, the same image under other lights, contacts, rays."""
+"""Requests that render: images, drafts, the same image under other lights, rays."""
 
 from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -14,8 +13,12 @@ from pydantic import Field
 
 from optisense.design import LightGroup, SensorDesign
 from optisense.design.near import suggestion
-from optisense.engine.contacts import AnyContact, GivenIndenter, contacts_of, indenter_of
-from optisense.engine.contacts import plain_contact as plain
+from optisense.engine.contacts import (
+    AnyContact,
+    contacts_of,
+    telling_which,
+    unseen,
+)
 from optisense.engine.designs import AnyDesign, AnyMesh
 from optisense.engine.failures import ProtocolError
 from optisense.engine.files import Files
@@ -24,7 +27,6 @@ from optisense.engine.protocol import Fields
 from optisense.engine.requests import Lane, handles
 from optisense.engine.session import KeptImage, Session, name_of
 from optisense.errors import RenderError
-from optisense.geometry import locate
 
 if TYPE_CHECKING:
     from optisense.optics import Progress, TactileImage
@@ -95,20 +97,6 @@ class Report(Fields):
     file: str
 
 
-class Place(OfDesign):
-    """See docs/engine.md."""
-
-    contacts: list[AnyContact]
-
-
-class NinePlaces(OfDesign):
-    """See docs/engine.md."""
-
-    indenter: GivenIndenter
-    depth: float = 0.5
-    rotation: float = 0.0
-
-
 class ChiefRayGrid(OfDesign):
     """See docs/engine.md."""
 
@@ -158,19 +146,21 @@ def simulate(session: Session, fields: Simulate, job: Job) -> dict[str, Any]:
         job.progress(0.0, "building the sensor")
     renderer = session.renderer
     model = renderer.draft_model(design) if fields.draft else renderer.model(design)
-    image = model.render(
-        contacts,
-        resolution=size,
-        photons=photons,
-        noise=fields.noise,
-        seconds=fields.seconds,
-        seed=fields.seed,
-        progress=_teller(job),
-    )
+    with telling_which(contacts, model.place):
+        image = model.render(
+            contacts,
+            resolution=size,
+            photons=photons,
+            noise=fields.noise,
+            seconds=fields.seconds,
+            seed=fields.seed,
+            progress=_teller(job),
+        )
     image.settings["contacts"] = [_text(given) for given in fields.contacts]
     exposure = _exposure(image, fields.exposure)
     name = name_of(fields, job.id)
     indenters = {} if fields.draft else _indenters(model, contacts)
+    hidden = unseen(indenters.values(), image.points, image.contact_mask)
     kept = KeptImage(image, design, contacts, indenters, exposure, fields.draft)
     written = write_image(image, exposure, fields.files, files)
     session.images.keep(name, kept)
@@ -183,6 +173,7 @@ def simulate(session: Session, fields: Simulate, job: Job) -> dict[str, Any]:
             group: {"flux": each.flux, "colour": list(each.colour)}
             for group, each in design.lights.items()
         },
+        "unseen": hidden,
         "files": written,
         "settings": image.settings,
     }
@@ -225,33 +216,6 @@ def report(session: Session, fields: Report, job: Job) -> dict[str, Any]:
     return {"file": str(path)}
 
 
-@handles("place", Place, Lane.RENDER)
-def place(session: Session, fields: Place, job: Job) -> dict[str, Any]:
-    """Contacts where they sit on the surface."""
-    files = session.files(fields, job.id)
-    model = session.renderer.model(design_of(session, fields, job))
-    rows = []
-    for number, contact in enumerate(contacts_of(fields.contacts)):
-        spot = locate(contact, model.surface)
-        rows.append(
-            {
-                "point": spot.point,
-                "inward": spot.inward,
-                "mesh": files.mesh(f"contact{number}", model.place(contact)),
-            }
-        )
-    return {"contacts": rows}
-
-
-@handles("nine_places", NinePlaces, Lane.RENDER)
-def nine_places(session: Session, fields: NinePlaces, job: Job) -> dict[str, Any]:
-    """Nine contacts that cover what the camera sees."""
-    model = session.renderer.model(design_of(session, fields, job))
-    found = model.nine_contacts(indenter_of(fields.indenter), fields.depth)
-    turned = [replace(contact, rotation=fields.rotation) for contact in found]
-    return {"contacts": [plain(contact, fields.indenter) for contact in turned]}
-
-
 @handles("chief_rays", ChiefRayGrid, Lane.RENDER)
 def chief_rays(session: Session, fields: ChiefRayGrid, job: Job) -> dict[str, Any]:
     """The ways of chief rays, for drawing."""
@@ -262,7 +226,9 @@ def chief_rays(session: Session, fields: ChiefRayGrid, job: Job) -> dict[str, An
     design = design_of(session, fields, job)
     _checked_size(fields.resolution, design)
     model = session.renderer.model(design)
-    paths = trace_paths(model, fields.resolution, contacts_of(fields.contacts))
+    contacts = contacts_of(fields.contacts)
+    with telling_which(contacts, model.place):
+        paths = trace_paths(model, fields.resolution, contacts)
     return {
         "files": {
             "vertices": files.array("rays.vertices.npy", paths.vertices),

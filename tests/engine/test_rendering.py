@@ -185,3 +185,27 @@ def test_an_engine_that_dies_in_the_middle_is_seen(start: Callable[..., Any]) ->
     with pytest.raises(EOFError):
         while True:
             client.next()
+
+
+def test_an_error_names_the_contact_that_it_is_about(engine: Any) -> None:
+    good, deep = "sphere:1.5@0,0:0.5", "sphere:1.5@1,1:40"
+    for what in ("simulate", "place", "chief_rays"):
+        refused = engine.refused(what, design="gelsight-mini", contacts=[good, good, deep])
+        assert refused["kind"] == "ContactError" and refused["contact"] == 2, what
+        assert "mm thick" in refused["message"]
+    file = {"indenter": {"kind": "mesh", "file": "/nowhere/wedge.obj"}, "depth": 0.3}
+    refused = engine.refused("simulate", design="gelsight-mini", contacts=[good, file])
+    assert refused["kind"] == "MeshError" and refused["contact"] == 1
+    refused = engine.refused("simulate", design="gelsight-mini", contacts=["sphere:0@0,0:0.5"])
+    assert refused["kind"] == "ContactError" and refused["contact"] == 0
+    assert engine.refused("open", design="no-such-sensor")["contact"] is None
+
+
+def test_contacts_that_no_pixel_sees_are_told(engine: Any) -> None:
+    corner, middle = "sphere:0.5@8.3,10:0.3", "sphere:1.5@0,0:0.5"
+    request = {"design": "gelsight-mini", "resolution": [80, 60], "photons": PHOTONS}
+    result = engine.ask("simulate", **request, contacts=[corner, middle], files=["mask", "points"])
+    mask = np.load(result["files"]["mask"]).astype(bool)
+    distance = np.linalg.norm(np.load(result["files"]["points"])[mask], axis=1)
+    assert mask.any() and distance.max() < 3.0  # all that is touched lies in the middle
+    assert result["unseen"] == [0]
