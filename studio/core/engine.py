@@ -38,6 +38,7 @@ class EngineError(Exception):
         message, where, hint: what is wrong, the place, what to do.
         path: the dotted path in the design, if known.
         part: the part of the design that it is about, if known.
+        contact: the number of the contact that it is about, if it is about one; the first is 0.
     """
 
     def __init__(self, error: dict[str, Any]) -> None:
@@ -48,6 +49,7 @@ class EngineError(Exception):
         self.hint: str | None = error.get("hint")
         self.path: str | None = error.get("path")
         self.part: str | None = error.get("part")
+        self.contact: int | None = error.get("contact")
 
     def text(self) -> str:
         """Everything in one line."""
@@ -121,6 +123,8 @@ class Engine:
         self._unsent = bytearray()
         self._gone = False
         self._refusal: EngineError | None = None
+        self.end: EngineError | None = None
+        """Why it is gone, where it was not asked to go."""
         environment = {
             name: value
             for name, value in os.environ.items()
@@ -306,7 +310,8 @@ class Engine:
                 "hint": "Your scene is unharmed; the next request starts the engine again",
             }
         )
-        self._fail_all(self._refusal or error)
+        self.end = self._refusal or error
+        self._fail_all(self.end)
 
     def _write(self) -> None:
         """As much of the requests as the pipe takes now."""

@@ -77,3 +77,13 @@ def joined(parts: Sequence[NDArray[np.float32]]) -> FloatArray:
     for part in reversed(parts):
         total = part.astype(np.float64) + total
     return total
+
+
+def shown_number(value: float) -> str:
+    """A number as people read it: counts in full, the rest with four digits that count."""
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if isinstance(value, int):
+        return f"{value:,}"
+    text = f"{value:.4g}"
+    return f"{text}.0" if text.lstrip("-").isdigit() else text  # a share of 1.0 is no count

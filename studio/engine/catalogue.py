@@ -14,6 +14,7 @@ LIBRARY_KINDS = ("material", "coating", "light", "camera")
 _lists: dict[str, list[dict[str, Any]]] = {}
 _items: dict[str, Items] = {}
 _NONE: Items = [("NONE", "(the engine is starting)", "Wait a moment, then open this again")]
+_NO_ENGINE: Items = [("NONE", "(no engine runs)", "The panel Sensor says what to do")]
 
 
 def entries(name: str) -> list[dict[str, Any]]:
@@ -23,7 +24,7 @@ def entries(name: str) -> list[dict[str, Any]]:
 
 def items(name: str) -> Items:
     """The same as choices of a menu; the texts are kept, as Blender asks for."""
-    return _items.get(name) or _NONE
+    return _items.get(name) or (_NONE if session.running() is not None else _NO_ENGINE)
 
 
 def refresh(engine: Engine) -> None:

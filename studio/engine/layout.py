@@ -4,13 +4,20 @@ from __future__ import annotations
 
 import textwrap
 
+import blf
 import bpy
 
 from . import session
 
 TAB = "OptiSense"
 CHARACTERS = 46
-"""About what fits in a line of the sidebar."""
+"""About what fits in a line of the sidebar, where that can't be measured."""
+
+FONT_SIZE = 11.0
+"""Of labels, in points; Blender's themes come with it."""
+
+EDGES, ICON, BOX = 56.0, 21.0, 14.0
+"""Pixels of the sidebar that a line of text can't have: its tabs and edges, an icon, a box."""
 
 
 class SidebarPanel:
@@ -25,14 +32,51 @@ class SidebarPanel:
         return context.scene is not None and context.scene.optisense.is_open
 
 
-def paragraph(layout: bpy.types.UILayout, text: str, icon: str = "NONE") -> None:
-    """A text in as many lines as it needs."""
+def paragraph(
+    layout: bpy.types.UILayout, text: str, icon: str = "NONE", *, boxed: bool = False
+) -> None:
+    """A text in as many lines as it needs.
+
+    Args:
+        layout: where to.
+        text: without line breaks.
+        icon: before the first line.
+        boxed: it is in a box, which leaves less room.
+    """
     column = layout.column(align=True)
     column.scale_y = 0.8
-    for number, line in enumerate(textwrap.wrap(text, CHARACTERS)):
+    for number, line in enumerate(lines_of(text, has_icon=icon != "NONE", boxed=boxed)):
         column.label(
             text=line, icon=icon if number == 0 else "BLANK1" if icon != "NONE" else "NONE"
         )
+
+
+def lines_of(text: str, *, has_icon: bool, boxed: bool) -> list[str]:
+    """A text broken where the sidebar ends, as wide as it is now."""
+    region = bpy.context.region
+    if bpy.app.background or region is None:
+        return textwrap.wrap(text, CHARACTERS)
+    scale = bpy.context.preferences.system.ui_scale
+    room = region.width - scale * (EDGES + ICON * has_icon + BOX * boxed)
+    blf.size(0, FONT_SIZE * scale)
+    lines: list[str] = []
+    for word in text.split():
+        longer = f"{lines[-1]} {word}" if lines else word
+        if lines and blf.dimensions(0, longer)[0] <= room:
+            lines[-1] = longer
+        else:
+            lines += _pieces(word, room)
+    return lines
+
+
+def _pieces(word: str, room: float) -> list[str]:
+    """A word that may be longer than a line, such as a path, cut where lines end."""
+    pieces = [""]
+    for letter in word:
+        if pieces[-1] and blf.dimensions(0, pieces[-1] + letter)[0] > room:
+            pieces.append("")
+        pieces[-1] += letter
+    return pieces
 
 
 def show_job(layout: bpy.types.UILayout, *titles: str) -> bool:
@@ -56,8 +100,8 @@ def show_messages(layout: bpy.types.UILayout) -> None:
     now = session.state()
     if now.problem:
         box = layout.box()
-        paragraph(box, now.problem, "ERROR")
+        paragraph(box, now.problem, "ERROR", boxed=True)
         if now.hint:
-            paragraph(box, now.hint, "BLANK1")
+            paragraph(box, now.hint, "BLANK1", boxed=True)
     elif now.note:
         paragraph(layout, now.note, "INFO")

@@ -13,6 +13,14 @@ PACKAGE = __package__.rpartition(".")[0]
 ENVIRONMENT = "OPTISENSE_ENGINE"
 
 
+def _changed(values: bpy.types.AddonPreferences, context: bpy.types.Context) -> None:
+    """Start the engine that is named now, unless the one before is at work."""
+    from . import session
+
+    if hasattr(bpy.types.WindowManager, "optisense") and not session.is_busy():
+        session.restart()
+
+
 class OPTISENSE_AP_preferences(bpy.types.AddonPreferences):
     """Settings that outlive a session of Blender."""
 
@@ -21,6 +29,7 @@ class OPTISENSE_AP_preferences(bpy.types.AddonPreferences):
     engine: StringProperty(
         name="Engine",
         description="How to start the engine, for example /home/me/.venv/bin/optisense engine",
+        update=_changed,
     )
 
     def draw(self, context: bpy.types.Context) -> None:
@@ -42,12 +51,12 @@ def preferences() -> bpy.types.AddonPreferences | None:
 def engine_command() -> list[str]:
     """How to start the engine; empty where none is known.
 
-    What `optisense studio` says comes first, then the preferences, then the search path.
+    The preferences come first, which what `optisense studio` says was written to when Blender
+    started; then that, then the search path.
     """
-    told = os.environ.get(ENVIRONMENT, "")
     own = preferences()
-    if not told and own is not None:
-        told = own.engine.strip()
+    told = own.engine.strip() if own is not None else ""
+    told = told or os.environ.get(ENVIRONMENT, "")
     if told:
         return [told] if os.path.isfile(told) else shlex.split(told)  # noqa: PTH113
     found = shutil.which("optisense")

@@ -76,6 +76,22 @@ def engine() -> Engine:
     return _engine
 
 
+def restart() -> None:
+    """End the engine, and start it as the preferences now say; what goes wrong is said."""
+    global _engine
+    if _engine is not None:
+        _engine.stop()
+        _engine = None
+    now = state()
+    now.problem = now.hint = ""
+    if not bpy.app.background:
+        try:
+            engine()
+        except EngineError as error:
+            say(error)
+    redraw()
+
+
 def folder() -> str:
     """Where the engine puts pictures, and where designs go on their way to it."""
     return engine().folder
@@ -182,11 +198,12 @@ def say(error: EngineError) -> None:
     """Show an error in the panels; select what it is about, and name that."""
     now = state()
     texts = [error.where, error.hint]
-    if error.part or error.path:
+    if error.part or error.path or error.contact is not None:
         from ..scene.offending import offending, select
 
         scene = bpy.context.scene
-        chosen = select(scene, offending(scene, error.path or "", error.part or ""))
+        found = offending(scene, error.path or "", error.part or "", error.contact)
+        chosen = select(scene, found)
         if chosen:
             names = ", ".join(each.name for each in chosen)
             texts.append(f"Selected: {names}")
@@ -253,6 +270,8 @@ def _tick() -> float | None:
         state().problem = f"Unexpected {type(error).__name__}: {error}"
         state().hint = "This is a defect of the extension; the console shows where it is"
     if _engine.ended:
+        if _engine.end is not None and not state().problem:
+            say(_engine.end)  # nobody waited for an answer who would have said it
         return None
     return BRISK if _engine.waiting else TICK
 

@@ -8,8 +8,10 @@ import bpy
 from bpy.props import StringProperty
 
 from ..core.engine import EngineError
+from ..core.numbers import shown_number
 from ..engine import catalogue, handing, polls, session
-from . import rays
+from ..simulate import editors
+from . import figures, rays
 
 RAYS = (16, 12)
 
@@ -91,6 +93,7 @@ def take(result: dict[str, Any]) -> None:
     """Keep the scores for the panel."""
     values = bpy.context.window_manager.optisense_evaluation
     values.scores.clear()
+    values.is_before = False
     for row in result["scores"]:
         score = values.scores.add()
         score.name = row["objective"]
@@ -99,12 +102,45 @@ def take(result: dict[str, Any]) -> None:
         score.failure = row.get("failure") or ""
         parts = row.get("parts") or {}
         score.parts = "\n".join(
-            f"{name.replace('_', ' ')}: {value:.4g}"
+            f"{name.replace('_', ' ')}: {shown_number(value)}"
             for name, value in parts.items()
             if isinstance(value, (int, float))
         )
         score.figure = row.get("figure") or ""
     session.redraw()
+
+
+class OPTISENSE_OT_show_figure(bpy.types.Operator):
+    """Show the figure of this score in full, in an Image Editor"""
+
+    bl_idname = "optisense.show_figure"
+    bl_label = "Open Figure"
+
+    objective: StringProperty(name="Objective", description="Whose figure; empty for the first")
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        scores = context.window_manager.optisense_evaluation.scores
+        if not any(figures.is_there(each.figure) for each in scores):
+            cls.poll_message_set("There is no figure yet: evaluate first")
+            return False
+        return editors.can_show(cls, context)
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        scores = context.window_manager.optisense_evaluation.scores
+        drawn = [each for each in scores if figures.is_there(each.figure)]
+        chosen = [each for each in drawn if self.objective in ("", each.name)]
+        if not chosen:
+            self.report({"ERROR"}, f"There is no figure of '{self.objective}'; evaluate again")
+            return {"CANCELLED"}
+        try:
+            # All of them, so that the editor's list of images offers the others too.
+            shown = {each.name: figures.load(each.title, each.figure) for each in drawn}
+        except RuntimeError as error:
+            self.report({"ERROR"}, f"The figure can't be read; evaluate again ({error})")
+            return {"CANCELLED"}
+        editors.show(context, shown[chosen[0].name])
+        return {"FINISHED"}
 
 
 class OPTISENSE_OT_show_rays(bpy.types.Operator):
@@ -167,6 +203,7 @@ class OPTISENSE_OT_hide_rays(bpy.types.Operator):
 CLASSES = (
     OPTISENSE_OT_choose_objective,
     OPTISENSE_OT_evaluate,
+    OPTISENSE_OT_show_figure,
     OPTISENSE_OT_show_rays,
     OPTISENSE_OT_hide_rays,
 )

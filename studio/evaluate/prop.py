@@ -3,7 +3,14 @@
 from __future__ import annotations
 
 import bpy
-from bpy.props import CollectionProperty, EnumProperty, IntProperty, PointerProperty, StringProperty
+from bpy.props import (
+    BoolProperty,
+    CollectionProperty,
+    EnumProperty,
+    IntProperty,
+    PointerProperty,
+    StringProperty,
+)
 
 from ..engine import catalogue
 
@@ -28,6 +35,9 @@ class OPTISENSE_PG_evaluation(bpy.types.PropertyGroup):
     chosen: EnumProperty(name="Objectives", items=_objectives, options={"ENUM_FLAG", "SKIP_SAVE"})
     own: StringProperty(
         name="Your own", description="FILE.py:FUNCTION", subtype="FILE_PATH", options={"SKIP_SAVE"}
+    )
+    is_before: BoolProperty(
+        description="They are of the sensor that was open before", options={"SKIP_SAVE"}
     )
     scores: CollectionProperty(type=OPTISENSE_PG_score, options={"SKIP_SAVE"})
     score_index: IntProperty(options={"SKIP_SAVE"})

@@ -5,8 +5,12 @@ from __future__ import annotations
 import bpy
 
 from ..engine import catalogue
-from ..engine.layout import SidebarPanel, paragraph, show_job
+from ..engine.layout import SidebarPanel, lines_of, paragraph, show_job
 from ..simulate.picture import file_icon
+from . import figures
+
+FIGURE = 10.5
+"""Width of a figure in the panel, in widths of an icon; in full it opens in an editor."""
 
 
 class OPTISENSE_PT_evaluate(SidebarPanel, bpy.types.Panel):
@@ -34,6 +38,8 @@ class OPTISENSE_PT_evaluate(SidebarPanel, bpy.types.Panel):
         row.scale_y = 1.4
         if not show_job(row, "Evaluating"):
             row.operator("optisense.evaluate", icon="CHECKMARK")
+        if values.scores and values.is_before:
+            layout.label(text="Of the sensor before", icon="INFO")
         for score in values.scores:
             _score(layout.box(), score)
         row = layout.row(align=True)
@@ -49,16 +55,19 @@ def _score(layout: bpy.types.UILayout, score: bpy.types.PropertyGroup) -> None:
     row.label(text=score.title)
     if score.failure:
         row.label(text="failed", icon="ERROR")
-        paragraph(layout, score.failure)
+        paragraph(layout, score.failure, boxed=True)
         return
     row.label(text=score.value)
     column = layout.column(align=True)
     column.scale_y = 0.8
     for line in score.parts.splitlines():
-        column.label(text=line, icon="DOT")
+        for number, piece in enumerate(lines_of(line, has_icon=True, boxed=True)):
+            column.label(text=piece, icon="BLANK1" if number else "DOT")
     icon = file_icon(score.figure)
     if icon:
-        layout.template_icon(icon_value=icon, scale=9.0)
+        layout.template_icon(icon_value=icon, scale=FIGURE)
+    if figures.is_there(score.figure):
+        layout.operator("optisense.show_figure", icon="IMAGE_DATA").objective = score.name
 
 
 register, unregister = bpy.utils.register_classes_factory((OPTISENSE_PT_evaluate,))

@@ -27,10 +27,10 @@ class OPTISENSE_PT_materials(SidebarPanel, bpy.types.Panel):
         coming = gallery.waiting(choice.kind)
         if coming:
             layout.label(text=f"Drawing {coming} more", icon="SORTTIME")
-        row = layout.row(align=True)
-        if not show_job(row, "Drawing the material"):
-            row.operator("optisense.preview_material", text="Preview", icon="SHADING_RENDERED")
-            row.operator("optisense.apply_material", icon="MATERIAL")
+        column = layout.column(align=True)
+        if not show_job(column, "Drawing the material"):
+            column.operator("optisense.preview_material", icon="SHADING_RENDERED")
+            column.operator("optisense.apply_material", icon="MATERIAL")
         icon = file_icon(choice.preview)
         if icon:
             layout.template_icon(icon_value=icon, scale=7.0)

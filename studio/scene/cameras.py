@@ -33,6 +33,7 @@ def add_camera(scene: bpy.types.Scene, values: dict[str, Any]) -> bpy.types.Obje
     own.fov = values["fov"]
     own.pixels = values["resolution"]
     place(camera, values)
+    camera.lock_scale = (True, True, True)
     camera.data.display_size = DRAWN_SIZE
     camera.data.clip_start = 0.01
     collection(scene, OPTICAL_SYSTEM).objects.link(camera)

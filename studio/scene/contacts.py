@@ -42,6 +42,8 @@ def add_contact(
     values.order = next_order(scene, "CONTACT")
     values.kind = "CONTACT"
     contact.color = COLOUR
+    # The surface says how it lies, and its own values how large it is and how it is turned.
+    contact.lock_rotation = contact.lock_scale = (True, True, True)
     turn = Vector(outward).to_track_quat("Z", "Y").to_matrix().to_4x4()
     contact.matrix_world = Matrix.Translation(point) @ turn
     collection(scene, CONTACTS).objects.link(contact)
@@ -158,7 +160,11 @@ def contact_values(contact: bpy.types.Object, depsgraph: bpy.types.Depsgraph) ->
     }
 
 
+def pressing(scene: bpy.types.Scene) -> list[bpy.types.Object]:
+    """The contacts that are not hidden, in the order in which the engine is told of them."""
+    return [each for each in objects_of(scene, "CONTACT") if not each.hide_get()]
+
+
 def contact_list(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> list[dict[str, Any]]:
-    """All contacts of the scene that are not hidden."""
-    contacts = [each for each in objects_of(scene, "CONTACT") if not each.hide_get()]
-    return [contact_values(each, depsgraph) for each in contacts]
+    """All contacts of the scene that press, as the engine reads them."""
+    return [contact_values(each, depsgraph) for each in pressing(scene)]

@@ -39,6 +39,7 @@ def add_light(
     place(light, pose)
     light.color = lamp_colour(group)
     light.show_in_front = True
+    light.lock_scale = (True, True, True)  # its group says how large it is
     collection(scene, OPTICAL_SYSTEM).objects.link(light)
     return light
 

@@ -7,18 +7,23 @@ import re
 import bpy
 
 from .collections import objects_of
-from .contacts import sensing_surface
+from .contacts import pressing, sensing_surface
 from .gather import part_names
 
 
-def offending(scene: bpy.types.Scene, path: str, part: str) -> list[bpy.types.Object]:
+def offending(
+    scene: bpy.types.Scene, path: str, part: str, contact: int | None = None
+) -> list[bpy.types.Object]:
     """Objects that stand for a place in the design; empty where none does.
 
     Args:
         scene: that holds the design.
         path: dotted, as in `lights.red.lights[0].position`; may be empty.
         part: the part that the error names; may be empty.
+        contact: which of the contacts that press, the first is 0; None if it is about none.
     """
+    if contact is not None:
+        return pressing(scene)[contact:][:1]
     light = re.match(r"lights\.([^.\[]+)(?:\.lights\[(\d+)\])?", path)
     if light:
         group = [e for e in objects_of(scene, "LIGHT") if e.optisense.group == light[1]]

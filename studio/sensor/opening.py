@@ -103,7 +103,11 @@ def open_stage(
 
 
 def _picture_is_old() -> None:
-    """What is shown is no picture of the sensor that opens, whose lights do not relight it."""
+    """What is shown is no picture of the sensor that opens, whose lights do not relight it.
+
+    The scores are not of that sensor either.
+    """
     now = bpy.context.window_manager.optisense_picture
     now.image = ""
     now.is_before = now.shown
+    bpy.context.window_manager.optisense_evaluation.is_before = True

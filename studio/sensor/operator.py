@@ -189,6 +189,24 @@ class OPTISENSE_OT_check(bpy.types.Operator):
         return {"FINISHED"}
 
 
+class OPTISENSE_OT_start_engine(bpy.types.Operator):
+    """Start the engine, which makes pictures, scores and searches"""
+
+    bl_idname = "optisense.start_engine"
+    bl_label = "Start the Engine"
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        if session.running() is not None:
+            cls.poll_message_set("It runs")
+            return False
+        return True
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        session.restart()
+        return {"FINISHED"}
+
+
 class OPTISENSE_OT_cancel(bpy.types.Operator):
     """Give up what the engine is working on"""
 
@@ -214,6 +232,7 @@ CLASSES = (
     OPTISENSE_OT_save,
     OPTISENSE_OT_save_as,
     OPTISENSE_OT_check,
+    OPTISENSE_OT_start_engine,
     OPTISENSE_OT_cancel,
 )
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import bpy
 
+from ..engine import session
 from ..engine.layout import SidebarPanel, paragraph, show_job, show_messages
 from ..engine.preferences import HOW_TO_GET, engine_command
 
@@ -21,6 +22,8 @@ class OPTISENSE_PT_sensor(SidebarPanel, bpy.types.Panel):
         layout = self.layout
         if not engine_command():
             paragraph(layout, f"No engine was found. {HOW_TO_GET}.", "ERROR")
+        elif session.running() is None:
+            layout.operator("optisense.start_engine", icon="PLAY")
         layout.menu("OPTISENSE_MT_new", icon="FILE_NEW")
         row = layout.row(align=True)
         row.operator("optisense.open", text="Open", icon="FILE_FOLDER")

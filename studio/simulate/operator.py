@@ -13,7 +13,7 @@ from ..core.engine import EngineError
 from ..engine import handing, polls, session
 from ..scene.collections import objects_of
 from ..scene.contacts import add_contact, sensing_surface
-from . import picture, requests
+from . import editors, picture, requests
 
 
 class OPTISENSE_OT_simulate(bpy.types.Operator):
@@ -70,35 +70,11 @@ class OPTISENSE_OT_show_picture(bpy.types.Operator):
         if bpy.data.images.get(picture.IMAGE) is None:
             cls.poll_message_set("Simulate first")
             return False
-        if context.screen is None:
-            cls.poll_message_set("There is no window")
-            return False
-        return True
+        return editors.can_show(cls, context)
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        areas = context.screen.areas
-        editor = next((each for each in areas if each.type == "IMAGE_EDITOR"), None)
-        if editor is None:
-            known = set(areas)
-            area = next(each for each in areas if each.type == "VIEW_3D")
-            with context.temp_override(area=area):
-                bpy.ops.screen.area_split(direction="VERTICAL", factor=0.5)
-            editor = next((each for each in context.screen.areas if each not in known), area)
-            editor.type = "IMAGE_EDITOR"
-        editor.spaces.active.image = bpy.data.images[picture.IMAGE]
-        bpy.app.timers.register(_fit_editors, first_interval=0.2)  # when the area has its size
+        editors.show(context, bpy.data.images[picture.IMAGE])
         return {"FINISHED"}
-
-
-def _fit_editors() -> None:
-    """Show the whole picture in every Image Editor that shows it."""
-    image = bpy.data.images.get(picture.IMAGE)
-    for window in bpy.context.window_manager.windows:
-        for area in window.screen.areas:
-            if area.type == "IMAGE_EDITOR" and area.spaces.active.image == image:
-                region = next(each for each in area.regions if each.type == "WINDOW")
-                with bpy.context.temp_override(window=window, area=area, region=region):
-                    bpy.ops.image.view_all(fit_view=True)
 
 
 class OPTISENSE_OT_add_contact(bpy.types.Operator):

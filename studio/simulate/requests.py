@@ -8,7 +8,8 @@ import bpy
 import numpy as np
 
 from ..engine import handing, session
-from ..scene.contacts import contact_list
+from ..scene.contacts import contact_list, pressing
+from ..scene.offending import select
 from . import picture
 
 LATEST = "picture"
@@ -57,7 +58,21 @@ def take(result: dict[str, Any], *, draft: bool) -> None:
     now.is_relit = now.is_before = False
     now.file = result["files"].get("picture", "")
     now.summary = summary(result)
+    _tell_unseen(result.get("unseen") or [])
     session.redraw()
+
+
+def _tell_unseen(numbers: list[int]) -> None:
+    """Select the contacts that the picture does not show, and say so."""
+    scene = bpy.context.scene
+    contacts = pressing(scene)
+    chosen = select(scene, [contacts[each] for each in numbers if each < len(contacts)])
+    if chosen:
+        names = ", ".join(each.name for each in chosen)
+        session.state().note = (
+            f"The camera does not see {names} (selected): move it to where the camera looks, "
+            "which Show Chief Rays draws"
+        )
 
 
 def summary(result: dict[str, Any]) -> str:

@@ -67,13 +67,13 @@ def _contact(column: bpy.types.UILayout, values: bpy.types.PropertyGroup) -> Non
     if values.indenter == "cylinder":
         column.prop(values, "length", text="Length (mm)")
     if values.indenter == "plane":
-        column.prop(values, "tilt")
+        column.prop(values, "tilt", text="Tilt (°)")
         column.prop(values, "size", text="Size (mm)")
     if values.indenter == "mesh":
         column.prop(values, "file")
         column.prop(values, "scale")
     column.prop(values, "depth", text="Depth (mm)")
-    column.prop(values, "rotation")
+    column.prop(values, "rotation", text="Rotation (°)")
 
 
 def _light_levels(layout: bpy.types.UILayout, scene: bpy.types.Scene) -> None:

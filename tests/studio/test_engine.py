@@ -143,6 +143,27 @@ def test_no_engine_and_one_that_is_no_engine(
         bpy.ops.optisense.check()
 
 
+def test_an_engine_that_ends_before_it_is_asked_is_told(
+    mini: Any, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    script = tmp_path / "broken.py"
+    script.write_text("raise SystemExit('No module named optisense')\n")
+    before = session._engine
+    monkeypatch.setattr(session, "_engine", None)
+    monkeypatch.setenv("OPTISENSE_ENGINE", f"{sys.executable} {script}")
+    session.engine()
+    end = time.monotonic() + 60.0
+    while session._tick() is not None:
+        assert time.monotonic() < end
+        time.sleep(0.01)
+    assert "ended unexpectedly" in session.state().problem
+    assert "No module named optisense" in session.state().hint
+    assert session.running() is None and bpy.ops.optisense.start_engine.poll()
+    monkeypatch.undo()
+    assert session._engine is before
+    assert bpy.ops.optisense.check() == {"FINISHED"}
+
+
 def test_a_defect_in_an_answer_does_not_stop_the_rest(
     mini: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:

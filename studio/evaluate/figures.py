@@ -1,0 +1,34 @@
+"""Figures of scores as Blender's images, to be looked at in full."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import bpy
+
+PREFIX = "OptiSense figure: "
+
+
+def load(title: str, file: str) -> bpy.types.Image:
+    """A figure as an image, in place of the one of that title before.
+
+    It is packed: the file is the engine's and goes with it, and the figure stays in the user's
+    .blend file if an editor shows it.
+
+    Raises:
+        RuntimeError: the file is gone or no picture.
+    """
+    name = f"{PREFIX}{title}"
+    loaded = bpy.data.images.load(file)
+    before = bpy.data.images.get(name)
+    if before is not None:
+        before.user_remap(loaded)  # editors that show it show the new one
+        bpy.data.images.remove(before)
+    loaded.name = name
+    loaded.pack()
+    return loaded
+
+
+def is_there(file: str) -> bool:
+    """Whether the engine's file of a figure is still there."""
+    return bool(file) and Path(file).is_file()

@@ -1,0 +1,51 @@
+"""Pictures in Image Editors."""
+
+from __future__ import annotations
+
+import bpy
+
+WAIT = 0.2
+"""Seconds until an area that was made or changed has its size."""
+
+
+def can_show(operator: type[bpy.types.Operator], context: bpy.types.Context) -> bool:
+    """Whether there is a window to show a picture in."""
+    if context.screen is None:
+        operator.poll_message_set("There is no window")
+        return False
+    return True
+
+
+def show(context: bpy.types.Context, image: bpy.types.Image) -> None:
+    """Show a picture in the Image Editor of this window, which is made where there is none."""
+    areas = context.screen.areas
+    editors = [each for each in areas if each.type == "IMAGE_EDITOR"]
+    editor = next((each for each in editors if each.spaces.active.image == image), None)
+    editor = editor or next(iter(editors), None) or _new_editor(context)
+    editor.spaces.active.image = image
+    name = image.name
+    bpy.app.timers.register(lambda: _fit(name), first_interval=WAIT)
+
+
+def _new_editor(context: bpy.types.Context) -> bpy.types.Area:
+    """Half of the largest 3D view becomes an Image Editor."""
+    areas = context.screen.areas
+    known = set(areas)
+    views = [each for each in areas if each.type == "VIEW_3D"] or list(areas)
+    area = max(views, key=lambda each: each.width * each.height)
+    with context.temp_override(area=area):
+        bpy.ops.screen.area_split(direction="VERTICAL", factor=0.5)
+    editor = next((each for each in context.screen.areas if each not in known), area)
+    editor.type = "IMAGE_EDITOR"
+    return editor
+
+
+def _fit(name: str) -> None:
+    """Show the whole picture in every Image Editor that shows it."""
+    image = bpy.data.images.get(name)
+    for window in bpy.context.window_manager.windows:
+        for area in window.screen.areas:
+            if area.type == "IMAGE_EDITOR" and area.spaces.active.image == image:
+                region = next(each for each in area.regions if each.type == "WINDOW")
+                with bpy.context.temp_override(window=window, area=area, region=region):
+                    bpy.ops.image.view_all(fit_view=True)

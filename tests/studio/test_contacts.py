@@ -1,0 +1,76 @@
+"""Contacts: what is wrong with one selects and names it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import bpy
+import pytest
+
+from studio.engine import session
+from studio.scene.collections import object_of, objects_of
+
+
+def small(scene: Any) -> None:
+    scene.optisense_simulation.size = "160"
+    scene.optisense_simulation.noise = 50.0
+
+
+def test_a_contact_that_is_too_deep_is_selected_and_named(
+    mini: Any, select: Callable[..., None]
+) -> None:
+    small(mini)
+    for _ in range(3):
+        bpy.ops.optisense.add_contact()
+    first, hidden, deep = objects_of(mini, "CONTACT")
+    hidden.hide_set(True)  # does not press, and is not counted
+    deep.optisense.depth = 40.0
+    select(first)
+    with pytest.raises(RuntimeError, match="mm thick"):
+        bpy.ops.optisense.simulate()
+    assert list(bpy.context.selected_objects) == [deep]
+    assert bpy.context.active_object == deep
+    assert f"Selected: {deep.name}" in session.state().hint
+
+
+def test_a_contact_off_the_surface_is_selected(mini: Any) -> None:
+    small(mini)
+    for _ in range(2):
+        bpy.ops.optisense.add_contact()
+    off = objects_of(mini, "CONTACT")[1]
+    off.constraints.clear()  # else it would be held on the surface
+    off.location = (0.0, 0.0, 30.0)
+    with pytest.raises(RuntimeError, match="away from the sensing surface"):
+        bpy.ops.optisense.simulate()
+    assert list(bpy.context.selected_objects) == [off]
+
+
+def test_a_contact_that_the_camera_does_not_see_is_selected_and_said(mini: Any) -> None:
+    small(mini)
+    for _ in range(2):
+        bpy.ops.optisense.add_contact()
+    corner = objects_of(mini, "CONTACT")[0]
+    corner.location = (8.3, 10.0, 0.0)
+    corner.optisense.radius = 0.5
+    assert bpy.ops.optisense.simulate() == {"FINISHED"}
+    assert list(bpy.context.selected_objects) == [corner]
+    assert f"does not see {corner.name}" in session.state().note
+    corner.location = (0.0, 0.0, 0.0)
+    assert bpy.ops.optisense.simulate() == {"FINISHED"}
+    assert "does not see" not in session.state().note
+
+
+def test_a_contact_on_a_gel_that_is_gone(mini: Any) -> None:
+    small(mini)
+    bpy.ops.optisense.add_contact()
+    bpy.data.objects.remove(object_of(mini, "PART", "skin"))
+    with pytest.raises(RuntimeError):
+        bpy.ops.optisense.simulate()
+    assert session.state().problem
+
+
+def test_only_what_counts_can_be_changed_by_hand(mini: Any) -> None:
+    bpy.ops.optisense.add_contact()
+    for kind in ("CONTACT", "LIGHT", "CAMERA"):
+        assert all(objects_of(mini, kind)[0].lock_scale), kind
