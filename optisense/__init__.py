@@ -6,9 +6,10 @@ the package neither loads the renderer nor needs libLLVM.
 
 from __future__ import annotations
 
-from importlib import import_module
 from importlib.metadata import PackageNotFoundError, version
 from typing import TYPE_CHECKING
+
+from optisense.lazy_names import load_on_first_use
 
 if TYPE_CHECKING:
     from optisense.design import SensorDesign, get_value, load_design, set_value
@@ -19,23 +20,24 @@ if TYPE_CHECKING:
     from optisense.sensors import check, load, save_design
 
 _HOMES = {
-    "Contact": "optisense.geometry",
-    "Cylinder": "optisense.geometry",
-    "MeshIndenter": "optisense.geometry",
-    "OpticalModel": "optisense.optics",
-    "Plane": "optisense.geometry",
-    "Score": "optisense.objectives",
-    "SearchSpace": "optisense.search",
-    "SensorDesign": "optisense.design",
-    "Sphere": "optisense.geometry",
-    "check": "optisense.sensors",
-    "evaluate": "optisense.objectives",
-    "get_value": "optisense.design",
-    "load": "optisense.sensors",
-    "load_design": "optisense.design",
-    "objective": "optisense.objectives",
-    "save_design": "optisense.sensors",
-    "set_value": "optisense.design",
+    "Contact": ".geometry",
+    "Cylinder": ".geometry",
+    "MeshIndenter": ".geometry",
+    "OpticalModel": ".optics",
+    "Plane": ".geometry",
+    "Score": ".objectives",
+    "SearchSpace": ".search",
+    "SensorDesign": ".design",
+    "Sphere": ".geometry",
+    "check": ".sensors",
+    "evaluate": ".objectives",
+    "get_value": ".design",
+    "load": ".sensors",
+    "load_design": ".design",
+    "objective": ".objectives",
+    "save_design": ".sensors",
+    "search": ".search",  # a package that can be called: see there
+    "set_value": ".design",
 }
 
 try:
@@ -65,17 +67,5 @@ __all__ = [
     "set_value",
 ]
 
-
-def __getattr__(name: str) -> object:
-    """Import a public name on first use (PEP 562)."""
-    if name == "search":  # a package that can be called: see there
-        return import_module("optisense.search")
-    if name not in _HOMES:
-        raise AttributeError(f"module 'optisense' has no attribute {name!r}")
-    value: object = getattr(import_module(_HOMES[name]), name)
-    globals()[name] = value
-    return value
-
-
-def __dir__() -> list[str]:
-    return sorted(__all__)
+if not TYPE_CHECKING:  # type checkers would take any name for one of the package's
+    __getattr__, __dir__ = load_on_first_use(__name__, _HOMES)

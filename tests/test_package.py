@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from importlib import import_module
 
 import pytest
 
@@ -31,3 +32,19 @@ def test_loading_a_design_does_not_load_the_renderer() -> None:
 def test_unknown_names_are_attribute_errors() -> None:
     with pytest.raises(AttributeError, match="nothing"):
         optisense.nothing  # noqa: B018
+
+
+@pytest.mark.parametrize("package", ["optisense", "optisense.optics", "optisense.report"])
+def test_every_public_name_loads_and_is_listed(package: str) -> None:
+    module = import_module(package)
+    assert dir(module) == sorted(module.__all__)
+    for name in module.__all__:
+        assert getattr(module, name) is getattr(module, name)
+        assert name in vars(module)
+
+
+def test_search_is_a_package_and_can_be_called() -> None:
+    from optisense import search
+
+    assert search is sys.modules["optisense.search"]
+    assert callable(search)

@@ -5,8 +5,9 @@ Names load on first use: whoever asks for one gets libLLVM checked before Mitsub
 
 from __future__ import annotations
 
-from importlib import import_module
 from typing import TYPE_CHECKING
+
+from optisense.lazy_names import load_on_first_use
 
 if TYPE_CHECKING:
     from optisense.optics.chief_rays import ChiefRays, Outcome
@@ -14,27 +15,21 @@ if TYPE_CHECKING:
     from optisense.optics.model import OpticalModel, Progress
 
 _HOMES = {
-    "ChiefRays": "chief_rays",
-    "OpticalModel": "model",
-    "Outcome": "chief_rays",
-    "Progress": "model",
-    "TactileImage": "image",
+    "ChiefRays": ".chief_rays",
+    "OpticalModel": ".model",
+    "Outcome": ".chief_rays",
+    "Progress": ".model",
+    "TactileImage": ".image",
 }
 
 __all__ = ["ChiefRays", "OpticalModel", "Outcome", "Progress", "TactileImage"]
 
 
-def __getattr__(name: str) -> object:
-    """Check libLLVM, then import a public name (PEP 562)."""
-    if name not in _HOMES:
-        raise AttributeError(f"module 'optisense.optics' has no attribute {name!r}")
+def _check_llvm() -> None:
     from optisense.optics.variant import select_variant
 
     select_variant("auto")
-    value: object = getattr(import_module(f"optisense.optics.{_HOMES[name]}"), name)
-    globals()[name] = value
-    return value
 
 
-def __dir__() -> list[str]:
-    return sorted(__all__)
+if not TYPE_CHECKING:  # type checkers would take any name for one of the package's
+    __getattr__, __dir__ = load_on_first_use(__name__, _HOMES, before=_check_llvm)

@@ -5,8 +5,9 @@ Names load on first use, so that importing the package loads neither scikit-lear
 
 from __future__ import annotations
 
-from importlib import import_module
 from typing import TYPE_CHECKING
+
+from optisense.lazy_names import load_on_first_use
 
 if TYPE_CHECKING:
     from optisense.tasks.calibration import CalibratedSensor, ReconstructionSettings
@@ -25,22 +26,22 @@ if TYPE_CHECKING:
     from optisense.tasks.snr import signal_to_noise
 
 _HOMES = {
-    "CalibratedSensor": "calibration",
-    "ContactDraw": "draws",
-    "CylinderRadius": "cylinder_radius",
-    "Dataset": "dataset",
-    "DatasetSettings": "generation",
-    "Misalignment": "misalignment",
-    "PerceptionResult": "perception",
-    "PerceptionTask": "perception",
-    "ReconstructionResult": "reconstruction",
-    "ReconstructionSettings": "calibration",
-    "Sample": "dataset",
-    "SampleSettings": "perception",
-    "generate": "generation",
-    "perceive": "perception",
-    "reconstruct": "reconstruction",
-    "signal_to_noise": "snr",
+    "CalibratedSensor": ".calibration",
+    "ContactDraw": ".draws",
+    "CylinderRadius": ".cylinder_radius",
+    "Dataset": ".dataset",
+    "DatasetSettings": ".generation",
+    "Misalignment": ".misalignment",
+    "PerceptionResult": ".perception",
+    "PerceptionTask": ".perception",
+    "ReconstructionResult": ".reconstruction",
+    "ReconstructionSettings": ".calibration",
+    "Sample": ".dataset",
+    "SampleSettings": ".perception",
+    "generate": ".generation",
+    "perceive": ".perception",
+    "reconstruct": ".reconstruction",
+    "signal_to_noise": ".snr",
 }
 
 __all__ = [
@@ -62,15 +63,5 @@ __all__ = [
     "signal_to_noise",
 ]
 
-
-def __getattr__(name: str) -> object:
-    """Import a public name on first use (PEP 562)."""
-    if name not in _HOMES:
-        raise AttributeError(f"module 'optisense.tasks' has no attribute {name!r}")
-    value: object = getattr(import_module(f"optisense.tasks.{_HOMES[name]}"), name)
-    globals()[name] = value
-    return value
-
-
-def __dir__() -> list[str]:
-    return sorted(__all__)
+if not TYPE_CHECKING:  # type checkers would take any name for one of the package's
+    __getattr__, __dir__ = load_on_first_use(__name__, _HOMES)
