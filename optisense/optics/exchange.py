@@ -108,6 +108,8 @@ def _sample(
     active: mi.Bool,
     raised: mi.Bool,
     random: mi.UInt32,
+    series: mi.UInt32,
+    first: mi.UInt32,
     directions: mi.UInt32,
 ) -> list[mi.Color3f]:
     totals = [mi.Color3f(0) for _ in range(groups)]
@@ -116,8 +118,9 @@ def _sample(
     survival = dr.max(albedo)
     k = mi.UInt32(0)
     while active & (k < directions):
-        u = unit_float(random + k * STEPS_2D[0])
-        v = unit_float(random * 277803737 + k * STEPS_2D[1])
+        # One sequence goes through all samples of a pixel.
+        u = unit_float(series + (first + k) * STEPS_2D[0])
+        v = unit_float(series * 277803737 + (first + k) * STEPS_2D[1])
         state = (random ^ (k * 0x9E3779B9)) * 69069
         way, weight = sample_coating(
             coating, normal, -towards_eye, unit_float(state), mi.Point2f(u, v)
@@ -197,5 +200,7 @@ def exchanged(
         active,
         raised,
         random,
+        points.series,
+        points.number * DIRECTIONS,
         dr.opaque(mi.UInt32, DIRECTIONS),
     )

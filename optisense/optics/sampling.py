@@ -19,6 +19,10 @@ def _steps(dimensions: int) -> list[int]:
 
 STEPS = _steps(4)
 STEPS_2D = _steps(2)
+STEPS_OF_SERIES = [round((2**0.5 - 1) * 2**32), *STEPS[1:]]
+"""The first of `STEPS` is nearly 6/7, and some ten elements would fall on seven places."""
+ROUNDS = 8
+"""Of the hash that shifts a series: after the usual four, similar bits give similar shifts."""
 
 
 def unit_float(bits: mi.UInt32) -> mi.Float:
@@ -51,6 +55,13 @@ def sequence_2d(index: mi.UInt32, stream: mi.UInt32, seed: mi.UInt32) -> mi.Poin
         shift = mi.sample_tea_32(stream * 4 + k, seed)[0]
         out.append(unit_float(index * mi.UInt32(step) + shift))
     return mi.Point2f(*out)
+
+
+def in_series(series: mi.UInt32, number: mi.UInt32, dimension: int) -> mi.Float:
+    """One coordinate (of `STEPS_OF_SERIES`) in [0, 1) of element ``number`` of a sequence that
+    random bits have shifted."""
+    shift = mi.sample_tea_32(series, mi.UInt32(dimension), ROUNDS)[0]
+    return unit_float(number * mi.UInt32(STEPS_OF_SERIES[dimension]) + shift)
 
 
 def seed_of(*numbers: int) -> int:

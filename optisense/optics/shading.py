@@ -20,7 +20,7 @@ from optisense.optics.cells import SurfaceCells, cell_at, plane_of
 from optisense.optics.exchange import exchanged, irradiance
 from optisense.optics.light_field import LEAST_COSINE, LightField
 from optisense.optics.ray_scene import RayScene, leave
-from optisense.optics.sampling import next_random, unit_float
+from optisense.optics.sampling import in_series, next_random
 from optisense.optics.scattering import (
     Coating,
     albedo_of,
@@ -97,8 +97,8 @@ def _sum_chosen(
         falling, mean, _ = irradiance(table, cell * groups + g, points.normal)
         expected = (falling + LEAST_LIGHT * mean) * grey(albedo_of(coating)) * dr.inv_pi
         steps.append(dr.maximum(expected / chosen, LEAST_STEP))
-        state = next_random(state)
-        running.append(unit_float(state))
+        # Of the samples of a pixel, each begins at another part of a step.
+        running.append(in_series(points.series + (g + 1), points.number, 0))
     upright, _ = plane_of(cells, cell, active)
     axis = mi.Vector3f(*[float(part) for part in cells.axes[2]])
     k = mi.UInt32(0)
@@ -216,7 +216,7 @@ def shade(
         onward = scenes.fixed.intersect(points.point, -points.towards_eye, raised)
         base = dr.select(raised & onward.valid, onward.point, points.point)
     random = points.random
-    cell, shift, active = _interpolating_cell(field.cells, base, active, random)
+    cell, shift, active = _interpolating_cell(field.cells, base, active, points)
     start = leave(points.point, points.face_normal, points.face_normal)
     coating = coating_of(table, points.surface, active, field.metallic)
     tables = (field.moments, field.heights, field.colours)
@@ -268,20 +268,16 @@ def shade(
 
 
 def _interpolating_cell(
-    cells: SurfaceCells, base: mi.Point3f, active: mi.Bool, random: mi.UInt32
+    cells: SurfaceCells, base: mi.Point3f, active: mi.Bool, points: VisiblePoints
 ) -> tuple[mi.UInt32, mi.Vector3f, mi.Bool]:
     """A random cell next to points, how far it was moved, and whether there is one.
 
     The same for all bins, as light that straddles two bins must not be taken twice; over the
-    samples of a pixel this interpolates between cells.
+    samples of a pixel, which are spread evenly, this interpolates between cells.
     """
     home, found = cell_at(cells, base, active)
     upright, _ = plane_of(cells, home, found)
-    shift = mi.Vector3f(
-        unit_float(random),
-        unit_float(random * 277803737),
-        unit_float((random ^ 0x9E3779B9) * 69069),
-    )
+    shift = mi.Vector3f(*(in_series(points.series, points.number, 1 + k) for k in range(3)))
     shift = (shift - 0.5) * dr.rcp(cells.inverse_size)
     shift -= upright * dr.dot(upright, shift)
     beside, exists = cell_at(cells, base + shift, found)

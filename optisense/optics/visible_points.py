@@ -38,7 +38,8 @@ class VisiblePoints:
 
     ``weight`` multiplies the radiance that leaves the point along ``towards_eye``; ``light`` is
     the number + 1 of a light that the path ends on instead (its emission is seen), else 0.
-    ``random`` are random bits of the path's own.
+    ``random`` are random bits of the path's own, ``series`` those of its pixel, and ``number`` that
+    of the sample there: what the samples of a pixel draw from one series is spread evenly.
     """
 
     pixel: mi.UInt32
@@ -51,6 +52,8 @@ class VisiblePoints:
     surface: mi.UInt32
     light: mi.UInt32
     random: mi.UInt32
+    series: mi.UInt32
+    number: mi.UInt32
 
 
 @dr.syntax
@@ -180,9 +183,11 @@ def find_visible_points(
     What is drawn at random follows from pixel, ``number`` of the sample and seed alone, so that
     each path is the same whichever others are traced with it.
     """
+    dr.make_opaque(number)  # one kernel for all numbers
     origin, direction = camera.rays(film.x, film.y)
     stream = mi.sample_tea_32(number, dr.opaque(mi.UInt32, seed))[0]
     own, other = mi.sample_tea_32(pixel, stream)
+    series = mi.sample_tea_32(pixel, dr.opaque(mi.UInt32, seed))[1]
     depth = dr.opaque(mi.UInt32, MAX_DEPTH)
     tables = (scene.scene, scene.rows, scene.corners, scene.table)
     start = dr.full(mi.Bool, True, dr.width(film))
@@ -198,15 +203,15 @@ def find_visible_points(
         scene.rough,
         depth,
     )
-    dr.eval(out, own, other)
-    main = VisiblePoints(*(pixel, *out[:8], own))
+    dr.eval(out, own, other, series)
+    main = VisiblePoints(*(pixel, *out[:8], own, series, number))
     total, branch_origin, branch_direction = out[8:]
     if only_main:
         return main, None
     lanes = dr.compress(dr.max(total) > 1e-5)
     if dr.width(lanes) == 0:
         return main, None
-    other = dr.gather(mi.UInt32, other, lanes)
+    other, series, number = (dr.gather(mi.UInt32, each, lanes) for each in (other, series, number))
     branch = _follow(
         *tables,
         dr.gather(mi.Point3f, branch_origin, lanes),
@@ -219,7 +224,7 @@ def find_visible_points(
         scene.rough,
         depth,
     )
-    dr.eval(branch, other)
+    dr.eval(branch, other, series, number)
     kept = dr.compress(branch[0] | (branch[7] > 0))
     if dr.width(kept) == 0:
         return main, None
@@ -228,7 +233,9 @@ def find_visible_points(
         alone
     ):  # Dr.Jit compiles other kernels for arrays of one entry: add one that counts for nothing
         kept = dr.repeat(kept, 2)
-    picked: list[Any] = [dr.gather(type(value), value, kept) for value in (*branch[:8], other)]
+    picked: list[Any] = [
+        dr.gather(type(value), value, kept) for value in (*branch[:8], other, series, number)
+    ]
     pixels = dr.gather(mi.UInt32, pixel, dr.gather(mi.UInt32, lanes, kept))
     reflected = VisiblePoints(pixels, *picked)
     if alone:
