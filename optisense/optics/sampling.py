@@ -19,8 +19,9 @@ def _steps(dimensions: int) -> list[int]:
 
 STEPS = _steps(4)
 STEPS_2D = _steps(2)
-STEPS_OF_SERIES = [round((2**0.5 - 1) * 2**32), *STEPS[1:]]
-"""The first of `STEPS` is nearly 6/7, and some ten elements would fall on seven places."""
+STEPS_OF_SERIES = [round((prime**0.5 % 1) * 2**32) for prime in (2, 3, 5, 7)]
+"""Square roots of primes (Richtmyer): no fraction is near them, so that a few elements are spread
+evenly in each dimension by itself, too. The first of `STEPS` is nearly 6/7."""
 ROUNDS = 8
 """Of the hash that shifts a series: after the usual four, similar bits give similar shifts."""
 
