@@ -6,6 +6,7 @@ import errno
 import json
 import os
 from collections.abc import Mapping
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -92,11 +93,12 @@ class TactileImage:
         self.settings["exposure"] = (
             auto_exposure(self.radiance) if exposure == "auto" else float(exposure)
         )
+        bitmaps = {"image.png": self.picture(exposure), "radiance.exr": self.radiance}
+        bitmaps |= {f"layers/{name}.exr": layer for name, layer in self.layers.items()}
         with written_together("the results") as stage:
-            _bitmap(self.picture(exposure), stage(out / "image.png"))
-            _bitmap(self.radiance, stage(out / "radiance.exr"))
-            for name, layer in self.layers.items():
-                _bitmap(layer, stage(out / "layers" / f"{name}.exr"))
+            paths = [stage(out / name) for name in bitmaps]
+            with ThreadPoolExecutor() as pool:  # compresses outside Python's lock
+                list(pool.map(_bitmap, bitmaps.values(), paths))
             np.save(stage(out / "normals.npy"), self.normals)
             np.save(stage(out / "contact_mask.npy"), self.contact_mask)
             text = json.dumps(self.settings, indent=2) + "\n"

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from functools import partial
 from pathlib import Path
 from typing import Any, Literal, Protocol
 
@@ -132,23 +133,27 @@ def _pictures(
     """The pictures with their captions; the tactile image comes first."""
     picture = image.picture(exposure)
     factor = auto_exposure(image.radiance) if exposure == "auto" else float(exposure)
-    shown = [("picture", picture, "tactile image", "")]
-    shown += [
-        (f"layer {name}", encode(factor * layer), f"{name} lights alone", "")
-        for name, layer in image.layers.items()
-    ]
-    normals = normal_colours(image.normals, design.camera.axes())
+    shown: list[tuple[str, Callable[[], NDArray[np.uint8]], str, str]]
+    shown = [("picture", lambda: picture, "tactile image", "")]
+    for name, layer in image.layers.items():
+        exposed = partial(_exposed, layer, factor)
+        shown.append((f"layer {name}", exposed, f"{name} lights alone", ""))
+    normals = partial(normal_colours, image.normals, design.camera.axes())
     shown.append(("normals", normals, "surface normals", "red right, green up, blue to the camera"))
     if image.contact_mask.any():
         covered = 100 * float(image.contact_mask.mean())
-        overlay = mask_overlay(picture, image.contact_mask)
+        overlay = partial(mask_overlay, picture, image.contact_mask)
         shown.append(("contact", overlay, "contact", f"{covered:.1f} % of the picture"))
-    with ThreadPoolExecutor() as pool:  # zlib compresses outside Python's lock
-        addresses = list(pool.map(data_uri, [pixels for _, pixels, _, _ in shown]))
+    with ThreadPoolExecutor() as pool:  # NumPy and zlib work outside Python's lock
+        addresses = list(pool.map(lambda pixels: data_uri(pixels()), [row[1] for row in shown]))
     return [
         {"name": name, "uri": address, "caption": caption, "note": note}
         for (name, _, caption, note), address in zip(shown, addresses, strict=True)
     ]
+
+
+def _exposed(layer: NDArray[np.float32], factor: float) -> NDArray[np.uint8]:
+    return encode(factor * layer)
 
 
 def _place_to_look_at(mask: NDArray[np.bool_]) -> tuple[int, int]:
