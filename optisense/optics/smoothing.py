@@ -154,7 +154,7 @@ def smooth(
     factors: mi.Float,
 ) -> list[Any]:
     """Kernel-weighted sums over neighbouring cells of the chosen bins, for tables whose entries are
-    of these kinds (`mi.Float` or a vector).
+    of these kinds (`mi.Float` or a vector): first the moments of a light field.
 
     ``factors`` (cells times groups) multiply the sums.
     """
@@ -169,9 +169,11 @@ def smooth(
     totals = [kind(0) for kind in kinds]
     while j < end:
         other = dr.gather(mi.UInt32, kernel.cell, j) * (stride * groups) + slot
-        weight = dr.gather(mi.Float, kernel.weight, j)
-        for i in range(len(kinds)):
-            totals[i] += weight * dr.gather(kinds[i], tables[i], other)
+        # Most bins hold nothing: one look at the fourth float of the first table tells.
+        if dr.gather(mi.Float, tables[0], other * 4 + 3) > 0:
+            weight = dr.gather(mi.Float, kernel.weight, j)
+            for i in range(len(kinds)):
+                totals[i] += weight * dr.gather(kinds[i], tables[i], other)
         j += 1
     factor = dr.gather(mi.Float, factors, cell * groups + group)
     return [total * factor for total in totals]
