@@ -160,7 +160,7 @@ def simulate(session: Session, fields: Simulate, job: Job) -> dict[str, Any]:
     exposure = _exposure(image, fields.exposure)
     name = name_of(fields, job.id)
     indenters = {} if fields.draft else _indenters(model, contacts)
-    hidden = unseen(indenters.values(), image.points, image.contact_mask)
+    hidden = unseen(indenters.values(), image.points, image.contact_mask) if indenters else []
     kept = KeptImage(image, design, contacts, indenters, exposure, fields.draft)
     written = write_image(image, exposure, fields.files, files)
     session.images.keep(name, kept)

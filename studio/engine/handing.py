@@ -13,7 +13,7 @@ import numpy as np
 from ..core import mesh_file
 from ..core.engine import EngineError
 from ..scene.gather import caged_parts, gather_document, part_names
-from ..scene.meshes import REST, part_mesh, shown_vertices
+from ..scene.meshes import REST, corners_of, part_mesh, shown_vertices
 from . import session
 
 _written: dict[str, bytes] = {}
@@ -54,9 +54,7 @@ def _digest(part: bpy.types.Object, *, caged: bool) -> bytes:
         text.update(rest.tobytes())
     else:
         text.update(shown_vertices(mesh).tobytes())
-    corners = np.empty(len(mesh.loops), dtype=np.int32)
-    mesh.loops.foreach_get("vertex_index", corners)
-    text.update(corners.tobytes())
+    text.update(corners_of(mesh).tobytes())
     text.update(np.array(part.matrix_world, dtype=np.float64).tobytes())
     return text.digest()
 

@@ -95,6 +95,15 @@ def show_job(layout: bpy.types.UILayout, *titles: str) -> bool:
     return True
 
 
+def show_outcome(layout: bpy.types.UILayout, *titles: str) -> None:
+    """What there is to tell of the job that was over last, where it is one of these.
+
+    The panel Sensor tells everything, but may be out of sight when a button further down is used.
+    """
+    if not session.state().busy and session.state().about in titles:
+        show_messages(layout)
+
+
 def show_messages(layout: bpy.types.UILayout) -> None:
     """What went wrong last, or what there is to tell."""
     now = session.state()

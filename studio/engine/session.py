@@ -38,12 +38,18 @@ class OPTISENSE_PG_session(bpy.types.PropertyGroup):
     """What is going on; never saved."""
 
     busy: StringProperty(description="What the engine works on", options={"SKIP_SAVE"})
+    about: StringProperty(
+        description="The long job that the messages are about", options={"SKIP_SAVE"}
+    )
     fraction: FloatProperty(options={"SKIP_SAVE"})
     progress: StringProperty(options={"SKIP_SAVE"})
     cancelling: BoolProperty(options={"SKIP_SAVE"})
     problem: StringProperty(options={"SKIP_SAVE"})
     hint: StringProperty(options={"SKIP_SAVE"})
     note: StringProperty(options={"SKIP_SAVE"})
+    written: StringProperty(
+        description="The page or folder that was written last", options={"SKIP_SAVE"}
+    )
 
 
 def state() -> OPTISENSE_PG_session:
@@ -152,6 +158,7 @@ def start_job(
     now.problem = now.hint = now.note = now.progress = ""
     now.fraction = 0.0
     now.cancelling = False
+    now.about = title
 
     def result(answer: dict[str, Any]) -> None:
         _over()

@@ -34,7 +34,11 @@ class OPTISENSE_PG_evaluation(bpy.types.PropertyGroup):
 
     chosen: EnumProperty(name="Objectives", items=_objectives, options={"ENUM_FLAG", "SKIP_SAVE"})
     own: StringProperty(
-        name="Your own", description="FILE.py:FUNCTION", subtype="FILE_PATH", options={"SKIP_SAVE"}
+        name="Your own",
+        description="A Python file with an objective of your own and, where it has several "
+        "functions, the one after a colon: FILE.py:FUNCTION",
+        subtype="FILE_PATH",
+        options={"SKIP_SAVE"},
     )
     is_before: BoolProperty(
         description="They are of the sensor that was open before", options={"SKIP_SAVE"}

@@ -5,7 +5,7 @@ from __future__ import annotations
 import bpy
 
 from ..engine import catalogue
-from ..engine.layout import SidebarPanel, lines_of, paragraph, show_job
+from ..engine.layout import SidebarPanel, lines_of, paragraph, show_job, show_outcome
 from ..simulate.picture import file_icon
 from . import figures
 
@@ -38,6 +38,7 @@ class OPTISENSE_PT_evaluate(SidebarPanel, bpy.types.Panel):
         row.scale_y = 1.4
         if not show_job(row, "Evaluating"):
             row.operator("optisense.evaluate", icon="CHECKMARK")
+        show_outcome(layout, "Evaluating", "Tracing rays")
         if values.scores and values.is_before:
             layout.label(text="Of the sensor before", icon="INFO")
         for score in values.scores:

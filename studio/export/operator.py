@@ -42,6 +42,7 @@ class OPTISENSE_OT_report(bpy.types.Operator):
 
         def written(result: dict[str, Any]) -> None:
             session.state().note = f"Written to {result['file']}"
+            session.state().written = result["file"]
 
         done = session.start_job(
             "Writing", "report", written, wait=bpy.app.background, image=image, file=str(path)
@@ -82,6 +83,7 @@ class OPTISENSE_OT_export(bpy.types.Operator):
 
         def written(result: dict[str, Any]) -> None:
             session.state().note = f"{len(result['files'])} files in {folder}"
+            session.state().written = folder
 
         try:
             design = handing.design(context.scene)

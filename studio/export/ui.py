@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import bpy
 
-from ..engine.layout import SidebarPanel, show_job
+from ..engine import session
+from ..engine.layout import SidebarPanel, show_job, show_outcome
 
 
 class OPTISENSE_PT_export(SidebarPanel, bpy.types.Panel):
@@ -19,6 +22,12 @@ class OPTISENSE_PT_export(SidebarPanel, bpy.types.Panel):
         column = self.layout.column(align=True)
         column.operator("optisense.report", icon="TEXT")
         column.operator("optisense.export", icon="EXPORT")
+        show_outcome(self.layout, "Writing")
+        written = session.state().written
+        if written and Path(written).exists():
+            text = f"Open {Path(written).name}"
+            row = self.layout.row()
+            row.operator("wm.path_open", text=text, icon="URL").filepath = written
 
 
 register, unregister = bpy.utils.register_classes_factory((OPTISENSE_PT_export,))

@@ -15,7 +15,7 @@ class OPTISENSE_UL_light_groups(bpy.types.UIList):
         row = layout.row(align=True)
         row.label(text=item.name, icon="LIGHT")
         row.prop(item, "colour", text="")
-        row.prop(item, "flux", text="mW")
+        row.prop(item, "flux", text="")
 
 
 class OPTISENSE_PT_lights(SidebarPanel, bpy.types.Panel):
@@ -30,6 +30,7 @@ class OPTISENSE_PT_lights(SidebarPanel, bpy.types.Panel):
         row = layout.row(align=True)
         row.operator("optisense.add_light", icon="LIGHT_AREA")
         row.operator("optisense.add_camera", icon="CAMERA_DATA")
+        layout.label(text="Groups: colour, flux of each light (mW)")
         layout.template_list(
             "OPTISENSE_UL_light_groups", "", design, "light_groups", design, "light_group_index",
             rows=3,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import bpy
 
-from ..engine.layout import SidebarPanel, show_job
+from ..engine.layout import SidebarPanel, show_job, show_outcome
 from ..simulate.picture import file_icon
 from . import gallery
 
@@ -31,6 +31,7 @@ class OPTISENSE_PT_materials(SidebarPanel, bpy.types.Panel):
         if not show_job(column, "Drawing the material"):
             column.operator("optisense.preview_material", icon="SHADING_RENDERED")
             column.operator("optisense.apply_material", icon="MATERIAL")
+        show_outcome(layout, "Drawing the material")
         icon = file_icon(choice.preview)
         if icon:
             layout.template_icon(icon_value=icon, scale=7.0)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import bpy
 
 from ..engine import catalogue
-from ..engine.layout import SidebarPanel, show_job
+from ..engine.layout import SidebarPanel, show_job, show_outcome
 from ..simulate.picture import icon
 from .following import CURVE
 
@@ -50,6 +50,7 @@ class OPTISENSE_PT_optimise(SidebarPanel, bpy.types.Panel):
         if not show_job(row, "Searching", "Reading the study"):
             row.operator("optisense.search", icon="VIEWZOOM")
             row.operator("optisense.resume", icon="PLAY")
+        show_outcome(layout, "Searching", "Reading the study", "Applying")
         curve = icon(CURVE)
         if curve:
             layout.template_icon(icon_value=curve, scale=8.0)

@@ -154,7 +154,7 @@ def contact_values(contact: bpy.types.Object, depsgraph: bpy.types.Depsgraph) ->
         indenter.update(file=file_of(values), scale=short(values.scale))
     return {
         "indenter": indenter,
-        "point": [short(value) for value in place],
+        "point": [round(short(value), 6) + 0.0 for value in place],
         "depth": short(values.depth),
         "rotation": short(values.rotation),
     }

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from functools import lru_cache
 from typing import Any
 
 import bpy
@@ -15,6 +16,9 @@ from .collections import OPTICAL_SYSTEM, collection, next_order, objects_of
 
 ARROW = 2.0
 """Length (mm) of the line that shows where a light shines."""
+
+MOST_POSES = 4096
+"""How many poses of lights are kept."""
 
 POINT_SIZE = (0.6, 0.6)
 """How large (mm) a lamp is drawn that is a point or whose size is not known."""
@@ -52,8 +56,15 @@ def place(item: bpy.types.Object, pose: dict[str, Any]) -> None:
 
 def light_pose(light: bpy.types.Object) -> dict[str, Any]:
     """The pose of a light as the design file holds it."""
-    before = json.loads(light.optisense.data) if light.optisense.data else {}
-    return pose_of(np.array(light.matrix_world), before, up=False)
+    matrix = tuple(tuple(row) for row in light.matrix_world)
+    found = _pose(matrix, light.optisense.data)
+    return {name: list(values) for name, values in found.items()}
+
+
+@lru_cache(maxsize=MOST_POSES)
+def _pose(matrix: tuple[tuple[float, ...], ...], data: str) -> dict[str, list[float]]:
+    """The pose of a light by its matrix and as it was read; most lights stand still."""
+    return pose_of(np.array(matrix), json.loads(data) if data else {}, up=False)
 
 
 def redraw(scene: bpy.types.Scene, group: bpy.types.PropertyGroup) -> None:

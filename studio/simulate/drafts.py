@@ -17,9 +17,16 @@ _wanted = False
 
 
 def wanted() -> None:
-    """Something changed that a picture would show."""
+    """Something changed that a picture would show: ask as soon as Blender is done with it."""
     global _wanted
     _wanted = True
+    if session.running() is not None and not bpy.app.timers.is_registered(_soon):
+        bpy.app.timers.register(_soon, first_interval=0.0)
+
+
+def _soon() -> None:
+    """Once, instead of at the next look at the engine, which may be a twentieth second away."""
+    _ask()
 
 
 def _ask() -> None:
@@ -74,5 +81,7 @@ def register() -> None:
 
 def unregister() -> None:
     global _open, _wanted
+    if bpy.app.timers.is_registered(_soon):
+        bpy.app.timers.unregister(_soon)
     bpy.app.handlers.depsgraph_update_post.remove(_changed)
     _open, _wanted = None, False

@@ -5,7 +5,7 @@ from __future__ import annotations
 import bpy
 
 from ..engine import session
-from ..engine.layout import SidebarPanel, show_job
+from ..engine.layout import SidebarPanel, show_job, show_outcome
 from ..scene.collections import objects_of
 from . import picture
 
@@ -42,6 +42,7 @@ class OPTISENSE_PT_simulate(SidebarPanel, bpy.types.Panel):
         row.scale_y = 1.4
         if not show_job(row, "Simulating", "Finding nine places"):
             row.operator("optisense.simulate", icon="RENDER_STILL")
+        show_outcome(layout, "Simulating", "Finding nine places")
         now = context.window_manager.optisense_picture
         if not now.shown:
             count = len(objects_of(scene, "CONTACT"))
@@ -79,12 +80,12 @@ def _contact(column: bpy.types.UILayout, values: bpy.types.PropertyGroup) -> Non
 def _light_levels(layout: bpy.types.UILayout, scene: bpy.types.Scene) -> None:
     """Flux and colour of each group; the picture follows at once."""
     box = layout.box().column(align=True)
-    box.label(text="Relight", icon="LIGHT")
+    box.label(text="Relight: flux (mW), colour", icon="LIGHT")
     box.enabled = session.running() is not None
     for group in scene.optisense.light_groups:
         row = box.row(align=True)
         row.label(text=group.name)
-        row.prop(group, "flux", text="mW")
+        row.prop(group, "flux", text="")
         row.prop(group, "colour", text="")
 
 
