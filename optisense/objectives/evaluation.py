@@ -25,8 +25,9 @@ _T = TypeVar("_T")
 Tell = Callable[[float, str], None]
 """Called with a fraction 0..1 of the rendering that is done, and with what is being done."""
 
-Reads = Callable[[Press], NDArray[np.bool_]]
-"""The pixels (h, w) of a press, not exposed, that objectives read one by one."""
+Reads = Callable[[Press], NDArray[np.float64]]
+"""The pixels (h, w) of a press, not exposed, that objectives read: 1 one by one, less where a part
+of the camera samples will do."""
 
 FIRST_IMAGE = 0.4
 """How much of all rendering the first image is, since light is traced for it."""
@@ -64,7 +65,7 @@ class Evaluation:
             model: the sensor's.
             settings: of images and rays.
             tell: called while images are rendered.
-            reads: which pixels of a press the objectives read one by one, if not all. The others
+            reads: which pixels of a press the objectives read, if not all one by one. The others
                 decide about the exposure only, and are rendered roughly (`registry.pixels_read`).
         """
         self.model = model
@@ -198,10 +199,11 @@ class Evaluation:
 
     def _careful(
         self, press_of: Callable[[int, ChiefRays], Press], numbers: Iterable[int], rays: ChiefRays
-    ) -> NDArray[np.bool_]:
-        """(h, w): the pixels of an image's presses that objectives read one by one.
+    ) -> NDArray[np.float64]:
+        """(h, w): which pixels of an image's presses objectives read (see `Reads`).
 
-        All where an objective can't say, since it can't judge the press: it will tell why.
+        All, one by one, where an objective can't say, since it can't judge the press: it will tell
+        why.
         """
         assert self._reads is not None
         found = []
@@ -211,20 +213,25 @@ class Evaluation:
                 press.check_seen()
                 found.append(self._reads(press))
             except ObjectiveError:
-                return np.ones_like(press.mask)
-        return np.logical_or.reduce(found)
+                return np.ones(press.mask.shape)
+        return np.maximum.reduce(found)
 
     def _unexposed(self) -> list[_Unexposed]:
         self.untouched  # noqa: B018  light is traced for it, which progress counts first
         return [
-            _Unexposed(press, image.contact_mask, image.radiance)
+            _Unexposed(press, image.contact_mask, _radiance(image, image.contact_mask))
             for press, image in self.each_press()
         ]
+
+    @property
+    def _untouched_radiance(self) -> NDArray[np.float32]:
+        return self._once("untouched radiance", lambda: self.untouched.radiance)
 
     def _auto_exposure(self) -> float:
         seen = self._once("pressed images", self._unexposed)
         return exposure_for(
-            self.untouched.radiance, [each.radiance[each.press.mask] for each in seen]
+            self._untouched_radiance,
+            [each.radiance[each.press.mask[each.touched]] for each in seen],
         )
 
     def _presses(self) -> list[Press]:
@@ -238,19 +245,21 @@ class Evaluation:
     def _response(
         self, touched: NDArray[np.bool_], radiance: NDArray[np.float32]
     ) -> NDArray[np.float32]:
-        """(h, w, 3): the camera sensor's response, 0 to 1; the untouched one outside contacts.
+        """(h, w, 3): the camera sensor's response, 0 to 1; the untouched one outside contacts,
+        which have a radiance (n, 3) in the n pixels that they touch.
 
         Overexposure spreads as far as its blur reaches, so only what lies that near to a contact
         is worked out anew.
         """
         from optisense.optics.response import BLUR_OF_WIDTH, saturate
 
-        exposure, untouched = np.float32(self.exposure), self.untouched.radiance
+        exposure, untouched = np.float32(self.exposure), self._untouched_radiance
         response = self._once("untouched response", lambda: saturate(untouched * exposure)).copy()
         if touched.any():
             reach = int(BLUR_REACH * BLUR_OF_WIDTH * touched.shape[1]) + 2
             changed, needed = _around(touched, reach), _around(touched, 2 * reach)
-            part = np.where(touched[needed][..., None], radiance[needed], untouched[needed])
+            part = untouched[needed].copy()
+            part[touched[needed]] = radiance
             inner = tuple(
                 slice(small.start - large.start, small.stop - large.start)
                 for small, large in zip(changed, needed, strict=True)
@@ -270,7 +279,7 @@ class Evaluation:
         contacts: Sequence[Contact],
         done: float,
         part: float,
-        careful: Callable[[ChiefRays], NDArray[np.bool_]] | None = None,
+        careful: Callable[[ChiefRays], NDArray[np.float64]] | None = None,
     ) -> TactileImage:
         """One image, which takes the progress from `done` by `part`.
 
@@ -294,11 +303,20 @@ class Evaluation:
 
 
 class _Unexposed(NamedTuple):
-    """A press with the pixels (h, w) that contacts touch in its image, and its radiance there."""
+    """A press with the n pixels of (h, w) that contacts touch in its image, and the radiance (n, 3)
+    there."""
 
     press: Press
     touched: NDArray[np.bool_]
     radiance: NDArray[np.float32]
+
+
+def _radiance(image: TactileImage, where: NDArray[np.bool_]) -> NDArray[np.float32]:
+    """(n, 3): `image.radiance` of the n pixels of a mask alone."""
+    total = np.zeros((np.count_nonzero(where), 3), dtype=np.float32)
+    for layer in image.layers.values():
+        total += layer[where]
+    return total
 
 
 def exposure_for(untouched: NDArray[np.float32], contacts: Iterable[NDArray[np.float32]]) -> float:

@@ -44,8 +44,9 @@ class Objective:
         title: how people write the name.
         draw: makes the figure of a score, or None.
         beside: names of parts to show beside the value wherever it stands.
-        reads: takes a `Press`, not exposed, and the settings as keyword arguments, and returns the
-            pixels (h, w) that are read one by one; all of the contact's where it is None.
+        reads: takes a `Press`, not exposed, and the settings as keyword arguments, and returns
+            which pixels (h, w) are read: True or 1 where they are read one by one, less where a
+            part of the camera samples will do; all of the contact's where it is None.
     """
 
     name: str
@@ -94,7 +95,7 @@ def objective(
         title: how people write the name; the name itself if left out.
         draw: makes a figure of the score; a plain one if left out.
         beside: names of parts to show beside the value wherever it stands.
-        reads: which pixels of a press are read one by one, if not all (see `Objective`).
+        reads: which pixels of a press are read, if not all one by one (see `Objective`).
 
     Raises:
         ObjectiveError: the name is taken or malformed, or the function takes no evaluation.
@@ -110,7 +111,7 @@ def objective(
 def pixels_read(
     objectives: Iterable[Objective], settings: Mapping[str, Mapping[str, Any]]
 ) -> Reads | None:
-    """The pixels of a press that objectives read one by one, together; None if that is all.
+    """The pixels of a press that objectives read, together; None if that is all, one by one.
 
     Args:
         objectives: that will share an evaluation.
@@ -122,8 +123,8 @@ def pixels_read(
             return None
         found.append(partial(each.reads, **{**each.settings, **settings.get(each.name, {})}))
 
-    def reads(press: Press) -> NDArray[np.bool_]:
-        return np.logical_or.reduce([read(press) for read in found])
+    def reads(press: Press) -> NDArray[np.float64]:
+        return np.maximum.reduce([np.asarray(read(press), dtype=np.float64) for read in found])
 
     return reads
 

@@ -60,8 +60,9 @@ GRAIN_REACH = 9
 """Pixels across that are judged, and sampled again, together."""
 
 
-Careful = Callable[[ChiefRays], NDArray[np.bool_]]
-"""Names the pixels (h, w) of contacts that are read, and not only looked at in passing."""
+Careful = Callable[[ChiefRays], NDArray[np.bool_] | NDArray[np.floating]]
+"""Says which pixels (h, w) of contacts are read, and not only looked at in passing: the part, 0 to
+1, of the camera samples that each deserves."""
 
 
 @dataclass
@@ -146,9 +147,9 @@ def render_field(
 ) -> ImageLayers:
     """Shade an image from a light field: one sample a pixel, more in and around contacts.
 
-    ``only_contacts`` leaves all pixels but those that see an indenter dark; of these, all but the
-    ones that ``careful`` names get a few samples only. A ``draft`` takes few samples in contacts,
-    and leaves grain as it is.
+    ``only_contacts`` leaves all pixels but those that see an indenter dark; of these, each gets the
+    part of the samples that ``careful`` says, but a few at least. A ``draft`` takes few samples in
+    contacts, and leaves grain as it is.
     """
     began = time.perf_counter()
     field, interrupted = light
@@ -184,8 +185,9 @@ def render_field(
         if draft:
             inner, outer = DRAFT_SAMPLES
         if only_contacts:
-            read = mask if careful is None else mask & careful(rays)
-            wanted = [(read, inner), (mask & ~read, min(inner, ROUGH_SAMPLES))]
+            part = np.ones_like(mask) if careful is None else careful(rays)
+            counts = np.maximum(np.round(inner * np.clip(part, 0, 1)), min(inner, ROUGH_SAMPLES))
+            wanted = [(mask & (counts == times), int(times)) for times in np.unique(counts[mask])]
         else:
             wanted = [(distance <= 1.0, inner), (near & (distance > 1.0), outer)]
         tiers = [_repeated(pixels, times) for pixels, times in wanted if pixels.any()]

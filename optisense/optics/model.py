@@ -115,8 +115,8 @@ class OpticalModel(RayModel):
                 for checking).
             only_contacts: light only the pixels that see an indenter and leave the others dark,
                 several times sooner; for scores that read nothing else.
-            careful: with ``only_contacts``, which pixels (h, w) of the chief rays are read; the
-                other ones of contacts get a few camera samples only.
+            careful: with ``only_contacts``, which pixels (h, w) of the chief rays are read: the
+                part, 0 to 1, of the camera samples that each gets; a few are taken anyway.
 
         Returns:
             The image; ``interrupted`` is set if Ctrl-C ended the tracing early.

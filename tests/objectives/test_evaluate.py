@@ -17,6 +17,7 @@ from optisense.design import set_value
 from optisense.errors import ObjectiveError
 from optisense.objectives import BUILT_IN, Evaluation, Objective, Press, Settings
 from optisense.objectives.evaluation import MOST_SATURATED, exposure_for
+from optisense.objectives.normdiff import CROWD, indented_pixels
 from optisense.objectives.registry import find, pixels_read
 from optisense.objectives.rgb2normal import lines_of
 from optisense.optics.response import auto_exposure, saturate
@@ -116,7 +117,21 @@ def test_lines_are_rendered_in_full_and_the_rest_roughly(model: OpticalModel) ->
 
 def test_an_objective_that_does_not_say_what_it_reads_gets_all() -> None:
     assert pixels_read([find("rgb2normal"), own(len)], {}) is None
-    assert pixels_read([find("normdiff")], {}) is None
+    assert pixels_read([find("normdiff"), own(len)], {}) is None
+
+
+def test_each_pixel_gets_the_most_that_any_objective_wants(model: OpticalModel) -> None:
+    """Lines in full, the crowd beside them nearly, and the flat middle roughly."""
+    press = Evaluation(model, Settings(**SMALL)).presses[0]
+    reads = pixels_read([find("rgb2normal"), find("normdiff")], {})
+    assert reads is not None
+    part = reads(press)
+    line = np.logical_or.reduce(list(lines_of(press).values()))
+    turned = indented_pixels(press)
+    assert (part[line] == 1.0).all()
+    assert (part[turned & ~line] == CROWD).all()
+    assert (part[~turned & ~line] == 0.0).all()
+    assert 0.5 < CROWD < 1.0 and (turned & ~line).sum() > 10
 
 
 def test_contacts_that_overlap_are_not_put_in_one_image(model: OpticalModel) -> None:
