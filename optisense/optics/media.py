@@ -217,8 +217,9 @@ def _disjoint(solids: list[Solid], tolerance: float) -> list[Solid]:
     for i, j in combinations(range(len(solids)), 2):
         if not boxes_overlap(result[i].mesh, result[j].mesh, tolerance):
             continue
-        one, other = _manifold(result[i]), _manifold(result[j])
-        place = _overlap_place(one ^ other, tolerance)
+        # Where faces lie on one another a cut takes ten times as long; a little room parts them.
+        smaller = _manifold(_grown(result[j], -CUT_CLEARANCE))
+        place = _overlap_place(_manifold(result[i]) ^ smaller, tolerance - CUT_CLEARANCE)
         if place is None:
             continue
         same_index = abs(result[i].ior - result[j].ior) <= EQUAL_INDEX
@@ -230,12 +231,13 @@ def _disjoint(solids: list[Solid], tolerance: float) -> list[Solid]:
                 hint="move them apart, or give the part that fills the common space the "
                 "larger priority",
             )
-        result[j] = replace(result[j], mesh=_from_manifold(other - _manifold(_grown(result[i]))))
+        larger = _manifold(_grown(result[i], CUT_CLEARANCE))
+        result[j] = replace(result[j], mesh=_from_manifold(_manifold(result[j]) - larger))
     return [solid for solid in result if len(solid.mesh.faces)]
 
 
-def _grown(solid: Solid) -> Solid:
-    """A little larger all round, so that faces in one plane up to rounding are cut cleanly."""
+def _grown(solid: Solid, room: float) -> Solid:
+    """Larger by so many mm all round, so that faces in one plane up to rounding are cut cleanly."""
     mesh = solid.mesh.welded()
     normal = mesh.face_normals
     sums, rights = np.zeros((len(mesh.vertices), 3, 3)), np.zeros((len(mesh.vertices), 3))
@@ -244,7 +246,7 @@ def _grown(solid: Solid) -> Solid:
         np.add.at(rights, corner, normal)
     step = np.linalg.solve(sums + 1e-3 * np.eye(3), rights[:, :, None])[:, :, 0]
     step /= np.maximum(1.0, np.linalg.norm(step, axis=1, keepdims=True) / 3.0)
-    return replace(solid, mesh=mesh.with_vertices(mesh.vertices + CUT_CLEARANCE * step))
+    return replace(solid, mesh=mesh.with_vertices(mesh.vertices + room * step))
 
 
 def _overlap_place(common: Any, tolerance: float) -> tuple[float, ...] | None:
