@@ -204,7 +204,7 @@ def is_busy() -> bool:
 def say(error: EngineError) -> None:
     """Show an error in the panels; select what it is about, and name that."""
     now = state()
-    texts = [error.where, error.hint]
+    texts = [error.where, f"{error.hint[:1].upper()}{error.hint[1:]}" if error.hint else ""]
     if error.part or error.path or error.contact is not None:
         from ..scene.offending import offending, select
 

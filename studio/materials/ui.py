@@ -66,7 +66,7 @@ def _part(
 def _material(column: bpy.types.UILayout, material: bpy.types.PropertyGroup) -> None:
     column.prop(material, "kind")
     if material.kind == "dielectric":
-        column.prop(material, "ior")
+        column.prop(material, "ior", text="Index")
     if material.kind == "conductor":
         column.prop(material, "eta")
         column.prop(material, "k")

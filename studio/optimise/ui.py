@@ -43,8 +43,9 @@ class OPTISENSE_PT_optimise(SidebarPanel, bpy.types.Panel):
                 row.prop(found, f"{what}_choice", text="", icon_only=True)
             else:
                 column.prop(search, what)
-        for name in ("budget", "workers", "seed", "go_on", "study"):
+        for name in ("budget", "workers", "seed", "study"):
             column.prop(search, name)
+        layout.prop(search, "go_on")  # its name is longer than half a line
         row = layout.row(align=True)
         row.scale_y = 1.4
         if not show_job(row, "Searching", "Reading the study"):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import bpy
 
-from ..engine.layout import SidebarPanel
+from ..engine.layout import SidebarPanel, paragraph
 from .cage_operator import active_cage
 
 
@@ -50,7 +50,8 @@ def _part(layout: bpy.types.UILayout, part: bpy.types.Object) -> None:
 
 def _cage(layout: bpy.types.UILayout, cage: bpy.types.Object, values: dict) -> None:
     along = " x ".join(str(count) for count in values["resolution"])
-    layout.label(text=f"{cage.optisense.key}: {along}, bends {', '.join(values['parts'])}")
+    text = f"{cage.optisense.key}: {along}, bends {', '.join(values['parts'])}"
+    paragraph(layout, text, boxed=True)
     row = layout.row(align=True)
     for bound, name in (("c_min", "C_min"), ("c_max", "C_max")):
         icon = "CHECKMARK" if values.get(bound) else "BLANK1"
