@@ -57,6 +57,16 @@ def place(kind: str, part: str) -> list[int]:
     return [left, first.y + first.height - bottom - found.height, found.width, found.height]
 
 
+def close_area(kind: str) -> None:
+    """Give an editor's place back to its neighbours."""
+    found = area(kind)
+    own = next(
+        each for each in bpy.context.window_manager.windows if found in each.screen.areas.values()
+    )
+    with bpy.context.temp_override(window=own, area=found):
+        bpy.ops.screen.area_close()
+
+
 def chosen_file() -> str:
     """What is chosen where a file is asked for."""
     browser = area("FILE_BROWSER")

@@ -22,6 +22,15 @@ ROW = 14
 SCROLLED, CLICK = 9, 40
 """Clicks of the wheel to see other buttons, and how many pixels a click moves them."""
 
+BESIDE = 5
+"""Pixels from the sidebar's edge where there are no buttons."""
+
+HEAD = 28
+"""Pixels from the head of a closed panel to the next one."""
+
+TRIES = 5
+"""To close all panels: a key may come later than the click that it belongs to."""
+
 PAGES = 15
 """Most of them that the sidebar has, in steps of so many clicks."""
 
@@ -167,11 +176,44 @@ class Bench:
         self._last = 0
         self.drawn()
 
+    def only(self, panel: int) -> None:
+        """Open one panel and close all others, by clicks on their heads; the first is 0."""
+        left, top, width, _ = self.sidebar()
+        x, y = left + width / 2, top + HEAD / 2
+        for _ in range(TRIES):
+            self.to_top()
+            self._on_head(x, y, "ctrl")  # closes all others, where the key came before the click
+            if self._shows_buttons():
+                self._on_head(x, y)
+            if not self._shows_buttons():
+                break
+        else:
+            raise AssertionError("the panels can't be closed")
+        self._on_head(x, y + HEAD * panel)
+
+    def _on_head(self, x: float, y: float, held: str = "") -> None:
+        """Click on the head of a panel, while a key is down if one is named."""
+        self.desktop.move(x, y)
+        if held:
+            self.desktop.hold(held, True)
+            self.see("1")
+        self.desktop.click(x, y)
+        self.see("1")
+        if held:
+            self.desktop.hold(held, False)
+        self.drawn()
+
+    def _shows_buttons(self) -> bool:
+        """Whether any of the extension's buttons is in view, where an open panel has one."""
+        left, top, width, _ = self.sidebar()
+        x, end = round(left + width * 0.25), top + 11 * HEAD
+        return self.see(f"scan {x} {top + HEAD} {end} {ROW} optisense.") is not None
+
     def scroll(self, clicks: int) -> None:
         """Turn the mouse's wheel over the sidebar; down is positive."""
-        left, top, width, height = self.sidebar()
-        self.desktop.click(
-            left + width / 2, top + height / 2, button=5 if clicks > 0 else 4, times=abs(clicks)
+        left, top, _, height = self.sidebar()
+        self.desktop.click(  # beside the buttons: over a list, the wheel would turn that
+            left + BESIDE, top + height / 2, button=5 if clicks > 0 else 4, times=abs(clicks)
         )
         self.see("1")
         self.drawn()

@@ -20,6 +20,9 @@ from .desktop import Desktop
 MOVED = 1.5
 """mm, how far a light is moved."""
 
+REPORT = 7
+"""The panel's place in the sidebar; the first is 0."""
+
 FIRST_ROW = 37
 """Pixels from the top of the button *Vary* to the middle of the first row of the list below it."""
 
@@ -28,6 +31,9 @@ ABOVE_BUTTON = 60
 
 LAST_PICTURE = (222, 114)
 """Pixels from there to the left and up: a picture in the last row of those to choose from."""
+
+EDITOR_FITS = "area('IMAGE_EDITOR').spaces.active.zoom[0] != 1.0"
+"""An Image Editor has been told to show its picture whole."""
 
 FIELDS_OF_VIEW = (50.0, 60.0, 70.0)
 """Degrees, what the search tries; all see less than the whole surface or beyond its edge."""
@@ -131,6 +137,14 @@ def test_scores_appear(bench: Bench) -> None:
     bench.rest()
     scores = bench.see("{s.name: float(s.value) for s in manager.optisense_evaluation.scores}")
     assert 0.5 < scores["aoap"] <= 1.0 and scores["2to3pw"] > 0.0, scores
+    bench.press("optisense.show_figure")
+    bench.until("any(each.type == 'IMAGE_EDITOR' for each in window().screen.areas)")
+    figure = "area('IMAGE_EDITOR').spaces.active.image"
+    bench.until(f"{figure} is not None and {figure}.name.startswith('OptiSense figure')")
+    assert min(bench.see(f"list({figure}.size)")) >= 400
+    bench.until(f"{EDITOR_FITS}")
+    photograph(bench, "figure")
+    bench.see("close_area('IMAGE_EDITOR')")
     bench.press("optisense.show_rays", across=0.25)
     bench.until("any(each.optisense.key == 'ray hit' for each in scene().objects)")
     bench.rest()
@@ -199,3 +213,18 @@ def test_the_best_is_applied_saved_and_opened_again(bench: Bench) -> None:
     bench.press("optisense.show_picture")
     bench.until("any(each.type == 'IMAGE_EDITOR' for each in window().screen.areas)")
     photograph(bench, "6-opened-again")
+
+
+def test_a_report_and_files_for_the_workshop_are_written(bench: Bench) -> None:
+    bench.only(REPORT)
+    photograph(bench, "7-report")
+    bench.press("optisense.report")
+    bench.choose_file()
+    bench.until("'Written to' in state().note")
+    page = (bench.home / "gelsight-mini.html").read_text(encoding="utf-8")
+    assert page.count("data:image/png;base64,") >= 2 and "gelsight-mini" in page
+    bench.press("optisense.export")
+    bench.choose_file()
+    bench.until("'files in' in state().note")
+    written = bench.home / "gelsight-mini-workshop"
+    assert {"gel.stl", "skin.stl"} <= {each.name for each in written.rglob("*.stl")}
