@@ -117,7 +117,7 @@ def plain_scene(pieces: Any, emitters: Any, camera: Any, flux: Any) -> dict[str,
     # A polygon of the disc's area.
     reach = np.sqrt(2 * np.pi / (DISC_CORNERS * np.sin(2 * np.pi / DISC_CORNERS)))
     for emitter in emitters:
-        s, t, _ = emitter.frame()
+        s, t, _ = emitter.frame
         half = np.array(emitter.size) / 2
         outline = np.stack([np.cos(turn), np.sin(turn)], axis=1) * half * reach
         points = np.asarray(emitter.position) + outline[:, :1] * s + outline[:, 1:] * t

@@ -254,7 +254,7 @@ def _emitters(design: SensorDesign) -> tuple[list[Emitter], list[float]]:
 
 def _window(number: int, emitter: Emitter) -> Piece:
     """The emitting face of a light, facing the way it shines."""
-    s, t, _ = emitter.frame()
+    s, t, _ = emitter.frame
     half = np.array(emitter.size) / 2
     if emitter.shape is Shape.DISC:
         turn = np.arange(DISC_CORNERS) * 2 * np.pi / DISC_CORNERS

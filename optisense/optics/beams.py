@@ -14,9 +14,14 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
+from optisense.optics.cells import SurfaceCells
+from optisense.optics.spread import passes_near, squared_radius
+
 STRONG = 0.03
 """Part of the light of a group in a cell from which four neighbouring bins stay apart."""
 NO_SLOT = 0xFFFFFFFF
+REACH = 1.5
+"""Of the side of a cell: how far from its middle the points are that read its beams."""
 
 
 @dataclass
@@ -147,3 +152,62 @@ def _collect(
             slot += dr.select(chosen[i], mi.UInt32(1), mi.UInt32(0))
         k += 1
     return slot - first
+
+
+def beams_near(beams: Beams, cells: SurfaceCells, groups: int, balls: mi.Float) -> Beams:
+    """Those beams that may touch one of the balls (centre and radius, four floats each) on their
+    way to points of their cell."""
+    entries = cells.cells * groups
+    centres = np.zeros((cells.cells, 4), dtype=np.float32)
+    centres[:, :3] = cells.centres
+    # Copied: arrays handed over from numpy differ in alignment, and so would kernels.
+    middles = mi.Float(centres.ravel()) + dr.opaque(mi.Float, 0)
+    lane = dr.arange(mi.UInt32, entries)
+    near = dr.zeros(mi.UInt32, dr.width(beams.ways) // 4)
+    margin = REACH / cells.inverse_size
+    sizes = (dr.opaque(mi.UInt32, groups), dr.opaque(mi.UInt32, dr.width(balls) // 4))
+    count = _mark_near(beams, middles, balls, margin, *sizes, lane, near)
+    counts = dr.zeros(mi.UInt32, entries + 1)
+    dr.scatter(counts, count, lane)
+    dr.eval(counts, near)
+    chosen = dr.compress(near != 0)
+    if dr.width(chosen) == 0:
+        chosen = dr.zeros(mi.UInt32, 1)
+    ways, fluxes = (
+        dr.ravel(dr.gather(mi.Vector4f, values, chosen)) for values in (beams.ways, beams.fluxes)
+    )
+    return Beams(dr.prefix_sum(counts), ways, fluxes)
+
+
+@dr.syntax
+def _mark_near(
+    beams: Beams,
+    middles: mi.Float,
+    balls: mi.Float,
+    margin: mi.Float,
+    groups: mi.UInt32,
+    ball_count: mi.UInt32,
+    lane: mi.UInt32,
+    near: mi.UInt32,
+) -> mi.UInt32:
+    """Set ``near`` to 1 for beams that pass near a ball; returns how many there are of each lane's
+    cell and group."""
+    middle = dr.gather(mi.Vector4f, middles, lane // groups)
+    point = mi.Point3f(middle.x, middle.y, middle.z)
+    count = mi.UInt32(0)
+    j = dr.gather(mi.UInt32, beams.starts, lane)
+    end = dr.gather(mi.UInt32, beams.starts, lane + 1)
+    while j < end:
+        way = dr.gather(mi.Vector4f, beams.ways, j)
+        towards = mi.Vector3f(way.x, way.y, way.z)
+        touches = mi.Bool(False)
+        n = mi.UInt32(0)
+        while n < ball_count:
+            ball = dr.gather(mi.Vector4f, balls, n)
+            ball.w += margin
+            touches |= passes_near(ball, point, towards, squared_radius(way.w))
+            n += 1
+        dr.scatter(near, mi.UInt32(1), j, touches)
+        count += dr.select(touches, mi.UInt32(1), mi.UInt32(0))
+        j += 1
+    return count

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from enum import IntEnum
+from functools import cached_property
 
 import drjit as dr
 import mitsuba as mi
@@ -100,6 +101,7 @@ class Emitter:
         filled = {Shape.POINT: 0.0, Shape.RECTANGLE: 1.0, Shape.DISC: np.pi / 4}[self.shape]
         return float(self.size[0] * self.size[1] * filled)
 
+    @cached_property
     def frame(self) -> FloatArray:
         """(3, 3): width axis, height axis, direction as rows."""
         n = np.asarray(self.direction, float)
@@ -176,7 +178,7 @@ def emitter_table(emitters: list[Emitter], groups: int) -> EmitterTable:
                 cosines, turns = inverse_tables(emitter.intensity)
                 polar.append(cosines)
                 azimuth.append(turns.ravel())
-        frame = emitter.frame()
+        frame = emitter.frame
         row[0:3] = emitter.position
         row[4:7], row[8:11], row[12:15] = frame
         row[7], row[11] = emitter.size[0] / 2, emitter.size[1] / 2

@@ -51,8 +51,8 @@ def harmonics(n: mi.Vector3f) -> tuple[mi.Float, ...]:
 
 @dr.syntax
 def irradiance_table(moments: mi.Float, cells: int, bins: mi.UInt32, groups: int) -> mi.Float:
-    """Twelve floats a cell and group: nine coefficients of irradiance over the normal, and the mean
-    direction of the light."""
+    """Twelve floats a cell and group: nine coefficients of irradiance over the normal, and the sum
+    of the light's directions, weighted with its flux density."""
     lane = dr.arange(mi.UInt32, cells * groups)
     cell, group = lane // groups, lane % groups
     sums = [mi.Float(0) for _ in range(9)]
@@ -71,16 +71,16 @@ def irradiance_table(moments: mi.Float, cells: int, bins: mi.UInt32, groups: int
     out = dr.empty(mi.Float, cells * groups * 12)
     for i in range(9):
         dr.scatter(out, sums[i] * band[i], lane * 12 + i)
-    towards = dr.select(dr.squared_norm(mean) > 0, dr.normalize(mean), mi.Vector3f(0, 0, 1))
     for i in range(3):
-        dr.scatter(out, towards[i], lane * 12 + 9 + i)
+        dr.scatter(out, mean[i], lane * 12 + 9 + i)
     return out
 
 
 def irradiance(
     table: mi.Float, entry: mi.UInt32, normal: mi.Vector3f
 ) -> tuple[mi.Float, mi.Float, mi.Vector3f]:
-    """Irradiance (mW/mm^2) at normals, its mean over all normals, and where its light is from."""
+    """Irradiance (mW/mm^2) at normals, its mean over all normals, and the vector along which most
+    of its light comes: light that is wholly above a normal's horizon brings its part along it."""
     a = dr.gather(mi.Vector4f, table, entry * 3)
     b = dr.gather(mi.Vector4f, table, entry * 3 + 1)
     c = dr.gather(mi.Vector4f, table, entry * 3 + 2)
@@ -90,6 +90,12 @@ def irradiance(
     for value, weight in zip(values, basis, strict=True):
         total = total + value * weight
     return dr.maximum(total, 0), a.x * basis[0], mi.Vector3f(c.y, c.z, c.w)
+
+
+def vector(table: mi.Float, entry: mi.UInt32) -> mi.Vector3f:
+    """The last of `irradiance` alone."""
+    third = dr.gather(mi.Vector4f, table, entry * 3 + 2)
+    return mi.Vector3f(third.y, third.z, third.w)
 
 
 @dr.syntax
@@ -150,10 +156,12 @@ def _sample(
                 lift = leave(seen, facing, facing)
                 for g in range(groups):
                     light, _mean, towards = irradiance(table, there * groups + g, facing)
+                    lit = light > 0
+                    towards = dr.select(lit, dr.normalize(towards), facing)
                     hidden = indenters.scene.ray_test(
                         mi.Ray3f(lift, towards), coherent=False, active=mi.Bool(True)
                     )
-                    totals[g] += dr.select(hidden, 0, light) * dr.inv_pi * weight
+                    totals[g] += dr.select(lit & ~hidden, light, 0) * dr.inv_pi * weight
                 # On from there, like light that is scattered evenly.
                 state = next_random(state)
                 places += 1
@@ -178,7 +186,6 @@ def exchanged(
     cell: mi.UInt32,
     active: mi.Bool,
     raised: mi.Bool,
-    random: mi.UInt32,
 ) -> list[mi.Color3f]:
     """Radiance towards the eye that points reflect of exchanged light, one colour a group.
 
@@ -199,7 +206,7 @@ def exchanged(
         cell,
         active,
         raised,
-        random,
+        points.random,
         points.series,
         points.number * DIRECTIONS,
         dr.opaque(mi.UInt32, DIRECTIONS),

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
+from optisense.optics.beams import beams_near
 from optisense.optics.camera import RayCamera
 from optisense.optics.chief_rays import ChiefRays
 from optisense.optics.emitters import Emitter
@@ -29,7 +30,7 @@ from optisense.optics.visible_points import film_samples, find_visible_points
 if TYPE_CHECKING:
     from optisense.optics.sppm import SppmResult
 
-CONTACT_SAMPLES = 16
+CONTACT_SAMPLES = 12
 """Camera samples of a pixel in contacts, where tilt and shadow change within it, in an image of
 USUAL_WIDTH; finer images have smaller pixels and take fewer."""
 RIM_SAMPLES = 6
@@ -158,6 +159,10 @@ def render_field(
     # beside it.
     film, mirrored = (Film(width * height, field.groups) for _ in range(2))
 
+    near_beams = field.beams
+    if scenes.indenters is not None:
+        near_beams = beams_near(field.beams, field.cells, field.groups, scenes.balls)
+
     def sample(pixel: mi.UInt32, number: mi.UInt32, thorough: bool, again: bool = False) -> None:
         spots = film_samples(pixel, width, number, seed_of(seed, 3))
         own = seed_of(seed, 4, int(thorough))
@@ -165,12 +170,12 @@ def render_field(
             scenes.full, camera, pixel, number, spots, own, only_main=again
         )
         film.count(pixel)
-        film.add(main, shade(field, scenes, main, thorough, False))
+        film.add(main, shade(field, scenes, near_beams, main, thorough, False))
         film.add_light(main, emitters, areas)
         if not again:
             mirrored.count(pixel)
         if reflected is not None:
-            mirrored.add(reflected, shade(field, scenes, reflected, False, True))
+            mirrored.add(reflected, shade(field, scenes, near_beams, reflected, False, True))
             mirrored.add_light(reflected, emitters, areas)
 
     region_image = np.where(rays.hit, rays.region, 0)

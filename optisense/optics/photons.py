@@ -56,6 +56,8 @@ class PhotonMap:
 # Photons that travel long leave most lanes of a vector idle; survivors are gathered anew after
 # so many surfaces.
 STAGES = (4, 4, 6)
+FEW = 100_000
+"""Photons of a pass below which gathering survivors costs more than it saves."""
 
 
 @dataclass
@@ -228,8 +230,9 @@ def _trace(
     flight, cell = _launch(table, guide, a, b, c, photons)
     arrived = dr.zeros(mi.UInt32, photons)
     travelled = 0
-    for stage in range(len(STAGES) + 1):
-        steps = STAGES[stage] if stage < len(STAGES) else MAX_DEPTH - travelled
+    stages = STAGES if photons > FEW else ()
+    for stage in range(len(stages) + 1):
+        steps = stages[stage] if stage < len(stages) else MAX_DEPTH - travelled
         travelled += steps
         flight = _fly(
             scene.scene,

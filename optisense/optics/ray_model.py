@@ -287,6 +287,7 @@ class RayModel:
             self._fixed,
             RayScene(pieces, [number] * len(pieces), self._table),
             mi.Float(np.concatenate([_ball(mesh) for mesh in placed]).astype(np.float32)),
+            all(getattr(contact.indenter, "convex", False) for contact in contacts),
         )
 
     def _with_indenters(

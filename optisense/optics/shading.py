@@ -15,7 +15,8 @@ from dataclasses import dataclass
 import drjit as dr
 import mitsuba as mi
 
-from optisense.optics.beam_sums import sum_all, sum_roughly
+from optisense.optics.beam_sums import sum_beams, sum_diffuse, sum_hidden
+from optisense.optics.beams import Beams
 from optisense.optics.cells import SurfaceCells, cell_at, plane_of
 from optisense.optics.exchange import exchanged, irradiance
 from optisense.optics.light_field import LEAST_COSINE, LightField
@@ -33,7 +34,9 @@ from optisense.optics.spread import (
     above,
     beam,
     reach,
+    skyline,
     spread,
+    squared_radius,
     widened,
     within,
 )
@@ -44,6 +47,10 @@ LEAST_LIGHT = 0.2
 """Part of the mean irradiance below which the spacing of shadow rays does not go."""
 CHOSEN_BINS = 16.0
 """Shadow rays of each light group for a camera sample near a contact."""
+SHADOW_RAYS = 32.0
+"""The same for a sample elsewhere, most of which pass no indenter and are not traced."""
+REFLECTED_SHADOW_RAYS = 4.0
+"""The same for points that are seen in a reflection, of which little reaches the eye."""
 LEAST_STEP = 1e-20
 """Of that spacing, where there is no light."""
 
@@ -52,12 +59,13 @@ LEAST_STEP = 1e-20
 class ContactScenes:
     """Ray scenes of one image: ``full`` has everything, ``fixed`` the opaque surfaces without
     indenters, ``indenters`` these alone (None without contacts); ``balls`` holds centre and radius
-    of a ball around each, four floats a ball."""
+    of a ball around each, four floats a ball; ``convex`` is whether none can shade itself."""
 
     full: RayScene
     fixed: RayScene
     indenters: RayScene | None
     balls: mi.Float
+    convex: bool = False
 
 
 @dr.syntax
@@ -81,8 +89,10 @@ def _sum_chosen(
     shift: mi.Vector3f,
     random: mi.UInt32,
     chosen: mi.Float,
+    sky: mi.Float,
 ) -> list[mi.Color3f]:
-    """Every bin, looked up along its own line, and shadow rays for some of them.
+    """Every bin, looked up along its own line, and shadow rays for some of those that are not
+    wholly above the skyline (``sky``, a sine).
 
     These are drawn in proportion to what they bring, evenly spaced in the running sum (systematic
     sampling), so that where nothing is hidden, the sum is exact to half a step.
@@ -127,9 +137,12 @@ def _sum_chosen(
                 reflected = evaluate_coating(
                     widened(coating, cosine), points.normal, towards, points.towards_eye, straying
                 )
+                sine = dr.dot(upright, towards)
+                doubtful = sine - dr.sqrt(squared_radius(cosine)) < sky
+                weight = dr.select(doubtful, mi.Float(0), 1)
                 share = value.w * grey(reflected) / steps[g]
                 before = dr.floor(running[g])
-                running[g] += share
+                running[g] += dr.select(doubtful, share, 0)
                 times = dr.floor(running[g]) - before
                 if times > 0:
                     state = next_random(state)
@@ -140,12 +153,12 @@ def _sum_chosen(
                         active=mi.Bool(True),
                     )
                     weight = dr.select(blocked, 0.0, times / share)
-                    if dr.hint(coloured, mode="scalar"):
-                        flux = dr.gather(mi.Vector4f, colours, entry)
-                        reflected *= mi.Color3f(flux.x, flux.y, flux.z)
-                    else:
-                        reflected *= value.w
-                    totals[g] += reflected * weight
+                if dr.hint(coloured, mode="scalar"):
+                    flux = dr.gather(mi.Vector4f, colours, entry)
+                    reflected *= mi.Color3f(flux.x, flux.y, flux.z)
+                else:
+                    reflected *= value.w
+                totals[g] += reflected * weight
         k += 1
     return totals
 
@@ -196,15 +209,17 @@ def _place(
 def shade(
     field: LightField,
     scenes: ContactScenes,
+    near_beams: Beams,
     points: VisiblePoints,
     thorough: bool,
     reflected: bool,
 ) -> list[mi.Color3f]:
     """Radiance of visible points towards the eye, for each light group with lights of 1 mW.
 
-    ``reflected`` points are seen in the reflection of an interface. ``thorough`` is for points on
-    and near indenters: each bin is looked up along its own line, and light that indenters and the
-    skin near them send to each other is added.
+    ``near_beams`` are those of the field that pass near indenters (`beams_near`); ``reflected``
+    points are seen in the reflection of an interface. ``thorough`` is for points on and near
+    indenters: each bin is looked up along its own line, and light that indenters and the skin near
+    them send to each other is added.
     """
     table = scenes.full.table
     active, base, raised = points.valid, points.point, mi.Bool(False)
@@ -215,7 +230,6 @@ def shade(
         # would have met.
         onward = scenes.fixed.intersect(points.point, -points.towards_eye, raised)
         base = dr.select(raised & onward.valid, onward.point, points.point)
-    random = points.random
     cell, shift, active = _interpolating_cell(field.cells, base, active, points)
     start = leave(points.point, points.face_normal, points.face_normal)
     coating = coating_of(table, points.surface, active, field.metallic)
@@ -242,29 +256,40 @@ def shade(
             active,
             raised,
             shift,
-            random,
+            points.random,
             dr.opaque(mi.Float, CHOSEN_BINS),
+            skyline(
+                scenes.balls,
+                dr.opaque(mi.UInt32, dr.width(scenes.balls) // 4),
+                points.point,
+                plane_of(field.cells, cell, active)[0],
+                raised & dr.opaque(mi.Bool, scenes.convex),
+            ),
         )
-        near = exchanged(field, scenes, points, coating, cell, active, raised, random)
+        near = exchanged(field, scenes, points, coating, cell, active, raised)
         return [one + other for one, other in zip(far, near, strict=True)]
-    summed = sum_roughly if reflected else sum_all
-    total: list[mi.Color3f] = summed(
-        field.beams,
-        field.groups,
-        scenes.fixed.scene if indenters is None else indenters.scene,
-        # A loop takes no empty array.
-        scenes.balls if indenters is not None else dr.zeros(mi.Float, 4),
-        dr.opaque(mi.UInt32, dr.width(scenes.balls) // 4),
-        indenters is not None,
-        dr.width(scenes.balls) == 4,
+    where = (coating, points, cell, active)
+    totals: list[mi.Color3f]
+    if field.metallic or field.coloured:
+        totals = sum_beams(field.beams, field.groups, *where)
+    else:
+        totals = sum_diffuse(field.irradiance, field.groups, *where)
+    if indenters is None:
+        return totals
+    hidden = sum_hidden(
+        near_beams,
+        totals,
+        indenters.scene,
         coating,
         points,
         start,
         cell,
         active,
-        random,
+        points.random,
+        dr.opaque(mi.Float, REFLECTED_SHADOW_RAYS if reflected else SHADOW_RAYS),
     )
-    return total
+    # Where all is hidden, the sum of the shares may be a little more than all.
+    return [dr.maximum(one - other, 0) for one, other in zip(totals, hidden, strict=True)]
 
 
 def _interpolating_cell(

@@ -100,6 +100,40 @@ def passes_near(
     return (along > -ball.w) & (gap2 < reach * reach)
 
 
+@dr.syntax
+def skyline(
+    balls: mi.Float,
+    ball_count: mi.UInt32,
+    point: mi.Point3f,
+    upright: mi.Vector3f,
+    own: mi.Bool,
+) -> mi.Float:
+    """Sine of the elevation (above the plane of ``upright``) below which a ball is in the way.
+
+    For points with ``own`` the one ball that they lie in does not count: they stand on the convex
+    shape within.
+    """
+    highest = mi.Float(-1)
+    inside = mi.UInt32(0)
+    n = mi.UInt32(0)
+    while n < ball_count:
+        ball = dr.gather(mi.Vector4f, balls, n)
+        offset = mi.Vector3f(ball.x, ball.y, ball.z) - mi.Vector3f(point)
+        distance = dr.norm(offset)
+        if distance < ball.w * 1.0001:
+            inside += 1
+            highest = dr.select(own, highest, 1)
+        else:
+            # The sum of the angles of the ball's middle and of its radius; at most a right angle.
+            sine, width = dr.dot(offset, upright) / distance, ball.w / distance
+            cosine, side = dr.safe_sqrt(1 - sine * sine), dr.safe_sqrt(1 - width * width)
+            top = dr.select(sine > side, 1, sine * side + width * cosine)
+            highest = dr.maximum(highest, top)
+        n += 1
+    # Within several, each may be in the way of the others.
+    return dr.select(inside > 1, 1, highest)
+
+
 def widened(coating: Coating, cosine: mi.Float) -> Coating:
     """A coating as it reflects light that is spread about its mean direction.
 

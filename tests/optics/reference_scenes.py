@@ -247,7 +247,7 @@ def referee_scene(
 
 def emitting_face(number: int, emitter: Emitter) -> Piece:
     """The face of a rectangular area light, for cameras to see and light to end on."""
-    s, t, _ = emitter.frame()
+    s, t, _ = emitter.frame
     corners = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]) * (np.array(emitter.size) / 2)
     points = np.asarray(emitter.position) + corners[:, :1] * s + corners[:, 1:] * t
     return quad(f"light {number}", points.tolist(), Surface(SurfaceKind.LIGHT, light=number))

@@ -7,12 +7,12 @@ import mitsuba as mi
 import pytest
 
 from optisense import OpticalModel, load
-from optisense.optics import beam_sums, photons
+from optisense.optics import photons, visible_points
 from optisense.optics.interrupts import lets_ctrl_c_through
 
 
 @pytest.mark.parametrize(
-    ("module", "step"), [(photons, "sample_coating"), (beam_sums, "evaluate_coating")]
+    ("module", "step"), [(photons, "sample_coating"), (visible_points, "refract")]
 )
 def test_ctrl_c_while_a_loop_is_recorded(
     module: object, step: str, monkeypatch: pytest.MonkeyPatch

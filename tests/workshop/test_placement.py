@@ -38,7 +38,7 @@ def test_rest_is_how_the_simulation_holds_a_light_without_up(
     from optisense.optics.emitters import Emitter
 
     light = Light(position=(0, 0, 0), direction=direction)
-    simulated = Emitter(0, (0.0, 0.0, 0.0), direction).frame()
+    simulated = Emitter(0, (0.0, 0.0, 0.0), direction).frame
     np.testing.assert_allclose(axes_at_rest(light), simulated, atol=1e-12)
 
 
