@@ -1,0 +1,98 @@
+"""What indenters hide, and what is not looked at because nothing can hide it."""
+
+from __future__ import annotations
+
+import mitsuba as mi
+import numpy as np
+import pytest
+
+from optisense import OpticalModel
+from optisense.geometry import Contact, Sphere
+from optisense.optics import beams, shading
+from optisense.optics.spread import skyline
+from optisense.sensors import BUILDERS
+
+BALL = Contact(Sphere(radius=1.5), at=(0.0, 0.0), depth=0.8)
+SIZE = {"resolution": (160, 120), "photons": 200_000}
+
+
+@pytest.fixture(scope="module")
+def mini() -> OpticalModel:
+    return OpticalModel(BUILDERS["gelsight-mini"](), "llvm")
+
+
+def horizon(balls: list[tuple[float, ...]], own: bool = False) -> float:
+    """The skyline seen from the origin, z being up."""
+    rows = mi.Float([value for ball in balls for value in ball])
+    sine = skyline(
+        rows, mi.UInt32(len(balls)), mi.Point3f(0), mi.Vector3f(0, 0, 1), mi.Bool(own)
+    )  # fmt: skip
+    return float(sine[0])
+
+
+@pytest.mark.parametrize("elevation", [-40.0, -10.0, 0.0, 25.0, 50.0])
+def test_a_ball_hides_what_is_below_its_top(elevation: float) -> None:
+    """The angle of its middle and, beside it, the one whose sine is radius over distance."""
+    way = np.array([0.6 * np.cos(np.radians(elevation)), 0.8 * np.cos(np.radians(elevation)), 0])
+    way[2] = np.sin(np.radians(elevation))
+    top = np.sin(np.radians(elevation) + np.arcsin(1.5 / 4))
+    assert horizon([(*(4 * way), 1.5)]) == pytest.approx(top, abs=1e-5)
+    assert horizon([(0, 0, -9, 1), (*(4 * way), 1.5)]) == pytest.approx(top, abs=1e-5)
+
+
+def test_a_ball_overhead_or_around_hides_all() -> None:
+    assert horizon([(0.5, 0, 3, 1.5)]) == 1
+    assert horizon([(0.5, 0, 0, 1.5)]) == 1
+
+
+def test_a_convex_shape_hides_nothing_of_its_own() -> None:
+    around, beside = (0.5, 0.0, -1.0, 1.5), (4.0, 0.0, 0.0, 1.5)
+    assert horizon([around], own=True) == -1
+    assert horizon([around, beside], own=True) == pytest.approx(1.5 / 4, abs=1e-5)
+    # Which of two the point stands on can't be told from their balls.
+    assert horizon([around, around], own=True) == 1
+
+
+def test_diffuse_light_is_the_sum_of_its_beams(mini: OpticalModel) -> None:
+    by_vector = mini.render(**SIZE)
+    (field,) = mini._store._done.values()
+    field.metallic = True  # without metal in the coating: every beam is gone through all the same
+    try:
+        one_by_one = mini.render(**SIZE)
+    finally:
+        field.metallic = False
+    assert by_vector.radiance.max() > 0
+    np.testing.assert_allclose(
+        by_vector.radiance, one_by_one.radiance, atol=1e-3 * one_by_one.radiance.max()
+    )
+
+
+def test_beams_that_pass_no_indenter_hide_nothing(
+    mini: OpticalModel, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Shadow rays of all beams, and many more of them, show the same shadows."""
+    near = mini.render([BALL], **SIZE)
+    monkeypatch.setattr(beams, "REACH", 1000.0)
+    monkeypatch.setattr(shading, "SHADOW_RAYS", 500.0)
+    every = mini.render([BALL], **SIZE)
+    untouched = mini.render(**SIZE).radiance
+    shadowed = ~near.contact_mask & (every.radiance < 0.97 * untouched).any(axis=2)
+    assert shadowed.sum() > 200
+    assert near.radiance[shadowed].mean(axis=0) == pytest.approx(
+        every.radiance[shadowed].mean(axis=0), rel=0.005
+    )
+    far = ~near.contact_mask & ~shadowed
+    assert near.radiance[far].mean(axis=0) == pytest.approx(
+        every.radiance[far].mean(axis=0), rel=0.001
+    )
+
+
+def test_a_ball_does_not_shade_itself(mini: OpticalModel, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Rays that look whether it does find that it does not."""
+    taken_for_granted = mini.render([BALL], **SIZE)
+    monkeypatch.setattr(Sphere, "convex", False)
+    tested = mini.render([BALL], **SIZE)
+    mask = tested.contact_mask
+    one, other = taken_for_granted.radiance[mask], tested.radiance[mask]
+    assert one.mean(axis=0) == pytest.approx(other.mean(axis=0), rel=0.002)
+    assert np.sqrt(((one - other) ** 2).mean()) < 0.02 * other.mean()
