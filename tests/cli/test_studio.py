@@ -63,7 +63,7 @@ def test_the_manifest_is_what_blender_asks_for() -> None:
 def test_the_extension_imports_only_what_blender_has() -> None:
     import ast
 
-    allowed = {*sys.stdlib_module_names, "bpy", "bpy_extras", "bmesh", "mathutils", "numpy"}
+    allowed = {*sys.stdlib_module_names, "bpy", "bpy_extras", "blf", "bmesh", "mathutils", "numpy"}
     for path in (ROOT / "studio").rglob("*.py"):
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
             names = []
