@@ -73,18 +73,24 @@ def relit_scores(inputs: Plain, folder: Path) -> Found:
     `objectives`, `settings` of the images, `own` settings of the objectives; and, where there are
     `normdiff_variants`, NormDiff with each of these settings.
     """
+    from optisense.objectives.registry import pixels_read, resolve
     from optisense.objectives.relighting import Relighting
+    from optisense.objectives.run import split_settings
 
-    model = _model(inputs["design"], lit=True)
-    relighting = Relighting(Evaluation(model, Settings(**tuples(inputs["settings"]))))
-    found, own = {}, inputs["own"]
+    model, own = _model(inputs["design"], lit=True), inputs["own"]
+    variants = inputs.get("normdiff_variants", {})
+    names = dict.fromkeys([*inputs["objectives"], *(["normdiff"] if variants else [])])
+    wanted = resolve(list(names))
+    reads = pixels_read(wanted, split_settings(own, wanted)[1])
+    relighting = Relighting(Evaluation(model, Settings(**tuples(inputs["settings"])), reads=reads))
+    found = {}
     for letters in inputs["colourings"]:
         design = coloured(model.design, inputs["groups"], letters)
         evaluation = relighting.lit(design, whole=False)
         found[letters] = _scores(evaluate(evaluation, list(inputs["objectives"]), **own))
         found[letters]["normdiff_variants"] = {
             name: _scores({"": evaluate(evaluation, "normdiff", **variant)})["scores"][""]
-            for name, variant in inputs.get("normdiff_variants", {}).items()
+            for name, variant in variants.items()
         }
     failures = {
         f"{letters} {name}": reason

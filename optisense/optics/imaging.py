@@ -33,6 +33,10 @@ if TYPE_CHECKING:
 CONTACT_SAMPLES = 12
 """Camera samples of a pixel in contacts, where tilt and shadow change within it, in an image of
 USUAL_WIDTH; finer images have smaller pixels and take fewer."""
+LEAST_OF_CONTACTS = 16_000
+"""Camera samples in contacts in all: where they fill few pixels, more changes within each."""
+MOST_SAMPLES = 64
+"""Of a pixel, for that."""
 RIM_SAMPLES = 6
 """The same around contacts."""
 DRAFT_SAMPLES = 3, 1
@@ -187,6 +191,7 @@ def render_field(
         near = distance <= max(2.0, REFINED * width)
         share = min(1.0, USUAL_WIDTH / width)
         inner, outer = (max(2, round(n * share)) for n in (CONTACT_SAMPLES, RIM_SAMPLES))
+        inner = max(inner, min(MOST_SAMPLES, LEAST_OF_CONTACTS // int(mask.sum())))
         if draft:
             inner, outer = DRAFT_SAMPLES
         if only_contacts:
