@@ -51,6 +51,8 @@ SHADOW_RAYS = 32.0
 """The same for a sample elsewhere, most of which pass no indenter and are not traced."""
 REFLECTED_SHADOW_RAYS = 4.0
 """The same for points that are seen in a reflection, of which little reaches the eye."""
+CELLS_OF_SAMPLE = 8
+"""Cells that a sample of diffuse light reads, where reading one is cheap: its mean is smooth."""
 LEAST_STEP = 1e-20
 """Of that spacing, where there is no light."""
 
@@ -230,7 +232,8 @@ def shade(
         # would have met.
         onward = scenes.fixed.intersect(points.point, -points.towards_eye, raised)
         base = dr.select(raised & onward.valid, onward.point, points.point)
-    cell, shift, active = _interpolating_cell(field.cells, base, active, points)
+    seen = active
+    cell, shift, active = _interpolating_cell(field.cells, base, seen, points, points.number)
     start = leave(points.point, points.face_normal, points.face_normal)
     coating = coating_of(table, points.surface, active, field.metallic)
     tables = (field.moments, field.heights, field.colours)
@@ -273,7 +276,12 @@ def shade(
     if field.metallic or field.coloured:
         totals = sum_beams(field.beams, field.groups, *where)
     else:
-        totals = sum_diffuse(field.irradiance, field.groups, *where)
+        totals = [mi.Color3f(0) for _ in range(field.groups)]
+        for k in range(CELLS_OF_SAMPLE):
+            number = points.number * CELLS_OF_SAMPLE + k
+            beside, _, lit = _interpolating_cell(field.cells, base, seen, points, number)
+            light = sum_diffuse(field.irradiance, field.groups, coating, points, beside, lit)
+            totals = [one + each / CELLS_OF_SAMPLE for one, each in zip(totals, light, strict=True)]
     if indenters is None:
         return totals
     hidden = sum_hidden(
@@ -293,16 +301,20 @@ def shade(
 
 
 def _interpolating_cell(
-    cells: SurfaceCells, base: mi.Point3f, active: mi.Bool, points: VisiblePoints
+    cells: SurfaceCells,
+    base: mi.Point3f,
+    active: mi.Bool,
+    points: VisiblePoints,
+    number: mi.UInt32,
 ) -> tuple[mi.UInt32, mi.Vector3f, mi.Bool]:
-    """A random cell next to points, how far it was moved, and whether there is one.
+    """A random cell next to points, how far these were moved, and whether there is one.
 
     The same for all bins, as light that straddles two bins must not be taken twice; over the
     samples of a pixel, which are spread evenly, this interpolates between cells.
     """
     home, found = cell_at(cells, base, active)
     upright, _ = plane_of(cells, home, found)
-    shift = mi.Vector3f(*(in_series(points.series, points.number, 1 + k) for k in range(3)))
+    shift = mi.Vector3f(*(in_series(points.series, number, 1 + k) for k in range(3)))
     shift = (shift - 0.5) * dr.rcp(cells.inverse_size)
     shift -= upright * dr.dot(upright, shift)
     beside, exists = cell_at(cells, base + shift, found)

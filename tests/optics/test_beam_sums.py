@@ -5,6 +5,7 @@ from __future__ import annotations
 import mitsuba as mi
 import numpy as np
 import pytest
+from scipy import ndimage
 
 from optisense import OpticalModel
 from optisense.geometry import Contact, Sphere
@@ -53,7 +54,10 @@ def test_a_convex_shape_hides_nothing_of_its_own() -> None:
     assert horizon([around, around], own=True) == 1
 
 
-def test_diffuse_light_is_the_sum_of_its_beams(mini: OpticalModel) -> None:
+def test_diffuse_light_is_the_sum_of_its_beams(
+    mini: OpticalModel, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(shading, "CELLS_OF_SAMPLE", 1)  # those that beams are read from
     by_vector = mini.render(**SIZE)
     (field,) = mini._store._done.values()
     field.metallic = True  # without metal in the coating: every beam is gone through all the same
@@ -65,6 +69,26 @@ def test_diffuse_light_is_the_sum_of_its_beams(mini: OpticalModel) -> None:
     np.testing.assert_allclose(
         by_vector.radiance, one_by_one.radiance, atol=1e-3 * one_by_one.radiance.max()
     )
+
+
+def test_an_untouched_picture_has_no_grain(mini: OpticalModel) -> None:
+    """What the cells of the light field differ by does not show from pixel to pixel."""
+    picture = mini.render(**SIZE).radiance.sum(axis=2)
+    around = ndimage.uniform_filter(picture, 3)
+    off = (picture / around - 1)[2:-2, 2:-2]
+    assert np.sqrt((off**2).mean()) < 0.01
+
+
+@pytest.mark.parametrize("fov", [50.0, 61.3])
+def test_no_camera_ray_slips_through_between_triangles(fov: float) -> None:
+    """At these angles rays through the middle of a pixel meet the edges of triangles."""
+    design = BUILDERS["gelsight-mini"]()
+    design.camera.fov = fov
+    model = OpticalModel(design, "llvm")
+    for contacts in ([], [BALL]):
+        image = model.render(contacts, resolution=(320, 240), photons=20_000)
+        assert image.radiance.sum(axis=2).min() > 0
+        assert np.isfinite(image.points).all()
 
 
 def test_beams_that_pass_no_indenter_hide_nothing(
