@@ -4,7 +4,6 @@ projection warping objective function").
 
 from __future__ import annotations
 
-from concurrent.futures import ThreadPoolExecutor
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -94,18 +93,16 @@ def triangle_areas(
     x, y, z = (np.ascontiguousarray(points[..., axis]) for axis in range(3))
     right = [c[:, 1:] - c[:, :-1] for c in (x, y, z)]
     down = [c[1:] - c[:-1] for c in (x, y, z)]
-    with ThreadPoolExecutor() as pool:  # NumPy computes outside Python's lock
-        upper = pool.submit(_half_cross, [c[:-1] for c in right], [c[:, :-1] for c in down])
-        lower = pool.submit(_half_cross, [c[1:] for c in right], [c[:, 1:] for c in down])
-        across = pool.submit(_leaps, right, hit[:, 1:] & hit[:, :-1], 1, jump)
-        along = pool.submit(_leaps, down, hit[1:] & hit[:-1], 0, jump)
-        areas = np.stack([upper.result(), lower.result()], axis=-1)
-        leap_right, leap_down = across.result(), along.result()
+    upper = _half_cross([c[:-1] for c in right], [c[:, :-1] for c in down])
+    lower = _half_cross([c[1:] for c in right], [c[:, 1:] for c in down])
+    areas = np.stack([upper, lower], axis=-1)
 
     corner = hit[:-1, :-1], hit[:-1, 1:], hit[1:, :-1], hit[1:, 1:]
     whole = np.stack(
         [corner[0] & corner[1] & corner[2], corner[1] & corner[2] & corner[3]], axis=-1
     )
+    leap_right = _leaps(right, hit[:, 1:] & hit[:, :-1], 1, jump)
+    leap_down = _leaps(down, hit[1:] & hit[:-1], 0, jump)
     leaps = whole & np.stack(
         [leap_right[:-1] | leap_down[:, :-1], leap_right[1:] | leap_down[:, 1:]], axis=-1
     )
