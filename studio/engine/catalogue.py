@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
+import bpy
+
 from ..core.engine import Engine
 from . import session
 
@@ -25,6 +27,11 @@ def entries(name: str) -> list[dict[str, Any]]:
 def items(name: str) -> Items:
     """The same as choices of a menu; the texts are kept, as Blender asks for."""
     return _items.get(name) or (_NONE if session.running() is not None else _NO_ENGINE)
+
+
+def objectives(_values: bpy.types.PropertyGroup, _context: bpy.types.Context | None) -> Items:
+    """The objectives, as properties ask for their choices."""
+    return items("objectives")
 
 
 def refresh(engine: Engine) -> None:

@@ -15,10 +15,6 @@ from bpy.props import (
 from ..engine import catalogue
 
 
-def _objectives(values: bpy.types.PropertyGroup, context: bpy.types.Context) -> catalogue.Items:
-    return catalogue.items("objectives")
-
-
 class OPTISENSE_PG_score(bpy.types.PropertyGroup):
     """A score; its name is the objective's."""
 
@@ -32,7 +28,9 @@ class OPTISENSE_PG_score(bpy.types.PropertyGroup):
 class OPTISENSE_PG_evaluation(bpy.types.PropertyGroup):
     """The last evaluation; never saved."""
 
-    chosen: EnumProperty(name="Objectives", items=_objectives, options={"ENUM_FLAG", "SKIP_SAVE"})
+    chosen: EnumProperty(
+        name="Objectives", items=catalogue.objectives, options={"ENUM_FLAG", "SKIP_SAVE"}
+    )
     own: StringProperty(
         name="Your own",
         description="A Python file with an objective of your own and, where it has several "

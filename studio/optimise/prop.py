@@ -15,10 +15,6 @@ from bpy.props import (
 from ..engine import catalogue
 
 
-def _objectives(values: bpy.types.PropertyGroup, context: bpy.types.Context) -> catalogue.Items:
-    return catalogue.items("objectives")
-
-
 def _methods(values: bpy.types.PropertyGroup, context: bpy.types.Context) -> catalogue.Items:
     return catalogue.items("methods")
 
@@ -57,7 +53,7 @@ class OPTISENSE_PG_found(bpy.types.PropertyGroup):
     """What the running search has found; never saved."""
 
     objective_choice: EnumProperty(
-        name="Objective", items=_objectives, options={"SKIP_SAVE"},
+        name="Objective", items=catalogue.objectives, options={"SKIP_SAVE"},
         update=lambda self, context: _choose(self, context, "objective"),
     )  # fmt: skip
     method_choice: EnumProperty(
