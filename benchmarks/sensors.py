@@ -28,7 +28,7 @@ NAMES = ("gelsight-mini", "gelbelt", "gelsight360", "gelsight-svelte")
 RESOLUTION = (320, 240)
 WANTED_NOISE = 0.03
 """Of the light in the contact."""
-TRIAL_PHOTONS, STEP, MOST_PHOTONS = 1_000_000, 250_000, 16_000_000
+TRIAL_PHOTONS, STEP, MOST_PHOTONS = 500_000, 250_000, 16_000_000
 RUNS = 3
 CHILD_RUNS = 5
 RADIUS, DEPTH = 1.5, 0.8

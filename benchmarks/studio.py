@@ -90,19 +90,55 @@ def main() -> None:
 
     relit(0)
     measured("relighting, 320 x 240", 60, "30 /s", relit, pid)
-    light = objects_of(scene, "LIGHT")[0]
     scene.optisense_simulation.draft = True
+    shown = 0
+    take = drafts._take
 
-    def dragged(step: int) -> None:
-        light.location.x += 0.05
-        bpy.context.view_layer.update()
-        drafts.wanted()
-        drafts._ask()
-        answered(drafts._open)
+    def taken(result: Any) -> None:
+        nonlocal shown
+        shown += 1
+        take(result)
 
-    for step in range(3):
-        dragged(step)
-    measured("draft, a light dragged, 160 x 120", given.drafts, "5 /s", dragged, pid)
+    drafts._take = taken
+
+    def dragged(what: str, move: Callable[[int], None]) -> None:
+        """The mouse goes on moving, and Blender calls its timer, until so many drafts came."""
+        step = 0
+
+        def another(_: int) -> None:
+            nonlocal step
+            before = shown
+            while shown == before:
+                step += 1
+                move(step)
+                bpy.context.view_layer.update()
+                drafts.wanted()
+                drafts._ask()
+                time.sleep(session._tick() or 0.0)
+
+        for first in range(3):
+            another(first)
+        measured(f"draft, {what} dragged, 160 x 120", given.drafts, "5 /s", another, pid)
+        scene.optisense_simulation.draft = False  # a draft that still waits
+        while session.engine().waiting:
+            time.sleep(session._tick() or 0.0)
+        scene.optisense_simulation.draft = True
+
+    light, contact, skin = (objects_of(scene, kind)[0] for kind in ("LIGHT", "CONTACT", "CAGE"))
+
+    def light_moved(_: int) -> None:
+        light.location.x += 0.005
+
+    def point_moved(_: int) -> None:
+        skin.data.vertices[14].co.z += 0.002
+        skin.data.update()
+
+    def contact_moved(_: int) -> None:
+        contact.location.x += 0.005
+
+    dragged("a light", light_moved)
+    dragged("a cage point", point_moved)
+    dragged("a contact", contact_moved)
     scene.optisense_simulation.draft = False
     cage = _caged_sheet(scene)
 

@@ -52,7 +52,7 @@ def export(
     ensure_writable(out)
 
     from optisense.workshop import export as write
-    from optisense.workshop.shapes import shapes
+    from optisense.workshop.shapes import is_air, shapes
 
     if "step" in wanted:
         messages.print("writing STEP; a finely cut curved part takes half a minute", style="dim")
@@ -66,4 +66,7 @@ def export(
             markup=False,
             style="dim",
         )
+    air = [name for name in sensor.parts if is_air(sensor, name)]
+    if air:
+        output.print(f"left out, since they are air: {', '.join(air)}", markup=False, style="dim")
     output.print("Lengths are in mm.", style="dim")

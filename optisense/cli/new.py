@@ -118,11 +118,11 @@ def _from_cad(source: Path, folder: Path, units: str | None, yes: bool, overwrit
             where=str(source),
             hint="Name a recipe (.yaml), a CAD file, or a folder of CAD files",
         )
-    asked = False
+    asked = guessed = False
     if source.suffix.lower() in (".yaml", ".yml"):
         recipe = read_recipe(source)
     elif yes:
-        recipe = guess_recipe(source, _units(units))
+        recipe, guessed = guess_recipe(source, _units(units)), True
     elif _at_terminal():
         from optisense.cli.new_questions import ask_recipe
 
@@ -139,12 +139,13 @@ def _from_cad(source: Path, folder: Path, units: str | None, yes: bool, overwrit
             made = design_from_meshes(recipe)
             problems = check(made.design)
     except OptiSenseError:
-        if asked:  # nobody likes to answer twice
+        if asked or guessed:  # nobody likes to answer twice, and a wrong guess can be mended
             save_recipe(recipe, folder / RECIPE_FILE)
+            _say_guesses(recipe, guessed)
+            what = "Your answers are" if asked else "The guessed recipe is"
             messages.print(
-                f"Your answers are kept in {folder / RECIPE_FILE}. When it or the CAD files are "
-                f"mended:\n  optisense new --from-meshes {folder / RECIPE_FILE} {folder} "
-                "--overwrite",
+                f"{what} kept in {folder / RECIPE_FILE}. When it or the CAD files are mended:\n"
+                f"  optisense new --from-meshes {folder / RECIPE_FILE} {folder} --overwrite",
                 markup=False,
             )
         raise
@@ -154,7 +155,7 @@ def _from_cad(source: Path, folder: Path, units: str | None, yes: bool, overwrit
         messages.print(f"note: {note}", markup=False, style="yellow")
     for problem in problems:
         messages.print(f"odd: {problem}", markup=False, style="yellow")
-    _say_guesses(recipe, yes)
+    _say_guesses(recipe, guessed)
     _say_what_next(folder, folder / RECIPE_FILE)
 
 

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from optisense.design.addressing import get_value
+from optisense.design.arrangement import out_of_view, overlaps
 from optisense.design.cage_checks import cage_problems
 from optisense.design.limits import unit_slips
 from optisense.design.near import suggestion
@@ -32,9 +33,10 @@ def check_design(design: SensorDesign, light_names: Collection[str] | None = Non
     """All that can be found wrong with a design without tracing light through it.
 
     Meshes that are empty, not closed or not finite, unit slips, missing meshes, unknown lights,
-    lights or a camera inside something opaque, a sensing surface that faces the wrong way or
-    lies off the elastomer, and provenance of values that don't exist. (Fields, ranges and
-    references between parts are checked as soon as a design is made.)
+    lights or a camera inside something opaque, a sensing surface that faces the wrong way, lies
+    off the elastomer or out of the camera's view, what cages have folded or pushed together,
+    solids that overlap with one priority, and provenance of values that don't exist. (Fields,
+    ranges and references between parts are checked as soon as a design is made.)
 
     Args:
         light_names: the lights of the library; None skips looking up light models.
@@ -57,7 +59,11 @@ def check_design(design: SensorDesign, light_names: Collection[str] | None = Non
         else:
             problems += _check_poses(design, meshes)
             problems += _check_sensing_surfaces(design, meshes)
-            problems += cage_problems(design, meshes)
+            problems += out_of_view(design, meshes)
+            bent = cage_problems(design, meshes)
+            problems += bent
+            if not any(problem.severity == "error" for problem in bent):
+                problems += overlaps(design, meshes)
     problems += _check_provenance(design)
     return problems
 

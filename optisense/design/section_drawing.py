@@ -22,6 +22,9 @@ WIDTH, LABELS, MARGIN, LINE = 440.0, 190.0, 24.0, 17.0
 """Pixels: of the drawing and the labels beside it, around both, and between labels."""
 
 TALLEST = 520.0
+DOT = 3.2
+"""Pixels, radius of a light."""
+
 INK = "#1c232b"
 
 
@@ -68,16 +71,17 @@ def section_svg(design: SensorDesign) -> str:
     shapes += _camera(found, place, scale)
     x, y = place(found.camera)
     labels.append(_Label(f"camera, {design.camera.fov:.3g}° across", x, y))
+    colours: dict[tuple[float, float], list[str]] = {}
     for name, spots in found.lights.items():
         middles = place(spots)
         r, g, b = (round(255 * min(1.0, value)) for value in found.colours[name])
-        shapes += [
-            f'<circle cx="{x:.1f}" cy="{y:.1f}" r="3.2" fill="rgb({r},{g},{b})" '
-            f'stroke="{INK}" stroke-width="0.7"/>'
-            for x, y in middles
-        ]
+        for x, y in middles:
+            there = colours.setdefault((round(float(x), 1), round(float(y), 1)), [])
+            if f"rgb({r},{g},{b})" not in there:
+                there.append(f"rgb({r},{g},{b})")
         x, y = middles[middles[:, 0].argmax()]
         labels.append(_Label(f"{name} lights", x, y))
+    shapes += [_light(x, y, there) for (x, y), there in colours.items()]
 
     column = 2 * MARGIN + width
     tall = max(height + 2 * MARGIN, LINE * len(labels) + 2 * MARGIN) + 16
@@ -122,6 +126,22 @@ def _anchor(lines: list[FloatArray], solid: bool) -> tuple[float, float]:
             if right - left > best:
                 best, x, y = right - left, right - 0.12 * (right - left), level
     return float(x), float(y)
+
+
+def _light(x: float, y: float, colours: list[str]) -> str:
+    """A dot; where lights of several colours lie behind one another, a sector for each."""
+    circle = f'<circle cx="{x:.1f}" cy="{y:.1f}" r="{DOT}"'
+    edge = f'stroke="{INK}" stroke-width="0.7"/>'
+    if len(colours) == 1:
+        return f'{circle} fill="{colours[0]}" {edge}'
+    turns = np.linspace(0.0, 2.0 * np.pi, len(colours) + 1)
+    rim = np.stack([x + DOT * np.sin(turns), y + DOT * np.cos(turns)], axis=1)
+    sectors = [
+        f'<path d="M{x:.1f} {y:.1f}L{a[0]:.2f} {a[1]:.2f}'
+        f'A{DOT} {DOT} 0 0 0 {b[0]:.2f} {b[1]:.2f}Z" fill="{colour}"/>'
+        for colour, a, b in zip(colours, rim[:-1], rim[1:], strict=True)
+    ]
+    return "".join(sectors) + f'{circle} fill="none" {edge}'
 
 
 def _labels(labels: list[_Label], column: float, tall: float) -> list[str]:

@@ -110,10 +110,14 @@ class SensorDesign(Model):
         path: tuple[str | int, ...] = ("parts", name, "material")
         if part.material is None:
             if part.role in MATERIAL_REQUIRED:
+                kinds = KINDS_OF_ROLE[part.role]
+                fit = [name for name, material in self.materials.items() if material.kind in kinds]
                 raise MisfitError(
                     f"part '{name}' ({part.role.value}) has no material",
                     path,
-                    "Name one of: " + (", ".join(self.materials) or "(none are defined yet)"),
+                    f"Name one of: {', '.join(fit)}"
+                    if fit
+                    else f"Add one of kind {' or '.join(kinds)} under 'materials', and name it",
                 )
             return
         if part.role is Role.SENSING_SURFACE:

@@ -72,14 +72,25 @@ def find_coincident(
     inside = _contains(corners[:, :, :2], frames.corners, tolerance=_THINNEST)
     whole = inside & (_heights(frames.corners, corners).max(axis=1, initial=0) <= tolerance)
     others = np.flatnonzero(~whole)
-    patches = shapely.intersection(
-        shapely.polygons(frames.corners[others]), shapely.polygons(corners[others, :, :2])
-    )
+    patches = _common(frames.corners[others], corners[others, :, :2])
     points, patch = shapely.get_coordinates(patches, return_index=True)
     apart = np.zeros(len(others))
     np.maximum.at(apart, patch, _heights(points[:, None], corners[others[patch]])[:, 0])
     whole[others] = _is_shape(patches) & (apart <= tolerance)
     return Overlay(first, second, pairs[whole])
+
+
+def _common(triangles: FloatArray, others: FloatArray) -> Any:
+    """(k,) polygons that triangles (k, 3, 2) have in common, pair by pair.
+
+    Edges that run along each other up to rounding can make an exact overlay lose the polygon:
+    where none came out, it is done again on a grid, which is slower and sure.
+    """
+    one, other = shapely.polygons(triangles), shapely.polygons(others)
+    patches = shapely.intersection(one, other)
+    lost = np.flatnonzero(shapely.area(patches) == 0.0)
+    patches[lost] = shapely.intersection(one[lost], other[lost], grid_size=_GRID)
+    return patches
 
 
 def boxes_overlap(first: TriangleMesh, second: TriangleMesh, depth: float) -> bool:

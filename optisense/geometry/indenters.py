@@ -65,32 +65,39 @@ class Sphere:
         _positive("radius", self.radius)
 
     def mesh(self, reach: float, facet_error: float = FACET_ERROR) -> TriangleMesh:
-        """See `Indenter.mesh`: a cap, cut along parallels and meridians."""
+        """See `Indenter.mesh`: a cap of parallels, each cut into as many parts as it needs."""
         end = _arc(self.radius, reach)
-        rings, sectors = self._divisions(end, facet_error)
-        polar = np.linspace(0.0, end, rings + 1)
-        around = np.linspace(0.0, 2.0 * np.pi, sectors + 1)
-        t, a = np.meshgrid(polar, around, indexing="ij")
-        normals = np.stack([np.sin(t) * np.cos(a), np.sin(t) * np.sin(a), -np.cos(t)], axis=-1)
-        normals = normals.reshape(-1, 3)
-        faces = grid_faces(rings + 1, sectors + 1)
-        vertices = self.radius * (normals + [0.0, 0.0, 1.0])
-        corners = vertices[faces]
-        size = np.linalg.norm(
-            np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1
+        side = self._side(facet_error)
+        polar = np.linspace(0.0, end, max(3, math.ceil(self.radius * end / side) + 1))
+        around = 2.0 * np.pi * self.radius * np.sin(polar) / side
+        counts = np.maximum(
+            np.ceil(around - 1e-9).astype(int), np.where(np.sin(polar) > 1e-9, 12, 1)
         )
-        return TriangleMesh(vertices, faces[size > 1e-12], normals).wound_like_normals()
+        t = np.repeat(polar, counts)
+        starts = np.cumsum(counts) - counts
+        a = (
+            2.0
+            * np.pi
+            * (np.arange(len(t)) - np.repeat(starts, counts))
+            / np.repeat(counts, counts)
+        )
+        normals = np.stack([np.sin(t) * np.cos(a), np.sin(t) * np.sin(a), -np.cos(t)], axis=-1)
+        faces = np.concatenate(
+            [
+                _between_rings(int(counts[i]), int(counts[i + 1])) + starts[i]
+                for i in range(len(counts) - 1)
+            ]
+        )
+        vertices = self.radius * (normals + [0.0, 0.0, 1.0])
+        return TriangleMesh(vertices, faces, normals).wound_like_normals()
 
-    def _divisions(self, end: float, facet_error: float) -> tuple[int, int]:
-        """Square cells at the widest parallel, with both triangles within the error.
+    def _side(self, facet_error: float) -> float:
+        """The side of square cells, with both triangles within the error.
 
         A flat triangle of circumradius c lies c^2 / (2 R) below a sphere of radius R at most;
         a square cell of side s has c = s / sqrt(2).
         """
-        side = math.sqrt(4.0 * self.radius * min(facet_error, 0.1 * self.radius))
-        widest = self.radius * math.sin(min(end, math.pi / 2))
-        rings = max(2, math.ceil(self.radius * end / side))
-        return rings, max(12, math.ceil(2.0 * math.pi * widest / side))
+        return math.sqrt(4.0 * self.radius * min(facet_error, 0.1 * self.radius))
 
 
 @dataclass(frozen=True)
@@ -209,6 +216,21 @@ class MeshIndenter:
     def mesh(self, reach: float, facet_error: float = FACET_ERROR) -> TriangleMesh:
         """See `Indenter.mesh`: all of it, in its own triangles."""
         return self._whole
+
+
+def _between_rings(inner: int, outer: int) -> NDArray[np.int64]:
+    """Triangles (n, 3) between two rings of so many points (one point is a ring, too), evenly
+    spaced from the same angle on and numbered one after the other.
+
+    Each edge of one ring goes to the point of the other that its middle is nearest to.
+    """
+    i, j = np.arange(inner), np.arange(outer)
+    # How many edges of the other ring have their middles before an edge's own.
+    to_outer = -(-((2 * i + 1) * outer - inner) // (2 * inner))
+    to_inner = ((2 * j + 1) * inner - outer) // (2 * outer) + 1
+    of_outer = np.column_stack([inner + j, inner + (j + 1) % outer, to_inner % inner])
+    of_inner = np.column_stack([i, (i + 1) % inner, inner + to_outer % outer])
+    return np.concatenate([of_outer] * (outer > 1) + [of_inner] * (inner > 1))
 
 
 def _arc(radius: float, reach: float) -> float:

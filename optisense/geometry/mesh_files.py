@@ -38,6 +38,8 @@ def load_mesh(path: Path) -> TriangleMesh:
     if suffix == ".obj":
         mesh = _parse_plain_obj(data) or _parse_obj(data, path)
     else:
+        if suffix == ".stl":
+            _refuse_cut_off_stl(data, path)
         mesh = _load_with_trimesh(data, path, suffix)
     if len(mesh.faces) == 0:
         raise MeshError(
@@ -57,6 +59,28 @@ def write_obj(mesh: TriangleMesh, path: Path) -> None:
         lines += [f"vn {x!r} {y!r} {z!r}" for x, y, z in mesh.normals.tolist()]
         lines += [f"f {a}//{a} {b}//{b} {c}//{c}" for a, b, c in faces]
     path.write_text("\n".join(lines) + "\n", encoding="ascii")
+
+
+def _refuse_cut_off_stl(data: bytes, path: Path) -> None:
+    """Of a binary file the length is known: 84 bytes and 50 a triangle. A text ends in endsolid."""
+    ended = b"endsolid" in data.lower()
+    text = data.lstrip()[:5].lower() == b"solid" and (ended or b"facet" in data[:2000].lower())
+    if text:
+        if not ended:
+            raise MeshError(
+                "the mesh file is cut off: it ends without 'endsolid'",
+                where=str(path),
+                hint="export or copy it again",
+            )
+        return
+    count = int.from_bytes(data[80:84], "little") if len(data) >= 84 else 0
+    if len(data) < 84 + 50 * count:
+        raise MeshError(
+            f"the mesh file is cut off, or is no STL file: it says {count} triangles and has room "
+            f"for {max(len(data) - 84, 0) // 50}",
+            where=str(path),
+            hint="export or copy it again",
+        )
 
 
 def _load_with_trimesh(data: bytes, path: Path, suffix: str) -> TriangleMesh:

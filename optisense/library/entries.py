@@ -13,6 +13,7 @@ from optisense.design.fields import Colour, MisfitError, Model, Name, Number, Po
 from optisense.design.materials import Coating, Material
 from optisense.design.near import suggestion
 from optisense.design.sensor_design import Status
+from optisense.library.lens import lens_misfit
 
 Value = TypeVar("Value", bound=Model)
 
@@ -154,6 +155,11 @@ class CameraModel(Model):
             raise MisfitError(
                 "a perspective camera sees less than 180 degrees", ("fov",), "Use equidistant"
             )
+        misfit = lens_misfit(
+            self.projection, self.fov, self.resolution, self.pixel_size, self.focal_length
+        )
+        if misfit is not None:
+            raise MisfitError(misfit[0], ("fov",), misfit[1])
         return self
 
     def angles(self) -> tuple[float, float, float]:

@@ -3,19 +3,20 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import lru_cache
 
 import numpy as np
 
 from optisense import library
-from optisense.design import SensorDesign
+from optisense.design import LightGroup, LightModel, SensorDesign
 from optisense.design.check import inside
 from optisense.design.materials import Absorber, Coating, Conductor, Dielectric, Diffuse, Material
 from optisense.design.parts import TRANSPARENT_SOLIDS, Role
 from optisense.errors import DesignError
 from optisense.geometry import TriangleMesh
 from optisense.geometry.coplanar import merge_coplanar
-from optisense.optics.emitters import Emitter, Intensity, Shape, spot_intensity
-from optisense.optics.media import Media, Sheet, Solid
+from optisense.optics.emitters import Emitter, Intensity, Shape, frame_of, spot_intensity
+from optisense.optics.media import Media, Sheet, Solid, same_faces
 from optisense.optics.ray_scene import Piece
 from optisense.optics.surfaces import Region, Surface, SurfaceKind
 
@@ -65,9 +66,13 @@ class Kept:
     merged: list[tuple[TriangleMesh, TriangleMesh]] = field(default_factory=list)
     pieces: list[tuple[TriangleMesh, Piece]] = field(default_factory=list)
 
-    def merge(self, mesh: TriangleMesh, before: Kept) -> TriangleMesh:
-        """A part's mesh, its flat faces merged."""
+    def merge(self, mesh: TriangleMesh, before: Kept, bend: bool = False) -> TriangleMesh:
+        """A part's mesh, its flat faces merged; not if ``bend`` and one of the same faces had
+        none."""
         known = next((merged for old, merged in before.merged if old is mesh), None)
+        if known is None and bend:
+            bent = (merged is old and same_faces(old, mesh) for old, merged in before.merged)
+            known = mesh if any(bent) else None
         self.merged.append((mesh, _merged(mesh) if known is None else known))
         return self.merged[-1][1]
 
@@ -80,12 +85,13 @@ class Kept:
         return known
 
 
-def assemble(design: SensorDesign, before: Assembly | None = None) -> Assembly:
+def assemble(design: SensorDesign, before: Assembly | None = None, bend: bool = False) -> Assembly:
     """Resolve media, and turn parts and lights into surfaces and emitters.
 
     Args:
         design: the sensor.
         before: the assembly of a similar design, from which what is the same is taken.
+        bend: take boundaries between media along with parts that bend, for drafts.
 
     Raises:
         DesignError: solids overlap without priority, or a light is not in the library.
@@ -98,7 +104,7 @@ def assemble(design: SensorDesign, before: Assembly | None = None) -> Assembly:
     for name, part in design.parts.items():
         if name not in meshes:
             raise DesignError(f"part '{name}' has no mesh", where=design.where("parts", name))
-        mesh = kept.merge(meshes[name], old)
+        mesh = kept.merge(meshes[name], old, bend)
         material = design.materials.get(part.material) if part.material else None
         if part.role in TRANSPARENT_SOLIDS:
             assert isinstance(material, Dielectric) and part.material is not None
@@ -114,7 +120,8 @@ def assemble(design: SensorDesign, before: Assembly | None = None) -> Assembly:
     if before is not None and before.media.holds_for(solids, sheets):
         media = before.media
     else:
-        media = Media(solids, sheets)
+        bent = before.media.bend(solids, sheets) if before is not None and bend else None
+        media = Media(solids, sheets) if bent is None else bent
     for face in media.interfaces:
         surface = Surface(
             SurfaceKind.DIELECTRIC, eta=face.ior_inside / face.ior_outside, alpha=face.roughness
@@ -218,22 +225,23 @@ def _piece(name: str, mesh: TriangleMesh, surface: Surface) -> Piece:
     return Piece(name, smooth.vertices, smooth.faces, surface, smooth.normals)
 
 
+@dataclass(frozen=True)
+class _Lamp:
+    """What all lights of a group have in common; ``area`` mm^2 is that of the window."""
+
+    intensity: Intensity | None
+    shape: Shape
+    size: tuple[float, float]
+    area: float
+
+
 def _emitters(design: SensorDesign) -> tuple[list[Emitter], list[float]]:
     emitters, areas = [], []
     for number, group in enumerate(design.lights.values()):
-        model = library.emitter(group)
-        intensity, shape, size, area = None, Shape.POINT, (0.0, 0.0), 0.0
-        if model.kind == "area":
-            shape = Shape.DISC if model.shape == "disc" else Shape.RECTANGLE
-            size = model.size
-            area = size[0] * size[1] * (np.pi / 4 if shape is Shape.DISC else 1.0)
-        elif model.kind == "spot":
-            intensity = spot_intensity(model.cutoff, model.beam)
+        if group.emitter is None and not library.is_own("light", group.model):
+            lamp = _built_in_lamp(group.model)
         else:
-            table = model.intensity_table()
-            intensity = Intensity(table.vertical_angles, table.horizontal_angles, table.candela)
-            if np.ptp(table.candela, axis=0).max() <= 1e-9 * table.candela.max():
-                intensity = Intensity(table.vertical_angles, np.zeros(1), table.candela[:1])
+            lamp = _lamp(library.emitter(group))
         for light in group.lights:
             emitters.append(
                 Emitter(
@@ -241,27 +249,60 @@ def _emitters(design: SensorDesign) -> tuple[list[Emitter], list[float]]:
                     position=light.position,
                     direction=light.direction,
                     up=light.up,
-                    shape=shape,
-                    size=size,
-                    intensity=intensity,
+                    shape=lamp.shape,
+                    size=lamp.size,
+                    intensity=lamp.intensity,
                 )
             )
-            areas.append(float(area))
+            areas.append(float(lamp.area))
     if not emitters:
         raise DesignError("the design has no lights", where=design.where("lights"))
     return emitters, areas
 
 
+@lru_cache(maxsize=64)
+def _built_in_lamp(name: str) -> _Lamp:
+    return _lamp(library.emitter(LightGroup.model_construct(model=name, emitter=None)))
+
+
+def _lamp(model: LightModel) -> _Lamp:
+    if model.kind == "area":
+        shape = Shape.DISC if model.shape == "disc" else Shape.RECTANGLE
+        area = model.size[0] * model.size[1] * (np.pi / 4 if shape is Shape.DISC else 1.0)
+        return _Lamp(None, shape, model.size, area)
+    if model.kind == "spot":
+        return _Lamp(spot_intensity(model.cutoff, model.beam), Shape.POINT, (0.0, 0.0), 0.0)
+    table = model.intensity_table()
+    intensity = Intensity(table.vertical_angles, table.horizontal_angles, table.candela)
+    if np.ptp(table.candela, axis=0).max() <= 1e-9 * table.candela.max():
+        intensity = Intensity(table.vertical_angles, np.zeros(1), table.candela[:1])
+    return _Lamp(intensity, Shape.POINT, (0.0, 0.0), 0.0)
+
+
 def _window(number: int, emitter: Emitter) -> Piece:
-    """The emitting face of a light, facing the way it shines."""
-    s, t, _ = emitter.frame
-    half = np.array(emitter.size) / 2
-    if emitter.shape is Shape.DISC:
+    """The emitting face of a light, facing the way it shines; the same object for the same one."""
+    return _window_of(
+        number, emitter.shape, emitter.size, emitter.position, emitter.direction, emitter.up
+    )
+
+
+@lru_cache(maxsize=1024)
+def _window_of(
+    number: int,
+    shape: Shape,
+    size: tuple[float, float],
+    position: tuple[float, float, float],
+    direction: tuple[float, float, float],
+    up: tuple[float, float, float] | None,
+) -> Piece:
+    s, t, _ = frame_of(direction, up)
+    half = np.array(size) / 2
+    if shape is Shape.DISC:
         turn = np.arange(DISC_CORNERS) * 2 * np.pi / DISC_CORNERS
         outline = np.stack([np.cos(turn), np.sin(turn)], axis=1) * half
     else:
         outline = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]) * half
-    points = np.asarray(emitter.position) + outline[:, :1] * s + outline[:, 1:] * t
+    points = np.asarray(position) + outline[:, :1] * s + outline[:, 1:] * t
     count = len(points)
     faces = np.array([[0, k, k + 1] for k in range(1, count - 1)])
     return Piece(f"light {number}", points, faces, Surface(SurfaceKind.LIGHT, light=number))

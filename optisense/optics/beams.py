@@ -38,6 +38,13 @@ class Beams:
     fluxes: mi.Float
 
 
+def blocks_of_four(bands: int, sectors: int) -> NDArray[np.int64]:
+    """(bands * sectors / 4, 4) the bins in blocks of two bands and two sectors."""
+    block = np.arange(bands * sectors // 4)
+    corner = (block // (sectors // 2)) * 2 * sectors + (block % (sectors // 2)) * 2
+    return corner[:, None] + np.array([0, 1, sectors, sectors + 1])
+
+
 def collect_beams(
     moments: mi.Float,
     colours: mi.Float,
@@ -59,9 +66,7 @@ def collect_beams(
     """
     slots = np.full(bands * sectors, NO_SLOT, dtype=np.uint32)
     slots[used] = np.arange(len(used))
-    block = np.arange(bands * sectors // 4)
-    corner = (block // (sectors // 2)) * 2 * sectors + (block % (sectors // 2)) * 2
-    four = slots[corner[:, None] + np.array([0, 1, sectors, sectors + 1])]
+    four = slots[blocks_of_four(bands, sectors)]
     # Blocks without any light are not looked at.
     four = four[(four != NO_SLOT).any(axis=1)]
     # Copied: arrays handed over from numpy differ in alignment, and so would kernels.

@@ -132,6 +132,12 @@ def _frame(z: FloatArray) -> FloatArray:
     return np.stack([x, np.cross(z, x), z])
 
 
+def bin_axis(cells: SurfaceCells, number: int) -> mi.Vector3f:
+    """One axis of the frame of the bins, of which no kernel knows the numbers: surfaces that bend a
+    little would have each of their own."""
+    return mi.Vector3f(*[dr.opaque(mi.Float, float(part)) for part in cells.axes[number]])
+
+
 def cell_at(cells: SurfaceCells, point: mi.Point3f, active: mi.Bool) -> tuple[mi.UInt32, mi.Bool]:
     """Number of the cell that holds a point, and whether there is one."""
     relative = (point - cells.lower) * cells.inverse_size

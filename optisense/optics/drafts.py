@@ -8,7 +8,10 @@ cells of surfaces that did not move, and the photon guide, which stays right for
 
 from __future__ import annotations
 
+from collections.abc import Callable, Collection, Sequence
+from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,22 +20,39 @@ from optisense.design import SensorDesign
 from optisense.geometry import Contact, SensingSurface, TriangleMesh
 from optisense.geometry.indenters import FACET_ERROR
 from optisense.optics.emitters import EmitterTable
-from optisense.optics.field_store import CELL_SIZE, FieldStore
-from optisense.optics.model import OpticalModel
+from optisense.optics.field_store import CELL_SIZE, SEEN_MARGIN, FieldStore
+from optisense.optics.image import TactileImage
+from optisense.optics.imaging import Careful
+from optisense.optics.model import OpticalModel, Progress
 from optisense.optics.ray_scene import Piece, RayScene
 from optisense.optics.surfaces import SurfaceKind
 
-COARSER = 3.0
+COARSER = 2.4
 """How much larger the cells of a draft are along a side. Of as few photons as a draft has, wider
 cells make a picture that is nearer to the whole one (9 % instead of 14 % with cells half as wide),
 and a smoothing costs a small part."""
+
+
+GUIDE_REACH = 0.5 * SEEN_MARGIN
+"""mm that shapes may differ from those that a photon guide was learned on."""
+
+
+@dataclass(frozen=True)
+class _Shown:
+    """The last draft, with all that was asked; ``kept`` is whether layers or media of it are those
+    of a draft before."""
+
+    asked: tuple[Any, ...]
+    design: SensorDesign
+    image: TactileImage
+    kept: bool
 
 
 class DraftStore(FieldStore):
     """Light fields in coarse cells, which takes over what it may from the store before it."""
 
     cell_size = COARSER * CELL_SIZE
-    least_passes = 1
+    lifts = False  # half of the light's time, for some per cent on flanks of contacts
 
     def __init__(
         self,
@@ -46,12 +66,27 @@ class DraftStore(FieldStore):
     ) -> None:
         """As of `FieldStore`; `before` is the store of the design before, if there is one."""
         super().__init__(scene, opaque, table, seen, coloured, metallic)
-        if before is None or not _same_shapes(opaque, before._opaque):
+        self.seen = seen
+        self._learned_on = opaque
+        if before is None:
             return
-        if table.groups == before._table.groups:
+        off = _apart(opaque, before._opaque)
+        same_view = seen is before.seen or np.array_equal(seen, before.seen)
+        if off == 0.0 and same_view and table.groups == before._table.groups:
             self._kernels = before._kernels
-        if table.count == before._table.count:
-            self._guide = before._guide
+        if before.aims_at(opaque, table):
+            self._guide, self._learned_on = before._guide, before._learned_on
+
+    def aims_at(self, opaque: list[Piece], table: EmitterTable) -> bool:
+        """Whether it knows where lights should send photons in a sensor of these surfaces."""
+        known = self._guide is not None and table.count == self._table.count
+        return known and _apart(opaque, self._learned_on) < GUIDE_REACH
+
+    def light_only(self, groups: Collection[int] | None) -> None:
+        """From now on trace the light of these groups alone, or of all (None)."""
+        if groups != self.lit:
+            self.forget_light(self._coloured, self._metallic)
+        self.lit = groups
 
 
 class DraftModel(OpticalModel):
@@ -60,6 +95,7 @@ class DraftModel(OpticalModel):
     """
 
     is_draft = True
+    bends_media = True
     facet_error = 10 * FACET_ERROR  # still far below a pixel; normals are those of the exact shape
 
     def __init__(self, design: SensorDesign, variant: str = "auto") -> None:
@@ -70,6 +106,8 @@ class DraftModel(OpticalModel):
         self._seen: NDArray[np.floating] | None = None
         self._placed: dict[Contact, TriangleMesh] = {}
         self._placed_on: SensingSurface | None = None
+        self._shown: _Shown | None = None
+        self._pressed: tuple[int, list[TriangleMesh], RayScene] | None = None
         super().__init__(self._straightened(design), variant)
 
     def become(self, design: SensorDesign) -> None:
@@ -93,19 +131,90 @@ class DraftModel(OpticalModel):
             self._placed[contact] = super().place(contact)
         return self._placed[contact]
 
+    def render(
+        self,
+        contacts: Sequence[Contact] = (),
+        resolution: tuple[int, int] | None = None,
+        photons: int | None = None,
+        noise: float | None = None,
+        seconds: float | None = None,
+        seed: int = 0,
+        progress: Callable[[Progress], None] | None = None,
+        estimator: str = "field",
+        only_contacts: bool = False,
+        careful: Careful | None = None,
+    ) -> TactileImage:
+        """As of `OpticalModel`; layers of light groups whose lights are where they were in the
+        draft before are taken from it, where all else is the same.
+
+        What is missed by that is the shadow of moved lights in the light of the others. The same
+        draft, asked for once more, is made anew in full, its media resolved as well;
+        ``settings["kept_layers"]`` and ``settings["kept_media"]`` say what was not.
+        """
+        asked = (
+            tuple(contacts), resolution, photons, noise, seconds, seed, estimator, only_contacts,
+            careful,
+        )  # fmt: skip
+        before = self._shown if self._shown is not None and self._shown.asked == asked else None
+        moved = None if before is None else _moved(before.design, self.design)
+        if before is not None and not moved:  # no light was, or more than lights
+            if moved is not None and not before.kept:
+                return self._relit(before.image)
+            if moved is not None:
+                self._resolve()
+            moved = None
+        self._shown = None
+        self._store.light_only(moved)
+        image = super().render(
+            contacts, resolution, photons, noise, seconds, seed, progress, estimator,
+            only_contacts, careful,
+        )  # fmt: skip
+        kept = [] if moved is None else [n for k, n in enumerate(self.groups) if k not in moved]
+        if before is not None:
+            for name in kept:
+                image.unit_layers[name] = before.image.unit_layers[name]
+            image = self._relit(image)
+        bent = self._parts.media.bent
+        image.settings |= {"kept_layers": kept, "kept_media": bent}
+        if not image.interrupted:
+            self._shown = _Shown(asked, self.design, image, bent or bool(kept))
+        return image
+
+    def _resolve(self) -> None:
+        """Resolve media that were only taken along."""
+        if self._parts.media.bent:
+            self._before = self.__dict__.get("_store", self._before)
+            self.bends_media = False
+            try:
+                self._assemble(self._parts)
+            finally:
+                self.bends_media = True
+
+    def _relit(self, image: TactileImage) -> TactileImage:
+        """The same under the design's own lights."""
+        return image.relit(
+            {name: self.design.lights[name].channel_flux() for name in image.unit_layers}
+        )
+
+    def _indenters(self, placed: list[TriangleMesh]) -> RayScene:
+        count = len(self._surfaces)  # the indenters' surface is the last
+        if self._pressed is None or self._pressed[:2] != (count, placed):
+            self._pressed = count, placed, super()._indenters(placed)
+        scene = self._pressed[2]
+        scene.table = self._table
+        return scene
+
     @cached_property
-    def _store(self) -> FieldStore:
-        if self._seen is None:
+    def _store(self) -> DraftStore:
+        opaque = [piece for piece in self._pieces if piece.surface.kind is SurfaceKind.OPAQUE]
+        before, seen = self._before, self._seen
+        if seen is None and before is not None and before.aims_at(opaque, self._emitter_table):
+            seen = before.seen
+        if seen is None:
             rays = self.chief_rays((96, 72))
-            self._seen = rays.points[rays.hit]
+            seen = self._seen = rays.points[rays.hit]
         return DraftStore(
-            self.scene,
-            [piece for piece in self._pieces if piece.surface.kind is SurfaceKind.OPAQUE],
-            self._emitter_table,
-            self._seen,
-            self._coloured,
-            self._metallic,
-            self._before,
+            self.scene, opaque, self._emitter_table, seen, self._coloured, self._metallic, before
         )
 
     def _straightened(self, design: SensorDesign) -> SensorDesign:
@@ -137,8 +246,33 @@ def _all_but_lights_same(one: SensorDesign, other: SensorDesign) -> bool:
     )
 
 
-def _same_shapes(one: list[Piece], other: list[Piece]) -> bool:
-    return len(one) == len(other) and all(
-        a is b or (np.array_equal(a.vertices, b.vertices) and np.array_equal(a.faces, b.faces))
-        for a, b in zip(one, other, strict=True)
+def _moved(one: SensorDesign, other: SensorDesign) -> frozenset[int] | None:
+    """The numbers of the light groups of which anything but flux and colour differs; None where
+    all do, or more than lights differs."""
+    if (
+        list(one.lights) != list(other.lights)
+        or one.coating != other.coating
+        or not _all_but_lights_same(one, other)
+    ):
+        return None
+    pairs = zip(one.lights.values(), other.lights.values(), strict=True)
+    moved = frozenset(
+        k
+        for k, (a, b) in enumerate(pairs)
+        if (a.model, a.emitter, a.lights) != (b.model, b.emitter, b.lights)
     )
+    return None if len(moved) == len(one.lights) else moved
+
+
+def _apart(one: list[Piece], other: list[Piece]) -> float:
+    """mm between the vertices that are farthest apart; infinite where the faces differ."""
+    if len(one) != len(other):
+        return np.inf
+    farthest = 0.0
+    for a, b in zip(one, other, strict=True):
+        if a is b:
+            continue
+        if len(a.vertices) != len(b.vertices) or not np.array_equal(a.faces, b.faces):
+            return np.inf
+        farthest = max(farthest, float(np.abs(a.vertices - b.vertices).max(initial=0.0)))
+    return farthest

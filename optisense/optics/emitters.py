@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from enum import IntEnum
-from functools import cached_property
+from functools import lru_cache
 
 import drjit as dr
 import mitsuba as mi
@@ -101,17 +101,26 @@ class Emitter:
         filled = {Shape.POINT: 0.0, Shape.RECTANGLE: 1.0, Shape.DISC: np.pi / 4}[self.shape]
         return float(self.size[0] * self.size[1] * filled)
 
-    @cached_property
+    @property
     def frame(self) -> FloatArray:
         """(3, 3): width axis, height axis, direction as rows."""
-        n = np.asarray(self.direction, float)
-        n = n / np.linalg.norm(n)
-        up = np.asarray(self.up if self.up is not None else (0.0, 0.0, 1.0), float)
-        s = np.cross(up, n)
-        if np.linalg.norm(s) < 1e-6:
-            s = np.cross((1.0, 0.0, 0.0) if abs(n[0]) < 0.9 else (0.0, 1.0, 0.0), n)
-        s = s / np.linalg.norm(s)
-        return np.stack([s, np.cross(n, s), n])
+        return frame_of(self.direction, self.up)
+
+
+@lru_cache(maxsize=4096)
+def frame_of(
+    direction: tuple[float, float, float], up: tuple[float, float, float] | None
+) -> FloatArray:
+    """(3, 3): width axis, height axis and direction of a light, as rows; not to be changed."""
+    n = np.asarray(direction, float)
+    n = n / np.linalg.norm(n)
+    s = np.cross(np.asarray(up if up is not None else (0.0, 0.0, 1.0), float), n)
+    if np.linalg.norm(s) < 1e-6:
+        s = np.cross((1.0, 0.0, 0.0) if abs(n[0]) < 0.9 else (0.0, 1.0, 0.0), n)
+    s = s / np.linalg.norm(s)
+    frame = np.stack([s, np.cross(n, s), n])
+    frame.flags.writeable = False
+    return frame
 
 
 @dataclass

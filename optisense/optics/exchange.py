@@ -67,6 +67,7 @@ def irradiance_table(moments: mi.Float, cells: int, bins: mi.UInt32, groups: int
             for i in range(9):
                 sums[i] += value.w * basis[i]
         k += 1
+    dr.eval(sums, mean)  # together: the loop would run again for each
     band = [BAND_0, *[BAND_1] * 3, *[BAND_2] * 5]
     out = dr.empty(mi.Float, cells * groups * 12)
     for i in range(9):

@@ -5,7 +5,7 @@ each seed.
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import dataclass
 
 import mitsuba as mi
@@ -20,18 +20,26 @@ from optisense.optics.light_field import BINS, FieldTally, LightField
 from optisense.optics.photons import Target, trace_photons, trace_pilot
 from optisense.optics.ray_scene import Piece, RayScene
 from optisense.optics.sampling import seed_of
+from optisense.optics.slab import Slab, grazing_share, slab_above
 from optisense.optics.smoothing import Kernels
 
 PASS_PHOTONS = 500_000
+ONE_PASS = 1.5 * PASS_PHOTONS
 PILOT_PHOTONS = 300_000
-CELL_SIZE = 0.4
+CELL_SIZE = 0.5
 """mm; larger where the tally would outgrow its memory."""
 MOST_BYTES = 375e6
 SEEN_MARGIN = 2.0
 """mm around what the camera sees that photons are sent to: an indenter's flank catches light
 that would land there.
 """
+SMOOTHED_MARGIN = 5.0
+"""mm around what the camera sees, beyond which light is hardly smoothed: little of it is read."""
 KEPT_FIELDS = 2
+SCOUTS = 20_000
+"""Photons that tell whether light nearly grazes the surface."""
+MOST_GRAZING = 0.25
+"""Share of such light above which indenters are lit from a field above the surface."""
 
 
 @dataclass
@@ -44,8 +52,10 @@ class FieldStore:
     """Traces photons pass by pass and keeps what it finds."""
 
     cell_size = CELL_SIZE
-    least_passes = 2
-    """Of photons; the noise is told from the difference of two."""
+    lifts = True
+    """Whether indenters are lit from a field above the surface where light grazes it."""
+    lit: Collection[int] | None = None
+    """The light groups whose light is traced; all where it is None."""
 
     def __init__(
         self,
@@ -66,6 +76,8 @@ class FieldStore:
         self._metallic = metallic
         self._opaque = opaque
         self._guide: Guide | None = None
+        self._grazing: bool | None = None
+        self._above: Slab | None = None
         self._kernels: Kernels | None = None
         self._running: dict[tuple[int, int], _Running] = {}
         self._done: dict[tuple[int, int, int], LightField] = {}
@@ -74,8 +86,33 @@ class FieldStore:
         """Surfaces reflect otherwise now: drop the fields, keep guide and cells."""
         self._coloured = coloured
         self._metallic = metallic
+        self._grazing = None
         self._running.clear()
         self._done.clear()
+
+    @property
+    def _slab(self) -> Slab | None:
+        """The slab above the surface where much of the light nearly grazes it, else None."""
+        if self._grazing is None:
+            self._grazing = self.lifts and self._grazing_share() > MOST_GRAZING
+        if not self._grazing:
+            return None
+        if self._above is None:
+            self._above = slab_above(self.cells)
+        return self._above
+
+    def _grazing_share(self) -> float:
+        """Of the flux across the light, where the camera sees, the part that nearly grazes."""
+        per_light = max(1, SCOUTS // self._table.count)
+        scouts = trace_photons(
+            self._scene,
+            self._table,
+            self.guide,
+            per_light,
+            seed_of(2, 2),
+            coloured=self._coloured,
+        )
+        return grazing_share(scouts, self.cells, cells_near(self.cells, self._seen, SEEN_MARGIN))
 
     @property
     def guide(self) -> Guide:
@@ -114,7 +151,8 @@ class FieldStore:
             least = float(np.sqrt(1.3 * area * entry / MOST_BYTES))
             scale = self.cell_size / CELL_SIZE
             cells = build_cells(points, triangles, max(self.cell_size, scale * least))
-            self._kernels = Kernels(cells, self._lamp_distance(cells.centres))
+            near = cells_near(cells, self._seen, SMOOTHED_MARGIN)
+            self._kernels = Kernels(cells, self._lamp_distance(cells.centres), near)
         return self._kernels
 
     def _lamp_distance(self, points: NDArray[np.floating]) -> NDArray[np.floating]:
@@ -141,16 +179,11 @@ class FieldStore:
         Returns the field and whether Ctrl-C ended it early.
         """
         lights = self._table.count
-        size = (
-            PASS_PHOTONS if photons is None else min(PASS_PHOTONS, -(-photons // self.least_passes))
-        )
+        # A pass costs a little by itself, so few photons are one.
+        size = photons if photons is not None and photons < ONE_PASS else PASS_PHOTONS
         per_light = max(1, size // lights)
-        wanted = (
-            None
-            if photons is None
-            else max(self.least_passes, round(photons / (per_light * lights)))
-        )
-        cap = max(2, most // (per_light * lights))
+        wanted = None if photons is None else max(1, round(photons / (per_light * lights)))
+        cap = max(1, most // (per_light * lights))
         key = (seed, per_light)
         if wanted is not None and noise is None and seconds is None:
             done = self._done.get((*key, wanted))
@@ -163,13 +196,19 @@ class FieldStore:
             or (wanted is None and seconds is None)
         ):
             running = _Running(
-                FieldTally(self.kernels, self._table.groups, self._coloured, self._metallic),
+                FieldTally(
+                    self.kernels,
+                    self._table.groups,
+                    self._coloured,
+                    self._metallic,
+                    self._slab,
+                ),
                 per_light,
             )
             self._running = {key: running}
         tally = running.tally
         limit = cap if wanted is None else wanted
-        check, reached, interrupted = 2, None, False
+        check, reached, interrupted = 1, None, False
         try:
             while tally.passes < limit:
                 started = time.perf_counter()
@@ -182,6 +221,8 @@ class FieldStore:
                         seed_of(seed, 2),
                         first=tally.passes * per_light,
                         coloured=self._coloured,
+                        groups=self.lit,
+                        slab=self._slab,
                     )
                 )
                 now = time.perf_counter()
@@ -195,7 +236,7 @@ class FieldStore:
                     fraction = max(fraction, min(0.95, (noise / reached) ** 2))
                 if seconds is not None:
                     fraction = max(fraction, min(0.95, (now - began) / seconds))
-                    if tally.passes >= 2 and now - began + (now - started) > 0.8 * seconds:
+                    if now - began + (now - started) > 0.8 * seconds:
                         break
                 tell(0.95 * fraction, tally.photons, reached)
         except KeyboardInterrupt:

@@ -51,5 +51,7 @@ class Film:
     def layers(self, width: int, height: int) -> NDArray[np.float32]:
         """(groups, h, w, 3): sums over the number of samples."""
         share = 1 / np.maximum(np.asarray(self.counts), 1).reshape(height, width, 1)
-        out = [np.asarray(total).reshape(height, width, 3) * share for total in self.sums]
-        return np.stack(out).astype(np.float32, copy=False)
+        out = np.empty((len(self.sums), height, width, 3), dtype=np.float32)
+        for layer, total in zip(out, self.sums, strict=True):
+            np.multiply(np.asarray(total).reshape(height, width, 3), share, out=layer)
+        return out

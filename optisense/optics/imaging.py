@@ -206,7 +206,7 @@ def render_field(
         sample(pixel, number, True)
         samples = [1, outer, inner]
     far = ~near
-    layers = None
+    layers = reflections = None
     if far.any() and not only_contacts:
         # Beams to go through: where they are many, every second pixel will do, if its neighbours
         # are like it.
@@ -217,12 +217,13 @@ def render_field(
         pixel = dr.compress(mi.Bool(first.ravel()))
         sample(pixel, dr.zeros(mi.UInt32, dr.width(pixel)), False)
         reflections = mirrored.layers(width, height)
-        fill(reflections, filled)
+        if sparse:
+            fill(reflections, filled)
         layers = film.layers(width, height) + reflections
         step = 2 if sparse else 1
         grainy = np.zeros_like(far)
         grainy[::step, ::step] = _grainy(
-            layers[:, ::step, ::step].sum(axis=(0, 3)),
+            layers[:, ::step, ::step].sum(axis=0) @ np.ones(3, dtype=np.float32),
             (far & rays.hit & (not draft))[::step, ::step],
         )
         if grainy.any():
@@ -247,7 +248,9 @@ def render_field(
                 layers = film.layers(width, height) + reflections
             fill(layers, alike)
     if layers is None:
-        layers = film.layers(width, height) + mirrored.layers(width, height)
+        if reflections is None:
+            reflections = mirrored.layers(width, height)
+        layers = film.layers(width, height) + reflections
     return ImageLayers(
         radiance=layers,
         normals=masked(rays.normals, rays.hit),

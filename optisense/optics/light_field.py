@@ -12,18 +12,20 @@ photons.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any, NamedTuple
 
 import drjit as dr
 import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from optisense.optics.beams import Beams, collect_beams
-from optisense.optics.cells import SurfaceCells, cell_at
+from optisense.optics.beams import Beams, blocks_of_four, collect_beams
+from optisense.optics.cells import SurfaceCells, bin_axis, cell_at
 from optisense.optics.exchange import irradiance_table
-from optisense.optics.photons import GROUP_MASK, PhotonMap
+from optisense.optics.photons import GROUP_MASK, HALF_SHIFT, PhotonMap
 from optisense.optics.sampling import unit_float
-from optisense.optics.smoothing import WIDEST, WIDEST_OF_METAL, Kernels, smooth
+from optisense.optics.slab import Slab, above_cell
+from optisense.optics.smoothing import Kernels, smooth
 
 FloatArray = NDArray[np.floating]
 
@@ -34,7 +36,6 @@ LEAST_COSINE = 0.02
 BANDS = 16
 SECTORS = 16
 BINS = BANDS * SECTORS
-BINS_IN_STEPS_OF = 32
 OVERLAP = 1.0
 """Bins by which light strays to its neighbours (triangular): each bin holds what a quadratic
 B-spline weights. With sharp edges, a lamp would be counted once or twice by a point above the
@@ -42,6 +43,8 @@ surface, depending on how near an edge it lies, where its light is only somewhat
 below; the sum over such bins hardly depends on where they lie."""
 OVERLAP_OF_METAL = 0.5
 """The same where a coating is part metal, which tells directions apart: a compromise."""
+WEAK = 0.002
+"""Part of all light below which four neighbouring bins become one, where coatings are diffuse."""
 # Where a bin of no light is told from one of little.
 DARK = 1e-7
 
@@ -52,7 +55,7 @@ def direction_bin(
     """Equal-area bin (of BINS on the sphere) of a unit direction, or the one so many bands and
     sectors beside it.
     """
-    x, y, z = (dr.dot(direction, mi.Vector3f(*map(float, row))) for row in cells.axes)
+    x, y, z = (dr.dot(direction, bin_axis(cells, k)) for k in range(3))
     place = (z + 1) * (BANDS / 2) + bands_off
     # Beyond a pole: back from it.
     place = dr.select(place > BANDS, 2 * BANDS - place, dr.abs(place))
@@ -74,15 +77,26 @@ def _dither(place: mi.Vector4f, direction: mi.Vector3f, reach: mi.Float) -> list
     return [reach * (unit_float(one) + unit_float(one * 277803737) - 1) for one in both]
 
 
-def bin_centres(cells: SurfaceCells, bins: NDArray[np.integer]) -> mi.Float:
-    """Middle direction of bins, four floats each."""
-    z = (bins // SECTORS + 0.5) * (2 / BANDS) - 1
-    turn = (bins % SECTORS + 0.5) * (2 * np.pi / SECTORS)
+def bin_centres(
+    cells: SurfaceCells, bins: NDArray[np.integer], folded: NDArray[np.integer]
+) -> mi.Float:
+    """Middle direction of bins, four floats each; ``folded`` are corners of four in one."""
+    half = np.where(np.isin(bins, folded), 1.0, 0.5)
+    z = (bins // SECTORS + half) * (2 / BANDS) - 1
+    turn = (bins % SECTORS + half) * (2 * np.pi / SECTORS)
     flat = np.sqrt(1 - z * z)
     local = np.stack([flat * np.cos(turn), flat * np.sin(turn), z], axis=1)
     out = np.zeros((len(bins), 4), dtype=np.float32)
     out[:, :3] = local @ cells.axes
     return mi.Float(out.ravel())
+
+
+class Tables(NamedTuple):
+    """Moments, heights and colours, see `LightField`."""
+
+    moments: mi.Float
+    heights: mi.Float
+    colours: mi.Float
 
 
 @dataclass
@@ -93,7 +107,8 @@ class LightField:
     (3), flux density (1). ``heights``: the flux density times the square of the direction's
     part along the axis of the bins. ``colours``: four floats, the flux density per channel R,
     G, B where surfaces are coloured, else the same array as ``moments``. ``beams``: the same
-    light in short lists.
+    light in short lists. ``raised``: moments, heights and colours of the light half-way up the
+    slab above the cells, if that was asked for (see ``slab.py``).
     """
 
     cells: SurfaceCells
@@ -109,16 +124,23 @@ class LightField:
     beams: Beams
     photons: int
     noise: float
+    raised: Tables | None = None
 
 
 class FieldTally:
     """Sums of landings per cell, direction bin and light group, over photon passes."""
 
     def __init__(
-        self, kernels: Kernels, groups: int, coloured: bool, metallic: bool = True
+        self,
+        kernels: Kernels,
+        groups: int,
+        coloured: bool,
+        metallic: bool = True,
+        slab: Slab | None = None,
     ) -> None:
+        """``slab``, if light above the surface is wanted, too."""
+        self.slab = slab
         self.metallic = metallic
-        self.widest = WIDEST_OF_METAL if metallic else WIDEST
         self.kernels = kernels
         self.cells = cells = kernels.cells
         self.groups = groups
@@ -126,52 +148,72 @@ class FieldTally:
         self.passes = 0
         self.photons = 0
         entries = cells.cells * BINS * groups * 4
-        self.moments = dr.zeros(mi.Float, entries)
-        self.heights = dr.zeros(mi.Float, entries // 4)
-        self.colours = dr.zeros(mi.Float, entries if coloured else 4)
-        # The irradiance of odd and of even passes; their difference tells the noise.
-        self.halves = [dr.zeros(mi.Float, cells.cells * groups) for _ in range(2)]
+        self.landed = self._tables(entries)
+        self.raised = None if slab is None else self._tables(entries)
+        # What photons of even and of odd number bring; their difference tells the noise.
+        self.halves = dr.zeros(mi.Float, 2 * cells.cells * groups)
+
+    def _tables(self, entries: int) -> Tables:
+        moments = dr.zeros(mi.Float, entries)
+        colours = dr.zeros(mi.Float, entries if self.coloured else 4)
+        return Tables(moments, dr.zeros(mi.Float, entries // 4), colours)
 
     def add(self, photons: PhotonMap) -> None:
         """Add a photon pass. All passes must have the same number of photons."""
+        cell, found, bits, scalar = self._tally(photons, self.landed, None)
+        row = cell + ((bits >> HALF_SHIFT) & 1) * dr.opaque(mi.UInt32, self.cells.cells)
+        dr.scatter_add(self.halves, scalar, row * self.groups + (bits & GROUP_MASK), found)
+        if self.raised is not None and photons.passing is not None:
+            self._tally(photons.passing, self.raised, self.slab)
+        self.passes += 1
+        self.photons += photons.emitted
+        dr.eval(self.landed, self.halves, self.raised)
+
+    def _tally(
+        self, photons: PhotonMap, tables: Tables, slab: Slab | None
+    ) -> tuple[mi.UInt32, mi.Bool, mi.UInt32, mi.Float]:
+        """Add photons, landings or in a slab, to tables; returns of each the cell, whether there
+        is one, the bits and the power."""
         index = dr.arange(mi.UInt32, photons.count)
         place = dr.gather(mi.Vector4f, photons.place, index)
         travel = dr.gather(mi.Vector4f, photons.travel, index)
-        group = dr.reinterpret_array(mi.UInt32, place.w) & GROUP_MASK
-        cell, found = cell_at(self.cells, mi.Point3f(place.x, place.y, place.z), mi.Bool(True))
+        bits = dr.reinterpret_array(mi.UInt32, place.w)
+        point = mi.Point3f(place.x, place.y, place.z)
+        if slab is None:
+            cell, found = cell_at(self.cells, point, mi.Bool(True))
+            across = dr.rcp(dr.maximum(travel.w, LEAST_COSINE))
+        else:
+            cell, _, found = above_cell(slab, point, mi.Bool(True))
+            across = dr.rcp(dr.maximum(travel.w, 1e-6))
         direction = mi.Vector3f(travel.x, travel.y, travel.z)
-        across = dr.rcp(dr.maximum(travel.w, LEAST_COSINE))
         reach = dr.opaque(mi.Float, OVERLAP_OF_METAL if self.metallic else OVERLAP)
         bin_ = direction_bin(self.cells, -direction, *_dither(place, direction, reach))
-        entry = (cell * BINS + bin_) * self.groups + group
+        entry = (cell * BINS + bin_) * self.groups + (bits & GROUP_MASK)
         if self.coloured:
             power = dr.gather(mi.Vector4f, photons.power, index)
             for k in range(3):
-                dr.scatter_add(self.colours, power[k] * across, entry * 4 + k, found)
+                dr.scatter_add(tables.colours, power[k] * across, entry * 4 + k, found)
             scalar = (power.x + power.y + power.z) * (1 / 3)
         else:
             scalar = dr.gather(mi.Float, photons.power, index)
         for k in range(3):
-            dr.scatter_add(self.moments, -direction[k] * (scalar * across), entry * 4 + k, found)
-        dr.scatter_add(self.moments, scalar * across, entry * 4 + 3, found)
-        height = dr.dot(direction, mi.Vector3f(*map(float, self.cells.axes[2])))
-        dr.scatter_add(self.heights, dr.square(height) * (scalar * across), entry, found)
-        dr.scatter_add(self.halves[self.passes % 2], scalar, cell * self.groups + group, found)
-        self.passes += 1
-        self.photons += photons.emitted
-        dr.eval(self.moments, self.heights, self.colours, self.halves)
+            dr.scatter_add(tables.moments, -direction[k] * (scalar * across), entry * 4 + k, found)
+        dr.scatter_add(tables.moments, scalar * across, entry * 4 + 3, found)
+        height = dr.dot(direction, bin_axis(self.cells, 2))
+        dr.scatter_add(tables.heights, dr.square(height) * (scalar * across), entry, found)
+        return cell, found, bits, scalar
 
     def noise(self) -> float:
         """Relative RMS noise of the smoothed irradiance (1 = 100 %), from the difference of
         both halves.
 
-        Over all cells and groups, in relation to each group's mean; infinite before the second
-        pass.
+        Over all cells that the camera sees, or nearly so, and all groups, in relation to each
+        group's mean; infinite without photons.
         """
-        if self.passes < 2:
+        if self.passes < 1:
             return float("inf")
-        matrix = self.kernels.smoothing(self.photons, self.widest).matrix
-        means = [matrix @ landed for landed in self._landed()]
+        matrix = self.kernels.smoothing(self.photons, self.metallic).matrix
+        means = [(matrix @ landed)[self.kernels.near] for landed in self._landed()]
         mean = (means[0] + means[1]) / 2
         # Half the difference of two halves has the deviation of their mean.
         spread = ((means[0] - means[1]) / 2) ** 2
@@ -181,28 +223,59 @@ class FieldTally:
             return 0.0
         return float(np.sqrt((spread[:, lit] / scale[lit] ** 2).mean()))
 
-    def _landed(self) -> list[FloatArray]:
-        """(cells, groups) mW on each cell, by the odd and by the even passes."""
-        counts = ((self.passes + 1) // 2, max(self.passes // 2, 1))
-        return [
-            np.asarray(half, dtype=np.float64).reshape(-1, self.groups) / count
-            for half, count in zip(self.halves, counts, strict=True)
-        ]
+    def _landed(self) -> FloatArray:
+        """(2, cells, groups) mW on each cell, by the photons of even and of odd number."""
+        halves = np.asarray(self.halves, dtype=np.float64) * (2 / self.passes)
+        return halves.reshape(2, -1, self.groups)
+
+    def _fold_weak(self, power: FloatArray) -> NDArray[np.int64]:
+        """Put the light of four neighbouring bins that hold little into the first of them, in all
+        tables and in ``power`` (BINS,); returns these.
+
+        Moments add up, so nothing is lost but where within the four the light came from.
+        """
+        blocks = blocks_of_four(BANDS, SECTORS)
+        whole = power[blocks].sum(axis=1)
+        weak = (whole > 0) & (whole < WEAK * power.sum())
+        blocks = blocks[weak]
+        if len(blocks) == 0:
+            return blocks[:, 0]
+        power[blocks] = 0.0
+        power[blocks[:, 0]] = whole[weak]
+        # Copied: arrays handed over from numpy differ in alignment, and so would kernels.
+        bins = mi.UInt32(blocks.ravel().astype(np.uint32)) + dr.opaque(mi.UInt32, 0)
+        lanes = dr.arange(mi.UInt32, self.cells.cells * len(blocks) * self.groups)
+        rest = lanes // self.groups
+        count = dr.opaque(mi.UInt32, len(blocks))
+        entries = []
+        for k in range(4):
+            row = (rest // count) * BINS + dr.gather(mi.UInt32, bins, rest % count * 4 + k)
+            entries.append(row * self.groups + lanes % self.groups)
+        for tables in (self.landed, self.raised):
+            if tables is not None:
+                _fold(tables.moments, mi.Vector4f, entries)
+                _fold(tables.heights, mi.Float, entries)
+                if self.coloured:
+                    _fold(tables.colours, mi.Vector4f, entries)
+        dr.eval(self.landed, self.raised)
+        return blocks[:, 0]
 
     def smoothed(self) -> LightField:
         """The field so far; only bins that hold light are kept."""
         total = dr.zeros(mi.Float, BINS)
         lanes = dr.arange(mi.UInt32, self.cells.cells * BINS * self.groups)
-        value = dr.gather(mi.Float, self.moments, lanes * 4 + 3)
+        value = dr.gather(mi.Float, self.landed.moments, lanes * 4 + 3)
+        if self.raised is not None:
+            value += dr.gather(mi.Float, self.raised.moments, lanes * 4 + 3)
         dr.scatter_add(total, value, (lanes // self.groups) % BINS)
-        power = np.asarray(total)
-        used = _padded(np.flatnonzero(power > DARK * power.sum()))
+        power = np.array(total)
+        folded = np.zeros(0, dtype=np.int64) if self.metallic else self._fold_weak(power)
+        used = np.flatnonzero(power > DARK * power.sum())
+        used = used if len(used) else np.zeros(1, dtype=np.int64)
         bins = mi.UInt32(used.astype(np.uint32)) + dr.opaque(mi.UInt32, 0)
-        kernel = self.kernels.smoothing(self.photons, self.widest)
-        landed = sum(np.asarray(half, dtype=np.float64) for half in self.halves)
-        factors = self.kernels.sharpening(
-            np.reshape(landed, (-1, self.groups)), self.photons, self.widest
-        )
+        kernel = self.kernels.smoothing(self.photons, self.metallic)
+        landed = self._landed().mean(axis=0)
+        factors = self.kernels.sharpening(landed, self.photons, self.metallic)
         rest = (
             bins,
             dr.opaque(mi.UInt32, BINS),
@@ -210,17 +283,23 @@ class FieldTally:
             # Copied: arrays handed over from numpy differ in alignment, and so would kernels.
             mi.Float((factors / self.passes).ravel().astype(np.float32)) + dr.opaque(mi.Float, 0),
         )
-        tables, kinds = [self.moments, self.heights], [mi.Vector4f, mi.Float]
-        if self.coloured:
-            tables.append(self.colours)
-            kinds.append(mi.Vector4f)
-        sums = smooth(kernel, self.cells.cells, tables, kinds, *rest)
-        moments, heights = dr.ravel(sums[0]), sums[1]
-        colours = dr.ravel(sums[2]) if self.coloured else moments
+
+        def smoothed(moments: mi.Float, heights: mi.Float, colours: mi.Float) -> Tables:
+            tables, kinds = [moments, heights], [mi.Vector4f, mi.Float]
+            if self.coloured:
+                tables.append(colours)
+                kinds.append(mi.Vector4f)
+            sums = smooth(kernel, self.cells.cells, tables, kinds, *rest)
+            dr.eval(sums)  # together: the loop would run again for those that are asked for later
+            values = dr.ravel(sums[0])
+            return Tables(values, sums[1], dr.ravel(sums[2]) if self.coloured else values)
+
+        moments, heights, colours = smoothed(*self.landed)
+        raised = None if self.raised is None else smoothed(*self.raised)
         table = irradiance_table(
             moments, self.cells.cells, dr.opaque(mi.UInt32, len(used)), self.groups
         )
-        dr.eval(moments, heights, colours, table)
+        dr.eval(moments, heights, colours, table, raised)
         return LightField(
             cells=self.cells,
             bins=len(used),
@@ -230,7 +309,7 @@ class FieldTally:
             colours=colours,
             coloured=self.coloured,
             metallic=self.metallic,
-            centres=bin_centres(self.cells, used),
+            centres=bin_centres(self.cells, used, folded),
             irradiance=table,
             beams=collect_beams(
                 moments,
@@ -244,11 +323,14 @@ class FieldTally:
             ),
             photons=self.photons,
             noise=self.noise(),
+            raised=raised,
         )
 
 
-def _padded(used: NDArray[np.integer]) -> NDArray[np.integer]:
-    """These bins, and dark ones to make their number one of a few: kernels are compiled for it."""
-    wanted = max(-(-len(used) // BINS_IN_STEPS_OF) * BINS_IN_STEPS_OF, BINS_IN_STEPS_OF)
-    dark = np.setdiff1d(np.arange(BINS), used)
-    return np.sort(np.concatenate([used, dark[: wanted - len(used)]]))
+def _fold(table: mi.Float, kind: Any, entries: list[mi.UInt32]) -> None:
+    """Put what is in all of these entries into the first."""
+    light = sum((dr.gather(kind, table, entry) for entry in entries), kind(0))
+    dr.eval(light)
+    for entry in entries[1:]:
+        dr.scatter(table, kind(0), entry)
+    dr.scatter(table, light, entries[0])

@@ -14,13 +14,17 @@ needs each boundary once, with the medium before and behind it. The way there:
 from __future__ import annotations
 
 from collections.abc import Sequence
+from copy import copy
 from dataclasses import dataclass, replace
 from itertools import combinations
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
+from optisense.design.arrangement import EQUAL_INDEX
 from optisense.errors import DesignError, MeshError
+from optisense.geometry.anchors import Anchors, anchored
 from optisense.geometry.coincidence import Overlay, boxes_overlap, cut, find_coincident
 from optisense.geometry.mesh import TriangleMesh
 
@@ -31,8 +35,9 @@ meant (a film of air) must be wider."""
 CUT_CLEARANCE = 2e-5
 """A solid is cut out with this much room (mm): more than rounding, far less than a contact."""
 
-EQUAL_INDEX = 1e-6
-"""Refractive indices that differ by less bend no light."""
+BENT_TOLERANCE = 0.02
+"""mm that surfaces which touch may come apart while they bend: triangles of two tessellations
+differ by less over one shape."""
 
 AIR = "air"
 
@@ -117,11 +122,70 @@ def resolve_media(
     return Media(solids, sheets, tolerance).interfaces
 
 
+class Bending:
+    """Interfaces and sheets as points of the solids that they are on."""
+
+    def __init__(
+        self, solids: Sequence[Solid], sheets: Sequence[Sheet], faces: Sequence[Interface]
+    ) -> None:
+        """Of resolved media, before anything bends."""
+        self._solids = {solid.name: solid for solid in solids}
+        self._sheets = {sheet.name: sheet for sheet in sheets}
+        self._faces = list(faces)
+        self._found: dict[tuple[int, str], tuple[Anchors, NDArray[np.bool_]]] = {}
+
+    def bent(self, solids: Sequence[Solid], sheets: Sequence[Sheet]) -> list[Interface] | None:
+        """The interfaces of solids that have bent; see `Media.bend`."""
+        new = {solid.name: solid for solid in solids}
+        skins = {sheet.name: sheet for sheet in sheets}
+        if list(new) != list(self._solids) or skins.keys() != self._sheets.keys():
+            return None
+        solid_pairs = [(new[name], old) for name, old in self._solids.items()]
+        meshes = [(solid.mesh, old.mesh) for solid, old in solid_pairs]
+        meshes += [(skins[name].mesh, old.mesh) for name, old in self._sheets.items()]
+        alike = all(replace(solid, mesh=old.mesh) == old for solid, old in solid_pairs)
+        if not alike or not all(same_faces(one, other) for one, other in meshes):
+            return None
+        for name, sheet in self._sheets.items():
+            for solid in solids:
+                anchors, found = self._anchors(sheet.mesh, solid.name)
+                off = anchors.on(solid.mesh.vertices) - skins[name].mesh.vertices
+                if np.abs(off[found]).max(initial=0.0) > BENT_TOLERANCE:
+                    return None
+        return self._moved(new)
+
+    def _moved(self, new: dict[str, Solid]) -> list[Interface] | None:
+        result = []
+        for face in self._faces:
+            places = []
+            for name in face.names:
+                anchors, found = self._anchors(face.mesh, name)
+                if not found.all():
+                    return None
+                places.append(anchors.on(new[name].mesh.vertices))
+            if np.abs(places[0] - places[-1]).max(initial=0.0) > BENT_TOLERANCE:
+                return None
+            if all(new[name].mesh is self._solids[name].mesh for name in face.names):
+                result.append(face)  # with all that is known of its mesh
+            else:
+                result.append(replace(face, mesh=face.mesh.with_vertices(places[0])))
+        return result
+
+    def _anchors(self, mesh: TriangleMesh, solid: str) -> tuple[Anchors, NDArray[np.bool_]]:
+        key = id(mesh), solid
+        if key not in self._found:
+            self._found[key] = anchored(
+                mesh.vertices, self._solids[solid].mesh, COINCIDENCE_TOLERANCE
+            )
+        return self._found[key]
+
+
 class Media:
     """The resolved boundaries of solids and sheets, which knows whether others give the same.
 
     Attributes:
         interfaces: as `resolve_media` returns them.
+        bent: whether they were taken along with solids that bend; see `bend`.
     """
 
     def __init__(
@@ -137,8 +201,10 @@ class Media:
         self._parted = _disjoint(closed, tolerance)
         self._lying: list[Sheet] = []
         self._loose: list[Sheet] = []
-        interfaces = self._resolve(list(sheets))
-        self.interfaces = [face for face in interfaces if _refracts(face)]
+        self._faces = self._resolve(list(sheets))
+        self.interfaces = [face for face in self._faces if _refracts(face)]
+        self.bent = False
+        self._bending: Bending | None = None
 
     def _resolve(self, sheets: list[Sheet]) -> list[Interface]:
         solids, tolerance = self._parted, self._tolerance
@@ -168,7 +234,7 @@ class Media:
         So it is with the very same solids, when all sheets that lie on one are the same and
         any others (a mirror in the open, say) touch none.
         """
-        if list(solids) != self._solids:
+        if self.bent or list(solids) != self._solids:
             return False
         others = [sheet for sheet in sheets if sheet not in self._lying]
         if len(others) + len(self._lying) != len(sheets):
@@ -179,6 +245,27 @@ class Media:
             if sheet not in self._loose
             for solid in self._parted
         )
+
+    def bend(self, solids: Sequence[Solid], sheets: Sequence[Sheet]) -> Media | None:
+        """The same boundaries on solids that have bent, each taken along by the faces it is on.
+
+        It is not noticed where solids touch or overlap that did not before. None where other
+        things than places have changed, or where what touched has come apart.
+        """
+        if self._bending is None:
+            self._bending = Bending(self._solids, [*self._lying, *self._loose], self._faces)
+        faces = self._bending.bent(solids, sheets)
+        if faces is None:
+            return None
+        result = copy(self)
+        lying = {sheet.name for sheet in self._lying}
+        result._solids = list(solids)
+        result._lying = [sheet for sheet in sheets if sheet.name in lying]
+        result._loose = [sheet for sheet in sheets if sheet.name not in lying]
+        result._faces = faces
+        result.interfaces = [face for face in faces if _refracts(face)]
+        result.bent = True
+        return result
 
 
 def _interface(mesh: TriangleMesh, solid: Solid, neighbour: Solid | None) -> Interface:
@@ -192,6 +279,13 @@ def _interface(mesh: TriangleMesh, solid: Solid, neighbour: Solid | None) -> Int
         neighbour.ior,
         max(solid.roughness, neighbour.roughness),
         (solid.name, neighbour.name),
+    )
+
+
+def same_faces(one: TriangleMesh, other: TriangleMesh) -> bool:
+    """Whether meshes have the same triangles, wherever their vertices are."""
+    return one is other or (
+        len(one.vertices) == len(other.vertices) and np.array_equal(one.faces, other.faces)
     )
 
 

@@ -109,7 +109,8 @@ class OpticalModel(RayModel):
             noise: per cent; trace until the relative RMS noise of the light on the sensing
                 surface is this small.
             seconds: stop tracing in time to be ready then.
-            seed: the same seed and settings give the same image.
+            seed: the same seed and settings give the same image, but for rounding, which in single
+                pixels at the edge of a contact turns a shadow ray.
             progress: called now and then.
             estimator: "field" (pooled light field, fast) or "sppm" (progressive photon mapping,
                 for checking).

@@ -7,10 +7,12 @@ Photons carry all light, direct light included, so nothing is connected to light
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass, fields
 
 import drjit as dr
 import mitsuba as mi
+import numpy as np
 
 from optisense.optics.cells import SurfaceCells, cell_at
 from optisense.optics.emitters import EmitterTable, emit
@@ -26,6 +28,7 @@ from optisense.optics.scattering import (
     sample_rough_interface,
     surface_kind,
 )
+from optisense.optics.slab import PIECES, Slab, crossing
 from optisense.optics.surfaces import SurfaceKind
 
 # Photons are dropped after so many surfaces; in GelSight-like sensors less than 0.1 % of the
@@ -33,16 +36,21 @@ from optisense.optics.surfaces import SurfaceKind
 MAX_DEPTH = 64
 
 GROUP_MASK = 0xFF
-SURFACE_SHIFT = 8
+HALF_SHIFT = 8
+"""Of the bit that tells photons of odd number from those of even: what both halves differ by tells
+the noise."""
+SURFACE_SHIFT = 9
 
 
 @dataclass
 class PhotonMap:
     """Landings of photons, all of one pass.
 
-    ``place`` holds x, y, z (mm) and bits (light group, surface); ``travel`` the unit direction
-    and the cosine with the face normal; ``power`` the photon's share of a light of 1 mW, per
-    channel.
+    ``emitted`` counts the photons of all lights, those that are not lit in this pass, too.
+    ``place`` holds x, y, z (mm) and bits (light group, surface, half); ``travel`` the unit
+    direction and the cosine with the face normal; ``power`` the photon's share of a light of 1 mW,
+    per channel. ``passing`` are those met in a slab above a surface, if one was given: the slab's
+    height over the way that each stands for is in the place of the cosine.
     """
 
     count: int
@@ -51,6 +59,7 @@ class PhotonMap:
     travel: mi.Float
     power: mi.Float
     coloured: bool
+    passing: PhotonMap | None = None
 
 
 # Photons that travel long leave most lanes of a vector idle; survivors are gathered anew after
@@ -63,7 +72,7 @@ FEW = 100_000
 @dataclass
 class _Flight:
     """Photons under way. ``origin_cell`` is the cell of the guide that each came from;
-    ``number`` its place in the pass.
+    ``number`` its place in the pass, ``group`` its light group and half.
     """
 
     origin: mi.Point3f
@@ -72,6 +81,7 @@ class _Flight:
     group: mi.UInt32
     landed: mi.Bool
     active: mi.Bool
+    scattered: mi.Bool
     number: mi.UInt32
 
 
@@ -97,14 +107,17 @@ class _Record:
 def _launch(
     table: EmitterTable,
     guide: Guide,
+    lights: mi.UInt32,
     first: mi.UInt32,
     per_light: mi.UInt32,
     seed: mi.UInt32,
     photons: int,
 ) -> tuple[_Flight, mi.UInt32]:
     index = dr.arange(mi.UInt32, photons)
-    light = index % table.count
-    number = first + index // table.count
+    count = dr.opaque(mi.UInt32, dr.width(lights))
+    light = dr.gather(mi.UInt32, lights, index % count)
+    place = index // count
+    number = first + place
     u0, u1, u2, u3 = sequence_4d(number, light, seed)
     angle, weight, cell = warp(guide, light, mi.Point2f(u0, u1))
     origin, direction, group = emit(table, light, angle, mi.Point2f(u2, u3))
@@ -112,10 +125,11 @@ def _launch(
         origin=origin,
         direction=direction,
         throughput=mi.Color3f(weight / mi.Float(per_light)),
-        group=group,
+        group=group | ((number & 1) << HALF_SHIFT),
         landed=dr.full(mi.Bool, False, photons),
         active=dr.full(mi.Bool, True, photons),
-        number=index,
+        scattered=dr.full(mi.Bool, False, photons),
+        number=place * table.count + light,
     )
     return flight, light * (CELLS * CELLS) + cell
 
@@ -129,6 +143,8 @@ def _fly(
     flight: _Flight,
     record: _Record,
     target: Target | None,
+    slab: Slab | None,
+    passing: _Record,
     coloured: bool,
     rough: bool,
     limit: mi.UInt32,
@@ -140,6 +156,7 @@ def _fly(
     group = flight.group
     landed = mi.Bool(flight.landed)
     active = mi.Bool(flight.active)
+    scattered = mi.Bool(flight.scattered)
     # By the photon's number alone: with `size` its lane would count too, and after a stage all
     # photons behind one that ended elsewhere would go other ways. So a small change of the design
     # changes little but what it touches.
@@ -148,28 +165,29 @@ def _fly(
     while active & (depth < limit):
         hit = intersect(scene, rows, corners, origin, direction, active)
         kind, eta, alpha = surface_kind(surfaces, hit.surface, hit.valid)
+        flying = mi.Bool(active)
         active &= hit.valid & (kind != int(SurfaceKind.ABSORBER)) & (kind != int(SurfaceKind.LIGHT))
         opaque = active & (kind == int(SurfaceKind.OPAQUE))
+        if slab is not None:
+            # What has left an opaque surface and meets none is exchange.py's part.
+            passes = flying & (opaque | ~scattered)
+            bits = mi.UInt32(seed) ^ (flight.number * 747796405) ^ (depth * 0x9E3779B9)
+            piece = mi.UInt32(0)
+            while passes & (piece < PIECES):
+                spot, share, crosses = crossing(slab, hit, origin, direction, bits, piece, opaque)
+                if crosses:
+                    slot = dr.scatter_inc(passing.counter, mi.UInt32(0), crosses)
+                    kept = crosses & (slot < passing.capacity)
+                    _write(passing, slot, kept, spot, group, direction, share, throughput, coloured)
+                piece += 1
+            scattered = opaque
         if target is None:
             if opaque:
                 slot = dr.scatter_inc(record.counter, mi.UInt32(0), opaque)
                 kept = opaque & (slot < record.capacity)
                 bits = group | (hit.surface << SURFACE_SHIFT)
-                p = hit.point
-                d = direction
-                cosine = dr.abs(dr.dot(d, hit.normal))
-                dr.scatter(
-                    record.place,
-                    mi.Vector4f(p.x, p.y, p.z, dr.reinterpret_array(mi.Float, bits)),
-                    slot,
-                    kept,
-                )
-                dr.scatter(record.travel, mi.Vector4f(d.x, d.y, d.z, cosine), slot, kept)
-                if dr.hint(coloured, mode="scalar"):
-                    t = throughput
-                    dr.scatter(record.power, mi.Vector4f(t.x, t.y, t.z, 0), slot, kept)
-                else:
-                    dr.scatter(record.power, throughput.x, slot, kept)
+                cosine = dr.abs(dr.dot(direction, hit.normal))
+                _write(record, slot, kept, hit.point, bits, direction, cosine, throughput, coloured)
             landed |= opaque
         else:
             cell, found = cell_at(target.cells, hit.point, opaque)
@@ -181,10 +199,9 @@ def _fly(
         if dr.hint(rough, mode="scalar"):
             is_rough = active & (kind == int(SurfaceKind.DIELECTRIC)) & (alpha > SMOOTH_ALPHA)
             if is_rough:
-                scattered, rough_weight, _through, _relative = sample_rough_interface(
+                outgoing, rough_weight, _through, _relative = sample_rough_interface(
                     direction, hit.shading_normal, eta, alpha, pick, sample
                 )
-                outgoing = scattered
                 throughput *= rough_weight
         if opaque | (active & (kind == int(SurfaceKind.MIRROR))):
             coating = coating_of(surfaces, hit.surface, active)
@@ -203,7 +220,29 @@ def _fly(
         direction = dr.normalize(outgoing)
         origin = leave(hit.point, hit.normal, direction)
         depth += 1
-    return _Flight(origin, direction, throughput, group, landed, active, flight.number)
+    return _Flight(origin, direction, throughput, group, landed, active, scattered, flight.number)
+
+
+def _write(
+    record: _Record,
+    slot: mi.UInt32,
+    kept: mi.Bool,
+    point: mi.Point3f,
+    bits: mi.UInt32,
+    direction: mi.Vector3f,
+    share: mi.Float,
+    throughput: mi.Color3f,
+    coloured: bool,
+) -> None:
+    """Write down a landing; ``share`` is the cosine, or what stands for it in a slab."""
+    p, d, t = point, direction, throughput
+    where = mi.Vector4f(p.x, p.y, p.z, dr.reinterpret_array(mi.Float, bits))
+    dr.scatter(record.place, where, slot, kept)
+    dr.scatter(record.travel, mi.Vector4f(d.x, d.y, d.z, share), slot, kept)
+    if coloured:
+        dr.scatter(record.power, mi.Vector4f(t.x, t.y, t.z, 0), slot, kept)
+    else:
+        dr.scatter(record.power, t.x, slot, kept)
 
 
 def _gathered(flight: _Flight, lanes: mi.UInt32) -> _Flight:
@@ -220,14 +259,17 @@ def _trace(
     first: int,
     record: _Record,
     target: Target | None,
+    slab: Slab | None,
+    passing: _Record,
     coloured: bool,
+    lights: mi.UInt32,
 ) -> mi.UInt32:
-    """Fly a pass stage by stage; returns the guide's cell of each photon, all ones if it never
-    landed.
+    """Fly a pass of some lights stage by stage; returns the guide's cell of each photon, all ones
+    if it never landed.
     """
-    photons = per_light * table.count
+    photons = per_light * dr.width(lights)
     a, b, c = (dr.opaque(mi.UInt32, value) for value in (first, per_light, seed))
-    flight, cell = _launch(table, guide, a, b, c, photons)
+    flight, cell = _launch(table, guide, lights, a, b, c, photons)
     arrived = dr.zeros(mi.UInt32, photons)
     travelled = 0
     stages = STAGES if photons > FEW else ()
@@ -242,6 +284,8 @@ def _trace(
             flight,
             record,
             target,
+            slab,
+            passing,
             coloured,
             scene.rough,
             dr.opaque(mi.UInt32, steps),
@@ -249,7 +293,7 @@ def _trace(
         )
         if target is not None:
             dr.scatter(arrived, mi.UInt32(1), flight.number, flight.landed)
-        dr.eval(flight, arrived, cell, record.counter, record.place, record.travel, record.power)
+        dr.eval(flight, arrived, cell, record, passing)
         lanes = dr.compress(flight.active)
         if dr.width(lanes) == 0 or travelled >= MAX_DEPTH:
             break
@@ -263,9 +307,9 @@ def trace_pilot(
     """For every photon of a pass the guide's cell that it came from, or all ones if it missed
     the target.
     """
-    one = dr.zeros(mi.Float, 4)
-    record = _Record(mi.UInt32(0), dr.zeros(mi.UInt32, 1), one, one, one)
-    return _trace(scene, table, guide, per_light, seed, 0, record, target, False)
+    none = _room(0, False)
+    lights = dr.arange(mi.UInt32, table.count)
+    return _trace(scene, table, guide, per_light, seed, 0, none, target, None, none, False, lights)
 
 
 def trace_photons(
@@ -278,37 +322,56 @@ def trace_photons(
     first: int = 0,
     coloured: bool,
     landings: float = 1.5,
+    groups: Collection[int] | None = None,
+    slab: Slab | None = None,
 ) -> PhotonMap:
     """Emit ``per_light`` photons from each light and record where they land.
 
     ``first`` is the number of photons a light has already sent in earlier passes of the same
     seed; ``landings`` is room for so many landings a photon; where they turn out to be more,
-    the pass is traced once more with more room. Each light has 1 mW in all.
+    the pass is traced once more with more room. Each light has 1 mW in all. With ``groups``,
+    only the lights of these are lit, with the same photons that they send among all. What
+    crosses a ``slab`` is recorded, too.
     """
-    photons = per_light * table.count
+    chosen = [
+        k for k, emitter in enumerate(table.emitters) if groups is None or emitter.group in groups
+    ]
+    # Copied: arrays handed over from numpy differ in alignment, and so would kernels.
+    lights = mi.UInt32(np.array(chosen, dtype=np.uint32)) + dr.opaque(mi.UInt32, 0)
+    photons = per_light * len(chosen)
+    room, room_passing = (int(photons * each) + 1024 for each in (landings, PIECES))
     while True:
-        capacity = int(photons * landings) + 1024
-        record = _Record(
-            capacity=dr.opaque(mi.UInt32, capacity),
-            counter=dr.zeros(mi.UInt32, 1),
-            place=dr.empty(mi.Float, capacity * 4),
-            travel=dr.empty(mi.Float, capacity * 4),
-            power=dr.empty(mi.Float, capacity * (4 if coloured else 1)),
-        )
-        _trace(scene, table, guide, per_light, seed, first, record, None, coloured)
-        count = int(record.counter[0])
-        if count <= capacity:
+        record = _room(room, coloured)
+        passing = _room(0 if slab is None else room_passing, coloured)
+        flown = (scene, table, guide, per_light, seed, first, record, None, slab, passing)
+        _trace(*flown, coloured, lights)
+        landed, passed = int(record.counter[0]), int(passing.counter[0])
+        if landed <= room and passed <= room_passing:
             break
-        landings = 1.2 * count / photons
+        room, room_passing = (max(int(1.2 * n), 1024) for n in (landed, passed))
+    emitted = per_light * table.count
+    met = None if slab is None else _photon_map(passing, passed, emitted, coloured)
+    return _photon_map(record, landed, emitted, coloured, met)
+
+
+def _room(capacity: int, coloured: bool) -> _Record:
+    """For so many landings."""
+    size = max(capacity, 1)
+    return _Record(
+        capacity=dr.opaque(mi.UInt32, capacity),
+        counter=dr.zeros(mi.UInt32, 1),
+        place=dr.empty(mi.Float, size * 4),
+        travel=dr.empty(mi.Float, size * 4),
+        power=dr.empty(mi.Float, size * (4 if coloured else 1)),
+    )
+
+
+def _photon_map(
+    record: _Record, count: int, emitted: int, coloured: bool, passing: PhotonMap | None = None
+) -> PhotonMap:
+    place, travel, power = record.place, record.travel, record.power
     if count == 0:
         # The renderer takes no empty arrays: one photon without power stands for none.
         count = 1
-        record.place, record.travel, record.power = (dr.zeros(mi.Float, 4) for _ in range(3))
-    return PhotonMap(
-        count=count,
-        emitted=photons,
-        place=record.place,
-        travel=record.travel,
-        power=record.power,
-        coloured=coloured,
-    )
+        place, travel, power = (dr.zeros(mi.Float, 4) for _ in range(3))
+    return PhotonMap(count, emitted, place, travel, power, coloured, passing)

@@ -44,6 +44,8 @@ class RayModel:
 
     facet_error = FACET_ERROR
     """mm, how far indenters' meshes may be off their exact shapes."""
+    bends_media = False
+    """Whether boundaries between media go along with parts that bend (`Media.bend`)."""
 
     def __init__(self, design: SensorDesign, variant: str = "auto") -> None:
         """Resolve media and build the scene.
@@ -64,7 +66,7 @@ class RayModel:
         self._assemble()
 
     def _assemble(self, before: Assembly | None = None) -> None:
-        self._parts = assemble(self.design, before)
+        self._parts = assemble(self.design, before, self.bends_media)
         self._surfaces = [piece.surface for piece in self._parts.pieces]
         self._surfaces.append(self._indenter_surface())
         self._refresh_surfaces()
@@ -282,19 +284,22 @@ class RayModel:
         raise errors[0]
 
     def _scenes(self, contacts: Sequence[Contact]) -> ContactScenes:
-        number = len(self._surfaces) - 1
         if not contacts:
             return ContactScenes(self._watched, self._fixed, None, mi.Float())
-        coat = self._surfaces[number]
         placed = [self.place(contact) for contact in contacts]
-        pieces = [indenter_piece(mesh, coat) for mesh in placed]
         return ContactScenes(
             self._with_indenters(self._pieces, placed, robust=True),
             self._fixed,
-            RayScene(pieces, [number] * len(pieces), self._table),
+            self._indenters(placed),
             mi.Float(np.concatenate([_ball(mesh) for mesh in placed]).astype(np.float32)),
             all(getattr(contact.indenter, "convex", False) for contact in contacts),
         )
+
+    def _indenters(self, placed: list[TriangleMesh]) -> RayScene:
+        """Indenters alone."""
+        number = len(self._surfaces) - 1
+        pieces = [indenter_piece(mesh, self._surfaces[number]) for mesh in placed]
+        return RayScene(pieces, [number] * len(pieces), self._table)
 
     def _with_indenters(
         self, fixed: list[Piece], placed: list[TriangleMesh], robust: bool = False

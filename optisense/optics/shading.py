@@ -17,7 +17,7 @@ import mitsuba as mi
 
 from optisense.optics.beam_sums import sum_beams, sum_diffuse, sum_hidden
 from optisense.optics.beams import Beams
-from optisense.optics.cells import SurfaceCells, cell_at, plane_of
+from optisense.optics.cells import SurfaceCells, bin_axis, cell_at, plane_of
 from optisense.optics.exchange import exchanged, irradiance
 from optisense.optics.light_field import LEAST_COSINE, LightField
 from optisense.optics.ray_scene import RayScene, leave
@@ -30,6 +30,7 @@ from optisense.optics.scattering import (
     grey,
     surface_region,
 )
+from optisense.optics.slab import HEIGHT
 from optisense.optics.spread import (
     above,
     beam,
@@ -53,6 +54,8 @@ REFLECTED_SHADOW_RAYS = 4.0
 """The same for points that are seen in a reflection, of which little reaches the eye."""
 CELLS_OF_SAMPLE = 8
 """Cells that a sample of diffuse light reads, where reading one is cheap: its mean is smooth."""
+MOST_UP = 1.5
+"""Of half the slab's height, up to which the light is extrapolated; it stays the same above."""
 LEAST_STEP = 1e-20
 """Of that spacing, where there is no light."""
 
@@ -74,6 +77,7 @@ class ContactScenes:
 def _sum_chosen(
     cells: SurfaceCells,
     tables: tuple[mi.Float, mi.Float, mi.Float],
+    upper: tuple[mi.Float, mi.Float, mi.Float] | None,
     centres: mi.Float,
     table: mi.Float,
     bins: mi.UInt32,
@@ -96,6 +100,9 @@ def _sum_chosen(
     """Every bin, looked up along its own line, and shadow rays for some of those that are not
     wholly above the skyline (``sky``, a sine).
 
+    With ``upper`` tables, of the light half-way up the slab, raised points take what lies between
+    these and those on the surface below them instead.
+
     These are drawn in proportion to what they bring, evenly spaced in the running sum (systematic
     sampling), so that where nothing is hidden, the sum is exact to half a step.
     """
@@ -111,28 +118,38 @@ def _sum_chosen(
         steps.append(dr.maximum(expected / chosen, LEAST_STEP))
         # Of the samples of a pixel, each begins at another part of a step.
         running.append(in_series(points.series + (g + 1), points.number, 0))
-    upright, _ = plane_of(cells, cell, active)
-    axis = mi.Vector3f(*[float(part) for part in cells.axes[2]])
+    upright, offset = plane_of(cells, cell, active)
+    up = dr.select(raised, (dr.dot(upright, points.point) - offset) / (HEIGHT / 2), 0)
+    up = dr.clip(up, 0, MOST_UP)
+    axis = bin_axis(cells, 2)
     k = mi.UInt32(0)
     while active & (k < bins):
-        there = _place(
-            cells,
-            centres,
-            fixed,
-            curved,
-            points,
-            cell,
-            shift,
-            raised,
-            active,
-            k,
-        )
+        there = mi.UInt32(cell)
+        if upper is None:
+            there = _place(
+                cells,
+                centres,
+                fixed,
+                curved,
+                points,
+                cell,
+                shift,
+                raised,
+                active,
+                k,
+            )
         for g in range(groups):
             entry = (there * bins + k) * groups + g
             value = dr.gather(mi.Vector4f, moments, entry, active)
+            if upper is not None:
+                above_it = dr.gather(mi.Vector4f, upper[0], entry, active & raised)
+                value = dr.lerp(value, above_it, up)
             if value.w > 0:
                 towards, cosine = beam(value)
-                height = dr.gather(mi.Float, heights, entry) / value.w
+                height = dr.gather(mi.Float, heights, entry)
+                if upper is not None:
+                    height = dr.lerp(height, dr.gather(mi.Float, upper[1], entry, raised), up)
+                height = dr.maximum(height, 0) / value.w
                 light = spread(axis, towards, cosine, height)
                 # On the undeformed surface the mean cosine is the sum's already.
                 straying = dr.select(raised, reach(light, points.normal, upright), 0)
@@ -157,6 +174,8 @@ def _sum_chosen(
                     weight = dr.select(blocked, 0.0, times / share)
                 if dr.hint(coloured, mode="scalar"):
                     flux = dr.gather(mi.Vector4f, colours, entry)
+                    if upper is not None:
+                        flux = dr.lerp(flux, dr.gather(mi.Vector4f, upper[2], entry, raised), up)
                     reflected *= mi.Color3f(flux.x, flux.y, flux.z)
                 else:
                     reflected *= value.w
@@ -244,6 +263,7 @@ def shade(
         far = _sum_chosen(
             field.cells,
             tables,
+            field.raised,
             field.centres,
             field.irradiance,
             bins,

@@ -2,13 +2,64 @@
 
 from __future__ import annotations
 
+import functools
 import inspect
 import math
 from collections.abc import Callable, Mapping
-from typing import Any
+from numbers import Integral, Real
+from typing import Any, ParamSpec
+
+from pydantic import ValidationError
 
 from optisense.design import SensorDesign
 from optisense.errors import DesignError
+
+Arguments = ParamSpec("Arguments")
+
+
+def tells_of_dimensions(
+    sensor: str,
+) -> Callable[[Callable[Arguments, SensorDesign]], Callable[Arguments, SensorDesign]]:
+    """Let a builder refuse arguments of a wrong type, and values that no design can have.
+
+    Args:
+        sensor: its name, for messages.
+    """
+
+    def decorate(builder: Callable[Arguments, SensorDesign]) -> Callable[Arguments, SensorDesign]:
+        signature = inspect.signature(builder)
+
+        @functools.wraps(builder)
+        def build(*args: Arguments.args, **kwargs: Arguments.kwargs) -> SensorDesign:
+            for name, value in signature.bind(*args, **kwargs).arguments.items():
+                kind = str(signature.parameters[name].annotation)
+                if value is None and kind.endswith(" | None"):
+                    continue
+                kind = kind.removesuffix(" | None")
+                whole, number = kind == "int", kind in ("int", "float")
+                if number and not isinstance(value, Integral if whole else Real):
+                    raise DesignError(
+                        f"{name} is {value!r}",
+                        where=sensor,
+                        hint=f"Give a {'whole ' if whole else ''}number",
+                    )
+            try:
+                return builder(*args, **kwargs)
+            except ValidationError as error:
+                raise _refusal(error, sensor) from None
+
+        return build
+
+    return decorate
+
+
+def _refusal(error: ValidationError, sensor: str) -> DesignError:
+    """What a part of the design refuses; it names its field, which is mostly the argument."""
+    report = error.errors(include_url=False)[0]
+    told = report["msg"].removeprefix("Value error, ").replace("Input should", "it should")
+    field = ".".join(str(step) for step in report["loc"])
+    what = f"{field} is {report['input']!r}" if field else f"the {error.title.lower()} can't be"
+    return DesignError(f"{what}: {told}", where=sensor, hint="Change that argument")
 
 
 def require_positive(sensor: str, **values: float) -> None:

@@ -27,7 +27,7 @@ from optisense.design import (
 )
 from optisense.geometry import TriangleMesh
 from optisense.sensors.belt_path import BeltHalf, Bend, Straight, mirrored_and_joined, trace
-from optisense.sensors.dimensions import describe_changes, require_positive
+from optisense.sensors.dimensions import describe_changes, require_positive, tells_of_dimensions
 from optisense.sensors.gelbelt_checks import (
     LED_LENGTH,
     SENSOR,
@@ -68,6 +68,7 @@ WRAP = 90.0
 """Degrees by which the belt is turned where it is no longer drawn."""
 
 
+@tells_of_dimensions(SENSOR)
 def gelbelt(
     *,
     light_design: int = 3,

@@ -24,7 +24,12 @@ from optisense.design import (
     Status,
 )
 from optisense.geometry import TriangleMesh
-from optisense.sensors.dimensions import describe_changes, require, require_positive
+from optisense.sensors.dimensions import (
+    describe_changes,
+    require,
+    require_positive,
+    tells_of_dimensions,
+)
 from optisense.sensors.led_boards import (
     BOARDS,
     COLOURS,
@@ -48,6 +53,7 @@ BOARD_CLEARANCE = 0.05
 """mm between boards and the gel, and between the ring's LEDs and the boards."""
 
 
+@tells_of_dimensions(SENSOR)
 def gelsight360(
     *,
     light_colours: str = "GRRGGRRG",
@@ -268,11 +274,17 @@ def _check_boards(boards: LedBoards, shape: TipShape, wall: float, base_leds: in
     """The boards must fit into the straight wall, whose outer radius is `wall` mm."""
     narrowest = LED[0] + 2.0 * WALL_MARGIN
     require(
-        boards.depth >= narrowest and boards.outermost <= wall - BOARD_CLEARANCE,
+        boards.depth >= narrowest,
         SENSOR,
         f"the LED boards don't fit into a shell of {boards.depth:g} mm",
-        f"Make shell_thickness at least {narrowest:g} mm, the radius larger, or board_thickness "
-        "smaller",
+        f"Make shell_thickness at least {narrowest:g} mm",
+    )
+    require(
+        boards.outermost <= wall - BOARD_CLEARANCE,
+        SENSOR,
+        f"the corners of the LED boards are {boards.outermost:.3g} mm off the axis, the shell "
+        f"ends at {wall:.3g} mm",
+        "Make board_thickness smaller or the radius larger",
     )
     top = boards.bottom + boards.height
     require(

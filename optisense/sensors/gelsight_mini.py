@@ -28,7 +28,12 @@ from optisense.design import (
     Status,
 )
 from optisense.geometry import TriangleMesh
-from optisense.sensors.dimensions import describe_changes, require, require_positive
+from optisense.sensors.dimensions import (
+    describe_changes,
+    require,
+    require_positive,
+    tells_of_dimensions,
+)
 from optisense.sensors.led_flux import BALANCED, balanced_flux
 
 NAME = "gelsight-mini"
@@ -42,6 +47,7 @@ WIDEST_FIELD = 150.0
 """Degrees: a field derived from `view_width` beyond this is a mistake."""
 
 
+@tells_of_dimensions("gelsight-mini")
 def gelsight_mini(
     *,
     gel_size: tuple[float, float] = (25.25, 20.75),
@@ -154,6 +160,7 @@ def gelsight_mini(
     return design
 
 
+@tells_of_dimensions("gelsight-mini")
 def gelsight_mini_cylindrical(rise: float = 6.0, **dimensions: Any) -> SensorDesign:
     """A GelSight Mini whose gel is bent to a cylinder along the short side (y).
 
@@ -168,6 +175,7 @@ def gelsight_mini_cylindrical(rise: float = 6.0, **dimensions: Any) -> SensorDes
     return _bent("cylindrical", "cylinder", [(1, j, 2) for j in range(3)], (rise, 0.5), dimensions)
 
 
+@tells_of_dimensions("gelsight-mini")
 def gelsight_mini_spherical(rise: float = 9.0, **dimensions: Any) -> SensorDesign:
     """A GelSight Mini whose gel is bent to a dome.
 

@@ -29,7 +29,12 @@ from optisense.design.cage import as_points
 from optisense.errors import DesignError
 from optisense.geometry import TriangleMesh
 from optisense.geometry.cage import cage_points
-from optisense.sensors.dimensions import describe_changes, require, require_positive
+from optisense.sensors.dimensions import (
+    describe_changes,
+    require,
+    require_positive,
+    tells_of_dimensions,
+)
 from optisense.sensors.led_flux import balanced_flux
 from optisense.sensors.shapes import ribbon, row_of_lights, strip
 from optisense.sensors.svelte_body import check_mirrors, housing
@@ -60,6 +65,7 @@ BACK_OUTLINE = (
 """(x, z) mm: the back from the bottom of the base to the tip."""
 
 
+@tells_of_dimensions("gelsight-svelte")
 def gelsight_svelte(
     *,
     palm_outline: Points = PALM_OUTLINE,

@@ -4,9 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from optisense.design import Role, SensorDesign
+from optisense.design import Dielectric, Role, SensorDesign
 from optisense.errors import DesignError
 from optisense.geometry import TriangleMesh
+
+AIR = 1.0
+"""Refractive index of a part that is not made but left free."""
 
 
 @dataclass(frozen=True)
@@ -36,8 +39,14 @@ class Shape:
         return abs(self.mesh.volume) if self.is_solid else None
 
 
+def is_air(design: SensorDesign, name: str) -> bool:
+    """Whether a part is a gap that the design draws, such as the film under a belt."""
+    material = design.materials.get(design.parts[name].material or "")
+    return isinstance(material, Dielectric) and material.ior == AIR
+
+
 def shapes(design: SensorDesign) -> list[Shape]:
-    """All parts of a design but its indenters, in their current shape.
+    """All parts of a design but its indenters and those of air, in their current shape.
 
     Raises:
         DesignError: a part has no mesh, or lies outside of the cage that deforms it.
@@ -45,7 +54,7 @@ def shapes(design: SensorDesign) -> list[Shape]:
     meshes = design.deformed_meshes()
     found = []
     for name, part in design.parts.items():
-        if part.role is Role.INDENTER:
+        if part.role is Role.INDENTER or is_air(design, name):
             continue
         if name not in meshes:
             raise DesignError(

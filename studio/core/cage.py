@@ -57,6 +57,23 @@ def blended(c_min: ArrayLike, c_max: ArrayLike, blend: ArrayLike) -> FloatArray:
     return (1.0 - share) * np.asarray(c_min) + share * np.asarray(c_max)
 
 
+def nearest_blend(points: ArrayLike, c_min: ArrayLike, c_max: ArrayLike) -> float:
+    """The A in 0..1 whose shape (1 - A) C_min + A C_max is nearest, by least squares.
+
+    Args:
+        points: (N, 3) mm, a shape.
+        c_min: (N, 3) mm, the shape of A = 0.
+        c_max: (N, 3) mm, the shape of A = 1; A is 0 where it is the same.
+    """
+    lower = np.asarray(c_min, dtype=np.float64)
+    way = (np.asarray(c_max, dtype=np.float64) - lower).ravel()
+    length = float(way @ way)
+    if length == 0.0:
+        return 0.0
+    along = float((np.asarray(points, dtype=np.float64) - lower).ravel() @ way)
+    return min(max(along / length, 0.0), 1.0)
+
+
 def _bernstein(t: FloatArray, count: int) -> FloatArray:
     i = np.arange(count)
     binomial = np.array([math.comb(count - 1, k) for k in range(count)], dtype=np.float64)

@@ -14,6 +14,9 @@ from ..scene.gather import coating_values, free_name, material_values
 from ..scene.kinds import KINDS_OF_ROLE
 from . import gallery
 
+KEEPING = "Keeping the material"
+"""What messages are about, so that they are told beside the button that was pressed."""
+
 
 def _materials(values: Any, context: bpy.types.Context | None) -> catalogue.Items:
     return gallery.items("material")
@@ -203,6 +206,8 @@ class OPTISENSE_OT_keep_material(bpy.types.Operator):
             kind = "material"
             values = material_values(context.scene.optisense.materials[own.material])
         name = free_name(self.name, ())
+        now = session.state()
+        now.about, now.problem, now.hint, now.note = KEEPING, "", "", ""
         try:
             session.ask_and_wait(
                 "library_add",
@@ -218,7 +223,7 @@ class OPTISENSE_OT_keep_material(bpy.types.Operator):
             return {"CANCELLED"}
         gallery.forget(kind, name)
         catalogue.refresh_library(session.engine(), kind)
-        session.state().note = f"'{name}' is in your library"
+        now.note = f"'{name}' is in your library"
         return {"FINISHED"}
 
 

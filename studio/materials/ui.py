@@ -7,6 +7,7 @@ import bpy
 from ..engine.layout import SidebarPanel, show_job, show_outcome
 from ..simulate.picture import file_icon
 from . import gallery
+from .operator import KEEPING
 
 
 class OPTISENSE_PT_materials(SidebarPanel, bpy.types.Panel):
@@ -61,6 +62,7 @@ def _part(
             return
         _material(column, material)
     layout.operator("optisense.keep_material", icon="FILE_TICK")
+    show_outcome(layout, KEEPING)
 
 
 def _material(column: bpy.types.UILayout, material: bpy.types.PropertyGroup) -> None:

@@ -14,6 +14,7 @@ from ..core.numbers import kept_array
 from ..engine import polls
 from ..scene.cages import (
     add_cage,
+    as_array,
     as_points,
     cage_data,
     cage_values,
@@ -41,6 +42,18 @@ def _cage(
                 return cage
     operator.poll_message_set("Select a cage, or a part that is in one")
     return None
+
+
+def _end_editing(cage: bpy.types.Object) -> None:
+    """Leave edit mode, as a step of its own in the undo history.
+
+    Blender's undo in edit mode knows of a mesh's points only, and not of what an object is: bounds
+    and the blend would stay while the points go back.
+    """
+    if cage.mode == "EDIT":
+        bpy.ops.object.mode_set(mode="OBJECT")
+        if bpy.ops.ed.undo_push.poll():
+            bpy.ops.ed.undo_push(message="End Editing")
 
 
 class OPTISENSE_OT_new_cage(bpy.types.Operator):
@@ -144,6 +157,7 @@ class OPTISENSE_OT_set_bound(bpy.types.Operator):
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         cage = _cage(type(self), context)
+        _end_editing(cage)
         shown = shown_points(cage)
         try:
             values = cage_values(cage)
@@ -178,7 +192,13 @@ class OPTISENSE_OT_blend(bpy.types.Operator):
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         cage = _cage(type(self), context)
-        cage.optisense.blend = cage.optisense.blend  # the update shows and follows
+        _end_editing(cage)
+        values, shown = cage_data(cage), shown_points(cage)
+        lower, upper = as_array(values["c_min"]), as_array(values["c_max"])
+        if len(shown) != len(lower):
+            self.report({"ERROR"}, "Control points were added or removed; undo that first")
+            return {"CANCELLED"}
+        cage.optisense.blend = core.nearest_blend(shown, lower, upper)  # its update shows it
         return {"FINISHED"}
 
 
@@ -195,6 +215,7 @@ class OPTISENSE_OT_rest_cage(bpy.types.Operator):
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         cage = _cage(type(self), context)
+        _end_editing(cage)
         values = cage_data(cage)
         points = core.rest_points(values["box"], tuple(values["resolution"]))
         values.pop("blend", None)

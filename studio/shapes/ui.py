@@ -57,7 +57,9 @@ def _cage(layout: bpy.types.UILayout, cage: bpy.types.Object, values: dict) -> N
         icon = "CHECKMARK" if values.get(bound) else "BLANK1"
         row.operator("optisense.set_bound", text=f"Set {name}", icon=icon).bound = bound
     if isinstance(values.get("blend"), (int, float)):
-        layout.prop(cage.optisense, "blend", text="A", slider=True)
+        row = layout.row()
+        row.enabled = cage.mode != "EDIT"  # undo in edit mode does not know of it
+        row.prop(cage.optisense, "blend", text="A", slider=True)
     elif values.get("c_min") and values.get("c_max"):
         layout.operator("optisense.blend")
     row = layout.row(align=True)

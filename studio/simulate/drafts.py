@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import time
+from typing import Any
+
 import bpy
 
 from ..core.engine import EngineError, Request
@@ -12,14 +15,25 @@ from . import requests
 NAME = "draft"
 KINDS = ("PART", "LIGHT", "CAMERA", "CAGE", "CONTACT")
 
-_open: Request | None = None
+MOST_OPEN = 3
+"""Drafts: one that is made, one that waits, and the one that this took the place of, until the
+engine has answered it."""
+RENEWED = 0.05
+"""Seconds after which a draft that waits for another to be made gives way to a newer one."""
+REST = 0.3
+"""Seconds without a change after which a draft that took things over is made once more, anew."""
+
+_open: list[Request] = []
 _wanted = False
+_sent = 0.0
+_again: float | None = None
+"""When to ask once more, if nothing changes before."""
 
 
 def wanted() -> None:
     """Something changed that a picture would show: ask as soon as Blender is done with it."""
-    global _wanted
-    _wanted = True
+    global _wanted, _again
+    _wanted, _again = True, None
     if session.running() is not None and not bpy.app.timers.is_registered(_soon):
         bpy.app.timers.register(_soon, first_interval=0.0)
 
@@ -30,31 +44,48 @@ def _soon() -> None:
 
 
 def _ask() -> None:
-    """One draft at a time; what changes meanwhile goes into the next."""
-    global _open, _wanted
+    """Ask for a draft if one is wanted: one is made, and the newest waits behind it, so that the
+    engine goes from one to the next at once."""
+    global _wanted, _sent, _again
     scene = bpy.context.scene
-    if not _wanted or scene is None or not scene.optisense_simulation.draft:
+    if scene is None or not scene.optisense_simulation.draft or session.is_busy():
         return
-    if (_open is not None and not _open.done) or session.is_busy():
+    now = time.monotonic()
+    _open[:] = [each for each in _open if not each.done]
+    rested = _again is not None and now >= _again and not _open
+    if not (_wanted or rested) or len(_open) == MOST_OPEN:
         return
-    _wanted = False
+    if len(_open) > 1 and now - _sent < RENEWED:
+        return
+    _wanted, _sent, _again = False, now, None
     if not scene.optisense.is_open:
         return
     try:
         design = handing.design(scene)
         contacts = contact_list(scene, bpy.context.evaluated_depsgraph_get())
-        _open = session.engine().send(
-            "simulate",
-            on_result=lambda result: requests.take(result, draft=True),
-            on_error=_refused,
-            design=design,
-            contacts=contacts,
-            draft=True,
-            files=["pixels"],
-            name=NAME,
+        _open.append(
+            session.engine().send(
+                "simulate",
+                on_result=_take,
+                on_error=_refused,
+                design=design,
+                contacts=contacts,
+                draft=True,
+                files=["pixels"],
+                name=NAME,
+            )
         )
     except EngineError as error:
         session.say(error)
+
+
+def _take(result: dict[str, Any]) -> None:
+    """Show a draft, and see to it that one that took things over does not stay."""
+    global _again
+    requests.take(result, draft=True)
+    settings = result["settings"]
+    if (settings.get("kept_layers") or settings.get("kept_media")) and not _wanted:
+        _again = time.monotonic() + REST
 
 
 def _refused(error: EngineError) -> None:
@@ -80,8 +111,9 @@ def register() -> None:
 
 
 def unregister() -> None:
-    global _open, _wanted
+    global _wanted, _again
     if bpy.app.timers.is_registered(_soon):
         bpy.app.timers.unregister(_soon)
     bpy.app.handlers.depsgraph_update_post.remove(_changed)
-    _open, _wanted = None, False
+    _open.clear()
+    _wanted, _again = False, None

@@ -69,6 +69,21 @@ def test_the_recipe_beside_the_design_makes_it_again(tmp_path: Path) -> None:
     assert np.diff(places(optisense.load(folder), "red")[:, 0]) == pytest.approx([5.0] * 3)
 
 
+def test_guesses_that_do_not_fit_are_kept_to_be_mended(tmp_path: Path) -> None:
+    cad = tmp_path / "cad"
+    shutil.copytree(CAD, cad, ignore=shutil.ignore_patterns("*.yaml", "*.py"))
+    gel = TriangleMesh.load(cad / "gel.stl")
+    gel.with_faces(gel.faces[1:]).save_obj(cad / "gel.obj")  # not closed
+    (cad / "gel.stl").unlink()
+    folder = tmp_path / "pad"
+    code, text = new("--from-meshes", cad, folder, "--yes")
+    assert code == 2 and "not closed" in text
+    assert "guessed: housing is blocker" in text and "recipe is kept" in text
+    assert not (folder / "design.yaml").exists()
+    gel.save_obj(cad / "gel.obj")
+    assert new("--from-meshes", folder / "recipe.yaml", folder, "--overwrite")[0] == 0
+
+
 def test_guesses_are_told(tmp_path: Path) -> None:
     code, text = new("--from-meshes", CAD, tmp_path / "pad", "--yes")
     assert code == 0, text

@@ -111,3 +111,95 @@ def test_inside_agrees_with_a_sphere() -> None:
     assert inside(2.9 * ring, ball).all()
     assert not inside(3.01 * ring, ball).any()
     assert inside(2.9 * ring, ball.flipped()).all()
+
+
+def with_plate(design: SensorDesign, bottom: float, priority: int, ior: float) -> SensorDesign:
+    """The design with a plate of glass under, or in, the gel, which reaches down to z = -2."""
+    data = design.model_dump(mode="json")
+    data["parts"]["plate"] = {
+        "role": "support", "mesh": "meshes/plate.obj", "material": "glass", "priority": priority,
+    }  # fmt: skip
+    data["materials"]["glass"] = {"kind": "dielectric", "ior": ior}
+    made = SensorDesign.model_validate(data)
+    made.meshes.update(design.meshes)
+    made.meshes["plate"] = TriangleMesh.box((-4, -3, bottom), (4, 3, bottom + 1.0), (3, 3, 1))
+    for name, group in made.lights.items():
+        if group.emitter is not None and group.emitter.kind == "ies":
+            group.emitter._folder = design.lights[name].emitter._folder  # type: ignore[union-attr]
+    return made
+
+
+class TestOverlaps:
+    def test_solids_of_one_priority_may_not_share_space(self, design: SensorDesign) -> None:
+        gel = design.parts["gel"].priority
+        problem = only(check_design(with_plate(design, -2.5, gel, 1.49)))
+        assert "'gel' and 'plate' overlap near (0.00, 0.00, -1.75) mm" in problem.message
+        assert problem.where == "parts.plate.priority" and "larger priority" in str(problem.hint)
+
+    def test_a_priority_settles_it(self, design: SensorDesign) -> None:
+        gel = design.parts["gel"].priority
+        assert check_design(with_plate(design, -2.5, gel + 1, 1.49)) == []
+
+    def test_what_is_one_to_the_light_may(self, design: SensorDesign) -> None:
+        gel = design.parts["gel"].priority
+        assert check_design(with_plate(design, -2.5, gel, 1.41)) == []
+
+    def test_what_only_touches_does_not_overlap(self, design: SensorDesign) -> None:
+        gel = design.parts["gel"].priority
+        assert check_design(with_plate(design, -3.0, gel, 1.49)) == []
+        assert check_design(with_plate(design, -2.999, gel, 1.49)) == []
+
+    def test_a_solid_wholly_inside_another(self, design: SensorDesign) -> None:
+        gel = design.parts["gel"].priority
+        assert "overlap" in only(check_design(with_plate(design, -1.5, gel, 1.49))).message
+
+
+class TestView:
+    @pytest.fixture
+    def plain(self, design: SensorDesign) -> SensorDesign:
+        """Without its mirror, and with a narrow lens."""
+        data = design.model_dump(mode="json")
+        del data["parts"]["mirror"], data["cages"]["mirror"]
+        data["camera"] |= {"projection": "perspective", "fov": 20.0}
+        made = SensorDesign.model_validate(data)
+        made.meshes.update({n: m for n, m in design.meshes.items() if n != "mirror"})
+        made.lights["own-ies"].emitter._folder = design.lights["own-ies"].emitter._folder  # type: ignore[union-attr]
+        return made
+
+    @pytest.mark.parametrize(
+        ("direction", "seen"),
+        [
+            ([0, 0, 1], True),
+            ([0.3, 0, 1], True),  # its left edge, 11 degrees inside the axis, meets the skin
+            ([0, 0, -1], False),
+            ([1, 0, 1], False),
+            ([0, 1, 0.3], False),
+        ],
+    )
+    def test_a_camera_that_looks_elsewhere(
+        self, plain: SensorDesign, direction: list[float], seen: bool
+    ) -> None:
+        problems = check_design(set_value(plain, "camera.direction", direction))
+        if seen:
+            assert problems == []
+        else:
+            problem = only(problems, "warning")
+            assert "not where the camera looks" in problem.message
+            assert problem.where == "camera.direction"
+
+    def test_a_surface_whose_corners_are_all_out_of_the_picture_is_seen(
+        self, plain: SensorDesign
+    ) -> None:
+        plain.meshes["skin"] = TriangleMesh.grid((10, 8), (1, 1)).flipped()
+        assert check_design(set_value(plain, "camera.position", [0, 0, -10])) == []
+
+    def test_a_fisheye_sees_what_is_beside_it(self, plain: SensorDesign) -> None:
+        wide = set_value(plain, "camera.projection", "equidistant")
+        wide = set_value(set_value(wide, "camera.fov", 240.0), "camera.direction", [1, 0, 0])
+        assert check_design(wide) == []
+        narrow = set_value(wide, "camera.fov", 100.0)
+        assert "not where" in only(check_design(narrow), "warning").message
+
+    def test_mirrors_may_show_it(self, design: SensorDesign) -> None:
+        away = set_value(design, "camera.direction", [0, 0, -1])
+        assert check_design(set_value(away, "camera.fov", 20.0)) == []

@@ -10,6 +10,7 @@ import pytest
 
 from optisense.design import SensorDesign
 from optisense.design.section import cut, section
+from optisense.design.section_drawing import section_svg
 from optisense.geometry import Sphere, TriangleMesh
 from optisense.sensors import BUILDERS, load
 
@@ -96,3 +97,15 @@ def test_a_design_without_meshes_lists_its_parts(design: SensorDesign) -> None:
     bare = design.copy()
     bare.meshes.clear()
     assert all(name in bare._repr_html_() for name in bare.parts)
+
+
+def test_lights_behind_one_another_show_all_their_colours() -> None:
+    # In a Mini the red row lies behind the blue one, and the green one stands by itself.
+    svg = section_svg(load("gelsight-mini"))
+    drawn = list(ElementTree.fromstring(svg).iter())
+    sectors = [
+        e.attrib["fill"] for e in drawn if e.tag.endswith("path") and "A3.2" in e.attrib["d"]
+    ]
+    assert sorted(sectors) == ["rgb(0,0,255)"] * 5 + ["rgb(255,0,0)"] * 5
+    dots = [e.attrib["fill"] for e in drawn if e.attrib.get("r") == "3.2"]
+    assert sorted(dots) == ["none"] * 5 + ["rgb(0,255,0)"]

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import yaml
 from pydantic import BaseModel
 
 from optisense.design import SensorDesign, load_design, save_design, set_value
@@ -310,3 +311,20 @@ class TestSaving:
         design.parts["wall"].mesh = "meshes/gel.stl"  # both would be written as gel.obj
         with pytest.raises(DesignError, match=r"gel\.obj"):
             save_design(design, tmp_path / "sensor")
+
+
+@pytest.mark.parametrize(
+    ("keep", "hint"), [("silver", "Name one of: silver"), ("gel", "Add one of kind conductor")]
+)
+def test_a_part_without_material_is_offered_those_that_fit(
+    tmp_path: Path, design: SensorDesign, keep: str, hint: str
+) -> None:
+    save_design(design, tmp_path)
+    file = tmp_path / "design.yaml"
+    data = yaml.safe_load(file.read_text(encoding="utf-8"))
+    data["materials"] = {name: data["materials"][name] for name in {"gel", keep}}
+    del data["parts"]["mirror"]["material"], data["parts"]["wall"]
+    file.write_text(yaml.safe_dump(data), encoding="utf-8")
+    with pytest.raises(DesignError, match=r"'mirror' \(mirror\) has no material") as caught:
+        load_design(tmp_path)
+    assert caught.value.hint is not None and caught.value.hint.startswith(hint)

@@ -49,6 +49,7 @@ def test_facets_of_a_sphere_stay_within_half_a_micrometre(radius: float) -> None
 
 def test_a_ball_is_whole_when_all_of_it_can_touch() -> None:
     mesh = Sphere(1.0).mesh(5.0)
+    mesh.validate("ball", closed=True)
     assert mesh.area == pytest.approx(4 * math.pi, rel=2e-3)
     assert mesh.bounds[1, 2] == pytest.approx(2.0)
 

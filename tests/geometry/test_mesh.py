@@ -53,6 +53,22 @@ def test_stl_and_ply_are_read_as_closed_solids(tmp_path: Path, suffix: str) -> N
     assert loaded.volume == pytest.approx(48)
 
 
+@pytest.mark.parametrize(
+    ("file_type", "told"),
+    [("stl", "it says 44 triangles and has room for 41"), ("stl_ascii", "endsolid")],
+)
+def test_an_stl_file_that_is_cut_off_says_so(tmp_path: Path, file_type: str, told: str) -> None:
+    import trimesh
+
+    whole = tmp_path / "box.stl"
+    trimesh.Trimesh(box().vertices, box().faces).export(whole, file_type=file_type)
+    assert TriangleMesh.load(whole).is_closed
+    whole.write_bytes(whole.read_bytes()[:-120])
+    with pytest.raises(MeshError, match=told) as caught:
+        TriangleMesh.load(whole)
+    assert "cut off" in caught.value.message and str(whole) in str(caught.value)
+
+
 def test_obj_polygons_are_triangulated_even_when_concave(tmp_path: Path) -> None:
     (tmp_path / "arrow.obj").write_text(
         "v 0 0 0\nv 2 -2 0\nv 0 2 0\nv -2 -2 0\nf 1/1 2/2 3/3 4/4\nf -4 -1 -2 -3\n"

@@ -143,6 +143,33 @@ class TestRefusals:
         assert f"our-gel.yaml:{line}" in str(caught.value)
         assert not own.exists()
 
+    @pytest.mark.parametrize(
+        ("value", "gives", "advice"),
+        [
+            ("perspective, fov: 73.8", "62.3", "diagonal"),
+            ("perspective, fov: 48.8", "62.3", "height"),
+            ("equidistant, fov: 62.2", "69.2", "'projection: perspective'"),
+            ("perspective, fov: 120.0", "62.3", "leave out focal_length"),
+        ],
+    )
+    def test_a_field_of_view_that_does_not_fit_the_lens(
+        self, own: Path, tmp_path: Path, value: str, gives: str, advice: str
+    ) -> None:
+        # The maker of this camera tells 62.2 x 48.8 degrees; over the diagonal these are 74.
+        lens = "resolution: [3280, 2464], pixel_size: 1.12, focal_length: 3.04"
+        text = "description: A camera\nvalue: {{projection: {}{}}}\nsources:\n  fov: {}\n"
+        source = "{status: assumed, source: a guess}"
+        wrong = write(tmp_path, "lens.yaml", text.format(value, f", {lens}", source))
+        with pytest.raises(LibraryError, match=f"they give {gives} degrees") as caught:
+            library.add_file(wrong)
+        assert advice in str(caught.value) and "lens.yaml:2" in str(caught.value)
+        assert not own.exists()
+
+        right = value.split(",")[0] + (", fov: 62.2, " if "persp" in value else ", fov: 69.2, ")
+        library.add_file(write(tmp_path, "right.yaml", text.format(right, lens, source)))
+        untold = text.format(value, ", resolution: [3280, 2464]", source)
+        library.add_file(write(tmp_path, "untold.yaml", untold))
+
     def test_names_are_taken_once_over_all_kinds(self, own: Path, tmp_path: Path) -> None:
         file = write(tmp_path, "our-gel.yaml", GEL)
         with pytest.raises(LibraryError, match=r"already has a light 'smd-3528' \(built in\)"):

@@ -18,7 +18,7 @@ from reference_scenes import (
 from optisense.optics.camera import RayCamera
 from optisense.optics.emitters import Emitter, Intensity, Shape
 from optisense.optics.guide import even_guide
-from optisense.optics.photons import trace_photons
+from optisense.optics.photons import SURFACE_SHIFT, trace_photons
 from optisense.optics.ray_scene import Piece, RayScene
 from optisense.optics.surfaces import Surface, SurfaceKind
 from optisense.optics.visible_points import find_visible_points
@@ -53,7 +53,7 @@ class Landings:
         n = found.count
         place = np.asarray(found.place)[: 4 * n].reshape(n, 4)
         self.place = place[:, :3].astype(float)
-        self.surface = place[:, 3].copy().view(np.uint32) >> 8
+        self.surface = place[:, 3].copy().view(np.uint32) >> SURFACE_SHIFT
         self.direction = np.asarray(found.travel)[: 4 * n].reshape(n, 4)[:, :3].astype(float)
         self.power = np.asarray(found.power)[:n].astype(float)
 

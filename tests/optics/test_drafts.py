@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import drjit as dr
 import numpy as np
 import pytest
 
@@ -128,3 +129,57 @@ def test_a_small_move_leaves_the_noise_of_all_other_light_as_it_was(
     assert change(nudged, still, "red") > 0.0
     for group in ("green", "blue"):
         assert change(nudged, still, group) < 0.15 * change(other_seed, still, group)
+
+
+def test_light_that_did_not_move_is_kept_until_the_draft_is_asked_for_again(
+    draft: DraftModel, mini: SensorDesign, moved: SensorDesign
+) -> None:
+    other_seed = draft.render(PRESS, SIZE, photons=60_000, seed=1)
+    before = draft.render(PRESS, SIZE, photons=60_000)
+    draft.become(moved)
+    nudged = draft.render(PRESS, SIZE, photons=60_000)
+    assert nudged.settings["kept_layers"] == ["green", "blue"]
+    again = draft.render(PRESS, SIZE, photons=60_000)
+    assert again.settings["kept_layers"] == []
+    # The same photons, alone or among all; only shadow rays are drawn for all groups together.
+    same = np.isclose(nudged.layers["red"], again.layers["red"], rtol=1e-3, atol=1e-6)
+    assert same[..., 0].mean() > 0.98
+    for group in ("green", "blue"):
+        assert np.array_equal(nudged.layers[group], before.layers[group])
+        missed = nudged.layers[group] - again.layers[group]  # the moved light's shadow
+        noise = before.layers[group] - other_seed.layers[group]
+        assert np.sqrt((missed**2).mean()) < 0.5 * np.sqrt((noise**2).mean())
+
+
+def test_other_fluxes_only_scale_a_draft(draft: DraftModel, mini: SensorDesign) -> None:
+    before = draft.render(PRESS, SIZE, photons=60_000)
+    draft.become(ots.set_value(mini, "lights.red.flux", 2 * mini.lights["red"].flux))
+    dimmed = draft.render(PRESS, SIZE, photons=60_000)
+    np.testing.assert_allclose(dimmed.layers["red"], 2 * before.layers["red"], rtol=1e-6)
+    assert np.array_equal(dimmed.layers["blue"], before.layers["blue"])
+
+
+def test_a_skin_that_bends_on_compiles_nothing(draft: DraftModel, mini: SensorDesign) -> None:
+    def misses(height: float) -> int:
+        draft.become(ots.set_value(mini, "cages.skin.points[14].z", height))
+        dr.kernel_history_clear()
+        draft.render(PRESS, SIZE, photons=60_000)
+        return sum(kernel.get("cache_hit") == 0 for kernel in dr.kernel_history())
+
+    with dr.scoped_set_flag(dr.JitFlag.KernelHistory, True):
+        misses(0.3)
+        misses(0.31)
+        assert misses(0.32) == misses(0.33) == 0
+
+
+def test_bent_media_are_resolved_when_the_draft_is_asked_for_again(
+    draft: DraftModel, mini: SensorDesign
+) -> None:
+    for height in (0.3, 0.5):
+        draft.become(ots.set_value(mini, "cages.skin.points[14].z", height))
+        bent = draft.render(PRESS, SIZE, photons=60_000)
+    assert bent.settings["kept_media"]
+    again = draft.render(PRESS, SIZE, photons=60_000)
+    assert not again.settings["kept_media"]
+    a, b = blocks(bent.radiance), blocks(again.radiance)
+    np.testing.assert_allclose(a, b, atol=0.2 * SAME * b.mean(axis=0).max())

@@ -21,6 +21,9 @@ ASIDE = Contact(Sphere(radius=2.0), at=(3.0, -2.0), depth=0.6)
 
 ROUNDING = 2e-5
 """Relative to the image's mean: sums of some thousand single-precision numbers in any order."""
+TURNED_RAYS = 1e-3, 0.01
+"""Part of an image's pixels where such rounding may draw another shadow ray, and what that may
+change, relative to the mean."""
 
 GUIDED_OTHERWISE = 0.02
 """Relative: two images of one design with photons sent by different guides differ by noise."""
@@ -55,10 +58,12 @@ def render(of: OpticalModel, *contacts: Contact, seed: int = 0) -> TactileImage:
 
 
 def same(a: TactileImage, b: TactileImage) -> bool:
-    return all(
-        np.abs(a.layers[name] - b.layers[name]).max() <= ROUNDING * a.layers[name].mean()
-        for name in a.layers
-    )
+    part, most = TURNED_RAYS
+    for name, layer in a.layers.items():
+        off = np.abs(layer - b.layers[name]).max(axis=2) / layer.mean()
+        if off.max() > most or (off > ROUNDING).mean() > part:
+            return False
+    return True
 
 
 def test_layers_add_up_to_the_image() -> None:

@@ -11,6 +11,7 @@ import bpy
 import numpy as np
 import pytest
 
+from studio.core import cage as core
 from studio.core.mesh_file import Mesh
 from studio.engine import handing, session
 from studio.scene import cages
@@ -24,15 +25,20 @@ def heights(name: str) -> Any:
     return cages.shown_vertices(part.data)[:, 2]
 
 
+def lift(cage: Any, by: float) -> None:
+    """Move a point of a cage that is being edited."""
+    mesh = bmesh.from_edit_mesh(cage.data)
+    mesh.verts.ensure_lookup_table()
+    mesh.verts[14].co.z += by
+    bmesh.update_edit_mesh(cage.data)
+
+
 def test_parts_follow_while_points_are_being_edited(mini: Any, select: Callable[..., None]) -> None:
     cage = objects_of(mini, "CAGE")[0]
     select(object_of(mini, "PART", "skin"))
     bpy.ops.optisense.edit_shape()
     assert cage.mode == "EDIT"
-    mesh = bmesh.from_edit_mesh(cage.data)
-    mesh.verts.ensure_lookup_table()
-    mesh.verts[14].co.z += 6.0
-    bmesh.update_edit_mesh(cage.data)
+    lift(cage, 6.0)
     bpy.context.view_layer.update()
     assert heights("skin").max() == pytest.approx(6.0 / 4, abs=1e-5)  # weight (1/2) (1/2) 1
     bpy.ops.optisense.edit_shape()
@@ -85,6 +91,8 @@ def test_bounds_and_blend(mini: Any, select: Callable[..., None]) -> None:
     cage.data.update()
     bpy.ops.optisense.set_bound(bound="c_max")
     bpy.ops.optisense.blend()
+    assert cage.optisense.blend == 1.0, "it starts from the shape that there is"
+    assert heights("skin").max() == pytest.approx(8.0 / 4, abs=1e-5)
     cage.optisense.blend = 0.25
     assert heights("skin").max() == pytest.approx(0.25 * 8.0 / 4, abs=1e-5)
     values = gather_document(mini)["cages"]["skin"]
@@ -96,6 +104,40 @@ def test_bounds_and_blend(mini: Any, select: Callable[..., None]) -> None:
     cage.data.update()
     values = gather_document(mini)["cages"]["skin"]
     assert "blend" not in values and values["points"][14]["z"] == pytest.approx(3.0)
+
+
+def test_bounds_end_editing(mini: Any, select: Callable[..., None]) -> None:
+    """Undo in edit mode knows of points only: it would not take bounds and blend back."""
+    cage = objects_of(mini, "CAGE")[0]
+    select(cage)
+    for operator, fields in (
+        ("set_bound", {"bound": "c_min"}),
+        ("set_bound", {"bound": "c_max"}),
+        ("blend", {}),
+        ("rest_cage", {}),
+    ):
+        bpy.ops.optisense.edit_shape()
+        assert cage.mode == "EDIT"
+        lift(cage, 2.0)
+        assert getattr(bpy.ops.optisense, operator)(**fields) == {"FINISHED"}
+        assert cage.mode == "OBJECT"
+    values = cages.cage_data(cage)
+    assert [values[name][14]["z"] for name in ("c_min", "c_max")] == pytest.approx([2.0, 4.0])
+    assert heights("skin").max() == pytest.approx(0.0, abs=1e-6)
+
+
+def test_the_nearest_blend() -> None:
+    rng = np.random.default_rng(1)
+    lower, upper, aside = rng.normal(size=(3, 27, 3))
+    way = upper - lower
+    aside -= (aside * way).sum() / (way * way).sum() * way
+    for share in (0.0, 0.3, 1.0):
+        assert core.nearest_blend(
+            core.blended(lower, upper, share) + aside, lower, upper
+        ) == pytest.approx(share)
+    assert core.nearest_blend(upper + way, lower, upper) == 1.0
+    assert core.nearest_blend(lower - way, lower, upper) == 0.0
+    assert core.nearest_blend(upper, lower, lower) == 0.0
 
 
 def test_back_to_rest_and_without_a_cage(mini: Any, select: Callable[..., None]) -> None:

@@ -20,7 +20,7 @@ from studio.scene.collections import object_of, objects_of
 from studio.scene.gather import gather_document
 from studio.scene.offending import offending
 from studio.sensor.warming import warm_up
-from studio.simulate import picture, relight
+from studio.simulate import drafts, picture, relight
 
 
 def shown() -> np.ndarray:
@@ -397,3 +397,38 @@ def test_a_search_goes_on_after_blender_was_closed(mini: Any, tmp_path: Path) ->
     assert bpy.ops.optisense.resume() == {"FINISHED"}
     found = bpy.context.window_manager.optisense_found
     assert found.ended.startswith("3 trials") and float(found.best) > 0.5
+
+
+def test_drafts_follow_a_dragged_light_and_the_last_is_whole(mini: Any) -> None:
+    pictures: list[dict[str, Any]] = []
+    take, engine = drafts.requests.take, session.engine()
+    light, settings = objects_of(mini, "LIGHT")[0], mini.optisense_simulation
+
+    def taken(result: dict[str, Any], *, draft: bool) -> None:
+        pictures.append(result)
+        take(result, draft=draft)
+
+    def until(done: Callable[[], bool]) -> None:
+        end = time.monotonic() + 120.0
+        while not done():
+            assert time.monotonic() < end and not session.state().problem
+            time.sleep(session._tick() or 0.0)
+
+    drafts.requests.take, settings.draft = taken, True
+    try:
+        for wanted in (1, 3):
+            while len(pictures) < wanted:  # the mouse goes on moving
+                light.location.x += 0.01
+                bpy.context.view_layer.update()
+                assert len(drafts._open) <= 3
+                time.sleep(session._tick() or 0.0)
+        assert pictures[-1]["draft"] and pictures[-1]["settings"]["kept_layers"]
+        assert bpy.context.window_manager.optisense_picture.is_draft
+        until(lambda: not pictures[-1]["settings"]["kept_layers"])
+        until(lambda: not engine.waiting)
+        came = len(pictures)
+        rest = time.monotonic() + 2 * drafts.REST
+        until(lambda: time.monotonic() > rest)
+        assert len(pictures) == came  # and no more, as nothing moves
+    finally:
+        drafts.requests.take, settings.draft = take, False

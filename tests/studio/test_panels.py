@@ -120,6 +120,17 @@ def test_messages_and_progress_are_drawn(mini: Any) -> None:
     assert "The gel leaks" in texts and "Close it" in texts
 
 
+def test_a_material_that_was_refused_is_told_beside_its_button(
+    mini: Any, select: Callable[..., None]
+) -> None:
+    select(object_of(mini, "PART", "gel"))
+    with pytest.raises(RuntimeError):
+        bpy.ops.optisense.keep_material(name="my-silicone", source="")
+    problem = session.state().problem
+    assert problem
+    assert problem.split()[0] in " ".join(draw_all()["Materials"].texts)
+
+
 def test_menus_are_filled_by_the_engine(scene: Any) -> None:
     engine = session.engine()
     end = time.monotonic() + 60.0

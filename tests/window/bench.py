@@ -253,6 +253,21 @@ class Bench:
             self.scroll(clicks)
         return self.find(what, across=across)
 
+    def new_sensor(self, name: str) -> None:
+        """Start from a built-in sensor."""
+        self.until("bool(part('engine.catalogue').entries('sensors'))")
+        names = self.see("[each['name'] for each in part('engine.catalogue').entries('sensors')]")
+        x, y = self.find("optisense.open", across=0.25)
+        self.choose((x, y - 22), names.index(name))
+        self.until("scene().optisense.is_open and not state().busy")
+
+    def photograph(self, name: str) -> None:
+        """Keep a picture of this step for the documentation, where that is wanted."""
+        folder = os.environ.get("OPTISENSE_WINDOW_PICTURES")
+        if folder:
+            self.drawn()
+            self.desktop.picture(Path(folder) / f"{name}.jpg")
+
     def choose_file(self, name: str = "") -> None:
         """Click on a file where one is asked for, if a name is given, and then on the button."""
         self.until("any(a.type == 'FILE_BROWSER' for w in manager.windows for a in w.screen.areas)")

@@ -6,16 +6,10 @@ OPTISENSE_WINDOW_PICTURES names.
 
 from __future__ import annotations
 
-import os
-from collections.abc import Iterator
-from pathlib import Path
-
 import pytest
 import yaml
 
-from .bench import Bench, install
-from .conftest import BLENDER
-from .desktop import Desktop
+from .bench import Bench
 
 MOVED = 1.5
 """mm, how far a light is moved."""
@@ -39,28 +33,6 @@ FIELDS_OF_VIEW = (50.0, 60.0, 70.0)
 """Degrees, what the search tries; all see less than the whole surface or beyond its edge."""
 
 
-@pytest.fixture(scope="module")
-def bench(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Bench]:
-    """Blender with the extension, installed as a user does."""
-    blender, home = Path(os.environ[BLENDER]).resolve(), tmp_path_factory.mktemp("home")
-    install(blender, home)
-    desktop = Desktop()
-    sitting = Bench(blender, desktop, home)
-    try:
-        yield sitting
-    finally:
-        sitting.close()
-        desktop.close()
-
-
-def photograph(bench: Bench, name: str) -> None:
-    """Keep a picture of this step for the documentation, where that is wanted."""
-    folder = os.environ.get("OPTISENSE_WINDOW_PICTURES")
-    if folder:
-        bench.drawn()
-        bench.desktop.picture(Path(folder) / f"{name}.jpg")
-
-
 def test_the_tab_is_there(bench: Bench) -> None:
     bench.greet()
     bench.open_tab()
@@ -68,16 +40,12 @@ def test_the_tab_is_there(bench: Bench) -> None:
 
 
 def test_a_new_mini(bench: Bench) -> None:
-    bench.until("bool(part('engine.catalogue').entries('sensors'))")
-    names = bench.see("[each['name'] for each in part('engine.catalogue').entries('sensors')]")
-    x, y = bench.find("optisense.open", across=0.25)
-    bench.choose((x, y - 22), names.index("gelsight-mini"))
-    bench.until("scene().optisense.is_open and not state().busy")
+    bench.new_sensor("gelsight-mini")
     assert bench.see("scene().optisense.title") == "gelsight-mini"
     assert len(bench.see("[light.name for light in kinds('LIGHT')]")) == 15
     bench.press("optisense.add_contact", across=0.75)
     bench.until("len(kinds('CONTACT')) == 1")
-    photograph(bench, "1-new-mini")
+    bench.photograph("1-new-mini")
 
 
 def test_a_light_is_moved(bench: Bench) -> None:
@@ -94,7 +62,7 @@ def test_a_light_is_moved(bench: Bench) -> None:
     bench.until(f"bpy.data.objects[{name!r}].location.z < {before[2] - 0.1}")
     after = bench.see(f"list(bpy.data.objects[{name!r}].location)")
     assert after == pytest.approx([before[0], before[1], before[2] - MOVED], abs=1e-4)
-    photograph(bench, "2-light-moved")
+    bench.photograph("2-light-moved")
 
 
 def test_a_material_is_chosen_from_pictures(bench: Bench) -> None:
@@ -108,7 +76,7 @@ def test_a_material_is_chosen_from_pictures(bench: Bench) -> None:
     bench.desktop.click(middle, y - ABOVE_BUTTON)
     bench.see("1")
     bench.drawn()
-    photograph(bench, "materials")
+    bench.photograph("materials")
     bench.desktop.click(middle - LAST_PICTURE[0], y - ABOVE_BUTTON - LAST_PICTURE[1])
     bench.until(f"manager.optisense_material.material != {before!r}")
 
@@ -125,7 +93,7 @@ def test_a_picture_appears(bench: Bench) -> None:
     )
     assert min(red, green, blue) > 0.05 * width * height
     bench.bring("optisense.show_picture", 0.95)
-    photograph(bench, "3-picture")
+    bench.photograph("3-picture")
 
 
 def test_scores_appear(bench: Bench) -> None:
@@ -143,13 +111,13 @@ def test_scores_appear(bench: Bench) -> None:
     bench.until(f"{figure} is not None and {figure}.name.startswith('OptiSense figure')")
     assert min(bench.see(f"list({figure}.size)")) >= 400
     bench.until(f"{EDITOR_FITS}")
-    photograph(bench, "figure")
+    bench.photograph("figure")
     bench.see("close_area('IMAGE_EDITOR')")
     bench.press("optisense.show_rays", across=0.25)
     bench.until("any(each.optisense.key == 'ray hit' for each in scene().objects)")
     bench.rest()
     bench.bring("optisense.show_rays", 0.95, across=0.25)
-    photograph(bench, "4-evaluated")
+    bench.photograph("4-evaluated")
 
 
 def test_it_is_saved(bench: Bench) -> None:
@@ -182,7 +150,7 @@ def test_a_small_grid_finds_the_best_of_three(bench: Bench) -> None:
     bench.rest()
     assert "3 trials" in bench.see("manager.optisense_found.ended")
     bench.bring("optisense.apply_best", 0.95, across=0.25)
-    photograph(bench, "5-searched")
+    bench.photograph("5-searched")
 
 
 def test_the_best_is_applied_saved_and_opened_again(bench: Bench) -> None:
@@ -212,12 +180,12 @@ def test_the_best_is_applied_saved_and_opened_again(bench: Bench) -> None:
     bench.rest()
     bench.press("optisense.show_picture")
     bench.until("any(each.type == 'IMAGE_EDITOR' for each in window().screen.areas)")
-    photograph(bench, "6-opened-again")
+    bench.photograph("6-opened-again")
 
 
 def test_a_report_and_files_for_the_workshop_are_written(bench: Bench) -> None:
     bench.only(REPORT)
-    photograph(bench, "7-report")
+    bench.photograph("7-report")
     bench.press("optisense.report")
     bench.choose_file()
     bench.until("'Written to' in state().note")

@@ -14,7 +14,7 @@ from optisense import sensors
 from optisense.design import Part, Point, Role, SensorDesign
 from optisense.errors import DesignError, OutputError, SetupError
 from optisense.geometry import TriangleMesh
-from optisense.workshop import export
+from optisense.workshop import bill_of_materials, export
 from optisense.workshop.mesh_formats import NAMESPACE, three_mf_bytes
 from optisense.workshop.shapes import Shape, shapes
 from optisense.workshop.step_format import bodies, write_step
@@ -184,6 +184,15 @@ def test_step_without_its_extra_says_what_to_install_before_any_work(
     with pytest.raises(SetupError, match=r"optisense\[step\]"):
         export(flat, tmp_path / "new", ["stl", "step"])
     assert not (tmp_path / "new").exists()
+
+
+def test_a_film_of_air_is_neither_made_nor_bought() -> None:
+    belt = sensors.build("gelbelt")
+    assert belt.parts["film"].material == "air-film"
+    assert [shape.name for shape in shapes(belt)] == [name for name in belt.parts if name != "film"]
+    bought = bill_of_materials(belt).items
+    assert not any("film" in item.used_for or "air" in item.name for item in bought)
+    assert any(item.used_for == "tape (support)" for item in bought)
 
 
 def test_indenters_are_not_made(flat: SensorDesign) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from textwrap import shorten
 from typing import TYPE_CHECKING, Any
 
 from optisense.library.entries import AnyEntry, LightEntry
@@ -16,6 +17,9 @@ if TYPE_CHECKING:
 
 DOTS_PER_INCH = 110
 
+LONGEST = 130
+"""Characters of a description that fit across the picture."""
+
 
 def draw(name: str, entry: AnyEntry) -> Figure:
     """The preview picture of an entry: 990 x 450 pixels when saved by `save`.
@@ -26,9 +30,10 @@ def draw(name: str, entry: AnyEntry) -> Figure:
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(9.0, 4.1), dpi=DOTS_PER_INCH)
-    figure.subplots_adjust(left=0.05, right=0.97, top=0.84, bottom=0.13, wspace=0.22)
+    figure.subplots_adjust(left=0.05, right=0.97, top=0.78, bottom=0.13, wspace=0.22)
     figure.suptitle(name, x=0.03, y=0.98, ha="left", va="top", fontsize=14, weight="bold")
-    figure.text(0.03, 0.905, entry.description, ha="left", va="top", fontsize=9, color="0.35")
+    about = shorten(entry.description, LONGEST, placeholder=" ...")
+    figure.text(0.03, 0.905, about, ha="left", va="top", fontsize=9, color="0.35")
     value: Any = entry.value
     if isinstance(entry, LightEntry):
         draw_light(figure, entry)

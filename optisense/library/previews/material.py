@@ -30,10 +30,10 @@ INCIDENCE = 45.0
 
 def draw_material(figure: Figure, material: Material | Coating) -> None:
     """Draw both pictures into a figure."""
-    left = figure.add_axes((0.03, 0.06, 0.36, 0.79))
+    left = figure.add_axes((0.03, 0.06, 0.36, 0.77))
     left.imshow(picture_of_ball(material), interpolation="none")
     left.set_axis_off()
-    place = (0.49, 0.15, 0.47, 0.66)
+    place = (0.49, 0.15, 0.47, 0.62)
     if isinstance(material, Dielectric):
         _reflectance_of_glass(figure.add_axes(place), material)
     elif isinstance(material, Conductor):

@@ -1,0 +1,81 @@
+"""Points on a mesh that go along when it bends."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from optisense.geometry.mesh import FloatArray, TriangleMesh
+
+_SAME = 1e-9
+"""mm: a vertex."""
+_NEAREST, _LARGEST = 64, 256
+"""Faces that are looked at for each point: those with the nearest middles, and the largest of all,
+whose middles may be far from points on them."""
+_SLACK = 1e-4
+"""Weight of a corner that may be missing: rounding."""
+
+
+@dataclass(frozen=True)
+class Anchors:
+    """Points as means of a mesh's vertices.
+
+    Attributes:
+        corners: (n, 3) numbers of vertices.
+        weights: (n, 3), adding up to 1.
+    """
+
+    corners: NDArray[np.int64]
+    weights: FloatArray
+
+    def on(self, vertices: FloatArray) -> FloatArray:
+        """(n, 3) mm: where the points are when the vertices (v, 3) are there."""
+        moved: FloatArray = np.einsum("nk,nkc->nc", self.weights, vertices[self.corners])
+        return moved
+
+
+def anchored(
+    points: FloatArray, mesh: TriangleMesh, tolerance: float
+) -> tuple[Anchors, NDArray[np.bool_]]:
+    """Find points (n, 3) on a mesh.
+
+    Args:
+        points: mm.
+        mesh: mm.
+        tolerance: mm; how far off it a point may be.
+
+    Returns:
+        The points, and (n,) which of them were found; the others are anchored anywhere.
+    """
+    distance, vertex = cKDTree(mesh.vertices).query(points)
+    corners = np.repeat(vertex[:, None], 3, axis=1).astype(np.int64)
+    weights = np.tile([1.0, 0.0, 0.0], (len(points), 1))
+    found = distance <= _SAME
+    rest = np.flatnonzero(~found)
+    if len(rest) == 0:
+        return Anchors(corners, weights), found
+    near = min(_NEAREST, len(mesh.faces))
+    _, nearest = cKDTree(mesh.triangles.mean(axis=1)).query(points[rest], k=near)
+    largest = np.argsort(-mesh.face_areas)[:_LARGEST]
+    faces = np.concatenate(
+        [nearest.reshape(len(rest), near), np.tile(largest, (len(rest), 1))], axis=1
+    )
+    a, b, c = (mesh.vertices[mesh.faces[faces, k]] for k in range(3))
+    normal = mesh.face_normals[faces]
+    off = points[rest, None] - a
+    twice = np.maximum(2 * mesh.face_areas[faces], 1e-300)
+    second = np.einsum("nfc,nfc->nf", np.cross(off, c - a), normal) / twice
+    third = np.einsum("nfc,nfc->nf", np.cross(b - a, off), normal) / twice
+    parts = np.stack([1 - second - third, second, third], axis=2)
+    height = np.abs(np.einsum("nfc,nfc->nf", off, normal))
+    on = (height <= tolerance) & (parts.min(axis=2) >= -_SLACK)
+    first = on.argmax(axis=1)
+    row = np.arange(len(rest))
+    there = on[row, first]
+    corners[rest[there]] = mesh.faces[faces[row, first]][there]
+    weights[rest[there]] = parts[row, first][there]
+    found[rest] = there
+    return Anchors(corners, weights), found

@@ -1,0 +1,79 @@
+"""Whether the numbers told of a camera's lens agree with each other."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+LENS_MISFIT = 0.1
+"""A lens may be so much shorter or longer than the field of view asks for: vendors round and
+lenses distort (of the Raspberry Pi cameras the worst is off by 5 %).
+"""
+
+PROJECTIONS: dict[str, Callable[[float], float]] = {
+    "perspective": lambda half: float(np.tan(half)) if half < np.pi / 2.0 else np.inf,
+    "equidistant": lambda half: half,
+}
+"""Image height over focal length of a ray at an angle (radians) to the axis."""
+
+
+def lens_misfit(
+    projection: str,
+    fov: float,
+    resolution: tuple[int, int],
+    pixel_size: float | None,
+    focal_length: float | None,
+) -> tuple[str, str] | None:
+    """Whether a field of view fits the focal length and the width of the image.
+
+    A perspective lens of focal length f shows 2 atan(w / 2f) across a width w, an equidistant one
+    w / f.
+
+    Args:
+        projection: perspective or equidistant.
+        fov: degrees, across the image width.
+        resolution: pixels of the sensor, width and height.
+        pixel_size: micrometres.
+        focal_length: mm.
+
+    Returns:
+        What is wrong and what to do; None when they agree within `LENS_MISFIT`, or when the focal
+        length or the pixel size is not told.
+    """
+    if pixel_size is None or focal_length is None:
+        return None
+    width, height = (0.001 * pixel_size * pixels for pixels in resolution)
+
+    def misfit(size: float, law: str) -> float:
+        """How far the focal length is from that of such a lens, as a share of it."""
+        return abs(0.5 * size / PROJECTIONS[law](np.radians(0.5 * fov)) / focal_length - 1.0)
+
+    if misfit(width, projection) <= LENS_MISFIT:
+        return None
+    half = 0.5 * width / focal_length
+    angle = np.degrees(2.0 * (half if projection == "equidistant" else np.arctan(half)))
+    message = (
+        f"a field of view of {fov:g} degrees does not fit a focal length of {focal_length:g} mm "
+        f"and an image {width:.3g} mm wide ({resolution[0]} pixels of {pixel_size:g} "
+        f"micrometres): as {projection} they give {angle:.1f} degrees"
+    )
+    other = "perspective" if projection == "equidistant" else "equidistant"
+    reasons = [
+        (
+            misfit(float(np.hypot(width, height)), projection),
+            "It fits the image's diagonal: give the angle across the width",
+        ),
+        (
+            misfit(height, projection),
+            "It fits the image's height: give the angle across the width",
+        ),
+        (misfit(width, other), f"It fits another projection: give 'projection: {other}'"),
+    ]
+    least, reason = min(reasons)
+    if least > LENS_MISFIT:
+        reason = (
+            "Correct the one that is wrong; where the lens fits no projection, leave out "
+            "focal_length"
+        )
+    return message, reason

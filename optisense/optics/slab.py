@@ -1,0 +1,116 @@
+"""Light on its way through the first millimetre above a surface.
+
+What an indenter raises into the gel catches light that would pass over the undeformed surface, or
+land on it far behind. How much there is, photons tell that cross a slab of this height: the length
+of their way within it, over its volume, is the flux density across the light. Each segment of a
+photon's path is looked at in a few random places.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+from numpy.typing import NDArray
+
+from optisense.optics.cells import SurfaceCells, cell_at, plane_of
+from optisense.optics.ray_scene import Hit
+from optisense.optics.sampling import unit_float
+
+if TYPE_CHECKING:
+    from optisense.optics.photons import PhotonMap
+
+HEIGHT = 1.0
+"""mm, of the slab."""
+FARTHEST = 50.0
+"""mm that light without anything in its way is followed."""
+PIECES = 4
+"""In which a segment of a photon's path is looked at, each at one place."""
+TAIL = 1.5
+"""Of the slab's height: how far above the surface the end of a path begins that lands there."""
+LEAST_COSINE = 1e-3
+GRAZING = 0.25
+"""Cosine of landing below which what lands far behind a raised point is not what passes there."""
+LEAST_CLEAR = 0.02
+"""Cosines are raised to this, to tell how much of the light grazes."""
+
+
+@dataclass
+class Slab:
+    """The slab above ``cells``; ``centres`` are four floats a cell: the middle of its surface."""
+
+    cells: SurfaceCells
+    centres: mi.Float
+
+
+def slab_above(cells: SurfaceCells) -> Slab:
+    """The slab above a surface."""
+    four = np.zeros((cells.cells, 4), dtype=np.float32)
+    four[:, :3] = cells.centres
+    return Slab(cells, mi.Float(four.ravel()) + dr.opaque(mi.Float, 0))
+
+
+def above_cell(
+    slab: Slab, point: mi.Point3f, active: mi.Bool
+) -> tuple[mi.UInt32, mi.Float, mi.Bool]:
+    """The cell that points lie above, how high (mm), and whether they are in the slab."""
+    cells = slab.cells
+    near, found = cell_at(cells, point, active)
+    normal, offset = plane_of(cells, near, found)
+    foot = point - normal * (dr.dot(normal, point) - offset)
+    cell, found = cell_at(cells, foot, found)
+    normal, offset = plane_of(cells, cell, found)
+    height = dr.dot(normal, point) - offset
+    # Beyond the surface's edge the nearest cell is found, too.
+    middle = dr.gather(mi.Vector4f, slab.centres, cell, found)
+    aside = foot - mi.Point3f(middle.x, middle.y, middle.z)
+    size = dr.rcp(cells.inverse_size)
+    beside = dr.maximum(dr.maximum(dr.abs(aside.x), dr.abs(aside.y)), dr.abs(aside.z))
+    return cell, height, found & (height > 0) & (height < HEIGHT) & (beside < size)
+
+
+def crossing(
+    slab: Slab,
+    hit: Hit,
+    origin: mi.Point3f,
+    direction: mi.Vector3f,
+    bits: mi.UInt32,
+    piece: mi.UInt32,
+    landing: mi.Bool,
+) -> tuple[mi.Point3f, mi.Float, mi.Bool]:
+    """A random place on one of the ``PIECES`` of the way of light to where it hits.
+
+    Half of them are of its end, where light that is ``landing`` is near the surface.
+
+    Returns:
+        The place; the slab's height over the length of the piece (as the cosine of a landing is
+        that of a slab over the way through it); whether it is in the slab.
+    """
+    end = dr.select(hit.valid, hit.distance, FARTHEST)
+    cosine = dr.maximum(dr.abs(dr.dot(direction, hit.normal)), LEAST_COSINE)
+    tail = dr.select(landing, dr.minimum(TAIL * HEIGHT / cosine, end * 0.5), end * 0.5)
+    last = piece >= PIECES // 2
+    length = dr.select(last, tail, end - tail) * (2 / PIECES)
+    first = dr.select(last, end - tail, 0) + length * mi.Float(piece % (PIECES // 2))
+    # Hashed: neighbouring photons have neighbouring bits.
+    spot = origin + direction * (first + length * unit_float(mi.sample_tea_32(bits, piece)[0]))
+    _, _, inside = above_cell(slab, mi.Point3f(spot), mi.Bool(True))
+    return mi.Point3f(spot), HEIGHT / length, inside
+
+
+def grazing_share(photons: PhotonMap, cells: SurfaceCells, where: NDArray[np.bool_]) -> float:
+    """The part of the flux across the light, over cells (cells,) that matter, which lands at a
+    cosine below `GRAZING`."""
+    index = dr.arange(mi.UInt32, photons.count)
+    place = dr.gather(mi.Vector4f, photons.place, index)
+    cosine = dr.gather(mi.Vector4f, photons.travel, index).w
+    width = 4 if photons.coloured else 1
+    power = dr.gather(mi.Float, photons.power, index * width)
+    cell, found = cell_at(cells, mi.Point3f(place.x, place.y, place.z), mi.Bool(True))
+    counts = np.asarray(found) & where[np.asarray(cell)]
+    across = np.asarray(power)[counts] / np.maximum(np.asarray(cosine)[counts], LEAST_CLEAR)
+    grazing = np.asarray(cosine)[counts] < GRAZING
+    return float(across[grazing].sum() / max(across.sum(), 1e-30))

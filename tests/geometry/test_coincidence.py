@@ -1,0 +1,38 @@
+"""Where meshes lie on one another: what is covered and what is not add up, whatever the edges."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from optisense.geometry import TriangleMesh
+from optisense.geometry.coincidence import cut, find_coincident
+
+SIDES = 96
+
+
+def disc(radius: float, inches: bool, up: bool) -> TriangleMesh:
+    """A fan of triangles, with corners of single precision as an STL file has them."""
+    angle = 2.0 * np.pi * np.arange(SIDES) / SIDES
+    rim = np.stack([radius * np.cos(angle), radius * np.sin(angle), 0.0 * angle], axis=1)
+    vertices = np.concatenate([[[0.0, 0.0, 0.0]], rim])
+    if inches:
+        vertices = (vertices / 25.4).astype(np.float32).astype(np.float64) * 25.4
+    row = np.arange(SIDES)
+    faces = np.stack([0 * row, 1 + row, 1 + (row + 1) % SIDES], axis=1)
+    return TriangleMesh(vertices, faces if up else faces[:, ::-1])
+
+
+@pytest.mark.parametrize("inches", [False, True])
+@pytest.mark.parametrize("first_corner", [0, 1, 2])
+def test_fans_whose_spokes_lie_on_one_another(inches: bool, first_corner: int) -> None:
+    # The spokes of both are the same lines up to rounding, the larger ones are longer.
+    large, small = (
+        mesh.with_faces(np.roll(mesh.faces, first_corner, axis=1))
+        for mesh in (disc(10.0, inches, up=True), disc(9.0, inches, up=False))
+    )
+    exact = 0.5 * SIDES * np.sin(2.0 * np.pi / SIDES)
+    for one, other in ((large, small), (small, large)):
+        covered, rest = cut(one, [find_coincident(one, other, 0.002, facing=True)])
+        assert covered.area == pytest.approx(exact * 9.0**2, rel=1e-6)
+        assert rest.area == pytest.approx(one.area - covered.area, abs=1e-4)
