@@ -52,7 +52,7 @@ class DraftStore(FieldStore):
     """Light fields in coarse cells, which takes over what it may from the store before it."""
 
     cell_size = COARSER * CELL_SIZE
-    lifts = False  # half of the light's time, for some per cent on flanks of contacts
+    asks_scouts = False  # half of the light's time, for some per cent on flanks of contacts
 
     def __init__(
         self,
@@ -73,7 +73,7 @@ class DraftStore(FieldStore):
         off = _apart(opaque, before._opaque)
         same_view = seen is before.seen or np.array_equal(seen, before.seen)
         if off == 0.0 and same_view and table.groups == before._table.groups:
-            self._kernels = before._kernels
+            self._cells, self._kernels = before._cells, before._kernels
         if before.aims_at(opaque, table):
             self._guide, self._learned_on = before._guide, before._learned_on
 

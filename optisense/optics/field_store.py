@@ -7,6 +7,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Collection
 from dataclasses import dataclass
+from functools import cached_property
 
 import mitsuba as mi
 import numpy as np
@@ -20,7 +21,8 @@ from optisense.optics.light_field import BINS, FieldTally, LightField
 from optisense.optics.photons import Target, trace_photons, trace_pilot
 from optisense.optics.ray_scene import Piece, RayScene
 from optisense.optics.sampling import seed_of
-from optisense.optics.slab import Slab, grazing_share, slab_above
+from optisense.optics.scouts import Scouts
+from optisense.optics.slab import Slab, slab_above
 from optisense.optics.smoothing import Kernels
 
 PASS_PHOTONS = 500_000
@@ -28,6 +30,8 @@ ONE_PASS = 1.5 * PASS_PHOTONS
 PILOT_PHOTONS = 300_000
 CELL_SIZE = 0.5
 """mm; larger where the tally would outgrow its memory."""
+TARGET_SIZE = 1.0
+"""mm, of the cells that tell whether a photon of the pilot lands where the camera looks."""
 MOST_BYTES = 375e6
 SEEN_MARGIN = 2.0
 """mm around what the camera sees that photons are sent to: an indenter's flank catches light
@@ -36,8 +40,6 @@ that would land there.
 SMOOTHED_MARGIN = 5.0
 """mm around what the camera sees, beyond which light is hardly smoothed: little of it is read."""
 KEPT_FIELDS = 2
-SCOUTS = 20_000
-"""Photons that tell whether light nearly grazes the surface."""
 MOST_GRAZING = 0.25
 """Share of such light above which indenters are lit from a field above the surface."""
 
@@ -52,8 +54,9 @@ class FieldStore:
     """Traces photons pass by pass and keeps what it finds."""
 
     cell_size = CELL_SIZE
-    lifts = True
-    """Whether indenters are lit from a field above the surface where light grazes it."""
+    asks_scouts = True
+    """Whether the photons that teach the guide also tell how light falls: indenters are then lit
+    from a field above the surface where it grazes, and kernels are narrower where it varies."""
     lit: Collection[int] | None = None
     """The light groups whose light is traced; all where it is None."""
 
@@ -76,8 +79,9 @@ class FieldStore:
         self._metallic = metallic
         self._opaque = opaque
         self._guide: Guide | None = None
-        self._grazing: bool | None = None
+        self._scouts: Scouts | None = None
         self._above: Slab | None = None
+        self._cells: SurfaceCells | None = None
         self._kernels: Kernels | None = None
         self._running: dict[tuple[int, int], _Running] = {}
         self._done: dict[tuple[int, int, int], LightField] = {}
@@ -86,33 +90,28 @@ class FieldStore:
         """Surfaces reflect otherwise now: drop the fields, keep guide and cells."""
         self._coloured = coloured
         self._metallic = metallic
-        self._grazing = None
         self._running.clear()
         self._done.clear()
 
     @property
     def _slab(self) -> Slab | None:
         """The slab above the surface where much of the light nearly grazes it, else None."""
-        if self._grazing is None:
-            self._grazing = self.lifts and self._grazing_share() > MOST_GRAZING
-        if not self._grazing:
+        if not self._grazes:
             return None
         if self._above is None:
             self._above = slab_above(self.cells)
         return self._above
 
-    def _grazing_share(self) -> float:
-        """Of the flux across the light, where the camera sees, the part that nearly grazes."""
-        per_light = max(1, SCOUTS // self._table.count)
-        scouts = trace_photons(
-            self._scene,
-            self._table,
-            self.guide,
-            per_light,
-            seed_of(2, 2),
-            coloured=self._coloured,
-        )
-        return grazing_share(scouts, self.cells, cells_near(self.cells, self._seen, SEEN_MARGIN))
+    @cached_property
+    def _grazes(self) -> bool:
+        """Whether much of the light where the camera looks nearly grazes the surface."""
+        scouts = self._asked_scouts
+        return scouts is not None and scouts.grazing_share(*self._target) > MOST_GRAZING
+
+    @property
+    def _asked_scouts(self) -> Scouts | None:
+        """The photons that taught the guide, if they are to be asked."""
+        return self._scouts if self.asks_scouts and self.guide else None
 
     @property
     def guide(self) -> Guide:
@@ -121,38 +120,68 @@ class FieldStore:
         """
         if self._guide is None:
             lights = self._table.count
-            near = cells_near(self.cells, self._seen, SEEN_MARGIN)
-            target = Target(self.cells, mi.UInt32(near.astype(np.uint32)))
+            cells, near = self._target
             per_light = max(1, PILOT_PHOTONS // lights)
-            arrived = trace_pilot(
-                self._scene, self._table, even_guide(lights), per_light, seed_of(0, 1), target
+            arrived, landed = trace_pilot(
+                self._scene,
+                self._table,
+                even_guide(lights),
+                per_light,
+                seed_of(0, 1),
+                Target(cells, mi.UInt32(near.astype(np.uint32))),
+                self._coloured,
             )
-            self._guide = learn_guide(arrived, lights)
+            self._guide = learn_guide(arrived, lights, per_light)
+            if self.asks_scouts:
+                self._scouts = Scouts.of(landed)
         return self._guide
+
+    @cached_property
+    def _opaque_mesh(self) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+        """Vertices (mm) and faces of all opaque surfaces."""
+        vertices, faces, start = [], [], 0
+        for piece in self._opaque:
+            vertices.append(np.asarray(piece.vertices, dtype=np.float64))
+            faces.append(np.asarray(piece.faces, dtype=np.int64) + start)
+            start += len(piece.vertices)
+        return np.concatenate(vertices), np.concatenate(faces)
+
+    @cached_property
+    def _target(self) -> tuple[SurfaceCells, NDArray[np.bool_]]:
+        """Rough cells over all opaque surfaces, and where photons are wanted: in those that the
+        camera sees and around them."""
+        cells = build_cells(*self._opaque_mesh, TARGET_SIZE)
+        return cells, cells_near(cells, self._seen, SEEN_MARGIN)
 
     @property
     def cells(self) -> SurfaceCells:
         """The cells over all opaque surfaces of the sensor."""
-        return self.kernels.cells
-
-    @property
-    def kernels(self) -> Kernels:
-        """These cells, and how light is smoothed among them."""
-        if self._kernels is None:
-            vertices, faces, start = [], [], 0
-            for piece in self._opaque:
-                vertices.append(np.asarray(piece.vertices, dtype=np.float64))
-                faces.append(np.asarray(piece.faces, dtype=np.int64) + start)
-                start += len(piece.vertices)
-            points, triangles = np.concatenate(vertices), np.concatenate(faces)
+        if self._cells is None:
+            points, triangles = self._opaque_mesh
             a, b, c = (points[triangles[:, k]] for k in range(3))
             area = np.linalg.norm(np.cross(b - a, c - a), axis=1).sum() / 2
             entry = BINS * self._table.groups * (36 if self._coloured else 20)
+            if self._grazes:
+                entry *= 2
             least = float(np.sqrt(1.3 * area * entry / MOST_BYTES))
             scale = self.cell_size / CELL_SIZE
-            cells = build_cells(points, triangles, max(self.cell_size, scale * least))
+            self._cells = build_cells(points, triangles, max(self.cell_size, scale * least))
+        return self._cells
+
+    @property
+    def kernels(self) -> Kernels:
+        """How light is smoothed among these cells."""
+        if self._kernels is None:
+            cells, (rough, where) = self.cells, self._target
+            area = rough.areas[where].sum()
             near = cells_near(cells, self._seen, SMOOTHED_MARGIN)
-            self._kernels = Kernels(cells, self._lamp_distance(cells.centres), near)
+            rest = cells, self._lamp_distance(cells.centres), self.guide.arriving / area, near
+            scouts = self._asked_scouts
+            if scouts is None:
+                self._kernels = Kernels(*rest)
+            else:
+                landed = scouts.landed(cells, self._table.groups)
+                self._kernels = Kernels(*rest, landed, scouts.count(rough, where) / area)
         return self._kernels
 
     def _lamp_distance(self, points: NDArray[np.floating]) -> NDArray[np.floating]:

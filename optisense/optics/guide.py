@@ -21,20 +21,19 @@ FLOOR = 0.15
 
 @dataclass
 class Guide:
-    """Cumulative tables: rows (lights, CELLS+1), columns (lights, CELLS, CELLS+1)."""
+    """Cumulative tables: rows (lights, CELLS+1), columns (lights, CELLS, CELLS+1); ``arriving`` is
+    the part of the photons sent so that arrive, 1 where nobody knows."""
 
     rows: mi.Float
     columns: mi.Float
+    arriving: float = 1.0
 
 
 def guide_from_density(density: NDArray[np.floating]) -> Guide:
     """A guide that follows ``density`` (lights, CELLS, CELLS), any scale, floored at FLOOR of
     its mean.
     """
-    density = np.asarray(density, dtype=np.float64)
-    mean = density.mean(axis=(1, 2), keepdims=True)
-    even = np.where(mean > 0, density / np.where(mean > 0, mean, 1), 1.0)
-    even = (1 - FLOOR) * even + FLOOR
+    even = _floored(np.asarray(density, dtype=np.float64))
     by_row = even.sum(axis=2)
     rows = np.zeros((len(density), CELLS + 1))
     rows[:, 1:] = np.cumsum(by_row, axis=1) / by_row.sum(axis=1, keepdims=True)
@@ -43,6 +42,13 @@ def guide_from_density(density: NDArray[np.floating]) -> Guide:
     return Guide(
         mi.Float(rows.ravel().astype(np.float32)), mi.Float(columns.ravel().astype(np.float32))
     )
+
+
+def _floored(density: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Densities in relation to the mean of each light, with the floor in."""
+    mean = density.mean(axis=(1, 2), keepdims=True)
+    even = np.where(mean > 0, density / np.where(mean > 0, mean, 1), 1.0)
+    return (1 - FLOOR) * even + FLOOR
 
 
 def even_guide(lights: int) -> Guide:
@@ -76,11 +82,14 @@ def warp(
     return moved, weight, row * CELLS + column
 
 
-def learn_guide(cells: mi.UInt32, lights: int) -> Guide:
-    """A guide from a pilot pass: ``cells`` holds the cell (over all lights) of every photon
-    that arrived.
+def learn_guide(cells: mi.UInt32, lights: int, per_light: int) -> Guide:
+    """A guide from a pilot pass of so many photons a light, sent evenly: ``cells`` holds the cell
+    (over all lights) of every photon that arrived.
     """
     arrived = np.asarray(cells)
     arrived = arrived[arrived < lights * CELLS * CELLS]
     counts = np.bincount(arrived, minlength=lights * CELLS * CELLS).reshape(-1, CELLS, CELLS)
-    return guide_from_density(np.sqrt(counts))
+    wanted = np.sqrt(counts)
+    guide = guide_from_density(wanted)
+    guide.arriving = float((_floored(wanted) * counts).sum() / (per_light * lights))
+    return guide

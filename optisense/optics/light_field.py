@@ -12,14 +12,14 @@ photons.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import drjit as dr
 import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from optisense.optics.beams import Beams, blocks_of_four, collect_beams
+from optisense.optics.beams import Beams, collect_beams
 from optisense.optics.cells import SurfaceCells, bin_axis, cell_at
 from optisense.optics.exchange import irradiance_table
 from optisense.optics.photons import GROUP_MASK, HALF_SHIFT, PhotonMap
@@ -43,8 +43,6 @@ surface, depending on how near an edge it lies, where its light is only somewhat
 below; the sum over such bins hardly depends on where they lie."""
 OVERLAP_OF_METAL = 0.5
 """The same where a coating is part metal, which tells directions apart: a compromise."""
-WEAK = 0.002
-"""Part of all light below which four neighbouring bins become one, where coatings are diffuse."""
 # Where a bin of no light is told from one of little.
 DARK = 1e-7
 
@@ -77,13 +75,10 @@ def _dither(place: mi.Vector4f, direction: mi.Vector3f, reach: mi.Float) -> list
     return [reach * (unit_float(one) + unit_float(one * 277803737) - 1) for one in both]
 
 
-def bin_centres(
-    cells: SurfaceCells, bins: NDArray[np.integer], folded: NDArray[np.integer]
-) -> mi.Float:
-    """Middle direction of bins, four floats each; ``folded`` are corners of four in one."""
-    half = np.where(np.isin(bins, folded), 1.0, 0.5)
-    z = (bins // SECTORS + half) * (2 / BANDS) - 1
-    turn = (bins % SECTORS + half) * (2 * np.pi / SECTORS)
+def bin_centres(cells: SurfaceCells, bins: NDArray[np.integer]) -> mi.Float:
+    """Middle direction of bins, four floats each."""
+    z = (bins // SECTORS + 0.5) * (2 / BANDS) - 1
+    turn = (bins % SECTORS + 0.5) * (2 * np.pi / SECTORS)
     flat = np.sqrt(1 - z * z)
     local = np.stack([flat * np.cos(turn), flat * np.sin(turn), z], axis=1)
     out = np.zeros((len(bins), 4), dtype=np.float32)
@@ -228,38 +223,6 @@ class FieldTally:
         halves = np.asarray(self.halves, dtype=np.float64) * (2 / self.passes)
         return halves.reshape(2, -1, self.groups)
 
-    def _fold_weak(self, power: FloatArray) -> NDArray[np.int64]:
-        """Put the light of four neighbouring bins that hold little into the first of them, in all
-        tables and in ``power`` (BINS,); returns these.
-
-        Moments add up, so nothing is lost but where within the four the light came from.
-        """
-        blocks = blocks_of_four(BANDS, SECTORS)
-        whole = power[blocks].sum(axis=1)
-        weak = (whole > 0) & (whole < WEAK * power.sum())
-        blocks = blocks[weak]
-        if len(blocks) == 0:
-            return blocks[:, 0]
-        power[blocks] = 0.0
-        power[blocks[:, 0]] = whole[weak]
-        # Copied: arrays handed over from numpy differ in alignment, and so would kernels.
-        bins = mi.UInt32(blocks.ravel().astype(np.uint32)) + dr.opaque(mi.UInt32, 0)
-        lanes = dr.arange(mi.UInt32, self.cells.cells * len(blocks) * self.groups)
-        rest = lanes // self.groups
-        count = dr.opaque(mi.UInt32, len(blocks))
-        entries = []
-        for k in range(4):
-            row = (rest // count) * BINS + dr.gather(mi.UInt32, bins, rest % count * 4 + k)
-            entries.append(row * self.groups + lanes % self.groups)
-        for tables in (self.landed, self.raised):
-            if tables is not None:
-                _fold(tables.moments, mi.Vector4f, entries)
-                _fold(tables.heights, mi.Float, entries)
-                if self.coloured:
-                    _fold(tables.colours, mi.Vector4f, entries)
-        dr.eval(self.landed, self.raised)
-        return blocks[:, 0]
-
     def smoothed(self) -> LightField:
         """The field so far; only bins that hold light are kept."""
         total = dr.zeros(mi.Float, BINS)
@@ -269,7 +232,6 @@ class FieldTally:
             value += dr.gather(mi.Float, self.raised.moments, lanes * 4 + 3)
         dr.scatter_add(total, value, (lanes // self.groups) % BINS)
         power = np.array(total)
-        folded = np.zeros(0, dtype=np.int64) if self.metallic else self._fold_weak(power)
         used = np.flatnonzero(power > DARK * power.sum())
         used = used if len(used) else np.zeros(1, dtype=np.int64)
         bins = mi.UInt32(used.astype(np.uint32)) + dr.opaque(mi.UInt32, 0)
@@ -309,7 +271,7 @@ class FieldTally:
             colours=colours,
             coloured=self.coloured,
             metallic=self.metallic,
-            centres=bin_centres(self.cells, used, folded),
+            centres=bin_centres(self.cells, used),
             irradiance=table,
             beams=collect_beams(
                 moments,
@@ -325,12 +287,3 @@ class FieldTally:
             noise=self.noise(),
             raised=raised,
         )
-
-
-def _fold(table: mi.Float, kind: Any, entries: list[mi.UInt32]) -> None:
-    """Put what is in all of these entries into the first."""
-    light = sum((dr.gather(kind, table, entry) for entry in entries), kind(0))
-    dr.eval(light)
-    for entry in entries[1:]:
-        dr.scatter(table, kind(0), entry)
-    dr.scatter(table, light, entries[0])

@@ -65,6 +65,8 @@ class PhotonMap:
 # Photons that travel long leave most lanes of a vector idle; survivors are gathered anew after
 # so many surfaces.
 STAGES = (4, 4, 6)
+LANDINGS = 1.5
+"""Of a photon, that there is room for at first."""
 FEW = 100_000
 """Photons of a pass below which gathering survivors costs more than it saves."""
 
@@ -181,15 +183,13 @@ def _fly(
                     _write(passing, slot, kept, spot, group, direction, share, throughput, coloured)
                 piece += 1
             scattered = opaque
-        if target is None:
-            if opaque:
-                slot = dr.scatter_inc(record.counter, mi.UInt32(0), opaque)
-                kept = opaque & (slot < record.capacity)
-                bits = group | (hit.surface << SURFACE_SHIFT)
-                cosine = dr.abs(dr.dot(direction, hit.normal))
-                _write(record, slot, kept, hit.point, bits, direction, cosine, throughput, coloured)
-            landed |= opaque
-        else:
+        if opaque:
+            slot = dr.scatter_inc(record.counter, mi.UInt32(0), opaque)
+            kept = opaque & (slot < record.capacity)
+            bits = group | (hit.surface << SURFACE_SHIFT)
+            cosine = dr.abs(dr.dot(direction, hit.normal))
+            _write(record, slot, kept, hit.point, bits, direction, cosine, throughput, coloured)
+        if target is not None:
             cell, found = cell_at(target.cells, hit.point, opaque)
             landed |= found & (dr.gather(mi.UInt32, target.flags, cell, found) != 0)
         pick = rng.next_float32()
@@ -302,14 +302,29 @@ def _trace(
 
 
 def trace_pilot(
-    scene: RayScene, table: EmitterTable, guide: Guide, per_light: int, seed: int, target: Target
-) -> mi.UInt32:
+    scene: RayScene,
+    table: EmitterTable,
+    guide: Guide,
+    per_light: int,
+    seed: int,
+    target: Target,
+    coloured: bool,
+) -> tuple[mi.UInt32, PhotonMap]:
     """For every photon of a pass the guide's cell that it came from, or all ones if it missed
-    the target.
+    the target; and where photons landed.
     """
-    none = _room(0, False)
     lights = dr.arange(mi.UInt32, table.count)
-    return _trace(scene, table, guide, per_light, seed, 0, none, target, None, none, False, lights)
+    photons = per_light * table.count
+    room = int(photons * LANDINGS)
+    while True:
+        record = _room(room, coloured)
+        none = _room(0, coloured)
+        flown = (scene, table, guide, per_light, seed, 0, record, target, None, none)
+        cells = _trace(*flown, coloured, lights)
+        landed = int(record.counter[0])
+        if landed <= room:
+            return cells, _photon_map(record, landed, photons, coloured)
+        room = int(1.2 * landed)
 
 
 def trace_photons(
@@ -321,7 +336,7 @@ def trace_photons(
     *,
     first: int = 0,
     coloured: bool,
-    landings: float = 1.5,
+    landings: float = LANDINGS,
     groups: Collection[int] | None = None,
     slab: Slab | None = None,
 ) -> PhotonMap:

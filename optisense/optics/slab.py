@@ -9,19 +9,14 @@ photon's path is looked at in a few random places.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import drjit as dr
 import mitsuba as mi
 import numpy as np
-from numpy.typing import NDArray
 
 from optisense.optics.cells import SurfaceCells, cell_at, plane_of
 from optisense.optics.ray_scene import Hit
 from optisense.optics.sampling import unit_float
-
-if TYPE_CHECKING:
-    from optisense.optics.photons import PhotonMap
 
 HEIGHT = 1.0
 """mm, of the slab."""
@@ -32,10 +27,6 @@ PIECES = 4
 TAIL = 1.5
 """Of the slab's height: how far above the surface the end of a path begins that lands there."""
 LEAST_COSINE = 1e-3
-GRAZING = 0.25
-"""Cosine of landing below which what lands far behind a raised point is not what passes there."""
-LEAST_CLEAR = 0.02
-"""Cosines are raised to this, to tell how much of the light grazes."""
 
 
 @dataclass
@@ -99,18 +90,3 @@ def crossing(
     spot = origin + direction * (first + length * unit_float(mi.sample_tea_32(bits, piece)[0]))
     _, _, inside = above_cell(slab, mi.Point3f(spot), mi.Bool(True))
     return mi.Point3f(spot), HEIGHT / length, inside
-
-
-def grazing_share(photons: PhotonMap, cells: SurfaceCells, where: NDArray[np.bool_]) -> float:
-    """The part of the flux across the light, over cells (cells,) that matter, which lands at a
-    cosine below `GRAZING`."""
-    index = dr.arange(mi.UInt32, photons.count)
-    place = dr.gather(mi.Vector4f, photons.place, index)
-    cosine = dr.gather(mi.Vector4f, photons.travel, index).w
-    width = 4 if photons.coloured else 1
-    power = dr.gather(mi.Float, photons.power, index * width)
-    cell, found = cell_at(cells, mi.Point3f(place.x, place.y, place.z), mi.Bool(True))
-    counts = np.asarray(found) & where[np.asarray(cell)]
-    across = np.asarray(power)[counts] / np.maximum(np.asarray(cosine)[counts], LEAST_CLEAR)
-    grazing = np.asarray(cosine)[counts] < GRAZING
-    return float(across[grazing].sum() / max(across.sum(), 1e-30))

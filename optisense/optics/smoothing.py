@@ -1,13 +1,13 @@
 """The kernel that a light field is smoothed with, and how wide it is.
 
-Its radius follows the distance of each cell to the nearest lamp, as light near a lamp varies
-faster, and shrinks as photons grow, so that what the field blurs goes away with its noise.
+Light varies over a length that follows the distance of each cell to the nearest lamp, and the
+surface's bend. Blur grows as the square of the kernel's radius over that length, noise falls as the
+radius grows and as photons do; the radius is the one that makes least of both, so both go to zero.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Any
 
 import drjit as dr
@@ -21,30 +21,26 @@ from optisense.optics.cells import SurfaceCells
 
 FloatArray = NDArray[np.floating]
 
-RADIUS = 1.1
-"""mm of the kernel of USUAL_PHOTONS, where lamps are some mm away (see benchmarks)."""
-RADIUS_BENT = 0.9
-"""The same where the surface is bent more than a little, or a coating is part metal, which shows
-from how many directions light comes that a kernel brings together."""
-RADIUS_OF_BEND = 0.03
-"""Of a surface's radius of curvature, from which on it is bent so much: a kernel there brings
-together light that arrives at other slants, and from behind a horizon."""
-RADIUS_OF_DISTANCE = 0.2
-"""Of the distance to the nearest lamp: nearer lamps make light that varies faster. What is left of
-the blur under a point light is then far below 1 % (see `sharpening`)."""
-LEAST_RADIUS = 1.5
-"""Of the side of a cell, however near a lamp is."""
-USUAL_PHOTONS = 5_000_000
+RADIUS = 1.7
+"""mm of the kernel where `USUAL_DENSITY` photons land on a mm^2 and light varies over `LENGTH`."""
+USUAL_DENSITY = 1000.0
+"""Photons on a mm^2."""
+LENGTH = 10.0
+"""mm over which light varies under a lamp as far away."""
 SHRINKS_AS = 1 / 6
-"""Power of the photons by which the radius falls: noise and bias both go to zero (Knaus and
-Zwicker 2011)."""
-SHRINKS_TO = 1.0
+"""Power of the density of photons by which the radius falls: a blur that goes as the square of
+the radius, and noise as its inverse, are then least together; both go to zero (Silverman 1986,
+chapter 4; Knaus and Zwicker 2011)."""
+GROWS_AS = 2 / 3
+"""Power of the length over which light varies by which the radius grows, for the same reason."""
+WIDEST = 0.3
+"""Of that length: the kernel of the fewest photons. What is left of its blur is below 1 % (see
+`sharpening`)."""
+LEAST = 1.5
+"""Of the side of a cell, however near a lamp is; with many photons this shrinks, too."""
+SHRINKS_TO = 1.25
 """Of the side of a cell, at which the kernel holds the cell and its neighbours."""
-WIDEST = 1.5
-"""Of that radius: the kernel of the fewest photons."""
-WIDEST_OF_METAL = 1.0
-"""The same where a coating is part metal."""
-WIDER = 2.0
+WIDER = 1.5
 """How much wider than the kernel that of the sharpening is."""
 ALIKE = 0.5
 """Least cosine between the normals of cells that a kernel brings together."""
@@ -61,7 +57,8 @@ class Smoothing:
     """Kernel-weighted sums among cells: rows of a sparse matrix, by start, neighbour and weight.
 
     ``blur`` is the same with what the cells themselves blur (not where a coating is part metal:
-    what else they bring together there makes up for it).
+    what else they bring together there makes up for it); ``wide`` is the wider kernel of the
+    sharpening.
     """
 
     start: mi.UInt32
@@ -69,6 +66,7 @@ class Smoothing:
     weight: mi.Float
     matrix: csr_matrix
     blur: csr_matrix
+    wide: csr_matrix
 
 
 class Kernels:
@@ -78,34 +76,48 @@ class Kernels:
         self,
         cells: SurfaceCells,
         lamp_distance: FloatArray,
+        density: float,
         near: NDArray[np.bool_] | None = None,
+        scouted: FloatArray | None = None,
+        scouts: float = 0.0,
     ) -> None:
-        """``lamp_distance`` (cells,) mm: how far the nearest lamp is; ``near`` (cells,) is whether
-        the camera sees a cell or one near it: others are hardly smoothed, which saves time."""
+        """
+        Args:
+            cells: of the surface.
+            lamp_distance: (cells,) mm, how far the nearest lamp is.
+            density: 1/mm^2, how many photons land on a mm^2, for each that is sent out.
+            near: (cells,) whether the camera sees a cell or one near it: others are hardly
+                smoothed, which saves time.
+            scouted: (2, cells, groups) mW on each cell by two halves of some photons, which tell
+                where light varies faster than its lamps' distance makes it.
+            scouts: 1/mm^2, how many of these photons there are.
+        """
         self.cells = cells
         self.near = np.ones(cells.cells, dtype=bool) if near is None else near
+        self.density = density
         self._size = 1 / float(cells.inverse_size[0])
-        by_bend = RADIUS_OF_BEND / np.maximum(bend(cells, RADIUS), 1e-9)
-        self._most = np.minimum(
-            RADIUS_OF_DISTANCE * np.asarray(lamp_distance), np.clip(by_bend, RADIUS_BENT, RADIUS)
-        )
-        self._known: dict[tuple[float, bool], Smoothing] = {}
+        self._length = np.maximum(np.asarray(lamp_distance), 1e-3)
+        if scouted is not None:
+            found = varies_over(cells, scouted, self._radii(scouts))
+            self._length = np.minimum(self._length, found)
+        self._known: dict[tuple[int, bool], Smoothing] = {}
 
-    def _usual(self, metallic: bool) -> FloatArray:
-        most = np.minimum(self._most, RADIUS_BENT) if metallic else self._most
-        return np.maximum(most, LEAST_RADIUS * self._size)
-
-    def radii(self, photons: int, metallic: bool = False) -> FloatArray:
+    def radii(self, photons: int) -> FloatArray:
         """(cells,) mm: the kernel's radius in each cell in a field of so many photons."""
-        usual = self._usual(metallic)
-        least = np.minimum(SHRINKS_TO * self._size, usual)
-        return np.where(self.near, np.maximum(usual * _scale(photons, metallic), least), least)
+        return self._radii(self.density * photons)
+
+    def _radii(self, density: float) -> FloatArray:
+        wider = (USUAL_DENSITY / max(density, 1e-9)) ** SHRINKS_AS
+        best = RADIUS * (self._length / LENGTH) ** GROWS_AS * wider
+        least = float(np.clip(LEAST * wider, SHRINKS_TO, LEAST)) * self._size
+        most = np.maximum(WIDEST * self._length, least)
+        return np.where(self.near, np.clip(best, least, most), SHRINKS_TO * self._size)
 
     def smoothing(self, photons: int, metallic: bool = False) -> Smoothing:
         """The kernel for a field of so many photons."""
-        key = _scale(photons, metallic), metallic
+        key = photons, metallic
         if key not in self._known:
-            radii = self.radii(photons, metallic)
+            radii = self.radii(photons)
             matrix = kernel_matrix(self.cells, radii)
             self._known = {
                 key: Smoothing(
@@ -114,17 +126,13 @@ class Kernels:
                     weight=_copied(mi.Float, matrix.data),
                     matrix=matrix,
                     blur=matrix if metallic else self._blur(radii),
+                    wide=kernel_matrix(self.cells, np.where(self.near, WIDER * radii, radii)),
                 )
             }
         return self._known[key]
 
     def _blur(self, radii: FloatArray) -> csr_matrix:
         return kernel_matrix(self.cells, np.sqrt(radii**2 + READ_WIDTH * self._size**2))
-
-    @cached_property
-    def _wide(self) -> csr_matrix:
-        radii = np.where(self.near, WIDER * self._usual(False), SHRINKS_TO * self._size)
-        return kernel_matrix(self.cells, radii)
 
     def sharpening(self, landed: FloatArray, photons: int, metallic: bool = False) -> FloatArray:
         """Factors (cells, groups) that undo most of what the kernel and the cells blur.
@@ -137,30 +145,34 @@ class Kernels:
             landed: (cells, groups) mW on each cell.
             photons: of the field.
         """
-        smooth = self._wide @ landed
-        again = self.smoothing(photons, metallic).blur @ (smooth * self.cells.areas[:, None])
+        kernel = self.smoothing(photons, metallic)
+        smooth = kernel.wide @ landed
+        again = kernel.blur @ (smooth * self.cells.areas[:, None])
         sharpened = (again > 0) & self.near[:, None]
         factor = np.divide(smooth, again, out=np.ones_like(smooth), where=sharpened)
         return np.clip(factor, 1 - MOST_SHARPENED, 1 + MOST_SHARPENED)
 
 
-def _scale(photons: int, metallic: bool) -> float:
-    widest = WIDEST_OF_METAL if metallic else WIDEST
-    return float(min(widest, (USUAL_PHOTONS / max(photons, 1)) ** SHRINKS_AS))
+def varies_over(cells: SurfaceCells, halves: FloatArray, radii: FloatArray) -> FloatArray:
+    """(cells,) mm: the distance of a lamp whose light a kernel would blur as much as this light.
 
+    Under a lamp at a distance h a kernel of radius r takes r^2 / (2 h^2) of the light. How much it
+    takes of this light is told by what it takes of its own result; the product of what two halves
+    of the photons tell is free of their noise. Groups count alike, by their light where it is.
 
-def bend(cells: SurfaceCells, distance: float) -> FloatArray:
-    """(cells,) 1/mm: the curvature along which normals turn most, towards cells within
-    ``distance`` mm; edges, across which a kernel does not reach, do not count."""
-    pairs = cKDTree(cells.centres).query_pairs(distance, output_type="ndarray")
-    one, other = pairs.T
-    cosine = np.einsum("ij,ij->i", cells.normals[one], cells.normals[other])
-    turn = np.where(cosine > ALIKE, np.arccos(np.clip(cosine, -1.0, 1.0)), 0.0)
-    turn /= np.maximum(np.linalg.norm(cells.centres[one] - cells.centres[other], axis=1), 1e-9)
-    most = np.zeros(cells.cells)
-    np.maximum.at(most, one, turn)
-    np.maximum.at(most, other, turn)
-    return most
+    Args:
+        halves: (2, cells, groups) mW on each cell.
+        radii: (cells,) mm of the kernels.
+    """
+    kernel = kernel_matrix(cells, radii)
+    areas = cells.areas[:, None]
+    once = [kernel @ half for half in halves]
+    change = [kernel @ (light * areas) - light for light in once]
+    scale = np.maximum((once[0] * areas).mean(axis=0) * (once[1] * areas).mean(axis=0), 1e-30)
+    products = [(a[0] * a[1] / scale).sum(axis=1) for a in (change, once)]
+    squares = kernel @ (np.stack(products, axis=1) * areas)
+    relative = np.sqrt(np.maximum(squares[:, 0], 0.0) / np.maximum(squares[:, 1], 1e-30))
+    return np.asarray(radii / np.sqrt(2 * np.maximum(relative, 1e-9)))
 
 
 def kernel_matrix(cells: SurfaceCells, radii: FloatArray) -> csr_matrix:

@@ -5,14 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from optisense import Contact, OpticalModel, Sphere, load
-from optisense.optics import beams, light_field
+from optisense import OpticalModel
+from optisense.optics import beams
 from optisense.sensors import BUILDERS
 
 MEAN = 0.001
 """Relative, of each light group's mean over the picture."""
-IN_CONTACT = 0.002
-"""The same inside a contact, of all light."""
 PER_PIXEL = 0.01
 """RMS, relative to that mean."""
 
@@ -56,27 +54,6 @@ def test_no_light_is_lost_in_merging() -> None:
         np.testing.assert_allclose(
             vector, moments[..., k].sum(axis=1).ravel(), rtol=1e-3, atol=1e-4 * flux.max()
         )
-
-
-@pytest.mark.parametrize("name", ["gelsight-mini", "gelsight-mini-cylindrical"])
-def test_bins_of_little_light_are_taken_four_together_unseen(
-    name: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """In a contact, too, whose flanks look into such bins."""
-    model = OpticalModel(load(name), "llvm")
-    ball = Contact(Sphere(1.5), at=(0.0, 0.0), depth=0.8)
-    size = {"resolution": (160, 120), "photons": 600_000}
-    folded = model.render([ball], **size)
-    bins = field_of(model).bins
-    monkeypatch.setattr(light_field, "WEAK", 0.0)
-    model.forget_light()
-    apart = model.render([ball], **size)
-    assert bins < 0.9 * field_of(model).bins
-    inside = apart.contact_mask
-    mean = apart.radiance[inside].mean()
-    assert folded.radiance[inside].mean() == pytest.approx(mean, rel=IN_CONTACT)
-    off = (folded.radiance - apart.radiance)[inside]
-    assert np.sqrt((off**2).mean()) < PER_PIXEL * mean
 
 
 def field_of(model: OpticalModel):  # type: ignore[no-untyped-def]
