@@ -61,8 +61,7 @@ class Scouts:
         cell, found = self.cells_of(cells)
         rows = (self.halves.astype(np.int64) * cells.cells + cell) * groups + self.groups
         power = np.bincount(rows[found], self.powers[found], 2 * cells.cells * groups)
-        halves: FloatArray = power.reshape(2, -1, groups)
-        return halves
+        return np.asarray(power, dtype=np.float64).reshape(2, -1, groups)
 
     def count(self, cells: SurfaceCells, where: NDArray[np.bool_]) -> int:
         """How many landed in the cells that matter (cells,)."""
