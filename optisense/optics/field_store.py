@@ -26,7 +26,7 @@ from optisense.optics.slab import Slab, slab_above
 from optisense.optics.smoothing import Kernels
 
 PASS_PHOTONS = 500_000
-ONE_PASS = 1.5 * PASS_PHOTONS
+ONE_PASS = 2.5 * PASS_PHOTONS
 PILOT_PHOTONS = 300_000
 CELL_SIZE = 0.5
 """mm; larger where the tally would outgrow its memory."""
