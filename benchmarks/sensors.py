@@ -28,7 +28,9 @@ NAMES = ("gelsight-mini", "gelbelt", "gelsight360", "gelsight-svelte")
 RESOLUTION = (320, 240)
 WANTED_NOISE = 0.03
 """Of the light in the contact."""
-TRIAL_PHOTONS, STEP, MOST_PHOTONS = 500_000, 250_000, 16_000_000
+TRIAL_PHOTONS, STEP, MOST_PHOTONS = 400_000, 50_000, 16_000_000
+SEEDS = 6
+"""Of images that tell the noise."""
 RUNS = 3
 CHILD_RUNS = 5
 RADIUS, DEPTH = 1.5, 0.8
@@ -110,15 +112,16 @@ def least_photons(model: OpticalModel, ball: Contact) -> tuple[int, float]:
 
 
 def noise_in_contact(model: OpticalModel, ball: Contact, photons: int) -> float:
-    """RMS over the contact's pixels and channels of what two seeds differ by, over sqrt 2, in
+    """RMS over the contact's pixels and channels of the deviation of images of other seeds, in
     relation to the mean there."""
-    one, other = (
-        model.render([ball], resolution=RESOLUTION, photons=photons, seed=seed) for seed in (1, 2)
-    )
-    mask = one.contact_mask & other.contact_mask
-    a, b = one.radiance[mask].astype(np.float64), other.radiance[mask].astype(np.float64)
-    lit = (a + b).sum(axis=0) > 0.0
-    return float(np.sqrt(((a - b)[:, lit] ** 2).mean() / 2.0) / (0.5 * (a + b)[:, lit].mean()))
+    images = [
+        model.render([ball], resolution=RESOLUTION, photons=photons, seed=seed)
+        for seed in range(1, SEEDS + 1)
+    ]
+    mask = np.logical_and.reduce([image.contact_mask for image in images])
+    values = np.array([image.radiance[mask] for image in images], dtype=np.float64)
+    values = values[..., values.sum(axis=(0, 1)) > 0.0]
+    return float(np.sqrt(values.var(axis=0, ddof=1).mean()) / values.mean())
 
 
 def plain(time: Time) -> dict[str, float]:
