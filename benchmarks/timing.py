@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import subprocess
 import sys
@@ -39,6 +40,17 @@ def medians(times: list[Time]) -> Time:
     return Time(median(t.wall for t in times), median(t.cpu for t in times))
 
 
+LAUNCHER = """
+import json, resource, subprocess, sys, time
+began = time.perf_counter()
+code = subprocess.run(sys.argv[1:], stdout=subprocess.DEVNULL).returncode
+wall, used = time.perf_counter() - began, resource.getrusage(resource.RUSAGE_CHILDREN)
+print(json.dumps([code, wall, used.ru_utime + used.ru_stime, used.ru_maxrss]))
+"""
+"""Starts a command from a process of its own: what a process is started from counts as its peak
+memory, if that is the larger."""
+
+
 def run_child(command: list[str]) -> tuple[Time, int]:
     """Time and peak memory (bytes) of a command run from the repository's root.
 
@@ -48,20 +60,9 @@ def run_child(command: list[str]) -> tuple[Time, int]:
         RuntimeError: it failed.
     """
     environment = {k: v for k, v in os.environ.items() if k != "PYTHONDONTWRITEBYTECODE"}
-    began = time.perf_counter()
-    child = subprocess.Popen(
-        command,
-        cwd=ROOT,
-        env=environment,
-        stdout=subprocess.DEVNULL,
-        stderr=subprocess.PIPE,
-        text=True,
-    )
-    assert child.stderr is not None
-    errors = child.stderr.read()
-    _, status, usage = os.wait4(child.pid, 0)
-    wall = time.perf_counter() - began
-    child.returncode = os.waitstatus_to_exitcode(status)
-    if child.returncode != 0:
-        raise RuntimeError(f"{' '.join(command)} failed: {errors[-800:]}")
-    return Time(wall, usage.ru_utime + usage.ru_stime), usage.ru_maxrss * BYTES_PER_MAXRSS
+    launch = [sys.executable, "-S", "-c", LAUNCHER, *command]
+    done = subprocess.run(launch, cwd=ROOT, env=environment, capture_output=True, text=True)
+    code, wall, cpu, peak = json.loads(done.stdout)
+    if code != 0:
+        raise RuntimeError(f"{' '.join(command)} failed: {done.stderr[-800:]}")
+    return Time(wall, cpu), peak * BYTES_PER_MAXRSS
