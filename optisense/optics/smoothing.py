@@ -157,8 +157,9 @@ def varies_over(cells: SurfaceCells, halves: FloatArray, radii: FloatArray) -> F
     """(cells,) mm: the distance of a lamp whose light a kernel would blur as much as this light.
 
     Under a lamp at a distance h a kernel of radius r takes r^2 / (2 h^2) of the light. How much it
-    takes of this light is told by what it takes of its own result; the product of what two halves
-    of the photons tell is free of their noise. Groups count alike, by their light where it is.
+    takes of this light is told by what it takes of its own result: by the product of what two
+    halves of the photons tell, which is free of their noise, where it is larger than that. Groups
+    count alike, by their light where it is.
 
     Args:
         halves: (2, cells, groups) mW on each cell.
@@ -167,11 +168,13 @@ def varies_over(cells: SurfaceCells, halves: FloatArray, radii: FloatArray) -> F
     kernel = kernel_matrix(cells, radii)
     areas = cells.areas[:, None]
     once = [kernel @ half for half in halves]
-    change = [kernel @ (light * areas) - light for light in once]
-    scale = np.maximum((once[0] * areas).mean(axis=0) * (once[1] * areas).mean(axis=0), 1e-30)
-    products = [(a[0] * a[1] / scale).sum(axis=1) for a in (change, once)]
-    squares = kernel @ (np.stack(products, axis=1) * areas)
-    relative = np.sqrt(np.maximum(squares[:, 0], 0.0) / np.maximum(squares[:, 1], 1e-30))
+    one, other = (kernel @ (light * areas) - light for light in once)
+    scale = np.maximum(np.prod([(light * areas).mean(axis=0) for light in once], axis=0), 1e-30)
+    changes, squares = (
+        np.maximum(kernel @ (each / scale * areas), 0.0).sum(axis=1)
+        for each in (one * other - (one - other) ** 2, once[0] * once[1])
+    )
+    relative = np.sqrt(changes / np.maximum(squares, 1e-30))
     return np.asarray(radii / np.sqrt(2 * np.maximum(relative, 1e-9)))
 
 
