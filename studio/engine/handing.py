@@ -12,6 +12,8 @@ import numpy as np
 
 from ..core import mesh_file
 from ..core.engine import EngineError
+from ..core.mesh_file import Mesh
+from ..scene.contacts import contact_list
 from ..scene.gather import caged_parts, gather_document, part_names
 from ..scene.meshes import REST, corners_of, part_mesh, shown_vertices
 from . import session
@@ -39,6 +41,24 @@ def design(scene: bpy.types.Scene) -> dict[str, Any]:
             _written[str(path)] = digest
     _copy_profiles(document, Path(scene.optisense.folder), folder)
     return {"data": document, "folder": str(folder)}
+
+
+def contacts(scene: bpy.types.Scene) -> list[dict[str, Any]]:
+    """The scene's contacts that press, as requests to the engine name them.
+
+    Raises:
+        EngineError: there is no engine.
+    """
+    folder = Path(session.folder()) / "indenters"
+
+    def write(mesh: Mesh) -> str:
+        text = hashlib.blake2b(mesh.vertices.tobytes() + mesh.faces.tobytes(), digest_size=16)
+        path = folder / f"{text.hexdigest()}.obj"
+        if not path.is_file():
+            mesh_file.write(mesh, path)
+        return str(path)
+
+    return contact_list(scene, bpy.context.evaluated_depsgraph_get(), write)
 
 
 def _digest(part: bpy.types.Object, *, caged: bool) -> bytes:

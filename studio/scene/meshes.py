@@ -76,6 +76,11 @@ def show_vertices(mesh: bpy.types.Mesh, vertices: ArrayLike) -> None:
     mesh.update()
 
 
+def mesh_of(mesh: bpy.types.Mesh) -> Mesh:
+    """What `new_mesh` made a Blender mesh of, or whatever a Blender mesh is."""
+    return Mesh(kept_array(remembered(mesh, REST), shown_vertices(mesh)), _triangles(mesh))
+
+
 def part_mesh(part: bpy.types.Object, *, caged: bool) -> Mesh:
     """The mesh of a part at rest, in the design's frame.
 

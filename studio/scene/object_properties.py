@@ -92,8 +92,13 @@ class OPTISENSE_PG_object(bpy.types.PropertyGroup):
         update=_contact_changed,
     )  # fmt: skip
     file: StringProperty(
-        name="Mesh", description="OBJ, STL or PLY", subtype="FILE_PATH", update=_contact_changed
-    )
+        name="Mesh", description="A file (OBJ, STL, PLY) whose lowest point touches first",
+        subtype="FILE_PATH", update=_contact_changed,
+    )  # fmt: skip
+    shape: PointerProperty(
+        type=bpy.types.Mesh, name="Shape", update=_contact_changed,
+        description="The reference's shape, which presses where no file is named",
+    )  # fmt: skip
     scale: FloatProperty(
         name="Scale", description="From the file's units to mm", min=1e-6, max=1e6, default=1.0,
         update=_contact_changed,

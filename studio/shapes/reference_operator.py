@@ -9,7 +9,6 @@ import bpy
 import numpy as np
 from bpy.props import EnumProperty, FloatProperty, StringProperty
 
-from ..core import mesh_file
 from ..core.engine import EngineError
 from ..core.mesh_file import Mesh
 from ..engine import polls, session
@@ -151,18 +150,17 @@ def make_part(scene: bpy.types.Scene, item: bpy.types.Object, role: str) -> bpy.
 
 
 def _press(operator: bpy.types.Operator, scene: bpy.types.Scene, item: bpy.types.Object) -> None:
-    """A contact in the shape of a mesh; the mesh goes to a file, which the engine reads."""
+    """A contact in the shape of a mesh, as it is now; it is pressed in along its own z axis."""
     surface = sensing_surface(scene)
-    if surface is None:
-        operator.report({"WARNING"}, "There is no sensing surface to press on")
+    mesh = part_mesh(item, caged=False)
+    if surface is None or not len(mesh.faces):
+        lacking = "no sensing surface to press on" if surface is None else "no face in this mesh"
+        operator.report({"WARNING"}, f"There is {lacking}")
         return
-    folder = Path(session.folder()) / "indenters"
-    path = folder / f"{free_name(item.name, ())}.obj"
-    mesh_file.write(part_mesh(item, caged=False), path)
     found, point, normal, _ = surface.closest_point_on_mesh((0.0, 0.0, 0.0))
     if found:
         contact = add_contact(scene, tuple(surface.matrix_world @ point), tuple(-normal))
-        contact.optisense.file = str(path)
+        contact.optisense.shape = new_mesh(item.name, mesh)
         contact.optisense.indenter = "mesh"
 
 

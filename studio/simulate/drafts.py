@@ -9,7 +9,6 @@ import bpy
 
 from ..core.engine import EngineError, Request
 from ..engine import handing, session
-from ..scene.contacts import contact_list
 from . import requests
 
 NAME = "draft"
@@ -62,7 +61,7 @@ def _ask() -> None:
         return
     try:
         design = handing.design(scene)
-        contacts = contact_list(scene, bpy.context.evaluated_depsgraph_get())
+        contacts = handing.contacts(scene)
         _open.append(
             session.engine().send(
                 "simulate",

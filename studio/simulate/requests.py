@@ -8,7 +8,7 @@ import bpy
 import numpy as np
 
 from ..engine import handing, session
-from ..scene.contacts import contact_list, pressing
+from ..scene.contacts import pressing
 from ..scene.offending import select
 from . import picture
 
@@ -31,10 +31,9 @@ def fields(scene: bpy.types.Scene) -> dict[str, Any]:
         EngineError: there is no engine, or the scene is no design.
     """
     settings = scene.optisense_simulation
-    depsgraph = bpy.context.evaluated_depsgraph_get()
     asked: dict[str, Any] = {
         "design": handing.design(scene),
-        "contacts": contact_list(scene, depsgraph),
+        "contacts": handing.contacts(scene),
         "noise": round(settings.noise, 3),
         "seed": settings.seed,
         "exposure": "auto" if settings.auto_exposure else settings.exposure,

@@ -72,6 +72,8 @@ def _contact(column: bpy.types.UILayout, values: bpy.types.PropertyGroup) -> Non
         column.prop(values, "size", text="Size (mm)")
     if values.indenter == "mesh":
         column.prop(values, "file")
+        if not values.file:
+            column.prop(values, "shape")
         column.prop(values, "scale")
     column.prop(values, "depth", text="Depth (mm)")
     column.prop(values, "rotation", text="Rotation (°)")

@@ -62,9 +62,22 @@ def test_references_become_parts(
 def test_an_indenter_reference_presses(mini: Any, bring: Callable[..., Any]) -> None:
     bring(CUBE, "indenter")
     (contact,) = objects_of(mini, "CONTACT")
-    assert contact.optisense.indenter == "mesh" and Path(contact.optisense.file).is_file()
+    assert contact.optisense.indenter == "mesh" and len(contact.data.vertices) == 8
     assert "brought" not in gather_document(mini)["parts"]
     mini.optisense_simulation.size, mini.optisense_simulation.noise = "160", 50.0
+    assert bpy.ops.optisense.simulate() == {"FINISHED"}
+    assert "does not see" not in session.state().note
+
+
+def test_an_indenter_reference_presses_on_another_day(
+    mini: Any, bring: Callable[..., Any], tmp_path: Path
+) -> None:
+    bring(CUBE, "indenter")
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "my sensor.blend"))
+    session.stop()
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "my sensor.blend"))
+    scene = bpy.context.scene
+    scene.optisense_simulation.size, scene.optisense_simulation.noise = "160", 50.0
     assert bpy.ops.optisense.simulate() == {"FINISHED"}
     assert "does not see" not in session.state().note
 
