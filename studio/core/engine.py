@@ -69,6 +69,10 @@ class Request:
     on_event: Answer
     done: bool = field(default=False)
 
+    def ignore(self) -> None:
+        """Whatever comes, nobody is told."""
+        self.on_result = self.on_error = self.on_event = _nothing
+
 
 def _nothing(_: Any) -> None:
     pass

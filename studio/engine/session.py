@@ -22,6 +22,8 @@ _folder: str | None = None
 _job: Request | None = None
 _each_tick: list[Callable[[], None]] = []
 _each_start: list[Callable[[Engine], None]] = []
+_each_load: list[Callable[[], None]] = []
+_job_goes_on = False
 
 
 def on_tick(work: Callable[[], None]) -> None:
@@ -32,6 +34,11 @@ def on_tick(work: Callable[[], None]) -> None:
 def on_start(work: Callable[[Engine], None]) -> None:
     """Let something be asked of every engine that is started."""
     _each_start.append(work)
+
+
+def on_load(work: Callable[[], None]) -> None:
+    """Let something be done before another .blend file is opened."""
+    _each_load.append(work)
 
 
 class OPTISENSE_PG_session(bpy.types.PropertyGroup):
@@ -153,7 +160,8 @@ def start_job(
         wait: until it is over, for scripts.
         fields: of the request.
     """
-    global _job
+    global _job, _job_goes_on
+    _job_goes_on = bool(fields.get("go_on"))
     now = state()
     now.problem = now.hint = now.note = now.progress = ""
     now.fraction = 0.0
@@ -194,6 +202,18 @@ def cancel_job() -> None:
     if _job is not None and _engine is not None:
         state().cancelling = True
         _engine.cancel(_job)
+
+
+@bpy.app.handlers.persistent
+def _loading(*_: Any) -> None:
+    """Another .blend file is opened: what is on its way is for the scene that goes."""
+    if _job is not None:
+        _job.ignore()
+        if _engine is not None and not _job_goes_on:
+            _engine.cancel(_job)
+        _over()
+    for each in _each_load:
+        each()
 
 
 def is_busy() -> bool:
@@ -288,13 +308,16 @@ def register() -> None:
     bpy.types.WindowManager.optisense = PointerProperty(
         type=OPTISENSE_PG_session, options={"SKIP_SAVE"}
     )
+    bpy.app.handlers.load_pre.append(_loading)
 
 
 def unregister() -> None:
+    bpy.app.handlers.load_pre.remove(_loading)
     if bpy.app.timers.is_registered(_tick):
         bpy.app.timers.unregister(_tick)
     stop()
     _each_tick.clear()
     _each_start.clear()
+    _each_load.clear()
     del bpy.types.WindowManager.optisense
     bpy.utils.unregister_class(OPTISENSE_PG_session)

@@ -81,7 +81,7 @@ def open_stage(
         document = handing.without_nulls(result["data"])
         parts = document["parts"].items()
         clear_startup(scene)
-        _picture_is_old()
+        picture_is_old()
         meshes = {key: mesh_file.read(stage / part["mesh"]) for key, part in parts}
         build(scene, document, meshes, keep_contacts=keep_contacts)
         scene.optisense.folder = folder or str(stage)
@@ -102,7 +102,7 @@ def open_stage(
     )
 
 
-def _picture_is_old() -> None:
+def picture_is_old() -> None:
     """What is shown is no picture of the sensor that opens, whose lights do not relight it.
 
     The scores are not of that sensor either.

@@ -93,6 +93,15 @@ def _refused(error: EngineError) -> None:
         session.redraw()
 
 
+def _leave() -> None:
+    """Another .blend file is opened: no draft of this one is wanted any more."""
+    global _wanted, _again
+    for each in _open:
+        each.ignore()
+    _open.clear()
+    _wanted, _again = False, None
+
+
 @bpy.app.handlers.persistent
 def _changed(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
     if not scene.optisense_simulation.draft:
@@ -107,12 +116,11 @@ def _changed(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
 def register() -> None:
     bpy.app.handlers.depsgraph_update_post.append(_changed)
     session.on_tick(_ask)
+    session.on_load(_leave)
 
 
 def unregister() -> None:
-    global _wanted, _again
     if bpy.app.timers.is_registered(_soon):
         bpy.app.timers.unregister(_soon)
     bpy.app.handlers.depsgraph_update_post.remove(_changed)
-    _open.clear()
-    _wanted, _again = False, None
+    _leave()

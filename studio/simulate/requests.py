@@ -10,7 +10,7 @@ import numpy as np
 from ..engine import handing, session
 from ..scene.contacts import pressing
 from ..scene.offending import select
-from . import picture
+from . import picture, relight
 
 LATEST = "picture"
 
@@ -52,6 +52,7 @@ def take(result: dict[str, Any], *, draft: bool) -> None:
     picture.show(pixels)
     now = bpy.context.window_manager.optisense_picture
     now.image = result["image"]
+    relight.shown(result["lights"])
     now.shown = True
     now.is_draft = draft
     now.is_relit = now.is_before = False
