@@ -12,6 +12,7 @@ import numpy as np
 
 from ..core import mesh_file
 from ..core.engine import EngineError
+from ..core.faults import SceneFault
 from ..core.mesh_file import Mesh
 from ..scene.contacts import contact_list
 from ..scene.gather import caged_parts, gather_document, part_names
@@ -30,8 +31,9 @@ def design(scene: bpy.types.Scene) -> dict[str, Any]:
     folder = Path(session.folder()) / "design"
     try:
         document = gather_document(scene)
-    except ValueError as error:
-        raise EngineError({"kind": "DesignError", "message": str(error)}) from error
+    except SceneFault as error:
+        row = {"kind": "DesignError", "message": str(error), "path": error.path}
+        raise EngineError(row) from error
     caged = caged_parts(document)
     for name, part in part_names(scene).items():
         path = folder / document["parts"][name]["mesh"]
@@ -67,6 +69,10 @@ def _digest(part: bpy.types.Object, *, caged: bool) -> bytes:
         part.update_from_editmode()
     mesh = part.data
     text = hashlib.blake2b(digest_size=16)
+    if part.modifiers and not caged:
+        made = part_mesh(part, caged=False)
+        text.update(made.vertices.tobytes() + made.faces.tobytes())
+        return text.digest()
     attribute = mesh.attributes.get(f"{REST}_0") if caged else None
     if attribute is not None:
         rest = np.empty(3 * len(mesh.vertices), dtype=np.float32)

@@ -230,10 +230,10 @@ def say(error: EngineError) -> None:
 
         scene = bpy.context.scene
         found = offending(scene, error.path or "", error.part or "", error.contact)
-        chosen = select(scene, found)
-        if chosen:
-            names = ", ".join(each.name for each in chosen)
-            texts.append(f"Selected: {names}")
+        chosen = select(found)
+        if found:
+            names = ", ".join(each.name for each in chosen or found)
+            texts.append(f"Selected: {names}" if chosen else f"Hidden with its collection: {names}")
     now.problem = f"{error.message[:1].upper()}{error.message[1:]}"
     now.hint = ". ".join(text for text in texts if text)
     redraw()

@@ -15,7 +15,7 @@ from ..core.rows import row_on_face
 from ..engine import catalogue, polls, session
 from ..scene.build import add_light_group
 from ..scene.cameras import add_camera
-from ..scene.collections import objects_of
+from ..scene.collections import objects_of, select_only
 from ..scene.gather import free_name
 from ..scene.lamps import add_light, lamp_colour, redraw
 from .windows import ask_for_windows
@@ -38,6 +38,9 @@ def _groups(operator: Any, context: bpy.types.Context | None) -> catalogue.Items
 
 
 _group_items: catalogue.Items = []
+
+SOLID = 1e-3
+"""The faces of a closed surface look to all sides: their sum is less than this share of all."""
 
 
 class OPTISENSE_OT_add_light(bpy.types.Operator):
@@ -69,6 +72,10 @@ class OPTISENSE_OT_add_light(bpy.types.Operator):
     def execute(self, context: bpy.types.Context) -> set[str]:
         scene = context.scene
         design = scene.optisense
+        poses = self._poses(context)
+        if not poses:
+            self.report({"ERROR"}, "The light reference is an empty mesh")
+            return {"CANCELLED"}
         if self.group in ("NEW", ""):
             if self.model in ("NONE", ""):
                 self.report({"ERROR"}, "The library is not loaded yet; try again in a moment")
@@ -81,8 +88,7 @@ class OPTISENSE_OT_add_light(bpy.types.Operator):
             group = add_light_group(design, name, values)
         else:
             group = design.light_groups[self.group]
-        for pose in self._poses(context):
-            add_light(scene, group, pose).select_set(True)
+        select_only(*(add_light(scene, group, pose) for pose in poses))
         ask_for_windows(scene)
         return {"FINISHED"}
 
@@ -93,12 +99,12 @@ class OPTISENSE_OT_add_light(bpy.types.Operator):
             for each in context.selected_objects
             if each.optisense.kind == "REFERENCE" and each.optisense.reference == "light"
         ]
-        for each in context.selected_objects:
-            each.select_set(False)
         poses = []
         for reference in references:
             corners = np.array([reference.matrix_world @ v.co for v in reference.data.vertices])
-            normal = _normal(reference)
+            if not len(corners):
+                continue
+            normal = _normal(reference, corners, middle)
             poses += row_on_face(corners, normal, np.array(middle), self.count, self.pitch)
         if not references:
             start = context.scene.cursor.location
@@ -123,11 +129,14 @@ def _middle(scene: bpy.types.Scene) -> Vector:
     return surface.matrix_world @ (sum((Vector(c) for c in surface.bound_box), Vector()) / 8.0)
 
 
-def _normal(reference: bpy.types.Object) -> np.ndarray:
-    """The direction in which most of a surface faces, weighted by area."""
-    total = sum((face.normal * face.area for face in reference.data.polygons), Vector())
-    turned = reference.matrix_world.to_3x3() @ total
-    return np.array(turned if turned.length > 1e-9 else (0.0, 0.0, 1.0))
+def _normal(reference: bpy.types.Object, corners: np.ndarray, target: Vector) -> np.ndarray:
+    """The direction in which most of a surface faces, by area; of a solid, the way to `target`."""
+    faces = reference.data.polygons
+    total = sum((face.normal * face.area for face in faces), Vector())
+    if total.length > SOLID * sum(face.area for face in faces):
+        return np.array(reference.matrix_world.to_3x3() @ total)
+    way = np.array(target) - (corners.min(axis=0) + corners.max(axis=0)) / 2.0
+    return way if np.linalg.norm(way) > 1e-9 else np.array((0.0, 0.0, 1.0))
 
 
 class OPTISENSE_OT_add_camera(bpy.types.Operator):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Iterator
 
 import bpy
@@ -32,6 +33,17 @@ def objects_of(scene: bpy.types.Scene, *kinds: str) -> list[bpy.types.Object]:
 def object_of(scene: bpy.types.Scene, kind: str, key: str) -> bpy.types.Object | None:
     """The object of a kind that stands for the part, cage or group member called `key`."""
     return next((each for each in objects_of(scene, kind) if each.optisense.key == key), None)
+
+
+def select_only(*chosen: bpy.types.Object) -> None:
+    """Select nothing but these, the last of them active; those that the view does not have, not."""
+    layer = bpy.context.view_layer  # a timer's context knows no selected objects
+    for each in layer.objects:
+        each.select_set(False)
+    for each in chosen:
+        with contextlib.suppress(RuntimeError):  # its collection is excluded from the view
+            each.select_set(True)
+            layer.objects.active = each
 
 
 def next_order(scene: bpy.types.Scene, kind: str) -> int:

@@ -9,6 +9,7 @@ from typing import Any
 
 import bpy
 
+from ..core.faults import SceneFault
 from ..core.mesh_file import Mesh
 from ..core.numbers import kept, kept_list
 from .cages import cage_values
@@ -29,7 +30,7 @@ def gather(scene: bpy.types.Scene) -> tuple[dict[str, Any], dict[str, Mesh]]:
     """The design of a scene: what `design.yaml` holds, and the parts at rest by name.
 
     Raises:
-        ValueError: the scene holds no design, or one that can't be written down.
+        SceneFault: the scene holds no design, or one that can't be written down.
     """
     document = gather_document(scene)
     caged = caged_parts(document)
@@ -46,11 +47,11 @@ def gather_document(scene: bpy.types.Scene) -> dict[str, Any]:
     """The design of a scene without the meshes of its parts: what `design.yaml` holds.
 
     Raises:
-        ValueError: the scene holds no design, or one that can't be written down.
+        SceneFault: the scene holds no design, or one that can't be written down.
     """
     design = scene.optisense
     if not design.is_open:
-        raise ValueError("there is no sensor in this scene; make or open one")
+        raise SceneFault("there is no sensor in this scene; make or open one")
     document: dict[str, Any] = json.loads(design.document)
     before = json.loads(design.document)
     bpy.context.view_layer.update()
@@ -61,7 +62,7 @@ def gather_document(scene: bpy.types.Scene) -> dict[str, Any]:
         each.name: material_values(each, before["materials"].get(each.name, {}))
         for each in design.materials
     }
-    cages = {each.optisense.key: cage_values(each) for each in objects_of(scene, "CAGE")}
+    cages = _cages(scene)
     parts = part_names(scene)
     for cage in cages.values():
         cage["parts"] = [name for name in cage["parts"] if name in parts]
@@ -71,9 +72,20 @@ def gather_document(scene: bpy.types.Scene) -> dict[str, Any]:
     document["lights"] = _lights(scene, before["lights"])
     camera = camera_values(scene)
     if camera is None:
-        raise ValueError("the sensor has no camera; add one in Lights and Camera")
+        raise SceneFault("the sensor has no camera; add one in Lights and Camera")
     document["camera"] = camera
     return document
+
+
+def _cages(scene: bpy.types.Scene) -> dict[str, Any]:
+    """The cages; copies made in Blender would bend the same parts twice."""
+    cages: dict[str, Any] = {}
+    for each in objects_of(scene, "CAGE"):
+        key = each.optisense.key
+        if key in cages:
+            raise SceneFault(f"two cages are called '{key}'; delete one of them", f"cages.{key}")
+        cages[key] = cage_values(each)
+    return cages
 
 
 def _own_files(values: dict[str, Any], parts: dict[str, bpy.types.Object]) -> None:
@@ -153,6 +165,14 @@ def _part(name: str, part: bpy.types.Object) -> dict[str, Any]:
 def _lights(scene: bpy.types.Scene, before: dict[str, Any]) -> dict[str, Any]:
     lights = objects_of(scene, "LIGHT")
     groups: dict[str, Any] = {}
+    for light in lights:
+        name = light.optisense.group
+        if name not in scene.optisense.light_groups:
+            raise SceneFault(
+                f"light '{light.name}' is of a group '{name}' that this sensor does not have; use "
+                "Move to Group",
+                f"lights.{name}",
+            )
     for group in scene.optisense.light_groups:
         poses = [light_pose(each) for each in lights if each.optisense.group == group.name]
         if not poses:

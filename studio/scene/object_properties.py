@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import bpy
 from bpy.props import (
+    BoolProperty,
     EnumProperty,
     FloatProperty,
     FloatVectorProperty,
@@ -55,6 +56,7 @@ class OPTISENSE_PG_object(bpy.types.PropertyGroup):
         min=-1000, max=1000,
     )  # fmt: skip
     mesh_file: StringProperty(options={"HIDDEN"})
+    is_caged: BoolProperty(description="A cage holds it where it is", options={"HIDDEN"})
 
     reference: EnumProperty(name="Reference", items=kinds.REFERENCES)
 

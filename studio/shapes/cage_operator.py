@@ -24,7 +24,7 @@ from ..scene.cages import (
     set_points,
     shown_points,
 )
-from ..scene.collections import object_of, objects_of
+from ..scene.collections import object_of, objects_of, select_only
 from ..scene.gather import free_name, part_names
 from ..scene.meshes import REST, part_mesh, remembered, show_vertices
 
@@ -106,10 +106,7 @@ class OPTISENSE_OT_new_cage(bpy.types.Operator):
             "points": as_points(core.rest_points(box, resolution)),
         }
         cage = add_cage(scene, key, values)
-        for each in context.selected_objects:
-            each.select_set(False)
-        cage.select_set(True)
-        context.view_layer.objects.active = cage
+        select_only(cage)
         return {"FINISHED"}
 
 
@@ -131,11 +128,11 @@ class OPTISENSE_OT_edit_shape(bpy.types.Operator):
             return {"FINISHED"}
         if context.mode != "OBJECT":
             bpy.ops.object.mode_set(mode="OBJECT")
-        for each in context.selected_objects:
-            each.select_set(False)
+        if cage.name not in context.view_layer.objects:
+            self.report({"ERROR"}, f"'{cage.name}' is hidden with its collection; show that first")
+            return {"CANCELLED"}
         cage.hide_set(False)
-        cage.select_set(True)
-        context.view_layer.objects.active = cage
+        select_only(cage)
         bpy.ops.object.mode_set(mode="EDIT")
         bpy.ops.mesh.select_mode(type="VERT")
         bpy.ops.mesh.select_all(action="DESELECT")

@@ -14,7 +14,7 @@ from ..core.mesh_file import Mesh
 from ..engine import polls, session
 from ..scene import kinds
 from ..scene.build import add_material, add_part
-from ..scene.collections import REFERENCE, collection
+from ..scene.collections import REFERENCE, collection, select_only
 from ..scene.contacts import add_contact, sensing_surface
 from ..scene.gather import free_name, part_names
 from ..scene.meshes import new_mesh, part_mesh
@@ -73,10 +73,7 @@ class OPTISENSE_OT_add_mesh(bpy.types.Operator):
         item.optisense.reference = "support" if result.get("closed") else "sensing_surface"
         item.color = (0.6, 0.6, 0.6, 0.5)
         collection(context.scene, REFERENCE).objects.link(item)
-        for each in context.selected_objects:
-            each.select_set(False)
-        item.select_set(True)
-        context.view_layer.objects.active = item
+        select_only(item)
         return {"FINISHED"}
 
 
@@ -100,15 +97,23 @@ class OPTISENSE_OT_set_reference(bpy.types.Operator):
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         scene = context.scene
-        for item in _meshes(type(self), context):
+        items = _meshes(type(self), context)
+        empty = [each.name for each in items if not each.data.polygons]
+        if empty and self.reference not in PLACES:
+            self.report({"ERROR"}, f"There is no face in {', '.join(empty)}")
+            return {"CANCELLED"}
+        made = []
+        for item in items:
             _into(scene, item, REFERENCE)
             item.optisense.kind = "REFERENCE"
             item.optisense.reference = self.reference
             if self.reference == "indenter":
                 _press(self, scene, item)
             elif self.reference not in PLACES:
-                make_part(scene, item, self.reference)
+                made.append(make_part(scene, item, self.reference))
                 item.hide_set(True)
+        if made:
+            select_only(*made)
         return {"FINISHED"}
 
 
@@ -144,23 +149,19 @@ def make_part(scene: bpy.types.Scene, item: bpy.types.Object, role: str) -> bpy.
         if name not in design.materials:
             add_material(design, name, material)
         values["material"] = name
-    part = add_part(scene, key, values, part_mesh(item, caged=False))
-    part.select_set(True)
-    return part
+    return add_part(scene, key, values, part_mesh(item, caged=False))
 
 
 def _press(operator: bpy.types.Operator, scene: bpy.types.Scene, item: bpy.types.Object) -> None:
     """A contact in the shape of a mesh, as it is now; it is pressed in along its own z axis."""
     surface = sensing_surface(scene)
-    mesh = part_mesh(item, caged=False)
-    if surface is None or not len(mesh.faces):
-        lacking = "no sensing surface to press on" if surface is None else "no face in this mesh"
-        operator.report({"WARNING"}, f"There is {lacking}")
+    if surface is None:
+        operator.report({"WARNING"}, "There is no sensing surface to press on")
         return
     found, point, normal, _ = surface.closest_point_on_mesh((0.0, 0.0, 0.0))
     if found:
         contact = add_contact(scene, tuple(surface.matrix_world @ point), tuple(-normal))
-        contact.optisense.shape = new_mesh(item.name, mesh)
+        contact.optisense.shape = new_mesh(item.name, part_mesh(item, caged=False))
         contact.optisense.indenter = "mesh"
 
 

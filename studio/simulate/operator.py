@@ -11,7 +11,7 @@ from mathutils import Vector
 
 from ..core.engine import EngineError
 from ..engine import handing, polls, session
-from ..scene.collections import objects_of
+from ..scene.collections import objects_of, select_only
 from ..scene.contacts import add_contact, sensing_surface
 from . import editors, picture, requests
 
@@ -164,10 +164,7 @@ def _add(
 ) -> None:
     outward = -(surface.matrix_world.to_3x3() @ normal)
     contact = add_contact(context.scene, tuple(surface.matrix_world @ point), tuple(outward))
-    for each in context.selected_objects:
-        each.select_set(False)
-    contact.select_set(True)
-    context.view_layer.objects.active = contact
+    select_only(contact)
 
 
 class OPTISENSE_OT_nine_contacts(bpy.types.Operator):

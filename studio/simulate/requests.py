@@ -66,7 +66,7 @@ def _tell_unseen(numbers: list[int]) -> None:
     """Select the contacts that the picture does not show, and say so."""
     scene = bpy.context.scene
     contacts = pressing(scene)
-    chosen = select(scene, [contacts[each] for each in numbers if each < len(contacts)])
+    chosen = select([contacts[each] for each in numbers if each < len(contacts)])
     if chosen:
         names = ", ".join(each.name for each in chosen)
         session.state().note = (
