@@ -12,7 +12,7 @@ import numpy as np
 
 from ..core import mesh_file
 from ..core.engine import EngineError
-from ..core.faults import SceneFault
+from ..core.errors import SceneError
 from ..core.mesh_file import Mesh
 from ..scene.contacts import contact_list
 from ..scene.gather import caged_parts, gather_document, part_names
@@ -31,7 +31,7 @@ def design(scene: bpy.types.Scene) -> dict[str, Any]:
     folder = Path(session.folder()) / "design"
     try:
         document = gather_document(scene)
-    except SceneFault as error:
+    except SceneError as error:
         row = {"kind": "DesignError", "message": str(error), "path": error.path}
         raise EngineError(row) from error
     caged = caged_parts(document)

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..core import cage as core
-from ..core.faults import SceneFault
+from ..core.errors import SceneError
 from ..core.numbers import kept, kept_array
 from .collections import CAGES, collection, next_order, object_of, objects_of
 from .meshes import REST, remembered, show_vertices, shown_vertices
@@ -104,14 +104,14 @@ def cage_values(cage: bpy.types.Object) -> dict[str, Any]:
     """The cage as the design file holds it, with the points as they are now.
 
     Raises:
-        SceneFault: control points were added or removed.
+        SceneError: control points were added or removed.
     """
     values = cage_data(cage)
     shown = shown_points(cage)
     before = current_points(values)
     if len(shown) != len(before):
         key = cage.optisense.key
-        raise SceneFault(
+        raise SceneError(
             f"cage '{key}' has {len(shown)} control points instead of {len(before)}; undo what "
             "added or removed some",
             f"cages.{key}",

@@ -9,7 +9,7 @@ from typing import Any
 import bpy
 import numpy as np
 
-from ..core.faults import SceneFault
+from ..core.errors import SceneError
 from ..core.numbers import kept
 from ..core.pose import pose_of
 from .collections import OPTICAL_SYSTEM, collection, objects_of
@@ -58,13 +58,13 @@ def camera_values(scene: bpy.types.Scene) -> dict[str, Any] | None:
     """The camera as the design file holds it; None where there is none.
 
     Raises:
-        SceneFault: there is more than one.
+        SceneError: there is more than one.
     """
     cameras = objects_of(scene, "CAMERA")
     if not cameras:
         return None
     if len(cameras) > 1:
-        raise SceneFault(f"the sensor has {len(cameras)} cameras; delete all but one", "camera")
+        raise SceneError(f"the sensor has {len(cameras)} cameras; delete all but one", "camera")
     camera = cameras[0]
     values = camera.optisense
     before = json.loads(values.data) if values.data else {}

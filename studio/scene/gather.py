@@ -9,7 +9,7 @@ from typing import Any
 
 import bpy
 
-from ..core.faults import SceneFault
+from ..core.errors import SceneError
 from ..core.mesh_file import Mesh
 from ..core.numbers import kept, kept_list
 from .cages import cage_values
@@ -30,7 +30,7 @@ def gather(scene: bpy.types.Scene) -> tuple[dict[str, Any], dict[str, Mesh]]:
     """The design of a scene: what `design.yaml` holds, and the parts at rest by name.
 
     Raises:
-        SceneFault: the scene holds no design, or one that can't be written down.
+        SceneError: the scene holds no design, or one that can't be written down.
     """
     document = gather_document(scene)
     caged = caged_parts(document)
@@ -47,11 +47,11 @@ def gather_document(scene: bpy.types.Scene) -> dict[str, Any]:
     """The design of a scene without the meshes of its parts: what `design.yaml` holds.
 
     Raises:
-        SceneFault: the scene holds no design, or one that can't be written down.
+        SceneError: the scene holds no design, or one that can't be written down.
     """
     design = scene.optisense
     if not design.is_open:
-        raise SceneFault("there is no sensor in this scene; make or open one")
+        raise SceneError("there is no sensor in this scene; make or open one")
     document: dict[str, Any] = json.loads(design.document)
     before = json.loads(design.document)
     bpy.context.view_layer.update()
@@ -72,7 +72,7 @@ def gather_document(scene: bpy.types.Scene) -> dict[str, Any]:
     document["lights"] = _lights(scene, before["lights"])
     camera = camera_values(scene)
     if camera is None:
-        raise SceneFault("the sensor has no camera; add one in Lights and Camera")
+        raise SceneError("the sensor has no camera; add one in Lights and Camera")
     document["camera"] = camera
     return document
 
@@ -83,7 +83,7 @@ def _cages(scene: bpy.types.Scene) -> dict[str, Any]:
     for each in objects_of(scene, "CAGE"):
         key = each.optisense.key
         if key in cages:
-            raise SceneFault(f"two cages are called '{key}'; delete one of them", f"cages.{key}")
+            raise SceneError(f"two cages are called '{key}'; delete one of them", f"cages.{key}")
         cages[key] = cage_values(each)
     return cages
 
@@ -168,7 +168,7 @@ def _lights(scene: bpy.types.Scene, before: dict[str, Any]) -> dict[str, Any]:
     for light in lights:
         name = light.optisense.group
         if name not in scene.optisense.light_groups:
-            raise SceneFault(
+            raise SceneError(
                 f"light '{light.name}' is of a group '{name}' that this sensor does not have; use "
                 "Move to Group",
                 f"lights.{name}",

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 
-class SceneFault(ValueError):
+class SceneError(ValueError):
     """A scene that can't be written down as a design.
 
     Attributes:
