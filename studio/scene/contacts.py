@@ -90,9 +90,11 @@ def redraw(contact: bpy.types.Object) -> None:
             depth=values.length, matrix=at,
         )  # fmt: skip
     elif values.indenter == "plane":
-        tilt = Matrix.Rotation(math.radians(values.tilt[0]), 4, "X") @ Matrix.Rotation(
-            math.radians(values.tilt[1]), 4, "Y"
+        about_x, about_y = (
+            Matrix.Rotation(math.radians(angle), 4, axis)
+            for angle, axis in zip(values.tilt, "XY", strict=True)
         )
+        tilt = about_y @ about_x
         bmesh.ops.create_grid(shape, x_segments=1, y_segments=1, size=values.size / 2, matrix=tilt)
         lowest = min((vertex.co.z for vertex in shape.verts), default=0.0)
         bmesh.ops.translate(shape, verts=shape.verts, vec=(0.0, 0.0, -lowest - values.depth))
@@ -146,7 +148,8 @@ def contact_values(
         write: gives the path of a file that holds a mesh.
     """
     values = contact.optisense
-    place = contact.evaluated_get(depsgraph).matrix_world.translation
+    held = contact.evaluated_get(depsgraph).matrix_world
+    place = held.translation
     indenter: dict[str, Any] = {"kind": values.indenter}
     if values.indenter == "sphere":
         indenter["radius"] = short(values.radius)
@@ -165,6 +168,7 @@ def contact_values(
         "point": [round(short(value), 6) + 0.0 for value in place],
         "depth": short(values.depth),
         "rotation": short(values.rotation),
+        "along": [round(short(value), 6) + 0.0 for value in held.col[0][:3]],
     }
 
 
