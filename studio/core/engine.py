@@ -54,7 +54,7 @@ class EngineError(Exception):
     def text(self) -> str:
         """Everything in one line."""
         where = f" ({self.where})" if self.where else ""
-        hint = f". {self.hint}" if self.hint else ""
+        hint = f". {self.hint[:1].upper()}{self.hint[1:]}" if self.hint else ""
         return f"{self.message[:1].upper()}{self.message[1:]}{where}{hint}"
 
 

@@ -50,17 +50,33 @@ class OPTISENSE_OT_add_light(bpy.types.Operator):
     bl_label = "Add Light"
     bl_options = {"REGISTER", "UNDO"}
 
-    model: EnumProperty(name="Model", items=_light_models)
-    group: EnumProperty(name="Group", items=_groups)
-    name: StringProperty(name="Name of a new group", default="white")
+    model: EnumProperty(
+        name="Model", items=_light_models, description="The library's light of a new group"
+    )
+    group: EnumProperty(
+        name="Group", items=_groups,
+        description="The lights of a group share model, colour and flux, and are relit together",
+    )  # fmt: skip
+    name: StringProperty(
+        name="Name of a new group", default="white",
+        description="Letters, digits, - and _; it gets a number where there is such a group",
+    )  # fmt: skip
     colour: FloatVectorProperty(
-        name="Colour of a new group", size=3, min=0.0, max=1.0, subtype="COLOR", default=(1.0,) * 3
+        name="Colour of a new group", size=3, min=0.0, max=1.0, subtype="COLOR",
+        default=(1.0,) * 3,
+        description="How the flux is shared among R, G, B; only ratios count",
+    )  # fmt: skip
+    flux: FloatProperty(
+        name="Flux of a new group (mW)", min=0.0, max=1e6, default=2.0,
+        description="mW, radiant flux of each light",
+    )  # fmt: skip
+    count: IntProperty(
+        name="Count", min=1, max=1000, default=1, description="How many lights, in a row"
     )
-    flux: FloatProperty(name="Flux of a new group (mW)", min=0.0, max=1e6, default=2.0)
-    count: IntProperty(name="Count", min=1, max=1000, default=1)
     pitch: FloatProperty(
-        name="Pitch (mm)", description="Between neighbours in the row", min=0.01, default=4.0
-    )
+        name="Pitch (mm)", description="mm, between the middles of neighbours in the row",
+        min=0.01, default=4.0,
+    )  # fmt: skip
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
@@ -140,13 +156,16 @@ def _normal(reference: bpy.types.Object, corners: np.ndarray, target: Vector) ->
 
 
 class OPTISENSE_OT_add_camera(bpy.types.Operator):
-    """Put a camera of the library on the selected camera reference, or at the 3D cursor"""
+    """Put a library camera on the selected camera reference or the 3D cursor, for this one"""
 
     bl_idname = "optisense.add_camera"
     bl_label = "Add Camera"
     bl_options = {"REGISTER", "UNDO"}
 
-    model: EnumProperty(name="Model", items=_camera_models)
+    model: EnumProperty(
+        name="Model", items=_camera_models,
+        description="The library's camera; its picture is 320 pixels wide at most, to begin with",
+    )  # fmt: skip
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
@@ -203,8 +222,8 @@ class OPTISENSE_OT_set_model(bpy.types.Operator):
     bl_options = {"REGISTER", "UNDO"}
     bl_property = "model"
 
-    model: EnumProperty(name="Model", items=_light_models)
-    group: StringProperty()
+    model: EnumProperty(name="Model", items=_light_models, description="The library's light")
+    group: StringProperty(name="Group", description="Whose lamps change")
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
@@ -232,8 +251,12 @@ class OPTISENSE_OT_set_group(bpy.types.Operator):
     bl_label = "Move to Group"
     bl_options = {"REGISTER", "UNDO"}
 
-    group: EnumProperty(name="Group", items=_groups)
-    name: StringProperty(name="Name of a new group", default="white")
+    group: EnumProperty(
+        name="Group", items=_groups, description="Where to; a new one is like that of the first"
+    )
+    name: StringProperty(
+        name="Name of a new group", default="white", description="Letters, digits, - and _"
+    )
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:

@@ -13,6 +13,7 @@ from ..core.engine import EngineError
 from ..engine import handing, polls, session
 from ..scene.cages import cage_data
 from ..scene.collections import objects_of
+from ..scene.paths import absolute, objective
 from ..sensor.opening import new_stage, open_stage
 from . import following
 
@@ -52,8 +53,10 @@ class OPTISENSE_OT_vary(bpy.types.Operator):
     bl_label = "Vary"
     bl_options = {"REGISTER", "UNDO"}
 
-    label: StringProperty()
-    text: StringProperty()
+    label: StringProperty(name="Label", description="What varies, in words")
+    text: StringProperty(
+        name="Range", description="PATH=LOW:HIGH, PATH=+-REACH, PATH=LOW:HIGH:STEPS or PATH=A,B"
+    )
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
@@ -107,7 +110,7 @@ class OPTISENSE_OT_vary_remove(bpy.types.Operator):
 def _study(context: bpy.types.Context) -> str:
     """The folder of the study as an absolute path; empty where none is named."""
     text = context.scene.optisense_search.study
-    return str(Path(bpy.path.abspath(text)).resolve()) if text else ""
+    return str(absolute(text)) if text else ""
 
 
 def _new_study(context: bpy.types.Context) -> str:
@@ -169,7 +172,7 @@ class OPTISENSE_OT_search(bpy.types.Operator):
             design=design,
             study=study,
             vary=vary.texts_of(search.vary),
-            objectives=[search.objective],
+            objectives=[objective(search.objective)],
             method=search.method,
             seed=search.seed,
             workers=search.workers,
@@ -254,7 +257,7 @@ class OPTISENSE_OT_apply_best(_WithStudy, bpy.types.Operator):
             if scene is not None:
                 following.clear_ghosts(scene)
                 open_stage(
-                    scene, stage, wait=wait, folder=folder if saved else "", keep_contacts=True
+                    scene, stage, wait=wait, folder=folder if saved else "", keep_others=True
                 )
 
         done = session.start_job(
@@ -271,7 +274,9 @@ class OPTISENSE_OT_keep_variant(_WithStudy, bpy.types.Operator):
     bl_idname = "optisense.keep_variant"
     bl_label = "Keep as Variant"
 
-    filepath: StringProperty(subtype="DIR_PATH")
+    filepath: StringProperty(
+        name="Folder", description="That does not exist yet", subtype="DIR_PATH"
+    )
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         self.filepath = f"{_study(context)}-best"
@@ -279,7 +284,7 @@ class OPTISENSE_OT_keep_variant(_WithStudy, bpy.types.Operator):
         return {"RUNNING_MODAL"}
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        target = str(Path(bpy.path.abspath(self.filepath)).resolve())
+        target = str(absolute(self.filepath))
 
         def kept(result: dict[str, Any]) -> None:
             session.state().note = f"Written to {result['folder']}"

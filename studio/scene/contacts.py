@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 import bmesh
@@ -16,6 +15,7 @@ from ..core.mesh_file import Mesh
 from ..core.numbers import short
 from .collections import CONTACTS, collection, next_order, objects_of
 from .meshes import mesh_of
+from .paths import absolute
 
 COLOUR = (0.48, 0.37, 0.07, 1.0)
 
@@ -119,7 +119,7 @@ def redraw(contact: bpy.types.Object) -> None:
 
 def absolute_file(values: bpy.types.PropertyGroup) -> str:
     """The absolute path of a contact's mesh file."""
-    return str(Path(bpy.path.abspath(values.file)).resolve())
+    return str(absolute(values.file))
 
 
 def _add_file_mesh(shape: bmesh.types.BMesh, mesh: Mesh, scale: float, depth: float) -> None:

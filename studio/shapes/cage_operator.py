@@ -64,8 +64,9 @@ class OPTISENSE_OT_new_cage(bpy.types.Operator):
     bl_options = {"REGISTER", "UNDO"}
 
     resolution: IntVectorProperty(
-        name="Points along x, y, z", size=3, min=2, max=64, soft_max=9, default=(3, 3, 3)
-    )
+        name="Points along x, y, z", size=3, min=2, max=64, soft_max=9, default=(3, 3, 3),
+        description="Control points of the cage; more of them bend more finely",
+    )  # fmt: skip
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
@@ -146,7 +147,10 @@ class OPTISENSE_OT_set_bound(bpy.types.Operator):
     bl_label = "Set Bound"
     bl_options = {"REGISTER", "UNDO"}
 
-    bound: EnumProperty(items=[("c_min", "C_min", "A = 0"), ("c_max", "C_max", "A = 1")])
+    bound: EnumProperty(
+        name="Bound", items=[("c_min", "C_min", "A = 0"), ("c_max", "C_max", "A = 1")],
+        description="Which end of the range",
+    )  # fmt: skip
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:

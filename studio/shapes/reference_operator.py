@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
 import bpy
@@ -18,6 +17,7 @@ from ..scene.collections import REFERENCE, collection, select_only
 from ..scene.contacts import add_contact, sensing_surface
 from ..scene.gather import free_name, part_names
 from ..scene.meshes import new_mesh, part_mesh
+from ..scene.paths import absolute
 
 PLACES = ("camera", "light")
 """References that lights and the camera are placed by; the others become parts."""
@@ -47,10 +47,14 @@ class OPTISENSE_OT_add_mesh(bpy.types.Operator):
     bl_label = "Add .obj Mesh"
     bl_options = {"REGISTER", "UNDO"}
 
-    filepath: StringProperty(subtype="FILE_PATH")
+    filepath: StringProperty(name="File", description="OBJ, STL or PLY", subtype="FILE_PATH")
     filter_glob: StringProperty(default="*.obj;*.stl;*.ply;*.3mf;*.step;*.stp", options={"HIDDEN"})
     scale: FloatProperty(
-        name="Scale", description="From the file's units to mm", min=1e-6, max=1e6, default=1.0
+        name="Scale",
+        description="From the file's units to mm: 1000 for metres, 25.4 for inches",
+        min=1e-6,
+        max=1e6,
+        default=1.0,
     )
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
@@ -58,7 +62,7 @@ class OPTISENSE_OT_add_mesh(bpy.types.Operator):
         return {"RUNNING_MODAL"}
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        path = Path(bpy.path.abspath(self.filepath)).resolve()
+        path = absolute(self.filepath)
         try:
             result = session.ask_and_wait("mesh", file=str(path), scale=self.scale)
         except EngineError as error:
@@ -84,7 +88,9 @@ class OPTISENSE_OT_set_reference(bpy.types.Operator):
     bl_label = "Set as Reference"
     bl_options = {"REGISTER", "UNDO"}
 
-    reference: EnumProperty(name="Reference", items=kinds.REFERENCES)
+    reference: EnumProperty(
+        name="Reference", items=kinds.REFERENCES, description="What the selected meshes are for"
+    )
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:

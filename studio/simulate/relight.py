@@ -7,13 +7,14 @@ from typing import Any
 import bpy
 import numpy as np
 
-from ..core.engine import EngineError, Request
+from ..core.engine import Engine, EngineError, Request
 from ..core.numbers import short
 from ..engine import session
 from ..scene.properties import when_relit
 from . import picture
 
 NAME = "relit"
+AGAIN = "Simulate again to see these lights"
 
 _open: Request | None = None
 _wanted = False
@@ -28,6 +29,8 @@ def wanted() -> None:
     if now.shown and now.image and session.running() is not None:
         _wanted = True
         _ask()
+    elif now.shown and not now.is_before:
+        session.state().note = AGAIN
 
 
 def shown(values: dict[str, Any]) -> None:
@@ -85,7 +88,7 @@ def _take(result: dict[str, Any]) -> None:
 def _refused(error: EngineError) -> None:
     # Lights that were added since, or a picture the engine forgot: only rendering helps.
     bpy.context.window_manager.optisense_picture.image = ""
-    session.state().note = "Simulate again to see these lights"
+    session.state().note = AGAIN
 
 
 @bpy.app.handlers.persistent
@@ -103,8 +106,14 @@ def _leave() -> None:
     _open, _wanted = None, False
 
 
+def _forget(_: Engine) -> None:
+    """A new engine knows no picture of the one before."""
+    bpy.context.window_manager.optisense_picture.image = ""
+
+
 def register() -> None:
     session.on_tick(_ask)
+    session.on_start(_forget)
     session.on_load(_leave)
     when_relit.append(wanted)
     bpy.app.handlers.undo_post.append(_undone)

@@ -77,6 +77,19 @@ def test_only_what_counts_can_be_changed_by_hand(mini: Any) -> None:
         assert all(objects_of(mini, kind)[0].lock_scale), kind
 
 
+def test_nine_contacts_are_like_the_active_one(mini: Any, select: Callable[..., None]) -> None:
+    bpy.ops.optisense.add_contact()
+    values = bpy.context.active_object.optisense
+    values.indenter, values.length, values.depth, values.rotation = "cylinder", 4.0, 0.25, 30.0
+    assert bpy.ops.optisense.nine_contacts() == {"FINISHED"}
+    nine = [each.optisense for each in objects_of(mini, "CONTACT")]
+    assert len(nine) == 9 and {each.indenter for each in nine} == {"cylinder"}
+    assert {(each.length, each.depth, each.rotation) for each in nine} == {(4.0, 0.25, 30.0)}
+    select(object_of(mini, "PART", "gel"))
+    assert bpy.ops.optisense.nine_contacts() == {"FINISHED"}
+    assert {each.optisense.indenter for each in objects_of(mini, "CONTACT")} == {"sphere"}
+
+
 @pytest.mark.parametrize("sensor", ["gelsight-mini-spherical", "gelsight-svelte"])
 def test_an_indenter_lies_as_it_is_drawn(sensor: str, scene: Any) -> None:
     assert bpy.ops.optisense.new(sensor=sensor) == {"FINISHED"}
