@@ -11,39 +11,14 @@ from bpy.props import StringProperty
 from ..core import vary
 from ..core.engine import EngineError
 from ..engine import handing, polls, session
-from ..scene.cages import cage_data
-from ..scene.collections import objects_of
 from ..scene.paths import absolute, objective
 from ..sensor.opening import new_stage, open_stage
 from . import following
+from .suggesting import suggestions
 
 TITLE = "Searching"
-
-
-def suggestions(context: bpy.types.Context) -> list[vary.Suggestion]:
-    """What a search may change of the active object."""
-    active = context.active_object
-    own = None if active is None else active.optisense
-    if own is None:
-        return []
-    if own.kind == "CAMERA":
-        return vary.for_camera()
-    if own.kind == "LIGHT":
-        group = [e for e in objects_of(context.scene, "LIGHT") if e.optisense.group == own.group]
-        return vary.for_light(own.group, group.index(active))
-    if own.kind == "PART":
-        materials = context.scene.optisense.materials
-        kind = materials[own.material].kind if own.material in materials else ""
-        return vary.for_part(own.role, own.material, kind)
-    if own.kind == "CAGE":
-        if active.mode == "EDIT":
-            active.update_from_editmode()
-        chosen = (
-            [v.index for v in active.data.vertices if v.select] if active.mode == "EDIT" else []
-        )
-        blended = cage_data(active).get("blend") is not None
-        return vary.for_cage(own.key, chosen, blended=blended)
-    return []
+WIDEST = 72
+"""Characters of an entry of the menu Vary."""
 
 
 class OPTISENSE_OT_vary(bpy.types.Operator):
@@ -82,7 +57,9 @@ class OPTISENSE_MT_vary(bpy.types.Menu):
         if not found:
             self.layout.label(text="Select a light, a part, a cage or the camera")
         for each in found:
-            choice = self.layout.operator("optisense.vary", text=f"{each.label}:  {each.text}")
+            text = f"{each.label}:  {each.text}"
+            short = text if len(text) <= WIDEST else f"{text[: WIDEST - 4]} ..."
+            choice = self.layout.operator("optisense.vary", text=short)
             choice.label, choice.text = each.label, each.text
 
 
@@ -172,7 +149,7 @@ class OPTISENSE_OT_search(bpy.types.Operator):
             design=design,
             study=study,
             vary=vary.texts_of(search.vary),
-            objectives=[objective(search.objective)],
+            objectives=[objective(each) for each in search.objective.split(",")],
             method=search.method,
             seed=search.seed,
             workers=search.workers,

@@ -47,7 +47,8 @@ class OPTISENSE_PG_search(bpy.types.PropertyGroup):
     objective: StringProperty(
         name="Objective",
         default="aoap",
-        description="What to make as high as possible: a name, or FILE.py:FUNCTION of your own",
+        description="What to make as high as possible: a name, or FILE.py:FUNCTION of your own; "
+        "several, with commas between them, for the method pareto",
     )
     method: StringProperty(
         name="Method", default="cma-es", description="How the next trials are chosen"
