@@ -99,7 +99,7 @@ class OPTISENSE_OT_add_light(bpy.types.Operator):
             if max(self.colour) <= 0.0:
                 self.report({"ERROR"}, "A colour needs at least one channel above 0")
                 return {"CANCELLED"}
-            name = free_name(self.name or "white", design.light_groups)
+            name = free_name(self.name, design.light_groups, "light")
             values = {"model": self.model, "colour": self.colour, "flux": self.flux}
             group = add_light_group(design, name, values)
         else:
@@ -275,7 +275,9 @@ class OPTISENSE_OT_set_group(bpy.types.Operator):
             values = {"model": "smd-3528", "colour": (1.0, 1.0, 1.0), "flux": 2.0}
             if old is not None:
                 values = {"model": old.model, "colour": old.colour[:], "flux": old.flux}
-            group = add_light_group(design, free_name(self.name, design.light_groups), values)
+            group = add_light_group(
+                design, free_name(self.name, design.light_groups, "light"), values
+            )
         else:
             group = design.light_groups[self.group]
         for light in lights:

@@ -216,7 +216,10 @@ class OPTISENSE_OT_keep_material(bpy.types.Operator):
         else:
             kind = "material"
             values = material_values(context.scene.optisense.materials[own.material])
-        name = free_name(self.name, ())
+        name = free_name(self.name, (), "")
+        if not name:
+            self.report({"ERROR"}, "The name needs a letter from A to Z, or a digit")
+            return {"CANCELLED"}
         now = session.state()
         now.about, now.problem, now.hint, now.note = KEEPING, "", "", ""
         try:

@@ -174,7 +174,7 @@ def contact_values(
 
 def pressing(scene: bpy.types.Scene) -> list[bpy.types.Object]:
     """The contacts that are not hidden, in the order in which the engine is told of them."""
-    return [each for each in objects_of(scene, "CONTACT") if not each.hide_get()]
+    return [each for each in objects_of(scene, "CONTACT") if each.visible_get()]
 
 
 def contact_list(

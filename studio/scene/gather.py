@@ -111,9 +111,15 @@ def part_names(scene: bpy.types.Scene) -> dict[str, bpy.types.Object]:
     return found
 
 
-def free_name(wanted: str, taken: Any) -> str:
-    """A name as the design file allows it that is not taken yet."""
-    base = re.sub(r"[^A-Za-z0-9_-]+", "-", wanted).strip("-_")[:58] or "part"
+def free_name(wanted: str, taken: Any, instead: str = "part") -> str:
+    """A name as the design file allows it that is not taken yet.
+
+    Args:
+        wanted: of any letters.
+        taken: names, to ask `in` of.
+        instead: where nothing of it is allowed.
+    """
+    base = re.sub(r"[^A-Za-z0-9_-]+", "-", wanted).strip("-_")[:58] or instead
     name, number = base, 2
     while name in taken:
         name, number = f"{base}-{number}", number + 1

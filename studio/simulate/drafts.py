@@ -12,6 +12,7 @@ from ..engine import handing, session
 from . import requests
 
 NAME = "draft"
+NONE = "No draft: "
 KINDS = ("PART", "LIGHT", "CAMERA", "CAGE", "CONTACT")
 
 MOST_OPEN = 3
@@ -75,13 +76,15 @@ def _ask() -> None:
             )
         )
     except EngineError as error:
-        session.say(error)
+        _refused(error)
 
 
 def _take(result: dict[str, Any]) -> None:
     """Show a draft, and see to it that one that took things over does not stay."""
     global _again
     requests.take(result, draft=True)
+    if session.state().note.startswith(NONE):
+        session.state().note = ""
     settings = result["settings"]
     if (settings.get("kept_layers") or settings.get("kept_media")) and not _wanted:
         _again = time.monotonic() + REST
@@ -89,7 +92,7 @@ def _take(result: dict[str, Any]) -> None:
 
 def _refused(error: EngineError) -> None:
     if error.kind not in ("Replaced", "Cancelled"):
-        session.state().note = f"No draft: {error.message}"
+        session.state().note = f"{NONE}{error.message}"  # nothing is selected in mid-movement
         session.redraw()
 
 

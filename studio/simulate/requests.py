@@ -8,6 +8,7 @@ import bpy
 import numpy as np
 
 from ..engine import handing, session
+from ..scene.collections import objects_of
 from ..scene.contacts import pressing
 from ..scene.offending import select
 from . import picture, relight
@@ -18,9 +19,10 @@ LATEST = "picture"
 def resolution(scene: bpy.types.Scene) -> list[int] | None:
     """Width and height to simulate; None is the camera's own."""
     size = scene.optisense_simulation.size
-    if size == "CAMERA" or scene.camera is None:
+    cameras = objects_of(scene, "CAMERA")
+    if size == "CAMERA" or not cameras:
         return None
-    width, height = scene.camera.optisense.pixels
+    width, height = cameras[0].optisense.pixels
     return [int(size), max(1, round(int(size) * height / width))]
 
 
