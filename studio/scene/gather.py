@@ -9,6 +9,7 @@ from typing import Any
 
 import bpy
 
+from ..core import provenance
 from ..core.errors import SceneError
 from ..core.mesh_file import Mesh
 from ..core.numbers import kept, kept_list
@@ -74,6 +75,8 @@ def gather_document(scene: bpy.types.Scene) -> dict[str, Any]:
     if camera is None:
         raise SceneError("the sensor has no camera; add one in Lights and Camera")
     document["camera"] = camera
+    if "provenance" in before:
+        document["provenance"] = provenance.updated(before, document)
     return document
 
 

@@ -48,7 +48,7 @@ class OPTISENSE_OT_add_mesh(bpy.types.Operator):
     bl_options = {"REGISTER", "UNDO"}
 
     filepath: StringProperty(name="File", description="OBJ, STL or PLY", subtype="FILE_PATH")
-    filter_glob: StringProperty(default="*.obj;*.stl;*.ply;*.3mf;*.step;*.stp", options={"HIDDEN"})
+    filter_glob: StringProperty(default="*.obj;*.stl;*.ply", options={"HIDDEN"})
     scale: FloatProperty(
         name="Scale",
         description="From the file's units to mm: 1000 for metres, 25.4 for inches",
@@ -56,6 +56,10 @@ class OPTISENSE_OT_add_mesh(bpy.types.Operator):
         max=1e6,
         default=1.0,
     )
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return polls.in_object_mode(cls, context)
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         context.window_manager.fileselect_add(self)
