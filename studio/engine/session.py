@@ -17,6 +17,9 @@ from .preferences import HOW_TO_GET, engine_command
 TICK, BRISK = 0.05, 0.01
 """Seconds between two looks at the engine: as a rule, and while it owes an answer."""
 
+PATIENCE = 20.0
+"""Seconds that Blender waits at most for what is answered within a blink."""
+
 _engine: Engine | None = None
 _folder: str | None = None
 _job: Request | None = None
@@ -135,7 +138,17 @@ def ask_and_wait(what: str, **fields: Any) -> dict[str, Any]:
     answers: list[Any] = []
     running = engine()
     request = running.send(what, on_result=answers.append, on_error=answers.append, **fields)
-    running.wait(request, timeout=60.0)
+    try:
+        running.wait(request, timeout=PATIENCE)
+    except TimeoutError:
+        request.ignore()
+        raise EngineError(
+            {
+                "kind": "EngineBusy",
+                "message": f"the engine has not answered '{what}' for {PATIENCE:g} seconds",
+                "hint": "Try again in a moment",
+            }
+        ) from None
     if isinstance(answers[0], EngineError):
         raise answers[0]
     return answers[0]

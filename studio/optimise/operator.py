@@ -90,6 +90,14 @@ def _study(context: bpy.types.Context) -> str:
     return str(absolute(text)) if text else ""
 
 
+def _is_taken(folder: Path) -> bool:
+    """Whether something is in a folder; what can't be looked into, the engine tells of."""
+    try:
+        return folder.is_dir() and any(folder.iterdir())
+    except OSError:
+        return False
+
+
 def _new_study(context: bpy.types.Context) -> str:
     """A folder beside the design's that is not there yet."""
     folder = Path(context.scene.optisense.folder)
@@ -127,7 +135,7 @@ class OPTISENSE_OT_search(bpy.types.Operator):
     def _start(self, context: bpy.types.Context, *, wait: bool) -> set[str]:
         search = context.scene.optisense_search
         study = _study(context)
-        if not study or (Path(study).is_dir() and any(Path(study).iterdir())):
+        if not study or _is_taken(Path(study)):
             if not context.scene.optisense.is_saved:
                 self.report({"ERROR"}, "The folder of the study is not empty; name another one")
                 return {"CANCELLED"}

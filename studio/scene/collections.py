@@ -63,6 +63,8 @@ def clear(scene: bpy.types.Scene, *but: str) -> None:
                 bpy.data.meshes.remove(data)
             elif isinstance(data, bpy.types.Camera):
                 bpy.data.cameras.remove(data)
+            elif isinstance(data, bpy.types.Curve):
+                bpy.data.curves.remove(data)
 
 
 def _ours(scene: bpy.types.Scene) -> Iterator[bpy.types.Object]:

@@ -8,7 +8,6 @@ import bpy
 import numpy as np
 from bpy.props import EnumProperty, FloatProperty, StringProperty
 
-from ..core.engine import EngineError
 from ..core.mesh_file import Mesh
 from ..engine import polls, session
 from ..scene import kinds
@@ -18,6 +17,9 @@ from ..scene.contacts import add_contact, sensing_surface
 from ..scene.gather import free_name, part_names
 from ..scene.meshes import new_mesh, part_mesh
 from ..scene.paths import absolute
+
+READING = "Reading the mesh"
+"""What messages are about, so that they are told beside the button that was pressed."""
 
 PLACES = ("camera", "light")
 """References that lights and the camera are placed by; the others become parts."""
@@ -45,7 +47,7 @@ class OPTISENSE_OT_add_mesh(bpy.types.Operator):
 
     bl_idname = "optisense.add_mesh"
     bl_label = "Add .obj Mesh"
-    bl_options = {"REGISTER", "UNDO"}
+    bl_options = {"REGISTER"}
 
     filepath: StringProperty(name="File", description="OBJ, STL or PLY", subtype="FILE_PATH")
     filter_glob: StringProperty(default="*.obj;*.stl;*.ply", options={"HIDDEN"})
@@ -59,7 +61,7 @@ class OPTISENSE_OT_add_mesh(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        return polls.in_object_mode(cls, context)
+        return polls.is_idle(cls, context) and polls.in_object_mode(cls, context)
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         context.window_manager.fileselect_add(self)
@@ -67,22 +69,35 @@ class OPTISENSE_OT_add_mesh(bpy.types.Operator):
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         path = absolute(self.filepath)
-        try:
-            result = session.ask_and_wait("mesh", file=str(path), scale=self.scale)
-        except EngineError as error:
-            session.say(error)
-            self.report({"ERROR"}, error.text())
-            return {"CANCELLED"}
-        files = result["mesh"]
-        vertices = np.load(files["vertices"]).astype(np.float64)
-        mesh = Mesh(vertices, np.load(files["faces"]).astype(np.int32))
-        item = bpy.data.objects.new(path.stem, new_mesh(path.stem, mesh))
-        item.optisense.kind = "REFERENCE"
-        item.optisense.reference = "support" if result.get("closed") else "sensing_surface"
-        item.color = (0.6, 0.6, 0.6, 0.5)
-        collection(context.scene, REFERENCE).objects.link(item)
-        select_only(item)
-        return {"FINISHED"}
+        name = context.scene.name
+
+        def read(result: dict[str, Any]) -> None:
+            scene = bpy.data.scenes.get(name)
+            if scene is not None:
+                _bring(scene, path.stem, result)
+                session.push_undo(f"Add {path.name}")
+
+        # A large file takes a while.
+        done = session.start_job(
+            READING, "mesh", read, wait=bpy.app.background, file=str(path), scale=self.scale
+        )
+        if not done:
+            now = session.state()
+            self.report({"ERROR"}, f"{now.problem}. {now.hint}")
+        return {"FINISHED"} if done else {"CANCELLED"}
+
+
+def _bring(scene: bpy.types.Scene, name: str, result: dict[str, Any]) -> None:
+    """Put a mesh that the engine has read into the collection Reference."""
+    files = result["mesh"]
+    vertices = np.load(files["vertices"]).astype(np.float64)
+    mesh = Mesh(vertices, np.load(files["faces"]).astype(np.int32))
+    item = bpy.data.objects.new(name, new_mesh(name, mesh))
+    item.optisense.kind = "REFERENCE"
+    item.optisense.reference = "support" if result.get("closed") else "sensing_surface"
+    item.color = (0.6, 0.6, 0.6, 0.5)
+    collection(scene, REFERENCE).objects.link(item)
+    select_only(item)
 
 
 class OPTISENSE_OT_set_reference(bpy.types.Operator):

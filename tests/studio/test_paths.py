@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import os
+import signal
 from pathlib import Path
 from typing import Any
 
 import bpy
 import pytest
 
+from studio.core.engine import EngineError
 from studio.engine import session
 from studio.engine.preferences import engine_command
 from studio.scene.paths import absolute, suggested
@@ -85,3 +88,18 @@ def test_a_new_engine_knows_no_picture_of_the_one_before(mini: Any, tmp_path: Pa
     assert not bpy.ops.optisense.report.poll()
     mini.optisense.light_groups[0].flux = 0.0
     assert "Simulate again" in session.state().note
+
+
+def test_blender_does_not_wait_for_an_engine_that_hangs(
+    mini: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(session, "PATIENCE", 0.2)
+    running = session.engine()
+    os.kill(running.pid, signal.SIGSTOP)
+    try:
+        with pytest.raises(EngineError, match="has not answered 'entry'"):
+            session.ask_and_wait("entry", kind="camera", entry="gelsight-mini")
+    finally:
+        os.kill(running.pid, signal.SIGCONT)
+    monkeypatch.setattr(session, "PATIENCE", 20.0)
+    assert session.ask_and_wait("entry", kind="camera", entry="gelsight-mini")["entry"]
