@@ -96,6 +96,8 @@ def restart() -> None:
     """End the engine, and start it as the preferences now say; what goes wrong is said."""
     global _engine
     if _engine is not None:
+        if not _engine.alive:
+            _engine.abandon()  # whoever waits is told
         _engine.stop()
         _engine = None
     now = state()
@@ -198,13 +200,15 @@ def start_job(
 
     try:
         now.busy = title
-        _job = engine().send(what, on_result=result, on_error=_failed, on_event=event, **fields)
+        at_work = engine()
+        begun = _job = at_work.send(
+            what, on_result=result, on_error=_failed, on_event=event, **fields
+        )
     except EngineError as error:
         _failed(error)
         return False
     if wait:
-        if _job is not None:
-            engine().wait(_job)
+        at_work.wait(begun)
         return not state().problem
     redraw()
     return True
