@@ -17,6 +17,7 @@ from ..core.mesh_file import Mesh
 from ..scene.contacts import contact_list
 from ..scene.gather import caged_parts, gather_document, part_names
 from ..scene.meshes import REST, corners_of, part_mesh, shown_vertices
+from ..scene.paths import absolute
 from . import session
 
 _written: dict[str, bytes] = {}
@@ -86,12 +87,21 @@ def _digest(part: bpy.types.Object, *, caged: bool) -> bytes:
 
 
 def _copy_profiles(document: dict[str, Any], source: Path, folder: Path) -> None:
-    """IES files of the design go along."""
+    """IES files of the design go along; those from elsewhere join it under their own name."""
     for group in document["lights"].values():
         file = (group.get("emitter") or {}).get("file")
-        if file and (source / file).is_file() and source != folder:
-            (folder / file).parent.mkdir(parents=True, exist_ok=True)
-            shutil.copyfile(source / file, folder / file)
+        if not file:
+            continue
+        origin = source / file
+        if file.startswith("//") or Path(file).is_absolute() or ".." in Path(file).parts:
+            origin = absolute(file)
+            group["emitter"]["file"] = origin.name
+        inside = folder / group["emitter"]["file"]
+        if not origin.is_file():
+            origin = source / origin.name  # it joined the design when that was saved
+        if origin.is_file() and origin != inside:
+            inside.parent.mkdir(parents=True, exist_ok=True)
+            shutil.copyfile(origin, inside)
 
 
 def without_nulls(values: Any) -> Any:

@@ -121,7 +121,10 @@ class OPTISENSE_PG_light_group(bpy.types.PropertyGroup):
         name="Size", description="mm, of the window", size=2, min=1e-4, default=(2.0, 2.0),
         precision=3, update=_redraw_group,
     )  # fmt: skip
-    file: StringProperty(name="IES file", description="Inside the design's folder")
+    file: StringProperty(
+        name="IES file", subtype="FILE_PATH",
+        description="In the design's folder, or anywhere else: Save copies it to there",
+    )  # fmt: skip
     beam: FloatProperty(
         name="Beam", description="Degrees up to which a spot is full", min=0.01, max=90.0,
         default=30.0, update=_redraw_group,

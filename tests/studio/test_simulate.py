@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import bpy
@@ -11,6 +12,8 @@ import bpy
 from studio.engine import handing, session
 from studio.scene.collections import object_of, objects_of
 from studio.simulate import drafts
+
+IES = "IESNA:LM-63-2002\nTILT=NONE\n1 100 1 3 1 1 1 0 0 0\n1 1 1\n0 45 90\n0\n100 50 0\n"
 
 
 def test_pictures_have_the_proportions_of_the_sensors_camera(mini: Any) -> None:
@@ -22,6 +25,26 @@ def test_pictures_have_the_proportions_of_the_sensors_camera(mini: Any) -> None:
         mini.camera = camera
         assert bpy.ops.optisense.simulate() == {"FINISHED"}
         assert bpy.context.window_manager.optisense_picture.summary.startswith("160 x 80")
+
+
+def test_an_ies_file_from_anywhere_joins_the_design(mini: Any, tmp_path: Path) -> None:
+    elsewhere = tmp_path / "my lamps" / "lämp 1.ies"
+    elsewhere.parent.mkdir()
+    elsewhere.write_text(IES, encoding="ascii")
+    group = mini.optisense.light_groups["red"]
+    group.emitter, group.file = "ies", str(elsewhere)
+    bpy.ops.optisense.check()
+    assert not session.state().problem
+    assert bpy.ops.optisense.save_as(filepath=str(tmp_path / "mini")) == {"FINISHED"}
+    assert (tmp_path / "mini" / elsewhere.name).read_text() == IES
+    elsewhere.unlink()  # the design has one of its own now
+    assert bpy.ops.optisense.save() == {"FINISHED"}
+    assert bpy.ops.optisense.open(filepath=str(tmp_path / "mini" / "design.yaml")) == {"FINISHED"}
+    assert mini.optisense.light_groups["red"].file == elsewhere.name
+    mini.optisense.light_groups["red"].file = "../gone.ies"
+    bpy.ops.optisense.check()
+    assert "gone.ies" in session.state().problem
+    assert {each.optisense.group for each in bpy.context.selected_objects} == {"red"}
 
 
 def test_hidden_contacts_do_not_press(mini: Any) -> None:
