@@ -203,11 +203,19 @@ class Engine:
         on_event: Answer = _nothing,
         **fields: Any,
     ) -> Request:
-        """Ask for something; the answer comes through `poll`."""
+        """Ask for something; the answer comes through `poll`.
+
+        Raises:
+            EngineError: a number is not finite.
+        """
         self._number += 1
         request = Request(self._number, what, on_result, on_error, on_event)
+        try:
+            line = json.dumps({"id": request.number, "do": what, **fields}, allow_nan=False)
+        except ValueError as error:
+            row = {"kind": "DesignError", "message": "a number in the scene is not finite"}
+            raise EngineError(row) from error
         self._requests[request.number] = request
-        line = json.dumps({"id": request.number, "do": what, **fields}, allow_nan=False)
         self._unsent += line.encode() + b"\n"
         self._write()
         return request

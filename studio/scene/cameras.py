@@ -68,7 +68,10 @@ def camera_values(scene: bpy.types.Scene) -> dict[str, Any] | None:
     camera = cameras[0]
     values = camera.optisense
     before = json.loads(values.data) if values.data else {}
-    pose = pose_of(np.array(camera.matrix_world), before, up=True)
+    try:
+        pose = pose_of(np.array(camera.matrix_world), before, up=True)
+    except ValueError as error:
+        raise SceneError(f"the camera {error}", "camera") from error
     return {
         "model": values.model,
         "projection": values.projection,

@@ -183,9 +183,10 @@ def _lights(scene: bpy.types.Scene, before: dict[str, Any]) -> dict[str, Any]:
                 f"lights.{name}",
             )
     for group in scene.optisense.light_groups:
-        poses = [light_pose(each) for each in lights if each.optisense.group == group.name]
-        if not poses:
+        members = [each for each in lights if each.optisense.group == group.name]
+        if not members:
             continue
+        poses = [_pose(each, number) for number, each in enumerate(members)]
         was = before.get(group.name, {})
         values: dict[str, Any] = {
             "model": group.model,
@@ -197,6 +198,15 @@ def _lights(scene: bpy.types.Scene, before: dict[str, Any]) -> dict[str, Any]:
             values["emitter"] = emitter
         groups[group.name] = {**values, "lights": poses}
     return groups
+
+
+def _pose(light: bpy.types.Object, number: int) -> dict[str, Any]:
+    """The pose of a light, which has this number in its group."""
+    try:
+        return light_pose(light)
+    except ValueError as error:
+        path = f"lights.{light.optisense.group}.lights[{number}]"
+        raise SceneError(f"light '{light.name}' {error}", path) from error
 
 
 def _emitter(group: bpy.types.PropertyGroup, was: dict[str, Any]) -> dict[str, Any] | None:

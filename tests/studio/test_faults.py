@@ -43,8 +43,23 @@ def lose_a_point() -> None:
         (lambda: copy(first("CAGE")), "Two cages", ["cage skin", "cage skin.001"]),
         (lambda: copy(first("CAMERA")), "2 cameras", ["camera", "camera.001"]),
         (lambda: setattr(first("LIGHT").optisense, "group", "gone"), "group 'gone'", ["red"]),
+        (
+            lambda: setattr(objects_of(bpy.context.scene, "LIGHT")[1], "scale", (0, 0, 0)),
+            "scaled to nothing",
+            ["red.001"],
+        ),
+        (lambda: setattr(first("CAMERA").location, "x", float("nan")), "nowhere", ["camera"]),
     ],
-    ids=["empty mesh", "field of view", "lost point", "two cages", "two cameras", "no group"],
+    ids=[
+        "empty mesh",
+        "field of view",
+        "lost point",
+        "two cages",
+        "two cameras",
+        "no group",
+        "no size",
+        "no place",
+    ],
 )
 def test_what_is_wrong_is_selected_and_named(
     spoil: Callable[[], Any], words: str, selected: list[str], mini: Any
