@@ -9,7 +9,7 @@ from bpy.props import BoolProperty, StringProperty
 
 from ..core.engine import EngineError
 from ..engine import handing, polls, session
-from ..scene.paths import absolute, suggested
+from ..scene.paths import chosen, suggested
 
 
 class OPTISENSE_OT_report(bpy.types.Operator):
@@ -38,7 +38,12 @@ class OPTISENSE_OT_report(bpy.types.Operator):
         return {"RUNNING_MODAL"}
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        path = absolute(self.filepath)
+        path = chosen(self, "a file")
+        if path is None:
+            return {"CANCELLED"}
+        if path.is_dir():
+            self.report({"ERROR"}, f"{path} is a folder; name a file in it")
+            return {"CANCELLED"}
         if path.suffix.lower() not in (".html", ".htm"):
             path = path.with_name(f"{path.name}.html")
         image = context.window_manager.optisense_picture.image
@@ -79,12 +84,15 @@ class OPTISENSE_OT_export(bpy.types.Operator):
         return {"RUNNING_MODAL"}
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        chosen = {"stl": self.stl, "obj": self.obj, "3mf": self.three_mf, "step": self.step}
-        formats = [name for name, wanted in chosen.items() if wanted]
+        wanted = {"stl": self.stl, "obj": self.obj, "3mf": self.three_mf, "step": self.step}
+        formats = [name for name, is_wanted in wanted.items() if is_wanted]
         if not formats:
             self.report({"ERROR"}, "Choose a format")
             return {"CANCELLED"}
-        folder = str(absolute(self.filepath))
+        target = chosen(self, "a folder")
+        if target is None:
+            return {"CANCELLED"}
+        folder = str(target)
 
         def written(result: dict[str, Any]) -> None:
             session.state().note = f"{len(result['files'])} files in {folder}"

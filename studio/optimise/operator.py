@@ -11,7 +11,7 @@ from bpy.props import StringProperty
 from ..core import vary
 from ..core.engine import EngineError
 from ..engine import handing, polls, session
-from ..scene.paths import absolute, objective
+from ..scene.paths import absolute, chosen, objective
 from ..sensor.opening import new_stage, open_stage
 from . import following
 from .suggesting import suggestions
@@ -269,13 +269,20 @@ class OPTISENSE_OT_keep_variant(_WithStudy, bpy.types.Operator):
         return {"RUNNING_MODAL"}
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        target = str(absolute(self.filepath))
+        target = chosen(self, "a folder")
+        if target is None:
+            return {"CANCELLED"}
 
         def kept(result: dict[str, Any]) -> None:
             session.state().note = f"Written to {result['folder']}"
 
         done = session.start_job(
-            "Applying", "apply", kept, wait=bpy.app.background, study=_study(context), to=target
+            "Applying",
+            "apply",
+            kept,
+            wait=bpy.app.background,
+            study=_study(context),
+            to=str(target),
         )
         if not done:
             self.report({"ERROR"}, session.state().problem)

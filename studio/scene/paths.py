@@ -22,6 +22,19 @@ def absolute(text: str) -> Path:
     return (base / Path(text.strip().removeprefix("//")).expanduser()).resolve()
 
 
+def chosen(operator: bpy.types.Operator, what: str) -> Path | None:
+    """The path that a file selector gave an operator; where it gave none, the user is told so.
+
+    Args:
+        operator: has a `filepath`.
+        what: a file or a folder, in words.
+    """
+    if not operator.filepath.strip():
+        operator.report({"ERROR"}, f"Name {what} first")
+        return None
+    return absolute(operator.filepath)
+
+
 def suggested(scene: bpy.types.Scene, end: str = "") -> str:
     """A path for a file or folder that is named after a scene's sensor."""
     name = re.sub(r'[\\/:*?"<>|\x00-\x1f]+', "-", scene.optisense.title).strip(" .-")[:LONGEST]

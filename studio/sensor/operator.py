@@ -10,7 +10,7 @@ from bpy.props import StringProperty
 
 from ..core.engine import EngineError
 from ..engine import catalogue, handing, polls, session
-from ..scene.paths import absolute, suggested
+from ..scene.paths import chosen, suggested
 from .opening import open_source
 
 
@@ -90,7 +90,9 @@ class OPTISENSE_OT_open(_Opens, bpy.types.Operator):
         return {"RUNNING_MODAL"}
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        path = absolute(self.filepath)
+        path = chosen(self, "a design.yaml")
+        if path is None:
+            return {"CANCELLED"}
         folder = path.parent if path.suffix in (".yaml", ".yml") else path
         return self._open(context, str(folder), str(folder), wait=bpy.app.background)
 
@@ -164,7 +166,8 @@ class OPTISENSE_OT_save_as(_Saves, bpy.types.Operator):
         return {"RUNNING_MODAL"}
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        return self._save(context, str(absolute(self.filepath)))
+        folder = chosen(self, "a folder")
+        return {"CANCELLED"} if folder is None else self._save(context, str(folder))
 
 
 class OPTISENSE_OT_check(bpy.types.Operator):

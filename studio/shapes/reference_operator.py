@@ -16,7 +16,7 @@ from ..scene.collections import REFERENCE, collection, select_only
 from ..scene.contacts import add_contact, sensing_surface
 from ..scene.gather import free_name, part_names
 from ..scene.meshes import new_mesh, part_mesh
-from ..scene.paths import absolute
+from ..scene.paths import chosen
 
 READING = "Reading the mesh"
 """What messages are about, so that they are told beside the button that was pressed."""
@@ -68,7 +68,9 @@ class OPTISENSE_OT_add_mesh(bpy.types.Operator):
         return {"RUNNING_MODAL"}
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        path = absolute(self.filepath)
+        path = chosen(self, "a mesh file")
+        if path is None:
+            return {"CANCELLED"}
         name = context.scene.name
 
         def read(result: dict[str, Any]) -> None:

@@ -44,6 +44,20 @@ def test_a_report_keeps_the_dots_of_its_name(mini: Any, tmp_path: Path) -> None:
     assert [each.name for each in tmp_path.iterdir()] == ["mini v1.2.html"]
 
 
+def test_nothing_is_written_where_nothing_was_named(mini: Any, tmp_path: Path) -> None:
+    mini.optisense_simulation.size, mini.optisense_simulation.noise = "160", 50.0
+    assert bpy.ops.optisense.simulate() == {"FINISHED"}
+    mini.optisense_search.study = str(tmp_path / "study")
+    for name in ("report", "export", "save_as", "open", "keep_variant", "add_mesh"):
+        with pytest.raises(RuntimeError, match="Name a"):
+            getattr(bpy.ops.optisense, name)(filepath=" ")
+    folder = tmp_path / "pages"
+    folder.mkdir()
+    with pytest.raises(RuntimeError, match="is a folder"):
+        bpy.ops.optisense.report(filepath=str(folder))
+    assert list(tmp_path.iterdir()) == [folder] and not list(folder.iterdir())
+
+
 def test_an_own_objective_lies_beside_the_blend_file(mini: Any, tmp_path: Path) -> None:
     goal = tmp_path / "my goal.py"
     goal.write_text("def shine(evaluation):\n    return evaluation.design.coating.specularity\n")
