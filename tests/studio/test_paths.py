@@ -67,7 +67,7 @@ def test_an_own_objective_lies_beside_the_blend_file(mini: Any, tmp_path: Path) 
     search = bpy.context.scene.optisense_search
     found.objective_choice = "OWN"
     assert search.objective == "my goal.py:shine"
-    search.method, search.study = "grid", "//study 1"
+    search.method, search.study = "grid", "study 1"
     bpy.ops.optisense.vary(label="specularity", text="coating.specularity=0.1,0.7,0.3")
     assert bpy.ops.optisense.search() == {"FINISHED"}
     assert found.best == "0.7" and (tmp_path / "study 1" / "design").is_dir()
