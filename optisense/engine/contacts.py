@@ -82,6 +82,7 @@ class GivenContact(_Given):
     point: tuple[float, float, float] | None = None
     depth: float = 0.5
     rotation: float = 0.0
+    along: tuple[float, float, float] | None = None
 
 
 AnyContact = str | GivenContact
@@ -117,6 +118,7 @@ def contact_of(given: AnyContact) -> Contact:
         point=given.point,
         depth=given.depth,
         rotation=given.rotation,
+        along=given.along,
     )
 
 
@@ -184,5 +186,6 @@ def plain_contact(contact: Contact, indenter: GivenIndenter) -> dict[str, Any]:
         point=contact.point,
         depth=contact.depth,
         rotation=contact.rotation,
+        along=contact.along,
     )
     return given.model_dump(exclude_none=True)

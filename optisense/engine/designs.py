@@ -169,12 +169,21 @@ class Designs:
         for name, part in design.parts.items():
             if name not in elsewhere:
                 path = _inside(base, part.mesh, f"parts.{name}.mesh")
-                design.meshes[name] = self._checked(self.mesh(str(path)), name, part.role)
+                design.meshes[name] = self._checked(self._read(path, name), name, part.role)
         for name, group in design.lights.items():
             if isinstance(group.emitter, IesEmitter):
                 _inside(base, group.emitter.file, f"lights.{name}.emitter.file")
                 group.emitter._folder = base
         return design
+
+    def _read(self, path: Path, part: str) -> TriangleMesh:
+        """The mesh of a part; what is wrong with its file names the part."""
+        try:
+            return self.mesh(str(path))
+        except MeshError as error:
+            raise MeshError(
+                f"part '{part}': {error.message}", where=f"parts.{part}.mesh", hint=error.hint
+            ) from error
 
     def _with_meshes(self, design: SensorDesign, meshes: Mapping[str, AnyMesh]) -> SensorDesign:
         design = design.copy()

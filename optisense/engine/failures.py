@@ -134,6 +134,8 @@ def place_in(message: str, parts: object = None) -> str | None:
             return str(text)
         if text in known:
             return f"parts.{text}"
+        if text in ("camera", "coating"):
+            return text
     return None
 
 

@@ -62,7 +62,9 @@ def entries(session: Session, fields: OfKind, job: Job) -> dict[str, Any]:
         job.check()
         entry = library.entry(fields.kind, name)
         own = library.is_own(fields.kind, name)
-        rows.append({"name": name, "description": entry.description, "own": own})
+        row = {"name": name, "description": entry.description, "own": own}
+        value_kind = getattr(entry.value, "kind", None)
+        rows.append(row | ({} if value_kind is None else {"kind": value_kind}))
     return {"entries": rows}
 
 

@@ -12,6 +12,7 @@ import argparse
 import contextlib
 import json
 import os
+import signal
 import sys
 import threading
 import time
@@ -40,19 +41,23 @@ def main() -> None:
     parser.add_argument("--go-on", action="store_true")
     given = parser.parse_args()
     channel = Channel.of_standard_output()
-    threading.Thread(target=_listen, args=(given.go_on,), daemon=True).start()
+    working = threading.Event()
+    threading.Thread(target=_listen, args=(given.go_on, working), daemon=True).start()
     with contextlib.suppress(OSError, AttributeError):
         os.nice(NICENESS)
-    channel.send(_run(given.study, given.workers, given.budget))
+    channel.send(_run(given.study, given.workers, given.budget, working))
     channel.close()
     sys.stderr.flush()
     os._exit(0)
 
 
-def _run(folder: Path, workers: int, budget: int | None) -> dict[str, Any]:
-    """Run a study; its result, or the error, as data."""
+def _run(
+    folder: Path, workers: int, budget: int | None, working: threading.Event
+) -> dict[str, Any]:
+    """Run a study; its result, or the error, as data. Interrupts are for while `working` is set."""
     mark = folder / PROCESS_FILE
     try:
+        working.set()
         from optisense.search import Study, run_study
 
         study = Study.open(folder)
@@ -78,10 +83,13 @@ def _run(folder: Path, workers: int, budget: int | None) -> dict[str, Any]:
     except Exception as error:
         traceback.print_exc()
         return {"error": as_data(error)}
+    finally:
+        signal.signal(signal.SIGINT, signal.SIG_IGN)  # it ends anyway
 
 
-def _listen(go_on: bool) -> None:
-    """Turn what comes on standard input into Ctrl-C."""
+def _listen(go_on: bool, working: threading.Event) -> None:
+    """Turn what comes on standard input into Ctrl-C, from when there is work to interrupt."""
+    working.wait()
     asked = False
     for line in sys.stdin.buffer:
         if line.strip() == b"stop":

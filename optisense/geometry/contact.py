@@ -33,6 +33,8 @@ class Contact:
         depth: mm, from the undeformed surface to the indenter's lowest point.
         rotation: degrees about the outward normal, counter-clockwise seen from outside, from
             the position in which the indenter's x axis runs along u.
+        along: (3,) direction in the design's frame that the x axis runs along instead of u, as
+            far as the surface allows.
     """
 
     indenter: Indenter
@@ -40,6 +42,7 @@ class Contact:
     point: tuple[float, float, float] | None = None
     depth: float = 0.5
     rotation: float = 0.0
+    along: tuple[float, float, float] | None = None
 
     def __post_init__(self) -> None:
         if self.at is not None and self.point is not None:
@@ -58,6 +61,10 @@ class Contact:
             )
         if not math.isfinite(self.rotation):
             raise ContactError("the rotation of a contact is not finite", hint="give degrees")
+        if self.along is not None and not (
+            np.isfinite(self.along).all() and np.linalg.norm(self.along) > 0.0
+        ):
+            raise ContactError("the direction of a contact is none", hint="give `along` as x, y, z")
 
 
 def locate(contact: Contact, surface: SensingSurface) -> SurfacePoint:
@@ -115,7 +122,7 @@ def place(
             )
     reach = contact.depth + surface.height_above(spot) + REACH_MARGIN
     pose = np.eye(4)
-    pose[:3, :3] = _axes(spot.inward, surface, contact.rotation)
+    pose[:3, :3] = _axes(spot.inward, surface, contact)
     pose[:3, 3] = spot.point + contact.depth * spot.inward
     return contact.indenter.mesh(reach, facet_error).transformed(pose)
 
@@ -144,16 +151,20 @@ def available_depth(point: ArrayLike, inward: ArrayLike, gel: TriangleMesh) -> f
 
 
 def _axes(
-    inward: NDArray[np.float64], surface: SensingSurface, rotation: float
+    inward: NDArray[np.float64], surface: SensingSurface, contact: Contact
 ) -> NDArray[np.float64]:
-    """(3, 3): columns are the indenter's x, y, z; z is outward, x along u, then turned."""
+    """(3, 3): columns are the indenter's x, y, z; z is outward, x along u or as told, turned."""
     z = -inward
-    x = surface.u_axis - (surface.u_axis @ z) * z
+    along = surface.u_axis
+    if contact.along is not None:
+        along = np.asarray(contact.along, dtype=np.float64)
+        along = along / np.linalg.norm(along)
+    x = along - (along @ z) * z
     if np.linalg.norm(x) < 1e-6:  # the surface has turned by 90 degrees since the origin
         x = np.cross(surface.v_axis, z)
     x = x / np.linalg.norm(x)
     y = np.cross(z, x)
-    a = math.radians(rotation)
+    a = math.radians(contact.rotation)
     return np.column_stack(
         [math.cos(a) * x + math.sin(a) * y, math.cos(a) * y - math.sin(a) * x, z]
     )

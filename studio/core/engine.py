@@ -11,6 +11,7 @@ from __future__ import annotations
 import contextlib
 import json
 import os
+import shlex
 import subprocess
 import sys
 import tempfile
@@ -24,6 +25,9 @@ from typing import Any
 PROTOCOL = 1
 CLIENT = "optisense-blender 0.1.0"
 SHUTDOWN_SECONDS = 2.0
+GREETING_SECONDS = 30.0
+"""An engine says hello before it loads anything large."""
+ELSEWHERE = "Set the engine's path in the preferences of the extension"
 LOG_LINES = 40
 PIECE = 1 << 16
 
@@ -54,7 +58,7 @@ class EngineError(Exception):
     def text(self) -> str:
         """Everything in one line."""
         where = f" ({self.where})" if self.where else ""
-        hint = f". {self.hint}" if self.hint else ""
+        hint = f". {self.hint[:1].upper()}{self.hint[1:]}" if self.hint else ""
         return f"{self.message[:1].upper()}{self.message[1:]}{where}{hint}"
 
 
@@ -68,6 +72,10 @@ class Request:
     on_error: Callable[[EngineError], None]
     on_event: Answer
     done: bool = field(default=False)
+
+    def ignore(self) -> None:
+        """Whatever comes, nobody is told."""
+        self.on_result = self.on_error = self.on_event = _nothing
 
 
 def _nothing(_: Any) -> None:
@@ -149,14 +157,15 @@ class Engine:
                     "kind": "EngineGone",
                     "message": f"the engine can't be started: {error.strerror or error}",
                     "where": command[0],
-                    "hint": "Set its path in the preferences of the extension",
+                    "hint": ELSEWHERE,
                 }
             ) from error
         assert self._process.stdin is not None
         self._pipe = self._process.stdin
         if os.name != "nt":  # Windows waits when a request is larger than its pipe
             os.set_blocking(self._pipe.fileno(), False)
-        self.send(
+        self._started = time.monotonic()
+        self._hello = self.send(
             "hello",
             protocol=PROTOCOL,
             client=CLIENT,
@@ -194,11 +203,19 @@ class Engine:
         on_event: Answer = _nothing,
         **fields: Any,
     ) -> Request:
-        """Ask for something; the answer comes through `poll`."""
+        """Ask for something; the answer comes through `poll`.
+
+        Raises:
+            EngineError: a number is not finite.
+        """
         self._number += 1
         request = Request(self._number, what, on_result, on_error, on_event)
+        try:
+            line = json.dumps({"id": request.number, "do": what, **fields}, allow_nan=False)
+        except ValueError as error:
+            row = {"kind": "DesignError", "message": "a number in the scene is not finite"}
+            raise EngineError(row) from error
         self._requests[request.number] = request
-        line = json.dumps({"id": request.number, "do": what, **fields}, allow_nan=False)
         self._unsent += line.encode() + b"\n"
         self._write()
         return request
@@ -221,6 +238,17 @@ class Engine:
             self._take(self._lines.popleft())
         if over and not self._gone:
             self._ended()
+        elif not self._hello.done and time.monotonic() - self._started > GREETING_SECONDS:
+            self._refused(
+                EngineError(
+                    {
+                        "kind": "EngineGone",
+                        "message": "this program does not answer as an engine does",
+                        "where": shlex.join(self.command),
+                        "hint": ELSEWHERE,
+                    }
+                )
+            )
         return any_came or over
 
     def wait(self, request: Request, timeout: float = 600.0) -> None:
@@ -279,9 +307,11 @@ class Engine:
         try:
             message = json.loads(line)
         except ValueError:
+            message = None
+        if not isinstance(message, dict):  # it is no engine, or a library of it prints
             self.log.append(line)
             return
-        request = self._requests.get(message.get("id"))
+        request = self._requests.get(message.get("id", 0))
         if request is None:
             return
         if "ok" not in message:
@@ -302,12 +332,13 @@ class Engine:
             self._pipe.close()
         self._close_files()
         last = self.log[-1] if self.log else None
+        again = "Your scene is unharmed; the next request starts the engine again"
         error = EngineError(
             {
                 "kind": "EngineGone",
                 "message": f"the engine ended unexpectedly (exit code {self._process.returncode})",
                 "where": last,
-                "hint": "Your scene is unharmed; the next request starts the engine again",
+                "hint": again if self._hello.done else ELSEWHERE,
             }
         )
         self.end = self._refusal or error

@@ -47,9 +47,15 @@ def pose_of(matrix: ArrayLike, original: dict[str, Any] | None, *, up: bool) -> 
         matrix: (4, 4) of the object in the world.
         original: the pose as it was read, if it was.
         up: whether the result must have an `up`, even if the original has none.
+
+    Raises:
+        ValueError: the object is scaled to nothing, or its place is not finite.
     """
     world = np.asarray(matrix, dtype=np.float64)
-    axes = world[:3, :3] / np.linalg.norm(world[:3, :3], axis=0)
+    lengths = np.linalg.norm(world[:3, :3], axis=0)
+    if not (np.isfinite(world).all() and (lengths > 0.0).all()):
+        raise ValueError("is scaled to nothing, or nowhere; give it a place, and a scale of 1")
+    axes = world[:3, :3] / lengths
     before = original or {}
     result: dict[str, Any] = {
         "position": kept_list(before.get("position"), world[:3, 3].tolist()),

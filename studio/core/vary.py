@@ -13,6 +13,10 @@ REACH = 2.0
 """mm to either side that a pose may move, until the user says otherwise."""
 
 
+TURN = 10.0
+"""Degrees to either side that a direction may turn, until the user says otherwise."""
+
+
 @dataclass(frozen=True)
 class Suggestion:
     """A parameter of a search: a label, and the text that the engine reads."""
@@ -21,46 +25,109 @@ class Suggestion:
     text: str
 
 
-def for_camera() -> list[Suggestion]:
-    """Where the camera is, and how wide it sees."""
+def for_camera(model: str = "", models: Sequence[str] = ()) -> list[Suggestion]:
+    """Where the camera is and looks, how wide it sees, which one it is.
+
+    Args:
+        model: the library camera that it is now.
+        models: those of the library.
+    """
     places = [Suggestion(f"Camera {axis}", f"camera.position.{axis}=+-{REACH:g}") for axis in "xyz"]
-    return [*places, Suggestion("Field of view", "camera.fov=+-5")]
-
-
-def for_light(group: str, index: int) -> list[Suggestion]:
-    """Where one light is, and what its whole group is like."""
-    place = f"lights.{group}.lights[{index}].position"
-    each = [Suggestion(f"{group} {index} {axis}", f"{place}.{axis}=+-{REACH:g}") for axis in "xyz"]
-    whole = [
-        Suggestion(f"All of {group}, {axis}", f"lights.{group}.shift.{axis}=-{REACH:g}:{REACH:g}")
-        for axis in "xyz"
-    ]
-    return [*each, *whole, *for_group(group)]
-
-
-def for_group(group: str) -> list[Suggestion]:
-    """How bright and of which colour a group is."""
     return [
-        Suggestion(f"{group} flux", f"lights.{group}.flux=0:5"),
-        Suggestion(f"{group} colour", f"lights.{group}.colour=red,green,blue,white"),
+        *places,
+        Suggestion("Field of view", "camera.fov=+-5"),
+        Suggestion("Camera direction", f"camera.turn=+-{TURN:g}"),
+        *_one_of("Camera model", "camera.model", model, models),
     ]
 
 
-def for_part(role: str, material: str, kind: str) -> list[Suggestion]:
-    """What a part is made of."""
-    if role == "sensing_surface":
-        return [
-            Suggestion("Specularity", "coating.specularity=0:1"),
-            *(Suggestion(f"Reflectance {c}", f"coating.reflectance.{c}=0.05:0.9") for c in "rgb"),
-        ]
+def for_light(
+    group: str, index: int, *, flux: float = 1.0, model: str = "", models: Sequence[str] = ()
+) -> list[Suggestion]:
+    """Where one light is and shines, and what its whole group is like.
+
+    Args:
+        group: its light group.
+        index: its number in the group.
+        flux: mW, of each light now.
+        model: the library light that it is now.
+        models: those of the library.
+    """
+    light, whole = f"lights.{group}.lights[{index}]", f"lights.{group}"
+    return [
+        *(_move(f"{group} {index} {axis}", f"{light}.position.{axis}") for axis in "xyz"),
+        Suggestion(f"{group} {index} direction", f"{light}.turn=+-{TURN:g}"),
+        *(_move(f"All of {group}, {axis}", f"{whole}.shift.{axis}") for axis in "xyz"),
+        Suggestion(f"All of {group}, direction", f"{whole}.turn=+-{TURN:g}"),
+        Suggestion(f"{group} flux", f"{whole}.flux={_around(flux, 0.0, max(5.0, 2.0 * flux))}"),
+        Suggestion(f"{group} colour", f"{whole}.colour=red,green,blue,white"),
+        *_one_of(f"{group} model", f"{whole}.model", model, models),
+    ]
+
+
+def for_surface(
+    library: str, libraries: Sequence[str], specularity: float, reflectance: Sequence[float]
+) -> list[Suggestion]:
+    """What the sensing surface is coated with.
+
+    Args:
+        library: the library coating that it is now.
+        libraries: those of the library.
+        specularity, reflectance: of the coating now; the latter of R, G, B.
+    """
+    return [
+        Suggestion("Specularity", f"coating.specularity={_around(specularity, 0.0, 1.0)}"),
+        *(
+            Suggestion(f"Reflectance {c}", f"coating.reflectance.{c}={_around(now, 0.05, 0.9)}")
+            for c, now in zip("rgb", reflectance, strict=True)
+        ),
+        *_one_of("Coating", "coating.library", library, libraries),
+    ]
+
+
+def for_pose(part: str) -> list[Suggestion]:
+    """Where a part is that no cage moves, and how it is turned."""
+    return [
+        *(_move(f"{part} {axis}", f"parts.{part}.shift.{axis}") for axis in "xyz"),
+        Suggestion(f"{part} direction", f"parts.{part}.turn=+-{TURN:g}"),
+    ]
+
+
+def for_material(
+    part: str, material: str, kind: str, roughness: float, choices: Sequence[str]
+) -> list[Suggestion]:
+    """What a part is made of.
+
+    Args:
+        part: its name.
+        material: its name.
+        kind: of the material; empty where the part has none.
+        roughness: of the material now.
+        choices: materials of the library that suit the part.
+    """
+    path = f"materials.{material}"
+    found = []
     if kind == "dielectric":
-        return [
-            Suggestion(f"{material} index", f"materials.{material}.ior=+-0.1"),
-            Suggestion(f"{material} roughness", f"materials.{material}.roughness=0:0.5"),
-        ]
-    if kind == "conductor":
-        return [Suggestion(f"{material} roughness", f"materials.{material}.roughness=0:0.5")]
-    return []
+        found.append(Suggestion(f"{material} index", f"{path}.ior=+-0.1"))
+    if kind in ("dielectric", "conductor"):
+        rough = _around(roughness, 0.0, 0.5)
+        found.append(Suggestion(f"{material} roughness", f"{path}.roughness={rough}"))
+    return [*found, *_one_of(f"{part} material", f"parts.{part}.material", material, choices)]
+
+
+def _move(label: str, path: str) -> Suggestion:
+    return Suggestion(label, f"{path}=+-{REACH:g}")
+
+
+def _around(now: float, low: float, high: float) -> str:
+    """A range that what is there now lies in: a search starts from it."""
+    return f"{min(low, now):.6g}:{max(high, now):.6g}"
+
+
+def _one_of(label: str, path: str, now: str, names: Sequence[str]) -> list[Suggestion]:
+    """One of several names, what is there now the first of them; none where there is no choice."""
+    choices = sorted(names, key=lambda name: name != now)
+    return [Suggestion(label, f"{path}={','.join(choices)}")] if len(choices) > 1 else []
 
 
 def for_cage(

@@ -12,8 +12,12 @@ import numpy as np
 
 from ..core import mesh_file
 from ..core.engine import EngineError
+from ..core.errors import SceneError
+from ..core.mesh_file import Mesh
+from ..scene.contacts import contact_list
 from ..scene.gather import caged_parts, gather_document, part_names
 from ..scene.meshes import REST, corners_of, part_mesh, shown_vertices
+from ..scene.paths import absolute
 from . import session
 
 _written: dict[str, bytes] = {}
@@ -28,8 +32,9 @@ def design(scene: bpy.types.Scene) -> dict[str, Any]:
     folder = Path(session.folder()) / "design"
     try:
         document = gather_document(scene)
-    except ValueError as error:
-        raise EngineError({"kind": "DesignError", "message": str(error)}) from error
+    except SceneError as error:
+        row = {"kind": "DesignError", "message": str(error), "path": error.path}
+        raise EngineError(row) from error
     caged = caged_parts(document)
     for name, part in part_names(scene).items():
         path = folder / document["parts"][name]["mesh"]
@@ -41,12 +46,34 @@ def design(scene: bpy.types.Scene) -> dict[str, Any]:
     return {"data": document, "folder": str(folder)}
 
 
+def contacts(scene: bpy.types.Scene) -> list[dict[str, Any]]:
+    """The scene's contacts that press, as requests to the engine name them.
+
+    Raises:
+        EngineError: there is no engine.
+    """
+    folder = Path(session.folder()) / "indenters"
+
+    def write(mesh: Mesh) -> str:
+        text = hashlib.blake2b(mesh.vertices.tobytes() + mesh.faces.tobytes(), digest_size=16)
+        path = folder / f"{text.hexdigest()}.obj"
+        if not path.is_file():
+            mesh_file.write(mesh, path)
+        return str(path)
+
+    return contact_list(scene, bpy.context.evaluated_depsgraph_get(), write)
+
+
 def _digest(part: bpy.types.Object, *, caged: bool) -> bytes:
     """Tells whether a part's mesh at rest changed."""
     if part.mode == "EDIT":
         part.update_from_editmode()
     mesh = part.data
     text = hashlib.blake2b(digest_size=16)
+    if part.modifiers and not caged:
+        made = part_mesh(part, caged=False)
+        text.update(made.vertices.tobytes() + made.faces.tobytes())
+        return text.digest()
     attribute = mesh.attributes.get(f"{REST}_0") if caged else None
     if attribute is not None:
         rest = np.empty(3 * len(mesh.vertices), dtype=np.float32)
@@ -60,12 +87,21 @@ def _digest(part: bpy.types.Object, *, caged: bool) -> bytes:
 
 
 def _copy_profiles(document: dict[str, Any], source: Path, folder: Path) -> None:
-    """IES files of the design go along."""
+    """IES files of the design go along; those from elsewhere join it under their own name."""
     for group in document["lights"].values():
         file = (group.get("emitter") or {}).get("file")
-        if file and (source / file).is_file() and source != folder:
-            (folder / file).parent.mkdir(parents=True, exist_ok=True)
-            shutil.copyfile(source / file, folder / file)
+        if not file:
+            continue
+        origin = source / file
+        if file.startswith("//") or Path(file).is_absolute() or ".." in Path(file).parts:
+            origin = absolute(file)
+            group["emitter"]["file"] = origin.name
+        inside = folder / group["emitter"]["file"]
+        if not origin.is_file():
+            origin = source / origin.name  # it joined the design when that was saved
+        if origin.is_file() and origin != inside:
+            inside.parent.mkdir(parents=True, exist_ok=True)
+            shutil.copyfile(origin, inside)
 
 
 def without_nulls(values: Any) -> Any:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import shlex
 import shutil
+from pathlib import Path
 
 import bpy
 from bpy.props import StringProperty
@@ -58,9 +59,18 @@ def engine_command() -> list[str]:
     told = own.engine.strip() if own is not None else ""
     told = told or os.environ.get(ENVIRONMENT, "")
     if told:
-        return [told] if os.path.isfile(told) else shlex.split(told)  # noqa: PTH113
+        return _split(told)
     found = shutil.which("optisense")
     return [found, "engine"] if found else []
+
+
+def _split(told: str) -> list[str]:
+    """The words of a command; a path with spaces needs no quotes, and `engine` may be left out."""
+    program = told.removesuffix(" engine").strip()
+    if not Path(program).is_file():
+        return shlex.split(told)
+    is_ours = Path(program).stem == "optisense"
+    return [program, "engine"] if is_ours or program != told else [program]
 
 
 def register() -> None:

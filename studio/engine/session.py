@@ -17,11 +17,16 @@ from .preferences import HOW_TO_GET, engine_command
 TICK, BRISK = 0.05, 0.01
 """Seconds between two looks at the engine: as a rule, and while it owes an answer."""
 
+PATIENCE = 20.0
+"""Seconds that Blender waits at most for what is answered within a blink."""
+
 _engine: Engine | None = None
 _folder: str | None = None
 _job: Request | None = None
 _each_tick: list[Callable[[], None]] = []
 _each_start: list[Callable[[Engine], None]] = []
+_each_load: list[Callable[[], None]] = []
+_job_goes_on = False
 
 
 def on_tick(work: Callable[[], None]) -> None:
@@ -32,6 +37,11 @@ def on_tick(work: Callable[[], None]) -> None:
 def on_start(work: Callable[[Engine], None]) -> None:
     """Let something be asked of every engine that is started."""
     _each_start.append(work)
+
+
+def on_load(work: Callable[[], None]) -> None:
+    """Let something be done before another .blend file is opened."""
+    _each_load.append(work)
 
 
 class OPTISENSE_PG_session(bpy.types.PropertyGroup):
@@ -86,6 +96,8 @@ def restart() -> None:
     """End the engine, and start it as the preferences now say; what goes wrong is said."""
     global _engine
     if _engine is not None:
+        if not _engine.alive:
+            _engine.abandon()  # whoever waits is told
         _engine.stop()
         _engine = None
     now = state()
@@ -128,7 +140,17 @@ def ask_and_wait(what: str, **fields: Any) -> dict[str, Any]:
     answers: list[Any] = []
     running = engine()
     request = running.send(what, on_result=answers.append, on_error=answers.append, **fields)
-    running.wait(request, timeout=60.0)
+    try:
+        running.wait(request, timeout=PATIENCE)
+    except TimeoutError:
+        request.ignore()
+        raise EngineError(
+            {
+                "kind": "EngineBusy",
+                "message": f"the engine has not answered '{what}' for {PATIENCE:g} seconds",
+                "hint": "Try again in a moment",
+            }
+        ) from None
     if isinstance(answers[0], EngineError):
         raise answers[0]
     return answers[0]
@@ -153,7 +175,8 @@ def start_job(
         wait: until it is over, for scripts.
         fields: of the request.
     """
-    global _job
+    global _job, _job_goes_on
+    _job_goes_on = bool(fields.get("go_on"))
     now = state()
     now.problem = now.hint = now.note = now.progress = ""
     now.fraction = 0.0
@@ -177,13 +200,15 @@ def start_job(
 
     try:
         now.busy = title
-        _job = engine().send(what, on_result=result, on_error=_failed, on_event=event, **fields)
+        at_work = engine()
+        begun = _job = at_work.send(
+            what, on_result=result, on_error=_failed, on_event=event, **fields
+        )
     except EngineError as error:
         _failed(error)
         return False
     if wait:
-        if _job is not None:
-            engine().wait(_job)
+        at_work.wait(begun)
         return not state().problem
     redraw()
     return True
@@ -194,6 +219,18 @@ def cancel_job() -> None:
     if _job is not None and _engine is not None:
         state().cancelling = True
         _engine.cancel(_job)
+
+
+@bpy.app.handlers.persistent
+def _loading(*_: Any) -> None:
+    """Another .blend file is opened: what is on its way is for the scene that goes."""
+    if _job is not None:
+        _job.ignore()
+        if _engine is not None and not _job_goes_on:
+            _engine.cancel(_job)
+        _over()
+    for each in _each_load:
+        each()
 
 
 def is_busy() -> bool:
@@ -210,10 +247,10 @@ def say(error: EngineError) -> None:
 
         scene = bpy.context.scene
         found = offending(scene, error.path or "", error.part or "", error.contact)
-        chosen = select(scene, found)
-        if chosen:
-            names = ", ".join(each.name for each in chosen)
-            texts.append(f"Selected: {names}")
+        chosen = select(found)
+        if found:
+            names = ", ".join(each.name for each in chosen or found)
+            texts.append(f"Selected: {names}" if chosen else f"Hidden with its collection: {names}")
     now.problem = f"{error.message[:1].upper()}{error.message[1:]}"
     now.hint = ". ".join(text for text in texts if text)
     redraw()
@@ -288,13 +325,16 @@ def register() -> None:
     bpy.types.WindowManager.optisense = PointerProperty(
         type=OPTISENSE_PG_session, options={"SKIP_SAVE"}
     )
+    bpy.app.handlers.load_pre.append(_loading)
 
 
 def unregister() -> None:
+    bpy.app.handlers.load_pre.remove(_loading)
     if bpy.app.timers.is_registered(_tick):
         bpy.app.timers.unregister(_tick)
     stop()
     _each_tick.clear()
     _each_start.clear()
+    _each_load.clear()
     del bpy.types.WindowManager.optisense
     bpy.utils.unregister_class(OPTISENSE_PG_session)

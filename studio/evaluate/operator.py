@@ -10,6 +10,7 @@ from bpy.props import StringProperty
 from ..core.engine import EngineError
 from ..core.numbers import shown_number
 from ..engine import catalogue, handing, polls, session
+from ..scene.paths import objective
 from ..simulate import editors
 from . import figures, rays
 
@@ -23,7 +24,7 @@ class OPTISENSE_OT_choose_objective(bpy.types.Operator):
     bl_label = "Choose Objective"
     bl_options = {"INTERNAL"}
 
-    objective: StringProperty(name="Objective")
+    objective: StringProperty(name="Objective", description="By the engine's name of it")
 
     @classmethod
     def description(cls, context: bpy.types.Context, values: bpy.types.OperatorProperties) -> str:
@@ -86,7 +87,7 @@ def chosen(context: bpy.types.Context) -> list[str]:
     """The objectives to score by, the user's own last."""
     values = context.window_manager.optisense_evaluation
     names = [name for name in sorted(values.chosen) if name != "NONE"]
-    return [*names, bpy.path.abspath(values.own)] if values.own.strip() else names
+    return [*names, objective(values.own)] if values.own.strip() else names
 
 
 def take(result: dict[str, Any]) -> None:

@@ -7,7 +7,6 @@ from bpy.props import (
     BoolProperty,
     CollectionProperty,
     EnumProperty,
-    IntProperty,
     PointerProperty,
     StringProperty,
 )
@@ -29,12 +28,15 @@ class OPTISENSE_PG_evaluation(bpy.types.PropertyGroup):
     """The last evaluation; never saved."""
 
     chosen: EnumProperty(
-        name="Objectives", items=catalogue.objectives, options={"ENUM_FLAG", "SKIP_SAVE"}
+        name="Objectives",
+        items=catalogue.objectives,
+        options={"ENUM_FLAG", "SKIP_SAVE"},
+        description="What the sensor is scored by",
     )
     own: StringProperty(
         name="Your own",
-        description="A Python file with an objective of your own and, where it has several "
-        "functions, the one after a colon: FILE.py:FUNCTION",
+        description="An objective of your own, scored with the others: FILE.py:FUNCTION, or only "
+        "FILE.py where a decorator in it says which function it is",
         subtype="FILE_PATH",
         options={"SKIP_SAVE"},
     )
@@ -42,7 +44,6 @@ class OPTISENSE_PG_evaluation(bpy.types.PropertyGroup):
         description="They are of the sensor that was open before", options={"SKIP_SAVE"}
     )
     scores: CollectionProperty(type=OPTISENSE_PG_score, options={"SKIP_SAVE"})
-    score_index: IntProperty(options={"SKIP_SAVE"})
     rays: StringProperty(description="What became of the chief rays", options={"SKIP_SAVE"})
 
 

@@ -13,12 +13,13 @@ from ..scene.collections import collection
 NAME = "Chief rays"
 THICKNESS = 0.02
 COLOURS = {
-    "hit": (0.05, 0.55, 0.2, 1.0),
-    "escaped": (0.9, 0.1, 0.1, 1.0),
-    "absorbed": (0.1, 0.1, 0.1, 1.0),
-    "total_reflection": (0.9, 0.5, 0.0, 1.0),
-    "depth_limit": (0.5, 0.1, 0.7, 1.0),
+    "hit": ("green", (0.05, 0.55, 0.2, 1.0)),
+    "escaped": ("red", (0.9, 0.1, 0.1, 1.0)),
+    "absorbed": ("black", (0.1, 0.1, 0.1, 1.0)),
+    "total_reflection": ("orange", (0.9, 0.5, 0.0, 1.0)),
+    "depth_limit": ("purple", (0.5, 0.1, 0.7, 1.0)),
 }
+OTHER = ("grey", (0.5, 0.5, 0.5, 1.0))
 
 
 def show(scene: bpy.types.Scene, result: dict[str, Any]) -> str:
@@ -33,7 +34,9 @@ def show(scene: bpy.types.Scene, result: dict[str, Any]) -> str:
         chosen = [line for line, outcome in zip(lines, outcomes, strict=True) if outcome == number]
         if chosen:
             _draw(scene, name, chosen)
-            texts.append(f"{100 * len(chosen) / len(lines):.0f} % {name.replace('_', ' ')}")
+            colour = COLOURS.get(name, OTHER)[0]
+            share = 100 * len(chosen) / len(lines)
+            texts.append(f"{share:.0f} % {name.replace('_', ' ')} ({colour})")
     return ", ".join(texts)
 
 
@@ -60,6 +63,6 @@ def _draw(scene: bpy.types.Scene, outcome: str, lines: list[NDArray[np.float32]]
     item = bpy.data.objects.new(curve.name, curve)
     item.optisense.kind = "SHOWN"
     item.optisense.key = f"ray {outcome}"
-    item.color = COLOURS.get(outcome, (0.5, 0.5, 0.5, 1.0))
+    item.color = COLOURS.get(outcome, OTHER)[1]
     item.hide_select = True
     collection(scene, NAME).objects.link(item)

@@ -32,7 +32,7 @@ class OPTISENSE_PT_evaluate(SidebarPanel, bpy.types.Panel):
                     depress=is_chosen,
                 ).objective = name
         else:
-            column.label(text="Waiting for the engine ...")
+            column.label(text=catalogue.items("objectives")[0][1])
         layout.prop(values, "own")
         row = layout.row()
         row.scale_y = 1.4

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
 import bpy
@@ -10,6 +9,7 @@ from bpy.props import BoolProperty, StringProperty
 
 from ..core.engine import EngineError
 from ..engine import handing, polls, session
+from ..scene.paths import chosen, suggested
 
 
 class OPTISENSE_OT_report(bpy.types.Operator):
@@ -18,7 +18,8 @@ class OPTISENSE_OT_report(bpy.types.Operator):
     bl_idname = "optisense.report"
     bl_label = "Write Report"
 
-    filepath: StringProperty(subtype="FILE_PATH")
+    filepath: StringProperty(name="File", description="The page to write", subtype="FILE_PATH")
+    check_existing: BoolProperty(default=True, options={"HIDDEN"})
     filter_glob: StringProperty(default="*.html", options={"HIDDEN"})
 
     @classmethod
@@ -32,12 +33,19 @@ class OPTISENSE_OT_report(bpy.types.Operator):
         return True
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
-        self.filepath = str(Path.home() / f"{context.scene.optisense.title or 'sensor'}.html")
+        self.filepath = suggested(context.scene, ".html")
         context.window_manager.fileselect_add(self)
         return {"RUNNING_MODAL"}
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        path = Path(bpy.path.abspath(self.filepath)).resolve().with_suffix(".html")
+        path = chosen(self, "a file")
+        if path is None:
+            return {"CANCELLED"}
+        if path.is_dir():
+            self.report({"ERROR"}, f"{path} is a folder; name a file in it")
+            return {"CANCELLED"}
+        if path.suffix.lower() not in (".html", ".htm"):
+            path = path.with_name(f"{path.name}.html")
         image = context.window_manager.optisense_picture.image
 
         def written(result: dict[str, Any]) -> None:
@@ -58,28 +66,33 @@ class OPTISENSE_OT_export(bpy.types.Operator):
     bl_idname = "optisense.export"
     bl_label = "Export for the Workshop"
 
-    filepath: StringProperty(subtype="DIR_PATH")
-    stl: BoolProperty(name="STL", default=True)
-    obj: BoolProperty(name="OBJ")
-    three_mf: BoolProperty(name="3MF")
-    step: BoolProperty(name="STEP")
+    filepath: StringProperty(name="Folder", description="Where to", subtype="DIR_PATH")
+    stl: BoolProperty(name="STL", description="Triangles, for printing; in mm", default=True)
+    obj: BoolProperty(name="OBJ", description="Triangles, for modelling programs; in mm")
+    three_mf: BoolProperty(name="3MF", description="Triangles with their unit, for printing")
+    step: BoolProperty(
+        name="STEP", description="Solids, for CAD; needs the extra 'step' of the package"
+    )
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         return polls.may_ask(cls, context)
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
-        self.filepath = str(Path.home() / f"{context.scene.optisense.title or 'sensor'}-workshop")
+        self.filepath = suggested(context.scene, "-workshop")
         context.window_manager.fileselect_add(self)
         return {"RUNNING_MODAL"}
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        chosen = {"stl": self.stl, "obj": self.obj, "3mf": self.three_mf, "step": self.step}
-        formats = [name for name, wanted in chosen.items() if wanted]
+        wanted = {"stl": self.stl, "obj": self.obj, "3mf": self.three_mf, "step": self.step}
+        formats = [name for name, is_wanted in wanted.items() if is_wanted]
         if not formats:
             self.report({"ERROR"}, "Choose a format")
             return {"CANCELLED"}
-        folder = str(Path(bpy.path.abspath(self.filepath)).resolve())
+        target = chosen(self, "a folder")
+        if target is None:
+            return {"CANCELLED"}
+        folder = str(target)
 
         def written(result: dict[str, Any]) -> None:
             session.state().note = f"{len(result['files'])} files in {folder}"

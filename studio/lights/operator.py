@@ -15,7 +15,7 @@ from ..core.rows import row_on_face
 from ..engine import catalogue, polls, session
 from ..scene.build import add_light_group
 from ..scene.cameras import add_camera
-from ..scene.collections import objects_of
+from ..scene.collections import objects_of, select_only
 from ..scene.gather import free_name
 from ..scene.lamps import add_light, lamp_colour, redraw
 from .windows import ask_for_windows
@@ -39,6 +39,9 @@ def _groups(operator: Any, context: bpy.types.Context | None) -> catalogue.Items
 
 _group_items: catalogue.Items = []
 
+SOLID = 1e-3
+"""The faces of a closed surface look to all sides: their sum is less than this share of all."""
+
 
 class OPTISENSE_OT_add_light(bpy.types.Operator):
     """Add a row of lights on the selected light reference, or one at the 3D cursor"""
@@ -47,17 +50,33 @@ class OPTISENSE_OT_add_light(bpy.types.Operator):
     bl_label = "Add Light"
     bl_options = {"REGISTER", "UNDO"}
 
-    model: EnumProperty(name="Model", items=_light_models)
-    group: EnumProperty(name="Group", items=_groups)
-    name: StringProperty(name="Name of a new group", default="white")
+    model: EnumProperty(
+        name="Model", items=_light_models, description="The library's light of a new group"
+    )
+    group: EnumProperty(
+        name="Group", items=_groups,
+        description="The lights of a group share model, colour and flux, and are relit together",
+    )  # fmt: skip
+    name: StringProperty(
+        name="Name of a new group", default="white",
+        description="Letters, digits, - and _; it gets a number where there is such a group",
+    )  # fmt: skip
     colour: FloatVectorProperty(
-        name="Colour of a new group", size=3, min=0.0, max=1.0, subtype="COLOR", default=(1.0,) * 3
+        name="Colour of a new group", size=3, min=0.0, max=1.0, subtype="COLOR",
+        default=(1.0,) * 3,
+        description="How the flux is shared among R, G, B; only ratios count",
+    )  # fmt: skip
+    flux: FloatProperty(
+        name="Flux of a new group (mW)", min=0.0, max=1e6, default=2.0,
+        description="mW, radiant flux of each light",
+    )  # fmt: skip
+    count: IntProperty(
+        name="Count", min=1, max=1000, default=1, description="How many lights, in a row"
     )
-    flux: FloatProperty(name="Flux of a new group (mW)", min=0.0, max=1e6, default=2.0)
-    count: IntProperty(name="Count", min=1, max=1000, default=1)
     pitch: FloatProperty(
-        name="Pitch (mm)", description="Between neighbours in the row", min=0.01, default=4.0
-    )
+        name="Pitch (mm)", description="mm, between the middles of neighbours in the row",
+        min=0.01, default=4.0,
+    )  # fmt: skip
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
@@ -69,6 +88,10 @@ class OPTISENSE_OT_add_light(bpy.types.Operator):
     def execute(self, context: bpy.types.Context) -> set[str]:
         scene = context.scene
         design = scene.optisense
+        poses = self._poses(context)
+        if not poses:
+            self.report({"ERROR"}, "The light reference is an empty mesh")
+            return {"CANCELLED"}
         if self.group in ("NEW", ""):
             if self.model in ("NONE", ""):
                 self.report({"ERROR"}, "The library is not loaded yet; try again in a moment")
@@ -76,13 +99,12 @@ class OPTISENSE_OT_add_light(bpy.types.Operator):
             if max(self.colour) <= 0.0:
                 self.report({"ERROR"}, "A colour needs at least one channel above 0")
                 return {"CANCELLED"}
-            name = free_name(self.name or "white", design.light_groups)
+            name = free_name(self.name, design.light_groups, "light")
             values = {"model": self.model, "colour": self.colour, "flux": self.flux}
             group = add_light_group(design, name, values)
         else:
             group = design.light_groups[self.group]
-        for pose in self._poses(context):
-            add_light(scene, group, pose).select_set(True)
+        select_only(*(add_light(scene, group, pose) for pose in poses))
         ask_for_windows(scene)
         return {"FINISHED"}
 
@@ -93,12 +115,12 @@ class OPTISENSE_OT_add_light(bpy.types.Operator):
             for each in context.selected_objects
             if each.optisense.kind == "REFERENCE" and each.optisense.reference == "light"
         ]
-        for each in context.selected_objects:
-            each.select_set(False)
         poses = []
         for reference in references:
             corners = np.array([reference.matrix_world @ v.co for v in reference.data.vertices])
-            normal = _normal(reference)
+            if not len(corners):
+                continue
+            normal = _normal(reference, corners, middle)
             poses += row_on_face(corners, normal, np.array(middle), self.count, self.pitch)
         if not references:
             start = context.scene.cursor.location
@@ -123,21 +145,27 @@ def _middle(scene: bpy.types.Scene) -> Vector:
     return surface.matrix_world @ (sum((Vector(c) for c in surface.bound_box), Vector()) / 8.0)
 
 
-def _normal(reference: bpy.types.Object) -> np.ndarray:
-    """The direction in which most of a surface faces, weighted by area."""
-    total = sum((face.normal * face.area for face in reference.data.polygons), Vector())
-    turned = reference.matrix_world.to_3x3() @ total
-    return np.array(turned if turned.length > 1e-9 else (0.0, 0.0, 1.0))
+def _normal(reference: bpy.types.Object, corners: np.ndarray, target: Vector) -> np.ndarray:
+    """The direction in which most of a surface faces, by area; of a solid, the way to `target`."""
+    faces = reference.data.polygons
+    total = sum((face.normal * face.area for face in faces), Vector())
+    if total.length > SOLID * sum(face.area for face in faces):
+        return np.array(reference.matrix_world.to_3x3() @ total)
+    way = np.array(target) - (corners.min(axis=0) + corners.max(axis=0)) / 2.0
+    return way if np.linalg.norm(way) > 1e-9 else np.array((0.0, 0.0, 1.0))
 
 
 class OPTISENSE_OT_add_camera(bpy.types.Operator):
-    """Put a camera of the library on the selected camera reference, or at the 3D cursor"""
+    """Put a library camera on the selected camera reference or the 3D cursor, for this one"""
 
     bl_idname = "optisense.add_camera"
     bl_label = "Add Camera"
     bl_options = {"REGISTER", "UNDO"}
 
-    model: EnumProperty(name="Model", items=_camera_models)
+    model: EnumProperty(
+        name="Model", items=_camera_models,
+        description="The library's camera; its picture is 320 pixels wide at most, to begin with",
+    )  # fmt: skip
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
@@ -194,8 +222,8 @@ class OPTISENSE_OT_set_model(bpy.types.Operator):
     bl_options = {"REGISTER", "UNDO"}
     bl_property = "model"
 
-    model: EnumProperty(name="Model", items=_light_models)
-    group: StringProperty()
+    model: EnumProperty(name="Model", items=_light_models, description="The library's light")
+    group: StringProperty(name="Group", description="Whose lamps change")
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
@@ -223,8 +251,12 @@ class OPTISENSE_OT_set_group(bpy.types.Operator):
     bl_label = "Move to Group"
     bl_options = {"REGISTER", "UNDO"}
 
-    group: EnumProperty(name="Group", items=_groups)
-    name: StringProperty(name="Name of a new group", default="white")
+    group: EnumProperty(
+        name="Group", items=_groups, description="Where to; a new one is like that of the first"
+    )
+    name: StringProperty(
+        name="Name of a new group", default="white", description="Letters, digits, - and _"
+    )
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
@@ -243,7 +275,9 @@ class OPTISENSE_OT_set_group(bpy.types.Operator):
             values = {"model": "smd-3528", "colour": (1.0, 1.0, 1.0), "flux": 2.0}
             if old is not None:
                 values = {"model": old.model, "colour": old.colour[:], "flux": old.flux}
-            group = add_light_group(design, free_name(self.name, design.light_groups), values)
+            group = add_light_group(
+                design, free_name(self.name, design.light_groups, "light"), values
+            )
         else:
             group = design.light_groups[self.group]
         for light in lights:

@@ -35,12 +35,17 @@ class OPTISENSE_PG_material_choice(bpy.types.PropertyGroup):
             ("material", "Parts", "Optical materials"),
             ("coating", "Sensing surface", "Coatings"),
         ],
+        description="What is to be chosen in the library",
         options={"SKIP_SAVE"},
     )
-    material: EnumProperty(name="Material", items=_materials, options={"SKIP_SAVE"})
-    coating: EnumProperty(name="Coating", items=_coatings, options={"SKIP_SAVE"})
-    preview: StringProperty(options={"SKIP_SAVE"})
-    previewed: StringProperty(options={"SKIP_SAVE"})
+    material: EnumProperty(
+        name="Material", items=_materials, description="Of the library", options={"SKIP_SAVE"}
+    )
+    coating: EnumProperty(
+        name="Coating", items=_coatings, description="Of the library", options={"SKIP_SAVE"}
+    )
+    preview: StringProperty(description="The file of the picture", options={"SKIP_SAVE"})
+    previewed: StringProperty(description="What it shows", options={"SKIP_SAVE"})
 
     @property
     def entry(self) -> str:
@@ -175,9 +180,15 @@ class OPTISENSE_OT_keep_material(bpy.types.Operator):
     bl_idname = "optisense.keep_material"
     bl_label = "Save as My Own"
 
-    name: StringProperty(name="Name", default="my-material")
-    description: StringProperty(name="Description")
-    source: StringProperty(name="Source of its numbers", default="chosen by hand")
+    name: StringProperty(
+        name="Name", default="my-material",
+        description="Letters, digits, - and _; one of yours of that name is replaced",
+    )  # fmt: skip
+    description: StringProperty(name="Description", description="A line that the lists show")
+    source: StringProperty(
+        name="Source of its numbers", default="chosen by hand",
+        description="A datasheet, a paper, a measurement",
+    )  # fmt: skip
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
@@ -205,7 +216,10 @@ class OPTISENSE_OT_keep_material(bpy.types.Operator):
         else:
             kind = "material"
             values = material_values(context.scene.optisense.materials[own.material])
-        name = free_name(self.name, ())
+        name = free_name(self.name, (), "")
+        if not name:
+            self.report({"ERROR"}, "The name needs a letter from A to Z, or a digit")
+            return {"CANCELLED"}
         now = session.state()
         now.about, now.problem, now.hint, now.note = KEEPING, "", "", ""
         try:

@@ -11,38 +11,14 @@ from bpy.props import StringProperty
 from ..core import vary
 from ..core.engine import EngineError
 from ..engine import handing, polls, session
-from ..scene.cages import cage_data
-from ..scene.collections import objects_of
+from ..scene.paths import absolute, chosen, objective
 from ..sensor.opening import new_stage, open_stage
 from . import following
+from .suggesting import suggestions
 
 TITLE = "Searching"
-
-
-def suggestions(context: bpy.types.Context) -> list[vary.Suggestion]:
-    """What a search may change of the active object."""
-    active = context.active_object
-    own = None if active is None else active.optisense
-    if own is None:
-        return []
-    if own.kind == "CAMERA":
-        return vary.for_camera()
-    if own.kind == "LIGHT":
-        group = [e for e in objects_of(context.scene, "LIGHT") if e.optisense.group == own.group]
-        return vary.for_light(own.group, group.index(active))
-    if own.kind == "PART":
-        materials = context.scene.optisense.materials
-        kind = materials[own.material].kind if own.material in materials else ""
-        return vary.for_part(own.role, own.material, kind)
-    if own.kind == "CAGE":
-        if active.mode == "EDIT":
-            active.update_from_editmode()
-        chosen = (
-            [v.index for v in active.data.vertices if v.select] if active.mode == "EDIT" else []
-        )
-        blended = cage_data(active).get("blend") is not None
-        return vary.for_cage(own.key, chosen, blended=blended)
-    return []
+WIDEST = 72
+"""Characters of an entry of the menu Vary."""
 
 
 class OPTISENSE_OT_vary(bpy.types.Operator):
@@ -52,8 +28,10 @@ class OPTISENSE_OT_vary(bpy.types.Operator):
     bl_label = "Vary"
     bl_options = {"REGISTER", "UNDO"}
 
-    label: StringProperty()
-    text: StringProperty()
+    label: StringProperty(name="Label", description="What varies, in words")
+    text: StringProperty(
+        name="Range", description="PATH=LOW:HIGH, PATH=+-REACH, PATH=LOW:HIGH:STEPS or PATH=A,B"
+    )
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
@@ -79,7 +57,9 @@ class OPTISENSE_MT_vary(bpy.types.Menu):
         if not found:
             self.layout.label(text="Select a light, a part, a cage or the camera")
         for each in found:
-            choice = self.layout.operator("optisense.vary", text=f"{each.label}:  {each.text}")
+            text = f"{each.label}:  {each.text}"
+            short = text if len(text) <= WIDEST else f"{text[: WIDEST - 4]} ..."
+            choice = self.layout.operator("optisense.vary", text=short)
             choice.label, choice.text = each.label, each.text
 
 
@@ -107,7 +87,15 @@ class OPTISENSE_OT_vary_remove(bpy.types.Operator):
 def _study(context: bpy.types.Context) -> str:
     """The folder of the study as an absolute path; empty where none is named."""
     text = context.scene.optisense_search.study
-    return str(Path(bpy.path.abspath(text)).resolve()) if text else ""
+    return str(absolute(text)) if text else ""
+
+
+def _is_taken(folder: Path) -> bool:
+    """Whether something is in a folder; what can't be looked into, the engine tells of."""
+    try:
+        return folder.is_dir() and any(folder.iterdir())
+    except OSError:
+        return False
 
 
 def _new_study(context: bpy.types.Context) -> str:
@@ -147,7 +135,7 @@ class OPTISENSE_OT_search(bpy.types.Operator):
     def _start(self, context: bpy.types.Context, *, wait: bool) -> set[str]:
         search = context.scene.optisense_search
         study = _study(context)
-        if not study or (Path(study).is_dir() and any(Path(study).iterdir())):
+        if not study or _is_taken(Path(study)):
             if not context.scene.optisense.is_saved:
                 self.report({"ERROR"}, "The folder of the study is not empty; name another one")
                 return {"CANCELLED"}
@@ -169,7 +157,7 @@ class OPTISENSE_OT_search(bpy.types.Operator):
             design=design,
             study=study,
             vary=vary.texts_of(search.vary),
-            objectives=[search.objective],
+            objectives=[objective(each) for each in search.objective.split(",")],
             method=search.method,
             seed=search.seed,
             workers=search.workers,
@@ -254,7 +242,7 @@ class OPTISENSE_OT_apply_best(_WithStudy, bpy.types.Operator):
             if scene is not None:
                 following.clear_ghosts(scene)
                 open_stage(
-                    scene, stage, wait=wait, folder=folder if saved else "", keep_contacts=True
+                    scene, stage, wait=wait, folder=folder if saved else "", keep_others=True
                 )
 
         done = session.start_job(
@@ -271,7 +259,9 @@ class OPTISENSE_OT_keep_variant(_WithStudy, bpy.types.Operator):
     bl_idname = "optisense.keep_variant"
     bl_label = "Keep as Variant"
 
-    filepath: StringProperty(subtype="DIR_PATH")
+    filepath: StringProperty(
+        name="Folder", description="That does not exist yet", subtype="DIR_PATH"
+    )
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         self.filepath = f"{_study(context)}-best"
@@ -279,13 +269,20 @@ class OPTISENSE_OT_keep_variant(_WithStudy, bpy.types.Operator):
         return {"RUNNING_MODAL"}
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        target = str(Path(bpy.path.abspath(self.filepath)).resolve())
+        target = chosen(self, "a folder")
+        if target is None:
+            return {"CANCELLED"}
 
         def kept(result: dict[str, Any]) -> None:
             session.state().note = f"Written to {result['folder']}"
 
         done = session.start_job(
-            "Applying", "apply", kept, wait=bpy.app.background, study=_study(context), to=target
+            "Applying",
+            "apply",
+            kept,
+            wait=bpy.app.background,
+            study=_study(context),
+            to=str(target),
         )
         if not done:
             self.report({"ERROR"}, session.state().problem)

@@ -14,6 +14,17 @@ from bpy.props import (
 
 from ..engine import catalogue
 
+_objective_items: catalogue.Items = []
+
+
+def _objectives(values: bpy.types.PropertyGroup, context: bpy.types.Context) -> catalogue.Items:
+    """The engine's objectives, and the one of the user's own that is named under Evaluate."""
+    global _objective_items
+    own = bpy.context.window_manager.optisense_evaluation.own.strip()
+    row = [("OWN", "Your own", f"As under Evaluate: {own}")] if own else []
+    _objective_items = [*catalogue.items("objectives"), *row]
+    return _objective_items
+
 
 def _methods(values: bpy.types.PropertyGroup, context: bpy.types.Context) -> catalogue.Items:
     return catalogue.items("methods")
@@ -22,7 +33,7 @@ def _methods(values: bpy.types.PropertyGroup, context: bpy.types.Context) -> cat
 class OPTISENSE_PG_vary(bpy.types.PropertyGroup):
     """A parameter of the search; its name is a label."""
 
-    active: BoolProperty(name="Vary", default=True)
+    active: BoolProperty(name="Vary", description="The search changes it", default=True)
     text: StringProperty(
         name="Range", description="PATH=LOW:HIGH, PATH=+-REACH, PATH=LOW:HIGH:STEPS or PATH=A,B"
     )
@@ -32,14 +43,27 @@ class OPTISENSE_PG_search(bpy.types.PropertyGroup):
     """The search of a scene; kept in the .blend file, so that it can go on another day."""
 
     vary: CollectionProperty(type=OPTISENSE_PG_vary)
-    vary_index: IntProperty()
-    objective: StringProperty(name="Objective", default="aoap")
-    method: StringProperty(name="Method", default="cma-es")
+    vary_index: IntProperty(options={"HIDDEN"})
+    objective: StringProperty(
+        name="Objective",
+        default="aoap",
+        description="What to make as high as possible: a name, or FILE.py:FUNCTION of your own; "
+        "several, with commas between them, for the method pareto",
+    )
+    method: StringProperty(
+        name="Method", default="cma-es", description="How the next trials are chosen"
+    )
     budget: IntProperty(
         name="Trials", description="In all; 0 leaves it to the method", min=0, default=60
     )
-    workers: IntProperty(name="Workers", description="Processes", min=1, max=256, default=1)
-    seed: IntProperty(name="Seed", min=0, max=2**31 - 1)
+    workers: IntProperty(
+        name="Workers", description="Processes that score trials at the same time", min=1, max=256,
+        default=1,
+    )  # fmt: skip
+    seed: IntProperty(
+        name="Seed", min=0, max=2**31 - 1,
+        description="Of the method's chance: the same seed goes the same way",
+    )  # fmt: skip
     go_on: BoolProperty(
         name="Go on without Blender",
         description="Closing Blender does not end the search; Resume finds it again",
@@ -49,27 +73,36 @@ class OPTISENSE_PG_search(bpy.types.PropertyGroup):
     )
 
 
+# Named functions: Blender reads these annotations where it does not know this module's names.
+def _objective_chosen(found: bpy.types.PropertyGroup, context: bpy.types.Context) -> None:
+    name = found.objective_choice
+    if name == "OWN":
+        name = context.window_manager.optisense_evaluation.own.strip()
+    if name and name != "NONE":
+        context.scene.optisense_search.objective = name
+
+
+def _method_chosen(found: bpy.types.PropertyGroup, context: bpy.types.Context) -> None:
+    if found.method_choice and found.method_choice != "NONE":
+        context.scene.optisense_search.method = found.method_choice
+
+
 class OPTISENSE_PG_found(bpy.types.PropertyGroup):
     """What the running search has found; never saved."""
 
     objective_choice: EnumProperty(
-        name="Objective", items=catalogue.objectives, options={"SKIP_SAVE"},
-        update=lambda self, context: _choose(self, context, "objective"),
+        name="Objective", items=_objectives, options={"SKIP_SAVE"},
+        description="Choose an objective",
+        update=_objective_chosen,
     )  # fmt: skip
     method_choice: EnumProperty(
-        name="Method", items=_methods, options={"SKIP_SAVE"},
-        update=lambda self, context: _choose(self, context, "method"),
+        name="Method", items=_methods, options={"SKIP_SAVE"}, description="Choose a method",
+        update=_method_chosen,
     )  # fmt: skip
-    best: StringProperty(options={"SKIP_SAVE"})
-    values: StringProperty(options={"SKIP_SAVE"})
-    start: StringProperty(options={"SKIP_SAVE"})
-    ended: StringProperty(options={"SKIP_SAVE"})
-
-
-def _choose(found: OPTISENSE_PG_found, context: bpy.types.Context, what: str) -> None:
-    name = getattr(found, f"{what}_choice")
-    if name and name != "NONE":
-        setattr(context.scene.optisense_search, what, name)
+    best: StringProperty(description="The best score so far", options={"SKIP_SAVE"})
+    values: StringProperty(description="What it has, one a line", options={"SKIP_SAVE"})
+    start: StringProperty(description="The score at the start", options={"SKIP_SAVE"})
+    ended: StringProperty(description="Why it is over", options={"SKIP_SAVE"})
 
 
 CLASSES = (OPTISENSE_PG_vary, OPTISENSE_PG_search, OPTISENSE_PG_found)

@@ -24,7 +24,7 @@ def build(
     document: dict[str, Any],
     meshes: dict[str, Mesh],
     *,
-    keep_contacts: bool = False,
+    keep_others: bool = False,
 ) -> None:
     """Put a design into a scene, in place of the one that was there.
 
@@ -32,9 +32,9 @@ def build(
         scene: what else is in it stays.
         document: what `design.yaml` holds.
         meshes: the parts at rest, by name, mm.
-        keep_contacts: the contacts of the design before press on this one.
+        keep_others: the contacts of the design before press on this one, and its references stay.
     """
-    clear(scene, *(["CONTACT"] if keep_contacts else []))
+    clear(scene, *(["CONTACT", "REFERENCE"] if keep_others else []))
     scene.unit_settings.system = "METRIC"
     scene.unit_settings.scale_length = MILLIMETRE
     scene.unit_settings.length_unit = "MILLIMETERS"

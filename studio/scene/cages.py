@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..core import cage as core
+from ..core.errors import SceneError
 from ..core.numbers import kept, kept_array
 from .collections import CAGES, collection, next_order, object_of, objects_of
 from .meshes import REST, remembered, show_vertices, shown_vertices
@@ -52,6 +53,18 @@ def add_cage(scene: bpy.types.Scene, key: str, values: dict[str, Any]) -> bpy.ty
 def lock(part: bpy.types.Object, locked: bool) -> None:
     """A part in a cage is shaped by it, and not moved by itself."""
     part.lock_location = part.lock_rotation = part.lock_scale = (locked,) * 3
+    part.optisense.is_caged = locked
+
+
+def release(scene: bpy.types.Scene) -> None:
+    """Let parts be moved whose cage was deleted, and copies, which are in none."""
+    cages = objects_of(scene, "CAGE")
+    bent = {name for cage in cages for name in cage_data(cage)["parts"]}
+    for part in objects_of(scene, "PART"):
+        if part.optisense.is_caged:
+            key = part.optisense.key
+            if key not in bent or part != object_of(scene, "PART", key):
+                lock(part, False)
 
 
 def cage_data(cage: bpy.types.Object) -> dict[str, Any]:
@@ -91,15 +104,17 @@ def cage_values(cage: bpy.types.Object) -> dict[str, Any]:
     """The cage as the design file holds it, with the points as they are now.
 
     Raises:
-        ValueError: control points were added or removed.
+        SceneError: control points were added or removed.
     """
     values = cage_data(cage)
     shown = shown_points(cage)
     before = current_points(values)
     if len(shown) != len(before):
-        raise ValueError(
-            f"cage '{cage.optisense.key}' has {len(shown)} control points instead of "
-            f"{len(before)}; undo what added or removed some"
+        key = cage.optisense.key
+        raise SceneError(
+            f"cage '{key}' has {len(shown)} control points instead of {len(before)}; undo what "
+            "added or removed some",
+            f"cages.{key}",
         )
     if values.get("blend") is not None:
         blend = values["blend"]
@@ -179,6 +194,8 @@ def _moved(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
         for cage in objects_of(scene, "CAGE"):
             if cage.name in changed:
                 follow(scene, cage)
+    if depsgraph.id_type_updated("COLLECTION"):  # objects came or went
+        release(scene)
 
 
 @bpy.app.handlers.persistent

@@ -9,6 +9,7 @@ from typing import Any
 import bpy
 import numpy as np
 
+from ..core.errors import SceneError
 from ..core.numbers import kept
 from ..core.pose import pose_of
 from .collections import OPTICAL_SYSTEM, collection, objects_of
@@ -54,14 +55,23 @@ def show(camera: bpy.types.Object) -> None:
 
 
 def camera_values(scene: bpy.types.Scene) -> dict[str, Any] | None:
-    """The camera as the design file holds it; None where there is none."""
+    """The camera as the design file holds it; None where there is none.
+
+    Raises:
+        SceneError: there is more than one.
+    """
     cameras = objects_of(scene, "CAMERA")
     if not cameras:
         return None
+    if len(cameras) > 1:
+        raise SceneError(f"the sensor has {len(cameras)} cameras; delete all but one", "camera")
     camera = cameras[0]
     values = camera.optisense
     before = json.loads(values.data) if values.data else {}
-    pose = pose_of(np.array(camera.matrix_world), before, up=True)
+    try:
+        pose = pose_of(np.array(camera.matrix_world), before, up=True)
+    except ValueError as error:
+        raise SceneError(f"the camera {error}", "camera") from error
     return {
         "model": values.model,
         "projection": values.projection,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Iterator
 
 import bpy
@@ -34,6 +35,17 @@ def object_of(scene: bpy.types.Scene, kind: str, key: str) -> bpy.types.Object |
     return next((each for each in objects_of(scene, kind) if each.optisense.key == key), None)
 
 
+def select_only(*chosen: bpy.types.Object) -> None:
+    """Select nothing but these, the last of them active; those that the view does not have, not."""
+    layer = bpy.context.view_layer  # a timer's context knows no selected objects
+    for each in layer.objects:
+        each.select_set(False)
+    for each in chosen:
+        with contextlib.suppress(RuntimeError):  # its collection is excluded from the view
+            each.select_set(True)
+            layer.objects.active = each
+
+
 def next_order(scene: bpy.types.Scene, kind: str) -> int:
     """An order behind all objects of a kind."""
     return max((each.optisense.order for each in objects_of(scene, kind)), default=-1) + 1
@@ -51,6 +63,8 @@ def clear(scene: bpy.types.Scene, *but: str) -> None:
                 bpy.data.meshes.remove(data)
             elif isinstance(data, bpy.types.Camera):
                 bpy.data.cameras.remove(data)
+            elif isinstance(data, bpy.types.Curve):
+                bpy.data.curves.remove(data)
 
 
 def _ours(scene: bpy.types.Scene) -> Iterator[bpy.types.Object]:

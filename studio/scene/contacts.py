@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 import bmesh
@@ -15,6 +14,8 @@ from mathutils import Matrix, Vector
 from ..core.mesh_file import Mesh
 from ..core.numbers import short
 from .collections import CONTACTS, collection, next_order, objects_of
+from .meshes import mesh_of
+from .paths import absolute
 
 COLOUR = (0.48, 0.37, 0.07, 1.0)
 
@@ -89,19 +90,23 @@ def redraw(contact: bpy.types.Object) -> None:
             depth=values.length, matrix=at,
         )  # fmt: skip
     elif values.indenter == "plane":
-        tilt = Matrix.Rotation(math.radians(values.tilt[0]), 4, "X") @ Matrix.Rotation(
-            math.radians(values.tilt[1]), 4, "Y"
+        about_x, about_y = (
+            Matrix.Rotation(math.radians(angle), 4, axis)
+            for angle, axis in zip(values.tilt, "XY", strict=True)
         )
+        tilt = about_y @ about_x
         bmesh.ops.create_grid(shape, x_segments=1, y_segments=1, size=values.size / 2, matrix=tilt)
         lowest = min((vertex.co.z for vertex in shape.verts), default=0.0)
         bmesh.ops.translate(shape, verts=shape.verts, vec=(0.0, 0.0, -lowest - values.depth))
     elif values.file:
-        file = file_of(values)
+        file = absolute_file(values)
         if file in file_meshes:
             _add_file_mesh(shape, file_meshes[file], values.scale, values.depth)
         else:
             for each in when_file_unknown:
                 each(file)
+    elif values.shape is not None:
+        _add_file_mesh(shape, mesh_of(values.shape), values.scale, values.depth)
     bmesh.ops.rotate(
         shape, verts=shape.verts, cent=(0.0, 0.0, 0.0),
         matrix=Matrix.Rotation(math.radians(values.rotation), 3, "Z"),
@@ -112,9 +117,9 @@ def redraw(contact: bpy.types.Object) -> None:
     contact.data.update()
 
 
-def file_of(values: bpy.types.PropertyGroup) -> str:
+def absolute_file(values: bpy.types.PropertyGroup) -> str:
     """The absolute path of a contact's mesh file."""
-    return str(Path(bpy.path.abspath(values.file)).resolve())
+    return str(absolute(values.file))
 
 
 def _add_file_mesh(shape: bmesh.types.BMesh, mesh: Mesh, scale: float, depth: float) -> None:
@@ -132,15 +137,19 @@ def _add_file_mesh(shape: bmesh.types.BMesh, mesh: Mesh, scale: float, depth: fl
             shape.faces.new(three)
 
 
-def contact_values(contact: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> dict[str, Any]:
+def contact_values(
+    contact: bpy.types.Object, depsgraph: bpy.types.Depsgraph, write: Callable[[Mesh], str]
+) -> dict[str, Any]:
     """A contact as the engine reads it.
 
     Args:
         contact: the object.
         depsgraph: evaluated, for where the surface holds it.
+        write: gives the path of a file that holds a mesh.
     """
     values = contact.optisense
-    place = contact.evaluated_get(depsgraph).matrix_world.translation
+    held = contact.evaluated_get(depsgraph).matrix_world
+    place = held.translation
     indenter: dict[str, Any] = {"kind": values.indenter}
     if values.indenter == "sphere":
         indenter["radius"] = short(values.radius)
@@ -151,20 +160,25 @@ def contact_values(contact: bpy.types.Object, depsgraph: bpy.types.Depsgraph) ->
             tilt_x=short(values.tilt[0]), tilt_y=short(values.tilt[1]), size=short(values.size)
         )
     else:
-        indenter.update(file=file_of(values), scale=short(values.scale))
+        own = values.shape is not None and not values.file
+        file = write(mesh_of(values.shape)) if own else absolute_file(values)
+        indenter.update(file=file, scale=short(values.scale))
     return {
         "indenter": indenter,
         "point": [round(short(value), 6) + 0.0 for value in place],
         "depth": short(values.depth),
         "rotation": short(values.rotation),
+        "along": [round(short(value), 6) + 0.0 for value in held.col[0][:3]],
     }
 
 
 def pressing(scene: bpy.types.Scene) -> list[bpy.types.Object]:
     """The contacts that are not hidden, in the order in which the engine is told of them."""
-    return [each for each in objects_of(scene, "CONTACT") if not each.hide_get()]
+    return [each for each in objects_of(scene, "CONTACT") if each.visible_get()]
 
 
-def contact_list(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> list[dict[str, Any]]:
-    """All contacts of the scene that press, as the engine reads them."""
-    return [contact_values(each, depsgraph) for each in pressing(scene)]
+def contact_list(
+    scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, write: Callable[[Mesh], str]
+) -> list[dict[str, Any]]:
+    """All contacts of the scene that press, as `contact_values`."""
+    return [contact_values(each, depsgraph, write) for each in pressing(scene)]

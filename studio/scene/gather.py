@@ -9,6 +9,8 @@ from typing import Any
 
 import bpy
 
+from ..core import provenance
+from ..core.errors import SceneError
 from ..core.mesh_file import Mesh
 from ..core.numbers import kept, kept_list
 from .cages import cage_values
@@ -29,7 +31,7 @@ def gather(scene: bpy.types.Scene) -> tuple[dict[str, Any], dict[str, Mesh]]:
     """The design of a scene: what `design.yaml` holds, and the parts at rest by name.
 
     Raises:
-        ValueError: the scene holds no design, or one that can't be written down.
+        SceneError: the scene holds no design, or one that can't be written down.
     """
     document = gather_document(scene)
     caged = caged_parts(document)
@@ -46,11 +48,11 @@ def gather_document(scene: bpy.types.Scene) -> dict[str, Any]:
     """The design of a scene without the meshes of its parts: what `design.yaml` holds.
 
     Raises:
-        ValueError: the scene holds no design, or one that can't be written down.
+        SceneError: the scene holds no design, or one that can't be written down.
     """
     design = scene.optisense
     if not design.is_open:
-        raise ValueError("there is no sensor in this scene; make or open one")
+        raise SceneError("there is no sensor in this scene; make or open one")
     document: dict[str, Any] = json.loads(design.document)
     before = json.loads(design.document)
     bpy.context.view_layer.update()
@@ -61,7 +63,7 @@ def gather_document(scene: bpy.types.Scene) -> dict[str, Any]:
         each.name: material_values(each, before["materials"].get(each.name, {}))
         for each in design.materials
     }
-    cages = {each.optisense.key: cage_values(each) for each in objects_of(scene, "CAGE")}
+    cages = _cages(scene)
     parts = part_names(scene)
     for cage in cages.values():
         cage["parts"] = [name for name in cage["parts"] if name in parts]
@@ -71,9 +73,22 @@ def gather_document(scene: bpy.types.Scene) -> dict[str, Any]:
     document["lights"] = _lights(scene, before["lights"])
     camera = camera_values(scene)
     if camera is None:
-        raise ValueError("the sensor has no camera; add one in Lights and Camera")
+        raise SceneError("the sensor has no camera; add one in Lights and Camera")
     document["camera"] = camera
+    if "provenance" in before:
+        document["provenance"] = provenance.updated(before, document)
     return document
+
+
+def _cages(scene: bpy.types.Scene) -> dict[str, Any]:
+    """The cages; copies made in Blender would bend the same parts twice."""
+    cages: dict[str, Any] = {}
+    for each in objects_of(scene, "CAGE"):
+        key = each.optisense.key
+        if key in cages:
+            raise SceneError(f"two cages are called '{key}'; delete one of them", f"cages.{key}")
+        cages[key] = cage_values(each)
+    return cages
 
 
 def _own_files(values: dict[str, Any], parts: dict[str, bpy.types.Object]) -> None:
@@ -99,9 +114,15 @@ def part_names(scene: bpy.types.Scene) -> dict[str, bpy.types.Object]:
     return found
 
 
-def free_name(wanted: str, taken: Any) -> str:
-    """A name as the design file allows it that is not taken yet."""
-    base = re.sub(r"[^A-Za-z0-9_-]+", "-", wanted).strip("-_")[:58] or "part"
+def free_name(wanted: str, taken: Any, instead: str = "part") -> str:
+    """A name as the design file allows it that is not taken yet.
+
+    Args:
+        wanted: of any letters.
+        taken: names, to ask `in` of.
+        instead: where nothing of it is allowed.
+    """
+    base = re.sub(r"[^A-Za-z0-9_-]+", "-", wanted).strip("-_")[:58] or instead
     name, number = base, 2
     while name in taken:
         name, number = f"{base}-{number}", number + 1
@@ -153,10 +174,19 @@ def _part(name: str, part: bpy.types.Object) -> dict[str, Any]:
 def _lights(scene: bpy.types.Scene, before: dict[str, Any]) -> dict[str, Any]:
     lights = objects_of(scene, "LIGHT")
     groups: dict[str, Any] = {}
+    for light in lights:
+        name = light.optisense.group
+        if name not in scene.optisense.light_groups:
+            raise SceneError(
+                f"light '{light.name}' is of a group '{name}' that this sensor does not have; use "
+                "Move to Group",
+                f"lights.{name}",
+            )
     for group in scene.optisense.light_groups:
-        poses = [light_pose(each) for each in lights if each.optisense.group == group.name]
-        if not poses:
+        members = [each for each in lights if each.optisense.group == group.name]
+        if not members:
             continue
+        poses = [_pose(each, number) for number, each in enumerate(members)]
         was = before.get(group.name, {})
         values: dict[str, Any] = {
             "model": group.model,
@@ -168,6 +198,15 @@ def _lights(scene: bpy.types.Scene, before: dict[str, Any]) -> dict[str, Any]:
             values["emitter"] = emitter
         groups[group.name] = {**values, "lights": poses}
     return groups
+
+
+def _pose(light: bpy.types.Object, number: int) -> dict[str, Any]:
+    """The pose of a light, which has this number in its group."""
+    try:
+        return light_pose(light)
+    except ValueError as error:
+        path = f"lights.{light.optisense.group}.lights[{number}]"
+        raise SceneError(f"light '{light.name}' {error}", path) from error
 
 
 def _emitter(group: bpy.types.PropertyGroup, was: dict[str, Any]) -> dict[str, Any] | None:

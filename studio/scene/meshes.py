@@ -76,6 +76,11 @@ def show_vertices(mesh: bpy.types.Mesh, vertices: ArrayLike) -> None:
     mesh.update()
 
 
+def mesh_of(mesh: bpy.types.Mesh) -> Mesh:
+    """What `new_mesh` made a Blender mesh of, or whatever a Blender mesh is."""
+    return Mesh(kept_array(remembered(mesh, REST), shown_vertices(mesh)), _triangles(mesh))
+
+
 def part_mesh(part: bpy.types.Object, *, caged: bool) -> Mesh:
     """The mesh of a part at rest, in the design's frame.
 
@@ -85,6 +90,9 @@ def part_mesh(part: bpy.types.Object, *, caged: bool) -> Mesh:
     """
     if part.mode == "EDIT":
         part.update_from_editmode()
+    world = np.array(part.matrix_world, dtype=np.float64)
+    if part.modifiers and not caged:
+        return _placed(_modified(part), world)
     data = part.data
     rest = remembered(data, REST)
     shown = shown_vertices(data)
@@ -92,11 +100,25 @@ def part_mesh(part: bpy.types.Object, *, caged: bool) -> Mesh:
     normals = remembered(data, NORMAL)
     if normals is not None and (rest is None or not np.array_equal(vertices, rest)):
         normals = None
-    world = np.array(part.matrix_world, dtype=np.float64)
-    if not np.array_equal(world, np.eye(4)):
-        vertices = vertices @ world[:3, :3].T + world[:3, 3]
-        normals = None
-    return Mesh(vertices, _triangles(data), normals)
+    return _placed(Mesh(vertices, _triangles(data), normals), world)
+
+
+def _modified(part: bpy.types.Object) -> Mesh:
+    """A part as its modifiers shape it, in its own frame."""
+    shown = part.evaluated_get(bpy.context.evaluated_depsgraph_get())
+    data = shown.to_mesh()
+    mesh = Mesh(shown_vertices(data).astype(np.float64), _triangles(data))
+    shown.to_mesh_clear()
+    return mesh
+
+
+def _placed(mesh: Mesh, world: NDArray[np.float64]) -> Mesh:
+    """A mesh where its object is; one that is mirrored keeps its outside."""
+    if np.array_equal(world, np.eye(4)):
+        return mesh
+    mirrored = np.linalg.det(world[:3, :3]) < 0.0
+    faces = np.ascontiguousarray(mesh.faces[:, ::-1]) if mirrored else mesh.faces
+    return Mesh(mesh.vertices @ world[:3, :3].T + world[:3, 3], faces)
 
 
 def _triangles(mesh: bpy.types.Mesh) -> NDArray[np.int32]:

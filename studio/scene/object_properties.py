@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import bpy
 from bpy.props import (
+    BoolProperty,
     EnumProperty,
     FloatProperty,
     FloatVectorProperty,
@@ -41,27 +42,38 @@ def _blend_changed(values: bpy.types.PropertyGroup, context: bpy.types.Context) 
 class OPTISENSE_PG_object(bpy.types.PropertyGroup):
     """An object's place in the design."""
 
-    kind: EnumProperty(name="Kind", items=kinds.OBJECT_KINDS)
+    kind: EnumProperty(
+        name="Kind", items=kinds.OBJECT_KINDS, description="What it is to the sensor"
+    )
     key: StringProperty(name="Name", description="In the design file")
     order: IntProperty(description="Its place in the design file", options={"HIDDEN"})
     data: StringProperty(
         description="Its values as they were read, with their numbers in full", options={"HIDDEN"}
     )
 
-    role: EnumProperty(name="Role", items=kinds.ROLES, update=_role_changed)
+    role: EnumProperty(
+        name="Role", items=kinds.ROLES, update=_role_changed,
+        description="What the part does in the sensor",
+    )  # fmt: skip
     material: StringProperty(name="Material", description="What the part is made of")
     priority: IntProperty(
         name="Priority", description="Where solids overlap, the higher one counts",
         min=-1000, max=1000,
     )  # fmt: skip
     mesh_file: StringProperty(options={"HIDDEN"})
+    is_caged: BoolProperty(description="A cage holds it where it is", options={"HIDDEN"})
 
-    reference: EnumProperty(name="Reference", items=kinds.REFERENCES)
+    reference: EnumProperty(
+        name="Reference", items=kinds.REFERENCES, description="What the mesh is for"
+    )
 
     group: StringProperty(name="Group", description="The light group it belongs to")
 
     model: StringProperty(name="Model", description="The library camera it started from")
-    projection: EnumProperty(name="Projection", items=kinds.PROJECTIONS, update=_camera_changed)
+    projection: EnumProperty(
+        name="Projection", items=kinds.PROJECTIONS, update=_camera_changed,
+        description="How the lens maps angles to the picture",
+    )  # fmt: skip
     fov: FloatProperty(
         name="Field of view", description="Degrees, across the image width", min=0.01, max=360.0,
         default=60.0, precision=3, update=_camera_changed,
@@ -76,12 +88,25 @@ class OPTISENSE_PG_object(bpy.types.PropertyGroup):
         update=_blend_changed,
     )  # fmt: skip
 
-    indenter: EnumProperty(name="Indenter", items=kinds.INDENTERS, update=_contact_changed)
+    indenter: EnumProperty(
+        name="Indenter", items=kinds.INDENTERS, update=_contact_changed,
+        description="The shape of what presses",
+    )  # fmt: skip
     radius: FloatProperty(
-        name="Radius", description="mm", min=0.01, max=1000.0, default=1.5, update=_contact_changed
+        name="Radius",
+        description="mm, of the ball or cylinder",
+        min=0.01,
+        max=1000.0,
+        default=1.5,
+        update=_contact_changed,
     )
     length: FloatProperty(
-        name="Length", description="mm", min=0.01, max=1000.0, default=8.0, update=_contact_changed
+        name="Length",
+        description="mm, of the cylinder",
+        min=0.01,
+        max=1000.0,
+        default=8.0,
+        update=_contact_changed,
     )
     tilt: FloatVectorProperty(
         name="Tilt", description="Degrees about x and y", size=2, min=-80.0, max=80.0,
@@ -92,8 +117,13 @@ class OPTISENSE_PG_object(bpy.types.PropertyGroup):
         update=_contact_changed,
     )  # fmt: skip
     file: StringProperty(
-        name="Mesh", description="OBJ, STL or PLY", subtype="FILE_PATH", update=_contact_changed
-    )
+        name="Mesh", description="A file (OBJ, STL, PLY) whose lowest point touches first",
+        subtype="FILE_PATH", update=_contact_changed,
+    )  # fmt: skip
+    shape: PointerProperty(
+        type=bpy.types.Mesh, name="Shape", update=_contact_changed,
+        description="The reference's shape, which presses where no file is named",
+    )  # fmt: skip
     scale: FloatProperty(
         name="Scale", description="From the file's units to mm", min=1e-6, max=1e6, default=1.0,
         update=_contact_changed,

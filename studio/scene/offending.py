@@ -6,7 +6,7 @@ import re
 
 import bpy
 
-from .collections import objects_of
+from .collections import objects_of, select_only
 from .contacts import pressing, sensing_surface
 from .gather import part_names
 
@@ -36,16 +36,23 @@ def offending(
     if path.partition(".")[0] == "coating":
         surface = sensing_surface(scene)
         return [] if surface is None else [surface]
+    material = re.match(r"materials\.([^.\[]+)", path)
+    if material:
+        return [e for e in objects_of(scene, "PART") if e.optisense.material == material[1]]
     found = part_names(scene).get(part)
     return [] if found is None else [found]
 
 
-def select(scene: bpy.types.Scene, found: list[bpy.types.Object]) -> list[bpy.types.Object]:
-    """Select nothing but these where any is visible; those that are selected then."""
-    visible = [each for each in found if each.visible_get()]
-    for each in scene.objects if visible else ():
-        each.select_set(False)
-    for each in visible:
-        each.select_set(True)
-        bpy.context.view_layer.objects.active = each
+def select(found: list[bpy.types.Object]) -> list[bpy.types.Object]:
+    """Select nothing but these where any can be seen; those that are selected then.
+
+    Those that are hidden one by one, to look behind them, are shown again.
+    """
+    there = set(bpy.context.view_layer.objects)
+    for each in found:
+        if each in there and each.hide_get():
+            each.hide_set(False)
+    visible = [each for each in found if each in there and each.visible_get()]
+    if visible:
+        select_only(*visible)
     return visible

@@ -48,13 +48,23 @@ class OPTISENSE_PG_coating(bpy.types.PropertyGroup):
 class OPTISENSE_PG_material(bpy.types.PropertyGroup):
     """An optical material of parts; its name is what parts refer to."""
 
-    kind: EnumProperty(name="Kind", items=kinds.MATERIAL_KINDS)
-    ior: FloatProperty(name="Refractive index", min=1.0, max=4.0, default=1.5, precision=4)
+    kind: EnumProperty(
+        name="Kind", items=kinds.MATERIAL_KINDS, description="What it does with light"
+    )
+    ior: FloatProperty(
+        name="Refractive index", min=1.0, max=4.0, default=1.5, precision=4,
+        description="Of all colours alike: 1 is air, 1.41 silicone, 1.49 acrylic",
+    )  # fmt: skip
     roughness: FloatProperty(
         name="Roughness", description="GGX alpha; 0 is smooth", min=0.0, max=1.0, precision=3
     )
-    has_dispersion: BoolProperty(name="Index for R, G, B")
-    dispersion: rgb("Dispersion", "Index at R, G, B", min=1.0, max=4.0, default=(1.5,) * 3)
+    has_dispersion: BoolProperty(
+        name="Index for R, G, B", description="It is kept with the material"
+    )
+    dispersion: rgb(
+        "Index at R, G, B", "Kept with the material, and not used",
+        min=1.0, max=4.0, default=(1.5,) * 3,
+    )  # fmt: skip
     eta: rgb("Index, real", "At R, G, B", min=1e-6, default=(1.0,) * 3)
     k: rgb("Index, imaginary", "At R, G, B", min=0.0)
     reflectance: rgb(
@@ -99,13 +109,22 @@ class OPTISENSE_PG_light_group(bpy.types.PropertyGroup):
         name="Flux", description="mW, radiant flux of each light", min=0.0, max=1e6, default=1.0,
         precision=3, update=_relight,
     )  # fmt: skip
-    emitter: EnumProperty(name="Lamp", items=kinds.EMITTERS, update=_redraw_group)
-    shape: EnumProperty(name="Window", items=kinds.WINDOWS, update=_redraw_group)
+    emitter: EnumProperty(
+        name="Lamp", items=kinds.EMITTERS, update=_redraw_group,
+        description="How each light of the group radiates",
+    )  # fmt: skip
+    shape: EnumProperty(
+        name="Window", items=kinds.WINDOWS, update=_redraw_group,
+        description="The shape of what emits",
+    )  # fmt: skip
     size: FloatVectorProperty(
         name="Size", description="mm, of the window", size=2, min=1e-4, default=(2.0, 2.0),
         precision=3, update=_redraw_group,
     )  # fmt: skip
-    file: StringProperty(name="IES file", description="Inside the design's folder")
+    file: StringProperty(
+        name="IES file", subtype="FILE_PATH",
+        description="In the design's folder, or anywhere else: Save copies it to there",
+    )  # fmt: skip
     beam: FloatProperty(
         name="Beam", description="Degrees up to which a spot is full", min=0.01, max=90.0,
         default=30.0, update=_redraw_group,
@@ -126,12 +145,11 @@ class OPTISENSE_PG_design(bpy.types.PropertyGroup):
     folder: StringProperty(name="Folder", description="Where the design is saved")
     is_saved: BoolProperty(options={"HIDDEN"})
     title: StringProperty(name="Name", description="Of the sensor", maxlen=200)
-    description: StringProperty(name="Description")
+    description: StringProperty(name="Description", description="Of the sensor, in a line or two")
     coating: PointerProperty(type=OPTISENSE_PG_coating)
     materials: CollectionProperty(type=OPTISENSE_PG_material)
-    material_index: IntProperty()
     light_groups: CollectionProperty(type=OPTISENSE_PG_light_group)
-    light_group_index: IntProperty()
+    light_group_index: IntProperty(options={"HIDDEN"})
 
     @property
     def is_open(self) -> bool:

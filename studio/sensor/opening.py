@@ -59,7 +59,7 @@ def open_stage(
     *,
     wait: bool,
     folder: str = "",
-    keep_contacts: bool = False,
+    keep_others: bool = False,
     then: Callable[[bpy.types.Scene], None] | None = None,
 ) -> bool:
     """Open what the engine wrote into a stage, as the job that the panels show.
@@ -69,7 +69,7 @@ def open_stage(
         stage: the folder.
         wait: until it is there.
         folder: the user's own folder of it; empty where it is not saved.
-        keep_contacts: the contacts of the sensor before press on this one.
+        keep_others: the contacts and references of the sensor before stay.
         then: called when it is open.
     """
     name = scene.name
@@ -81,9 +81,9 @@ def open_stage(
         document = handing.without_nulls(result["data"])
         parts = document["parts"].items()
         clear_startup(scene)
-        _picture_is_old()
+        picture_is_old()
         meshes = {key: mesh_file.read(stage / part["mesh"]) for key, part in parts}
-        build(scene, document, meshes, keep_contacts=keep_contacts)
+        build(scene, document, meshes, keep_others=keep_others)
         scene.optisense.folder = folder or str(stage)
         scene.optisense.is_saved = bool(folder)
         show_design(scene)
@@ -102,7 +102,7 @@ def open_stage(
     )
 
 
-def _picture_is_old() -> None:
+def picture_is_old() -> None:
     """What is shown is no picture of the sensor that opens, whose lights do not relight it.
 
     The scores are not of that sensor either.
@@ -110,4 +110,6 @@ def _picture_is_old() -> None:
     now = bpy.context.window_manager.optisense_picture
     now.image = ""
     now.is_before = now.shown
-    bpy.context.window_manager.optisense_evaluation.is_before = True
+    evaluation = bpy.context.window_manager.optisense_evaluation
+    evaluation.is_before = True
+    evaluation.rays = ""  # they go with the sensor that they were drawn in

@@ -10,6 +10,7 @@ from bpy.props import StringProperty
 
 from ..core.engine import EngineError
 from ..engine import catalogue, handing, polls, session
+from ..scene.paths import chosen, suggested
 from .opening import open_source
 
 
@@ -30,13 +31,15 @@ class _Opens:
 
 
 class OPTISENSE_OT_new(_Opens, bpy.types.Operator):
-    """Start from a built-in sensor"""
+    """Start from a built-in sensor, in place of the one in this scene"""
 
     bl_idname = "optisense.new"
     bl_label = "New Sensor"
     bl_options = {"REGISTER"}
 
-    sensor: StringProperty(name="Sensor", default="gelsight-mini")
+    sensor: StringProperty(
+        name="Sensor", description="The name of a built-in sensor", default="gelsight-mini"
+    )
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
@@ -64,13 +67,15 @@ class OPTISENSE_MT_new(bpy.types.Menu):
 
 
 class OPTISENSE_OT_open(_Opens, bpy.types.Operator):
-    """Open a sensor's folder"""
+    """Open the design.yaml of a sensor's folder, in place of the sensor in this scene"""
 
     bl_idname = "optisense.open"
     bl_label = "Open Sensor"
     bl_options = {"REGISTER"}
 
-    filepath: StringProperty(subtype="FILE_PATH")
+    filepath: StringProperty(
+        name="File", description="A design.yaml, or its folder", subtype="FILE_PATH"
+    )
     filter_glob: StringProperty(default="*.yaml", options={"HIDDEN"})
 
     @classmethod
@@ -85,7 +90,9 @@ class OPTISENSE_OT_open(_Opens, bpy.types.Operator):
         return {"RUNNING_MODAL"}
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        path = Path(bpy.path.abspath(self.filepath)).resolve()
+        path = chosen(self, "a design.yaml")
+        if path is None:
+            return {"CANCELLED"}
         folder = path.parent if path.suffix in (".yaml", ".yml") else path
         return self._open(context, str(folder), str(folder), wait=bpy.app.background)
 
@@ -145,23 +152,26 @@ class OPTISENSE_OT_save_as(_Saves, bpy.types.Operator):
     bl_idname = "optisense.save_as"
     bl_label = "Save As"
 
-    filepath: StringProperty(subtype="DIR_PATH")
+    filepath: StringProperty(
+        name="Folder", description="That does not exist yet", subtype="DIR_PATH"
+    )
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         return polls.may_ask(cls, context)
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
-        self.filepath = str(Path.home() / (context.scene.optisense.title or "sensor"))
+        self.filepath = suggested(context.scene)
         context.window_manager.fileselect_add(self)
         return {"RUNNING_MODAL"}
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        return self._save(context, str(Path(bpy.path.abspath(self.filepath)).resolve()))
+        folder = chosen(self, "a folder")
+        return {"CANCELLED"} if folder is None else self._save(context, str(folder))
 
 
 class OPTISENSE_OT_check(bpy.types.Operator):
-    """Find what is wrong without simulating"""
+    """Find what is wrong without simulating; the object that it is about is selected"""
 
     bl_idname = "optisense.check"
     bl_label = "Check"

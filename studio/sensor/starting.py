@@ -1,16 +1,18 @@
-"""What happens by itself when Blender starts: the engine warms up, and a design opens."""
+"""What happens by itself when Blender starts or opens a file: the engine warms up."""
 
 from __future__ import annotations
 
 import os
 from pathlib import Path
+from typing import Any
 
 import bpy
 
 from ..core.engine import EngineError
 from ..engine import session
 from ..engine.preferences import engine_command
-from .opening import open_source
+from .opening import open_source, picture_is_old
+from .warming import warm_up
 
 SOON = 0.5
 ENVIRONMENT = "OPTISENSE_OPEN"
@@ -26,15 +28,28 @@ def _start() -> None:
         if source:
             folder = source if Path(source).is_dir() else ""
             open_source(bpy.context.scene, source, folder, wait=False)
+        elif bpy.context.scene.optisense.is_open:
+            warm_up(bpy.context.scene)
     except EngineError as error:
         session.say(error)
 
 
+@bpy.app.handlers.persistent
+def _loaded(*_: Any) -> None:
+    """A .blend file was opened, with a sensor or without: the picture is of another one."""
+    picture_is_old()
+    scene = bpy.context.scene
+    if not bpy.app.background and scene.optisense.is_open and session.running() is not None:
+        warm_up(scene)
+
+
 def register() -> None:
+    bpy.app.handlers.load_post.append(_loaded)
     if not bpy.app.background:
         bpy.app.timers.register(_start, first_interval=SOON)
 
 
 def unregister() -> None:
+    bpy.app.handlers.load_post.remove(_loaded)
     if bpy.app.timers.is_registered(_start):
         bpy.app.timers.unregister(_start)

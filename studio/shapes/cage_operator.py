@@ -24,7 +24,7 @@ from ..scene.cages import (
     set_points,
     shown_points,
 )
-from ..scene.collections import object_of, objects_of
+from ..scene.collections import object_of, objects_of, select_only
 from ..scene.gather import free_name, part_names
 from ..scene.meshes import REST, part_mesh, remembered, show_vertices
 
@@ -64,8 +64,9 @@ class OPTISENSE_OT_new_cage(bpy.types.Operator):
     bl_options = {"REGISTER", "UNDO"}
 
     resolution: IntVectorProperty(
-        name="Points along x, y, z", size=3, min=2, max=64, soft_max=9, default=(3, 3, 3)
-    )
+        name="Points along x, y, z", size=3, min=2, max=64, soft_max=9, default=(3, 3, 3),
+        description="Control points of the cage; more of them bend more finely",
+    )  # fmt: skip
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
@@ -106,10 +107,7 @@ class OPTISENSE_OT_new_cage(bpy.types.Operator):
             "points": as_points(core.rest_points(box, resolution)),
         }
         cage = add_cage(scene, key, values)
-        for each in context.selected_objects:
-            each.select_set(False)
-        cage.select_set(True)
-        context.view_layer.objects.active = cage
+        select_only(cage)
         return {"FINISHED"}
 
 
@@ -131,11 +129,11 @@ class OPTISENSE_OT_edit_shape(bpy.types.Operator):
             return {"FINISHED"}
         if context.mode != "OBJECT":
             bpy.ops.object.mode_set(mode="OBJECT")
-        for each in context.selected_objects:
-            each.select_set(False)
+        if cage.name not in context.view_layer.objects:
+            self.report({"ERROR"}, f"'{cage.name}' is hidden with its collection; show that first")
+            return {"CANCELLED"}
         cage.hide_set(False)
-        cage.select_set(True)
-        context.view_layer.objects.active = cage
+        select_only(cage)
         bpy.ops.object.mode_set(mode="EDIT")
         bpy.ops.mesh.select_mode(type="VERT")
         bpy.ops.mesh.select_all(action="DESELECT")
@@ -149,7 +147,10 @@ class OPTISENSE_OT_set_bound(bpy.types.Operator):
     bl_label = "Set Bound"
     bl_options = {"REGISTER", "UNDO"}
 
-    bound: EnumProperty(items=[("c_min", "C_min", "A = 0"), ("c_max", "C_max", "A = 1")])
+    bound: EnumProperty(
+        name="Bound", items=[("c_min", "C_min", "A = 0"), ("c_max", "C_max", "A = 1")],
+        description="Which end of the range",
+    )  # fmt: skip
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:

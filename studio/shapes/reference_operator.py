@@ -2,23 +2,24 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
 import bpy
 import numpy as np
 from bpy.props import EnumProperty, FloatProperty, StringProperty
 
-from ..core import mesh_file
-from ..core.engine import EngineError
 from ..core.mesh_file import Mesh
 from ..engine import polls, session
 from ..scene import kinds
 from ..scene.build import add_material, add_part
-from ..scene.collections import REFERENCE, collection
+from ..scene.collections import REFERENCE, collection, select_only
 from ..scene.contacts import add_contact, sensing_surface
 from ..scene.gather import free_name, part_names
 from ..scene.meshes import new_mesh, part_mesh
+from ..scene.paths import chosen
+
+READING = "Reading the mesh"
+"""What messages are about, so that they are told beside the button that was pressed."""
 
 PLACES = ("camera", "light")
 """References that lights and the camera are placed by; the others become parts."""
@@ -46,39 +47,59 @@ class OPTISENSE_OT_add_mesh(bpy.types.Operator):
 
     bl_idname = "optisense.add_mesh"
     bl_label = "Add .obj Mesh"
-    bl_options = {"REGISTER", "UNDO"}
+    bl_options = {"REGISTER"}
 
-    filepath: StringProperty(subtype="FILE_PATH")
-    filter_glob: StringProperty(default="*.obj;*.stl;*.ply;*.3mf;*.step;*.stp", options={"HIDDEN"})
+    filepath: StringProperty(name="File", description="OBJ, STL or PLY", subtype="FILE_PATH")
+    filter_glob: StringProperty(default="*.obj;*.stl;*.ply", options={"HIDDEN"})
     scale: FloatProperty(
-        name="Scale", description="From the file's units to mm", min=1e-6, max=1e6, default=1.0
+        name="Scale",
+        description="From the file's units to mm: 1000 for metres, 25.4 for inches",
+        min=1e-6,
+        max=1e6,
+        default=1.0,
     )
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return polls.is_idle(cls, context) and polls.in_object_mode(cls, context)
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         context.window_manager.fileselect_add(self)
         return {"RUNNING_MODAL"}
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        path = Path(bpy.path.abspath(self.filepath)).resolve()
-        try:
-            result = session.ask_and_wait("mesh", file=str(path), scale=self.scale)
-        except EngineError as error:
-            session.say(error)
-            self.report({"ERROR"}, error.text())
+        path = chosen(self, "a mesh file")
+        if path is None:
             return {"CANCELLED"}
-        files = result["mesh"]
-        vertices = np.load(files["vertices"]).astype(np.float64)
-        mesh = Mesh(vertices, np.load(files["faces"]).astype(np.int32))
-        item = bpy.data.objects.new(path.stem, new_mesh(path.stem, mesh))
-        item.optisense.kind = "REFERENCE"
-        item.optisense.reference = "support" if result.get("closed") else "sensing_surface"
-        item.color = (0.6, 0.6, 0.6, 0.5)
-        collection(context.scene, REFERENCE).objects.link(item)
-        for each in context.selected_objects:
-            each.select_set(False)
-        item.select_set(True)
-        context.view_layer.objects.active = item
-        return {"FINISHED"}
+        name = context.scene.name
+
+        def read(result: dict[str, Any]) -> None:
+            scene = bpy.data.scenes.get(name)
+            if scene is not None:
+                _bring(scene, path.stem, result)
+                session.push_undo(f"Add {path.name}")
+
+        # A large file takes a while.
+        done = session.start_job(
+            READING, "mesh", read, wait=bpy.app.background, file=str(path), scale=self.scale
+        )
+        if not done:
+            now = session.state()
+            self.report({"ERROR"}, f"{now.problem}. {now.hint}")
+        return {"FINISHED"} if done else {"CANCELLED"}
+
+
+def _bring(scene: bpy.types.Scene, name: str, result: dict[str, Any]) -> None:
+    """Put a mesh that the engine has read into the collection Reference."""
+    files = result["mesh"]
+    vertices = np.load(files["vertices"]).astype(np.float64)
+    mesh = Mesh(vertices, np.load(files["faces"]).astype(np.int32))
+    item = bpy.data.objects.new(name, new_mesh(name, mesh))
+    item.optisense.kind = "REFERENCE"
+    item.optisense.reference = "support" if result.get("closed") else "sensing_surface"
+    item.color = (0.6, 0.6, 0.6, 0.5)
+    collection(scene, REFERENCE).objects.link(item)
+    select_only(item)
 
 
 class OPTISENSE_OT_set_reference(bpy.types.Operator):
@@ -88,7 +109,9 @@ class OPTISENSE_OT_set_reference(bpy.types.Operator):
     bl_label = "Set as Reference"
     bl_options = {"REGISTER", "UNDO"}
 
-    reference: EnumProperty(name="Reference", items=kinds.REFERENCES)
+    reference: EnumProperty(
+        name="Reference", items=kinds.REFERENCES, description="What the selected meshes are for"
+    )
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
@@ -101,15 +124,23 @@ class OPTISENSE_OT_set_reference(bpy.types.Operator):
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         scene = context.scene
-        for item in _meshes(type(self), context):
+        items = _meshes(type(self), context)
+        empty = [each.name for each in items if not each.data.polygons]
+        if empty and self.reference not in PLACES:
+            self.report({"ERROR"}, f"There is no face in {', '.join(empty)}")
+            return {"CANCELLED"}
+        made = []
+        for item in items:
             _into(scene, item, REFERENCE)
             item.optisense.kind = "REFERENCE"
             item.optisense.reference = self.reference
             if self.reference == "indenter":
                 _press(self, scene, item)
             elif self.reference not in PLACES:
-                make_part(scene, item, self.reference)
+                made.append(make_part(scene, item, self.reference))
                 item.hide_set(True)
+        if made:
+            select_only(*made)
         return {"FINISHED"}
 
 
@@ -145,24 +176,19 @@ def make_part(scene: bpy.types.Scene, item: bpy.types.Object, role: str) -> bpy.
         if name not in design.materials:
             add_material(design, name, material)
         values["material"] = name
-    part = add_part(scene, key, values, part_mesh(item, caged=False))
-    part.select_set(True)
-    return part
+    return add_part(scene, key, values, part_mesh(item, caged=False))
 
 
 def _press(operator: bpy.types.Operator, scene: bpy.types.Scene, item: bpy.types.Object) -> None:
-    """A contact in the shape of a mesh; the mesh goes to a file, which the engine reads."""
+    """A contact in the shape of a mesh, as it is now; it is pressed in along its own z axis."""
     surface = sensing_surface(scene)
     if surface is None:
         operator.report({"WARNING"}, "There is no sensing surface to press on")
         return
-    folder = Path(session.folder()) / "indenters"
-    path = folder / f"{free_name(item.name, ())}.obj"
-    mesh_file.write(part_mesh(item, caged=False), path)
     found, point, normal, _ = surface.closest_point_on_mesh((0.0, 0.0, 0.0))
     if found:
         contact = add_contact(scene, tuple(surface.matrix_world @ point), tuple(-normal))
-        contact.optisense.file = str(path)
+        contact.optisense.shape = new_mesh(item.name, part_mesh(item, caged=False))
         contact.optisense.indenter = "mesh"
 
 

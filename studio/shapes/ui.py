@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import bpy
 
-from ..engine.layout import SidebarPanel, paragraph
+from ..engine.layout import SidebarPanel, paragraph, show_job, show_outcome
 from .cage_operator import active_cage
+from .reference_operator import READING
 
 
 class OPTISENSE_PT_shapes(SidebarPanel, bpy.types.Panel):
@@ -16,8 +17,10 @@ class OPTISENSE_PT_shapes(SidebarPanel, bpy.types.Panel):
     def draw(self, context: bpy.types.Context) -> None:
         layout = self.layout
         column = layout.column(align=True)
-        column.operator("optisense.add_mesh", icon="IMPORT")
+        if not show_job(column, READING):
+            column.operator("optisense.add_mesh", icon="IMPORT")
         column.operator("optisense.set_reference", icon="PINNED")
+        show_outcome(layout, READING)
         active = context.active_object
         if active is not None and active.optisense.kind == "PART":
             _part(layout.box(), active)

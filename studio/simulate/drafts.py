@@ -9,10 +9,10 @@ import bpy
 
 from ..core.engine import EngineError, Request
 from ..engine import handing, session
-from ..scene.contacts import contact_list
 from . import requests
 
 NAME = "draft"
+NONE = "No draft: "
 KINDS = ("PART", "LIGHT", "CAMERA", "CAGE", "CONTACT")
 
 MOST_OPEN = 3
@@ -62,7 +62,7 @@ def _ask() -> None:
         return
     try:
         design = handing.design(scene)
-        contacts = contact_list(scene, bpy.context.evaluated_depsgraph_get())
+        contacts = handing.contacts(scene)
         _open.append(
             session.engine().send(
                 "simulate",
@@ -76,13 +76,15 @@ def _ask() -> None:
             )
         )
     except EngineError as error:
-        session.say(error)
+        _refused(error)
 
 
 def _take(result: dict[str, Any]) -> None:
     """Show a draft, and see to it that one that took things over does not stay."""
     global _again
     requests.take(result, draft=True)
+    if session.state().note.startswith(NONE):
+        session.state().note = ""
     settings = result["settings"]
     if (settings.get("kept_layers") or settings.get("kept_media")) and not _wanted:
         _again = time.monotonic() + REST
@@ -90,8 +92,17 @@ def _take(result: dict[str, Any]) -> None:
 
 def _refused(error: EngineError) -> None:
     if error.kind not in ("Replaced", "Cancelled"):
-        session.state().note = f"No draft: {error.message}"
+        session.state().note = f"{NONE}{error.message}"  # nothing is selected in mid-movement
         session.redraw()
+
+
+def _leave() -> None:
+    """Another .blend file is opened: no draft of this one is wanted any more."""
+    global _wanted, _again
+    for each in _open:
+        each.ignore()
+    _open.clear()
+    _wanted, _again = False, None
 
 
 @bpy.app.handlers.persistent
@@ -108,12 +119,11 @@ def _changed(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
 def register() -> None:
     bpy.app.handlers.depsgraph_update_post.append(_changed)
     session.on_tick(_ask)
+    session.on_load(_leave)
 
 
 def unregister() -> None:
-    global _wanted, _again
     if bpy.app.timers.is_registered(_soon):
         bpy.app.timers.unregister(_soon)
     bpy.app.handlers.depsgraph_update_post.remove(_changed)
-    _open.clear()
-    _wanted, _again = False, None
+    _leave()

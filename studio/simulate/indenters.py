@@ -10,7 +10,7 @@ import numpy as np
 from ..core.mesh_file import Mesh
 from ..engine import session
 from ..scene.collections import objects_of
-from ..scene.contacts import file_meshes, file_of, redraw, when_file_unknown
+from ..scene.contacts import absolute_file, file_meshes, redraw, when_file_unknown
 
 _asked: set[str] = set()
 
@@ -27,7 +27,10 @@ def ask_for_mesh(file: str) -> None:
         file_meshes[file] = Mesh(np.load(files["vertices"]), np.load(files["faces"]))
         for scene in bpy.data.scenes:
             for contact in objects_of(scene, "CONTACT"):
-                if contact.optisense.indenter == "mesh" and file_of(contact.optisense) == file:
+                if (
+                    contact.optisense.indenter == "mesh"
+                    and absolute_file(contact.optisense) == file
+                ):
                     redraw(contact)
         session.redraw()
 

@@ -11,9 +11,14 @@ from mathutils import Vector
 
 from ..core.engine import EngineError
 from ..engine import handing, polls, session
-from ..scene.collections import objects_of
+from ..scene.collections import objects_of, select_only
 from ..scene.contacts import add_contact, sensing_surface
 from . import editors, picture, requests
+
+SHAPE = (
+    "radius", "length", "size", "file", "shape", "scale", "depth", "rotation", "indenter",
+)  # fmt: skip
+"""What a contact is like, wherever it is."""
 
 
 class OPTISENSE_OT_simulate(bpy.types.Operator):
@@ -164,10 +169,7 @@ def _add(
 ) -> None:
     outward = -(surface.matrix_world.to_3x3() @ normal)
     contact = add_contact(context.scene, tuple(surface.matrix_world @ point), tuple(outward))
-    for each in context.selected_objects:
-        each.select_set(False)
-    contact.select_set(True)
-    context.view_layer.objects.active = contact
+    select_only(contact)
 
 
 class OPTISENSE_OT_nine_contacts(bpy.types.Operator):
@@ -185,7 +187,7 @@ class OPTISENSE_OT_nine_contacts(bpy.types.Operator):
         )
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        name = context.scene.name
+        name, like = context.scene.name, self._like(context)
 
         def placed(result: dict[str, Any]) -> None:
             scene = bpy.data.scenes.get(name)
@@ -199,28 +201,40 @@ class OPTISENSE_OT_nine_contacts(bpy.types.Operator):
                 near = surface.closest_point_on_mesh(inverse @ Vector(each["point"]))
                 outward = -(surface.matrix_world.to_3x3() @ near[2])
                 contact = add_contact(scene, each["point"], tuple(outward))
-                contact.optisense.radius = each["indenter"].get("radius", 1.5)
-                contact.optisense.depth = each["depth"]
+                for field, value in like.items():
+                    setattr(contact.optisense, field, value)
             session.push_undo("Nine contacts")
             session.redraw()
 
+        # Any shape finds the same places; that of a ball is always known.
+        ball = {"kind": "sphere", "radius": 1.5}
         try:
-            fields = {"design": handing.design(context.scene), **self._indenter(context)}
+            design = handing.design(context.scene)
         except EngineError as error:
             session.say(error)
+            self.report({"ERROR"}, error.text())
             return {"CANCELLED"}
-        session.start_job(
-            "Finding nine places", "nine_places", placed, wait=bpy.app.background, **fields
+        done = session.start_job(
+            "Finding nine places",
+            "nine_places",
+            placed,
+            wait=bpy.app.background,
+            design=design,
+            indenter=ball,
+            depth=0.3,
         )
-        return {"FINISHED"}
+        if not done:
+            self.report({"ERROR"}, session.state().problem)
+        return {"FINISHED"} if done else {"CANCELLED"}
 
-    def _indenter(self, context: bpy.types.Context) -> dict[str, Any]:
+    def _like(self, context: bpy.types.Context) -> dict[str, Any]:
+        """What the nine contacts are like: the active one, or a ball."""
         active = context.active_object
-        radius, depth = 1.5, 0.3
-        if active is not None and active.optisense.kind == "CONTACT":
-            radius, depth = active.optisense.radius, active.optisense.depth
-        indenter = {"kind": "sphere", "radius": round(radius, 6)}
-        return {"indenter": indenter, "depth": round(depth, 6)}
+        if active is None or active.optisense.kind != "CONTACT":
+            return {"depth": 0.3}
+        values = active.optisense
+        found = {field: getattr(values, field) for field in SHAPE}
+        return found | {"tilt": tuple(values.tilt)}
 
 
 class OPTISENSE_OT_clear_contacts(bpy.types.Operator):

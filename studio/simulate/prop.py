@@ -29,14 +29,26 @@ def _draft_changed(values: bpy.types.PropertyGroup, context: bpy.types.Context) 
 class OPTISENSE_PG_simulation(bpy.types.PropertyGroup):
     """Settings of pictures."""
 
-    size: EnumProperty(name="Size", items=SIZES, default="320")
+    size: EnumProperty(
+        name="Size", items=SIZES, default="320",
+        description="Of the picture; it keeps the camera's proportions",
+    )  # fmt: skip
     noise: FloatProperty(
         name="Noise", description="Per cent; simulate until no more is left", min=0.5, max=100.0,
         default=5.0, precision=1,
     )  # fmt: skip
-    auto_exposure: BoolProperty(name="Automatic exposure", default=True)
-    exposure: FloatProperty(name="Exposure", min=1e-6, max=1e9, default=30.0)
-    seed: IntProperty(name="Seed", min=0, max=2**31 - 1)
+    auto_exposure: BoolProperty(
+        name="Automatic exposure", default=True,
+        description="As bright as fits into the picture; off keeps pictures comparable",
+    )  # fmt: skip
+    exposure: FloatProperty(
+        name="Exposure", min=1e-6, max=1e9, default=30.0,
+        description="Factor from radiance to the brightness of the picture",
+    )  # fmt: skip
+    seed: IntProperty(
+        name="Seed", min=0, max=2**31 - 1,
+        description="Of the noise: the same seed gives the same picture",
+    )  # fmt: skip
     draft: BoolProperty(
         name="Draft while editing",
         description="Update a small, noisy picture while lights and cages are moved",

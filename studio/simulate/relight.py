@@ -7,16 +7,19 @@ from typing import Any
 import bpy
 import numpy as np
 
-from ..core.engine import EngineError, Request
+from ..core.engine import Engine, EngineError, Request
 from ..core.numbers import short
 from ..engine import session
 from ..scene.properties import when_relit
 from . import picture
 
 NAME = "relit"
+AGAIN = "Simulate again to see these lights"
 
 _open: Request | None = None
 _wanted = False
+_shown: dict[str, Any] = {}
+"""The lights of the picture that is shown."""
 
 
 def wanted() -> None:
@@ -26,24 +29,37 @@ def wanted() -> None:
     if now.shown and now.image and session.running() is not None:
         _wanted = True
         _ask()
+    elif now.shown and not now.is_before:
+        session.state().note = AGAIN
+
+
+def shown(values: dict[str, Any]) -> None:
+    """A new picture is shown: its lights, by group, as the engine tells them."""
+    global _shown
+    _shown = {
+        name: {"flux": short(group["flux"]), "colour": [short(one) for one in group["colour"]]}
+        for name, group in values.items()
+    }
 
 
 def lights(scene: bpy.types.Scene) -> dict[str, Any]:
-    """All groups as they are now."""
+    """All groups as they are now; one without a colour, which no design may have, is dark."""
     used = {each.optisense.group for each in scene.objects if each.optisense.kind == "LIGHT"}
     return {
         group.name: {
             "flux": short(group.flux),
             "colour": [short(channel) for channel in group.colour],
         }
+        if max(group.colour) > 0.0
+        else {"flux": 0.0}
         for group in scene.optisense.light_groups
-        if group.name in used and max(group.colour) > 0.0
+        if group.name in used
     }
 
 
 def _ask() -> None:
     """One request at a time; what changes meanwhile goes into the next."""
-    global _open, _wanted
+    global _open, _wanted, _shown
     if not _wanted or (_open is not None and not _open.done):
         return
     engine = session.running()
@@ -51,12 +67,13 @@ def _ask() -> None:
         return
     _wanted = False
     image = bpy.context.window_manager.optisense_picture.image
+    _shown = lights(bpy.context.scene)
     _open = engine.send(
         "relight",
         on_result=_take,
         on_error=_refused,
         image=image,
-        lights=lights(bpy.context.scene),
+        lights=_shown,
         files=["pixels"],
         name=NAME,
     )
@@ -71,15 +88,40 @@ def _take(result: dict[str, Any]) -> None:
 def _refused(error: EngineError) -> None:
     # Lights that were added since, or a picture the engine forgot: only rendering helps.
     bpy.context.window_manager.optisense_picture.image = ""
-    session.state().note = "Simulate again to see these lights"
+    session.state().note = AGAIN
+
+
+@bpy.app.handlers.persistent
+def _undone(*_: Any) -> None:
+    """Undo brings values back without telling of it."""
+    if lights(bpy.context.scene) != _shown:
+        wanted()
+
+
+def _leave() -> None:
+    """Another .blend file is opened, with lights of its own."""
+    global _open, _wanted
+    if _open is not None:
+        _open.ignore()
+    _open, _wanted = None, False
+
+
+def _forget(_: Engine) -> None:
+    """A new engine knows no picture of the one before."""
+    bpy.context.window_manager.optisense_picture.image = ""
 
 
 def register() -> None:
     session.on_tick(_ask)
+    session.on_start(_forget)
+    session.on_load(_leave)
     when_relit.append(wanted)
+    bpy.app.handlers.undo_post.append(_undone)
+    bpy.app.handlers.redo_post.append(_undone)
 
 
 def unregister() -> None:
-    global _open, _wanted
-    _open, _wanted = None, False
+    _leave()
     when_relit.remove(wanted)
+    bpy.app.handlers.undo_post.remove(_undone)
+    bpy.app.handlers.redo_post.remove(_undone)

@@ -8,9 +8,10 @@ import bpy
 import numpy as np
 
 from ..engine import handing, session
-from ..scene.contacts import contact_list, pressing
+from ..scene.collections import objects_of
+from ..scene.contacts import pressing
 from ..scene.offending import select
-from . import picture
+from . import picture, relight
 
 LATEST = "picture"
 
@@ -18,9 +19,10 @@ LATEST = "picture"
 def resolution(scene: bpy.types.Scene) -> list[int] | None:
     """Width and height to simulate; None is the camera's own."""
     size = scene.optisense_simulation.size
-    if size == "CAMERA" or scene.camera is None:
+    cameras = objects_of(scene, "CAMERA")
+    if size == "CAMERA" or not cameras:
         return None
-    width, height = scene.camera.optisense.pixels
+    width, height = cameras[0].optisense.pixels
     return [int(size), max(1, round(int(size) * height / width))]
 
 
@@ -31,10 +33,9 @@ def fields(scene: bpy.types.Scene) -> dict[str, Any]:
         EngineError: there is no engine, or the scene is no design.
     """
     settings = scene.optisense_simulation
-    depsgraph = bpy.context.evaluated_depsgraph_get()
     asked: dict[str, Any] = {
         "design": handing.design(scene),
-        "contacts": contact_list(scene, depsgraph),
+        "contacts": handing.contacts(scene),
         "noise": round(settings.noise, 3),
         "seed": settings.seed,
         "exposure": "auto" if settings.auto_exposure else settings.exposure,
@@ -53,6 +54,7 @@ def take(result: dict[str, Any], *, draft: bool) -> None:
     picture.show(pixels)
     now = bpy.context.window_manager.optisense_picture
     now.image = result["image"]
+    relight.shown(result["lights"])
     now.shown = True
     now.is_draft = draft
     now.is_relit = now.is_before = False
@@ -66,7 +68,7 @@ def _tell_unseen(numbers: list[int]) -> None:
     """Select the contacts that the picture does not show, and say so."""
     scene = bpy.context.scene
     contacts = pressing(scene)
-    chosen = select(scene, [contacts[each] for each in numbers if each < len(contacts)])
+    chosen = select([contacts[each] for each in numbers if each < len(contacts)])
     if chosen:
         names = ", ".join(each.name for each in chosen)
         session.state().note = (

@@ -6,7 +6,7 @@ import bpy
 
 from ..engine import session
 from ..engine.layout import SidebarPanel, show_job, show_outcome
-from ..scene.collections import objects_of
+from ..scene.contacts import pressing
 from . import picture
 
 
@@ -45,7 +45,7 @@ class OPTISENSE_PT_simulate(SidebarPanel, bpy.types.Panel):
         show_outcome(layout, "Simulating", "Finding nine places")
         now = context.window_manager.optisense_picture
         if not now.shown:
-            count = len(objects_of(scene, "CONTACT"))
+            count = len(pressing(scene))
             layout.label(text=f"{count} contacts" if count != 1 else "1 contact")
             return
         icon = picture.icon()
@@ -72,6 +72,8 @@ def _contact(column: bpy.types.UILayout, values: bpy.types.PropertyGroup) -> Non
         column.prop(values, "size", text="Size (mm)")
     if values.indenter == "mesh":
         column.prop(values, "file")
+        if not values.file:
+            column.prop(values, "shape")
         column.prop(values, "scale")
     column.prop(values, "depth", text="Depth (mm)")
     column.prop(values, "rotation", text="Rotation (°)")

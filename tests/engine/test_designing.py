@@ -169,6 +169,7 @@ def test_the_library_is_listed_drawn_and_added_to(engine: Any) -> None:
     for kind in ("material", "coating", "light", "camera"):
         rows = engine.ask("library", kind=kind)["entries"]
         assert rows and all(row["description"] for row in rows)
+        assert kind != "material" or {"dielectric", "conductor"} <= {row["kind"] for row in rows}
     picture = engine.ask("preview", kind="coating", entry="diffuse-grey")["files"]["picture"]
     assert Path(picture).read_bytes().startswith(b"\x89PNG")
     ball = engine.ask("preview", kind="coating", entry="diffuse-grey", ball=True, name="ball")

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import json
 import os
+import subprocess
+import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -126,6 +129,27 @@ def test_a_search_in_which_everything_fails_says_why(engine: Any, tmp_path: Path
         method="grid",
     )
     assert error["kind"] == "SearchError" and "no luck" in error["message"]
+
+
+def test_a_search_that_is_stopped_before_it_has_begun_says_so(
+    engine: Any, tmp_path: Path, goal: Callable[..., str]
+) -> None:
+    study = tmp_path / "study"
+    number = engine.send(
+        "search",
+        design="gelsight-mini",
+        study=str(study),
+        vary=["coating.specularity=0:1:2"],
+        objectives=[goal()],
+        method="grid",
+    )
+    engine.result(number)
+    command = [sys.executable, "-m", "optisense.engine.searcher", str(study), "--budget", "9"]
+    # Asked, or whoever would ask has gone; more than once, since it was a matter of luck.
+    for told in (b"stop\n", b"") * 6:
+        ended = subprocess.run(command, input=told, capture_output=True, check=False)
+        assert ended.returncode == 0, ended.stderr.decode()
+        assert json.loads(ended.stdout)["interrupted"]
 
 
 @pytest.mark.slow

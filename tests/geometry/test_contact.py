@@ -104,6 +104,15 @@ def test_rotation_turns_a_cylinder_counter_clockwise_seen_from_outside() -> None
     np.testing.assert_allclose(flat.bounds[:, 0], [-4, 6], atol=1e-9)
 
 
+def test_an_indenter_lies_along_a_direction_of_the_frame() -> None:
+    turned = place(Contact(Cylinder(1.0, 10.0), at=(1, 2), depth=0.4, rotation=70.0), FLAT, GEL)
+    along = (math.cos(math.radians(50)), math.sin(math.radians(50)), 0.3)  # as the surface allows
+    told = Contact(Cylinder(1.0, 10.0), at=(1, 2), depth=0.4, rotation=20.0, along=along)
+    np.testing.assert_allclose(place(told, FLAT, GEL).vertices, turned.vertices, atol=1e-9)
+    with pytest.raises(ContactError, match="direction"):
+        Contact(Cylinder(1.0), along=(0.0, 0.0, 0.0))
+
+
 def test_on_a_dome_the_way_in_is_the_inward_normal() -> None:
     vertices = GEL.vertices.copy()
     share = (vertices[:, 2] + 4.25) / 4.25

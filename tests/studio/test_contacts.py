@@ -1,4 +1,4 @@
-"""Contacts: what is wrong with one selects and names it."""
+"""Contacts: they press as they are drawn; what is wrong with one selects and names it."""
 
 from __future__ import annotations
 
@@ -6,9 +6,10 @@ from collections.abc import Callable
 from typing import Any
 
 import bpy
+import numpy as np
 import pytest
 
-from studio.engine import session
+from studio.engine import handing, session
 from studio.scene.collections import object_of, objects_of
 
 
@@ -74,3 +75,55 @@ def test_only_what_counts_can_be_changed_by_hand(mini: Any) -> None:
     bpy.ops.optisense.add_contact()
     for kind in ("CONTACT", "LIGHT", "CAMERA"):
         assert all(objects_of(mini, kind)[0].lock_scale), kind
+
+
+def test_nine_contacts_are_like_the_active_one(mini: Any, select: Callable[..., None]) -> None:
+    bpy.ops.optisense.add_contact()
+    values = bpy.context.active_object.optisense
+    values.indenter, values.length, values.depth, values.rotation = "cylinder", 4.0, 0.25, 30.0
+    assert bpy.ops.optisense.nine_contacts() == {"FINISHED"}
+    nine = [each.optisense for each in objects_of(mini, "CONTACT")]
+    assert len(nine) == 9 and {each.indenter for each in nine} == {"cylinder"}
+    assert {(each.length, each.depth, each.rotation) for each in nine} == {(4.0, 0.25, 30.0)}
+    select(object_of(mini, "PART", "gel"))
+    assert bpy.ops.optisense.nine_contacts() == {"FINISHED"}
+    assert {each.optisense.indenter for each in objects_of(mini, "CONTACT")} == {"sphere"}
+
+
+@pytest.mark.parametrize("sensor", ["gelsight-mini-spherical", "gelsight-svelte"])
+def test_an_indenter_lies_as_it_is_drawn(sensor: str, scene: Any) -> None:
+    assert bpy.ops.optisense.new(sensor=sensor) == {"FINISHED"}
+    assert bpy.ops.optisense.nine_contacts() == {"FINISHED"}
+    for contact in objects_of(scene, "CONTACT"):
+        contact.optisense.indenter, contact.optisense.rotation = "cylinder", 20.0
+    bpy.context.view_layer.update()
+    placed = session.ask_and_wait(
+        "place", design=handing.design(scene), contacts=handing.contacts(scene)
+    )["contacts"]
+    depsgraph = bpy.context.evaluated_depsgraph_get()
+    for contact, row in zip(objects_of(scene, "CONTACT"), placed, strict=True):
+        pose = contact.evaluated_get(depsgraph).matrix_world
+        drawn = np.array([pose @ vertex.co for vertex in contact.data.vertices])
+        pressed = np.load(row["mesh"]["vertices"])
+        assert abs(long_axis(drawn) @ long_axis(pressed)) > 0.99
+
+
+def test_a_tilted_plate_lies_as_it_is_drawn(mini: Any) -> None:
+    bpy.ops.optisense.add_contact()
+    contact = objects_of(mini, "CONTACT")[0]
+    contact.optisense.tilt, contact.optisense.rotation = (12.0, 25.0), 35.0
+    contact.optisense.indenter = "plane"
+    bpy.context.view_layer.update()
+    (placed,) = session.ask_and_wait(
+        "place", design=handing.design(mini), contacts=handing.contacts(mini)
+    )["contacts"]
+    pressed = np.load(placed["mesh"]["vertices"])
+    depsgraph = bpy.context.evaluated_depsgraph_get()
+    pose = contact.evaluated_get(depsgraph).matrix_world
+    for vertex in contact.data.vertices:
+        assert np.linalg.norm(pressed - np.array(pose @ vertex.co), axis=1).min() < 1e-4
+
+
+def long_axis(points: np.ndarray) -> np.ndarray:
+    """(3,) the direction in which points (n, 3) spread most."""
+    return np.linalg.svd(points - points.mean(axis=0), full_matrices=False)[2][0]

@@ -206,6 +206,29 @@ def test_an_engine_of_another_version_says_so(tmp_path: Path) -> None:
     engine.stop()
 
 
+def test_a_program_that_never_answers_is_no_engine(
+    scene: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("studio.core.engine.GREETING_SECONDS", 0.5)
+    silent = tmp_path / "silent.py"
+    silent.write_text("import sys\nfor line in sys.stdin:\n    print(line, flush=True)\n")
+    for told, words in (
+        (f"{sys.executable} {silent}", "does not answer"),
+        (f"{sys.executable} -c print(1)", "ended unexpectedly"),
+    ):
+        session.stop()
+        monkeypatch.setenv("OPTISENSE_ENGINE", told)
+        for run in (
+            lambda: bpy.ops.optisense.new(sensor="gelsight-mini"),
+            lambda: bpy.ops.optisense.add_mesh(filepath=str(silent)),
+        ):
+            with pytest.raises(RuntimeError, match=words):
+                run()
+            assert not session.is_busy() and words in session.state().problem
+            assert "preferences" in session.state().hint
+    session.stop()
+
+
 def test_a_picture_of_the_sensor_before_is_not_relit_and_says_so(mini: Any) -> None:
     small(mini)
     assert bpy.ops.optisense.simulate() == {"FINISHED"}

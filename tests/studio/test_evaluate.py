@@ -11,6 +11,7 @@ import pytest
 from studio.core.numbers import shown_number
 from studio.evaluate import figures
 from studio.evaluate import operator as evaluate_operator
+from studio.scene.collections import objects_of
 from studio.simulate import editors
 
 
@@ -70,6 +71,17 @@ def test_scores_of_the_sensor_before_say_so(mini: Any) -> None:
     assert values.is_before
     evaluate_operator.take({"scores": []})
     assert not values.is_before
+
+
+def test_rays_are_coloured_by_outcome_and_leave_with_their_sensor(scene: Any) -> None:
+    assert bpy.ops.optisense.new(sensor="gelsight-svelte") == {"FINISHED"}
+    assert bpy.ops.optisense.show_rays() == {"FINISHED"}
+    values = bpy.context.window_manager.optisense_evaluation
+    drawn = {each.optisense.key: tuple(each.color) for each in objects_of(scene, "SHOWN")}
+    assert {"ray hit", "ray absorbed"} <= drawn.keys() and len(set(drawn.values())) == len(drawn)
+    assert "hit (green)" in values.rays and "absorbed (black)" in values.rays
+    assert bpy.ops.optisense.new(sensor="gelsight-mini") == {"FINISHED"}
+    assert not objects_of(scene, "SHOWN") and not values.rays and not bpy.data.curves
 
 
 def test_counts_are_shown_in_full() -> None:

@@ -107,6 +107,50 @@ def test_every_panel_with_each_kind_of_object(mini: Any, select: Callable[..., N
         assert "kind" in draw_all()["Materials"].properties
 
 
+def test_objectives_and_methods_are_chosen_from_lists(mini: Any) -> None:
+    test_menus_are_filled_by_the_engine(mini)
+    search, found = mini.optisense_search, bpy.context.window_manager.optisense_found
+    for name in ("rgb2normal", "2to3pw"):
+        found.objective_choice = name
+        assert search.objective == name
+    for name in ("random", "grid"):
+        found.method_choice = name
+        assert search.method == name
+
+
+def test_whatever_can_be_set_says_what_it_is(mini: Any, select: Callable[..., None]) -> None:
+    silent = []
+    for name in dir(bpy.ops.optisense):
+        kind = getattr(bpy.ops.optisense, name).get_rna_type()
+        assert kind.name and kind.description, name
+        silent += [f"{name}.{each.identifier}" for each in kind.properties if _is_silent(each)]
+    for root in (bpy.types.Scene, bpy.types.Object, bpy.types.WindowManager):
+        for pointer in root.bl_rna.properties:
+            if pointer.identifier.startswith("optisense"):
+                silent += _silent(pointer.fixed_type)
+    assert not silent
+
+
+TOLD = {"session", "picture", "score"}
+"""What panels tell, which nobody sets."""
+
+
+def _silent(group: Any) -> list[str]:
+    found = []
+    for each in group.properties:
+        if each.type in ("POINTER", "COLLECTION") and each.fixed_type:
+            if each.fixed_type.identifier.startswith("OPTISENSE"):
+                found += _silent(each.fixed_type)
+        elif group.identifier.removeprefix("OPTISENSE_PG_") not in TOLD and _is_silent(each):
+            found.append(f"{group.identifier}.{each.identifier}")
+    return found
+
+
+def _is_silent(each: Any) -> bool:
+    told = each.identifier in ("rna_type", "name") or each.is_hidden or each.is_readonly
+    return not told and not each.description
+
+
 def test_messages_and_progress_are_drawn(mini: Any) -> None:
     now = session.state()
     now.busy, now.fraction, now.progress = "Simulating", 0.4, "1.0 million photons"

@@ -101,7 +101,21 @@ def test_what_is_edited_is_written_and_nothing_else(mini: Any) -> None:
     after["lights"]["blue"]["flux"] = before["lights"]["blue"]["flux"]
     after["coating"]["specularity"] = before["coating"]["specularity"]
     after["camera"]["fov"] = before["camera"]["fov"]
+    after["provenance"] = before["provenance"]
     assert after == before
+
+
+def test_what_is_changed_no_longer_has_the_source_it_had(mini: Any) -> None:
+    before = gather_document(mini)["provenance"]
+    assert {"camera.fov", "camera.position", "lights.red.flux", "parts.guide"} <= before.keys()
+    objects_of(mini, "CAMERA")[0].optisense.fov = 61.0
+    bpy.data.objects.remove(object_of(mini, "PART", "guide"))
+    after = gather_document(mini)["provenance"]
+    assert after["camera.fov"]["status"] == "assumed" and "by hand" in after["camera.fov"]["source"]
+    assert "parts.guide" not in after
+    changed = {path for path in before if after.get(path) != before[path]}
+    assert changed == {"camera.fov", "parts.guide"}
+    assert session.ask_and_wait("check", design=handing.design(mini))["problems"] == []
 
 
 def test_copies_made_in_blender_join_the_sensor(mini: Any, select: Callable[..., None]) -> None:

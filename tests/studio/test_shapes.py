@@ -56,15 +56,28 @@ def test_references_become_parts(
     assert part["role"] == reference and part.get("material") == material
     made = object_of(mini, "PART", "brought")
     assert np.allclose(made.matrix_world @ made.data.vertices[1].co, item.data.vertices[1].co)
-    assert list(bpy.context.selected_objects) == [made]
+    assert list(bpy.context.selected_objects) == [made] and bpy.context.active_object == made
 
 
 def test_an_indenter_reference_presses(mini: Any, bring: Callable[..., Any]) -> None:
     bring(CUBE, "indenter")
     (contact,) = objects_of(mini, "CONTACT")
-    assert contact.optisense.indenter == "mesh" and Path(contact.optisense.file).is_file()
+    assert contact.optisense.indenter == "mesh" and len(contact.data.vertices) == 8
     assert "brought" not in gather_document(mini)["parts"]
     mini.optisense_simulation.size, mini.optisense_simulation.noise = "160", 50.0
+    assert bpy.ops.optisense.simulate() == {"FINISHED"}
+    assert "does not see" not in session.state().note
+
+
+def test_an_indenter_reference_presses_on_another_day(
+    mini: Any, bring: Callable[..., Any], tmp_path: Path
+) -> None:
+    bring(CUBE, "indenter")
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "my sensor.blend"))
+    session.stop()
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "my sensor.blend"))
+    scene = bpy.context.scene
+    scene.optisense_simulation.size, scene.optisense_simulation.noise = "160", 50.0
     assert bpy.ops.optisense.simulate() == {"FINISHED"}
     assert "does not see" not in session.state().note
 
@@ -95,3 +108,32 @@ def test_a_file_that_is_no_mesh_is_told(mini: Any, tmp_path: Path) -> None:
     file.write_text("not a mesh\n")
     with pytest.raises(RuntimeError, match=r"text\.obj"):
         bpy.ops.optisense.add_mesh(filepath=str(file))
+
+
+def test_lights_on_a_solid_look_at_the_sensing_surface(
+    mini: Any, bring: Callable[..., Any], select: Callable[..., None]
+) -> None:
+    lamp = bring(CUBE, "light")
+    lamp.location = (20.0, -1.0, -1.0)
+    lamp.rotation_euler = (0.3, 0.2, 0.1)  # its faces' normals no longer add up to zero exactly
+    bpy.context.view_layer.update()
+    select(lamp)
+    assert bpy.ops.optisense.add_light(model="smd-3528", group="NEW", name="side") == {"FINISHED"}
+    (pose,) = gather_document(mini)["lights"]["side"]["lights"]
+    surface = object_of(mini, "PART", "skin")
+    corners = np.array([surface.matrix_world @ v.co for v in surface.data.vertices])
+    way = (corners.min(axis=0) + corners.max(axis=0)) / 2 - pose["position"]
+    assert np.allclose(pose["direction"], way / np.linalg.norm(way), atol=0.05)
+
+
+def test_a_mesh_without_a_face_is_told(mini: Any, select: Callable[..., None]) -> None:
+    empty = bpy.data.objects.new("nothing", bpy.data.meshes.new("nothing"))
+    mini.collection.objects.link(empty)
+    select(empty)
+    for reference in ("support", "indenter"):
+        with pytest.raises(RuntimeError, match="no face in nothing"):
+            bpy.ops.optisense.set_reference(reference=reference)
+    bpy.ops.optisense.set_reference(reference="light")
+    select(empty)
+    with pytest.raises(RuntimeError, match="empty mesh"):
+        bpy.ops.optisense.add_light(model="smd-3528", group="NEW", name="side")

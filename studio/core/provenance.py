@@ -1,0 +1,41 @@
+"""Where the numbers of a design come from, after somebody changed some of them."""
+
+from __future__ import annotations
+
+import re
+from typing import Any
+
+BY_HAND = {"status": "assumed", "source": "set by hand in OptiSense Studio"}
+
+AXES = {"x": 0, "y": 1, "z": 2, "r": 0, "g": 1, "b": 2}
+"""Names of the three numbers of a list."""
+
+
+def updated(before: dict[str, Any], now: dict[str, Any]) -> dict[str, Any]:
+    """The sources of a design: of what was changed it is the user, of what went there is none.
+
+    Args:
+        before: the design with its `provenance`, by dotted path.
+        now: the same design, changed.
+    """
+    found = {}
+    for path, entry in (before.get("provenance") or {}).items():
+        was, there_is = value_at(before, path), value_at(now, path)
+        if not was or was == there_is:
+            found[path] = entry
+        elif there_is:
+            found[path] = dict(BY_HAND)
+    return found
+
+
+def value_at(document: Any, path: str) -> tuple[Any, ...]:
+    """What is at a dotted path, in a tuple; an empty one where the path leads nowhere."""
+    for step in re.findall(r"[^.\[\]]+", path):
+        if isinstance(document, dict) and step in document:
+            document = document[step]
+            continue
+        number = AXES.get(step, int(step) if step.isdigit() else -1)
+        if not isinstance(document, list) or not 0 <= number < len(document):
+            return ()
+        document = document[number]
+    return (document,)

@@ -1,0 +1,78 @@
+"""What a search may change of the object that is selected."""
+
+from __future__ import annotations
+
+import bpy
+
+from ..core import vary
+from ..engine import catalogue
+from ..scene.cages import cage_data
+from ..scene.collections import objects_of
+from ..scene.gather import part_names
+from ..scene.kinds import KINDS_OF_ROLE
+
+
+def suggestions(context: bpy.types.Context) -> list[vary.Suggestion]:
+    """What a search may change of the active object."""
+    active = context.active_object
+    own = None if active is None else active.optisense
+    if own is None:
+        return []
+    if own.kind == "CAMERA":
+        return vary.for_camera(own.model, _names("camera"))
+    if own.kind == "LIGHT":
+        return _of_light(context.scene, active)
+    if own.kind == "PART":
+        return _of_part(context.scene, active)
+    if own.kind == "CAGE":
+        return _of_cage(active)
+    return []
+
+
+def _names(kind: str) -> list[str]:
+    """What the library has of a kind; empty until the engine has told."""
+    return [row["name"] for row in catalogue.entries(kind)]
+
+
+def _of_light(scene: bpy.types.Scene, light: bpy.types.Object) -> list[vary.Suggestion]:
+    group = scene.optisense.light_groups.get(light.optisense.group)
+    if group is None:
+        return []
+    lights = [e for e in objects_of(scene, "LIGHT") if e.optisense.group == group.name]
+    models = _names("light") if group.emitter == "library" else []
+    return vary.for_light(
+        group.name, lights.index(light), flux=group.flux, model=group.model, models=models
+    )
+
+
+def _of_part(scene: bpy.types.Scene, part: bpy.types.Object) -> list[vary.Suggestion]:
+    own, design = part.optisense, scene.optisense
+    name = next(key for key, each in part_names(scene).items() if each == part)
+    caged = {key for cage in objects_of(scene, "CAGE") for key in cage_data(cage)["parts"]}
+    pose = [] if name in caged else vary.for_pose(name)
+    if own.role == "sensing_surface":
+        coating = design.coating
+        made = vary.for_surface(
+            coating.library, _names("coating"), coating.specularity, coating.reflectance
+        )
+        return [*made, *pose]
+    material = design.materials.get(own.material)
+    fitting = KINDS_OF_ROLE[own.role]
+    choices = [row["name"] for row in catalogue.entries("material") if row.get("kind") in fitting]
+    made = vary.for_material(
+        name,
+        own.material,
+        "" if material is None else material.kind,
+        0.0 if material is None else material.roughness,
+        choices,
+    )
+    return [*made, *pose]
+
+
+def _of_cage(cage: bpy.types.Object) -> list[vary.Suggestion]:
+    chosen: list[int] = []
+    if cage.mode == "EDIT":
+        cage.update_from_editmode()
+        chosen = [vertex.index for vertex in cage.data.vertices if vertex.select]
+    blended = cage_data(cage).get("blend") is not None
+    return vary.for_cage(cage.optisense.key, chosen, blended=blended)

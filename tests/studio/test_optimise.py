@@ -1,0 +1,101 @@
+"""What a search may change, as the studio offers it."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import bpy
+import pytest
+
+from studio.engine import catalogue, handing, session
+from studio.optimise.suggesting import suggestions
+from studio.scene.collections import objects_of
+
+
+@pytest.fixture
+def library() -> None:
+    """The engine has told what the library has."""
+    engine = session.engine()
+    end = time.monotonic() + 60.0
+    while not all(catalogue.entries(kind) for kind in ("material", "coating", "light", "camera")):
+        engine.poll()
+        assert time.monotonic() < end
+        time.sleep(0.01)
+
+
+def parameters(scene: Any, text: str) -> list[dict[str, Any]]:
+    """What the engine makes of a range."""
+    found = session.ask_and_wait("space", design=handing.design(scene), vary=[text])
+    return list(found["parameters"])
+
+
+@pytest.mark.parametrize("sensor", ["gelsight-mini", "gelsight-svelte"])
+def test_pose_material_and_points_of_every_object_can_vary(
+    sensor: str, scene: Any, select: Callable[..., None], library: None
+) -> None:
+    assert bpy.ops.optisense.new(sensor=sensor) == {"FINISHED"}
+    names = set()
+    for each in objects_of(scene, "LIGHT", "PART", "CAMERA", "CAGE"):
+        select(each)
+        offered = suggestions(bpy.context)
+        assert offered and len({row.text for row in offered}) == len(offered)
+        for row in offered:
+            names |= {one["name"] for one in parameters(scene, row.text)}
+    assert {"camera.position.x", "camera.turn.y", "camera.model", "coating.library"} <= names
+    assert {"lights.red.lights[0].position.z", "lights.red.turn.x", "lights.red.model"} <= names
+    assert {"parts.gel.material", "coating.specularity"} <= names
+    assert any(name.startswith("cages.") for name in names)
+    free = "M2" if sensor == "gelsight-svelte" else "tray"
+    assert {f"parts.{free}.shift.x", f"parts.{free}.turn.z", f"parts.{free}.material"} <= names
+
+
+def test_a_search_starts_from_what_is_there(
+    mini: Any, select: Callable[..., None], library: None
+) -> None:
+    design = mini.optisense
+    design.light_groups["red"].flux = 30.0
+    design.coating.reflectance = (0.95, 0.01, 0.5)
+    design.materials["silicone-xp565"].roughness = 0.75
+    starts: dict[str, float] = {}
+    for kind in ("LIGHT", "PART"):
+        for each in objects_of(mini, kind):
+            select(each)
+            for row in suggestions(bpy.context):
+                for one in parameters(mini, row.text):
+                    assert one["lower"] <= one["start"] <= one["upper"]
+                    starts[one["name"]] = one["start"]
+    assert starts["lights.red.flux"] == pytest.approx(30.0)
+    assert starts["coating.reflectance.r"] == pytest.approx(0.95)
+    assert starts["coating.reflectance.g"] == pytest.approx(0.01)
+    assert starts["materials.silicone-xp565.roughness"] == pytest.approx(0.75)
+
+
+def test_several_objectives_are_weighed_against_each_other(mini: Any, tmp_path: Path) -> None:
+    goals = tmp_path / "goals.py"
+    goals.write_text(
+        "def up(e):\n    return e.design.coating.specularity\n"
+        "def down(e):\n    return -e.design.coating.specularity\n"
+    )
+    search = mini.optisense_search
+    search.objective = f"{goals}:up, {goals}:down"
+    search.method, search.budget, search.study = "pareto", 3, str(tmp_path / "study")
+    bpy.ops.optisense.vary(label="specularity", text="coating.specularity=0:1")
+    assert bpy.ops.optisense.search() == {"FINISHED"}
+    about = session.ask_and_wait("study", study=str(tmp_path / "study"))
+    assert about["objectives"] == ["up", "down"]
+
+
+def test_long_choices_fit_into_the_menu(
+    mini: Any, select: Callable[..., None], library: None
+) -> None:
+    select(objects_of(mini, "LIGHT")[0])
+    texts: list[str] = []
+    layout = SimpleNamespace(
+        operator=lambda name, text: texts.append(text) or SimpleNamespace(),
+    )
+    bpy.types.OPTISENSE_MT_vary.draw(SimpleNamespace(layout=layout), bpy.context)
+    assert texts and max(map(len, texts)) <= 72 and any(text.endswith(" ...") for text in texts)

@@ -1,0 +1,96 @@
+"""What is simulated: as large as asked, with the contacts that are seen, whatever a draft says."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import bpy
+
+from studio.engine import handing, session
+from studio.scene.collections import object_of, objects_of
+from studio.simulate import drafts
+
+IES = "IESNA:LM-63-2002\nTILT=NONE\n1 100 1 3 1 1 1 0 0 0\n1 1 1\n0 45 90\n0\n100 50 0\n"
+
+
+def test_pictures_have_the_proportions_of_the_sensors_camera(mini: Any) -> None:
+    mini.optisense_simulation.size, mini.optisense_simulation.noise = "160", 50.0
+    objects_of(mini, "CAMERA")[0].optisense.pixels = (200, 100)
+    other = bpy.data.objects.new("view", bpy.data.cameras.new("view"))
+    mini.collection.objects.link(other)
+    for camera in (other, None):  # a camera to make a film with, and none
+        mini.camera = camera
+        assert bpy.ops.optisense.simulate() == {"FINISHED"}
+        assert bpy.context.window_manager.optisense_picture.summary.startswith("160 x 80")
+
+
+def test_an_ies_file_from_anywhere_joins_the_design(mini: Any, tmp_path: Path) -> None:
+    elsewhere = tmp_path / "my lamps" / "lämp 1.ies"
+    elsewhere.parent.mkdir()
+    elsewhere.write_text(IES, encoding="ascii")
+    group = mini.optisense.light_groups["red"]
+    group.emitter, group.file = "ies", str(elsewhere)
+    bpy.ops.optisense.check()
+    assert not session.state().problem
+    assert bpy.ops.optisense.save_as(filepath=str(tmp_path / "mini")) == {"FINISHED"}
+    assert (tmp_path / "mini" / elsewhere.name).read_text() == IES
+    elsewhere.unlink()  # the design has one of its own now
+    assert bpy.ops.optisense.save() == {"FINISHED"}
+    assert bpy.ops.optisense.open(filepath=str(tmp_path / "mini" / "design.yaml")) == {"FINISHED"}
+    assert mini.optisense.light_groups["red"].file == elsewhere.name
+    mini.optisense.light_groups["red"].file = "../gone.ies"
+    bpy.ops.optisense.check()
+    assert "gone.ies" in session.state().problem
+    assert {each.optisense.group for each in bpy.context.selected_objects} == {"red"}
+
+
+def test_hidden_contacts_do_not_press(mini: Any) -> None:
+    for _ in range(2):
+        bpy.ops.optisense.add_contact()
+    contact = objects_of(mini, "CONTACT")[0]
+    folder = bpy.context.view_layer.layer_collection.children["Contacts"]
+    assert len(handing.contacts(mini)) == 2
+    contact.hide_set(True)
+    assert len(handing.contacts(mini)) == 1
+    contact.hide_set(False)
+    contact.hide_viewport = True
+    assert len(handing.contacts(mini)) == 1
+    contact.hide_viewport = False
+    for hide in ("hide_viewport", "exclude"):
+        setattr(folder, hide, True)
+        assert handing.contacts(mini) == []
+        setattr(folder, hide, False)
+    assert len(handing.contacts(mini)) == 2
+
+
+def test_a_draft_that_can_not_be_made_selects_nothing_and_is_forgotten(
+    mini: Any, select: Callable[..., None]
+) -> None:
+    gel, light = object_of(mini, "PART", "gel"), objects_of(mini, "LIGHT")[0]
+    select(light)
+    now = session.state()
+
+    def draft() -> None:
+        light.location.z -= 0.25
+        bpy.context.view_layer.update()
+        drafts._soon()
+        end = time.monotonic() + 60.0
+        while drafts._wanted or any(not each.done for each in drafts._open):
+            session._tick()
+            assert time.monotonic() < end
+            time.sleep(0.01)
+
+    mini.optisense_simulation.draft = True
+    material, gel.optisense.material = gel.optisense.material, ""
+    draft()
+    assert "'gel'" in now.note
+    gel.optisense.material = material
+    draft()
+    assert not now.note
+    objects_of(mini, "CAMERA")[0].optisense.kind = "NONE"
+    draft()
+    assert "no camera" in now.note and not now.problem
+    assert list(bpy.context.selected_objects) == [light]
