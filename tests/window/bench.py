@@ -31,8 +31,8 @@ HEAD = 28
 TRIES = 5
 """To close all panels: a key may come later than the click that it belongs to."""
 
-PAGES = 15
-"""Most of them that the sidebar has, in steps of so many clicks."""
+SCROLLED_TO = "region('VIEW_3D', 'UI').view2d.region_to_view(0, 0)[1]"
+"""How far the sidebar is scrolled."""
 
 
 class Bench:
@@ -143,28 +143,39 @@ class Bench:
         """Look for a button: where it was seen last, from where the mouse is down, then everywhere.
 
         Args:
-            what: in its operator's or property's name.
+            what: the whole name of its operator, with arguments where several buttons have it, or
+                of its property; see `is_named` of the agent.
             across: where to look, 0 is the sidebar's left edge and 1 its right one.
         """
         left, top, width, height = self.sidebar()
         x, end = round(left + width * across), top + height - 6
-        y = self._seen(what, x, max(self._last - ROW, top + 6), end)
+        seen: list[str] = []
+        y = self._seen(what, x, max(self._last - ROW, top + 6), end, seen)
         if y is None:
             self.to_top()
-        for _ in range(PAGES):
-            y = self._seen(what, x, top + 6, end) if y is None else y
-            if y is not None:
-                self._last = y
-                return x, y
-            self.scroll(SCROLLED)
-        raise AssertionError(f"no button '{what}' in the sidebar")
+        while y is None:
+            y = self._seen(what, x, top + 6, end, seen)
+            if y is None and not self.scroll(SCROLLED):
+                break
+        assert y is not None, (
+            f"no button '{what}' in the sidebar; {across:g} across there are: {', '.join(seen)}"
+        )
+        self._last = y
+        return x, y
 
-    def _seen(self, what: str, x: int, top: int, end: int) -> int | None:
-        """How far down a button is in a part of the sidebar that is in view."""
-        y = self.see(f"scan {x} {top} {end} {ROW} {what}")
+    def _seen(self, what: str, x: int, top: int, end: int, seen: list[str]) -> int | None:
+        """How far down a button is in a part of the sidebar that is in view.
+
+        Args:
+            what: its name.
+            x, top, end: where to look, pixels.
+            seen: names of buttons, to which those are added that are there.
+        """
+        y, names = self.see(f"scan {x} {top} {end} {ROW} {what}")
+        seen += [each for each in names if each not in seen]
         if y is not None:
             self.drawn()  # the wheel is quicker than the sidebar: it may have moved meanwhile
-            y = self.see(f"scan {x} {y - 3} {y + 2 * ROW} 3 {what}")
+            y, _ = self.see(f"scan {x} {y - 3} {y + 2 * ROW} 3 {what}")
         return None if y is None else int(y)
 
     def to_top(self) -> None:
@@ -207,16 +218,18 @@ class Bench:
         """Whether any of the extension's buttons is in view, where an open panel has one."""
         left, top, width, _ = self.sidebar()
         x, end = round(left + width * 0.25), top + 11 * HEAD
-        return self.see(f"scan {x} {top + HEAD} {end} {ROW} optisense.") is not None
+        return self.see(f"scan {x} {top + HEAD} {end} {ROW} optisense.*")[0] is not None
 
-    def scroll(self, clicks: int) -> None:
-        """Turn the mouse's wheel over the sidebar; down is positive."""
+    def scroll(self, clicks: int) -> bool:
+        """Turn the mouse's wheel over the sidebar, down is positive; whether that moved it."""
         left, top, _, height = self.sidebar()
+        before = self.see(SCROLLED_TO)
         self.desktop.click(  # beside the buttons: over a list, the wheel would turn that
             left + BESIDE, top + height / 2, button=5 if clicks > 0 else 4, times=abs(clicks)
         )
         self.see("1")
         self.drawn()
+        return bool(self.see(SCROLLED_TO) != before)
 
     def press(self, what: str, *, across: float = 0.5) -> None:
         """Find a button and click on it."""
