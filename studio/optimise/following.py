@@ -16,14 +16,15 @@ CURVE = "OptiSense search"
 CURVE_SIZE = (220, 150)
 GHOSTS = "Best so far"
 
-_curve: list[float | None] = []
+_curve: dict[int, float | None] = {}
+"""The score of each trial by its number: trials may be told twice."""
 
 
 def begin() -> None:
     """Forget the search before."""
     _curve.clear()
     found = bpy.context.window_manager.optisense_found
-    found.best = found.values = found.start = found.ended = ""
+    found.best = found.values = found.start = found.ended = found.offer = ""
     clear_ghosts(bpy.context.scene)
 
 
@@ -34,7 +35,7 @@ def take(event: dict[str, Any]) -> None:
     scores = event.get("scores") or {}
     objective = bpy.context.scene.optisense_search.objective
     score = scores.get(objective, next(iter(scores.values()), None))
-    _curve.append(score)
+    _curve[event["number"]] = score
     found = bpy.context.window_manager.optisense_found
     if score is not None and event.get("start"):
         found.start = f"{score:.4g}"
@@ -45,18 +46,20 @@ def take(event: dict[str, Any]) -> None:
             for name, value in list((event.get("values") or {}).items())[:8]
         )
         show_ghosts(bpy.context.scene, event.get("shapes") or {})
-    picture.show_icon(CURVE, curve_picture(_curve, CURVE_SIZE))
+    in_order = [_curve[number] for number in sorted(_curve)]
+    picture.show_icon(CURVE, curve_picture(in_order, CURVE_SIZE))
     session.redraw()
 
 
 def take_curve(rows: list[dict[str, Any]]) -> None:
     """All trials of a study at once."""
     begin()
-    for number, row in enumerate(rows):
-        scores = [each for each in _curve if each is not None]
+    best = None
+    for row in rows:
         score = next(iter((row.get("scores") or {}).values()), None)
-        better = score is not None and (not scores or score > max(scores))
-        take({"event": "trial", "best": better, "number": number, **row})
+        better = score is not None and (best is None or score > best)
+        best = score if better else best
+        take({"event": "trial", "best": better, **row})
 
 
 def show_ghosts(scene: bpy.types.Scene, shapes: dict[str, Any]) -> None:
@@ -84,12 +87,19 @@ def clear_ghosts(scene: bpy.types.Scene) -> None:
             bpy.data.meshes.remove(mesh)
 
 
+def has_trials() -> bool:
+    """Whether there is a curve to show."""
+    return bool(_curve)
+
+
 def finished(result: dict[str, Any]) -> None:
     """The search is over."""
     found = bpy.context.window_manager.optisense_found
     done = result.get("done")
     why = "stopped" if result.get("interrupted") else result.get("ended") or "finished"
     found.ended = f"{done} trials: {why}"
+    if result.get("interrupted"):  # given up: what is drawn is as it was before
+        clear_ghosts(bpy.context.scene)
     notes = [str(note) for note in result.get("notes") or []]
     session.state().note = "; ".join(notes)
     session.redraw()

@@ -64,6 +64,7 @@ class OPTISENSE_PG_found(bpy.types.PropertyGroup):
     values: StringProperty(options={"SKIP_SAVE"})
     start: StringProperty(options={"SKIP_SAVE"})
     ended: StringProperty(options={"SKIP_SAVE"})
+    offer: StringProperty(description="What a study waits for", options={"SKIP_SAVE"})
 
 
 def _choose(found: OPTISENSE_PG_found, context: bpy.types.Context, what: str) -> None:

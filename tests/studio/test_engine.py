@@ -380,25 +380,6 @@ def test_an_indenter_from_a_file_is_drawn_as_it_presses(mini: Any, tmp_path: Pat
     assert np.allclose(points.max(axis=0), [0.5, 1.0, 2.1], atol=1e-6)
 
 
-def test_a_search_goes_on_after_blender_was_closed(mini: Any, tmp_path: Path) -> None:
-    search = mini.optisense_search
-    bpy.ops.optisense.vary(text="camera.fov=50:70", label="field of view")
-    search.study, search.objective = str(tmp_path / "study"), "aoap"
-    search.method, search.budget = "random", 2
-    assert bpy.ops.optisense.search() == {"FINISHED"}
-    assert bpy.context.window_manager.optisense_found.ended.startswith("2 trials")
-    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "bench.blend"))
-    session.stop()
-    bpy.ops.wm.read_homefile(use_empty=True)
-    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "bench.blend"))
-    search = bpy.context.scene.optisense_search
-    assert search.study == str(tmp_path / "study")
-    search.budget = 3
-    assert bpy.ops.optisense.resume() == {"FINISHED"}
-    found = bpy.context.window_manager.optisense_found
-    assert found.ended.startswith("3 trials") and float(found.best) > 0.5
-
-
 def test_drafts_follow_a_dragged_light_and_the_last_is_whole(mini: Any) -> None:
     pictures: list[dict[str, Any]] = []
     take, engine = drafts.requests.take, session.engine()
