@@ -53,7 +53,7 @@ class OPTISENSE_PT_optimise(SidebarPanel, bpy.types.Panel):
         if not show_job(row, "Searching", "Reading the study"):
             row.operator("optisense.search", icon="VIEWZOOM")
             row.operator("optisense.resume", icon="PLAY")
-        show_outcome(layout, "Searching", "Reading the study", "Applying")
+        show_outcome(layout, "Searching", "Reading the study")
         curve = icon(CURVE) if has_trials() else 0
         if curve:
             layout.template_icon(icon_value=curve, scale=8.0)
@@ -70,6 +70,7 @@ class OPTISENSE_PT_optimise(SidebarPanel, bpy.types.Panel):
         if not show_job(row, "Applying"):
             row.operator("optisense.apply_best", icon="CHECKMARK")
             row.operator("optisense.keep_variant", icon="DUPLICATE")
+        show_outcome(layout, "Applying")
 
 
 CLASSES = (OPTISENSE_UL_vary, OPTISENSE_PT_optimise)

@@ -11,6 +11,9 @@ import time
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from .desktop import SIZE, Desktop
 
 PATIENCE = 300.0
@@ -47,18 +50,25 @@ class Bench:
     def __init__(self, blender: Path, desktop: Desktop, home: Path) -> None:
         self.desktop = desktop
         self.home = home
-        address = home / "agent"
+        self._blender = blender
+        self.start()
+
+    def start(self, file: Path | None = None) -> None:
+        """Start Blender, with a file of its own if one is given."""
+        address = self.home / "agent"
+        address.unlink(missing_ok=True)
         environment = {
             **os.environ,
-            **own_place(home),
-            "DISPLAY": desktop.name,
+            **own_place(self.home),
+            "DISPLAY": self.desktop.name,
             "OPTISENSE_AGENT": str(address),
         }
         environment.pop("OPTISENSE_ENGINE", None)  # it knows that from when it was installed
         self._last = 0
-        self._log = (home / "blender.log").open("ab")
+        self._log = (self.home / "blender.log").open("ab")
         self.process = subprocess.Popen(
-            [blender, "--window-geometry", "0", "0", str(SIZE[0]), str(SIZE[1]),
+            [self._blender, *([file] if file else []),
+             "--window-geometry", "0", "0", str(SIZE[0]), str(SIZE[1]),
              "--python", Path(__file__).with_name("agent.py")],
             env=environment,
             stdout=self._log,
@@ -281,6 +291,13 @@ class Bench:
             self.drawn()
             self.desktop.picture(Path(folder) / f"{name}.jpg")
 
+    def view(self) -> NDArray[np.int64]:
+        """(h, w, 3) what the 3D view shows, 0 to 255."""
+        self.drawn()
+        left, top, width, height = self.see("place('VIEW_3D', 'WINDOW')")
+        shown = self.desktop.shown().crop((left, top, left + width, top + height))
+        return np.asarray(shown, dtype=np.int64)
+
     def choose_file(self, name: str = "") -> None:
         """Click on a file where one is asked for, if a name is given, and then on the button."""
         self.until("any(a.type == 'FILE_BROWSER' for w in manager.windows for a in w.screen.areas)")
@@ -296,6 +313,44 @@ class Bench:
         left, top, width, height = self.see("place('FILE_BROWSER', 'EXECUTE')")
         self.desktop.click(left + width - 70, top + height / 2)
         self.until("len(manager.windows) == 1")
+
+    def select_part(self, name: str, at: tuple[float, float, float], *, too: bool = False) -> None:
+        """Click on a part in the view.
+
+        Args:
+            name: the part's.
+            at: mm, a point of it that is not hidden.
+            too: besides what is selected, with the key Shift.
+        """
+        if too:
+            self.desktop.hold("shift", True)
+        self.desktop.click(*self.see(f"on_screen({at})"))
+        self.see("1")
+        if too:
+            self.desktop.hold("shift", False)
+        self.see("1")
+        self.drawn()
+        chosen = self.see("[each.name for each in scene().objects if each.select_get()]")
+        assert name in chosen, f"a click on '{name}' selected: {', '.join(chosen) or 'nothing'}"
+
+    def over_view(self) -> None:
+        """Put the mouse over the 3D view, for keys that are meant for it."""
+        left, top, width, height = self.see("place('VIEW_3D', 'WINDOW')")
+        self.desktop.move(left + width * 0.3, top + height - 60)
+        self.see("1")
+
+    def quit(self) -> None:
+        """Close Blender as a user does, saving the file when it asks."""
+        self.over_view()
+        self.desktop.keys("ctrl+q")
+        for _ in range(TRIES):
+            try:
+                self.process.wait(2)
+                break
+            except subprocess.TimeoutExpired:
+                self.desktop.keys("Return")
+        self.process.wait(PATIENCE)
+        self._log.close()
 
     def close(self) -> None:
         """End Blender."""

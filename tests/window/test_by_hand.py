@@ -40,6 +40,8 @@ def test_the_tab_is_there(bench: Bench) -> None:
     bench.greet()
     bench.open_tab()
     bench.find("optisense.open", across=0.25)
+    with pytest.raises(AssertionError, match=r"are: .*optisense\.open"):
+        bench.find("optisense.ope", across=0.25)  # names are whole, and what there is, is told
 
 
 def test_a_new_mini(bench: Bench) -> None:
