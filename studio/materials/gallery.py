@@ -13,19 +13,27 @@ _asked: set[tuple[str, str]] = set()
 _items: dict[str, tuple[catalogue.Items, list[tuple[Any, ...]]]] = {}
 """Choices of each kind, and the list that they were made for."""
 
+_numbers: dict[str, dict[str, int]] = {}
+"""What Blender keeps of a choice: each entry has its own, wherever it is in the list."""
 
-def items(kind: str) -> catalogue.Items | list[tuple[Any, ...]]:
+
+def items(kind: str) -> list[tuple[Any, ...]]:
     """A kind of the library as choices of a menu, with those pictures that are drawn."""
     plain = catalogue.items(kind)
-    if not is_begun(kind):
-        return plain
     # Kept, as Blender asks for, and made anew for another list or picture only: this is asked for
     # at each drawing of the panel.
     made_for, found = _items.get(kind, (None, []))
     if made_for is not plain:
+        numbers = _numbers.setdefault(kind, {})
         found = [
-            (name, title, text, file_icon(picture(kind, name)), number)
-            for number, (name, title, text) in enumerate(plain)
+            (
+                name,
+                title,
+                text,
+                file_icon(picture(kind, name)),
+                numbers.setdefault(name, len(numbers)) if catalogue.entries(kind) else 0,
+            )
+            for name, title, text in plain
         ]
         _items[kind] = plain, found
     return found
@@ -86,3 +94,4 @@ def unregister() -> None:
     _files.clear()
     _asked.clear()
     _items.clear()
+    _numbers.clear()

@@ -291,29 +291,6 @@ def test_shapes_materials_and_lights_make_a_design_in_order(
     assert Path(choice.preview).read_bytes().startswith(b"\x89PNG")
 
 
-def test_coatings_are_chosen_from_pictures(mini: Any) -> None:
-    from studio.engine import catalogue, session
-    from studio.materials import gallery
-
-    choice = bpy.context.window_manager.optisense_material
-    choice.kind = "coating"
-    names = [row["name"] for row in catalogue.entries("coating")]
-    choice.coating = names[1]
-    assert gallery.missing("coating") == names and not gallery.is_begun("coating")
-    assert bpy.ops.optisense.material_pictures() == {"FINISHED"}
-    assert gallery.waiting("coating") == len(names)
-    assert not bpy.ops.optisense.material_pictures.poll()
-    session.ask_and_wait("library", kind="coating")  # answered after the pictures
-    assert gallery.waiting("coating") == 0
-    for name in names:
-        assert Path(gallery.picture("coating", name)).read_bytes().startswith(b"\x89PNG")
-    rows = gallery.items("coating")
-    assert [(row[0], row[4]) for row in rows] == [(each, n) for n, each in enumerate(names)]
-    assert choice.coating == names[1]  # the same one as before there were pictures
-    gallery.forget("coating", names[0])
-    assert gallery.missing("coating") == names[:1]
-
-
 def test_scores_rays_a_search_and_its_best_design(
     mini: Any, select: Callable[..., None], tmp_path: Path
 ) -> None:

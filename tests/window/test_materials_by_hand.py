@@ -55,6 +55,7 @@ def test_one_number_is_changed_and_it_is_kept_as_ones_own(bench: Bench) -> None:
     bench.until(f"{NAME!r} in state().note")
     assert not bench.see("state().problem"), bench.said()
     bench.until(f"any(e['name'] == {NAME!r} for e in part('engine.catalogue').entries('material'))")
+    assert bench.see(f"{CHOICE}.material") == bench.see(GEL), "another one is not chosen by that"
     bench.bring("optisense.keep_material", 0.8)
     bench.photograph("own-kept")
 
