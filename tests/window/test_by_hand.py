@@ -32,6 +32,12 @@ LAST_PICTURE = (222, 114)
 EDITOR_FITS = "area('IMAGE_EDITOR').spaces.active.zoom[0] != 1.0"
 """An Image Editor has been told to show its picture whole."""
 
+CORNERS_ACROSS = (
+    "on_screen(each.matrix_world @ Vector(corner))[0]"
+    " for each in kinds('PART') for corner in each.bound_box"
+)
+"""Where corners of parts are in the window, pixels from its left."""
+
 FIELDS_OF_VIEW = (50.0, 60.0, 70.0)
 """Degrees, what the search tries; all see less than the whole surface or beyond its edge."""
 
@@ -48,6 +54,9 @@ def test_a_new_mini(bench: Bench) -> None:
     bench.new_sensor("gelsight-mini")
     assert bench.see("scene().optisense.title") == "gelsight-mini"
     assert len(bench.see("[light.name for light in kinds('LIGHT')]")) == 15
+    bench.drawn()
+    right = bench.see(f"max({CORNERS_ACROSS})")
+    assert right < bench.sidebar()[0], "the sensor is not hidden by the sidebar"
     bench.press("optisense.add_contact", across=0.75)
     bench.until("len(kinds('CONTACT')) == 1")
     bench.photograph("1-new-mini")

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pytest
 import yaml
 
 from .bench import Bench
@@ -24,7 +25,7 @@ TOLD = "manager.optisense_found"
 A_GHOST = 10_000
 """Pixels of the view that a ghost covers at least."""
 
-MANY, TRIALS = 5000, 400
+MANY, TRIALS = 5000, 150
 """Trials of a search that is given up, and of one that is not over before Blender is closed."""
 
 RANGE = "cages.skin.points[14].z=2:12"
@@ -137,5 +138,8 @@ def test_the_ghost_becomes_the_sensor(bench: Bench) -> None:
     bench.press("optisense.apply_best", across=0.25)
     bench.until(f"not state().busy and float({POINTS}[14][2]) > 1.0")
     bench.rest()
+    height = bench.see(f"float({POINTS}[14][2])")
+    skin = bench.see("max(v.co.z for v in bpy.data.objects['skin'].data.vertices)")
+    assert skin == pytest.approx(height / 4, abs=1e-4), "the weight of that point in its middle"
     assert not bench.see(GHOSTS) and ghost_pixels(bench) < A_GHOST / 100
     bench.photograph("applied")

@@ -23,8 +23,8 @@ CONTACTS = (
 LAST = 0.88
 """How far across the sidebar a small button at the end of a row of a box is; of no box, 0.9."""
 
-ON_SKIN, ON_GEL = (-6.0, -7.0, 0.0), (-5.0, -10.375, -1.5)
-"""mm, places that the view shows: on the skin, and on the gel's side below it."""
+ON_SKIN, ON_GEL = (-6.0, -7.0, 0.0), (12.625, -5.0, -3.2)
+"""mm, places that the view shows: on the skin, and on the side of the gel below it."""
 
 LIFTED = 2.0
 """mm, how far the middle point of the cage's top is lifted; the skin's middle rises a quarter."""
