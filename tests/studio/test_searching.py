@@ -111,17 +111,3 @@ def test_a_study_of_another_sensor_is_not_offered(saved: Any) -> None:
     offering.offer(saved)
     session.ask_and_wait("study", study=str(study))
     assert not found().offer and not following.has_trials()
-
-
-def test_more_trials_than_at_first_count_to_the_new_number(saved: Any) -> None:
-    search = saved.optisense_search
-    bpy.ops.optisense.vary(text="camera.fov=50:70", label="field of view")
-    search.objective, search.method, search.budget = "aoap", "random", 1
-    assert bpy.ops.optisense.search() == {"FINISHED"}
-    assert found().ended.startswith("1 trials")
-    search.budget = 2
-    told: list[str] = []
-    assert bpy.ops.optisense.resume(wait=False) == {"FINISHED"}
-    until(lambda: told.append(session.state().progress) or not session.is_busy())
-    assert found().ended.startswith("2 trials") and float(found().best) > 0.5
-    assert "2 of 2 trials" in told and "2 of 1 trials" not in told
