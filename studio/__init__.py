@@ -18,7 +18,7 @@ from .lights import ui as light_ui
 from .materials import gallery
 from .materials import operator as material_operator
 from .materials import ui as material_ui
-from .optimise import following
+from .optimise import following, offering
 from .optimise import operator as optimise_operator
 from .optimise import prop as optimise_prop
 from .optimise import ui as optimise_ui
@@ -26,7 +26,7 @@ from .scene import cages, object_properties, properties
 from .sensor import operator as sensor_operator
 from .sensor import starting
 from .sensor import ui as sensor_ui
-from .shapes import cage_operator, reference_operator
+from .shapes import cage_operator, cage_warnings, reference_operator
 from .shapes import ui as shape_ui
 from .simulate import drafts, indenters, picture, relight
 from .simulate import operator as simulate_operator
@@ -51,12 +51,14 @@ MODULES = (
     sensor_operator,
     reference_operator,
     cage_operator,
+    cage_warnings,
     gallery,
     material_operator,
     light_operator,
     simulate_operator,
     evaluate_operator,
     optimise_operator,
+    offering,
     export_operator,
     sensor_ui,
     shape_ui,

@@ -72,6 +72,35 @@ def cage_problems(design: SensorDesign, meshes: Meshes | None = None) -> list[Pr
     return problems
 
 
+def half_caged(design: SensorDesign, meshes: Meshes) -> list[Problem]:
+    """Warnings of cages around a sensing surface without the solid that it coats, or around that
+    solid alone: to bend one is to tear the two apart. A cage that has moved is left to
+    `cage_problems`.
+    """
+    solids = [name for name in meshes if design.parts[name].role in TRANSPARENT_SOLIDS]
+    problems: list[Problem] = []
+    for cage_name, cage in design.cages.items():
+        for surface in design.parts_of(Role.SENSING_SURFACE):
+            for solid in solids:
+                inner = [name for name in (surface, solid) if name in cage.parts]
+                if len(inner) != 1 or _has_moved(cage):
+                    continue
+                rows = resting_on(design.meshes[surface], design.meshes[solid])
+                if len(rows) == 0:
+                    continue
+                (outer,) = {surface, solid} - {*inner}
+                problems.append(
+                    Problem(
+                        f"cage '{cage_name}' is around part '{inner[0]}' without part '{outer}', "
+                        "which it touches: to bend one of them tears the two apart",
+                        design.where("cages", cage_name, "parts"),
+                        f"Put '{outer}' into the cage too",
+                        severity="warning",
+                    )
+                )
+    return problems
+
+
 def _has_moved(cage: Cage) -> bool:
     rest = cage_points(cage.box, cage.resolution)
     return bool(np.abs(cage.current_points() - rest).max() > AT_REST)

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from optisense.design.addressing import get_value
 from optisense.design.arrangement import out_of_view, overlaps
-from optisense.design.cage_checks import cage_problems
+from optisense.design.cage_checks import cage_problems, half_caged
 from optisense.design.limits import unit_slips
 from optisense.design.near import suggestion
 from optisense.design.parts import TRANSPARENT_SOLIDS, Role
@@ -35,8 +35,9 @@ def check_design(design: SensorDesign, light_names: Collection[str] | None = Non
     Meshes that are empty, not closed or not finite, unit slips, missing meshes, unknown lights,
     lights or a camera inside something opaque, a sensing surface that faces the wrong way, lies
     off the elastomer or out of the camera's view, what cages have folded or pushed together,
-    solids that overlap with one priority, and provenance of values that don't exist. (Fields,
-    ranges and references between parts are checked as soon as a design is made.)
+    cages that would tear a sensing surface off its elastomer, solids that overlap with one
+    priority, and provenance of values that don't exist. (Fields, ranges and references between
+    parts are checked as soon as a design is made.)
 
     Args:
         light_names: the lights of the library; None skips looking up light models.
@@ -62,6 +63,7 @@ def check_design(design: SensorDesign, light_names: Collection[str] | None = Non
             problems += out_of_view(design, meshes)
             bent = cage_problems(design, meshes)
             problems += bent
+            problems += half_caged(design, meshes)
             if not any(problem.severity == "error" for problem in bent):
                 problems += overlaps(design, meshes)
     problems += _check_provenance(design)

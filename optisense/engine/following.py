@@ -30,7 +30,14 @@ MOST_AT_ONCE = 20
 class Following:
     """A study that is followed until nobody runs it any more."""
 
-    def __init__(self, folder: Path, job: Job, files: Files, child: SearchProcess | None) -> None:
+    def __init__(
+        self,
+        folder: Path,
+        job: Job,
+        files: Files,
+        child: SearchProcess | None,
+        budget: int | None = None,
+    ) -> None:
         """Follow a study.
 
         Args:
@@ -38,7 +45,9 @@ class Following:
             job: whom to tell.
             files: where meshes of the best go.
             child: the process that runs it, if that is the engine's own.
+            budget: trials in all; the study's own if None.
         """
+        self._budget = budget
         self._folder = folder
         self._job = job
         self._files = files
@@ -65,7 +74,7 @@ class Following:
                 "begun",
                 study=str(self._folder),
                 pid=None if self._child is None else self._child.pid,
-                budget=study.settings.budget,
+                budget=self._total(study),
                 objectives=study.settings.names,
                 parameters=study.space.names,
             )
@@ -119,16 +128,17 @@ class Following:
                 self._best = best
             if is_best or len(new) <= MOST_AT_ONCE or row is new[-1]:
                 self._tell(study, row, is_best)
+        total = self._total(study)
         speed = (self._done - self._before) / max(time.monotonic() - self._began, 1e-6)
-        left = (study.settings.budget - self._done) / speed if speed > 0 else None
+        left = (total - self._done) / speed if speed > 0 else None
         self._job.tell(
             "progress",
             done=self._done,
-            total=study.settings.budget,
+            total=total,
             failed=self._failed,
-            fraction=min(1.0, self._done / max(1, study.settings.budget)),
+            fraction=min(1.0, self._done / max(1, total)),
             seconds_left=None if left is None else round(max(0.0, left), 1),
-            text=f"{self._done} of {study.settings.budget} trials",
+            text=f"{self._done} of {total} trials",
         )
 
     def _tell(self, study: Study, row: Row, is_best: bool) -> None:
@@ -141,10 +151,14 @@ class Following:
             "trial",
             **trial_row(study, trial),
             done=self._done,
-            total=study.settings.budget,
+            total=self._total(study),
             best=is_best,
             shapes=shapes,
         )
+
+    def _total(self, study: Study) -> int:
+        """Trials that there are to be."""
+        return study.settings.budget if self._budget is None else self._budget
 
     def _outcome(self, study: Study) -> dict[str, Any]:
         if self._child is not None and not self._left.is_set():

@@ -139,7 +139,7 @@ def resume(session: Session, fields: Resume, job: Job) -> dict[str, Any]:
     with session.courtesy, _opened(folder) as study:
         study.lock()  # what is wrong with it is told before a process is started
     child = SearchProcess(folder, fields.workers, fields.budget, fields.go_on)
-    return Following(folder, job, files, child).result()
+    return Following(folder, job, files, child, fields.budget).result()
 
 
 @handles("watch", OfStudy, Lane.OWN)

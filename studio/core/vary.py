@@ -9,6 +9,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+TRIAL, BEST = (0.55, 0.75, 0.95, 1.0), (0.95, 0.55, 0.15, 1.0)
+"""Colours of the curve: each trial, and the line of the best so far."""
+
+FEW = 60
+"""Trials up to which their dots are large."""
+
 REACH = 2.0
 """mm to either side that a pose may move, until the user says otherwise."""
 
@@ -170,18 +176,25 @@ def curve_picture(scores: Sequence[float | None], size: tuple[int, int]) -> NDAr
     low, high = min(known), max(known)
     room = (high - low) or 1.0
     edge = 6
-    best: float | None = None
-    column_before = edge
-    for number, score in enumerate(scores):
-        column = edge + round(number / max(len(scores) - 1, 1) * (width - 2 * edge - 1))
-        if best is not None:
-            row = _row(best, low, room, height, edge)
-            picture[row - 1 : row + 1, column_before : column + 1] = (0.95, 0.55, 0.15, 1.0)
+    columns = [
+        edge + round(number / max(len(scores) - 1, 1) * (width - 2 * edge - 1))
+        for number in range(len(scores))
+    ]
+    half = 3 if len(scores) <= FEW else 1
+    for column, score in zip(columns, scores, strict=True):
         if score is not None:
-            best = score if best is None else max(best, score)
             row = _row(score, low, room, height, edge)
-            picture[row - 3 : row + 3, column - 3 : column + 3] = (0.55, 0.75, 0.95, 1.0)
-        column_before = column
+            picture[row - half : row + half, column - half : column + half] = TRIAL
+    best, before, last = -np.inf, 0, columns[0]
+    for column, score in zip(columns, scores, strict=True):
+        if np.isfinite(best):
+            picture[before - 1 : before + 1, last : column + 1] = BEST
+        if score is not None and score > best:
+            row = _row(score, low, room, height, edge)
+            if np.isfinite(best):
+                picture[before - 1 : row + 1, column : column + 2] = BEST
+            best, before = score, row
+        last = column
     return picture
 
 

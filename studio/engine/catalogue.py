@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import bpy
@@ -46,11 +47,15 @@ def refresh(engine: Engine) -> None:
         refresh_library(engine, kind)
 
 
-def refresh_library(engine: Engine, kind: str) -> None:
-    """Ask for a kind of the library anew."""
-    engine.send(
-        "library", kind=kind, on_result=lambda result: _keep(kind, result["entries"])
-    )  # fmt: skip
+def refresh_library(engine: Engine, kind: str, then: Callable[[], None] | None = None) -> None:
+    """Ask for a kind of the library anew, and do something when it is there."""
+
+    def told(result: dict[str, Any]) -> None:
+        _keep(kind, result["entries"])
+        if then is not None:
+            then()
+
+    engine.send("library", kind=kind, on_result=told)
 
 
 def _keep(name: str, rows: list[dict[str, Any]]) -> None:

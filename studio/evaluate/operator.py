@@ -190,7 +190,7 @@ class OPTISENSE_OT_hide_rays(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        if not any(each.optisense.kind == "SHOWN" for each in context.scene.objects):
+        if not rays.drawn(context.scene):
             cls.poll_message_set("No rays are shown")
             return False
         return True

@@ -8,7 +8,7 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from ..scene.collections import collection
+from ..scene.collections import collection, objects_of
 
 NAME = "Chief rays"
 THICKNESS = 0.02
@@ -40,13 +40,17 @@ def show(scene: bpy.types.Scene, result: dict[str, Any]) -> str:
     return ", ".join(texts)
 
 
+def drawn(scene: bpy.types.Scene) -> list[bpy.types.Object]:
+    """The rays that are shown, one object for each outcome."""
+    return [e for e in objects_of(scene, "SHOWN") if e.optisense.key.startswith("ray ")]
+
+
 def clear(scene: bpy.types.Scene) -> None:
     """Remove the rays."""
-    for each in list(scene.objects):
-        if each.optisense.kind == "SHOWN" and each.optisense.key.startswith("ray "):
-            curve = each.data
-            bpy.data.objects.remove(each)
-            bpy.data.curves.remove(curve)
+    for each in drawn(scene):
+        curve = each.data
+        bpy.data.objects.remove(each)
+        bpy.data.curves.remove(curve)
 
 
 def _draw(scene: bpy.types.Scene, outcome: str, lines: list[NDArray[np.float32]]) -> None:

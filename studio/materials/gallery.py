@@ -14,14 +14,12 @@ _items: dict[str, tuple[catalogue.Items, list[tuple[Any, ...]]]] = {}
 """Choices of each kind, and the list that they were made for."""
 
 _numbers: dict[str, dict[str, int]] = {}
-"""By kind and name what Blender keeps of a choice: it stays where an entry is added."""
+"""What Blender keeps of a choice: each entry has its own, wherever it is in the list."""
 
 
-def items(kind: str) -> catalogue.Items | list[tuple[Any, ...]]:
+def items(kind: str) -> list[tuple[Any, ...]]:
     """A kind of the library as choices of a menu, with those pictures that are drawn."""
     plain = catalogue.items(kind)
-    if not catalogue.entries(kind):
-        return plain
     # Kept, as Blender asks for, and made anew for another list or picture only: this is asked for
     # at each drawing of the panel.
     made_for, found = _items.get(kind, (None, []))
@@ -33,7 +31,7 @@ def items(kind: str) -> catalogue.Items | list[tuple[Any, ...]]:
                 title,
                 text,
                 file_icon(picture(kind, name)),
-                numbers.setdefault(name, len(numbers)),
+                numbers.setdefault(name, len(numbers)) if catalogue.entries(kind) else 0,
             )
             for name, title, text in plain
         ]

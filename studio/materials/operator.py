@@ -235,8 +235,14 @@ class OPTISENSE_OT_keep_material(bpy.types.Operator):
             session.say(error)
             self.report({"ERROR"}, error.text())
             return {"CANCELLED"}
+        begun = gallery.is_begun(kind)
         gallery.forget(kind, name)
-        catalogue.refresh_library(session.engine(), kind)
+
+        def listed() -> None:
+            if begun:  # the others have pictures
+                gallery.draw_missing(kind)
+
+        catalogue.refresh_library(session.engine(), kind, listed)
         now.note = f"'{name}' is in your library"
         return {"FINISHED"}
 

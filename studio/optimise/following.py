@@ -6,24 +6,33 @@ from typing import Any
 
 import bpy
 import numpy as np
+from numpy.typing import NDArray
 
 from ..core.vary import curve_picture
 from ..engine import session
-from ..scene.collections import collection
+from ..scene.collections import collection, object_of, objects_of
+from ..scene.meshes import part_mesh
 from ..simulate import picture
 
 CURVE = "OptiSense search"
 CURVE_SIZE = (220, 150)
 GHOSTS = "Best so far"
+COLOUR = (0.1, 0.85, 0.95, 0.4)
+"""Of ghosts; no light, no part and no outline has it."""
 
-_curve: list[float | None] = []
+SAME_PLACE = 1e-3
+"""mm: what is nearer to its place in the scene is not drawn."""
+
+
+_curve: dict[int, float | None] = {}
+"""The score of each trial by its number: trials may be told twice."""
 
 
 def begin() -> None:
     """Forget the search before."""
     _curve.clear()
     found = bpy.context.window_manager.optisense_found
-    found.best = found.values = found.start = found.ended = ""
+    found.best = found.values = found.start = found.ended = found.offer = ""
     clear_ghosts(bpy.context.scene)
 
 
@@ -34,7 +43,7 @@ def take(event: dict[str, Any]) -> None:
     scores = event.get("scores") or {}
     objective = bpy.context.scene.optisense_search.objective
     score = scores.get(objective, next(iter(scores.values()), None))
-    _curve.append(score)
+    _curve[event["number"]] = score
     found = bpy.context.window_manager.optisense_found
     if score is not None and event.get("start"):
         found.start = f"{score:.4g}"
@@ -45,43 +54,62 @@ def take(event: dict[str, Any]) -> None:
             for name, value in list((event.get("values") or {}).items())[:8]
         )
         show_ghosts(bpy.context.scene, event.get("shapes") or {})
-    picture.show_icon(CURVE, curve_picture(_curve, CURVE_SIZE))
+    in_order = [_curve[number] for number in sorted(_curve)]
+    picture.show_icon(CURVE, curve_picture(in_order, CURVE_SIZE))
     session.redraw()
 
 
 def take_curve(rows: list[dict[str, Any]]) -> None:
     """All trials of a study at once."""
     begin()
-    for number, row in enumerate(rows):
-        scores = [each for each in _curve if each is not None]
+    best = None
+    for row in rows:
         score = next(iter((row.get("scores") or {}).values()), None)
-        better = score is not None and (not scores or score > max(scores))
-        take({"event": "trial", "best": better, "number": number, **row})
+        better = score is not None and (best is None or score > best)
+        best = score if better else best
+        take({"event": "trial", "best": better, **row})
 
 
 def show_ghosts(scene: bpy.types.Scene, shapes: dict[str, Any]) -> None:
-    """Draw the parts of the best design so far that differ from the start, as wires."""
+    """Draw what is not as in the scene of the parts of the best design so far, see-through."""
     clear_ghosts(scene)
     for name, files in shapes.items():
-        mesh = bpy.data.meshes.new(f"ghost {name}")
         vertices, faces = np.load(files["vertices"]), np.load(files["faces"])
-        mesh.from_pydata(vertices.tolist(), [], faces.tolist())
+        faces = faces[_moved(scene, name, vertices)[faces].any(axis=1)]
+        if len(faces) == 0:
+            continue
+        mesh = bpy.data.meshes.new(f"ghost {name}")
+        mesh.from_pydata(vertices.tolist(), [], faces.tolist(), shade_flat=False)
         ghost = bpy.data.objects.new(f"ghost {name}", mesh)
         ghost.optisense.kind = "SHOWN"
         ghost.optisense.key = f"ghost {name}"
-        ghost.display_type = "WIRE"
-        ghost.color = (1.0, 0.55, 0.1, 0.6)
+        ghost.color = COLOUR
+        ghost.show_in_front = True
         ghost.hide_select = True
         collection(scene, GHOSTS).objects.link(ghost)
 
 
+def _moved(scene: bpy.types.Scene, name: str, vertices: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """(n,) which vertices of a part are elsewhere in the scene."""
+    part = object_of(scene, "PART", name)
+    if part is None or len(part.data.vertices) != len(vertices):
+        return np.ones(len(vertices), dtype=bool)
+    shown = part_mesh(part, caged=False).vertices
+    return np.abs(vertices - shown).max(axis=1) > SAME_PLACE
+
+
 def clear_ghosts(scene: bpy.types.Scene) -> None:
     """Remove what `show_ghosts` drew."""
-    for each in list(scene.objects):
-        if each.optisense.kind == "SHOWN" and each.optisense.key.startswith("ghost "):
+    for each in objects_of(scene, "SHOWN"):
+        if each.optisense.key.startswith("ghost "):
             mesh = each.data
             bpy.data.objects.remove(each)
             bpy.data.meshes.remove(mesh)
+
+
+def has_trials() -> bool:
+    """Whether there is a curve to show."""
+    return bool(_curve)
 
 
 def finished(result: dict[str, Any]) -> None:
@@ -90,6 +118,8 @@ def finished(result: dict[str, Any]) -> None:
     done = result.get("done")
     why = "stopped" if result.get("interrupted") else result.get("ended") or "finished"
     found.ended = f"{done} trials: {why}"
+    if result.get("interrupted"):  # given up: what is drawn is as it was before
+        clear_ghosts(bpy.context.scene)
     notes = [str(note) for note in result.get("notes") or []]
     session.state().note = "; ".join(notes)
     session.redraw()

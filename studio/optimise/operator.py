@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import bpy
-from bpy.props import StringProperty
+from bpy.props import BoolProperty, StringProperty
 
 from ..core import vary
 from ..core.engine import EngineError
 from ..engine import handing, polls, session
-from ..scene.paths import absolute, chosen, objective
+from ..scene.paths import chosen, objective
 from ..sensor.opening import new_stage, open_stage
 from . import following
+from .offering import NOT_OVER, new_study, study_of
 from .suggesting import suggestions
 
 TITLE = "Searching"
@@ -84,12 +86,6 @@ class OPTISENSE_OT_vary_remove(bpy.types.Operator):
         return {"FINISHED"}
 
 
-def _study(context: bpy.types.Context) -> str:
-    """The folder of the study as an absolute path; empty where none is named."""
-    text = context.scene.optisense_search.study
-    return str(absolute(text)) if text else ""
-
-
 def _is_taken(folder: Path) -> bool:
     """Whether something is in a folder; what can't be looked into, the engine tells of."""
     try:
@@ -98,13 +94,14 @@ def _is_taken(folder: Path) -> bool:
         return False
 
 
-def _new_study(context: bpy.types.Context) -> str:
-    """A folder beside the design's that is not there yet."""
-    folder = Path(context.scene.optisense.folder)
-    number = 1
-    while (study := folder.with_name(f"{folder.name}-search-{number}")).exists():
-        number += 1
-    return str(study)
+def wait_property() -> Any:
+    """For scripts."""
+    return BoolProperty(
+        name="Wait",
+        description="Return when the search is over; a click never waits",
+        default=True,
+        options={"HIDDEN", "SKIP_SAVE"},
+    )
 
 
 class OPTISENSE_OT_search(bpy.types.Operator):
@@ -112,6 +109,8 @@ class OPTISENSE_OT_search(bpy.types.Operator):
 
     bl_idname = "optisense.search"
     bl_label = "Search"
+
+    wait: wait_property()
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
@@ -130,16 +129,17 @@ class OPTISENSE_OT_search(bpy.types.Operator):
         return self._start(context, wait=False)
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        return self._start(context, wait=True)
+        return self._start(context, wait=self.wait)
 
     def _start(self, context: bpy.types.Context, *, wait: bool) -> set[str]:
         search = context.scene.optisense_search
-        study = _study(context)
+        study = study_of(context.scene)
         if not study or _is_taken(Path(study)):
             if not context.scene.optisense.is_saved:
                 self.report({"ERROR"}, "The folder of the study is not empty; name another one")
                 return {"CANCELLED"}
-            study = search.study = _new_study(context)
+            study = search.study = str(new_study(Path(context.scene.optisense.folder)))
+            session.push_undo("Search")  # so that Blender asks to save the file that names it
         try:
             design = handing.design(context.scene)
         except EngineError as error:
@@ -189,31 +189,39 @@ class OPTISENSE_OT_resume(_WithStudy, bpy.types.Operator):
     bl_idname = "optisense.resume"
     bl_label = "Resume"
 
+    wait: wait_property()
+
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         return self._start(context, wait=False)
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        return self._start(context, wait=True)
+        return self._start(context, wait=self.wait)
 
     def _start(self, context: bpy.types.Context, *, wait: bool) -> set[str]:
         search = context.scene.optisense_search
-        study = _study(context)
+        study = study_of(context.scene)
+        fields: dict[str, Any] = {"workers": search.workers, "go_on": search.go_on}
+        if search.budget:
+            fields["budget"] = search.budget
+
+        def follow(what: str, then: Callable[[dict[str, Any]], None], **fields: Any) -> None:
+            session.start_job(
+                TITLE, what, then, on_event=following.take, wait=wait, study=study, name="search",
+                **fields,
+            )  # fmt: skip
+
+        def watched(result: dict[str, Any]) -> None:
+            if result["ended"] in NOT_OVER:  # it was ending, as Blender had been closed
+                follow("resume", following.finished, **fields)
+            else:
+                following.finished(result)
 
         def known(result: dict[str, Any]) -> None:
             following.take_curve(result["curve"])
-            fields: dict[str, Any] = {"workers": search.workers, "go_on": search.go_on}
-            if search.budget:
-                fields["budget"] = search.budget
-            session.start_job(
-                TITLE,
-                "watch" if result.get("running") else "resume",
-                following.finished,
-                on_event=following.take,
-                wait=wait,
-                study=study,
-                name="search",
-                **({} if result.get("running") else fields),
-            )
+            if result.get("running"):
+                follow("watch", watched)
+            else:
+                follow("resume", following.finished, **fields)
 
         done = session.start_job("Reading the study", "study", known, wait=wait, study=study)
         if not done:
@@ -246,7 +254,7 @@ class OPTISENSE_OT_apply_best(_WithStudy, bpy.types.Operator):
                 )
 
         done = session.start_job(
-            "Applying", "apply", applied, wait=wait, study=_study(context), to=str(stage)
+            "Applying", "apply", applied, wait=wait, study=study_of(context.scene), to=str(stage)
         )
         if not done:
             self.report({"ERROR"}, session.state().problem)
@@ -264,7 +272,7 @@ class OPTISENSE_OT_keep_variant(_WithStudy, bpy.types.Operator):
     )
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
-        self.filepath = f"{_study(context)}-best"
+        self.filepath = f"{study_of(context.scene)}-best"
         context.window_manager.fileselect_add(self)
         return {"RUNNING_MODAL"}
 
@@ -281,7 +289,7 @@ class OPTISENSE_OT_keep_variant(_WithStudy, bpy.types.Operator):
             "apply",
             kept,
             wait=bpy.app.background,
-            study=_study(context),
+            study=study_of(context.scene),
             to=str(target),
         )
         if not done:

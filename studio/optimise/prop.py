@@ -103,6 +103,7 @@ class OPTISENSE_PG_found(bpy.types.PropertyGroup):
     values: StringProperty(description="What it has, one a line", options={"SKIP_SAVE"})
     start: StringProperty(description="The score at the start", options={"SKIP_SAVE"})
     ended: StringProperty(description="Why it is over", options={"SKIP_SAVE"})
+    offer: StringProperty(description="What a study waits for", options={"SKIP_SAVE"})
 
 
 CLASSES = (OPTISENSE_PG_vary, OPTISENSE_PG_search, OPTISENSE_PG_found)

@@ -5,9 +5,9 @@ from __future__ import annotations
 import bpy
 
 from ..engine import catalogue
-from ..engine.layout import SidebarPanel, show_job, show_outcome
+from ..engine.layout import SidebarPanel, paragraph, show_job, show_outcome
 from ..simulate.picture import icon
-from .following import CURVE
+from .following import CURVE, has_trials
 
 
 class OPTISENSE_UL_vary(bpy.types.UIList):
@@ -46,13 +46,15 @@ class OPTISENSE_PT_optimise(SidebarPanel, bpy.types.Panel):
         for name in ("budget", "workers", "seed", "study"):
             column.prop(search, name)
         layout.prop(search, "go_on")  # its name is longer than half a line
+        if found.offer:
+            paragraph(layout, found.offer, "TIME")
         row = layout.row(align=True)
         row.scale_y = 1.4
         if not show_job(row, "Searching", "Reading the study"):
             row.operator("optisense.search", icon="VIEWZOOM")
             row.operator("optisense.resume", icon="PLAY")
-        show_outcome(layout, "Searching", "Reading the study", "Applying")
-        curve = icon(CURVE)
+        show_outcome(layout, "Searching", "Reading the study")
+        curve = icon(CURVE) if has_trials() else 0
         if curve:
             layout.template_icon(icon_value=curve, scale=8.0)
         column = layout.column(align=True)
@@ -68,6 +70,7 @@ class OPTISENSE_PT_optimise(SidebarPanel, bpy.types.Panel):
         if not show_job(row, "Applying"):
             row.operator("optisense.apply_best", icon="CHECKMARK")
             row.operator("optisense.keep_variant", icon="DUPLICATE")
+        show_outcome(layout, "Applying")
 
 
 CLASSES = (OPTISENSE_UL_vary, OPTISENSE_PT_optimise)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from typing import Any
 
 import bmesh
@@ -18,6 +19,9 @@ from .meshes import REST, remembered, show_vertices, shown_vertices
 
 MOST_KEPT = 32
 _weights: dict[tuple[bytes, bytes, tuple[int, int, int]], NDArray[np.float32]] = {}
+
+when_bent: list[Callable[[], None]] = []
+"""Called when parts took the shape that a cage gives them."""
 
 
 def add_cage(scene: bpy.types.Scene, key: str, values: dict[str, Any]) -> bpy.types.Object:
@@ -170,6 +174,8 @@ def follow(scene: bpy.types.Scene, cage: bpy.types.Object) -> None:
         except ValueError:  # the engine's check says so in words
             continue
         show_vertices(part.data, weights @ points)
+    for each in when_bent:
+        each()
 
 
 def _kept_weights(

@@ -17,6 +17,9 @@ from ..scene.startup import clear_startup
 from ..scene.views import show_design
 from .warming import warm_up
 
+when_opened: list[Callable[[bpy.types.Scene], None]] = []
+"""Called when a built-in sensor or the user's folder is open."""
+
 
 def new_stage() -> Path:
     """A folder of the engine's, not there yet, for a design on its way.
@@ -44,7 +47,11 @@ def open_source(scene: bpy.types.Scene, source: str, folder: str, *, wait: bool)
     def written(_: dict[str, Any]) -> None:
         scene = bpy.data.scenes.get(name)
         if scene is not None:
-            open_stage(scene, stage, wait=wait, folder=folder)
+            open_stage(scene, stage, wait=wait, folder=folder, then=tell)
+
+    def tell(scene: bpy.types.Scene) -> None:
+        for each in when_opened:
+            each(scene)
 
     # Written out first: the engine reads what users have, and writes what this reads.
     done = session.start_job(

@@ -6,7 +6,10 @@ import bpy
 
 from ..engine.layout import SidebarPanel, paragraph, show_job, show_outcome
 from .cage_operator import active_cage
+from .cage_warnings import warnings_of
 from .reference_operator import READING
+
+HOW_TO_CAGE_MORE = "For more parts in a cage: remove it, select all of them, Create a New Cage."
 
 
 class OPTISENSE_PT_shapes(SidebarPanel, bpy.types.Panel):
@@ -55,6 +58,14 @@ def _cage(layout: bpy.types.UILayout, cage: bpy.types.Object, values: dict) -> N
     along = " x ".join(str(count) for count in values["resolution"])
     text = f"{cage.optisense.key}: {along}, bends {', '.join(values['parts'])}"
     paragraph(layout, text, boxed=True)
+    problems = warnings_of(cage.optisense.key)
+    for problem in problems:
+        message = problem["message"]
+        hint = f" {problem['hint']}." if problem["hint"] else ""
+        told = f"{message[:1].upper()}{message[1:]}.{hint}"
+        paragraph(layout, told, "ERROR", boxed=True)
+    if problems:
+        paragraph(layout, HOW_TO_CAGE_MORE, "BLANK1", boxed=True)
     row = layout.row(align=True)
     for bound, name in (("c_min", "C_min"), ("c_max", "C_max")):
         icon = "CHECKMARK" if values.get(bound) else "BLANK1"

@@ -53,6 +53,24 @@ class TestChecks:
             problems = cage_problems(set_value(svelte, "cages.M1.blend", value))
             assert not [p for p in problems if "through" in p.message or "inside" in p.message]
 
+    @pytest.mark.parametrize(("caged", "other"), [("skin", "gel"), ("gel", "skin")])
+    def test_skin_or_gel_caged_alone_is_told_before_they_are_torn_apart(
+        self, mini: SensorDesign, caged: str, other: str
+    ) -> None:
+        bare = remove_cage(mini, "skin")
+        alone = add_cage(bare, "half", [caged], margin=0.5)
+        (problem,) = check_design(alone)
+        assert problem.severity == "warning" and problem.where == "cages.half.parts"
+        assert f"'{caged}'" in problem.message and f"'{other}'" in problem.message
+        assert problem.hint == f"Put '{other}' into the cage too"
+        height = alone.cages["half"].points[14].z
+        bent = set_value(alone, "cages.half.points[14].z", height + 1.0)
+        torn = [each for each in check_design(bent) if f"'{other}'" in each.message]
+        assert torn and all("tears" not in each.message for each in torn), "told once, as it is"
+        assert any(f"put '{other}' into the cage too" in str(each).lower() for each in torn)
+        for parts in (["skin", "gel"], ["guide"]):
+            assert check_design(add_cage(bare, "whole", parts)) == []
+
     def test_a_part_whose_triangles_are_too_large_to_bend(self, mini: SensorDesign) -> None:
         """Only the corners of the guide are vertices: raising the middle of its face by 4 mm,
         which is to lift that face by 1 mm there, lifts nothing."""

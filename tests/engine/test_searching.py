@@ -177,6 +177,21 @@ def test_a_cancelled_search_keeps_its_trials_and_goes_on_later(
     assert not engine.ask("study", study=study)["running"]
 
 
+def test_more_trials_than_at_first_are_counted_to_the_new_number(
+    engine: Any, tmp_path: Path, goal: Callable[..., str]
+) -> None:
+    study = str(tmp_path / "study")
+    fields = {"vary": ["coating.specularity=0:1"], "objectives": [goal(0.0)], "method": "random"}
+    first = engine.send("search", design="gelsight-mini", study=study, budget=2, **fields)
+    assert engine.result(first)["done"] == 2
+    again = engine.send("resume", study=study, budget=4)
+    assert engine.result(again)["done"] == 4
+    assert engine.event(again, "begun")["budget"] == 4
+    told = engine.events(again, "progress")
+    assert {each["total"] for each in told} == {4}
+    assert told[-1]["fraction"] == 1.0 and told[-1]["text"] == "4 of 4 trials"
+
+
 @pytest.mark.slow
 def test_a_search_ends_with_the_engine_or_outlives_it(
     start: Callable[..., Any], tmp_path: Path, goal: Callable[..., str], gone: Callable[[int], bool]

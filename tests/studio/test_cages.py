@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import json
+import sys
+import time
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import bmesh
@@ -18,6 +21,12 @@ from studio.scene import cages
 from studio.scene.build import add_part
 from studio.scene.collections import object_of, objects_of
 from studio.scene.gather import gather_document
+from studio.shapes.cage_warnings import warnings_of
+from studio.shapes.ui import OPTISENSE_PT_shapes
+
+sys.path.insert(0, str(Path(__file__).parent))
+
+from recording import draw
 
 
 def heights(name: str) -> Any:
@@ -154,6 +163,40 @@ def test_back_to_rest_and_without_a_cage(mini: Any, select: Callable[..., None])
     assert bpy.ops.optisense.new_cage(resolution=(4, 3, 2)) == {"FINISHED"}
     values = gather_document(mini)["cages"]["skin"]
     assert values["parts"] == ["skin", "gel"] and len(values["points"]) == 24
+
+
+def told(done: Callable[[str], bool]) -> str:
+    """What the panel says, as soon as it says that."""
+    end = time.monotonic() + 60.0
+    while not done(texts := " ".join(draw(OPTISENSE_PT_shapes).texts)):
+        assert time.monotonic() < end and not session.state().problem, texts
+        time.sleep(session._tick() or 0.0)
+    return texts
+
+
+def test_a_cage_that_would_tear_skin_and_gel_apart_is_told_in_the_panel(
+    mini: Any, select: Callable[..., None]
+) -> None:
+    skin, gel = (object_of(mini, "PART", name) for name in ("skin", "gel"))
+    select(objects_of(mini, "CAGE")[0])
+    bpy.ops.optisense.remove_cage()
+    select(skin)
+    assert bpy.ops.optisense.new_cage() == {"FINISHED"}
+    text = told(lambda text: "tears" in text)
+    assert "Put 'gel' into the cage too" in text and "select all of them" in text
+    assert warnings_of("skin")[0]["severity"] == "warning"
+
+    bpy.ops.optisense.edit_shape()
+    lift(objects_of(mini, "CAGE")[0], 2.0)
+    bpy.context.view_layer.update()
+    text = told(lambda text: "has come off" in text)
+    assert "part 'gel'" in text and "Put 'gel' into the cage too" in text and "tears" not in text
+    bpy.ops.optisense.edit_shape()
+
+    bpy.ops.optisense.remove_cage()
+    select(skin, gel)
+    assert bpy.ops.optisense.new_cage() == {"FINISHED"}
+    told(lambda text: "gel" in text and "Put" not in text and "select all" not in text)
 
 
 def test_a_lost_control_point_is_told(mini: Any) -> None:

@@ -314,29 +314,6 @@ def test_shapes_materials_and_lights_make_a_design_in_order(
     assert Path(choice.preview).read_bytes().startswith(b"\x89PNG")
 
 
-def test_coatings_are_chosen_from_pictures(mini: Any) -> None:
-    from studio.engine import catalogue, session
-    from studio.materials import gallery
-
-    choice = bpy.context.window_manager.optisense_material
-    choice.kind = "coating"
-    names = [row["name"] for row in catalogue.entries("coating")]
-    choice.coating = names[1]
-    assert gallery.missing("coating") == names and not gallery.is_begun("coating")
-    assert bpy.ops.optisense.material_pictures() == {"FINISHED"}
-    assert gallery.waiting("coating") == len(names)
-    assert not bpy.ops.optisense.material_pictures.poll()
-    session.ask_and_wait("library", kind="coating")  # answered after the pictures
-    assert gallery.waiting("coating") == 0
-    for name in names:
-        assert Path(gallery.picture("coating", name)).read_bytes().startswith(b"\x89PNG")
-    rows = gallery.items("coating")
-    assert [(row[0], row[4]) for row in rows] == [(each, n) for n, each in enumerate(names)]
-    assert choice.coating == names[1]  # the same one as before there were pictures
-    gallery.forget("coating", names[0])
-    assert gallery.missing("coating") == names[:1]
-
-
 def test_scores_rays_a_search_and_its_best_design(
     mini: Any, select: Callable[..., None], tmp_path: Path
 ) -> None:
@@ -401,25 +378,6 @@ def test_an_indenter_from_a_file_is_drawn_as_it_presses(mini: Any, tmp_path: Pat
     points = np.array([vertex.co for vertex in contact.data.vertices])
     assert np.allclose(points.min(axis=0), [-0.5, -1.0, -0.4], atol=1e-6)
     assert np.allclose(points.max(axis=0), [0.5, 1.0, 2.1], atol=1e-6)
-
-
-def test_a_search_goes_on_after_blender_was_closed(mini: Any, tmp_path: Path) -> None:
-    search = mini.optisense_search
-    bpy.ops.optisense.vary(text="camera.fov=50:70", label="field of view")
-    search.study, search.objective = str(tmp_path / "study"), "aoap"
-    search.method, search.budget = "random", 2
-    assert bpy.ops.optisense.search() == {"FINISHED"}
-    assert bpy.context.window_manager.optisense_found.ended.startswith("2 trials")
-    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "bench.blend"))
-    session.stop()
-    bpy.ops.wm.read_homefile(use_empty=True)
-    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "bench.blend"))
-    search = bpy.context.scene.optisense_search
-    assert search.study == str(tmp_path / "study")
-    search.budget = 3
-    assert bpy.ops.optisense.resume() == {"FINISHED"}
-    found = bpy.context.window_manager.optisense_found
-    assert found.ended.startswith("3 trials") and float(found.best) > 0.5
 
 
 def test_drafts_follow_a_dragged_light_and_the_last_is_whole(mini: Any) -> None:

@@ -1,4 +1,4 @@
-"""Materials of the user's own beside those of the library."""
+"""Materials: chosen from pictures, and kept as one's own."""
 
 from __future__ import annotations
 
@@ -11,46 +11,69 @@ import bpy
 import pytest
 
 from studio.engine import catalogue, session
+from studio.materials import gallery
 from studio.scene.collections import object_of
 
 
 @pytest.fixture
-def own_library(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Iterator[Path]:
-    """An engine that keeps the user's own parts in a folder of the test's."""
+def own_library(mini: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+    """An engine whose user has a library of their own, which is empty."""
     monkeypatch.setenv("OPTISENSE_LIBRARY", str(tmp_path))
     session.stop()
     session.engine()
+    session.ask_and_wait("library", kind="camera")  # answered after all that is asked at the start
     yield tmp_path
     session.stop()
+    monkeypatch.undo()
+    session.engine()
+    session.ask_and_wait("library", kind="camera")
 
 
-def listed(name: str) -> bool:
-    return name in [row["name"] for row in catalogue.entries("material")]
+def test_coatings_are_chosen_from_pictures(mini: Any) -> None:
+    choice = bpy.context.window_manager.optisense_material
+    choice.kind = "coating"
+    names = [row["name"] for row in catalogue.entries("coating")]
+    choice.coating = names[1]
+    assert gallery.missing("coating") == names and not gallery.is_begun("coating")
+    assert bpy.ops.optisense.material_pictures() == {"FINISHED"}
+    assert gallery.waiting("coating") == len(names)
+    assert not bpy.ops.optisense.material_pictures.poll()
+    session.ask_and_wait("library", kind="coating")  # answered after the pictures
+    assert gallery.waiting("coating") == 0
+    for name in names:
+        assert Path(gallery.picture("coating", name)).read_bytes().startswith(b"\x89PNG")
+    rows = gallery.items("coating")
+    assert [(row[0], row[4]) for row in rows] == [(each, n) for n, each in enumerate(names)]
+    assert choice.coating == names[1]  # the same one as before there were pictures
+    gallery.forget("coating", names[0])
+    assert gallery.missing("coating") == names[:1]
 
 
-def until(is_so: Callable[[], bool]) -> None:
-    end = time.monotonic() + 60.0
-    while not is_so():
-        session.engine().poll()
-        assert time.monotonic() < end
-        time.sleep(0.01)
-
-
-def test_what_is_chosen_stays_chosen_when_the_library_grows(
+def test_an_own_material_does_not_change_what_is_chosen(
     mini: Any, select: Callable[..., None], own_library: Path
 ) -> None:
-    until(lambda: listed("silicone-lsr"))
+    """It comes before others in the list, and gets a picture where the others have one."""
     choice = bpy.context.window_manager.optisense_material
-    choice.material = "silicone-lsr"
-    select(object_of(mini, "PART", "gel"))
-    assert bpy.ops.optisense.keep_material(name="a gel of mine") == {"FINISHED"}
-    until(lambda: listed("a-gel-of-mine"))
-    assert list(own_library.rglob("a-gel-of-mine.yaml"))
-    assert choice.material == "silicone-lsr"
+    choice.kind, choice.material = "material", "pdms-soft"
+    bpy.ops.optisense.material_pictures()
+    gel = object_of(mini, "PART", "gel")
+    select(gel)
     assert bpy.ops.optisense.apply_material() == {"FINISHED"}
-    assert object_of(mini, "PART", "gel").optisense.material == "silicone-lsr"
-    choice.material = "a-gel-of-mine"
-    assert choice.entry == "a-gel-of-mine"
+    mini.optisense.materials["pdms-soft"].ior = 1.43
+    session.ask_and_wait("library", kind="material")  # answered after the pictures
+    assert bpy.ops.optisense.keep_material(name="my-gel") == {"FINISHED"}
+    assert (own_library / "materials" / "my-gel.yaml").is_file()
+    end = time.monotonic() + 60.0
+    while not gallery.picture("material", "my-gel"):
+        assert time.monotonic() < end and not session.state().problem, session.state().problem
+        time.sleep(session._tick() or 0.0)
+    names = [row["name"] for row in catalogue.entries("material")]
+    assert names.index("my-gel") < names.index("pdms-soft")
+    assert choice.material == "pdms-soft", "as before"
+    choice.material = "my-gel"
+    assert bpy.ops.optisense.apply_material() == {"FINISHED"}
+    assert gel.optisense.material == "my-gel"
+    assert mini.optisense.materials["my-gel"].ior == pytest.approx(1.43)
 
 
 def test_a_material_needs_a_name_that_files_can_have(

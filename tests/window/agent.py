@@ -2,8 +2,9 @@
 move the mouse where it looks for a button.
 
 Each line on a local socket is a Python expression, or `scan X TOP END STEP` and a name: the mouse
-goes down the sidebar until it is over a button of that name, and the answer is how far down that
-is, or null. Answers are lines of JSON.
+goes down the sidebar until it is over a button of that name (see `is_named`), and the answer is how
+far down that is, or null, and the names of all buttons that it came over. Answers are lines of
+JSON.
 """
 
 from __future__ import annotations
@@ -87,7 +88,9 @@ def on_screen(point: Any) -> list[float]:
 
 
 def under() -> str:
-    """The button under the pointer in the sidebar: an operator's name, a property's, or nothing."""
+    """The button under the pointer in the sidebar: `optisense.open()`, with all its arguments,
+    a property as `optisense_search.budget`, or nothing.
+    """
     sidebar = region("VIEW_3D", "UI")
     with bpy.context.temp_override(window=window(), area=area("VIEW_3D"), region=sidebar):
         found = getattr(bpy.context, "property", None)
@@ -97,7 +100,24 @@ def under() -> str:
             return ""
         bpy.context.window_manager.clipboard = ""
         bpy.ops.ui.copy_python_command_button()
-        return bpy.context.window_manager.clipboard
+        return bpy.context.window_manager.clipboard.removeprefix("bpy.ops.")
+
+
+def is_named(button: str, what: str) -> bool:
+    """Whether a button is meant by a name.
+
+    Args:
+        button: as `under` tells it.
+        what: an operator (`optisense.open`), one with its arguments
+            (`wm.call_menu(name="OPTISENSE_MT_vary")`), or a property (`budget`). `optisense.*` is
+            any operator of ours.
+    """
+    operator, is_operator, _ = button.partition("(")
+    if what.endswith(".*"):
+        return bool(is_operator) and operator.startswith(what[:-1])
+    if "(" in what:
+        return button == what
+    return what == (operator if is_operator else button.rpartition(".")[2])
 
 
 def part(name: str) -> Any:
@@ -155,8 +175,9 @@ def _poll() -> float:
     return SOON
 
 
-def _scan(x: int, rows: range, what: str) -> Generator[None, None, int | None]:
-    """The first row where a button is; goes on at each turn of the timer."""
+def _scan(x: int, rows: range, what: str) -> Generator[None, None, tuple[int | None, list[str]]]:
+    """The first row where a button is, and those seen; goes on at each turn of the timer."""
+    seen: list[str] = []
     for y in rows:
         window().cursor_warp(x, window().height - y)
         for _ in range(MOST_TURNS):
@@ -164,9 +185,12 @@ def _scan(x: int, rows: range, what: str) -> Generator[None, None, int | None]:
             if _has_come(x, y):
                 break
         yield  # timers come before what the mouse touches is told
-        if what in under():
-            return y
-    return None
+        found = under()
+        if found and found not in seen:
+            seen.append(found)
+        if is_named(found, what):
+            return y, seen
+    return None, seen
 
 
 def _say(line: str) -> None:
@@ -205,7 +229,7 @@ class Listener:
 
     connection: socket.socket
     rest = b""
-    scan: Generator[None, None, int | None] | None = None
+    scan: Generator[None, None, tuple[int | None, list[str]]] | None = None
 
     def __init__(self) -> None:
         self.server = socket.socket(socket.AF_UNIX)

@@ -11,31 +11,20 @@ import time
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from .desktop import SIZE, Desktop
+from .sidebar import Sidebar
 
 PATIENCE = 300.0
 """Seconds after which something that does not happen has failed the test."""
 
-ROW = 14
-"""Pixels between places where a button is looked for; buttons are at least 18 high."""
-
-SCROLLED, CLICK = 9, 40
-"""Clicks of the wheel to see other buttons, and how many pixels a click moves them."""
-
-BESIDE = 5
-"""Pixels from the sidebar's edge where there are no buttons."""
-
-HEAD = 28
-"""Pixels from the head of a closed panel to the next one."""
-
 TRIES = 5
-"""To close all panels: a key may come later than the click that it belongs to."""
-
-PAGES = 15
-"""Most of them that the sidebar has, in steps of so many clicks."""
+"""To close Blender: a key may come before the question that it answers."""
 
 
-class Bench:
+class Bench(Sidebar):
     """Blender with the extension, in a window.
 
     Args:
@@ -47,18 +36,25 @@ class Bench:
     def __init__(self, blender: Path, desktop: Desktop, home: Path) -> None:
         self.desktop = desktop
         self.home = home
-        address = home / "agent"
+        self._blender = blender
+        self.start()
+
+    def start(self, file: Path | None = None) -> None:
+        """Start Blender, with a file of its own if one is given."""
+        address = self.home / "agent"
+        address.unlink(missing_ok=True)
         environment = {
             **os.environ,
-            **own_place(home),
-            "DISPLAY": desktop.name,
+            **own_place(self.home),
+            "DISPLAY": self.desktop.name,
             "OPTISENSE_AGENT": str(address),
         }
         environment.pop("OPTISENSE_ENGINE", None)  # it knows that from when it was installed
         self._last = 0
-        self._log = (home / "blender.log").open("ab")
+        self._log = (self.home / "blender.log").open("ab")
         self.process = subprocess.Popen(
-            [blender, "--window-geometry", "0", "0", str(SIZE[0]), str(SIZE[1]),
+            [self._blender, *([file] if file else []),
+             "--window-geometry", "0", "0", str(SIZE[0]), str(SIZE[1]),
              "--python", Path(__file__).with_name("agent.py")],
             env=environment,
             stdout=self._log,
@@ -118,111 +114,6 @@ class Bench:
         self.desktop.keys("Escape")
         self.see("1")
 
-    # --- the mouse in the sidebar ---------------------------------------------------------------
-
-    def sidebar(self) -> tuple[int, int, int, int]:
-        """Left, top, width and height of its part with buttons, in pixels."""
-        left, top, width, height = self.see("place('VIEW_3D', 'UI')")
-        return left, top, width - 22, height
-
-    def open_tab(self) -> None:
-        """Open the sidebar by its key, and click on its tabs until ours is open."""
-        left, top, width, height = self.see("place('VIEW_3D', 'WINDOW')")
-        self.desktop.move(left + width / 2, top + height / 2)
-        self.desktop.keys("n")
-        self.until("region('VIEW_3D', 'UI').width > 1")
-        left, top, width, height = self.see("place('VIEW_3D', 'UI')")
-        for y in range(top + 40, top + height, 25):
-            self.desktop.click(left + width - 9, y)
-            self.see("1")
-            if self.see("region('VIEW_3D', 'UI').active_panel_category") == "OptiSense":
-                return
-        raise AssertionError("there is no tab OptiSense")
-
-    def find(self, what: str, *, across: float = 0.5) -> tuple[int, int]:
-        """Look for a button: where it was seen last, from where the mouse is down, then everywhere.
-
-        Args:
-            what: in its operator's or property's name.
-            across: where to look, 0 is the sidebar's left edge and 1 its right one.
-        """
-        left, top, width, height = self.sidebar()
-        x, end = round(left + width * across), top + height - 6
-        y = self._seen(what, x, max(self._last - ROW, top + 6), end)
-        if y is None:
-            self.to_top()
-        for _ in range(PAGES):
-            y = self._seen(what, x, top + 6, end) if y is None else y
-            if y is not None:
-                self._last = y
-                return x, y
-            self.scroll(SCROLLED)
-        raise AssertionError(f"no button '{what}' in the sidebar")
-
-    def _seen(self, what: str, x: int, top: int, end: int) -> int | None:
-        """How far down a button is in a part of the sidebar that is in view."""
-        y = self.see(f"scan {x} {top} {end} {ROW} {what}")
-        if y is not None:
-            self.drawn()  # the wheel is quicker than the sidebar: it may have moved meanwhile
-            y = self.see(f"scan {x} {y - 3} {y + 2 * ROW} 3 {what}")
-        return None if y is None else int(y)
-
-    def to_top(self) -> None:
-        """Show the sidebar's first panel, by the key Home over it."""
-        left, top, width, _ = self.sidebar()
-        self.desktop.move(left + width / 2, top + 6)
-        self.see("1")
-        self.desktop.keys("Home")
-        self._last = 0
-        self.drawn()
-
-    def only(self, panel: int) -> None:
-        """Open one panel and close all others, by clicks on their heads; the first is 0."""
-        left, top, width, _ = self.sidebar()
-        x, y = left + width / 2, top + HEAD / 2
-        for _ in range(TRIES):
-            self.to_top()
-            self._on_head(x, y, "ctrl")  # closes all others, where the key came before the click
-            if self._shows_buttons():
-                self._on_head(x, y)
-            if not self._shows_buttons():
-                break
-        else:
-            raise AssertionError("the panels can't be closed")
-        self._on_head(x, y + HEAD * panel)
-
-    def _on_head(self, x: float, y: float, held: str = "") -> None:
-        """Click on the head of a panel, while a key is down if one is named."""
-        self.desktop.move(x, y)
-        if held:
-            self.desktop.hold(held, True)
-            self.see("1")
-        self.desktop.click(x, y)
-        self.see("1")
-        if held:
-            self.desktop.hold(held, False)
-        self.drawn()
-
-    def _shows_buttons(self) -> bool:
-        """Whether any of the extension's buttons is in view, where an open panel has one."""
-        left, top, width, _ = self.sidebar()
-        x, end = round(left + width * 0.25), top + 11 * HEAD
-        return self.see(f"scan {x} {top + HEAD} {end} {ROW} optisense.") is not None
-
-    def scroll(self, clicks: int) -> None:
-        """Turn the mouse's wheel over the sidebar; down is positive."""
-        left, top, _, height = self.sidebar()
-        self.desktop.click(  # beside the buttons: over a list, the wheel would turn that
-            left + BESIDE, top + height / 2, button=5 if clicks > 0 else 4, times=abs(clicks)
-        )
-        self.see("1")
-        self.drawn()
-
-    def press(self, what: str, *, across: float = 0.5) -> None:
-        """Find a button and click on it."""
-        x, y = self.find(what, across=across)
-        self.desktop.click(x, y)
-
     def choose(self, menu: tuple[int, int], number: int) -> None:
         """Open a menu by a click and choose an entry by keys, the first is 0."""
         self.desktop.click(*menu)
@@ -242,17 +133,6 @@ class Bench:
         self.desktop.write(text)
         self.desktop.keys("Return")
 
-    def bring(self, what: str, down: float, *, across: float = 0.5) -> tuple[int, int]:
-        """Scroll until a button is so far down the sidebar, 0 is its top and 1 its end."""
-        _, top, _, height = self.sidebar()
-        for _ in range(3):
-            y = self.find(what, across=across)[1]
-            clicks = round((y - top - down * height) / CLICK)
-            if clicks == 0:
-                break
-            self.scroll(clicks)
-        return self.find(what, across=across)
-
     def new_sensor(self, name: str) -> None:
         """Start from a built-in sensor."""
         self.until("bool(part('engine.catalogue').entries('sensors'))")
@@ -267,6 +147,13 @@ class Bench:
         if folder:
             self.drawn()
             self.desktop.picture(Path(folder) / f"{name}.jpg")
+
+    def view(self) -> NDArray[np.int64]:
+        """(h, w, 3) what the 3D view shows, 0 to 255."""
+        self.drawn()
+        left, top, width, height = self.see("place('VIEW_3D', 'WINDOW')")
+        shown = self.desktop.shown().crop((left, top, left + width, top + height))
+        return np.asarray(shown, dtype=np.int64)
 
     def choose_file(self, name: str = "") -> None:
         """Click on a file where one is asked for, if a name is given, and then on the button."""
@@ -283,6 +170,44 @@ class Bench:
         left, top, width, height = self.see("place('FILE_BROWSER', 'EXECUTE')")
         self.desktop.click(left + width - 70, top + height / 2)
         self.until("len(manager.windows) == 1")
+
+    def select_part(self, name: str, at: tuple[float, float, float], *, too: bool = False) -> None:
+        """Click on a part in the view.
+
+        Args:
+            name: the part's.
+            at: mm, a point of it that is not hidden.
+            too: besides what is selected, with the key Shift.
+        """
+        if too:
+            self.desktop.hold("shift", True)
+        self.desktop.click(*self.see(f"on_screen({at})"))
+        self.see("1")
+        if too:
+            self.desktop.hold("shift", False)
+        self.see("1")
+        self.drawn()
+        chosen = self.see("[each.name for each in scene().objects if each.select_get()]")
+        assert name in chosen, f"a click on '{name}' selected: {', '.join(chosen) or 'nothing'}"
+
+    def over_view(self) -> None:
+        """Put the mouse over the 3D view, for keys that are meant for it."""
+        left, top, width, height = self.see("place('VIEW_3D', 'WINDOW')")
+        self.desktop.move(left + width * 0.3, top + height - 60)
+        self.see("1")
+
+    def quit(self) -> None:
+        """Close Blender as a user does, saving the file when it asks."""
+        self.over_view()
+        self.desktop.keys("ctrl+q")
+        for _ in range(TRIES):
+            try:
+                self.process.wait(2)
+                break
+            except subprocess.TimeoutExpired:
+                self.desktop.keys("Return")
+        self.process.wait(PATIENCE)
+        self._log.close()
 
     def close(self) -> None:
         """End Blender."""

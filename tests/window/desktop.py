@@ -8,7 +8,7 @@ import time
 from pathlib import Path
 from shutil import which
 
-from PIL import ImageGrab
+from PIL import Image, ImageGrab
 
 SIZE = (1280, 860)
 PAGE = (1000, 1000)
@@ -63,10 +63,14 @@ class Desktop:
         """Type a text."""
         self._do("type", "--delay", 15, text)
 
+    def shown(self) -> Image.Image:
+        """What the display shows."""
+        return ImageGrab.grab(xdisplay=self.name).convert("RGB")
+
     def picture(self, path: Path) -> None:
         """Keep what the display shows."""
         path.parent.mkdir(parents=True, exist_ok=True)
-        picture = ImageGrab.grab(xdisplay=self.name).convert("RGB")
+        picture = self.shown()
         picture.thumbnail(PAGE)
         picture.save(path, quality=82, optimize=True)
 

@@ -17,6 +17,9 @@ MOVED = 1.5
 REPORT = 7
 """The panel's place in the sidebar; the first is 0."""
 
+VARY = 'wm.call_menu(name="OPTISENSE_MT_vary")'
+"""The button *Vary*."""
+
 FIRST_ROW = 37
 """Pixels from the top of the button *Vary* to the middle of the first row of the list below it."""
 
@@ -29,6 +32,12 @@ LAST_PICTURE = (222, 114)
 EDITOR_FITS = "area('IMAGE_EDITOR').spaces.active.zoom[0] != 1.0"
 """An Image Editor has been told to show its picture whole."""
 
+CORNERS_ACROSS = (
+    "on_screen(each.matrix_world @ Vector(corner))[0]"
+    " for each in kinds('PART') for corner in each.bound_box"
+)
+"""Where corners of parts are in the window, pixels from its left."""
+
 FIELDS_OF_VIEW = (50.0, 60.0, 70.0)
 """Degrees, what the search tries; all see less than the whole surface or beyond its edge."""
 
@@ -37,12 +46,17 @@ def test_the_tab_is_there(bench: Bench) -> None:
     bench.greet()
     bench.open_tab()
     bench.find("optisense.open", across=0.25)
+    with pytest.raises(AssertionError, match=r"are: .*optisense\.open"):
+        bench.find("optisense.ope", across=0.25)  # names are whole, and what there is, is told
 
 
 def test_a_new_mini(bench: Bench) -> None:
     bench.new_sensor("gelsight-mini")
     assert bench.see("scene().optisense.title") == "gelsight-mini"
     assert len(bench.see("[light.name for light in kinds('LIGHT')]")) == 15
+    bench.drawn()
+    right = bench.see(f"max({CORNERS_ACROSS})")
+    assert right < bench.sidebar()[0], "the sensor is not hidden by the sidebar"
     bench.press("optisense.add_contact", across=0.75)
     bench.until("len(kinds('CONTACT')) == 1")
     bench.photograph("1-new-mini")
@@ -98,7 +112,7 @@ def test_a_picture_appears(bench: Bench) -> None:
 
 def test_scores_appear(bench: Bench) -> None:
     for name in ("aoap", "2to3pw"):
-        bench.press(f'choose_objective(objective="{name}")')
+        bench.press(f'optisense.choose_objective(objective="{name}")')
     bench.until("manager.optisense_evaluation.chosen == {'aoap', '2to3pw'}")
     bench.press("optisense.evaluate")
     bench.until("len(manager.optisense_evaluation.scores) == 2")
@@ -137,10 +151,10 @@ def test_a_small_grid_finds_the_best_of_three(bench: Bench) -> None:
                                    ".translation)"))  # fmt: skip
     bench.until(f"bpy.context.view_layer.objects.active.name == {camera!r}")
     labels = bench.see("[each.label for each in part('core.vary').for_camera()]")
-    bench.choose(bench.bring("OPTISENSE_MT_vary", 0.3), labels.index("Field of view"))
+    bench.choose(bench.bring(VARY, 0.3), labels.index("Field of view"))
     bench.until("len(scene().optisense_search.vary) == 1")
     grid = "camera.fov=" + ",".join(f"{each:g}" for each in FIELDS_OF_VIEW)
-    x, y = bench.find("OPTISENSE_MT_vary")
+    x, y = bench.find(VARY)
     bench.enter_at((x, y + FIRST_ROW), grid, times=2)
     bench.until(f"scene().optisense_search.vary[0].text == {grid!r}")
     bench.enter("method", "grid")
@@ -161,7 +175,7 @@ def test_the_best_is_applied_saved_and_opened_again(bench: Bench) -> None:
     bench.until("not state().busy and abs(kinds('CAMERA')[0].optisense.fov - "
                 f"{before}) > 1e-3")  # fmt: skip
     assert bench.see("kinds('CAMERA')[0].optisense.fov") == pytest.approx(best, abs=1e-4)
-    bench.press("optisense.save(", across=0.5)
+    bench.press("optisense.save")
     bench.until("'Saved in' in state().note")
     folder = bench.home / "gelsight-mini"
     written = yaml.safe_load((folder / "design.yaml").read_text())

@@ -23,8 +23,8 @@ CONTACTS = (
 LAST = 0.88
 """How far across the sidebar a small button at the end of a row of a box is; of no box, 0.9."""
 
-ON_SKIN, ON_GEL = (-6.0, -7.0, 0.0), (-5.0, -10.375, -1.5)
-"""mm, places that the view shows: on the skin, and on the gel's side below it."""
+ON_SKIN, ON_GEL = (-6.0, -7.0, 0.0), (12.625, -5.0, -3.2)
+"""mm, places that the view shows: on the skin, and on the side of the gel below it."""
 
 LIFTED = 2.0
 """mm, how far the middle point of the cage's top is lifted; the skin's middle rises a quarter."""
@@ -44,20 +44,29 @@ def test_a_new_mini(bench: Bench) -> None:
     bench.new_sensor("gelsight-mini")
 
 
-def test_a_cage_is_made_around_two_parts(bench: Bench) -> None:
-    bench.desktop.click(*bench.see(f"on_screen({ON_SKIN})"))
-    bench.until(f"{SELECTED} == ['skin']")
+def test_a_cage_around_the_skin_alone_is_told(bench: Bench) -> None:
+    bench.select_part("skin", ON_SKIN)
     bench.press("optisense.remove_cage", across=LAST)
     bench.until("not kinds('CAGE')")
-    bench.desktop.hold("shift", True)
-    bench.desktop.click(*bench.see(f"on_screen({ON_GEL})"))
-    bench.see("1")
-    bench.desktop.hold("shift", False)
-    bench.until(f"{SELECTED} == ['gel', 'skin']")
+    bench.press("optisense.new_cage")
+    bench.until("len(kinds('CAGE')) == 1")
+    (told,) = bench.until("part('shapes.cage_warnings').warnings_of('skin')")
+    assert "'gel'" in told["message"] and told["hint"] == "Put 'gel' into the cage too"
+    bench.bring("optisense.remove_cage", 0.7, across=LAST)
+    bench.photograph("cage-of-skin-alone")
+    bench.press("optisense.remove_cage", across=LAST)
+    bench.until("not kinds('CAGE')")
+
+
+def test_a_cage_is_made_around_two_parts(bench: Bench) -> None:
+    bench.select_part("skin", ON_SKIN)
+    bench.select_part("gel", ON_GEL, too=True)
+    assert bench.see(SELECTED) == ["gel", "skin"]
     bench.press("optisense.new_cage")
     bench.until("len(kinds('CAGE')) == 1")
     assert sorted(bench.see(f"{CAGE}['parts']")) == ["gel", "skin"]
     assert bench.see(f"{CAGE}['resolution']") == [3, 3, 3]
+    bench.until("not part('shapes.cage_warnings').warnings_of('skin')")
 
 
 def test_parts_follow_a_point_while_it_moves(bench: Bench) -> None:

@@ -1,0 +1,99 @@
+"""A study that was not over when Blender was closed: found again when its sensor is opened."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import bpy
+
+from ..core.engine import EngineError
+from ..engine import session
+from ..scene.paths import absolute
+from ..sensor import opening
+from . import following
+
+NOT_OVER = (None, "", "interrupted")
+"""Why a study ended that can go on: it was stopped, or nobody lived to say."""
+
+
+def study_of(scene: bpy.types.Scene) -> str:
+    """The folder of the scene's study as an absolute path; empty where none is named."""
+    text = scene.optisense_search.study
+    return str(absolute(text)) if text else ""
+
+
+def studies_beside(folder: Path) -> list[Path]:
+    """Where the searches of a design's folder are kept, the last one at the end."""
+    found: list[Path] = []
+    while (study := folder.with_name(f"{folder.name}-search-{len(found) + 1}")).exists():
+        found.append(study)
+    return found
+
+
+def new_study(folder: Path) -> Path:
+    """A folder beside the design's that is not there yet."""
+    return folder.with_name(f"{folder.name}-search-{len(studies_beside(folder)) + 1}")
+
+
+def offer(scene: bpy.types.Scene) -> None:
+    """Show how far the sensor's study is, where it is not over, and that it can go on.
+
+    It is the study that the scene names, or else the last one beside the design's folder: a .blend
+    file may have been saved before the search began, or never.
+    """
+    following.begin()
+    design, study = scene.optisense, study_of(scene)
+    if not study and design.is_open and design.is_saved:
+        study = next((str(each) for each in reversed(studies_beside(Path(design.folder)))), "")
+    if not study or not Path(study).is_dir():
+        return
+    name = scene.name
+
+    def known(result: dict[str, Any]) -> None:
+        scene = bpy.data.scenes.get(name)
+        if scene is None or session.is_busy() or result["design"] != scene.optisense.title:
+            return
+        search, running = scene.optisense_search, result["running"]
+        if study_of(scene) not in ("", study) or not (running or result["ended"] in NOT_OVER):
+            return
+        if not search.study:
+            search.study, search.budget = study, result["budget"]
+            search.objective = ", ".join(result["objectives"])
+            search.method = result["method"]
+        following.take_curve(result["curve"])
+        done = sum(not row["start"] for row in result["curve"])
+        far = f"{done} of {search.budget or result['budget']} trials"
+        bpy.context.window_manager.optisense_found.offer = (
+            f"The search {Path(study).name} goes on without Blender: {far}. Resume follows it"
+            if running
+            else f"The search {Path(study).name} is not over: {far}. Resume goes on with it"
+        )
+        session.redraw()
+
+    def unreadable(_: EngineError) -> None:
+        """That is said when the user asks for this study."""
+
+    session.ask("study", known, unreadable, study=study)
+
+
+@bpy.app.handlers.persistent
+def _loaded(*_: Any) -> None:
+    if not bpy.app.background:  # scripts say themselves what they want
+        following.clear_ghosts(bpy.context.scene)
+        offer(bpy.context.scene)
+
+
+def _opened(scene: bpy.types.Scene) -> None:
+    if not bpy.app.background:
+        offer(scene)
+
+
+def register() -> None:
+    bpy.app.handlers.load_post.append(_loaded)
+    opening.when_opened.append(_opened)
+
+
+def unregister() -> None:
+    bpy.app.handlers.load_post.remove(_loaded)
+    opening.when_opened.remove(_opened)
