@@ -17,7 +17,7 @@ DESIGN = "gelsight-mini"
 RADIUS, DEPTH = 1.5, 0.8
 """mm: the ball of the OptiSense paper."""
 RESOLUTION = (320, 240)
-PHOTONS = 530_000
+PHOTONS = 560_000
 """Of an image: about the fewest for 3 % of error in the contact."""
 CONTACT_TEXT = f"sphere:{RADIUS}@0,0:{DEPTH}"
 

@@ -21,7 +21,7 @@ from optisense.optics.cells import SurfaceCells
 
 FloatArray = NDArray[np.floating]
 
-RADIUS = 1.7
+RADIUS = 1.6
 """mm of the kernel where `USUAL_DENSITY` photons land on a mm^2 and light varies over `LENGTH`."""
 USUAL_DENSITY = 1000.0
 """Photons on a mm^2."""
@@ -40,8 +40,6 @@ LEAST = 1.5
 """Of the side of a cell, however near a lamp is; with many photons this shrinks, too."""
 SHRINKS_TO = 1.25
 """Of the side of a cell, at which the kernel holds the cell and its neighbours."""
-WIDER = 1.5
-"""How much wider than the kernel that of the sharpening is."""
 ALIKE = 0.5
 """Least cosine between the normals of cells that a kernel brings together."""
 READ_WIDTH = 1.5
@@ -57,8 +55,7 @@ class Smoothing:
     """Kernel-weighted sums among cells: rows of a sparse matrix, by start, neighbour and weight.
 
     ``blur`` is the same with what the cells themselves blur (not where a coating is part metal:
-    what else they bring together there makes up for it); ``wide`` is the wider kernel of the
-    sharpening.
+    what else they bring together there makes up for it).
     """
 
     start: mi.UInt32
@@ -66,7 +63,6 @@ class Smoothing:
     weight: mi.Float
     matrix: csr_matrix
     blur: csr_matrix
-    wide: csr_matrix
 
 
 class Kernels:
@@ -126,7 +122,6 @@ class Kernels:
                     weight=_copied(mi.Float, matrix.data),
                     matrix=matrix,
                     blur=matrix if metallic else self._blur(radii),
-                    wide=kernel_matrix(self.cells, np.where(self.near, WIDER * radii, radii)),
                 )
             }
         return self._known[key]
@@ -137,16 +132,15 @@ class Kernels:
     def sharpening(self, landed: FloatArray, photons: int, metallic: bool = False) -> FloatArray:
         """Factors (cells, groups) that undo most of what the kernel and the cells blur.
 
-        They take from peaks and give to hollows, by what they make of a smooth estimate of the
-        light, too: multiplicative bias correction (Jones, Linton and Nielsen 1995). The
-        estimate is smoothed more widely, so that it brings little noise.
+        They take from peaks and give to hollows, by what they make of their own result:
+        multiplicative bias correction (Jones, Linton and Nielsen 1995).
 
         Args:
             landed: (cells, groups) mW on each cell.
             photons: of the field.
         """
         kernel = self.smoothing(photons, metallic)
-        smooth = kernel.wide @ landed
+        smooth = kernel.matrix @ landed
         again = kernel.blur @ (smooth * self.cells.areas[:, None])
         sharpened = (again > 0) & self.near[:, None]
         factor = np.divide(smooth, again, out=np.ones_like(smooth), where=sharpened)
