@@ -41,7 +41,7 @@ OVERLAP = 1.0
 B-spline weights. With sharp edges, a lamp would be counted once or twice by a point above the
 surface, depending on how near an edge it lies, where its light is only somewhat stronger than
 below; the sum over such bins hardly depends on where they lie."""
-OVERLAP_OF_METAL = 0.5
+OVERLAP_OF_METAL = 0.4
 """The same where a coating is part metal, which tells directions apart: a compromise."""
 # Where a bin of no light is told from one of little.
 DARK = 1e-7
