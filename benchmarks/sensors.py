@@ -101,13 +101,18 @@ def measure(name: str) -> dict[str, Any]:
 
 def least_photons(model: OpticalModel, ball: Contact) -> tuple[int, float]:
     """About the fewest photons that bring the noise in the contact to WANTED_NOISE, and the noise
-    that they give: noise falls as the root of photons, which tells where to look."""
-    photons = TRIAL_PHOTONS
+    that they give: each trial is where noise that falls as the third root of photons says."""
+    photons, too_few = TRIAL_PHOTONS, 0
     while True:
         noise = noise_in_contact(model, ball, photons)
-        if noise <= WANTED_NOISE or photons >= MOST_PHOTONS:
+        wanted = 1.03 * photons * (noise / WANTED_NOISE) ** 3
+        if (noise <= WANTED_NOISE and wanted > 0.85 * photons) or photons >= MOST_PHOTONS:
             return photons, noise
-        wanted = max(1.25 * photons, 1.05 * photons * (noise / WANTED_NOISE) ** 2)
+        if noise > WANTED_NOISE:
+            too_few = max(too_few, photons)
+            wanted = max(wanted, 1.1 * too_few)
+        elif wanted <= 1.1 * too_few:
+            return photons, noise
         photons = min(MOST_PHOTONS, -(-int(wanted) // STEP) * STEP)
 
 

@@ -18,7 +18,7 @@ from optisense.optics.cells import SurfaceCells, cell_at
 from optisense.optics.emitters import EmitterTable, emit
 from optisense.optics.guide import CELLS, Guide, warp
 from optisense.optics.ray_scene import RayScene, intersect, leave
-from optisense.optics.sampling import seed_of, sequence_4d
+from optisense.optics.sampling import seed_of, sequence_4d, unit_float
 from optisense.optics.scattering import (
     SMOOTH_ALPHA,
     coating_of,
@@ -174,9 +174,11 @@ def _fly(
             # What has left an opaque surface and meets none is exchange.py's part.
             passes = flying & (opaque | ~scattered)
             bits = mi.UInt32(seed) ^ (flight.number * 747796405) ^ (depth * 0x9E3779B9)
+            # Hashed: neighbouring photons have neighbouring bits.
+            chance = unit_float(mi.sample_tea_32(bits, mi.UInt32(0))[0])
             piece = mi.UInt32(0)
             while passes & (piece < PIECES):
-                spot, share, crosses = crossing(slab, hit, origin, direction, bits, piece, opaque)
+                spot, share, crosses = crossing(slab, hit, origin, direction, chance, piece, opaque)
                 if crosses:
                     slot = dr.scatter_inc(passing.counter, mi.UInt32(0), crosses)
                     kept = crosses & (slot < passing.capacity)

@@ -16,7 +16,6 @@ import numpy as np
 
 from optisense.optics.cells import SurfaceCells, cell_at, plane_of
 from optisense.optics.ray_scene import Hit
-from optisense.optics.sampling import unit_float
 
 HEIGHT = 1.0
 """mm, of the slab."""
@@ -24,6 +23,8 @@ FARTHEST = 50.0
 """mm that light without anything in its way is followed."""
 PIECES = 4
 """In which a segment of a photon's path is looked at, each at one place."""
+GOLDEN = 0.618034
+"""By which the places within pieces differ, so that they lie evenly in the mean of few."""
 TAIL = 1.5
 """Of the slab's height: how far above the surface the end of a path begins that lands there."""
 LEAST_COSINE = 1e-3
@@ -68,13 +69,14 @@ def crossing(
     hit: Hit,
     origin: mi.Point3f,
     direction: mi.Vector3f,
-    bits: mi.UInt32,
+    chance: mi.Float,
     piece: mi.UInt32,
     landing: mi.Bool,
 ) -> tuple[mi.Point3f, mi.Float, mi.Bool]:
     """A random place on one of the ``PIECES`` of the way of light to where it hits.
 
-    Half of them are of its end, where light that is ``landing`` is near the surface.
+    Half of them are of its end, where light that is ``landing`` is near the surface. ``chance`` is
+    even over 0..1, one for all pieces of a way.
 
     Returns:
         The place; the slab's height over the length of the piece (as the cosine of a landing is
@@ -86,7 +88,7 @@ def crossing(
     last = piece >= PIECES // 2
     length = dr.select(last, tail, end - tail) * (2 / PIECES)
     first = dr.select(last, end - tail, 0) + length * mi.Float(piece % (PIECES // 2))
-    # Hashed: neighbouring photons have neighbouring bits.
-    spot = origin + direction * (first + length * unit_float(mi.sample_tea_32(bits, piece)[0]))
+    place = chance + mi.Float(piece) * GOLDEN
+    spot = origin + direction * (first + length * (place - dr.floor(place)))
     _, _, inside = above_cell(slab, mi.Point3f(spot), mi.Bool(True))
     return mi.Point3f(spot), HEIGHT / length, inside
