@@ -14,6 +14,7 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
+from optisense.optics.arrays import floats, indices
 from optisense.optics.cells import SurfaceCells
 from optisense.optics.spread import passes_near, squared_radius
 
@@ -38,13 +39,6 @@ class Beams:
     fluxes: mi.Float
 
 
-def blocks_of_four(bands: int, sectors: int) -> NDArray[np.int64]:
-    """(bands * sectors / 4, 4) the bins in blocks of two bands and two sectors."""
-    block = np.arange(bands * sectors // 4)
-    corner = (block // (sectors // 2)) * 2 * sectors + (block % (sectors // 2)) * 2
-    return corner[:, None] + np.array([0, 1, sectors, sectors + 1])
-
-
 def collect_beams(
     moments: mi.Float,
     colours: mi.Float,
@@ -66,11 +60,12 @@ def collect_beams(
     """
     slots = np.full(bands * sectors, NO_SLOT, dtype=np.uint32)
     slots[used] = np.arange(len(used))
-    four = slots[blocks_of_four(bands, sectors)]
+    block = np.arange(bands * sectors // 4)
+    corner = (block // (sectors // 2)) * 2 * sectors + (block % (sectors // 2)) * 2
+    four = slots[corner[:, None] + np.array([0, 1, sectors, sectors + 1])]
     # Blocks without any light are not looked at.
     four = four[(four != NO_SLOT).any(axis=1)]
-    # Copied: arrays handed over from numpy differ in alignment, and so would kernels.
-    field = (moments, colours, mi.UInt32(four.ravel()) + dr.opaque(mi.UInt32, 0))
+    field = (moments, colours, indices(four))
     sizes = (dr.opaque(mi.UInt32, len(four)), dr.opaque(mi.UInt32, len(used)))
     nowhere = dr.zeros(mi.Float, 4)
     lane = dr.arange(mi.UInt32, entries)
@@ -165,8 +160,7 @@ def beams_near(beams: Beams, cells: SurfaceCells, groups: int, balls: mi.Float) 
     entries = cells.cells * groups
     centres = np.zeros((cells.cells, 4), dtype=np.float32)
     centres[:, :3] = cells.centres
-    # Copied: arrays handed over from numpy differ in alignment, and so would kernels.
-    middles = mi.Float(centres.ravel()) + dr.opaque(mi.Float, 0)
+    middles = floats(centres)
     lane = dr.arange(mi.UInt32, entries)
     near = dr.zeros(mi.UInt32, dr.width(beams.ways) // 4)
     margin = REACH / cells.inverse_size

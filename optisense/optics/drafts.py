@@ -8,7 +8,7 @@ cells of surfaces that did not move, and the photon guide, which stays right for
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -22,8 +22,7 @@ from optisense.geometry.indenters import FACET_ERROR
 from optisense.optics.emitters import EmitterTable
 from optisense.optics.field_store import CELL_SIZE, SEEN_MARGIN, FieldStore
 from optisense.optics.image import TactileImage
-from optisense.optics.imaging import Careful
-from optisense.optics.model import OpticalModel, Progress
+from optisense.optics.model import OpticalModel
 from optisense.optics.ray_scene import Piece, RayScene
 from optisense.optics.surfaces import SurfaceKind
 
@@ -131,19 +130,7 @@ class DraftModel(OpticalModel):
             self._placed[contact] = super().place(contact)
         return self._placed[contact]
 
-    def render(
-        self,
-        contacts: Sequence[Contact] = (),
-        resolution: tuple[int, int] | None = None,
-        photons: int | None = None,
-        noise: float | None = None,
-        seconds: float | None = None,
-        seed: int = 0,
-        progress: Callable[[Progress], None] | None = None,
-        estimator: str = "field",
-        only_contacts: bool = False,
-        careful: Careful | None = None,
-    ) -> TactileImage:
+    def render(self, contacts: Sequence[Contact] = (), *args: Any, **kwargs: Any) -> TactileImage:
         """As of `OpticalModel`; layers of light groups whose lights are where they were in the
         draft before are taken from it, where all else is the same.
 
@@ -151,10 +138,7 @@ class DraftModel(OpticalModel):
         draft, asked for once more, is made anew in full, its media resolved as well;
         ``settings["kept_layers"]`` and ``settings["kept_media"]`` say what was not.
         """
-        asked = (
-            tuple(contacts), resolution, photons, noise, seconds, seed, estimator, only_contacts,
-            careful,
-        )  # fmt: skip
+        asked = tuple(contacts), args, {k: v for k, v in kwargs.items() if k != "progress"}
         before = self._shown if self._shown is not None and self._shown.asked == asked else None
         moved = None if before is None else _moved(before.design, self.design)
         if before is not None and not moved:  # no light was, or more than lights
@@ -165,10 +149,7 @@ class DraftModel(OpticalModel):
             moved = None
         self._shown = None
         self._store.light_only(moved)
-        image = super().render(
-            contacts, resolution, photons, noise, seconds, seed, progress, estimator,
-            only_contacts, careful,
-        )  # fmt: skip
+        image = super().render(contacts, *args, **kwargs)
         kept = [] if moved is None else [n for k, n in enumerate(self.groups) if k not in moved]
         if before is not None:
             for name in kept:

@@ -105,13 +105,19 @@ class FieldStore:
     @cached_property
     def _grazes(self) -> bool:
         """Whether much of the light where the camera looks nearly grazes the surface."""
-        scouts = self._asked_scouts
-        return scouts is not None and scouts.grazing_share(*self._target) > MOST_GRAZING
+        seen = self._seen_scouts
+        return seen is not None and seen.grazing_share() > MOST_GRAZING
 
     @property
     def _asked_scouts(self) -> Scouts | None:
         """The photons that taught the guide, if they are to be asked."""
         return self._scouts if self.asks_scouts and self.guide else None
+
+    @cached_property
+    def _seen_scouts(self) -> Scouts | None:
+        """Those of them that landed where photons are wanted."""
+        scouts = self._asked_scouts
+        return None if scouts is None else scouts.within(*self._target)
 
     @property
     def guide(self) -> Guide:
@@ -173,15 +179,19 @@ class FieldStore:
         """How light is smoothed among these cells."""
         if self._kernels is None:
             cells, (rough, where) = self.cells, self._target
-            area = rough.areas[where].sum()
-            near = cells_near(cells, self._seen, SMOOTHED_MARGIN)
-            rest = cells, self._lamp_distance(cells.centres), self.guide.arriving / area, near
-            scouts = self._asked_scouts
-            if scouts is None:
-                self._kernels = Kernels(*rest)
-            else:
-                landed = scouts.landed(cells, self._table.groups)
-                self._kernels = Kernels(*rest, landed, scouts.count(rough, where) / area)
+            area = float(rough.areas[where].sum())
+            landed, scouts = None, 0.0
+            if self._asked_scouts is not None and self._seen_scouts is not None:
+                landed = self._asked_scouts.landed(cells, self._table.groups)
+                scouts = len(self._seen_scouts.powers) / area
+            self._kernels = Kernels(
+                cells,
+                self._lamp_distance(cells.centres),
+                self.guide.arriving / area,
+                cells_near(cells, self._seen, SMOOTHED_MARGIN),
+                landed,
+                scouts,
+            )
         return self._kernels
 
     def _lamp_distance(self, points: NDArray[np.floating]) -> NDArray[np.floating]:

@@ -19,6 +19,7 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
+from optisense.optics.arrays import floats, indices
 from optisense.optics.beams import Beams, collect_beams
 from optisense.optics.cells import SurfaceCells, bin_axis, cell_at
 from optisense.optics.exchange import irradiance_table
@@ -234,7 +235,7 @@ class FieldTally:
         power = np.array(total)
         used = np.flatnonzero(power > DARK * power.sum())
         used = used if len(used) else np.zeros(1, dtype=np.int64)
-        bins = mi.UInt32(used.astype(np.uint32)) + dr.opaque(mi.UInt32, 0)
+        bins = indices(used)
         kernel = self.kernels.smoothing(self.photons, self.metallic)
         landed = self._landed().mean(axis=0)
         factors = self.kernels.sharpening(landed, self.photons, self.metallic)
@@ -242,8 +243,7 @@ class FieldTally:
             bins,
             dr.opaque(mi.UInt32, BINS),
             self.groups,
-            # Copied: arrays handed over from numpy differ in alignment, and so would kernels.
-            mi.Float((factors / self.passes).ravel().astype(np.float32)) + dr.opaque(mi.Float, 0),
+            floats(factors / self.passes),
         )
 
         def smoothed(moments: mi.Float, heights: mi.Float, colours: mi.Float) -> Tables:

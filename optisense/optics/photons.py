@@ -14,6 +14,7 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
+from optisense.optics.arrays import indices
 from optisense.optics.cells import SurfaceCells, cell_at
 from optisense.optics.emitters import EmitterTable, emit
 from optisense.optics.guide import CELLS, Guide, warp
@@ -316,17 +317,7 @@ def trace_pilot(
     the target; and where photons landed.
     """
     lights = dr.arange(mi.UInt32, table.count)
-    photons = per_light * table.count
-    room = int(photons * LANDINGS)
-    while True:
-        record = _room(room, coloured)
-        none = _room(0, coloured)
-        flown = (scene, table, guide, per_light, seed, 0, record, target, None, none)
-        cells = _trace(*flown, coloured, lights)
-        landed = int(record.counter[0])
-        if landed <= room:
-            return cells, _photon_map(record, landed, photons, coloured)
-        room = int(1.2 * landed)
+    return _traced(scene, table, guide, per_light, seed, 0, target, None, coloured, lights)
 
 
 def trace_photons(
@@ -338,37 +329,50 @@ def trace_photons(
     *,
     first: int = 0,
     coloured: bool,
-    landings: float = LANDINGS,
     groups: Collection[int] | None = None,
     slab: Slab | None = None,
 ) -> PhotonMap:
     """Emit ``per_light`` photons from each light and record where they land.
 
     ``first`` is the number of photons a light has already sent in earlier passes of the same
-    seed; ``landings`` is room for so many landings a photon; where they turn out to be more,
-    the pass is traced once more with more room. Each light has 1 mW in all. With ``groups``,
-    only the lights of these are lit, with the same photons that they send among all. What
-    crosses a ``slab`` is recorded, too.
+    seed. Each light has 1 mW in all. With ``groups``, only the lights of these are lit, with the
+    same photons that they send among all. What crosses a ``slab`` is recorded, too.
     """
     chosen = [
         k for k, emitter in enumerate(table.emitters) if groups is None or emitter.group in groups
     ]
-    # Copied: arrays handed over from numpy differ in alignment, and so would kernels.
-    lights = mi.UInt32(np.array(chosen, dtype=np.uint32)) + dr.opaque(mi.UInt32, 0)
-    photons = per_light * len(chosen)
-    room, room_passing = (int(photons * each) + 1024 for each in (landings, PIECES))
+    lights = indices(np.array(chosen))
+    return _traced(scene, table, guide, per_light, seed, first, None, slab, coloured, lights)[1]
+
+
+def _traced(
+    scene: RayScene,
+    table: EmitterTable,
+    guide: Guide,
+    per_light: int,
+    seed: int,
+    first: int,
+    target: Target | None,
+    slab: Slab | None,
+    coloured: bool,
+    lights: mi.UInt32,
+) -> tuple[mi.UInt32, PhotonMap]:
+    """As `_trace`, with where photons landed; where there are more landings than room, the pass is
+    traced once more with more room."""
+    photons = per_light * dr.width(lights)
+    room, room_passing = (int(photons * each) + 1024 for each in (LANDINGS, PIECES))
     while True:
         record = _room(room, coloured)
         passing = _room(0 if slab is None else room_passing, coloured)
-        flown = (scene, table, guide, per_light, seed, first, record, None, slab, passing)
-        _trace(*flown, coloured, lights)
+        flown = (scene, table, guide, per_light, seed, first, record, target, slab, passing)
+        cells = _trace(*flown, coloured, lights)
         landed, passed = int(record.counter[0]), int(passing.counter[0])
         if landed <= room and passed <= room_passing:
             break
         room, room_passing = (max(int(1.2 * n), 1024) for n in (landed, passed))
     emitted = per_light * table.count
     met = None if slab is None else _photon_map(passing, passed, emitted, coloured)
-    return _photon_map(record, landed, emitted, coloured, met)
+    return cells, _photon_map(record, landed, emitted, coloured, met)
 
 
 def _room(capacity: int, coloured: bool) -> _Record:

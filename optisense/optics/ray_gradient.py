@@ -25,6 +25,7 @@ from optisense.errors import RenderError
 from optisense.geometry import TriangleMesh
 from optisense.geometry.mesh import CREASE
 from optisense.geometry.shading_normals import smooth_corners
+from optisense.optics.arrays import floats, indices
 from optisense.optics.camera import RayCamera
 from optisense.optics.chief_rays import MAX_DEPTH, sees_nothing, trace_chief_rays
 from optisense.optics.ray_scene import Piece, RayScene, intersect, leave
@@ -104,13 +105,13 @@ class DifferentiableRays:
 
     def _record(self) -> None:
         scene = self._scene
-        pixel = _indices(np.flatnonzero(self.hit.ravel()))
+        pixel = indices(np.flatnonzero(self.hit.ravel()))
         x = mi.Float(pixel % self._camera.width) + 0.5
         y = mi.Float(pixel // self._camera.width) + 0.5
-        self._vertices = _floats(scene.vertices)
+        self._vertices = floats(scene.vertices)
         self._pose = self._camera.pose()
         dr.enable_grad(self._vertices, *self._pose)
-        faces = _indices(scene.faces)
+        faces = indices(scene.faces)
         normals = self._vertex_normals()
 
         origin, direction = self._camera.rays(x, y, self._pose)
@@ -168,10 +169,10 @@ class DifferentiableRays:
         for piece, start in zip(self._pieces, self._starts[:-1], strict=True):
             if piece.normals is not None and piece.name not in self._sheets:
                 fixed[start : start + len(piece.vertices)] = piece.normals
-        normals = _floats(fixed)
+        normals = floats(fixed)
         for piece, start in zip(self._pieces, self._starts[:-1], strict=True):
             if piece.name in self._sheets:
-                corners = _indices(np.asarray(piece.faces) + start)
+                corners = indices(np.asarray(piece.faces) + start)
                 normals = normals + _smooth_normals(self._vertices, corners, len(fixed))
         return normals
 
@@ -180,9 +181,9 @@ class DifferentiableRays:
         first, second = self._edges.nearest(
             places, np.asarray(face), np.asarray(active), self._fade
         )
-        near = _indices(first >= 0) > 0
-        a = dr.gather(mi.Point3f, self._vertices, _indices(first.clip(0)), near)
-        b = dr.gather(mi.Point3f, self._vertices, _indices(second.clip(0)), near)
+        near = indices(first >= 0) > 0
+        a = dr.gather(mi.Point3f, self._vertices, indices(first.clip(0)), near)
+        b = dr.gather(mi.Point3f, self._vertices, indices(second.clip(0)), near)
         along = dr.normalize(b - a)
         aside = dr.cross(point - a, along)
         distance = dr.sqrt(dr.squared_norm(aside) + 1e-12)
@@ -204,7 +205,7 @@ class DifferentiableRays:
         for output, slope in zip(self._outputs, (cosine, weight, points), strict=True):
             if slope is None:
                 continue
-            given = dr.unravel(type(output), _floats(slope)) if slope.ndim > 1 else _floats(slope)
+            given = dr.unravel(type(output), floats(slope)) if slope.ndim > 1 else floats(slope)
             loss += dr.sum(dr.dot(output, given))
         dr.backward(loss)
         moved = np.asarray(dr.grad(self._vertices), dtype=np.float64).reshape(-1, 3)
@@ -286,21 +287,6 @@ class _OpenEdges:
             edge = which[sample[found]]
             first[rows[found]], second[rows[found]] = edges[edge, 0], edges[edge, 1]
         return first, second
-
-
-def _floats(values: NDArray[np.floating]) -> mi.Float:
-    """On the device, in memory of its own: how numpy aligns an array would become part of
-    compiled kernels.
-    """
-    held = mi.Float(np.asarray(values, dtype=np.float32).ravel()) + dr.opaque(mi.Float, 0)
-    dr.eval(held)
-    return held
-
-
-def _indices(values: NDArray[np.integer] | NDArray[np.bool_]) -> mi.UInt32:
-    held = mi.UInt32(np.asarray(values, dtype=np.uint32).ravel()) + dr.opaque(mi.UInt32, 0)
-    dr.eval(held)
-    return held
 
 
 def _hit(

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import drjit as dr
 import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
+from optisense.optics.arrays import floats
 from optisense.optics.cells import SurfaceCells, cell_at
 from optisense.optics.photons import GROUP_MASK, HALF_SHIFT, PhotonMap
 
@@ -49,12 +50,16 @@ class Scouts:
 
     def cells_of(self, cells: SurfaceCells) -> tuple[NDArray[np.integer], NDArray[np.bool_]]:
         """(n,) the cell that each landed in, and whether there is one."""
-        x, y, z = (mi.Float(np.ascontiguousarray(self.points[:, k])) for k in range(3))
-        # Copied: arrays handed over from numpy differ in alignment, and so would kernels.
-        point = mi.Point3f(x, y, z) + dr.opaque(mi.Float, 0)
+        point = mi.Point3f(*(floats(self.points[:, k]) for k in range(3)))
         cell, found = cell_at(cells, point, mi.Bool(True))
         dr.eval(cell, found)
         return np.asarray(cell), np.asarray(found)
+
+    def within(self, cells: SurfaceCells, where: NDArray[np.bool_]) -> Scouts:
+        """Those that landed in the cells that matter (cells,)."""
+        cell, found = self.cells_of(cells)
+        kept = found & where[cell]
+        return Scouts(*(getattr(self, field.name)[kept] for field in fields(self)))
 
     def landed(self, cells: SurfaceCells, groups: int) -> FloatArray:
         """(2, cells, groups) mW on each cell, by the two halves."""
@@ -63,16 +68,8 @@ class Scouts:
         power = np.bincount(rows[found], self.powers[found], 2 * cells.cells * groups)
         return np.asarray(power, dtype=np.float64).reshape(2, -1, groups)
 
-    def count(self, cells: SurfaceCells, where: NDArray[np.bool_]) -> int:
-        """How many landed in the cells that matter (cells,)."""
-        cell, found = self.cells_of(cells)
-        return int((found & where[cell]).sum())
-
-    def grazing_share(self, cells: SurfaceCells, where: NDArray[np.bool_]) -> float:
-        """The part of the flux across the light, over cells (cells,) that matter, which lands at a
-        cosine below `GRAZING`."""
-        cell, found = self.cells_of(cells)
-        counts = found & where[cell]
-        across = self.powers[counts] / np.maximum(self.cosines[counts], LEAST_CLEAR)
-        grazing = self.cosines[counts] < GRAZING
+    def grazing_share(self) -> float:
+        """The part of their flux across the light which lands at a cosine below `GRAZING`."""
+        across = self.powers / np.maximum(self.cosines, LEAST_CLEAR)
+        grazing = self.cosines < GRAZING
         return float(across[grazing].sum() / max(across.sum(), 1e-30))

@@ -14,6 +14,7 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
+from optisense.optics.arrays import floats
 from optisense.optics.cells import SurfaceCells, cell_at, plane_of
 from optisense.optics.ray_scene import Hit
 
@@ -42,7 +43,7 @@ def slab_above(cells: SurfaceCells) -> Slab:
     """The slab above a surface."""
     four = np.zeros((cells.cells, 4), dtype=np.float32)
     four[:, :3] = cells.centres
-    return Slab(cells, mi.Float(four.ravel()) + dr.opaque(mi.Float, 0))
+    return Slab(cells, floats(four))
 
 
 def above_cell(

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_matrix
 from scipy.spatial import cKDTree
 
+from optisense.optics.arrays import floats, indices
 from optisense.optics.cells import SurfaceCells
 
 FloatArray = NDArray[np.floating]
@@ -117,9 +118,9 @@ class Kernels:
             matrix = kernel_matrix(self.cells, radii)
             self._known = {
                 key: Smoothing(
-                    start=_copied(mi.UInt32, matrix.indptr),
-                    cell=_copied(mi.UInt32, matrix.indices),
-                    weight=_copied(mi.Float, matrix.data),
+                    start=indices(matrix.indptr),
+                    cell=indices(matrix.indices),
+                    weight=floats(matrix.data),
                     matrix=matrix,
                     blur=matrix if metallic else self._blur(radii),
                 )
@@ -191,12 +192,6 @@ def kernel_matrix(cells: SurfaceCells, radii: FloatArray) -> csr_matrix:
     rows, columns, weight = rows[kept], columns[kept], weight[kept]
     weight /= np.bincount(rows, weight * cells.areas[columns], cells.cells)[rows]
     return csr_matrix((weight, (rows, columns)), shape=(cells.cells, cells.cells))
-
-
-def _copied(kind: Any, values: FloatArray | NDArray[np.integer]) -> Any:
-    """Values on the device: arrays handed over from numpy differ in alignment, and so would
-    kernels."""
-    return kind(values.astype(np.float32 if kind is mi.Float else np.uint32)) + dr.opaque(kind, 0)
 
 
 @dr.syntax
