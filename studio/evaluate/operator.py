@@ -7,7 +7,6 @@ from typing import Any
 import bpy
 from bpy.props import StringProperty
 
-from ..core.engine import EngineError
 from ..core.numbers import shown_number
 from ..engine import catalogue, handing, polls, session
 from ..scene.paths import objective
@@ -62,11 +61,8 @@ class OPTISENSE_OT_evaluate(bpy.types.Operator):
         return self._start(context, wait=True)
 
     def _start(self, context: bpy.types.Context, *, wait: bool) -> set[str]:
-        try:
-            design = handing.design(context.scene)
-        except EngineError as error:
-            session.say(error)
-            self.report({"ERROR"}, error.text())
+        design = handing.design_for(self, context.scene)
+        if design is None:
             return {"CANCELLED"}
         done = session.start_job(
             "Evaluating",
@@ -164,11 +160,8 @@ class OPTISENSE_OT_show_rays(bpy.types.Operator):
                 bpy.context.window_manager.optisense_evaluation.rays = text
                 session.push_undo("Chief rays")
 
-        try:
-            design = handing.design(context.scene)
-        except EngineError as error:
-            session.say(error)
-            self.report({"ERROR"}, error.text())
+        design = handing.design_for(self, context.scene)
+        if design is None:
             return {"CANCELLED"}
         done = session.start_job(
             "Tracing rays",

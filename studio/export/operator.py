@@ -7,7 +7,6 @@ from typing import Any
 import bpy
 from bpy.props import BoolProperty, StringProperty
 
-from ..core.engine import EngineError
 from ..engine import handing, polls, session
 from ..scene.paths import chosen, suggested
 
@@ -98,11 +97,8 @@ class OPTISENSE_OT_export(bpy.types.Operator):
             session.state().note = f"{len(result['files'])} files in {folder}"
             session.state().written = folder
 
-        try:
-            design = handing.design(context.scene)
-        except EngineError as error:
-            session.say(error)
-            self.report({"ERROR"}, error.text())
+        design = handing.design_for(self, context.scene)
+        if design is None:
             return {"CANCELLED"}
         done = session.start_job(
             "Writing",

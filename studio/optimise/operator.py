@@ -140,11 +140,8 @@ class OPTISENSE_OT_search(bpy.types.Operator):
                 return {"CANCELLED"}
             study = search.study = str(new_study(Path(context.scene.optisense.folder)))
             session.push_undo("Search")  # so that Blender asks to save the file that names it
-        try:
-            design = handing.design(context.scene)
-        except EngineError as error:
-            session.say(error)
-            self.report({"ERROR"}, error.text())
+        design = handing.design_for(self, context.scene)
+        if design is None:
             return {"CANCELLED"}
         following.begin()
         fields: dict[str, Any] = {"budget": search.budget} if search.budget else {}

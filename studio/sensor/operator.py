@@ -189,11 +189,8 @@ class OPTISENSE_OT_check(bpy.types.Operator):
             worst = next((p for p in problems if p["severity"] == "error"), problems[0])
             session.say(EngineError({"kind": "DesignError", **worst}))
 
-        try:
-            design = handing.design(context.scene)
-        except EngineError as error:
-            session.say(error)
-            self.report({"ERROR"}, error.text())
+        design = handing.design_for(self, context.scene)
+        if design is None:
             return {"CANCELLED"}
         session.start_job("Checking", "check", checked, wait=bpy.app.background, design=design)
         return {"FINISHED"}

@@ -208,11 +208,8 @@ class OPTISENSE_OT_nine_contacts(bpy.types.Operator):
 
         # Any shape finds the same places; that of a ball is always known.
         ball = {"kind": "sphere", "radius": 1.5}
-        try:
-            design = handing.design(context.scene)
-        except EngineError as error:
-            session.say(error)
-            self.report({"ERROR"}, error.text())
+        design = handing.design_for(self, context.scene)
+        if design is None:
             return {"CANCELLED"}
         done = session.start_job(
             "Finding nine places",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from typing import Any
 
 from .desktop import Desktop
@@ -25,24 +26,24 @@ TRIES = 5
 """To close all panels: a key may come later than the click that it belongs to."""
 
 
-class Sidebar:
+class Sidebar(ABC):
     """The part of a bench that is about the sidebar of its 3D view."""
 
     desktop: Desktop
     _last = 0
     """How far down the button is that was found last."""
 
+    @abstractmethod
     def see(self, expression: str) -> Any:
         """What Blender holds."""
-        raise NotImplementedError
 
+    @abstractmethod
     def until(self, expression: str) -> Any:
         """Wait until an expression is true."""
-        raise NotImplementedError
 
+    @abstractmethod
     def drawn(self) -> None:
         """Wait until all that changed is drawn."""
-        raise NotImplementedError
 
     def sidebar(self) -> tuple[int, int, int, int]:
         """Left, top, width and height of its part with buttons, in pixels."""
