@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import hashlib
-import importlib.util
 import sys
 import traceback
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 from optisense.errors import ObjectiveError
@@ -15,6 +15,10 @@ from optisense.errors import ObjectiveError
 def run_file(path: Path) -> dict[str, Any]:
     """Run a Python file as a module of its own and return the names it defines.
 
+    The text of the file is compiled each time. Python's import system would take compiled code
+    from ``__pycache__`` if the file has the same size and the same second of change as before,
+    and so miss a quick edit; it would also write that folder beside the user's file.
+
     Raises:
         ObjectiveError: it is missing or fails; names the line that failed.
     """
@@ -22,13 +26,17 @@ def run_file(path: Path) -> dict[str, Any]:
         raise ObjectiveError(f"there is no file '{path}'", hint="Give FILE.py:FUNCTION")
     whole = path.resolve()
     name = f"optisense_user_{path.stem}_{hashlib.sha256(str(whole).encode()).hexdigest()[:8]}"
-    spec = importlib.util.spec_from_file_location(name, whole)
-    if spec is None or spec.loader is None:
-        raise ObjectiveError("the file is not a Python file", where=str(path))
-    module = importlib.util.module_from_spec(spec)
+    try:
+        source = whole.read_bytes()
+    except OSError as error:
+        raise ObjectiveError(
+            f"the file can't be read: {error.strerror}", where=str(path)
+        ) from error
+    module = ModuleType(name)
+    module.__file__ = str(whole)
     sys.modules[name] = module
     try:
-        spec.loader.exec_module(module)
+        exec(compile(source, str(whole), "exec", dont_inherit=True), vars(module))
     except ObjectiveError:
         raise
     except SyntaxError as error:

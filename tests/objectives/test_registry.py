@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -72,10 +73,18 @@ def test_a_function_of_a_file_can_be_named(own_file: Path) -> None:
     assert find(f"{own_file}:plain").name == "plain"
 
 
-def test_a_file_may_be_loaded_again(own_file: Path) -> None:
-    find(str(own_file))
+def test_an_edited_file_is_read_again_even_at_the_same_time_and_size(
+    own_file: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Python's compiled files tell an edit by these two alone; and no folder is left behind."""
+    monkeypatch.setattr("sys.dont_write_bytecode", False)
+    before = own_file.stat()
+    assert find(str(own_file)).settings == {"factor": 2.0}
     own_file.write_text(OWN.replace("factor=2.0", "factor=3.0"))
+    os.utime(own_file, ns=(before.st_atime_ns, before.st_mtime_ns))
+    assert own_file.stat().st_size == before.st_size
     assert find(str(own_file)).settings == {"factor": 3.0}
+    assert list(own_file.parent.iterdir()) == [own_file]
 
 
 @pytest.mark.parametrize(

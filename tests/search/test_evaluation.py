@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 import pickle
 from pathlib import Path
 
@@ -129,6 +130,17 @@ class TestConstraints:
             UserRule(f"{file}:dear")(mini)
         with pytest.raises(SearchError, match="names no rule"):
             UserRule("rules.py")
+
+    def test_an_edited_rule_is_read_again_even_at_the_same_time_and_size(
+        self, mini: SensorDesign, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        monkeypatch.setattr("sys.dont_write_bytecode", False)
+        file = tmp_path / "rules.py"
+        for answer in ("'one'", "'two'"):
+            file.write_text(f"def rule(design):\n    return {answer}\n")
+            os.utime(file, (1e9, 1e9))
+            assert f"'{why_forbidden(mini, [UserRule(f'{file}:rule')])}'" == answer
+        assert list(tmp_path.iterdir()) == [file]
 
     def test_what_rules_say(self, mini: SensorDesign) -> None:
         def said(answer: object) -> str | None:
