@@ -41,7 +41,7 @@ class Case:
     @cached_property
     def mask(self) -> NDArray[np.bool_]:
         """(h, w): pixels whose middle sees the ball."""
-        from optisense.optics.surfaces import Region
+        from optisense.optics.scene.surfaces import Region
 
         rays = self.model.chief_rays(RESOLUTION, [ball()])
         seen: NDArray[np.bool_] = rays.hit & (rays.region == Region.INDENTER)

@@ -10,10 +10,10 @@ import numpy as np
 
 from benchmarks.case import RESOLUTION, Case, ball
 from benchmarks.snapshots import Snapshot, due_times
-from optisense.optics import assembly
 from optisense.optics.mitsuba_export import mitsuba_scene
-from optisense.optics.ray_scene import Piece
-from optisense.optics.surfaces import Region
+from optisense.optics.scene import assembly
+from optisense.optics.scene.ray_scene import Piece
+from optisense.optics.scene.surfaces import Region
 
 PASS_SAMPLES = 16
 DEPTH = 32

@@ -13,8 +13,8 @@ import numpy as np
 
 from benchmarks.case import Case
 from benchmarks.timing import timed
-from optisense.optics import photons as photon_pass
-from optisense.optics.photons import trace_photons
+from optisense.optics.transport import photons as photon_pass
+from optisense.optics.transport.photons import trace_photons
 
 PHOTONS = 1_000_000
 PURE_RAYS = 4_000_000

@@ -22,8 +22,8 @@ from numpy.typing import NDArray
 
 from benchmarks.case import CONTACT_TEXT, DESIGN, RESOLUTION, Case, FloatArray, ball
 from optisense.design import SensorDesign
-from optisense.optics.camera import RayCamera
-from optisense.optics.sppm import render_sppm
+from optisense.optics.camera.projection import RayCamera
+from optisense.optics.imaging.sppm import render_sppm
 
 CACHE = Path(__file__).parent / ".cache"
 SEEDS = 6

@@ -74,8 +74,8 @@ renderer_loads() {
     "$venv/bin/python" - "$@" <<'EOF'
 import sys
 from optisense.errors import OptiSenseError
-from optisense.optics.llvm import find_llvm
-from optisense.optics.variant import import_renderer
+from optisense.optics.backend.llvm import find_llvm
+from optisense.optics.backend.variant import import_renderer
 try:
     library = find_llvm()
     import_renderer("mitsuba")

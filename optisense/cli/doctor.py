@@ -87,7 +87,7 @@ def _renderer() -> Finding:
 
 
 def _llvm() -> Finding:
-    from optisense.optics.llvm import find_llvm
+    from optisense.optics.backend.llvm import find_llvm
 
     try:
         return Finding("libLLVM", "good", str(find_llvm()))
@@ -96,7 +96,7 @@ def _llvm() -> Finding:
 
 
 def _gpu() -> Finding:
-    from optisense.optics.variant import cuda_device_found
+    from optisense.optics.backend.variant import cuda_device_found
 
     try:
         found = cuda_device_found()
@@ -108,7 +108,7 @@ def _gpu() -> Finding:
 
 
 def _kernel() -> Finding:
-    from optisense.optics.variant import run_test_kernel
+    from optisense.optics.backend.variant import run_test_kernel
 
     test = run_test_kernel()
     if test.passed:

@@ -295,7 +295,7 @@ def _teller(job: Job) -> Callable[[Progress], None]:
 
 def _exposure(image: TactileImage, given: float | Literal["auto", "same"]) -> float:
     if isinstance(given, str):
-        from optisense.optics.response import auto_exposure
+        from optisense.optics.camera.response import auto_exposure
 
         return auto_exposure(image.radiance)
     if not given > 0.0:

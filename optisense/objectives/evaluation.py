@@ -251,7 +251,7 @@ class Evaluation:
         Overexposure spreads as far as its blur reaches, so only what lies that near to a contact
         is worked out anew.
         """
-        from optisense.optics.response import BLUR_OF_WIDTH, saturate
+        from optisense.optics.camera.response import BLUR_OF_WIDTH, saturate
 
         exposure, untouched = np.float32(self.exposure), self._untouched_radiance
         response = self._once("untouched response", lambda: saturate(untouched * exposure)).copy()
@@ -329,7 +329,7 @@ def exposure_for(untouched: NDArray[np.float32], contacts: Iterable[NDArray[np.f
         untouched: (h, w, 3) radiance.
         contacts: (n, 3) radiance of the pixels of each contact.
     """
-    from optisense.optics.response import KNEE, auto_exposure
+    from optisense.optics.camera.response import KNEE, auto_exposure
 
     exposure = auto_exposure(untouched)
     for radiance in contacts:

@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from optisense.errors import ObjectiveError
 from optisense.objectives.evaluation import Evaluation, exposure_for
 from optisense.objectives.press import Press
-from optisense.optics.response import BLUR_OF_WIDTH, KNEE, saturate
+from optisense.optics.camera.response import BLUR_OF_WIDTH, KNEE, saturate
 
 if TYPE_CHECKING:
     from optisense.design import SensorDesign

@@ -10,23 +10,23 @@ from typing import TYPE_CHECKING
 from optisense.lazy_names import load_on_first_use
 
 if TYPE_CHECKING:
-    from optisense.optics.chief_rays import ChiefRays, Outcome
-    from optisense.optics.image import TactileImage
+    from optisense.optics.imaging.tactile_image import TactileImage
     from optisense.optics.model import OpticalModel, Progress
+    from optisense.optics.transport.chief_rays import ChiefRays, Outcome
 
 _HOMES = {
-    "ChiefRays": ".chief_rays",
+    "ChiefRays": ".transport.chief_rays",
     "OpticalModel": ".model",
-    "Outcome": ".chief_rays",
+    "Outcome": ".transport.chief_rays",
     "Progress": ".model",
-    "TactileImage": ".image",
+    "TactileImage": ".imaging.tactile_image",
 }
 
 __all__ = ["ChiefRays", "OpticalModel", "Outcome", "Progress", "TactileImage"]
 
 
 def _check_llvm() -> None:
-    from optisense.optics.variant import select_variant
+    from optisense.optics.backend.variant import select_variant
 
     select_variant("auto")
 

@@ -19,12 +19,12 @@ from numpy.typing import NDArray
 from optisense.design import SensorDesign
 from optisense.geometry import Contact, SensingSurface, TriangleMesh
 from optisense.geometry.indenters import FACET_ERROR
-from optisense.optics.emitters import EmitterTable
-from optisense.optics.field_store import CELL_SIZE, SEEN_MARGIN, FieldStore
-from optisense.optics.image import TactileImage
+from optisense.optics.imaging.tactile_image import TactileImage
 from optisense.optics.model import OpticalModel
-from optisense.optics.ray_scene import Piece, RayScene
-from optisense.optics.surfaces import SurfaceKind
+from optisense.optics.radiance_cache.store import CELL_SIZE, SEEN_MARGIN, FieldStore
+from optisense.optics.scene.emitters import EmitterTable
+from optisense.optics.scene.ray_scene import Piece, RayScene
+from optisense.optics.scene.surfaces import SurfaceKind
 
 COARSER = 2.4
 """How much larger the cells of a draft are along a side. Of as few photons as a draft has, wider

@@ -15,11 +15,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from optisense.errors import RenderError
-from optisense.optics.camera import RayCamera
-from optisense.optics.emitters import Emitter, Shape
-from optisense.optics.ray_scene import Piece
-from optisense.optics.scattering import SMOOTH_ALPHA
-from optisense.optics.surfaces import Surface, SurfaceKind
+from optisense.optics.camera.projection import RayCamera
+from optisense.optics.scene.bsdf import SMOOTH_ALPHA
+from optisense.optics.scene.emitters import Emitter, Shape
+from optisense.optics.scene.ray_scene import Piece
+from optisense.optics.scene.surfaces import Surface, SurfaceKind
 
 Colour = tuple[float, float, float]
 

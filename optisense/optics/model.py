@@ -14,17 +14,17 @@ import numpy as np
 
 from optisense.errors import RenderError
 from optisense.geometry import Contact
-from optisense.optics.camera import RayCamera
-from optisense.optics.chief_rays import ChiefRays, sees_nothing, trace_chief_rays
-from optisense.optics.field_store import FieldStore
-from optisense.optics.guide import Guide
-from optisense.optics.image import TactileImage
-from optisense.optics.imaging import Careful, ImageLayers, render_field
-from optisense.optics.interrupts import lets_ctrl_c_through
+from optisense.optics.backend.interrupts import lets_ctrl_c_through
+from optisense.optics.backend.versions import versions
+from optisense.optics.camera.projection import RayCamera
+from optisense.optics.imaging.cached import Careful, ImageLayers, render_field
+from optisense.optics.imaging.tactile_image import TactileImage
+from optisense.optics.radiance_cache.store import FieldStore
 from optisense.optics.ray_model import RayModel
-from optisense.optics.shading import ContactScenes
-from optisense.optics.surfaces import SurfaceKind
-from optisense.optics.versions import versions
+from optisense.optics.scene.contact_scenes import ContactScenes
+from optisense.optics.scene.surfaces import SurfaceKind
+from optisense.optics.transport.chief_rays import ChiefRays, sees_nothing, trace_chief_rays
+from optisense.optics.transport.emission_guide import Guide
 
 DEFAULT_PHOTONS = 5_000_000
 """Photons of a light field where nothing else is asked; it is kept for the next image."""
@@ -215,7 +215,7 @@ class OpticalModel(RayModel):
         began: float,
         tell: Callable[[float, int, float | None], None],
     ) -> ImageLayers:
-        from optisense.optics.sppm import render_sppm
+        from optisense.optics.imaging.sppm import render_sppm
 
         per_light = max(1, SPPM_PASS // self._emitter_table.count)
         emitted = per_light * self._emitter_table.count

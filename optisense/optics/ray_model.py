@@ -21,18 +21,23 @@ from optisense.geometry import (
     nine_places,
 )
 from optisense.geometry.indenters import FACET_ERROR
-from optisense.optics.assembly import Assembly, assemble, coating_surface, indenter_piece
-from optisense.optics.camera import RayCamera
-from optisense.optics.chief_rays import ChiefRays, pixel_areas, sees_nothing, trace_chief_rays
-from optisense.optics.emitters import EmitterTable, emitter_table
-from optisense.optics.interrupts import lets_ctrl_c_through
-from optisense.optics.ray_scene import Piece, RayScene
-from optisense.optics.scattering import surface_table
-from optisense.optics.shading import ContactScenes
-from optisense.optics.surfaces import Region, Surface, SurfaceKind
+from optisense.optics.backend.interrupts import lets_ctrl_c_through
+from optisense.optics.camera.projection import RayCamera
+from optisense.optics.scene.assembly import Assembly, assemble, coating_surface, indenter_piece
+from optisense.optics.scene.bsdf import surface_table
+from optisense.optics.scene.contact_scenes import ContactScenes
+from optisense.optics.scene.emitters import EmitterTable, emitter_table
+from optisense.optics.scene.ray_scene import Piece, RayScene
+from optisense.optics.scene.surfaces import Region, Surface, SurfaceKind
+from optisense.optics.transport.chief_rays import (
+    ChiefRays,
+    pixel_areas,
+    sees_nothing,
+    trace_chief_rays,
+)
 
 if TYPE_CHECKING:
-    from optisense.optics.ray_gradient import DifferentiableRays
+    from optisense.optics.transport.ray_gradient import DifferentiableRays
 
 
 class RayModel:
@@ -59,7 +64,7 @@ class RayModel:
             SetupError: the variant is not to be had on this machine.
             DesignError, MeshError, LibraryError: the design can't be built.
         """
-        from optisense.optics.variant import use_variant
+        from optisense.optics.backend.variant import use_variant
 
         self.variant = use_variant(variant)
         self.design = design.copy()
@@ -243,7 +248,7 @@ class RayModel:
         Raises:
             RenderError: no ray arrives, or a moving part is no such surface.
         """
-        from optisense.optics.ray_gradient import DifferentiableRays
+        from optisense.optics.transport.ray_gradient import DifferentiableRays
 
         meshes = self.design.deformed_meshes()
         chosen = {name: meshes[name] for name in moving}

@@ -12,10 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from optisense.geometry import Contact
-from optisense.optics.chief_rays import MAX_DEPTH, Outcome
-from optisense.optics.ray_scene import RayScene, intersect, leave
-from optisense.optics.scattering import refract, surface_kind, surface_region
-from optisense.optics.surfaces import Region, SurfaceKind
+from optisense.optics.scene.bsdf import refract, surface_kind, surface_region
+from optisense.optics.scene.ray_scene import RayScene, intersect, leave
+from optisense.optics.scene.surfaces import Region, SurfaceKind
+from optisense.optics.transport.chief_rays import MAX_DEPTH, Outcome
 
 if TYPE_CHECKING:
     from optisense.optics.model import OpticalModel
@@ -89,7 +89,7 @@ def trace_paths(
 
 def _step(scene: RayScene, origin: Any, direction: Any, active: Any) -> tuple[Any, ...]:
     """One surface further: where it is met, the outcome or -1, whether all light was reflected,
-    and the ray that goes on; by the rules of `optisense.optics.chief_rays`.
+    and the ray that goes on; by the rules of `optisense.optics.transport.chief_rays`.
     """
     hit = intersect(scene.scene, scene.rows, scene.corners, origin, direction, active, True)
     kind, eta, _alpha = surface_kind(scene.table, hit.surface, hit.valid)

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from optisense import __version__
 from optisense.design import LightGroup, SensorDesign
 from optisense.geometry import Contact, TriangleMesh
-from optisense.optics.response import auto_exposure, encode
+from optisense.optics.camera.response import auto_exposure, encode
 from optisense.report import tables
 from optisense.report.files import template
 from optisense.report.pictures import data_uri, mask_overlay, normal_colours

@@ -96,7 +96,7 @@ class CalibratedSensor:
         tell: Callable[[int], None] = lambda done: None,
     ) -> None:
         """Press the balls and fit the reader. tell: called with the number of balls pressed."""
-        from optisense.optics.response import auto_exposure
+        from optisense.optics.camera.response import auto_exposure
 
         self._model = model
         self._settings = settings

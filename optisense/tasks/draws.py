@@ -97,7 +97,7 @@ class Places:
     @classmethod
     def of(cls, model: OpticalModel) -> Places:
         """The places that a model's camera sees."""
-        from optisense.optics.chief_rays import pixel_areas
+        from optisense.optics.transport.chief_rays import pixel_areas
 
         rays = model.chief_rays(PLACES_SEEN)
         return cls(rays, pixel_areas(rays))

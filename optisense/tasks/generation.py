@@ -203,7 +203,7 @@ class _Maker:
         )
         if image.interrupted:
             raise KeyboardInterrupt
-        from optisense.optics.response import auto_exposure
+        from optisense.optics.camera.response import auto_exposure
 
         asked = self._settings.exposure
         exposure = float(auto_exposure(image.radiance) if asked == "auto" else asked)
@@ -230,7 +230,7 @@ class _Maker:
 
     def _common(self) -> dict[str, Any]:
         """What all samples share and a continued dataset must agree with."""
-        from optisense.optics.versions import versions
+        from optisense.optics.backend.versions import versions
 
         values = asdict(self._settings)
         values["resolution"] = self._resolution

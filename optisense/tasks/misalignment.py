@@ -91,7 +91,7 @@ class Misalignment:
             ContactError: the plane would go through the gel.
             TaskError: it would not cover the crop.
         """
-        from optisense.optics.surfaces import Region
+        from optisense.optics.scene.surfaces import Region
 
         for angle_x in (-self.range, self.range):
             for angle_y in (-self.range, self.range):

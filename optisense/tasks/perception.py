@@ -239,7 +239,7 @@ class _Camera:
     """Takes the pictures of one task with a fixed exposure."""
 
     def __init__(self, task: PerceptionTask, model: OpticalModel, settings: SampleSettings) -> None:
-        from optisense.optics.response import auto_exposure
+        from optisense.optics.camera.response import auto_exposure
 
         self._task = task
         self._model = model

@@ -30,7 +30,7 @@ def test_a_spot_is_full_in_its_beam_half_midway_and_dark_beyond() -> None:
 
 
 def test_the_spot_is_the_one_that_the_simulation_emits() -> None:
-    from optisense.optics.emitters import spot_intensity
+    from optisense.optics.scene.emitters import spot_intensity
 
     angles = np.linspace(0.0, 60.0, 241)
     emitted = spot_intensity(40.0, 20.0).at(angles, np.zeros_like(angles))

@@ -54,12 +54,12 @@ class TestReflection:
 
     def test_metals_reflect_as_in_the_simulation(self) -> None:
         """Two ways of writing the same law: complex numbers here, real ones there."""
-        from optisense.optics.variant import use_variant
+        from optisense.optics.backend.variant import use_variant
 
         use_variant("auto")
         import mitsuba as mi
 
-        from optisense.optics.scattering import fresnel_metal as traced
+        from optisense.optics.scene.bsdf import fresnel_metal as traced
 
         eta, k = (1.43, 0.922, 0.686), (7.508, 6.373, 5.635)
         for cosine in (0.05, 0.4, 0.9, 1.0):
@@ -168,12 +168,12 @@ class TestCameras:
 
     @pytest.mark.parametrize("name", ["pi-v1", "ov5647-fisheye-160"])
     def test_borders_are_those_of_the_simulated_camera(self, name: str) -> None:
-        from optisense.optics.variant import use_variant
+        from optisense.optics.backend.variant import use_variant
 
         use_variant("auto")
         import mitsuba as mi
 
-        from optisense.optics.camera import RayCamera
+        from optisense.optics.camera.projection import RayCamera
 
         camera = library.camera(name)
         rays = RayCamera(

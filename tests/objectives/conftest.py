@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from optisense.objectives import Press
-from optisense.optics.variant import use_variant
+from optisense.optics.backend.variant import use_variant
 
 # Before any test module imports what needs a variant.
 use_variant(os.environ.get("OPTISENSE_TEST_VARIANT", "llvm"))

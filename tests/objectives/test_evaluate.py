@@ -20,7 +20,7 @@ from optisense.objectives.evaluation import MOST_SATURATED, exposure_for
 from optisense.objectives.normdiff import CROWD, indented_pixels
 from optisense.objectives.registry import find, pixels_read
 from optisense.objectives.rgb2normal import lines_of
-from optisense.optics.response import auto_exposure, saturate
+from optisense.optics.camera.response import auto_exposure, saturate
 
 SMALL: dict[str, Any] = {
     "resolution": (160, 120),

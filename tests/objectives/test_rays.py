@@ -13,10 +13,10 @@ from optisense.geometry import TriangleMesh
 from optisense.objectives import Evaluation
 from optisense.objectives.aoap import aoap
 from optisense.objectives.projection_warping import projection_warping, triangle_areas
-from optisense.optics.camera import RayCamera
-from optisense.optics.chief_rays import ChiefRays, Outcome, trace_chief_rays
-from optisense.optics.ray_scene import Piece, RayScene
-from optisense.optics.surfaces import Region, Surface, SurfaceKind
+from optisense.optics.camera.projection import RayCamera
+from optisense.optics.scene.ray_scene import Piece, RayScene
+from optisense.optics.scene.surfaces import Region, Surface, SurfaceKind
+from optisense.optics.transport.chief_rays import ChiefRays, Outcome, trace_chief_rays
 
 DISTANCE, FOV = 10.0, 60.0
 SLOPE = np.tan(np.radians(FOV) / 2)

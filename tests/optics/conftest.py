@@ -6,7 +6,7 @@ import os
 import sys
 from pathlib import Path
 
-from optisense.optics.variant import use_variant
+from optisense.optics.backend.variant import use_variant
 
 # Before any test module imports what needs a variant.
 use_variant(os.environ.get("OPTISENSE_TEST_VARIANT", "llvm"))

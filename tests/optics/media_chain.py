@@ -13,7 +13,7 @@ import numpy as np
 
 from optisense.geometry import TriangleMesh
 from optisense.geometry.rays import ray_hits
-from optisense.optics.media import Interface
+from optisense.optics.scene.media import Interface
 
 GEL, ACRYLIC = 1.41, 1.49
 

@@ -11,17 +11,17 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from optisense.optics.camera import RayCamera
-from optisense.optics.chief_rays import ChiefRays, trace_chief_rays
-from optisense.optics.emitters import Emitter, EmitterTable, Intensity, Shape, emitter_table
-from optisense.optics.field_store import FieldStore
-from optisense.optics.guide import even_guide
-from optisense.optics.imaging import render_field
+from optisense.optics.camera.projection import RayCamera
+from optisense.optics.imaging.cached import render_field
+from optisense.optics.imaging.sppm import render_sppm
 from optisense.optics.mitsuba_export import PATH_DEPTH, Colour, mitsuba_scene
-from optisense.optics.ray_scene import Piece, RayScene
-from optisense.optics.shading import ContactScenes
-from optisense.optics.sppm import render_sppm
-from optisense.optics.surfaces import Region, Surface, SurfaceKind
+from optisense.optics.radiance_cache.store import FieldStore
+from optisense.optics.scene.contact_scenes import ContactScenes
+from optisense.optics.scene.emitters import Emitter, EmitterTable, Intensity, Shape, emitter_table
+from optisense.optics.scene.ray_scene import Piece, RayScene
+from optisense.optics.scene.surfaces import Region, Surface, SurfaceKind
+from optisense.optics.transport.chief_rays import ChiefRays, trace_chief_rays
+from optisense.optics.transport.emission_guide import even_guide
 
 FloatArray = NDArray[np.floating]
 

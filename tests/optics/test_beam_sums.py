@@ -9,8 +9,8 @@ from scipy import ndimage
 
 from optisense import OpticalModel
 from optisense.geometry import Contact, Sphere
-from optisense.optics import beams, shading
-from optisense.optics.spread import skyline
+from optisense.optics.radiance_cache import beams, shading
+from optisense.optics.radiance_cache.angular_variance import skyline
 from optisense.sensors import BUILDERS
 
 BALL = Contact(Sphere(radius=1.5), at=(0.0, 0.0), depth=0.8)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from optisense import OpticalModel
-from optisense.optics import beams
+from optisense.optics.radiance_cache import beams
 from optisense.sensors import BUILDERS
 
 MEAN = 0.001

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from optisense.optics.variant import use_variant
+from optisense.optics.backend.variant import use_variant
 
 RADIUS = 6.0
 SIZE = 0.5
@@ -41,7 +41,7 @@ def rings(sectors: int, count: int) -> tuple[np.ndarray, np.ndarray]:
 @pytest.mark.parametrize("mesh", [fan(400), rings(90, 40)], ids=["fan", "rings"])
 def test_areas_are_true_where_many_thin_faces_meet(mesh: tuple[np.ndarray, np.ndarray]) -> None:
     use_variant("llvm")
-    from optisense.optics.cells import build_cells
+    from optisense.optics.scene.surface_cells import build_cells
 
     cells = build_cells(*mesh, SIZE)
     assert cells.areas.sum() == pytest.approx(np.pi * RADIUS**2, rel=1e-3)

@@ -7,10 +7,10 @@ import pytest
 from reference_scenes import box, diffuse_coating, quad
 
 from optisense import OpticalModel
-from optisense.optics.camera import RayCamera
-from optisense.optics.chief_rays import ChiefRays, Outcome, trace_chief_rays
-from optisense.optics.ray_scene import Piece, RayScene
-from optisense.optics.surfaces import Surface, SurfaceKind
+from optisense.optics.camera.projection import RayCamera
+from optisense.optics.scene.ray_scene import Piece, RayScene
+from optisense.optics.scene.surfaces import Surface, SurfaceKind
+from optisense.optics.transport.chief_rays import ChiefRays, Outcome, trace_chief_rays
 from optisense.sensors import gelbelt
 
 # Single precision over some 10 mm, and rays that start RAY_OFFSET (0.0002 mm) off each surface.

@@ -15,13 +15,13 @@ from reference_scenes import (
     quad,
 )
 
-from optisense.optics.camera import RayCamera
-from optisense.optics.emitters import Emitter, Intensity, Shape
-from optisense.optics.guide import even_guide
-from optisense.optics.photons import SURFACE_SHIFT, trace_photons
-from optisense.optics.ray_scene import Piece, RayScene
-from optisense.optics.surfaces import Surface, SurfaceKind
-from optisense.optics.visible_points import find_visible_points
+from optisense.optics.camera.projection import RayCamera
+from optisense.optics.scene.emitters import Emitter, Intensity, Shape
+from optisense.optics.scene.ray_scene import Piece, RayScene
+from optisense.optics.scene.surfaces import Surface, SurfaceKind
+from optisense.optics.transport.camera_paths import find_visible_points
+from optisense.optics.transport.emission_guide import even_guide
+from optisense.optics.transport.photons import SURFACE_SHIFT, trace_photons
 
 PHOTONS = 400_000
 POWER = 1000.0

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from reference_scenes import ReferenceScene, diffuse_coating, isotropic, quad
 
-from optisense.optics.camera import RayCamera
-from optisense.optics.emitters import Emitter, Shape
-from optisense.optics.guide import even_guide
-from optisense.optics.sppm import render_sppm
+from optisense.optics.camera.projection import RayCamera
+from optisense.optics.imaging.sppm import render_sppm
+from optisense.optics.scene.emitters import Emitter, Shape
+from optisense.optics.transport.emission_guide import even_guide
 
 SLOPE = (-0.85, -0.42)
 """Of log error over log photons at a fixed radius: -1/2 for random points, steeper for evenly

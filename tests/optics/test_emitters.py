@@ -13,7 +13,8 @@ from scipy import stats
 
 import optisense.library
 from optisense.library.ies import read_ies
-from optisense.optics.emitters import (
+from optisense.optics.backend.sequences import sequence_4d
+from optisense.optics.scene.emitters import (
     Emitter,
     EmitterTable,
     Intensity,
@@ -22,9 +23,14 @@ from optisense.optics.emitters import (
     emitter_table,
     spot_intensity,
 )
-from optisense.optics.guide import CELLS, FLOOR, even_guide, guide_from_density, warp
-from optisense.optics.sampling import sequence_4d
-from optisense.optics.surfaces import RAY_OFFSET
+from optisense.optics.scene.surfaces import RAY_OFFSET
+from optisense.optics.transport.emission_guide import (
+    CELLS,
+    FLOOR,
+    even_guide,
+    guide_from_density,
+    warp,
+)
 
 SIGNIFICANCE = 0.001
 """Seeds are fixed: a right sampler that happened to fail would fail always, and be seen once."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from optisense import Contact, OpticalModel, Plane
-from optisense.optics import imaging
+from optisense.optics.imaging.cached import cached as imaging
 from optisense.sensors import BUILDERS
 
 

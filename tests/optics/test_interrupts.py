@@ -7,8 +7,9 @@ import mitsuba as mi
 import pytest
 
 from optisense import OpticalModel, load
-from optisense.optics import photons, visible_points
-from optisense.optics.interrupts import lets_ctrl_c_through
+from optisense.optics.backend.interrupts import lets_ctrl_c_through
+from optisense.optics.transport import camera_paths as visible_points
+from optisense.optics.transport import photons
 
 
 @pytest.mark.parametrize(

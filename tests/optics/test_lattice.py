@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from optisense import Contact, OpticalModel, Sphere
-from optisense.optics import imaging
-from optisense.optics.chief_rays import ChiefRays
-from optisense.optics.lattice import agreed, between_rays, fill
+from optisense.optics.imaging.cached import cached as imaging
+from optisense.optics.imaging.pixel_interpolation import agreed, between_rays, fill
+from optisense.optics.transport.chief_rays import ChiefRays
 from optisense.sensors import BUILDERS
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from optisense.errors import SetupError
-from optisense.optics import llvm
+from optisense.optics.backend import llvm
 
 
 @pytest.fixture(autouse=True)

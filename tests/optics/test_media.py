@@ -7,7 +7,7 @@ from media_chain import ACRYLIC, GEL, area, ball, box, check_chain, in_box, pair
 from optisense.errors import DesignError, MeshError
 from optisense.geometry import TriangleMesh
 from optisense.geometry.rays import ray_hits
-from optisense.optics.media import Solid, resolve_media
+from optisense.optics.scene.media import Solid, resolve_media
 
 
 def test_a_single_solid_lies_in_air() -> None:

@@ -9,7 +9,7 @@ import pytest
 from media_chain import ACRYLIC, GEL, area, box
 
 from optisense.geometry import TriangleMesh
-from optisense.optics.media import Media, Sheet, Solid
+from optisense.optics.scene.media import Media, Sheet, Solid
 
 SIZE = (8, 8, 2)
 GUIDE = Solid("guide", box((-3, -2, -2), (3, 2, 0), (4, 3, 2)), "acrylic", ACRYLIC)

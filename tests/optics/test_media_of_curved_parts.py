@@ -8,7 +8,7 @@ from media_chain import ACRYLIC, GEL, area, box, check_chain, in_box
 
 from optisense.geometry import TriangleMesh
 from optisense.geometry.rays import ray_hits
-from optisense.optics.media import Media, Sheet, Solid, resolve_media
+from optisense.optics.scene.media import Media, Sheet, Solid, resolve_media
 
 
 def dome(radius: float, rings: int, sectors: int, floor: float) -> TriangleMesh:

@@ -11,7 +11,7 @@ from optisense import Contact, OpticalModel, SensorDesign, Sphere
 from optisense.design import set_value
 from optisense.errors import LibraryError, RenderError
 from optisense.optics import TactileImage
-from optisense.optics.light_field import SECTORS
+from optisense.optics.radiance_cache.cache import SECTORS
 from optisense.sensors import BUILDERS
 
 PIXELS = (80, 60)

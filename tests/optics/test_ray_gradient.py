@@ -7,11 +7,11 @@ import pytest
 
 from optisense.errors import RenderError
 from optisense.geometry import TriangleMesh
-from optisense.optics.camera import RayCamera
-from optisense.optics.ray_gradient import DifferentiableRays
-from optisense.optics.ray_scene import Piece, RayScene
-from optisense.optics.surfaces import Region, Surface, SurfaceKind
-from optisense.optics.variant import use_variant
+from optisense.optics.backend.variant import use_variant
+from optisense.optics.camera.projection import RayCamera
+from optisense.optics.scene.ray_scene import Piece, RayScene
+from optisense.optics.scene.surfaces import Region, Surface, SurfaceKind
+from optisense.optics.transport.ray_gradient import DifferentiableRays
 
 FADE = 1.5
 STEP = 2e-3
@@ -162,7 +162,7 @@ def test_rays_weigh_less_near_open_edges_only() -> None:
 
 
 def test_cosines_and_points_are_those_of_the_chief_rays() -> None:
-    from optisense.optics.chief_rays import trace_chief_rays
+    from optisense.optics.transport.chief_rays import trace_chief_rays
 
     of = rays()
     traced = trace_chief_rays(of._scene, camera())

@@ -18,7 +18,7 @@ from reference_scenes import (
     referee_scene,
 )
 
-from optisense.optics.surfaces import Surface
+from optisense.optics.scene.surfaces import Surface
 
 NO_SLAB, SLAB, SLAB_POINT = 0.24287, 0.26653, 0.531
 """Agreed means: the first two Mitsuba's, the last halfway between pbrt's and LuxCore's."""

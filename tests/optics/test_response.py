@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from optisense.optics.image import TactileImage
-from optisense.optics.response import encode, picture, saturate, srgb_curve
+from optisense.optics.camera.response import encode, picture, saturate, srgb_curve
+from optisense.optics.imaging.tactile_image import TactileImage
 
 
 def test_eight_bits_are_the_transfer_curve_rounded() -> None:

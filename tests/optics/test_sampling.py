@@ -6,7 +6,7 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from optisense.optics.sampling import STEPS_OF_SERIES, in_series
+from optisense.optics.backend.sequences import STEPS_OF_SERIES, in_series
 
 SAMPLES = 64
 SERIES = 500

@@ -9,7 +9,7 @@ import pytest
 from scipy import stats
 
 from optisense.optics.mitsuba_export import surface_bsdf
-from optisense.optics.scattering import (
+from optisense.optics.scene.bsdf import (
     Coating,
     evaluate_coating,
     refract,
@@ -17,7 +17,7 @@ from optisense.optics.scattering import (
     sample_ggx,
     sample_rough_interface,
 )
-from optisense.optics.surfaces import Surface, SurfaceKind
+from optisense.optics.scene.surfaces import Surface, SurfaceKind
 
 SIGNIFICANCE = 0.001
 SAMPLES = 200_000

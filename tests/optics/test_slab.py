@@ -9,14 +9,14 @@ from numpy.typing import NDArray
 from reference_scenes import diffuse_coating, quad
 
 from optisense.geometry import Sphere
-from optisense.optics.camera import RayCamera
-from optisense.optics.chief_rays import trace_chief_rays
-from optisense.optics.emitters import Emitter, Shape, emitter_table
-from optisense.optics.field_store import FieldStore
-from optisense.optics.imaging import render_field
-from optisense.optics.ray_scene import Piece, RayScene
-from optisense.optics.shading import ContactScenes
-from optisense.optics.surfaces import Region, Surface
+from optisense.optics.camera.projection import RayCamera
+from optisense.optics.imaging.cached import render_field
+from optisense.optics.radiance_cache.store import FieldStore
+from optisense.optics.scene.contact_scenes import ContactScenes
+from optisense.optics.scene.emitters import Emitter, Shape, emitter_table
+from optisense.optics.scene.ray_scene import Piece, RayScene
+from optisense.optics.scene.surfaces import Region, Surface
+from optisense.optics.transport.chief_rays import trace_chief_rays
 
 REFLECTANCE = 0.02
 """Little: light that the ball and the surface send to each other must not matter."""

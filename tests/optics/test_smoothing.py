@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from optisense.optics.variant import use_variant
+from optisense.optics.backend.variant import use_variant
 
 SIZE = 0.3
 """mm, of a cell."""
@@ -20,8 +20,8 @@ AT_DEFAULT = 0.004
 @pytest.fixture(scope="module")
 def kernels():  # type: ignore[no-untyped-def]
     use_variant("llvm")
-    from optisense.optics.cells import build_cells
-    from optisense.optics.smoothing import Kernels
+    from optisense.optics.radiance_cache.smoothing import Kernels
+    from optisense.optics.scene.surface_cells import build_cells
 
     corners = np.array([(-8.0, -8, 0), (8, -8, 0), (8, 8, 0), (-8, 8, 0)])
     cells = build_cells(corners, np.array([(0, 1, 2), (0, 2, 3)]), SIZE)
@@ -109,7 +109,13 @@ def test_even_light_stays_even_up_to_the_edge(kernels) -> None:  # type: ignore[
 
 
 def test_a_kernel_is_narrower_near_a_lamp_and_no_wider_than_a_cell_allows(kernels) -> None:  # type: ignore[no-untyped-def]
-    from optisense.optics.smoothing import LEAST, LENGTH, RADIUS, USUAL_DENSITY, Kernels
+    from optisense.optics.radiance_cache.smoothing import (
+        LEAST,
+        LENGTH,
+        RADIUS,
+        USUAL_DENSITY,
+        Kernels,
+    )
 
     distance = np.linspace(0.0, LENGTH, kernels.cells.cells)
     cell = 1 / float(kernels.cells.inverse_size[0])
@@ -123,7 +129,7 @@ def test_a_kernel_is_narrower_near_a_lamp_and_no_wider_than_a_cell_allows(kernel
 
 
 def test_a_kernel_widens_as_photons_grow_few_up_to_a_limit(kernels) -> None:  # type: ignore[no-untyped-def]
-    from optisense.optics.smoothing import WIDEST
+    from optisense.optics.radiance_cache.smoothing import WIDEST
 
     usual = kernels.radii(5_000_000)
     assert kernels.radii(2_500_000) == pytest.approx(usual * 2 ** (1 / 6))
@@ -133,7 +139,7 @@ def test_a_kernel_widens_as_photons_grow_few_up_to_a_limit(kernels) -> None:  # 
 
 
 def test_as_wide_a_kernel_where_half_the_photons_sent_land_as_with_half_of_them(kernels) -> None:  # type: ignore[no-untyped-def]
-    from optisense.optics.smoothing import Kernels
+    from optisense.optics.radiance_cache.smoothing import Kernels
 
     distance = np.full(kernels.cells.cells, 5.0)
     one, other = (Kernels(kernels.cells, distance, d) for d in (DENSITY, DENSITY / 2))
@@ -141,7 +147,7 @@ def test_as_wide_a_kernel_where_half_the_photons_sent_land_as_with_half_of_them(
 
 
 def test_cells_far_from_what_the_camera_sees_keep_their_own_light(kernels) -> None:  # type: ignore[no-untyped-def]
-    from optisense.optics.smoothing import Kernels
+    from optisense.optics.radiance_cache.smoothing import Kernels
 
     cells = kernels.cells
     near = cells.centres[:, 0] < 0.0
@@ -157,7 +163,7 @@ def test_cells_far_from_what_the_camera_sees_keep_their_own_light(kernels) -> No
 
 
 def test_light_of_a_lamp_varies_over_its_distance(kernels) -> None:  # type: ignore[no-untyped-def]
-    from optisense.optics.smoothing import varies_over
+    from optisense.optics.radiance_cache.smoothing import varies_over
 
     cells = kernels.cells
     halves = np.array([light(cells.centres) * cells.areas[:, None]] * 2)
@@ -168,7 +174,7 @@ def test_light_of_a_lamp_varies_over_its_distance(kernels) -> None:  # type: ign
 
 
 def test_noise_is_not_taken_for_light_that_varies(kernels) -> None:  # type: ignore[no-untyped-def]
-    from optisense.optics.smoothing import varies_over
+    from optisense.optics.radiance_cache.smoothing import varies_over
 
     cells = kernels.cells
     inside = np.abs(cells.centres[:, :2]).max(axis=1) < 4.0
@@ -181,7 +187,7 @@ def test_noise_is_not_taken_for_light_that_varies(kernels) -> None:  # type: ign
 
 
 def test_kernels_are_narrower_along_the_edge_of_a_shadow(kernels) -> None:  # type: ignore[no-untyped-def]
-    from optisense.optics.smoothing import Kernels
+    from optisense.optics.radiance_cache.smoothing import Kernels
 
     cells = kernels.cells
     lit = np.where(cells.centres[:, :1] > 0.0, 1.0, 0.3) * cells.areas[:, None]

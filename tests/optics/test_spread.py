@@ -8,8 +8,8 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from optisense.optics.scattering import Coating, evaluate_coating
-from optisense.optics.spread import Spread, above, reach, spread, within
+from optisense.optics.radiance_cache.angular_variance import Spread, above, reach, spread, within
+from optisense.optics.scene.bsdf import Coating, evaluate_coating
 
 COUNT = 200_000
 TOWARDS = np.array([0.6, 0.0, 0.8])

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from optisense.errors import SetupError
-from optisense.optics import llvm, variant
+from optisense.optics.backend import llvm, variant
 
 
 @pytest.fixture(autouse=True)
@@ -71,7 +71,7 @@ def test_a_renderer_that_already_loaded_an_old_library_is_an_error() -> None:
     script = (
         "import drjit\n"
         "from optisense.errors import SetupError\n"
-        "from optisense.optics.variant import select_variant\n"
+        "from optisense.optics.backend.variant import select_variant\n"
         "try:\n"
         "    select_variant('llvm')\n"
         "except SetupError as error:\n"

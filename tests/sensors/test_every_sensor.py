@@ -13,8 +13,8 @@ from optisense.design import Role, SensorDesign, load_design, save_design
 from optisense.design.parts import TRANSPARENT_SOLIDS
 from optisense.geometry import Contact, Cylinder, MeshIndenter, Plane, Sphere, TriangleMesh
 from optisense.optics import OpticalModel
-from optisense.optics.chief_rays import Outcome
-from optisense.optics.image import TactileImage
+from optisense.optics.imaging.tactile_image import TactileImage
+from optisense.optics.transport.chief_rays import Outcome
 
 SMALL: dict[str, Any] = {"resolution": (160, 120), "photons": 200_000}
 

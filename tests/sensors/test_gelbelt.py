@@ -14,8 +14,8 @@ from optisense.design import SensorDesign
 from optisense.errors import DesignError
 from optisense.geometry.containment import inside
 from optisense.optics import OpticalModel
-from optisense.optics.chief_rays import Outcome
-from optisense.optics.image import TactileImage
+from optisense.optics.imaging.tactile_image import TactileImage
+from optisense.optics.transport.chief_rays import Outcome
 
 WIDTH, GEL, TAPE, FILM, WINDOW = 36.0, 3.0, 0.05, 0.02, 6.0
 WHEEL, ROLLER, DEFLECTION, INCLINE = 25.0, 1.0, 35.0, 25.0

@@ -13,7 +13,7 @@ from optisense.design import SensorDesign
 from optisense.errors import DesignError
 from optisense.geometry.containment import inside
 from optisense.optics import OpticalModel
-from optisense.optics.chief_rays import Outcome
+from optisense.optics.transport.chief_rays import Outcome
 from optisense.sensors.tip_shape import TipShape
 
 R, HEIGHT, GEL, SHELL = 14.0, 34.0, 3.0, 2.5

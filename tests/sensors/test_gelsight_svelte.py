@@ -14,7 +14,7 @@ from optisense.design import Role, SensorDesign, set_value
 from optisense.design.cage import as_array
 from optisense.errors import DesignError
 from optisense.optics import OpticalModel
-from optisense.optics.chief_rays import ChiefRays, Outcome
+from optisense.optics.transport.chief_rays import ChiefRays, Outcome
 from optisense.sensors.gelsight_svelte import PALM_OUTLINE
 from optisense.sensors.svelte_profile import Palm
 

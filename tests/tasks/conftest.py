@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from optisense.optics.variant import use_variant
+from optisense.optics.backend.variant import use_variant
 
 use_variant(os.environ.get("OPTISENSE_TEST_VARIANT", "llvm"))
 

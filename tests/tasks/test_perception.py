@@ -11,7 +11,7 @@ import pytest
 from optisense import OpticalModel, load
 from optisense.errors import ContactError, TaskError
 from optisense.geometry import Contact, Cylinder
-from optisense.optics.response import auto_exposure, srgb_curve
+from optisense.optics.camera.response import auto_exposure, srgb_curve
 from optisense.tasks import CylinderRadius, Misalignment, SampleSettings, perceive
 from optisense.tasks.misalignment import plane_contact
 from optisense.tasks.perception import collect

@@ -35,7 +35,7 @@ def with_lights(design: SensorDesign, *lights: Light, **changes: object) -> Sens
 def test_rest_is_how_the_simulation_holds_a_light_without_up(
     direction: tuple[float, float, float],
 ) -> None:
-    from optisense.optics.emitters import Emitter
+    from optisense.optics.scene.emitters import Emitter
 
     light = Light(position=(0, 0, 0), direction=direction)
     simulated = Emitter(0, (0.0, 0.0, 0.0), direction).frame

@@ -123,7 +123,7 @@ def work_out(key: str, blob: bytes | None, vector: NDArray[np.float64], seed: in
                 raise SetupError("a worker has not been given what to work out")
             evaluator = pickle.loads(known)
             if getattr(evaluator, "renders", True):
-                from optisense.optics.threads import use_threads
+                from optisense.optics.backend.threads import use_threads
 
                 use_threads(1)
             _evaluators.clear()

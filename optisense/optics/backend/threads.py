@@ -1,0 +1,15 @@
+"""How many threads the renderer may use in this process."""
+
+from __future__ import annotations
+
+from optisense.optics.backend.variant import import_renderer, select_variant
+
+
+def use_threads(count: int) -> None:
+    """Let Dr.Jit compute on so many threads, for processes that share a machine.
+
+    Raises:
+        SetupError: the renderer can't run on this machine.
+    """
+    select_variant("auto")  # libLLVM is checked before Dr.Jit is imported
+    import_renderer("drjit").set_thread_count(count)

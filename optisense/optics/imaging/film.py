@@ -1,0 +1,57 @@
+"""Where the light of camera samples is added up, a layer for each light group."""
+
+from __future__ import annotations
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+from numpy.typing import NDArray
+
+from optisense.optics.scene.emitters import Emitter
+from optisense.optics.transport.camera_paths import VisiblePoints
+
+
+class Film:
+    """Sums of radiance and of samples per pixel and group."""
+
+    def __init__(self, pixels: int, groups: int) -> None:
+        self.sums = [dr.zeros(mi.Float, pixels * 3) for _ in range(groups)]
+        self.counts = dr.zeros(mi.Float, pixels)
+
+    def count(self, pixel: mi.UInt32) -> None:
+        """Note one sample of each of these pixels."""
+        dr.scatter_add(self.counts, mi.Float(1), pixel)
+
+    def add(self, points: VisiblePoints, radiance: list[mi.Color3f]) -> None:
+        """Add what leaves visible points towards the eye, one colour a group."""
+        for total, value in zip(self.sums, radiance, strict=True):
+            weighted = points.weight * value
+            for k in range(3):
+                dr.scatter_add(total, weighted[k], points.pixel * 3 + k, points.valid)
+
+    def add_light(self, points: VisiblePoints, emitters: list[Emitter], areas: list[float]) -> None:
+        """The windows of flat lights that are seen directly; a Lambertian window of 1 mW has
+        radiance 1 / (pi A).
+        """
+        radiance = [1 / (np.pi * area) if area > 0 else 0.0 for area in areas]
+        values = mi.Float(np.array([0.0, *radiance], dtype=np.float32))
+        groups = mi.UInt32(np.array([0, *(e.group for e in emitters)], dtype=np.uint32))
+        seen = points.light > 0
+        value = dr.gather(mi.Float, values, points.light, seen)
+        group = dr.gather(mi.UInt32, groups, points.light, seen)
+        for number, total in enumerate(self.sums):
+            for k in range(3):
+                dr.scatter_add(
+                    total,
+                    points.weight[k] * value,
+                    points.pixel * 3 + k,
+                    seen & (group == number),
+                )
+
+    def layers(self, width: int, height: int) -> NDArray[np.float32]:
+        """(groups, h, w, 3): sums over the number of samples."""
+        share = 1 / np.maximum(np.asarray(self.counts), 1).reshape(height, width, 1)
+        out = np.empty((len(self.sums), height, width, 3), dtype=np.float32)
+        for layer, total in zip(out, self.sums, strict=True):
+            np.multiply(np.asarray(total).reshape(height, width, 3), share, out=layer)
+        return out

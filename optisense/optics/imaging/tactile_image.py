@@ -1,0 +1,121 @@
+"""A tactile image: what the sensor's camera sees, and what is true about it."""
+
+from __future__ import annotations
+
+import errno
+import json
+import os
+from collections.abc import Mapping
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import mitsuba as mi
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from optisense.errors import RenderError
+from optisense.optics.camera.response import auto_exposure, picture
+from optisense.writing import written_together
+
+
+@dataclass
+class TactileImage:
+    """The result of a render; arrays are (h, w, ...), row 0 is the top.
+
+    layers: linear radiance (mW / (mm^2 sr)) of each light group with its colour and flux; they
+        add up to the radiance.
+    normals: unit, of the coating as it is seen, in the design's frame, towards the camera's
+        side; NaN where the camera sees none. contact_mask: where an indenter is seen. depth: mm
+        that the coating is pushed in along the inward normal, 0 outside contacts. settings:
+        what was asked and what was reached, ready for JSON. unit_layers: each group's layer for
+        lights of 1 mW in every channel, from which others follow (see ``relit``).
+    """
+
+    layers: dict[str, NDArray[np.float32]]
+    normals: NDArray[np.float32]
+    contact_mask: NDArray[np.bool_]
+    points: NDArray[np.float32]
+    settings: dict[str, Any] = field(default_factory=dict)
+    interrupted: bool = False
+    unit_layers: dict[str, NDArray[np.float32]] = field(default_factory=dict)
+
+    def relit(self, flux: Mapping[str, ArrayLike]) -> TactileImage:
+        """The same image under lights of other colours and powers; exact, with no new rendering.
+
+        Args:
+            flux: (3,) mW of R, G, B of each light, by light group; a group that is not named
+                keeps its light. ``LightGroup.channel_flux()`` gives a design's own.
+
+        Raises:
+            RenderError: there is no such light group.
+        """
+        for name in flux:
+            if name not in self.unit_layers:
+                raise RenderError(
+                    f"the image has no light group '{name}'",
+                    hint="It has: " + ", ".join(self.unit_layers),
+                )
+        changed = {
+            name: _scaled(self.unit_layers[name], np.asarray(values, dtype=np.float32))
+            for name, values in flux.items()
+        }
+        return replace(self, layers=self.layers | changed, settings=dict(self.settings))
+
+    @property
+    def radiance(self) -> NDArray[np.float32]:
+        """(h, w, 3) linear radiance, the sum of all layers."""
+        total = np.zeros_like(self.normals, dtype=np.float32)
+        for layer in self.layers.values():
+            total += layer
+        return total
+
+    def picture(self, exposure: float | str = "auto") -> NDArray[np.uint8]:
+        """(h, w, 3) uint8: exposed, saturated and sRGB-encoded."""
+        return picture(self.radiance, exposure)
+
+    def _repr_png_(self) -> bytes:
+        """The exposed picture as a PNG file, for notebooks."""
+        stream = mi.MemoryStream()
+        mi.Bitmap(self.picture()).write(stream, mi.Bitmap.FileFormat.PNG)
+        return bytes(stream.raw_buffer())
+
+    def save(self, folder: str | Path, exposure: float | str = "auto") -> None:
+        """Write image.png, radiance.exr, normals.npy, contact_mask.npy, `layers/*.exr`, run.json.
+
+        They are written under temporary names and appear when all are whole.
+
+        Raises:
+            OutputError: a file can't be written, for instance because the disk is full.
+        """
+        out = Path(folder)
+        self.settings["exposure"] = (
+            auto_exposure(self.radiance) if exposure == "auto" else float(exposure)
+        )
+        bitmaps = {"image.png": self.picture(exposure), "radiance.exr": self.radiance}
+        bitmaps |= {f"layers/{name}.exr": layer for name, layer in self.layers.items()}
+        with written_together("the results") as stage:
+            paths = [stage(out / name) for name in bitmaps]
+            with ThreadPoolExecutor() as pool:  # compresses outside Python's lock
+                list(pool.map(_bitmap, bitmaps.values(), paths))
+            np.save(stage(out / "normals.npy"), self.normals)
+            np.save(stage(out / "contact_mask.npy"), self.contact_mask)
+            text = json.dumps(self.settings, indent=2) + "\n"
+            stage(out / "run.json").write_text(text, encoding="utf-8")
+
+
+def _scaled(layer: NDArray[np.float32], factors: NDArray[np.float32]) -> NDArray[np.float32]:
+    """A layer (h, w, 3) times (3,) factors; by rows, several times sooner than by pixels."""
+    height, width = layer.shape[:2]
+    row = np.tile(np.broadcast_to(factors, 3), width)
+    return (layer.reshape(height, -1) * row).reshape(layer.shape)
+
+
+def _bitmap(values: NDArray[Any], path: Path) -> None:
+    try:
+        mi.Bitmap(np.ascontiguousarray(values)).write(str(path))
+    except RuntimeError as error:
+        raise OSError(errno.EIO, str(error), str(path)) from error
+    if path.stat().st_size == 0:  # it says nothing when the disk is full
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(path))

@@ -1,0 +1,119 @@
+"""Points on the undeformed surface: the light of beams, and what indenters hide of it."""
+
+from __future__ import annotations
+
+import drjit as dr
+import mitsuba as mi
+
+from optisense.optics.backend.sequences import next_random, unit_float
+from optisense.optics.radiance_cache.angular_variance import round_spread, widened, within
+from optisense.optics.radiance_cache.beams import Beams
+from optisense.optics.radiance_cache.irradiance import vector
+from optisense.optics.scene.bsdf import Coating, albedo_of, evaluate_coating, grey
+from optisense.optics.transport.camera_paths import VisiblePoints
+
+LEAST_STEP = 1e-20
+"""Of the running sum, where there is no light."""
+
+
+@dr.syntax
+def sum_beams(
+    beams: Beams,
+    groups: int,
+    coating: Coating,
+    points: VisiblePoints,
+    cell: mi.UInt32,
+    active: mi.Bool,
+) -> list[mi.Color3f]:
+    """Radiance towards the eye of all beams, for points on the undeformed surface."""
+    totals = [mi.Color3f(0) for _ in range(groups)]
+    j = dr.gather(mi.UInt32, beams.starts, cell * groups, active)
+    end = dr.gather(mi.UInt32, beams.starts, (cell + 1) * groups, active)
+    while j < end:
+        towards, cosine, flux, group = beam_at(beams, j)
+        reflected = flux * evaluate_coating(
+            widened(coating, cosine), points.normal, towards, points.towards_eye
+        )
+        for g in range(groups):
+            totals[g] += dr.select(group == g, reflected, 0)
+        j += 1
+    return totals
+
+
+def sum_diffuse(
+    table: mi.Float,
+    groups: int,
+    coating: Coating,
+    points: VisiblePoints,
+    cell: mi.UInt32,
+    active: mi.Bool,
+) -> list[mi.Color3f]:
+    """The same where coatings are diffuse and grey, from the `irradiance_table`: what all beams
+    bring is what the sum of their vectors brings."""
+    reflectance = dr.select(active, albedo_of(coating) * dr.inv_pi, 0)
+    return [
+        reflectance * dr.maximum(dr.dot(vector(table, cell * groups + g), points.normal), 0)
+        for g in range(groups)
+    ]
+
+
+@dr.syntax
+def sum_hidden(
+    beams: Beams,
+    totals: list[mi.Color3f],
+    indenters: mi.Scene,
+    coating: Coating,
+    points: VisiblePoints,
+    start: mi.Point3f,
+    cell: mi.UInt32,
+    active: mi.Bool,
+    random: mi.UInt32,
+    shadow_rays: mi.Float,
+) -> list[mi.Color3f]:
+    """What indenters take away of these ``totals``.
+
+    For all the light of a group there would be so many ``shadow_rays``: ``beams``, those that pass
+    near indenters, get their share of them, evenly spaced in the running sum.
+    """
+    groups = len(totals)
+    hidden = [mi.Color3f(0) for _ in range(groups)]
+    steps = [dr.maximum(grey(total) / shadow_rays, LEAST_STEP) for total in totals]
+    state = next_random(random)
+    running = unit_float(state)
+    j = dr.gather(mi.UInt32, beams.starts, cell * groups, active)
+    end = dr.gather(mi.UInt32, beams.starts, (cell + 1) * groups, active)
+    while j < end:
+        towards, cosine, flux, group = beam_at(beams, j)
+        reflected = flux * evaluate_coating(
+            widened(coating, cosine), points.normal, towards, points.towards_eye
+        )
+        step = mi.Float(LEAST_STEP)
+        for g in range(groups):
+            step = dr.select(group == g, steps[g], step)
+        share = dr.minimum(grey(reflected) / step, shadow_rays)
+        before = dr.floor(running)
+        running += share
+        times = dr.floor(running) - before
+        weight = dr.rcp(dr.select(share < 1, share, times))
+        while times > 0:
+            state = next_random(state)
+            blocked = indenters.ray_test(
+                mi.Ray3f(start, within(round_spread(towards, cosine), state)),
+                coherent=False,
+                active=mi.Bool(True),
+            )
+            part = dr.select(blocked, weight, 0)
+            for g in range(groups):
+                hidden[g] += dr.select(group == g, reflected * part, 0)
+            times -= 1
+        j += 1
+    return hidden
+
+
+def beam_at(beams: Beams, number: mi.UInt32) -> tuple[mi.Vector3f, mi.Float, mi.Color3f, mi.UInt32]:
+    """Direction towards the light, mean cosine, flux density and light group of beams."""
+    way = dr.gather(mi.Vector4f, beams.ways, number)
+    flux = dr.gather(mi.Vector4f, beams.fluxes, number)
+    towards = mi.Vector3f(way.x, way.y, way.z)
+    colour = mi.Color3f(flux.x, flux.y, flux.z)
+    return towards, way.w, colour, dr.reinterpret_array(mi.UInt32, flux.w)

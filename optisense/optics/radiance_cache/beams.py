@@ -1,0 +1,212 @@
+"""The light field as short lists of beams, for points that lie in the undeformed surface.
+
+A cell of the field keeps its light in many narrow bins of directions. Most of them hold a little
+scattered light, a few hold the lamps. Where the surface is not tilted, weak bins may be taken four
+together without a visible change (see tests/optics/test_beams.py), which leaves a short list.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+from numpy.typing import NDArray
+
+from optisense.optics.backend.arrays import floats, indices
+from optisense.optics.radiance_cache.angular_variance import passes_near, squared_radius
+from optisense.optics.scene.surface_cells import SurfaceCells
+
+STRONG = 0.03
+"""Part of the light of a group in a cell from which four neighbouring bins stay apart."""
+NO_SLOT = 0xFFFFFFFF
+REACH = 1.5
+"""Of the side of a cell: how far from its middle the points are that read its beams."""
+
+
+@dataclass
+class Beams:
+    """Beams in the order of cells, and within these of light groups.
+
+    ``starts`` has one entry for each cell and group, and one more. ``ways`` holds four floats a
+    beam: the unit direction towards its light, and the mean cosine with it of the beam's light;
+    ``fluxes`` the flux density across it (mW/mm^2) in R, G, B, and the light group as bits.
+    """
+
+    starts: mi.UInt32
+    ways: mi.Float
+    fluxes: mi.Float
+
+
+def collect_beams(
+    moments: mi.Float,
+    colours: mi.Float,
+    coloured: bool,
+    used: NDArray[np.integer],
+    bands: int,
+    sectors: int,
+    entries: int,
+    groups: int,
+) -> Beams:
+    """Beams from the bins of a field.
+
+    Args:
+        moments, colours, coloured: as in ``LightField``.
+        used: which of the bands times sectors bins the field holds, ascending.
+        bands, sectors: even numbers.
+        entries: cells times groups.
+        groups: light groups.
+    """
+    slots = np.full(bands * sectors, NO_SLOT, dtype=np.uint32)
+    slots[used] = np.arange(len(used))
+    block = np.arange(bands * sectors // 4)
+    corner = (block // (sectors // 2)) * 2 * sectors + (block % (sectors // 2)) * 2
+    four = slots[corner[:, None] + np.array([0, 1, sectors, sectors + 1])]
+    # Blocks without any light are not looked at.
+    four = four[(four != NO_SLOT).any(axis=1)]
+    field = (moments, colours, indices(four))
+    sizes = (dr.opaque(mi.UInt32, len(four)), dr.opaque(mi.UInt32, len(used)))
+    nowhere = dr.zeros(mi.Float, 4)
+    lane = dr.arange(mi.UInt32, entries)
+    total = _total(moments, sizes[1], groups, lane)
+    zero = dr.zeros(mi.UInt32, entries)
+    count = _collect(*field, *sizes, groups, coloured, total, lane, zero, nowhere, nowhere, False)
+    padded = dr.zeros(mi.UInt32, entries + 1)
+    dr.scatter(padded, count, lane)
+    starts = dr.prefix_sum(padded)
+    dr.eval(starts)
+    beams = max(int(starts[entries]), 1)
+    ways, fluxes = dr.zeros(mi.Float, 4 * beams), dr.zeros(mi.Float, 4 * beams)
+    first = dr.gather(mi.UInt32, starts, lane)
+    _collect(*field, *sizes, groups, coloured, total, lane, first, ways, fluxes, True)
+    dr.eval(ways, fluxes)
+    return Beams(starts, ways, fluxes)
+
+
+@dr.syntax
+def _total(moments: mi.Float, used: mi.UInt32, groups: int, lane: mi.UInt32) -> mi.Float:
+    cell, group = lane // groups, lane % groups
+    total = mi.Float(0)
+    k = mi.UInt32(0)
+    while k < used:
+        total += dr.gather(mi.Float, moments, ((cell * used + k) * groups + group) * 4 + 3)
+        k += 1
+    return total
+
+
+@dr.syntax
+def _collect(
+    moments: mi.Float,
+    colours: mi.Float,
+    four: mi.UInt32,
+    blocks: mi.UInt32,
+    used: mi.UInt32,
+    groups: int,
+    coloured: bool,
+    total: mi.Float,
+    lane: mi.UInt32,
+    first: mi.UInt32,
+    ways: mi.Float,
+    fluxes: mi.Float,
+    write: bool,
+) -> mi.UInt32:
+    """Count the beams of each lane's cell and group, or write them from ``first`` on."""
+    cell, group = lane // groups, lane % groups
+    slot = mi.UInt32(first)
+    k = mi.UInt32(0)
+    while k < blocks:
+        values = []
+        inks = []
+        whole = mi.Vector4f(0)
+        ink = mi.Vector4f(0)
+        for i in range(4):
+            bin_slot = dr.gather(mi.UInt32, four, k * 4 + i)
+            there = bin_slot != NO_SLOT
+            entry = (cell * used + bin_slot) * groups + group
+            value = dr.gather(mi.Vector4f, moments, entry, there)
+            values.append(value)
+            whole += value
+            if dr.hint(write and coloured, mode="scalar"):
+                inks.append(dr.gather(mi.Vector4f, colours, entry, there))
+                ink += inks[i]
+        strong = whole.w > STRONG * total
+        if dr.hint(not (write and coloured), mode="scalar"):
+            inks = [mi.Vector4f(value.w) for value in values]
+            ink = mi.Vector4f(whole.w)
+        chosen = [strong & (value.w > 0) for value in values]
+        chosen.append(~strong & (whole.w > 0))
+        values.append(whole)
+        inks.append(ink)
+        for i in range(5):
+            if dr.hint(write, mode="scalar"):
+                value = values[i]
+                length = dr.norm(mi.Vector3f(value.x, value.y, value.z))
+                scale = dr.rcp(dr.maximum(length, 1e-30))
+                cosine = dr.minimum(length / dr.maximum(value.w, 1e-30), 1.0)
+                way = mi.Vector4f(value.x * scale, value.y * scale, value.z * scale, cosine)
+                dr.scatter(ways, way, slot, chosen[i])
+                tag = dr.reinterpret_array(mi.Float, mi.UInt32(group))
+                flux = mi.Vector4f(inks[i].x, inks[i].y, inks[i].z, tag)
+                dr.scatter(fluxes, flux, slot, chosen[i])
+            slot += dr.select(chosen[i], mi.UInt32(1), mi.UInt32(0))
+        k += 1
+    return slot - first
+
+
+def beams_near(beams: Beams, cells: SurfaceCells, groups: int, balls: mi.Float) -> Beams:
+    """Those beams that may touch one of the balls (centre and radius, four floats each) on their
+    way to points of their cell."""
+    entries = cells.cells * groups
+    centres = np.zeros((cells.cells, 4), dtype=np.float32)
+    centres[:, :3] = cells.centres
+    middles = floats(centres)
+    lane = dr.arange(mi.UInt32, entries)
+    near = dr.zeros(mi.UInt32, dr.width(beams.ways) // 4)
+    margin = REACH / cells.inverse_size
+    sizes = (dr.opaque(mi.UInt32, groups), dr.opaque(mi.UInt32, dr.width(balls) // 4))
+    count = _mark_near(beams, middles, balls, margin, *sizes, lane, near)
+    counts = dr.zeros(mi.UInt32, entries + 1)
+    dr.scatter(counts, count, lane)
+    dr.eval(counts, near)
+    chosen = dr.compress(near != 0)
+    if dr.width(chosen) == 0:
+        chosen = dr.zeros(mi.UInt32, 1)
+    ways, fluxes = (
+        dr.ravel(dr.gather(mi.Vector4f, values, chosen)) for values in (beams.ways, beams.fluxes)
+    )
+    return Beams(dr.prefix_sum(counts), ways, fluxes)
+
+
+@dr.syntax
+def _mark_near(
+    beams: Beams,
+    middles: mi.Float,
+    balls: mi.Float,
+    margin: mi.Float,
+    groups: mi.UInt32,
+    ball_count: mi.UInt32,
+    lane: mi.UInt32,
+    near: mi.UInt32,
+) -> mi.UInt32:
+    """Set ``near`` to 1 for beams that pass near a ball; returns how many there are of each lane's
+    cell and group."""
+    middle = dr.gather(mi.Vector4f, middles, lane // groups)
+    point = mi.Point3f(middle.x, middle.y, middle.z)
+    count = mi.UInt32(0)
+    j = dr.gather(mi.UInt32, beams.starts, lane)
+    end = dr.gather(mi.UInt32, beams.starts, lane + 1)
+    while j < end:
+        way = dr.gather(mi.Vector4f, beams.ways, j)
+        towards = mi.Vector3f(way.x, way.y, way.z)
+        touches = mi.Bool(False)
+        n = mi.UInt32(0)
+        while n < ball_count:
+            ball = dr.gather(mi.Vector4f, balls, n)
+            ball.w += margin
+            touches |= passes_near(ball, point, towards, squared_radius(way.w))
+            n += 1
+        dr.scatter(near, mi.UInt32(1), j, touches)
+        count += dr.select(touches, mi.UInt32(1), mi.UInt32(0))
+        j += 1
+    return count

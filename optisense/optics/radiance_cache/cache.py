@@ -1,0 +1,289 @@
+"""The light that falls on the undeformed opaque surfaces, pooled into cells and directions.
+
+Light arriving at the sensing surface varies slowly from place to place; what varies within a
+tenth of a millimetre in a contact is the surface's tilt and what it hides. So photons are
+traced once a design, without contacts, and pooled where they land: each cell and bin of
+directions (bins overlap, see `OVERLAP`) keeps the flux through a plane *across the
+light* (a photon's power over the cosine of its landing) and the mean direction. What a contact
+makes of it is ``shading.py``'s part. The cost of an image then does not depend on the number of
+photons.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+from numpy.typing import NDArray
+
+from optisense.optics.backend.arrays import floats, indices
+from optisense.optics.backend.sequences import unit_float
+from optisense.optics.radiance_cache.beams import Beams, collect_beams
+from optisense.optics.radiance_cache.irradiance import irradiance_table
+from optisense.optics.radiance_cache.smoothing import Kernels, smooth
+from optisense.optics.scene.surface_cells import SurfaceCells, bin_axis, cell_at
+from optisense.optics.transport.photons import GROUP_MASK, HALF_SHIFT, PhotonMap
+from optisense.optics.transport.volume_flux import Slab, above_cell
+
+FloatArray = NDArray[np.floating]
+
+# An isolated photon that grazes the surface must not become a bright beam: cosines below are
+# raised to this.
+LEAST_COSINE = 0.02
+# Equal-area bins of the sphere of directions, about the mean normal of the surfaces.
+BANDS = 16
+SECTORS = 16
+BINS = BANDS * SECTORS
+OVERLAP = 1.0
+"""Bins by which light strays to its neighbours (triangular): each bin holds what a quadratic
+B-spline weights. With sharp edges, a lamp would be counted once or twice by a point above the
+surface, depending on how near an edge it lies, where its light is only somewhat stronger than
+below; the sum over such bins hardly depends on where they lie."""
+OVERLAP_OF_METAL = 0.4
+"""The same where a coating is part metal, which tells directions apart: a compromise."""
+# Where a bin of no light is told from one of little.
+DARK = 1e-7
+
+
+def direction_bin(
+    cells: SurfaceCells, direction: mi.Vector3f, bands_off: mi.Float, sectors_off: mi.Float
+) -> mi.UInt32:
+    """Equal-area bin (of BINS on the sphere) of a unit direction, or the one so many bands and
+    sectors beside it.
+    """
+    x, y, z = (dr.dot(direction, bin_axis(cells, k)) for k in range(3))
+    place = (z + 1) * (BANDS / 2) + bands_off
+    # Beyond a pole: back from it.
+    place = dr.select(place > BANDS, 2 * BANDS - place, dr.abs(place))
+    band = dr.minimum(mi.UInt32(place), BANDS - 1)
+    turn = dr.atan2(y, x) * (1 / dr.two_pi) + sectors_off / SECTORS
+    turn -= dr.floor(turn)
+    return band * SECTORS + dr.minimum(mi.UInt32(turn * SECTORS), SECTORS - 1)
+
+
+def _dither(place: mi.Vector4f, direction: mi.Vector3f, reach: mi.Float) -> list[mi.Float]:
+    """Offsets in bands and sectors, of a triangular density over -reach .. reach, for landings.
+
+    They follow from the landing, as landings are in no order.
+    """
+    first, second, third = (
+        dr.reinterpret_array(mi.UInt32, value) for value in (place.x, place.y, direction.x)
+    )
+    both = mi.sample_tea_32(first ^ (third * 747796405), second)
+    return [reach * (unit_float(one) + unit_float(one * 277803737) - 1) for one in both]
+
+
+def bin_centres(cells: SurfaceCells, bins: NDArray[np.integer]) -> mi.Float:
+    """Middle direction of bins, four floats each."""
+    z = (bins // SECTORS + 0.5) * (2 / BANDS) - 1
+    turn = (bins % SECTORS + 0.5) * (2 * np.pi / SECTORS)
+    flat = np.sqrt(1 - z * z)
+    local = np.stack([flat * np.cos(turn), flat * np.sin(turn), z], axis=1)
+    out = np.zeros((len(bins), 4), dtype=np.float32)
+    out[:, :3] = local @ cells.axes
+    return mi.Float(out.ravel())
+
+
+class Tables(NamedTuple):
+    """Moments, heights and colours, see `LightField`."""
+
+    moments: mi.Float
+    heights: mi.Float
+    colours: mi.Float
+
+
+@dataclass
+class LightField:
+    """The smoothed field: values of each cell, bin and group; lights of 1 mW.
+
+    ``moments``: flux density across the light (mW/mm^2) times the direction towards the light
+    (3), flux density (1). ``heights``: the flux density times the square of the direction's
+    part along the axis of the bins. ``colours``: four floats, the flux density per channel R,
+    G, B where surfaces are coloured, else the same array as ``moments``. ``beams``: the same
+    light in short lists. ``raised``: moments, heights and colours of the light half-way up the
+    slab above the cells, if that was asked for (see ``slab.py``).
+    """
+
+    cells: SurfaceCells
+    bins: int
+    groups: int
+    moments: mi.Float
+    heights: mi.Float
+    colours: mi.Float
+    coloured: bool
+    metallic: bool
+    centres: mi.Float
+    irradiance: mi.Float
+    beams: Beams
+    photons: int
+    noise: float
+    raised: Tables | None = None
+
+
+class FieldTally:
+    """Sums of landings per cell, direction bin and light group, over photon passes."""
+
+    def __init__(
+        self,
+        kernels: Kernels,
+        groups: int,
+        coloured: bool,
+        metallic: bool = True,
+        slab: Slab | None = None,
+    ) -> None:
+        """``slab``, if light above the surface is wanted, too."""
+        self.slab = slab
+        self.metallic = metallic
+        self.kernels = kernels
+        self.cells = cells = kernels.cells
+        self.groups = groups
+        self.coloured = coloured
+        self.passes = 0
+        self.photons = 0
+        entries = cells.cells * BINS * groups * 4
+        self.landed = self._tables(entries)
+        self.raised = None if slab is None else self._tables(entries)
+        # What photons of even and of odd number bring; their difference tells the noise.
+        self.halves = dr.zeros(mi.Float, 2 * cells.cells * groups)
+
+    def _tables(self, entries: int) -> Tables:
+        moments = dr.zeros(mi.Float, entries)
+        colours = dr.zeros(mi.Float, entries if self.coloured else 4)
+        return Tables(moments, dr.zeros(mi.Float, entries // 4), colours)
+
+    def add(self, photons: PhotonMap) -> None:
+        """Add a photon pass. All passes must have the same number of photons."""
+        cell, found, bits, scalar = self._tally(photons, self.landed, None)
+        row = cell + ((bits >> HALF_SHIFT) & 1) * dr.opaque(mi.UInt32, self.cells.cells)
+        dr.scatter_add(self.halves, scalar, row * self.groups + (bits & GROUP_MASK), found)
+        if self.raised is not None and photons.passing is not None:
+            self._tally(photons.passing, self.raised, self.slab)
+        self.passes += 1
+        self.photons += photons.emitted
+        dr.eval(self.landed, self.halves, self.raised)
+
+    def _tally(
+        self, photons: PhotonMap, tables: Tables, slab: Slab | None
+    ) -> tuple[mi.UInt32, mi.Bool, mi.UInt32, mi.Float]:
+        """Add photons, landings or in a slab, to tables; returns of each the cell, whether there
+        is one, the bits and the power."""
+        index = dr.arange(mi.UInt32, photons.count)
+        place = dr.gather(mi.Vector4f, photons.place, index)
+        travel = dr.gather(mi.Vector4f, photons.travel, index)
+        bits = dr.reinterpret_array(mi.UInt32, place.w)
+        point = mi.Point3f(place.x, place.y, place.z)
+        if slab is None:
+            cell, found = cell_at(self.cells, point, mi.Bool(True))
+            across = dr.rcp(dr.maximum(travel.w, LEAST_COSINE))
+        else:
+            cell, _, found = above_cell(slab, point, mi.Bool(True))
+            across = dr.rcp(dr.maximum(travel.w, 1e-6))
+        direction = mi.Vector3f(travel.x, travel.y, travel.z)
+        reach = dr.opaque(mi.Float, OVERLAP_OF_METAL if self.metallic else OVERLAP)
+        bin_ = direction_bin(self.cells, -direction, *_dither(place, direction, reach))
+        entry = (cell * BINS + bin_) * self.groups + (bits & GROUP_MASK)
+        if self.coloured:
+            power = dr.gather(mi.Vector4f, photons.power, index)
+            for k in range(3):
+                dr.scatter_add(tables.colours, power[k] * across, entry * 4 + k, found)
+            scalar = (power.x + power.y + power.z) * (1 / 3)
+        else:
+            scalar = dr.gather(mi.Float, photons.power, index)
+        for k in range(3):
+            dr.scatter_add(tables.moments, -direction[k] * (scalar * across), entry * 4 + k, found)
+        dr.scatter_add(tables.moments, scalar * across, entry * 4 + 3, found)
+        height = dr.dot(direction, bin_axis(self.cells, 2))
+        dr.scatter_add(tables.heights, dr.square(height) * (scalar * across), entry, found)
+        return cell, found, bits, scalar
+
+    def noise(self) -> float:
+        """Relative RMS noise of the smoothed irradiance (1 = 100 %), from the difference of
+        both halves.
+
+        Over all cells that the camera sees, or nearly so, and all groups, in relation to each
+        group's mean; infinite without photons.
+        """
+        if self.passes < 1:
+            return float("inf")
+        matrix = self.kernels.smoothing(self.photons, self.metallic).matrix
+        means = [(matrix @ landed)[self.kernels.near] for landed in self._landed()]
+        mean = (means[0] + means[1]) / 2
+        # Half the difference of two halves has the deviation of their mean.
+        spread = ((means[0] - means[1]) / 2) ** 2
+        scale = mean.mean(axis=0)
+        lit = scale > 0
+        if not lit.any():
+            return 0.0
+        return float(np.sqrt((spread[:, lit] / scale[lit] ** 2).mean()))
+
+    def _landed(self) -> FloatArray:
+        """(2, cells, groups) mW on each cell, by the photons of even and of odd number."""
+        halves = np.asarray(self.halves, dtype=np.float64) * (2 / self.passes)
+        return halves.reshape(2, -1, self.groups)
+
+    def smoothed(self) -> LightField:
+        """The field so far; only bins that hold light are kept."""
+        total = dr.zeros(mi.Float, BINS)
+        lanes = dr.arange(mi.UInt32, self.cells.cells * BINS * self.groups)
+        value = dr.gather(mi.Float, self.landed.moments, lanes * 4 + 3)
+        if self.raised is not None:
+            value += dr.gather(mi.Float, self.raised.moments, lanes * 4 + 3)
+        dr.scatter_add(total, value, (lanes // self.groups) % BINS)
+        power = np.array(total)
+        used = np.flatnonzero(power > DARK * power.sum())
+        used = used if len(used) else np.zeros(1, dtype=np.int64)
+        bins = indices(used)
+        kernel = self.kernels.smoothing(self.photons, self.metallic)
+        landed = self._landed().mean(axis=0)
+        factors = self.kernels.sharpening(landed, self.photons, self.metallic)
+        rest = (
+            bins,
+            dr.opaque(mi.UInt32, BINS),
+            self.groups,
+            floats(factors / self.passes),
+        )
+
+        def smoothed(moments: mi.Float, heights: mi.Float, colours: mi.Float) -> Tables:
+            tables, kinds = [moments, heights], [mi.Vector4f, mi.Float]
+            if self.coloured:
+                tables.append(colours)
+                kinds.append(mi.Vector4f)
+            sums = smooth(kernel, self.cells.cells, tables, kinds, *rest)
+            dr.eval(sums)  # together: the loop would run again for those that are asked for later
+            values = dr.ravel(sums[0])
+            return Tables(values, sums[1], dr.ravel(sums[2]) if self.coloured else values)
+
+        moments, heights, colours = smoothed(*self.landed)
+        raised = None if self.raised is None else smoothed(*self.raised)
+        table = irradiance_table(
+            moments, self.cells.cells, dr.opaque(mi.UInt32, len(used)), self.groups
+        )
+        dr.eval(moments, heights, colours, table, raised)
+        return LightField(
+            cells=self.cells,
+            bins=len(used),
+            groups=self.groups,
+            moments=moments,
+            heights=heights,
+            colours=colours,
+            coloured=self.coloured,
+            metallic=self.metallic,
+            centres=bin_centres(self.cells, used),
+            irradiance=table,
+            beams=collect_beams(
+                moments,
+                colours,
+                self.coloured,
+                used,
+                BANDS,
+                SECTORS,
+                self.cells.cells * self.groups,
+                self.groups,
+            ),
+            photons=self.photons,
+            noise=self.noise(),
+            raised=raised,
+        )

@@ -1,0 +1,142 @@
+"""Light that indenters and the skin near them send to each other.
+
+The light field holds all light that comes from afar, also after scattering. Inside a contact, a
+point sees an indenter or, standing on one, the skin beside it; what comes from there is sampled by
+rays. It is a few per cent of the whole, so the place that is seen is taken to be diffuse, and the
+field's irradiance there is read from nine spherical-harmonic coefficients per cell and light group
+(Ramamoorthi and Hanrahan 2001), with one shadow ray a group towards the mean of its light.
+"""
+
+from __future__ import annotations
+
+import drjit as dr
+import mitsuba as mi
+
+from optisense.optics.backend.sequences import STEPS_2D, next_random, unit_float
+from optisense.optics.radiance_cache.cache import LightField
+from optisense.optics.radiance_cache.irradiance import irradiance
+from optisense.optics.scene.bsdf import Coating, albedo_of, sample_coating
+from optisense.optics.scene.contact_scenes import ContactScenes
+from optisense.optics.scene.ray_scene import RayScene, intersect, leave
+from optisense.optics.scene.surface_cells import SurfaceCells, cell_at
+from optisense.optics.transport.camera_paths import VisiblePoints
+
+DIRECTIONS = 8
+"""Rays of a camera sample for exchanged light."""
+MOST_PLACES = 8
+"""That scatter exchanged light one after another, at most."""
+
+
+@dr.syntax
+def _sample(
+    cells: SurfaceCells,
+    table: mi.Float,
+    groups: int,
+    indenters: RayScene,
+    fixed: RayScene,
+    coating: Coating,
+    normal: mi.Vector3f,
+    face_normal: mi.Vector3f,
+    towards_eye: mi.Vector3f,
+    point: mi.Point3f,
+    cell: mi.UInt32,
+    active: mi.Bool,
+    raised: mi.Bool,
+    random: mi.UInt32,
+    series: mi.UInt32,
+    first: mi.UInt32,
+    directions: mi.UInt32,
+) -> list[mi.Color3f]:
+    totals = [mi.Color3f(0) for _ in range(groups)]
+    # How much of the light the places that are seen send on, if they are diffuse.
+    albedo = albedo_of(coating)
+    survival = dr.max(albedo)
+    k = mi.UInt32(0)
+    while active & (k < directions):
+        # One sequence goes through all samples of a pixel.
+        u = unit_float(series + (first + k) * STEPS_2D[0])
+        v = unit_float(series * 277803737 + (first + k) * STEPS_2D[1])
+        state = (random ^ (k * 0x9E3779B9)) * 69069
+        way, weight = sample_coating(
+            coating, normal, -towards_eye, unit_float(state), mi.Point2f(u, v)
+        )
+        weight *= albedo
+        above = mi.Bool(raised)
+        start = leave(point, face_normal, way)
+        walking = (dr.dot(way, face_normal) > 0) & (dr.max(weight) > 0)
+        places = mi.UInt32(0)
+        while walking:
+            pressed = intersect(
+                indenters.scene, indenters.rows, indenters.corners, start, way, mi.Bool(True)
+            )
+            skin = intersect(fixed.scene, fixed.rows, fixed.corners, start, way, above)
+            on_indenter = pressed.valid & (~skin.valid | (pressed.distance < skin.distance))
+            # Light along a line that comes from the skin behind is in the field already.
+            behind = fixed.scene.ray_test(mi.Ray3f(start, -way), coherent=False, active=above)
+            walking = on_indenter | (skin.valid & ~behind)
+            if walking:
+                seen = dr.select(on_indenter, pressed.point, skin.point)
+                facing = dr.select(on_indenter, pressed.shading_normal, skin.shading_normal)
+                facing *= -dr.sign(dr.dot(way, facing))
+                there, exists = cell_at(cells, skin.point, ~on_indenter)
+                # An indenter's place is lit like its neighbourhood, which is where the point
+                # stands.
+                there = dr.select(exists, there, cell)
+                lift = leave(seen, facing, facing)
+                for g in range(groups):
+                    light, _mean, towards = irradiance(table, there * groups + g, facing)
+                    lit = light > 0
+                    towards = dr.select(lit, dr.normalize(towards), facing)
+                    hidden = indenters.scene.ray_test(
+                        mi.Ray3f(lift, towards), coherent=False, active=mi.Bool(True)
+                    )
+                    totals[g] += dr.select(lit & ~hidden, light, 0) * dr.inv_pi * weight
+                # On from there, like light that is scattered evenly.
+                state = next_random(state)
+                places += 1
+                walking = (unit_float(state) < survival) & (places < MOST_PLACES)
+                weight *= albedo / survival
+                u = unit_float(state * 277803737)
+                v = unit_float((state ^ 0x9E3779B9) * 69069)
+                way = mi.Frame3f(facing).to_world(
+                    mi.warp.square_to_cosine_hemisphere(mi.Point2f(u, v))
+                )
+                start = lift
+                above = mi.Bool(on_indenter)
+        k += 1
+    return [total / mi.Float(directions) for total in totals]
+
+
+def exchanged(
+    field: LightField,
+    scenes: ContactScenes,
+    points: VisiblePoints,
+    coating: Coating,
+    cell: mi.UInt32,
+    active: mi.Bool,
+    raised: mi.Bool,
+) -> list[mi.Color3f]:
+    """Radiance towards the eye that points reflect of exchanged light, one colour a group.
+
+    ``cell`` is where each point looks up the field, ``raised`` whether it is on an indenter.
+    """
+    assert scenes.indenters is not None
+    return _sample(
+        field.cells,
+        field.irradiance,
+        field.groups,
+        scenes.indenters,
+        scenes.fixed,
+        coating,
+        points.normal,
+        points.face_normal,
+        points.towards_eye,
+        points.point,
+        cell,
+        active,
+        raised,
+        points.random,
+        points.series,
+        points.number * DIRECTIONS,
+        dr.opaque(mi.UInt32, DIRECTIONS),
+    )

@@ -1,0 +1,79 @@
+"""Irradiance over all normals, from nine spherical-harmonic coefficients per cell and light group.
+
+Nine coefficients (bands 0 to 2) give the irradiance of distant light to about one per cent for any
+normal (Ramamoorthi and Hanrahan 2001).
+"""
+
+from __future__ import annotations
+
+import drjit as dr
+import mitsuba as mi
+
+# Clamped-cosine convolution of bands 0, 1, 2 (Ramamoorthi and Hanrahan 2001, eq. 8).
+BAND_0, BAND_1, BAND_2 = 3.141593, 2.094395, 0.785398
+
+
+def harmonics(n: mi.Vector3f) -> tuple[mi.Float, ...]:
+    """The nine real spherical harmonics up to band 2 of unit directions."""
+    x, y, z = n.x, n.y, n.z
+    return (
+        mi.Float(0.282095) + 0 * x,
+        0.488603 * y,
+        0.488603 * z,
+        0.488603 * x,
+        1.092548 * x * y,
+        1.092548 * y * z,
+        0.315392 * (3 * z * z - 1),
+        1.092548 * x * z,
+        0.546274 * (x * x - y * y),
+    )
+
+
+@dr.syntax
+def irradiance_table(moments: mi.Float, cells: int, bins: mi.UInt32, groups: int) -> mi.Float:
+    """Twelve floats a cell and group: nine coefficients of irradiance over the normal, and the sum
+    of the light's directions, weighted with its flux density."""
+    lane = dr.arange(mi.UInt32, cells * groups)
+    cell, group = lane // groups, lane % groups
+    sums = [mi.Float(0) for _ in range(9)]
+    mean = mi.Vector3f(0)
+    k = mi.UInt32(0)
+    while k < bins:
+        value = dr.gather(mi.Vector4f, moments, (cell * bins + k) * groups + group)
+        if value.w > 0:
+            flux = mi.Vector3f(value.x, value.y, value.z)
+            mean += flux
+            basis = harmonics(dr.normalize(flux))
+            for i in range(9):
+                sums[i] += value.w * basis[i]
+        k += 1
+    dr.eval(sums, mean)  # together: the loop would run again for each
+    band = [BAND_0, *[BAND_1] * 3, *[BAND_2] * 5]
+    out = dr.empty(mi.Float, cells * groups * 12)
+    for i in range(9):
+        dr.scatter(out, sums[i] * band[i], lane * 12 + i)
+    for i in range(3):
+        dr.scatter(out, mean[i], lane * 12 + 9 + i)
+    return out
+
+
+def irradiance(
+    table: mi.Float, entry: mi.UInt32, normal: mi.Vector3f
+) -> tuple[mi.Float, mi.Float, mi.Vector3f]:
+    """Irradiance (mW/mm^2) at normals, its mean over all normals, and the vector along which most
+    of its light comes: light that is wholly above a normal's horizon brings its part along it."""
+    a = dr.gather(mi.Vector4f, table, entry * 3)
+    b = dr.gather(mi.Vector4f, table, entry * 3 + 1)
+    c = dr.gather(mi.Vector4f, table, entry * 3 + 2)
+    basis = harmonics(normal)
+    values = (a.x, a.y, a.z, a.w, b.x, b.y, b.z, b.w, c.x)
+    total = mi.Float(0)
+    for value, weight in zip(values, basis, strict=True):
+        total = total + value * weight
+    return dr.maximum(total, 0), a.x * basis[0], mi.Vector3f(c.y, c.z, c.w)
+
+
+def vector(table: mi.Float, entry: mi.UInt32) -> mi.Vector3f:
+    """The last of `irradiance` alone."""
+    third = dr.gather(mi.Vector4f, table, entry * 3 + 2)
+    return mi.Vector3f(third.y, third.z, third.w)

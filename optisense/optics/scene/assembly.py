@@ -1,0 +1,308 @@
+"""From a sensor design to the surfaces, emitters and camera that light meets."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import lru_cache
+
+import numpy as np
+
+from optisense import library
+from optisense.design import LightGroup, LightModel, SensorDesign
+from optisense.design.check import inside
+from optisense.design.materials import Absorber, Coating, Conductor, Dielectric, Diffuse, Material
+from optisense.design.parts import TRANSPARENT_SOLIDS, Role
+from optisense.errors import DesignError
+from optisense.geometry import TriangleMesh
+from optisense.geometry.coplanar import merge_coplanar
+from optisense.optics.scene.emitters import Emitter, Intensity, Shape, frame_of, spot_intensity
+from optisense.optics.scene.media import Media, Sheet, Solid, same_faces
+from optisense.optics.scene.ray_scene import Piece
+from optisense.optics.scene.surfaces import Region, Surface, SurfaceKind
+
+SMOOTH_METAL = 0.01
+"""A metal of less roughness (GGX alpha) is an ideal mirror."""
+
+FLAT = 1e-6
+"""A mesh whose corner normals differ by less from its face normals has flat facets."""
+
+DISC_CORNERS = 12
+PROBE = 0.02
+"""The medium before a coating is looked up this far (mm) off it."""
+
+
+@dataclass(frozen=True)
+class Assembly:
+    """A design as ray tracing needs it.
+
+    Attributes:
+        pieces: all fixed surfaces; flat faces in as few triangles as will do.
+        sensing: the deformed sensing surface, with all its triangles.
+        gels: the elastomers.
+        emitters: all lights; ``group`` counts in the order of ``groups``.
+        light_areas: mm^2 of the lights' windows, 0 for points.
+        fine: for pieces of the sensing surface, by number, the same with all its triangles.
+        ior_before: refractive index on the inner side of the (first) sensing surface.
+        media: the resolved boundaries.
+        kept: what else the assembly of a similar design can take over.
+    """
+
+    pieces: list[Piece]
+    sensing: TriangleMesh
+    gels: list[TriangleMesh]
+    emitters: list[Emitter]
+    groups: list[str]
+    light_areas: list[float]
+    fine: dict[int, Piece]
+    ior_before: float
+    media: Media
+    kept: Kept
+
+
+@dataclass
+class Kept:
+    """Shapes worked out from meshes, with the meshes, which are recognised by identity."""
+
+    merged: list[tuple[TriangleMesh, TriangleMesh]] = field(default_factory=list)
+    pieces: list[tuple[TriangleMesh, Piece]] = field(default_factory=list)
+
+    def merge(self, mesh: TriangleMesh, before: Kept, bend: bool = False) -> TriangleMesh:
+        """A part's mesh, its flat faces merged; not if ``bend`` and one of the same faces had
+        none."""
+        known = next((merged for old, merged in before.merged if old is mesh), None)
+        if known is None and bend:
+            bent = (merged is old and same_faces(old, mesh) for old, merged in before.merged)
+            known = mesh if any(bent) else None
+        self.merged.append((mesh, _merged(mesh) if known is None else known))
+        return self.merged[-1][1]
+
+    def piece(self, name: str, mesh: TriangleMesh, surface: Surface, before: Kept) -> Piece:
+        """A mesh and its surface, for ray tracing."""
+        known = next((piece for old, piece in before.pieces if old is mesh), None)
+        if known is None or (known.name, known.surface) != (name, surface):
+            known = _piece(name, mesh, surface)
+        self.pieces.append((mesh, known))
+        return known
+
+
+def assemble(design: SensorDesign, before: Assembly | None = None, bend: bool = False) -> Assembly:
+    """Resolve media, and turn parts and lights into surfaces and emitters.
+
+    Args:
+        design: the sensor.
+        before: the assembly of a similar design, from which what is the same is taken.
+        bend: take boundaries between media along with parts that bend, for drafts.
+
+    Raises:
+        DesignError: solids overlap without priority, or a light is not in the library.
+        MeshError: a solid is not closed.
+    """
+    meshes = design.deformed_meshes()
+    solids, sheets, pieces, fine = [], [], [], {}
+    indices: list[float] = []
+    kept, old = Kept(), Kept() if before is None else before.kept
+    for name, part in design.parts.items():
+        if name not in meshes:
+            raise DesignError(f"part '{name}' has no mesh", where=design.where("parts", name))
+        mesh = kept.merge(meshes[name], old, bend)
+        material = design.materials.get(part.material) if part.material else None
+        if part.role in TRANSPARENT_SOLIDS:
+            assert isinstance(material, Dielectric) and part.material is not None
+            solids.append(
+                Solid(name, mesh, part.material, material.ior, material.roughness, part.priority)
+            )
+        elif part.role is Role.INTERFACE:
+            assert isinstance(material, Dielectric)
+            surface = Surface(SurfaceKind.DIELECTRIC, eta=material.ior, alpha=material.roughness)
+            pieces.append(kept.piece(name, mesh, surface, old))
+        elif part.role is not Role.INDENTER:
+            sheets.append(Sheet(name, mesh, part.role.value))
+    if before is not None and before.media.holds_for(solids, sheets):
+        media = before.media
+    else:
+        bent = before.media.bend(solids, sheets) if before is not None and bend else None
+        media = Media(solids, sheets) if bent is None else bent
+    for face in media.interfaces:
+        surface = Surface(
+            SurfaceKind.DIELECTRIC, eta=face.ior_inside / face.ior_outside, alpha=face.roughness
+        )
+        name = "/".join(face.names) + "|" + face.outside
+        pieces.append(kept.piece(name, face.mesh, surface, old))
+    for sheet in sheets:
+        part = design.parts[sheet.name]
+        ior = _index_before(sheet.mesh, solids)
+        if part.role is Role.SENSING_SURFACE:
+            indices.append(ior)
+            surface = coating_surface(design.coating, ior, Region.SENSING)
+            fine[len(pieces)] = kept.piece(sheet.name, meshes[sheet.name], surface, old)
+        else:
+            surface = _opaque(design.materials.get(part.material or ""), ior)
+        pieces.append(kept.piece(sheet.name, sheet.mesh, surface, old))
+    sensing = [meshes[name] for name in design.parts_of(Role.SENSING_SURFACE)]
+    emitters, areas = _emitters(design)
+    for number, emitter in enumerate(emitters):
+        if emitter.shape is not Shape.POINT:
+            pieces.append(_window(number, emitter))
+    return Assembly(
+        pieces=pieces,
+        sensing=sensing[0] if len(sensing) == 1 else TriangleMesh.joined(sensing),
+        gels=[meshes[name] for name in design.parts_of(Role.ELASTOMER)],
+        emitters=emitters,
+        groups=list(design.lights),
+        light_areas=areas,
+        fine=fine,
+        ior_before=indices[0],
+        media=media,
+        kept=kept,
+    )
+
+
+def coating_surface(coating: Coating, ior: float, region: Region) -> Surface:
+    """The coating as seen from a medium of refractive index ``ior``."""
+    return Surface(
+        SurfaceKind.OPAQUE,
+        alpha=library.specularity_to_roughness(coating.specularity),
+        specularity=coating.specularity,
+        reflectance=coating.reflectance,
+        metal_eta=_relative(coating.eta, ior),
+        metal_k=_relative(coating.k, ior),
+        region=region,
+    )
+
+
+def indenter_piece(mesh: TriangleMesh, coating: Surface) -> Piece:
+    """An indenter that carries the coating."""
+    surface = Surface(**{**coating.__dict__, "region": Region.INDENTER})
+    return Piece("indenter", mesh.vertices, mesh.faces, surface, mesh.normals)
+
+
+def _relative(values: tuple[float, float, float], ior: float) -> tuple[float, float, float]:
+    return values[0] / ior, values[1] / ior, values[2] / ior
+
+
+def _opaque(material: Material | None, ior: float) -> Surface:
+    if isinstance(material, Diffuse):
+        return Surface(SurfaceKind.OPAQUE, alpha=1.0, reflectance=material.reflectance)
+    if isinstance(material, Conductor):
+        kind = SurfaceKind.MIRROR if material.roughness < SMOOTH_METAL else SurfaceKind.OPAQUE
+        return Surface(
+            kind,
+            alpha=material.roughness,
+            specularity=1.0,
+            metal_eta=_relative(material.eta, ior),
+            metal_k=_relative(material.k, ior),
+        )
+    assert material is None or isinstance(material, Absorber)
+    return Surface(SurfaceKind.ABSORBER)
+
+
+def _index_before(mesh: TriangleMesh, solids: list[Solid]) -> float:
+    """Refractive index on the side that the middle face's normal points to."""
+    face = int(np.argmax(mesh.face_areas))
+    probe = (mesh.triangles[face].mean(axis=0) + PROBE * mesh.face_normals[face])[None]
+    around = [solid for solid in solids if inside(probe, solid.mesh)[0]]
+    return max(around, key=lambda solid: solid.priority).ior if around else 1.0
+
+
+def _merged(mesh: TriangleMesh) -> TriangleMesh:
+    """A mesh with flat facets in as few triangles as will do: fewer to trace, fewer to compare."""
+    smooth = mesh if mesh.normals is not None else mesh.vertex_normals()
+    assert smooth.normals is not None
+    bend = np.abs(smooth.normals[smooth.faces] - smooth.face_normals[:, None]).max(axis=(1, 2))
+    if bend.max() < FLAT:
+        return merge_coplanar(mesh)
+    # A curved mesh may still have flat walls; shading normals would be lost, so only these are
+    # merged.
+    return mesh
+
+
+def _piece(name: str, mesh: TriangleMesh, surface: Surface) -> Piece:
+    smooth = mesh if mesh.normals is not None else mesh.vertex_normals()
+    assert smooth.normals is not None
+    corners = smooth.normals[smooth.faces]
+    if np.abs(corners - smooth.face_normals[:, None]).max() < FLAT:
+        return Piece(name, mesh.vertices, mesh.faces, surface)
+    return Piece(name, smooth.vertices, smooth.faces, surface, smooth.normals)
+
+
+@dataclass(frozen=True)
+class _Lamp:
+    """What all lights of a group have in common; ``area`` mm^2 is that of the window."""
+
+    intensity: Intensity | None
+    shape: Shape
+    size: tuple[float, float]
+    area: float
+
+
+def _emitters(design: SensorDesign) -> tuple[list[Emitter], list[float]]:
+    emitters, areas = [], []
+    for number, group in enumerate(design.lights.values()):
+        if group.emitter is None and not library.is_own("light", group.model):
+            lamp = _built_in_lamp(group.model)
+        else:
+            lamp = _lamp(library.emitter(group))
+        for light in group.lights:
+            emitters.append(
+                Emitter(
+                    group=number,
+                    position=light.position,
+                    direction=light.direction,
+                    up=light.up,
+                    shape=lamp.shape,
+                    size=lamp.size,
+                    intensity=lamp.intensity,
+                )
+            )
+            areas.append(float(lamp.area))
+    if not emitters:
+        raise DesignError("the design has no lights", where=design.where("lights"))
+    return emitters, areas
+
+
+@lru_cache(maxsize=64)
+def _built_in_lamp(name: str) -> _Lamp:
+    return _lamp(library.emitter(LightGroup.model_construct(model=name, emitter=None)))
+
+
+def _lamp(model: LightModel) -> _Lamp:
+    if model.kind == "area":
+        shape = Shape.DISC if model.shape == "disc" else Shape.RECTANGLE
+        area = model.size[0] * model.size[1] * (np.pi / 4 if shape is Shape.DISC else 1.0)
+        return _Lamp(None, shape, model.size, area)
+    if model.kind == "spot":
+        return _Lamp(spot_intensity(model.cutoff, model.beam), Shape.POINT, (0.0, 0.0), 0.0)
+    table = model.intensity_table()
+    intensity = Intensity(table.vertical_angles, table.horizontal_angles, table.candela)
+    if np.ptp(table.candela, axis=0).max() <= 1e-9 * table.candela.max():
+        intensity = Intensity(table.vertical_angles, np.zeros(1), table.candela[:1])
+    return _Lamp(intensity, Shape.POINT, (0.0, 0.0), 0.0)
+
+
+def _window(number: int, emitter: Emitter) -> Piece:
+    """The emitting face of a light, facing the way it shines; the same object for the same one."""
+    return _window_of(
+        number, emitter.shape, emitter.size, emitter.position, emitter.direction, emitter.up
+    )
+
+
+@lru_cache(maxsize=1024)
+def _window_of(
+    number: int,
+    shape: Shape,
+    size: tuple[float, float],
+    position: tuple[float, float, float],
+    direction: tuple[float, float, float],
+    up: tuple[float, float, float] | None,
+) -> Piece:
+    s, t, _ = frame_of(direction, up)
+    half = np.array(size) / 2
+    if shape is Shape.DISC:
+        turn = np.arange(DISC_CORNERS) * 2 * np.pi / DISC_CORNERS
+        outline = np.stack([np.cos(turn), np.sin(turn)], axis=1) * half
+    else:
+        outline = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]) * half
+    points = np.asarray(position) + outline[:, :1] * s + outline[:, 1:] * t
+    count = len(points)
+    faces = np.array([[0, k, k + 1] for k in range(1, count - 1)])
+    return Piece(f"light {number}", points, faces, Surface(SurfaceKind.LIGHT, light=number))

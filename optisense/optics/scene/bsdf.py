@@ -1,0 +1,245 @@
+"""What happens to light at a surface: refraction, mirror reflection, and the coating's blend of
+two lobes.
+
+The coating is ``(1 - s)`` times a Lambertian lobe of its reflectance plus ``s`` times a
+metallic GGX lobe (Walter et al. 2007, separable Smith shadowing, sampled by visible normals:
+Heitz 2018) of its complex index.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+
+from optisense.optics.scene.surfaces import Surface
+
+ROW = 16
+# Below this roughness a dielectric is treated as smooth.
+SMOOTH_ALPHA = 1e-3
+
+
+def surface_table(surfaces: list[Surface]) -> mi.Float:
+    """Optical data of all surfaces, ``ROW`` floats each."""
+    return mi.Float(surface_rows(surfaces).ravel())
+
+
+def surface_rows(surfaces: list[Surface]) -> np.ndarray:
+    """(n, 16) float32: kind (as bits), eta, alpha, specularity | reflectance, region | metal
+    eta | metal k.
+    """
+    rows = np.zeros((len(surfaces), ROW), dtype=np.float32)
+    for row, surface in zip(rows, surfaces, strict=True):
+        bits = np.array([int(surface.kind), int(surface.region), surface.light], dtype=np.uint32)
+        row[0], row[7], row[11] = bits.view(np.float32)
+        row[1:4] = surface.eta, surface.alpha, surface.specularity
+        row[4:7] = surface.reflectance
+        row[8:11] = surface.metal_eta
+        row[12:15] = surface.metal_k
+    return rows
+
+
+@dataclass
+class Coating:
+    """Opaque reflectance of hits: per-lane parameters of the blend.
+
+    ``metallic`` is False where it is known that no surface has a metallic lobe, which then is not
+    compiled into kernels.
+    """
+
+    reflectance: mi.Color3f
+    metal_eta: mi.Color3f
+    metal_k: mi.Color3f
+    specularity: mi.Float
+    alpha: mi.Float
+    metallic: bool = True
+
+
+def surface_kind(
+    table: mi.Float, surface: mi.UInt32, active: mi.Bool
+) -> tuple[mi.UInt32, mi.Float, mi.Float]:
+    """kind, eta, alpha of surfaces."""
+    row = dr.gather(mi.Vector4f, table, surface * 4, active)
+    return dr.reinterpret_array(mi.UInt32, row.x), row.y, row.z
+
+
+def surface_region(table: mi.Float, surface: mi.UInt32, active: mi.Bool) -> mi.UInt32:
+    """The region (sensing surface, indenter, other) of surfaces."""
+    return dr.reinterpret_array(mi.UInt32, dr.gather(mi.Float, table, surface * ROW + 7, active))
+
+
+def surface_light(table: mi.Float, surface: mi.UInt32, active: mi.Bool) -> mi.UInt32:
+    """The number of the light whose emitting face a surface is."""
+    return dr.reinterpret_array(mi.UInt32, dr.gather(mi.Float, table, surface * ROW + 11, active))
+
+
+def coating_of(
+    table: mi.Float, surface: mi.UInt32, active: mi.Bool, metallic: bool = True
+) -> Coating:
+    """The reflective parameters of surfaces."""
+    first = dr.gather(mi.Vector4f, table, surface * 4, active)
+    base = dr.gather(mi.Vector4f, table, surface * 4 + 1, active)
+    eta = dr.gather(mi.Vector4f, table, surface * 4 + 2, active)
+    k = dr.gather(mi.Vector4f, table, surface * 4 + 3, active)
+    return Coating(
+        reflectance=mi.Color3f(base.x, base.y, base.z),
+        metal_eta=mi.Color3f(eta.x, eta.y, eta.z),
+        metal_k=mi.Color3f(k.x, k.y, k.z),
+        specularity=first.w,
+        alpha=first.z,
+        metallic=metallic,
+    )
+
+
+def grey(colour: mi.Color3f) -> mi.Float:
+    """The mean of three channels. (``dr.mean`` writes the number of lanes into kernels.)"""
+    return (colour.x + colour.y + colour.z) * (1 / 3)
+
+
+def albedo_of(coating: Coating) -> mi.Color3f:
+    """About how much light the coating sends back, per channel (its metal at normal incidence)."""
+    metal = fresnel_metal(mi.Float(1), coating.metal_eta, coating.metal_k)
+    return coating.reflectance * (1 - coating.specularity) + metal * coating.specularity
+
+
+def fresnel_metal(cosine: mi.Float, eta: mi.Color3f, k: mi.Color3f) -> mi.Color3f:
+    """Unpolarised Fresnel reflectance of a metal, per channel (Born & Wolf, 13.2)."""
+    cos2 = cosine * cosine
+    sin2 = 1 - cos2
+    eta2, k2 = eta * eta, k * k
+    t0 = eta2 - k2 - sin2
+    a2b2 = dr.safe_sqrt(t0 * t0 + 4 * k2 * eta2)
+    a = dr.safe_sqrt(0.5 * (a2b2 + t0))
+    rs = (a2b2 + cos2 - 2 * a * cosine) / (a2b2 + cos2 + 2 * a * cosine)
+    ratio = (cos2 * a2b2 + sin2 * sin2 - 2 * a * cosine * sin2) / (
+        cos2 * a2b2 + sin2 * sin2 + 2 * a * cosine * sin2
+    )
+    return 0.5 * rs * (1 + ratio)
+
+
+def _ggx(cos_m: mi.Float, alpha: mi.Float) -> mi.Float:
+    a2 = alpha * alpha
+    base = cos_m * cos_m * (a2 - 1) + 1
+    return a2 / (dr.pi * base * base)
+
+
+def _smith(cosine: mi.Float, alpha: mi.Float) -> mi.Float:
+    tan2 = (1 - cosine * cosine) / dr.maximum(cosine * cosine, 1e-12)
+    return 2 / (1 + dr.sqrt(1 + alpha * alpha * tan2))
+
+
+def evaluate_coating(
+    coating: Coating,
+    normal: mi.Vector3f,
+    towards_light: mi.Vector3f,
+    towards_eye: mi.Vector3f,
+    reach: mi.Float | None = None,
+) -> mi.Color3f:
+    """BSDF times the cosine at the light, for unit directions away from the surface; 0 below it.
+
+    With ``reach``, the diffuse lobe's cosine is the mean over light whose cosines are spread evenly
+    so far to both sides, of which only what comes from above counts.
+    """
+    cos_i = dr.dot(normal, towards_light)
+    cos_o = dr.dot(normal, towards_eye)
+    lit = (cos_i > 0) & (cos_o > 0)
+    cos_d = cos_i
+    if reach is not None:
+        reach = reach + 1e-9
+        part = dr.maximum(cos_i + reach, 0)
+        cos_d = dr.select(cos_i < reach, part * part / (4 * reach), cos_i)
+    diffuse = dr.select(
+        (cos_d > 0) & (cos_o > 0), coating.reflectance * (dr.inv_pi * cos_d), mi.Color3f(0)
+    )
+    if not coating.metallic:
+        return diffuse
+    half = dr.normalize(towards_light + towards_eye)
+    cos_m = dr.dot(half, normal)
+    lobe = (
+        _ggx(cos_m, coating.alpha)
+        * _smith(cos_i, coating.alpha)
+        * _smith(cos_o, coating.alpha)
+        / (4 * cos_o)
+    )
+    metal = fresnel_metal(dr.abs(dr.dot(half, towards_light)), coating.metal_eta, coating.metal_k)
+    shiny = dr.select(lit, metal * (coating.specularity * lobe), 0.0)
+    return diffuse * (1 - coating.specularity) + shiny
+
+
+def sample_coating(
+    coating: Coating, normal: mi.Vector3f, incoming: mi.Vector3f, pick: mi.Float, sample: mi.Point2f
+) -> tuple[mi.Vector3f, mi.Color3f]:
+    """A scattered direction and its weight, for light that travels along ``incoming``."""
+    frame = mi.Frame3f(normal)
+    local = frame.to_local(-incoming)
+    metallic = pick < coating.specularity
+    half = sample_ggx(local, coating.alpha, sample)
+    reflected = 2 * dr.dot(local, half) * half - local
+    metal = fresnel_metal(dr.dot(local, half), coating.metal_eta, coating.metal_k) * _smith(
+        dr.maximum(reflected.z, 1e-6), coating.alpha
+    )
+    spread = mi.warp.square_to_cosine_hemisphere(sample)
+    outgoing = dr.select(metallic, reflected, spread)
+    weight = dr.select(metallic, metal, coating.reflectance)
+    return frame.to_world(outgoing), dr.select((outgoing.z > 0) & (local.z > 0), weight, 0.0)
+
+
+def sample_ggx(local: mi.Vector3f, alpha: mi.Float, sample: mi.Point2f) -> mi.Vector3f:
+    """A visible GGX normal for a viewer at ``local`` (Heitz 2018, listing 1)."""
+    stretched = dr.normalize(mi.Vector3f(alpha * local.x, alpha * local.y, local.z))
+    length2 = stretched.x * stretched.x + stretched.y * stretched.y
+    inverse = dr.select(length2 > 0, dr.rsqrt(dr.maximum(length2, 1e-20)), 0)
+    t1 = dr.select(
+        length2 > 1e-12,
+        mi.Vector3f(-stretched.y * inverse, stretched.x * inverse, 0),
+        mi.Vector3f(1, 0, 0),
+    )
+    t2 = dr.cross(stretched, t1)
+    disk = mi.warp.square_to_uniform_disk_concentric(sample)
+    s = 0.5 * (1 + stretched.z)
+    y = (1 - s) * dr.safe_sqrt(1 - disk.x * disk.x) + s * disk.y
+    z = dr.safe_sqrt(1 - disk.x * disk.x - y * y)
+    half = t1 * disk.x + t2 * y + stretched * z
+    return dr.normalize(mi.Vector3f(alpha * half.x, alpha * half.y, dr.maximum(half.z, 1e-6)))
+
+
+def refract(
+    incoming: mi.Vector3f, normal: mi.Vector3f, eta: mi.Float
+) -> tuple[mi.Float, mi.Vector3f, mi.Vector3f, mi.Float]:
+    """Ideal interface: reflectance, reflected direction, transmitted direction, relative index.
+
+    ``eta`` is the index behind the normal over the index before it. The relative index is that
+    of the far side over the near side. At total internal reflection the reflectance is 1.
+    """
+    cosine = -dr.dot(incoming, normal)
+    reflectance, cos_t, eta_it, eta_ti = mi.fresnel(cosine, eta)
+    reflected = incoming + normal * (2 * cosine)
+    transmitted = incoming * eta_ti + normal * (cosine * eta_ti + cos_t)
+    return reflectance, dr.normalize(reflected), dr.normalize(transmitted), eta_it
+
+
+def sample_rough_interface(
+    incoming: mi.Vector3f,
+    normal: mi.Vector3f,
+    eta: mi.Float,
+    alpha: mi.Float,
+    pick: mi.Float,
+    sample: mi.Point2f,
+) -> tuple[mi.Vector3f, mi.Float, mi.Bool, mi.Float]:
+    """Rough (GGX) interface: direction, weight, whether it was transmitted, and the relative
+    index.
+    """
+    facing = normal * dr.sign(-dr.dot(incoming, normal))
+    frame = mi.Frame3f(facing)
+    half = frame.to_world(sample_ggx(frame.to_local(-incoming), alpha, sample))
+    inside = dr.dot(facing, normal) < 0
+    relative = dr.select(inside, dr.rcp(eta), eta)
+    reflectance, reflected, transmitted, eta_it = refract(incoming, half, relative)
+    through = pick >= reflectance
+    outgoing = dr.select(through, transmitted, reflected)
+    cosine = dr.dot(outgoing, facing)
+    proper = dr.select(through, cosine < 0, cosine > 0)
+    weight = dr.select(proper, _smith(dr.abs(cosine), alpha), 0.0)
+    return outgoing, weight, through, dr.select(through, eta_it, 1.0)

@@ -1,0 +1,261 @@
+"""Light sources that emit photons: where they sit, how large they are, and how they radiate.
+
+A light is a rectangle, a disc or a point with an angular profile that is rotationally exact: a
+power of the cosine (1 is Lambertian), or a table of radiant intensity over true angles (IES,
+spot). Emission is importance sampled so that every photon carries the same power; a *guide*
+(see ``guide.py``) may redistribute photons towards what matters.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from enum import IntEnum
+from functools import lru_cache
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+from numpy.typing import NDArray
+
+from optisense.optics.scene.surfaces import RAY_OFFSET
+
+FloatArray = NDArray[np.floating]
+
+# Cells of a tabulated profile: polar, of less probability towards the rim, and for each of them
+# azimuthal, of equal probability.
+POLAR_CELLS = 512
+AZIMUTH_CELLS = 128
+ROW = 20
+
+
+class Shape(IntEnum):
+    """Outline of a light's emitting face."""
+
+    POINT = 0
+    RECTANGLE = 1
+    DISC = 2
+
+
+@dataclass(frozen=True)
+class Intensity:
+    """Radiant intensity over the polar angle from the axis and the azimuth.
+
+    polar (n,) degrees ascending from 0; azimuth (m,) degrees, [0] alone if symmetric, else
+    covering 0..360; values (m, n) relative intensity, linear between the given angles, zero
+    beyond the last.
+    """
+
+    polar: FloatArray
+    azimuth: FloatArray
+    values: FloatArray
+
+    def at(self, polar: FloatArray, azimuth: FloatArray) -> FloatArray:
+        """Intensity at angles in degrees (arrays of one shape)."""
+        p = np.clip(np.interp(polar, self.polar, np.arange(len(self.polar))), 0, None)
+        i = np.minimum(p.astype(int), max(len(self.polar) - 2, 0))
+        f = p - i
+        i1 = np.minimum(i + 1, len(self.polar) - 1)
+        if len(self.azimuth) == 1:
+            j = j1 = np.zeros(np.shape(polar), dtype=int)
+            g = np.zeros(np.shape(polar))
+        else:
+            q = np.interp(np.mod(azimuth, 360.0), self.azimuth, np.arange(len(self.azimuth)))
+            j = np.minimum(q.astype(int), len(self.azimuth) - 2)
+            g, j1 = q - j, j + 1
+        low = self.values[j, i] * (1 - f) + self.values[j, i1] * f
+        high = self.values[j1, i] * (1 - f) + self.values[j1, i1] * f
+        inside = (polar >= self.polar[0]) & (polar <= self.polar[-1])
+        return np.where(inside, low * (1 - g) + high * g, 0.0)
+
+
+def spot_intensity(cutoff: float, beam: float) -> Intensity:
+    """A spot: full intensity within ``beam`` degrees of the axis, falling smoothly to 0 at
+    ``cutoff``.
+    """
+    polar = np.unique(np.concatenate([[0.0, beam], np.linspace(beam, cutoff, 65)]))
+    t = np.clip((cutoff - polar) / max(cutoff - beam, 1e-9), 0.0, 1.0)
+    values = (t * t * (3 - 2 * t))[None]
+    return Intensity(polar, np.zeros(1), values)
+
+
+@dataclass(frozen=True)
+class Emitter:
+    """One light. Lengths mm; ``direction`` and ``up`` need not be unit vectors; size is (width,
+    height).
+
+    ``exponent`` is the power of the cosine of a profile without a table.
+    """
+
+    group: int
+    position: tuple[float, float, float]
+    direction: tuple[float, float, float]
+    up: tuple[float, float, float] | None = None
+    shape: Shape = Shape.POINT
+    size: tuple[float, float] = (0.0, 0.0)
+    exponent: float = 1.0
+    intensity: Intensity | None = None
+
+    @property
+    def area(self) -> float:
+        """mm^2 of the emitting face, 0 for a point."""
+        filled = {Shape.POINT: 0.0, Shape.RECTANGLE: 1.0, Shape.DISC: np.pi / 4}[self.shape]
+        return float(self.size[0] * self.size[1] * filled)
+
+    @property
+    def frame(self) -> FloatArray:
+        """(3, 3): width axis, height axis, direction as rows."""
+        return frame_of(self.direction, self.up)
+
+
+@lru_cache(maxsize=4096)
+def frame_of(
+    direction: tuple[float, float, float], up: tuple[float, float, float] | None
+) -> FloatArray:
+    """(3, 3): width axis, height axis and direction of a light, as rows; not to be changed."""
+    n = np.asarray(direction, float)
+    n = n / np.linalg.norm(n)
+    s = np.cross(np.asarray(up if up is not None else (0.0, 0.0, 1.0), float), n)
+    if np.linalg.norm(s) < 1e-6:
+        s = np.cross((1.0, 0.0, 0.0) if abs(n[0]) < 0.9 else (0.0, 1.0, 0.0), n)
+    s = s / np.linalg.norm(s)
+    frame = np.stack([s, np.cross(n, s), n])
+    frame.flags.writeable = False
+    return frame
+
+
+@dataclass
+class EmitterTable:
+    """All lights on the device: ``rows`` of ``ROW`` floats, and the inverse tables of profiles."""
+
+    count: int
+    groups: int
+    rows: mi.Float
+    polar: mi.Float
+    azimuth: mi.Float
+    emitters: list[Emitter] = field(default_factory=list)
+
+
+def inverse_tables(intensity: Intensity) -> tuple[FloatArray, FloatArray]:
+    """Cosines at the borders of cells (POLAR_CELLS+1,), and azimuths / 2 pi (POLAR_CELLS,
+    AZIMUTH_CELLS+1).
+    """
+    fine = 8192
+    # Cells are even in angle near the axis, where narrow beams live, and exact in solid angle.
+    angles = np.linspace(0.0, np.radians(intensity.polar[-1]), fine + 1)
+    edges = np.cos(angles)
+    middle = np.degrees(0.5 * (angles[1:] + angles[:-1]))
+    phi = (np.arange(AZIMUTH_CELLS * 4) + 0.5) * 360.0 / (AZIMUTH_CELLS * 4)
+    if len(intensity.azimuth) == 1:
+        ring = intensity.at(middle, np.zeros(fine))
+    else:
+        ring = np.mean(
+            [
+                intensity.at(middle, np.full(fine, angle))
+                for angle in phi[:: max(1, len(phi) // 128)]
+            ],
+            axis=0,
+        )
+    power = np.concatenate([[0.0], np.cumsum(ring * -np.diff(edges))])
+    power /= power[-1]
+    keep = np.concatenate([[True], np.diff(power) > 0])
+    # Cells get smaller towards the rim, where intensity falls to nothing.
+    share = 1 - (1 - np.linspace(0, 1, POLAR_CELLS + 1)) ** 2
+    cosines = np.interp(share, power[keep], edges[keep])
+    steps = np.linspace(0.0, 1.0, AZIMUTH_CELLS + 1)
+    if len(intensity.azimuth) == 1:
+        return cosines, np.tile(steps, (POLAR_CELLS, 1))
+    rows = np.empty((POLAR_CELLS, AZIMUTH_CELLS + 1))
+    centre = np.degrees(np.arccos(np.clip(0.5 * (cosines[1:] + cosines[:-1]), -1, 1)))
+    for k in range(POLAR_CELLS):
+        values = intensity.at(np.full(len(phi), centre[k]), phi) + 1e-12
+        cdf = np.concatenate([[0.0], np.cumsum(values)]) / values.sum()
+        rows[k] = np.interp(steps, cdf, np.linspace(0, 1, len(cdf)))
+    return cosines, rows
+
+
+def emitter_table(emitters: list[Emitter], groups: int) -> EmitterTable:
+    """Put lights on the device; lights that share an intensity table share its inverse."""
+    rows = np.zeros((len(emitters), ROW), dtype=np.float32)
+    profiles: dict[int, int] = {}
+    polar: list[FloatArray] = []
+    azimuth: list[FloatArray] = []
+    for row, emitter in zip(rows, emitters, strict=True):
+        profile = -1
+        if emitter.intensity is not None:
+            profile = profiles.setdefault(id(emitter.intensity), len(profiles))
+            if profile == len(polar):
+                cosines, turns = inverse_tables(emitter.intensity)
+                polar.append(cosines)
+                azimuth.append(turns.ravel())
+        frame = emitter.frame
+        row[0:3] = emitter.position
+        row[4:7], row[8:11], row[12:15] = frame
+        row[7], row[11] = emitter.size[0] / 2, emitter.size[1] / 2
+        row[15] = emitter.exponent
+        bits = np.array([emitter.group, emitter.shape, profile + 1], dtype=np.uint32)
+        row[3], row[16], row[17] = bits.view(np.float32)
+    if not polar:
+        polar, azimuth = [np.zeros(1)], [np.zeros(1)]
+    return EmitterTable(
+        count=len(emitters),
+        groups=groups,
+        rows=mi.Float(rows.ravel()),
+        polar=mi.Float(np.concatenate(polar).astype(np.float32)),
+        azimuth=mi.Float(np.concatenate(azimuth).astype(np.float32)),
+        emitters=list(emitters),
+    )
+
+
+def profile_direction(
+    table: EmitterTable, profile: mi.UInt32, exponent: mi.Float, sample: mi.Point2f
+) -> mi.Vector3f:
+    """Local direction (axis = +z) of equal-power samples; ``profile`` 0 is a power of the
+    cosine.
+    """
+    tabulated = profile > 0
+    base = dr.maximum(profile, 1) - 1
+    # The inverse of the spacing of cells in ``inverse_tables``.
+    place = (1 - dr.safe_sqrt(1 - sample.x)) * POLAR_CELLS
+    cell = dr.minimum(mi.UInt32(place), POLAR_CELLS - 1)
+    start = base * (POLAR_CELLS + 1) + cell
+    c0 = dr.gather(mi.Float, table.polar, start, tabulated)
+    c1 = dr.gather(mi.Float, table.polar, start + 1, tabulated)
+    cosine = dr.select(
+        tabulated,
+        dr.lerp(c0, c1, place - mi.Float(cell)),
+        dr.power(1 - sample.x, dr.rcp(exponent + 1)),
+    )
+    turn = sample.y * AZIMUTH_CELLS
+    step = dr.minimum(mi.UInt32(turn), AZIMUTH_CELLS - 1)
+    begin = (base * POLAR_CELLS + cell) * (AZIMUTH_CELLS + 1) + step
+    p0 = dr.gather(mi.Float, table.azimuth, begin, tabulated)
+    p1 = dr.gather(mi.Float, table.azimuth, begin + 1, tabulated)
+    phi = dr.two_pi * dr.select(tabulated, dr.lerp(p0, p1, turn - mi.Float(step)), sample.y)
+    sine = dr.safe_sqrt(1 - cosine * cosine)
+    sin_phi, cos_phi = dr.sincos(phi)
+    return mi.Vector3f(sine * cos_phi, sine * sin_phi, cosine)
+
+
+def emit(
+    table: EmitterTable, light: mi.UInt32, angle: mi.Point2f, place: mi.Point2f
+) -> tuple[mi.Point3f, mi.Vector3f, mi.UInt32]:
+    """Start, unit direction and light group of photons of equal power.
+
+    ``light`` is the number of the light, ``angle`` and ``place`` points in the unit square.
+    """
+    a = dr.gather(mi.Vector4f, table.rows, light * 5)
+    b = dr.gather(mi.Vector4f, table.rows, light * 5 + 1)
+    c = dr.gather(mi.Vector4f, table.rows, light * 5 + 2)
+    d = dr.gather(mi.Vector4f, table.rows, light * 5 + 3)
+    e = dr.gather(mi.Vector4f, table.rows, light * 5 + 4)
+    group = dr.reinterpret_array(mi.UInt32, a.w)
+    shape = dr.reinterpret_array(mi.UInt32, e.x)
+    profile = dr.reinterpret_array(mi.UInt32, e.y)
+    s, t, n = (mi.Vector3f(v.x, v.y, v.z) for v in (b, c, d))
+    local = profile_direction(table, profile, d.w, angle)
+    disc = mi.warp.square_to_uniform_disk_concentric(place)
+    square = 2 * place - 1
+    offset = dr.select(shape == int(Shape.DISC), disc, square)
+    point = mi.Point3f(a.x, a.y, a.z) + s * (offset.x * b.w) + t * (offset.y * c.w) + n * RAY_OFFSET
+    direction = s * local.x + t * local.y + n * local.z
+    return mi.Point3f(point), mi.Vector3f(direction), group

@@ -1,0 +1,204 @@
+"""The geometry of a sensor as one ray-traced mesh with a table of faces and a table of surfaces.
+
+All surfaces (interfaces between media, coating, mirrors, blockers, lights, indenters) are
+merged into a single Mitsuba mesh. A hit's triangle number then leads straight to its normal and
+its optical data by two gathers: no virtual function calls in the inner loops, and replacing an
+indenter never changes a compiled kernel.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+from numpy.typing import NDArray
+
+from optisense.optics.scene.bsdf import SMOOTH_ALPHA, surface_table
+from optisense.optics.scene.surfaces import RAY_OFFSET, Surface, SurfaceKind
+
+FloatArray = NDArray[np.floating]
+
+SMOOTH_FACE = 1 << 16
+
+
+@dataclass(frozen=True)
+class Piece:
+    """A triangle mesh with one surface.
+
+    vertices (n, 3) mm, faces (m, 3), corner normals (n, 3) or None for flat facets. Face
+    normals point to the outside of a dielectric.
+    """
+
+    name: str
+    vertices: FloatArray
+    faces: NDArray[np.integer]
+    surface: Surface
+    normals: FloatArray | None = None
+
+    @cached_property
+    def rows(self) -> NDArray[np.float32]:
+        """(m, 4) unit normals, and room for the surface's number."""
+        a, b, c = (self.vertices[self.faces[:, i]] for i in range(3))
+        cross = np.cross(b - a, c - a)
+        length = np.linalg.norm(cross, axis=1)
+        # A triangle without area is never hit; it keeps its place so that numbers stay those of
+        # the piece.
+        rows = np.zeros((len(self.faces), 4), dtype=np.float32)
+        rows[:, :3] = cross / np.where(length > 0, length, 1.0)[:, None]
+        return rows
+
+    @cached_property
+    def corners(self) -> NDArray[np.float32]:
+        """(m, 3, 4) corner normals, on the side of the face normal, and padding."""
+        corners = np.zeros((len(self.faces), 3, 4), dtype=np.float32)
+        if self.normals is not None:
+            corners[:, :, :3] = self.normals[self.faces]
+            against = np.einsum("fck,fk->fc", corners[:, :, :3], self.rows[:, :3]) < 0
+            corners[against] *= -1
+        return corners
+
+    @cached_property
+    def open_edges(self) -> NDArray[np.int64]:
+        """(e, 2) vertices of the edges that one triangle only has, whether vertices are split
+        or not.
+        """
+        _, same = np.unique(np.round(self.vertices, 6), axis=0, return_inverse=True)
+        faces = np.asarray(self.faces, dtype=np.int64)
+        edges = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
+        ends = np.sort(same.reshape(-1)[edges], axis=1)
+        key = ends[:, 0] * len(self.vertices) + ends[:, 1]
+        _, first, counts = np.unique(key, return_index=True, return_counts=True)
+        return edges[first[counts == 1]]
+
+
+@dataclass
+class Hit:
+    """Where rays met a surface. ``normal`` is the face normal, ``shading_normal`` the smooth
+    one.
+    """
+
+    valid: mi.Bool
+    distance: mi.Float
+    point: mi.Point3f
+    normal: mi.Vector3f
+    shading_normal: mi.Vector3f
+    surface: mi.UInt32
+    face: mi.UInt32
+
+
+class RayScene:
+    """A merged mesh for ray tracing, with its tables on the device.
+
+    ``rows`` holds four floats a face: the normal, and surface number (with ``SMOOTH_FACE`` set
+    where the shading normal varies) as bits; ``corners`` twelve floats a face: three corner
+    normals, padded to four.
+    """
+
+    def __init__(
+        self,
+        pieces: list[Piece],
+        numbers: list[int] | None = None,
+        table: mi.Float | None = None,
+        robust: bool = False,
+    ) -> None:
+        """Build the mesh and its acceleration structure.
+
+        Several scenes of one sensor share a ``table`` (see ``surface_table``); ``numbers`` then
+        says which of its surfaces each piece has. By default a scene numbers its own. In a
+        ``robust`` one no ray slips through between two triangles, which takes a little longer.
+        """
+        self.pieces = pieces
+        surfaces = [piece.surface for piece in pieces]
+        numbers = list(range(len(pieces))) if numbers is None else numbers
+        vertices, faces, rows, corners = _merge(pieces, numbers)
+        self.bounds = vertices.min(axis=0), vertices.max(axis=0)
+        self.vertices = vertices
+        self.faces = faces
+        mesh = mi.Mesh("sensor", len(vertices), len(faces))
+        params = mi.traverse(mesh)
+        params["vertex_positions"] = mi.Float(vertices.ravel())
+        params["faces"] = mi.UInt32(faces.ravel())
+        params.update()
+        self.scene = mi.load_dict(
+            {"type": "scene", "sensor": mesh, "embree_use_robust_intersections": robust}
+        )
+        self.rows = mi.Float(rows.ravel())
+        self.corners = mi.Float(corners.ravel())
+        self.table = surface_table(surfaces) if table is None else table
+        self.smooth = any(piece.normals is not None for piece in pieces)
+        self.rough = any(
+            s.kind is SurfaceKind.DIELECTRIC and s.alpha > SMOOTH_ALPHA for s in surfaces
+        )
+
+    def intersect(
+        self, origin: mi.Point3f, direction: mi.Vector3f, active: mi.Bool, coherent: bool = False
+    ) -> Hit:
+        """First hit along rays (unit directions), with normals."""
+        return intersect(self.scene, self.rows, self.corners, origin, direction, active, coherent)
+
+
+def intersect(
+    scene: mi.Scene,
+    rows: mi.Float,
+    corners: mi.Float,
+    origin: mi.Point3f,
+    direction: mi.Vector3f,
+    active: mi.Bool,
+    coherent: bool = False,
+) -> Hit:
+    """First hit of rays with a scene; free function, so that symbolic loops may call it."""
+    found = scene.ray_intersect_preliminary(
+        mi.Ray3f(origin, direction), coherent=coherent, active=active
+    )
+    valid = active & found.is_valid()
+    face = found.prim_index
+    row = dr.gather(mi.Vector4f, rows, face, valid)
+    normal = mi.Vector3f(row.x, row.y, row.z)
+    bits = dr.reinterpret_array(mi.UInt32, row.w)
+    smooth = valid & ((bits & SMOOTH_FACE) != 0)
+    u, v = found.prim_uv.x, found.prim_uv.y
+    n0 = dr.gather(mi.Vector4f, corners, face * 3, smooth)
+    n1 = dr.gather(mi.Vector4f, corners, face * 3 + 1, smooth)
+    n2 = dr.gather(mi.Vector4f, corners, face * 3 + 2, smooth)
+    blended = n0 * (1 - u - v) + n1 * u + n2 * v
+    shading = dr.select(smooth, dr.normalize(mi.Vector3f(blended.x, blended.y, blended.z)), normal)
+    return Hit(
+        valid=valid,
+        distance=found.t,
+        point=mi.Point3f(origin + direction * found.t),
+        normal=normal,
+        shading_normal=shading,
+        surface=bits & (SMOOTH_FACE - 1),
+        face=face,
+    )
+
+
+def leave(point: mi.Point3f, normal: mi.Vector3f, direction: mi.Vector3f) -> mi.Point3f:
+    """Start of a ray from a surface: moved off it to the side that ``direction`` points to."""
+    side = dr.select(dr.dot(direction, normal) > 0, RAY_OFFSET, -RAY_OFFSET)
+    return mi.Point3f(point + normal * side)
+
+
+def _merge(
+    pieces: list[Piece], numbers: list[int]
+) -> tuple[FloatArray, NDArray[np.uint32], NDArray[np.float32], NDArray[np.float32]]:
+    vertices, faces, rows = [], [], []
+    start = 0
+    for number, piece in zip(numbers, pieces, strict=True):
+        bits = number if piece.normals is None else number | SMOOTH_FACE
+        row = piece.rows.copy()
+        row[:, 3] = np.array([bits], dtype=np.uint32).view(np.float32)
+        vertices.append(np.asarray(piece.vertices, dtype=np.float32))
+        faces.append(np.asarray(piece.faces, dtype=np.uint32) + np.uint32(start))
+        rows.append(row)
+        start += len(piece.vertices)
+    corners = [piece.corners for piece in pieces]
+    return (
+        np.concatenate(vertices),
+        np.concatenate(faces),
+        np.concatenate(rows),
+        np.concatenate(corners),
+    )

@@ -1,0 +1,188 @@
+"""Chief rays: where on the sensing surface each pixel looks, refracted and reflected ideally."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import IntEnum
+from typing import Any
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+from numpy.typing import NDArray
+
+from optisense.errors import RenderError
+from optisense.optics.camera.projection import RayCamera
+from optisense.optics.scene.bsdf import refract, surface_kind, surface_region
+from optisense.optics.scene.ray_scene import RayScene, intersect, leave
+from optisense.optics.scene.surfaces import Region, SurfaceKind
+
+MAX_DEPTH = 32
+
+
+class Outcome(IntEnum):
+    """What became of a chief ray."""
+
+    HIT = 0  # reached the sensing surface (or an indenter pressed into it)
+    ESCAPED = 1  # left the sensor
+    ABSORBED = 2  # ended on a blocker, a light, or another opaque surface
+    TOTAL_REFLECTION = 3  # was totally reflected on its way and did not reach the surface
+    DEPTH_LIMIT = 4  # still on its way after MAX_DEPTH surfaces
+
+
+@dataclass(frozen=True)
+class ChiefRays:
+    """One chief ray a pixel; arrays are (h, w, ...). Entries other than ``outcome`` count where
+    it is HIT.
+
+    points: mm; normals: unit, towards the ray; incidence: cosine of the angle between ray and
+    normal (1 is perpendicular); directions: unit, the way the ray travels when it arrives;
+    face: triangle of the sensing surface hit, in the order of its mesh; region: 1 sensing
+    surface, 2 indenter.
+    """
+
+    points: NDArray[np.float32]
+    normals: NDArray[np.float32]
+    directions: NDArray[np.float32]
+    incidence: NDArray[np.float32]
+    outcome: NDArray[np.uint8]
+    face: NDArray[np.int64]
+    region: NDArray[np.uint8]
+
+    @property
+    def hit(self) -> NDArray[np.bool_]:
+        """(h, w): which pixels see the sensing surface."""
+        return self.outcome == Outcome.HIT
+
+    @property
+    def contact_mask(self) -> NDArray[np.bool_]:
+        """(h, w): which pixels see an indenter."""
+        return self.hit & (self.region == Region.INDENTER)
+
+
+@dr.syntax
+def _trace(
+    scene: mi.Scene,
+    rows: mi.Float,
+    corners: mi.Float,
+    surfaces: mi.Float,
+    origin: mi.Point3f,
+    direction: mi.Vector3f,
+    limit: mi.UInt32,
+) -> tuple[Any, ...]:
+    active = mi.Bool(True)
+    depth = mi.UInt32(0)
+    outcome = mi.UInt32(int(Outcome.DEPTH_LIMIT))
+    total = mi.Bool(False)
+    point = mi.Point3f(0)
+    normal = mi.Vector3f(0)
+    region = mi.UInt32(0)
+    face = mi.UInt32(0)
+    while active:
+        hit = intersect(scene, rows, corners, origin, direction, active, True)
+        kind, eta, _alpha = surface_kind(surfaces, hit.surface, hit.valid)
+        where = surface_region(surfaces, hit.surface, hit.valid)
+        opaque = hit.valid & (kind == int(SurfaceKind.OPAQUE))
+        arrived = opaque & (where != int(Region.OTHER))
+        ended = (
+            hit.valid
+            & ~arrived
+            & (opaque | (kind == int(SurfaceKind.ABSORBER)) | (kind == int(SurfaceKind.LIGHT)))
+        )
+        outcome = dr.select(active & ~hit.valid, int(Outcome.ESCAPED), outcome)
+        outcome = dr.select(ended, int(Outcome.ABSORBED), outcome)
+        outcome = dr.select(arrived, int(Outcome.HIT), outcome)
+        side = -dr.sign(dr.dot(direction, hit.normal))
+        point = dr.select(arrived, hit.point, point)
+        normal = dr.select(arrived, hit.shading_normal * side, normal)
+        region = dr.select(arrived, where, region)
+        face = dr.select(arrived, hit.face, face)
+        active &= hit.valid & ~arrived & ~ended
+        reflectance, reflected, transmitted, _relative = refract(direction, hit.shading_normal, eta)
+        mirror = kind == int(SurfaceKind.MIRROR)
+        totally = active & ~mirror & (reflectance >= 1)
+        total |= totally
+        turned = dr.select(mirror | totally, reflected, transmitted)
+        direction = dr.select(active, turned, direction)
+        origin = dr.select(active, leave(hit.point, hit.normal, direction), origin)
+        depth += 1
+        active &= depth < limit
+    failed = total & (outcome != int(Outcome.HIT))
+    outcome = dr.select(failed, int(Outcome.TOTAL_REFLECTION), outcome)
+    return outcome, point, normal, direction, region, face
+
+
+def trace_chief_rays(
+    scene: RayScene, camera: RayCamera, sensing_faces: NDArray[np.int64] | None = None
+) -> ChiefRays:
+    """Follow the ray through the middle of every pixel.
+
+    ``sensing_faces`` maps the scene's triangles to those of the sensing surface (-1, as for any
+    triangles that follow: another); without it ``face`` is -1 everywhere.
+    """
+    shape = camera.height, camera.width
+    index = dr.arange(mi.UInt32, camera.width * camera.height)
+    x = mi.Float(index % camera.width) + 0.5
+    y = mi.Float(index // camera.width) + 0.5
+    origin, direction = camera.rays(x, y)
+    outcome, point, normal, arriving, region, face = _trace(
+        scene.scene,
+        scene.rows,
+        scene.corners,
+        scene.table,
+        origin,
+        direction,
+        dr.opaque(mi.UInt32, MAX_DEPTH),
+    )
+    incidence = -dr.dot(arriving, normal)
+    if sensing_faces is None:
+        sensing_faces = np.zeros(0, dtype=np.int64)
+    dr.eval(outcome, point, normal, arriving, region, face, incidence)
+
+    def image(values: object) -> NDArray[np.float32]:
+        return np.asarray(values, dtype=np.float32).T.reshape(*shape, 3)
+
+    return ChiefRays(
+        points=image(point),
+        normals=image(normal),
+        directions=image(arriving),
+        incidence=np.asarray(incidence, dtype=np.float32).reshape(shape),
+        outcome=np.asarray(outcome).astype(np.uint8).reshape(shape),
+        face=np.append(sensing_faces, -1)[np.minimum(np.asarray(face), len(sensing_faces))].reshape(
+            shape
+        ),
+        region=np.asarray(region).astype(np.uint8).reshape(shape),
+    )
+
+
+def pixel_areas(rays: ChiefRays) -> NDArray[np.float64]:
+    """(h, w) mm^2 of surface behind each pixel, from its neighbours' points; 0 where these do
+    not hit.
+    """
+    p = rays.points.astype(np.float64)
+    along_x = np.zeros_like(p)
+    along_y = np.zeros_like(p)
+    along_x[:, 1:-1] = (p[:, 2:] - p[:, :-2]) / 2
+    along_x[:, 0], along_x[:, -1] = p[:, 1] - p[:, 0], p[:, -1] - p[:, -2]
+    along_y[1:-1] = (p[2:] - p[:-2]) / 2
+    along_y[0], along_y[-1] = p[1] - p[0], p[-1] - p[-2]
+    area = np.linalg.norm(np.cross(along_x, along_y), axis=2)
+    hit = rays.hit
+    whole = hit.copy()
+    whole[:, 1:] &= hit[:, :-1]
+    whole[:, :-1] &= hit[:, 1:]
+    whole[1:] &= hit[:-1]
+    whole[:-1] &= hit[1:]
+    return np.where(whole, area, 0.0)
+
+
+def sees_nothing(rays: ChiefRays) -> RenderError:
+    """The error to raise where no chief ray meets the sensing surface; says what became of them."""
+    names = {outcome: outcome.name.lower().replace("_", " ") for outcome in Outcome}
+    counts = {names[o]: int((rays.outcome == o).sum()) for o in Outcome}
+    met = ", ".join(f"{name}: {count}" for name, count in counts.items() if count)
+    return RenderError(
+        "the camera sees nothing of the sensing surface",
+        where=f"of {rays.outcome.size} rays, {met}",
+        hint="Check the camera's position, direction and field of view, and what is in its way",
+    )
