@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from optisense import Contact, OpticalModel, Plane
-from optisense.optics.imaging.cached import cached as imaging
+from optisense.optics.imaging import cached
 from optisense.sensors import BUILDERS
 
 
@@ -16,11 +16,11 @@ def test_noise_is_grainy_and_slopes_edges_of_the_mask_and_darkness_are_not() -> 
     image[10:30, 10:30] *= 1 + 0.05 * random.normal(size=(20, 20))
     image[:, 60:] = 0.005 * random.random((60, 20))
     where = (x < 75) & (y > 2)
-    found = imaging._grainy(image.astype(np.float32), where)
+    found = cached._grainy(image.astype(np.float32), where)
     assert found[14:26, 14:26].all()
     assert not found[36:, :50].any()
     assert not found[:, 66:].any()
-    assert not imaging._grainy(image.astype(np.float32), np.zeros_like(where)).any()
+    assert not cached._grainy(image.astype(np.float32), np.zeros_like(where)).any()
 
 
 def test_a_contact_may_fill_the_picture() -> None:
@@ -42,10 +42,10 @@ def test_an_untouched_gel_has_less_grain_than_one_camera_sample_a_pixel_would_sh
         return float(np.abs(np.diff(image, n=2, axis=1)).mean() / image.mean())
 
     often = grain()
-    usual = imaging._grainy
+    usual = cached._grainy
     try:
-        imaging._grainy = lambda image, where: np.zeros_like(where)
+        cached._grainy = lambda image, where: np.zeros_like(where)
         once = grain()
     finally:
-        imaging._grainy = usual
+        cached._grainy = usual
     assert often < 0.9 * once  # the rest is noise of photons
