@@ -103,6 +103,7 @@ def render(
     from optisense.cli.placing import place_contacts
     from optisense.optics import OpticalModel
     from optisense.report import write_report
+    from optisense.report.camera_rays import CameraRays
 
     with _progress_bar() as show:
         model = OpticalModel(sensor, variant=variant)
@@ -131,6 +132,7 @@ def render(
         contacts,
         exposure=brightness,
         indenters=place_contacts(model, contacts),
+        rays=CameraRays.of(model),
     )
     _say_what_came(image, out)
     if image.interrupted:

@@ -55,15 +55,20 @@ def report(
         if page.is_dir():
             raise typer.BadParameter(f"'{page}' is a folder", param_hint="--out")
         ensure_writable(page.parent)
-        looks = _looks(opened, photons) if pictures else {}
+        looks = _looks(opened, photons, pictures)
         write_study_report(page, opened, looks)
     finally:
         opened.close()
     output.print(f"report: {page}", markup=False)
 
 
-def _looks(study: Study, photons: int) -> dict[str, Look]:
-    """Pictures of the start and of the best trial."""
+def _looks(study: Study, photons: int, pictures: bool) -> dict[str, Look]:
+    """Chief rays of the start and of the best trial, and pictures where they are asked for.
+
+    Raises:
+        SetupError: the renderer can't run on this machine, and pictures are asked for.
+    """
+    from optisense.errors import SetupError
     from optisense.report.before_after import look
 
     designs = {"before": study.space.design}
@@ -71,7 +76,14 @@ def _looks(study: Study, photons: int) -> dict[str, Look]:
     if best is not None:
         designs["after"] = best.design
     found = {}
+    verb = "rendering" if pictures else "tracing the rays of"
     for label, design in designs.items():
-        with messages.status(f"rendering the sensor {label} the search"):
-            found[label] = look(design, study.settings.settings, photons=photons)
+        with messages.status(f"{verb} the sensor {label} the search"):
+            try:
+                settings = study.settings.settings
+                found[label] = look(design, settings, pictures=pictures, photons=photons)
+            except SetupError:
+                if pictures:
+                    raise
+                return {}
     return found

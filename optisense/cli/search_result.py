@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -10,6 +11,9 @@ from optisense.cli.console import messages, output
 
 if TYPE_CHECKING:
     from optisense.search import Result, Study, Trial
+
+MOST_CAUSES = 4
+"""Causes of failure that are printed; the report lists more."""
 
 MOST_VALUES = 12
 """Parameters of the best trial that are printed; all are in the study."""
@@ -59,7 +63,7 @@ def print_result(result: Result, out: Path) -> None:
     best, start = study.best, study.start
     failed = [trial for trial in result.trials if trial.failure is not None]
     if failed:
-        output.print(f"{len(failed)} trials failed; the last: {failed[-1].failure}", markup=False)
+        output.print(_failures(failed), markup=False)
     if best is None:
         output.print("no trial has a score yet")
         return
@@ -88,6 +92,18 @@ def print_result(result: Result, out: Path) -> None:
         output.print("no trial is better than the start")
     elif not result.interrupted:
         output.print(f"Take it:  optisense apply {out} --trial best --out better", style="dim")
+
+
+def _failures(failed: Sequence[Trial]) -> str:
+    """How many trials failed, and the commonest causes."""
+    from optisense.search.failures import by_cause
+
+    causes = by_cause((trial.number, trial.failure or "") for trial in failed)
+    lines = [f"{len(failed)} {'trial' if len(failed) == 1 else 'trials'} failed:"]
+    lines += [f"  {len(each.numbers)}  {each.text}" for each in causes[:MOST_CAUSES]]
+    if len(causes) > MOST_CAUSES:
+        lines.append(f"  and {len(causes) - MOST_CAUSES} more causes")
+    return "\n".join(lines)
 
 
 def _beside(study: Study, best: Trial, start: Trial | None) -> list[str]:

@@ -76,12 +76,11 @@ def section(design: SensorDesign) -> Section:
     right, up, forward = camera.axes()
     origin = np.asarray(camera.position, dtype=np.float64)
     meshes = design.deformed_meshes()
-    sensed = [meshes[name].vertices for name in design.parts_of(Role.SENSING_SURFACE)]
-    points = np.concatenate(sensed) if sensed else design.bounds()
-    across = right if np.ptp(points @ right) >= np.ptp(points @ up) else up
+    is_wide = along_rows(design)
+    across = right if is_wide else up
     normal = np.cross(across, forward)
     width, height = camera.resolution
-    share = 1.0 if across is right else height / width
+    share = 1.0 if is_wide else height / width
     half = np.radians(camera.fov / 2)
     if camera.projection == "equidistant":
         half_angle = share * half
@@ -113,6 +112,15 @@ def section(design: SensorDesign) -> Section:
         across=across,
         along=forward,
     )
+
+
+def along_rows(design: SensorDesign) -> bool:
+    """Whether the section runs along the rows of the picture, else along its columns."""
+    right, up, _ = design.camera.axes()
+    meshes = design.deformed_meshes()
+    sensed = [meshes[name].vertices for name in design.parts_of(Role.SENSING_SURFACE)]
+    points = np.concatenate(sensed) if sensed else design.bounds()
+    return bool(np.ptp(points @ right) >= np.ptp(points @ up))
 
 
 def cut(mesh: TriangleMesh, origin: FloatArray, normal: FloatArray) -> list[FloatArray]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from html import escape
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -26,6 +26,8 @@ DOT = 3.2
 """Pixels, radius of a light."""
 
 INK = "#1c232b"
+RAY, LOST_RAY = "#7a3fb8", "#8d97a3"
+"""Colours of chief rays that reach the sensing surface, and of those that do not."""
 
 
 class _Label(NamedTuple):
@@ -34,10 +36,27 @@ class _Label(NamedTuple):
     y: float
 
 
-def section_svg(design: SensorDesign) -> str:
+class DrawnRay(NamedTuple):
+    """A chief ray to draw.
+
+    Attributes:
+        points: (n, 3) mm in the design's frame: the camera, where it is refracted or reflected, and
+            where it ends.
+        arrived: whether it ends on the sensing surface.
+    """
+
+    points: FloatArray
+    arrived: bool
+
+
+def section_svg(design: SensorDesign, rays: Sequence[DrawnRay] = ()) -> str:
     """A labelled section through a design as an SVG element.
 
-    The camera's view runs upward. Lights are moved into the plane of the section.
+    The camera's view runs upward. Lights and rays are moved into the plane of the section.
+
+    Args:
+        design: the sensor.
+        rays: chief rays of the camera to draw, if any.
     """
     found = section(design)
     low, high = found.bounds
@@ -68,7 +87,14 @@ def section_svg(design: SensorDesign) -> str:
             shapes.append(f'<path d="{path}" fill="none" stroke="{INK}" stroke-width="2.2"/>')
         x, y = _anchor(lines, solid)
         labels.append(_Label(outline.name.replace("_", " "), x, y))
+    column = 2 * MARGIN + width
     shapes += _camera(found, place, scale)
+    if rays:
+        ways = [place(_flat(ray.points, found)) for ray in rays]
+        shapes.append(_rays(ways, [ray.arrived for ray in rays], column))
+        arrived = [way for way, ray in zip(ways, rays, strict=True) if ray.arrived]
+        x, y = (arrived or ways)[len(arrived or ways) // 2][:2].mean(axis=0)
+        labels.append(_Label(f"{len(arrived)} of {len(rays)} rays reach the skin", x, y))
     x, y = place(found.camera)
     labels.append(_Label(f"camera, {design.camera.fov:.3g}° across", x, y))
     colours: dict[tuple[float, float], list[str]] = {}
@@ -83,7 +109,6 @@ def section_svg(design: SensorDesign) -> str:
         labels.append(_Label(f"{name} lights", x, y))
     shapes += [_light(x, y, there) for (x, y), there in colours.items()]
 
-    column = 2 * MARGIN + width
     tall = max(height + 2 * MARGIN, LINE * len(labels) + 2 * MARGIN) + 16
     shapes += _labels(labels, column, tall - 16)
     shapes.append(_scale_bar(scale, width, tall))
@@ -178,6 +203,22 @@ def _camera(found: Section, place: Callable[[FloatArray], FloatArray], scale: fl
     ]
     shapes.append(f'<circle cx="{x:.1f}" cy="{y:.1f}" r="4" fill="{INK}"/>')
     return shapes
+
+
+def _flat(points: FloatArray, found: Section) -> FloatArray:
+    """(n, 2): points (n, 3) moved into the plane of a section."""
+    return np.stack([points @ found.across, points @ found.along], axis=-1)
+
+
+def _rays(ways: list[FloatArray], arrived: list[bool], column: float) -> str:
+    """Polylines, cut off where the labels begin; rays that do not arrive are dashed."""
+    seen, lost = f'stroke="{RAY}"', f'stroke="{LOST_RAY}" stroke-dasharray="3 3"'
+    lines = "".join(
+        f'<path d="{_path(way)}" {seen if hit else lost}/>'
+        for way, hit in zip(ways, arrived, strict=True)
+    )
+    style = 'fill="none" stroke-width="0.9" stroke-opacity="0.85"'
+    return f'<svg width="{column - 8:.0f}" height="100%"><g {style}>{lines}</g></svg>'
 
 
 def _scale_bar(scale: float, width: float, tall: float) -> str:

@@ -9,6 +9,8 @@ from typing import Any
 
 import numpy as np
 
+from optisense.objectives.score import deviation_of
+
 SURE = 0.95
 """How sure a difference must be before two values count as different (one-sided t test)."""
 
@@ -21,7 +23,7 @@ def spread(values: Sequence[float | None]) -> Spread:
     there = [float(value) for value in values if value is not None and math.isfinite(value)]
     return {
         "mean": float(np.mean(there)) if there else None,
-        "standard_deviation": float(np.std(there, ddof=1)) if len(there) > 1 else None,
+        "standard_deviation": deviation_of(there) if len(there) > 1 else None,
         "values": [None if v is None or not math.isfinite(v) else float(v) for v in values],
     }
 

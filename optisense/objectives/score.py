@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import html
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
@@ -14,6 +14,11 @@ from optisense.errors import ObjectiveError
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+ROUNDING = 1e-9
+"""Values that differ by a smaller part of themselves count as the same. Scores of the same rays
+differ by about 1e-15 of themselves, the rounding of double precision; those of other random numbers
+by more than 1e-6."""
 
 Drawing = Callable[["Score"], "Figure"]
 """Makes the figure of a score."""
@@ -87,6 +92,25 @@ class Score:
                 rows.append((html.escape(key.replace("_", " ")), html.escape(shown_number(value))))
         body = "".join(f"<tr><th>{key}</th><td>{value}</td></tr>" for key, value in rows)
         return f"<table>{body}</table>"
+
+
+def deviation_of(values: Sequence[float]) -> float:
+    """The standard deviation of a sample.
+
+    It is exactly 0 where all values are the same but for rounding, as those of an objective are
+    that draws no random numbers.
+
+    Args:
+        values: finite numbers.
+
+    Returns:
+        The deviation, by n - 1; NaN for fewer than two values.
+    """
+    if len(values) < 2:
+        return math.nan
+    if np.ptp(values) <= ROUNDING * np.abs(values).max():
+        return 0.0
+    return float(np.std(values, ddof=1))
 
 
 def json_ready(value: Any) -> Any:

@@ -10,7 +10,7 @@ import numpy as np
 
 from optisense.design import SensorDesign
 from optisense.objectives.evaluation import Evaluation
-from optisense.objectives.score import Score, json_ready
+from optisense.objectives.score import Score, deviation_of, json_ready
 
 
 @dataclass(frozen=True)
@@ -56,7 +56,7 @@ class Scored:
     def spread(self, name: str) -> float | None:
         """Standard deviation over seeds (of a sample); None for fewer than two."""
         values = self.values(name)
-        return float(np.std(values, ddof=1)) if len(values) > 1 else None
+        return deviation_of(values) if len(values) > 1 else None
 
     def failed(self) -> bool:
         """Whether any score of any seed failed."""

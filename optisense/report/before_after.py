@@ -1,18 +1,23 @@
-"""What a search has changed: pictures, coverage and numbers of two designs, side by side."""
+"""How a design looks from its camera: a picture, its chief rays, and how they distort."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from optisense.design import SensorDesign
 from optisense.errors import OptiSenseError, SetupError
-from optisense.geometry import Sphere
+from optisense.geometry import Contact, Sphere
 from optisense.objectives import Evaluation, Settings, evaluate
+from optisense.report.balls import Ball, find_balls
+from optisense.report.camera_rays import CameraRays
+
+if TYPE_CHECKING:
+    from optisense.optics import OpticalModel
 
 PHOTONS = 1_000_000
 """Of a picture on the page: enough to look at."""
@@ -20,21 +25,55 @@ PHOTONS = 1_000_000
 ACROSS = 320
 """Pixels across a picture."""
 
+STRETCHED = 90.0
+"""Percentile of the pixels' stretching that stands for the worst tenth."""
+
+
+@dataclass(frozen=True)
+class RayFigures:
+    """What chief rays alone tell of a design; NaN where it can't be told.
+
+    Attributes:
+        aoap: the score.
+        coverage: part of the sensing surface's triangles that the camera sees.
+        upright: mean cosine between ray and surface normal, over all pixels.
+        seeing: part of the pixels that see the surface.
+        evenness: the score 2to3PW.
+        stretching: median over the pixels of how much longer than wide a small circle of the
+            picture is on the surface; 1 is undistorted.
+        worst_stretching: the same, exceeded by a tenth of the pixels.
+        map: (h, w) the stretching of each pixel, NaN where there is none.
+    """
+
+    aoap: float
+    coverage: float
+    upright: float
+    seeing: float
+    evenness: float
+    stretching: float
+    worst_stretching: float
+    map: NDArray[np.float64] = field(repr=False)
+
 
 @dataclass(frozen=True)
 class Look:
-    """How a design looks from its camera.
+    """How a design looks from its camera. What could not be worked out, or was not asked for, is
+    None.
 
     Attributes:
-        picture: (h, w, 3) uint8, with nine balls pressed in; None where it can't be rendered.
-        coverage: part of the sensing surface's triangles that the camera sees; None likewise.
-        facts: more numbers, by name.
+        picture: (h, w, 3) uint8, with nine balls pressed in.
+        balls: where the picture shows each of them.
+        pressed: radius and depth of the balls, mm.
+        figures: of the chief rays.
+        rays: chief rays to draw.
         failure: why something is missing.
     """
 
     picture: NDArray[np.uint8] | None = None
-    coverage: float | None = None
-    facts: Mapping[str, float] = field(default_factory=dict)
+    balls: tuple[Ball, ...] = ()
+    pressed: tuple[float, float] | None = None
+    figures: RayFigures | None = None
+    rays: CameraRays | None = None
     failure: str | None = None
 
 
@@ -42,15 +81,17 @@ def look(
     design: SensorDesign,
     settings: Mapping[str, Any] | None = None,
     *,
+    pictures: bool = True,
     photons: int = PHOTONS,
     seed: int = 0,
 ) -> Look:
-    """Render a design with the balls that its objectives press into it.
+    """Trace a design's chief rays, and render it with the balls that its objectives press into it.
 
     Args:
         design: the sensor.
         settings: of the objectives, whose ball, depth and resolution of the rays are taken.
-        photons: to trace.
+        pictures: whether to render; the rays alone take a tenth of a second.
+        photons: to trace for the picture.
         seed: of the light.
 
     Raises:
@@ -60,23 +101,54 @@ def look(
 
     taken = ("radius", "depth", "ray_resolution")
     shared = Settings(**{key: value for key, value in (settings or {}).items() if key in taken})
-    width, height = design.camera.resolution
-    size = ACROSS, max(1, round(ACROSS * height / width))
+    found: dict[str, Any] = {}
     try:
         model = OpticalModel(design)
-        score = evaluate(Evaluation(model, shared), "aoap")
-        if score.failure is not None:
-            return Look(failure=score.failure)
-        facts = {
-            "upright rays (mean cosine)": score.parts["mean_cosine"],
-            "pixels that see the surface": score.parts["pixels_that_see_the_surface"],
-        }
-        contacts = model.nine_contacts(Sphere(shared.radius), shared.depth)
-        image = model.render(contacts, resolution=size, photons=photons, seed=seed)
+        found["rays"] = CameraRays.of(model)
+        found["figures"] = ray_figures(Evaluation(model, shared))
+        if pictures:
+            contacts = model.nine_contacts(Sphere(shared.radius), shared.depth)
+            found["pressed"] = shared.radius, shared.depth
+            found["picture"], found["balls"] = _picture(model, contacts, photons, seed)
     except SetupError:
         raise
     except OptiSenseError as error:
-        return Look(failure=str(error))
+        return Look(**found, failure=str(error))
+    return Look(**found)
+
+
+def ray_figures(evaluation: Evaluation) -> RayFigures:
+    """What the chief rays of a sensor tell.
+
+    Raises:
+        RenderError, ObjectiveError: they can't be traced.
+    """
+    from optisense.optics.chief_rays import pixel_stretching
+
+    scores = evaluate(evaluation, ["aoap", "2to3pw"])
+    parts = scores["aoap"].parts
+    stretching = pixel_stretching(evaluation.chief_rays)
+    known = stretching[np.isfinite(stretching)]
+    middle, worst = np.percentile(known, [50.0, STRETCHED]) if len(known) else (np.nan, np.nan)
+    return RayFigures(
+        aoap=scores["aoap"].value,
+        coverage=parts.get("coverage", np.nan),
+        upright=parts.get("mean_cosine", np.nan),
+        seeing=parts.get("pixels_that_see_the_surface", np.nan),
+        evenness=scores["2to3pw"].value,
+        stretching=float(middle),
+        worst_stretching=float(worst),
+        map=stretching,
+    )
+
+
+def _picture(
+    model: OpticalModel, contacts: list[Contact], photons: int, seed: int
+) -> tuple[NDArray[np.uint8], tuple[Ball, ...]]:
+    width, height = model.design.camera.resolution
+    size = ACROSS, max(1, round(ACROSS * height / width))
+    image = model.render(contacts, resolution=size, photons=photons, seed=seed)
     if image.interrupted:
         raise KeyboardInterrupt
-    return Look(image.picture(), score.parts["coverage"], facts)
+    places = np.array([contact.point for contact in contacts], dtype=np.float64)
+    return image.picture(), find_balls(image.points, image.contact_mask, places)

@@ -19,6 +19,7 @@ from optisense.design import LightGroup, SensorDesign
 from optisense.geometry import Contact, TriangleMesh
 from optisense.optics.camera.response import auto_exposure, encode
 from optisense.report import tables
+from optisense.report.camera_rays import CameraRays
 from optisense.report.files import template
 from optisense.report.pictures import data_uri, mask_overlay, normal_colours
 from optisense.report.scene_view import scene_data
@@ -64,6 +65,7 @@ def write_report(
     *,
     exposure: float | Literal["auto"] = "auto",
     indenters: Mapping[str, TriangleMesh] | None = None,
+    rays: CameraRays | None = None,
 ) -> Path:
     """Write a render as one self-contained HTML page.
 
@@ -74,6 +76,7 @@ def write_report(
         contacts: what touched it.
         exposure: of the picture, as for `TactileImage.picture`.
         indenters: the contacts' shapes in the design's frame (mm), drawn in the 3-D view.
+        rays: chief rays of the camera (`CameraRays.of` a model), drawn there too.
 
     Returns:
         The path.
@@ -82,7 +85,7 @@ def write_report(
         OutputError: the file can't be written.
     """
     path = Path(path)
-    page = render_page(design, image, contacts, exposure=exposure, indenters=indenters)
+    page = render_page(design, image, contacts, exposure=exposure, indenters=indenters, rays=rays)
     write_text(path, page)
     return path
 
@@ -94,6 +97,7 @@ def render_page(
     *,
     exposure: float | Literal["auto"] = "auto",
     indenters: Mapping[str, TriangleMesh] | None = None,
+    rays: CameraRays | None = None,
 ) -> str:
     """The page of `write_report` as text."""
     height, width = image.contact_mask.shape
@@ -121,7 +125,7 @@ def render_page(
         sourced=sourced,
         version=__version__,
         css=Markup(template("report.css")),
-        scene=_json(scene_data(design, dict(indenters or {}))),
+        scene=_json(scene_data(design, dict(indenters or {}), rays)),
         picture_script=Markup(template("picture.js")),
         viewer_script=Markup(template("viewer.js")),
     )

@@ -12,6 +12,10 @@ from numpy.typing import NDArray
 FloatArray = NDArray[np.floating]
 ByteArray = NDArray[np.uint8]
 
+MOST_STRETCHED = 4.0
+"""Where the scale of stretching ends: a ball that looks four times as long as wide is hardly a ball
+any more, and finer differences beyond that matter little."""
+
 
 def png(picture: ByteArray) -> bytes:
     """A PNG file of a picture.
@@ -59,6 +63,23 @@ def normal_colours(normals: FloatArray, axes: NDArray[np.float64]) -> ByteArray:
     seen = np.where(seen[..., 2:] < 0, -seen, seen)
     colours = np.round((0.5 + 0.5 * np.clip(seen, -1, 1)) * 255).astype(np.uint8)
     colours[~valid] = 0
+    return colours
+
+
+def stretching_colours(stretching: FloatArray) -> ByteArray:
+    """A map of how pixels are stretched: dark blue is undistorted, yellow `MOST_STRETCHED` or more.
+
+    Args:
+        stretching: (h, w), 1 or more; NaN, drawn black, where nothing is seen.
+
+    Returns:
+        (h, w, 3) uint8.
+    """
+    from matplotlib import colormaps
+
+    share = np.clip((np.nan_to_num(stretching, nan=1.0) - 1.0) / (MOST_STRETCHED - 1.0), 0.0, 1.0)
+    colours: ByteArray = np.round(255 * colormaps["viridis"](share)[..., :3]).astype(np.uint8)
+    colours[~np.isfinite(stretching)] = 0
     return colours
 
 

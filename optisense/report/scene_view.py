@@ -12,6 +12,7 @@ from optisense.design import LightGroup, SensorDesign
 from optisense.design.looks import ROLE_LOOKS
 from optisense.errors import OptiSenseError
 from optisense.geometry import TriangleMesh
+from optisense.report.camera_rays import CameraRays
 from optisense.report.edges import feature_edges
 
 CREASE = 35.0
@@ -24,16 +25,21 @@ MARKER_SIZE = 0.35
 """Radius (mm) at which lights without an emitting window are drawn."""
 
 
-def scene_data(design: SensorDesign, indenters: dict[str, TriangleMesh]) -> dict[str, Any]:
+def scene_data(
+    design: SensorDesign, indenters: dict[str, TriangleMesh], rays: CameraRays | None = None
+) -> dict[str, Any]:
     """The 3-D view's data, ready for JSON.
 
     Args:
         design: the sensor.
         indenters: what touches it, in the design's frame.
+        rays: chief rays of the camera, if they are to be drawn.
 
     Returns:
         ``parts`` (name, role, colour, alpha, meshes), ``lights`` (groups with discs and
-        directions), ``camera`` (pose and frustum), ``centre`` (3,) and ``size`` in mm.
+        directions), ``camera`` (pose and frustum), ``rays`` (pairs of ends of those that reach
+        the sensing surface, ``seen``, and of others, ``lost``; empty where there are none),
+        ``centre`` (3,) and ``size`` in mm.
     """
     meshes = design.deformed_meshes()
     parts = [_part(name, design.parts[name].role.value, mesh) for name, mesh in meshes.items()]
@@ -46,6 +52,9 @@ def scene_data(design: SensorDesign, indenters: dict[str, TriangleMesh]) -> dict
         "parts": [part for part in parts if part is not None],
         "lights": [_lights(name, group) for name, group in design.lights.items()],
         "camera": _camera(design, meshes),
+        "rays": {}
+        if rays is None
+        else {name: _encoded(ends, np.float32) for name, ends in rays.segments().items()},
         "centre": _rounded((low + high) / 2),
         "size": float(np.linalg.norm(high - low)),
     }

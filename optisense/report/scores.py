@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import base64
 import io
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -12,10 +12,13 @@ from jinja2 import DictLoader, Environment, StrictUndefined
 from markupsafe import Markup
 
 from optisense import __version__
-from optisense.design.section_drawing import section_svg
+from optisense.design.section import along_rows
+from optisense.design.section_drawing import DrawnRay, section_svg
+from optisense.errors import OptiSenseError
 from optisense.objectives.registry import Objective
 from optisense.objectives.score import Score, shown_number
 from optisense.objectives.scored import Scored
+from optisense.report.camera_rays import CameraRays
 from optisense.report.files import template
 from optisense.writing import write_text
 
@@ -57,10 +60,13 @@ def render_scores(scored: Scored, objectives: list[Objective]) -> str:
         title=scored.design.name,
         description=scored.design.description,
         headline=_headline(scored),
-        section=Markup(section_svg(scored.design)),
+        section=Markup(section_svg(scored.design, _rays(scored))),
         rows=[_row(scored, name, score) for name, score in scored.scores.items()],
         seeds=len(scored.runs),
-        scores=[_score(score, summaries.get(name, "")) for name, score in scored.scores.items()],
+        scores=[
+            _score(scored, name, score, summaries.get(name, ""))
+            for name, score in scored.scores.items()
+        ],
         settings=[
             (key.replace("_", " "), _text(value))
             for key, value in scored.to_dict().get("settings", {}).items()
@@ -82,6 +88,17 @@ def _headline(scored: Scored) -> list[tuple[str, str]]:
     return facts
 
 
+def _rays(scored: Scored) -> Sequence[DrawnRay]:
+    """Chief rays for the section; none where nothing was scored or the camera can't be traced."""
+    if not scored.runs:
+        return ()
+    try:
+        rays = CameraRays.of(scored.runs[0].evaluation.model)
+    except OptiSenseError:
+        return ()
+    return rays.in_section(along_rows(scored.design))
+
+
 def _row(scored: Scored, name: str, score: Score) -> dict[str, str]:
     spread = scored.spread(name)
     failed = score.failure is not None
@@ -94,7 +111,11 @@ def _row(scored: Scored, name: str, score: Score) -> dict[str, str]:
     }
 
 
-def _score(score: Score, summary: str) -> dict[str, Any]:
+def _score(scored: Scored, name: str, score: Score, summary: str) -> dict[str, Any]:
+    """An objective's section. Its heading is the value of the table; figure and parts are those of
+    the first seed, whose own value stands beside them.
+    """
+    row = _row(scored, name, score)
     numbers = [
         (key.replace("_", " "), _text(value))
         for key, value in score.parts.items()
@@ -107,7 +128,10 @@ def _score(score: Score, summary: str) -> dict[str, Any]:
             tables.append({"name": key.replace("_", " "), "heads": table[0], "rows": table[1]})
     return {
         "name": score.name,
-        "value": "" if score.failure is not None else f"{score.value:.4g}",
+        "value": row["value"],
+        "spread": row["spread"],
+        "first": f"{score.value:.4g}",
+        "first_seed": scored.runs[0].evaluation.settings.seed,
         "failure": score.failure,
         "summary": summary,
         "figure": "" if score.failure is not None else _figure(score),

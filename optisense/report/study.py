@@ -2,40 +2,37 @@
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 from jinja2 import DictLoader, Environment, StrictUndefined
 from markupsafe import Markup
 
 from optisense import __version__
 from optisense.design import SensorDesign
+from optisense.design.section import along_rows
 from optisense.design.section_drawing import section_svg
 from optisense.errors import OptiSenseError
 from optisense.report import study_figures
+from optisense.report import study_tables as tables
+from optisense.report.balls import marks_svg, told
 from optisense.report.before_after import Look
+from optisense.report.cage_changes import CageChange, cage_changes, cage_figure
 from optisense.report.drawing import figure_uri
 from optisense.report.files import template
-from optisense.report.pictures import data_uri
+from optisense.report.pictures import MOST_STRETCHED, data_uri, stretching_colours
 from optisense.search.methods import find
-from optisense.search.study import Study, beside, best_of, front_among
+from optisense.search.study import Study, best_of, front_among
 from optisense.search.trial import Trial
 from optisense.writing import write_text
 
-MOST_TRIALS = 200
-"""Trials in the table: the best ones."""
-
 MOST_COLUMNS = 8
-"""Parameters in the table: those that go most with the score."""
+"""Parameters in the table of trials: those that go most with the score."""
 
-MOST_CHANGES = 40
-"""Parameters in the list of changes, the largest change first."""
-
-MOST_FAILURES = 10
+FEW_CHANGES = 8
+"""Rows of a table of changes that are shown at once; the others are folded away."""
 
 
 def write_study_report(
@@ -72,6 +69,12 @@ def render_study(study: Study, looks: Mapping[str, Look] | None = None) -> str:
         name: study_figures.parameters(trials, name, _best_by(trials, name) if number else best)
         for number, name in enumerate(weighed)
     }
+    looks = looks or {}
+    figures = [looks.get(label, Look()).figures for label in ("before", "after")]
+    after = _design(study, best)
+    cages = [] if after is None else cage_changes(study.space.design, after)
+    changes = tables.changes(study, start, best, bool(cages))
+    failures, more_causes = tables.failures(trials)
     environment = Environment(
         loader=DictLoader({"study": template("study.html.j2")}),
         autoescape=True,
@@ -91,17 +94,29 @@ def render_study(study: Study, looks: Mapping[str, Look] | None = None) -> str:
         shown_parameters=min(len(strongest), study_figures.MOST_PANELS),
         all_parameters=study.space.size,
         front=figure_uri(study_figures.front(trials, front, names, best)) if front else "",
-        front_rows=[_front_row(trial, names) for trial in front[:MOST_TRIALS]],
+        front_rows=[_front_row(trial, names) for trial in front[: tables.MOST_TRIALS]],
         names=names,
-        sides=_sides(study, start, best, looks or {}),
+        sides=_sides(study, best, looks),
         overlay=_overlay(study, best),
-        scores=_scores(study, start, best),
-        changes=_changes(study, start, best)[:MOST_CHANGES],
-        all_changes=len(_changes(study, start, best)),
-        trials=_table(study, trials, strongest[:MOST_COLUMNS]),
+        scores=tables.scores(study, start, best),
+        no_fresh=tables.why_no_fresh(study, trials),
+        rays=tables.ray_figures(*figures),
+        worse=tables.got_worse(*figures),
+        stretching=[
+            (label, data_uri(stretching_colours(each.map)))
+            for label, each in zip(("before", "after"), figures, strict=True)
+            if each is not None
+        ],
+        most_stretched=f"{MOST_STRETCHED:g}",
+        cages=[_cage(each) for each in cages],
+        changes=changes[:FEW_CHANGES],
+        more_changes=changes[FEW_CHANGES : tables.MOST_CHANGES],
+        all_changes=len(changes),
+        trials=tables.trials(study, trials, strongest[:MOST_COLUMNS]),
         finished=len(trials),
-        failures=_failures(trials),
-        settings=_settings(study),
+        failures=failures,
+        more_causes=more_causes,
+        settings=tables.settings(study),
         version=__version__,
         css=Markup(template("report.css")),
     )
@@ -150,32 +165,59 @@ def _robust(study: Study) -> str:
 
 
 def _front_row(trial: Trial, names: Sequence[str]) -> list[str]:
-    return [str(trial.number), *(_number(trial.scores[name]) for name in names)]
+    return [str(trial.number), *(tables.number(trial.scores[name]) for name in names)]
 
 
-def _sides(
-    study: Study, start: Trial | None, best: Trial | None, looks: Mapping[str, Look]
-) -> list[dict[str, Any]]:
-    """Before and after: the picture, the section, and what the camera covers."""
+def _sides(study: Study, best: Trial | None, looks: Mapping[str, Look]) -> list[dict[str, Any]]:
+    """Before and after: the picture with its balls, and the section with chief rays."""
     found = []
-    for label, trial in (("before", start), ("after", best)):
-        design = _design(study, trial) if label == "after" else study.space.design
+    for label in ("before", "after"):
+        design = _design(study, best) if label == "after" else study.space.design
         if design is None:
             continue
+        is_start = label == "before" or best is None or best.is_start
         seen = looks.get(label, Look())
-        facts = [] if seen.coverage is None else [("coverage", f"{100 * seen.coverage:.1f} %")]
-        facts += [(name, _number(value)) for name, value in seen.facts.items()]
+        rays = seen.rays.in_section(along_rows(design)) if seen.rays is not None else ()
         found.append(
             {
                 "label": label,
-                "what": "the start" if trial is None or trial.is_start else f"trial {trial.number}",
-                "picture": "" if seen.picture is None else data_uri(seen.picture),
+                "what": "the start" if is_start or best is None else f"trial {best.number}",
                 "failure": seen.failure or "",
-                "facts": facts,
-                "section": Markup(section_svg(design)),
+                "section": Markup(section_svg(design, rays)),
+                **_picture(seen),
             }
         )
     return found
+
+
+def _picture(seen: Look) -> dict[str, Any]:
+    """The picture, what lies over it, and what it shows."""
+    if seen.picture is None:
+        return {"picture": "", "marks": "", "told": ""}
+    height, width = seen.picture.shape[:2]
+    balls = ""
+    if seen.pressed is not None:
+        radius, depth = seen.pressed
+        balls = f"balls of {radius:g} mm radius, pressed in {depth:g} mm and outlined"
+    return {
+        "picture": data_uri(seen.picture),
+        "marks": marks_svg(seen.balls, width, height),
+        "told": f"What the camera sees of {len(seen.balls)} {balls}. {told(seen.balls)}"
+        if seen.balls
+        else "",
+    }
+
+
+def _cage(change: CageChange) -> dict[str, Any]:
+    rows = change.rows()
+    return {
+        "name": change.name,
+        "summary": change.summary(),
+        "figure": figure_uri(cage_figure(change)),
+        "heads": ["point", "before, mm", "x", "y", "z", "length, mm"],
+        "rows": rows[:FEW_CHANGES],
+        "more": rows[FEW_CHANGES:],
+    }
 
 
 def _overlay(study: Study, best: Trial | None) -> str:
@@ -198,101 +240,3 @@ def _design(study: Study, trial: Trial | None) -> SensorDesign | None:
         return trial.design
     except OptiSenseError:
         return None
-
-
-def _scores(study: Study, start: Trial | None, best: Trial | None) -> list[list[str]]:
-    """Name, before, after, and both with fresh seeds, of every objective and what stands beside."""
-    rows = []
-    for name in study.settings.names:
-        row = [name]
-        for trial in (start, best):
-            row.append("" if trial is None else _number(trial.scores.get(name, math.nan)))
-        for trial in (start, best):
-            row.append("" if trial is None else _fresh(trial, name))
-        rows.append(row)
-    sides = [{} if trial is None else beside(study, trial) for trial in (start, best)]
-    for name in dict.fromkeys([*sides[0], *sides[1]]):
-        if name not in study.settings.names:
-            cells = [_number(side[name]) if name in side else "" for side in sides]
-            rows.append([name.replace("_", " "), *cells, "", ""])
-    return rows
-
-
-def _fresh(trial: Trial, name: str) -> str:
-    mean, spread = trial.fresh_score(name), trial.fresh_spread(name)
-    if not math.isfinite(mean):
-        return ""
-    return f"{_number(mean)} ± {spread:.2g}" if math.isfinite(spread) else _number(mean)
-
-
-def _changes(study: Study, start: Trial | None, best: Trial | None) -> list[list[str]]:
-    """Parameter, before and after, the largest change relative to its range first."""
-    if best is None:
-        return []
-    space = study.space
-    before = space.start if start is None else start.vector
-    apart = np.abs(space.to_unit(best.vector) - space.to_unit(before))
-    old, new = space.values(before), best.values
-    return [
-        [space.names[number], _text(list(old.values())[number]), _text(list(new.values())[number])]
-        for number in np.argsort(-apart, kind="stable")
-        if apart[number] > 0.0
-    ]
-
-
-def _table(study: Study, trials: Sequence[Trial], columns: Sequence[int]) -> dict[str, Any]:
-    """The best trials, with the parameters that matter most."""
-    fine = sorted(
-        (trial for trial in trials if math.isfinite(trial.score)), key=lambda trial: -trial.score
-    )
-    paths = [study.space.names[number] for number in columns]
-    rows = []
-    for trial in fine[:MOST_TRIALS]:
-        values = list(trial.values.values())
-        number = f"{trial.number} (start)" if trial.is_start else str(trial.number)
-        scores = [_number(trial.scores[name]) for name in study.settings.names]
-        fresh = [_fresh(trial, study.objective)]
-        rows.append([number, *scores, *fresh, *(_text(values[column]) for column in columns)])
-    heads = ["trial", *study.settings.names, "fresh seeds", *paths]
-    return {"heads": heads, "rows": rows}
-
-
-def _failures(trials: Sequence[Trial]) -> list[tuple[str, int, str]]:
-    """Reasons with how often, and the first trials that have each."""
-    found: dict[str, list[int]] = {}
-    for trial in trials:
-        if trial.failure is not None:
-            found.setdefault(trial.failure, []).append(trial.number)
-    ranked = sorted(found.items(), key=lambda item: -len(item[1]))
-    return [
-        (reason, len(numbers), ", ".join(map(str, numbers[:5])))
-        for reason, numbers in ranked[:MOST_FAILURES]
-    ]
-
-
-def _settings(study: Study) -> list[tuple[str, str]]:
-    settings = study.settings
-    rows = [("varied", "; ".join(f"{path}: {_plain(v)}" for path, v in settings.space.items()))]
-    rows += [(f"option {key}", _plain(value)) for key, value in settings.options.items()]
-    rows += [(f"setting {key}", _plain(value)) for key, value in settings.settings.items()]
-    if settings.rules:
-        rows.append(("rules", ", ".join(settings.rules)))
-    ended = study.store.fact("ended")
-    rows += [("begun", settings.begun), ("ended", str(ended or "not yet"))]
-    rows += [(f"version of {name}", text) for name, text in settings.versions.items()]
-    return rows
-
-
-def _plain(value: Any) -> str:
-    if isinstance(value, Mapping) and "kind" in value:
-        inner = {k: v for k, v in value.items() if k not in ("kind", "labels") and v is not None}
-        return f"{value['kind']} " + ", ".join(f"{k} {_plain(v)}" for k, v in inner.items())
-    return value if isinstance(value, str) else json.dumps(value)
-
-
-def _number(value: float) -> str:
-    return f"{value:.4g}" if math.isfinite(value) else "failed"
-
-
-def _text(value: float | int | str) -> str:
-    return f"{value:.5g}" if isinstance(value, float) else str(value)

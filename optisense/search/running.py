@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import queue
-import re
 import time
 from collections.abc import Callable, Sequence
 from concurrent.futures import Future
@@ -17,6 +16,7 @@ import numpy as np
 from optisense.errors import OptiSenseError, SearchError
 from optisense.search.evaluation import Evaluator
 from optisense.search.executors import Runner
+from optisense.search.failures import cause_of
 from optisense.search.making import MakingErrors
 from optisense.search.methods import Method, Problem, make
 from optisense.search.outcome import Outcome
@@ -310,7 +310,7 @@ class Run:
             self._done += 1
             self._failed += outcome.failed
             if outcome.failure is not None:
-                self._reasons.setdefault(_kind(outcome.failure), []).append(outcome.failure)
+                self._reasons.setdefault(cause_of(outcome.failure), []).append(outcome.failure)
         if not outcome.failed:
             self._scored[row.vector.tobytes()] = outcome
             self._best = score if math.isnan(self._best) else max(self._best, score)
@@ -363,11 +363,6 @@ class Run:
                 facts=self.method.describe(),
             )
         )
-
-
-def _kind(reason: str) -> str:
-    """A reason without its numbers, by which like ones are counted."""
-    return re.sub(r"-?[0-9]+([.][0-9]+)?", "", reason)
 
 
 def _outcome(done: Future[Outcome]) -> Outcome:

@@ -15,8 +15,10 @@ from numpy.typing import NDArray
 
 from optisense.design import Dielectric, SensorDesign
 from optisense.errors import SearchError
+from optisense.objectives.score import deviation_of
 from optisense.search.evaluation import DesignEvaluator, Goal
 from optisense.search.executors import ProcessPool, Runner, SerialRunner
+from optisense.search.failures import cause_of
 from optisense.search.making import MakingErrors, Spread
 from optisense.search.outcome import Outcome
 from optisense.search.rescoring import fresh_seeds
@@ -69,7 +71,7 @@ class Spreading:
     def deviation(self) -> float:
         """Standard deviation of the scores, failed sensors left out; NaN for less than two."""
         known = self.scores[np.isfinite(self.scores)]
-        return float(known.std(ddof=1)) if len(known) > 1 else math.nan
+        return deviation_of(known.ravel().tolist())
 
 
 @dataclass(frozen=True)
@@ -81,7 +83,8 @@ class Tolerance:
         errors: of making.
         results: by objective.
         sensors: how many were tried.
-        failures: why sensors have no score, with how often.
+        failures: the causes for which sensors have no score (see `failures.cause_of`), each with
+            the number of sensors.
         interrupted: whether it was stopped early.
         seconds: wall time.
         settings: of the objectives.
@@ -194,7 +197,7 @@ def tolerance(
             for name in evaluator.names
         },
         sensors=len(outcomes),
-        failures=Counter(each.failure for each in outcomes if each.failure is not None),
+        failures=Counter(cause_of(each.failure) for each in outcomes if each.failure is not None),
         interrupted=interrupted,
         seconds=time.perf_counter() - began,
         settings=evaluator.settings,
@@ -220,7 +223,7 @@ def _spreading(
     order = sorted(shares, key=lambda source: -_size(shares[source]))
     return Spreading(
         nominal=float(same[0]),
-        noise=float(np.nanstd(same, ddof=1)) if np.isfinite(same).sum() > 1 else math.nan,
+        noise=deviation_of(same[np.isfinite(same)].tolist()),
         scores=values,
         percentiles={key: percentile_of(values, share) for key, share in PERCENTILES.items()},
         shares={source: shares[source] for source in order},

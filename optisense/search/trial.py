@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from optisense.design import SensorDesign
+from optisense.objectives.score import deviation_of
 from optisense.search.outcome import Outcome
 from optisense.search.space import BoundSpace
 
@@ -82,4 +83,4 @@ class Trial:
         """Standard deviation over the other seeds; NaN if there are less than two."""
         name = objective or self.objective
         values = [outcome.scores.get(name, math.nan) for outcome in self.fresh.values()]
-        return float(np.std(values, ddof=1)) if len(values) > 1 else math.nan
+        return deviation_of(values) if np.isfinite(values).all() else math.nan

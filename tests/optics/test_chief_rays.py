@@ -10,7 +10,12 @@ from optisense import OpticalModel
 from optisense.optics.camera.projection import RayCamera
 from optisense.optics.scene.ray_scene import Piece, RayScene
 from optisense.optics.scene.surfaces import Surface, SurfaceKind
-from optisense.optics.transport.chief_rays import ChiefRays, Outcome, trace_chief_rays
+from optisense.optics.transport.chief_rays import (
+    ChiefRays,
+    Outcome,
+    pixel_stretching,
+    trace_chief_rays,
+)
 from optisense.sensors import gelbelt
 
 # Single precision over some 10 mm, and rays that start RAY_OFFSET (0.0002 mm) off each surface.
@@ -128,3 +133,24 @@ def test_no_ray_slips_through_between_two_triangles() -> None:
     # Rays of the middle row and column run along edges of this regular mesh.
     belt = OpticalModel(gelbelt(light_design=2, tessellation=0.7), "llvm")
     assert belt.chief_rays((320, 240)).hit.all()
+
+
+def test_a_tilted_plane_is_stretched_by_the_cosine() -> None:
+    """Seen from far along its normal a plane keeps angles; tilted by 60 degrees, it shows a small
+    circle of the picture twice as long as wide.
+    """
+    straight = pixel_stretching(trace([plane(300.0, 500.0)], camera(fov=2)))
+    assert np.nanmax(straight) == pytest.approx(1.0, abs=2e-3)
+    assert np.isnan(straight[0]).all() and np.isfinite(straight[1:-1, 1:-1]).all()
+    slope = np.tan(np.radians(60))
+    corners = [(x, y, 300 + slope * x) for x, y in ((-90, -500), (-90, 500), (90, 500), (90, -500))]
+    tilted = pixel_stretching(trace([quad("plane", corners, COATING)], camera(fov=2)))
+    assert np.nanmedian(tilted) == pytest.approx(2.0, rel=0.02)
+
+
+def test_stretching_is_unknown_where_nothing_is_seen() -> None:
+    half = [(0.0, -50, 3), (0.0, 50, 3), (50.0, 50, 3), (50.0, -50, 3)]
+    rays = trace([quad("plane", half, COATING)], camera())
+    found = pixel_stretching(rays)
+    assert np.isnan(found[~rays.hit]).all()
+    assert np.isfinite(found).any()

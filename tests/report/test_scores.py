@@ -72,3 +72,20 @@ def test_spread_is_that_of_a_sample(evaluation: Evaluation) -> None:
     assert scored.failed()
     assert scored.spread("other") is None
     assert math.isnan(scored.mean("other"))
+
+
+def test_a_score_is_one_number_in_the_table_and_in_its_heading(evaluation: Evaluation) -> None:
+    scored = Scored(evaluation.design)
+    for value in (0.9575, 0.9553):
+        scored.add(evaluation)["mine"] = Score("mine", value, title="Mine")
+    text = render_scores(scored, [])
+    assert text.count("0.9564") == 2
+    assert "seed 0, which scores 0.9575" in text
+
+
+def test_a_spread_that_is_rounding_is_none(evaluation: Evaluation) -> None:
+    scored = Scored(evaluation.design)
+    for value in (0.1, 0.1, 0.1):  # the mean of three equal numbers is not always that number
+        scored.add(evaluation)["mine"] = Score("mine", value, title="Mine")
+    assert scored.spread("mine") == 0.0
+    assert "± 0<" in render_scores(scored, [])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,9 +14,11 @@ import optisense as ots
 from optisense.cli import app
 from optisense.design import SensorDesign
 from optisense.report import study_figures
-from optisense.report.before_after import Look
+from optisense.report.balls import Ball
+from optisense.report.before_after import Look, RayFigures
+from optisense.report.cage_changes import cage_changes
 from optisense.report.study import render_study, write_study_report
-from optisense.search import Result, Study, search
+from optisense.search import Around, CagePoints, Result, Study, search
 
 EVIL = "</table><img src=x onerror=alert(1)>"
 SPACE: dict[str, object] = {
@@ -45,9 +48,11 @@ def result() -> Result:
 @pytest.fixture(scope="module")
 def page(result: Result) -> str:
     picture = np.full((3, 4, 3), 90, dtype=np.uint8)
+    ball = Ball(1, 20, (np.array([[0.0, 0.0], [2.0, 0.0], [1.0, 2.0]]),))
+    figures = RayFigures(0.5, 0.25, 0.75, 0.5, 4.0, 1.1, 1.5, np.full((3, 4), 1.2))
     looks = {
-        "before": Look(picture, 0.25, {"upright rays": 0.75}),
-        "after": Look(failure=EVIL),
+        "before": Look(picture, (ball, Ball(2, 3)), (1.5, 0.3), figures),
+        "after": Look(figures=replace(figures, evenness=1.0), failure=EVIL),
     }
     return render_study(result.study, looks)
 
@@ -57,20 +62,20 @@ def test_scores_before_and_after_are_told(result: Result, page: str) -> None:
         for name in ("steep", "opposite"):
             assert f">{trial.scores[name]:.4g}<" in page
     assert f"<b>trial {result.best.number}</b>" in page
-    assert "coverage</span> <b>25.0 %</b>" in page
+    assert "25.0 %" in page
     assert "0.75" in page
 
 
 def test_every_figure_is_there(page: str) -> None:
-    """Convergence, both objectives, parameters against each of them, and one picture; all inside
-    the page.
+    """Convergence, both objectives, parameters against each of them, one picture, and stretching
+    before and after; all inside the page.
     """
     images = re.findall(r'<img [^>]*src="([^"]*)"', page)
-    assert len(images) == 5
+    assert len(images) == 7
     assert 'alt="parameters against opposite"' in page
     assert "search for steep and opposite</h1>" in page
     assert all(image.startswith("data:image/png;base64,") for image in images)
-    assert page.count("<svg") == 2
+    assert page.count("<svg") == 3  # two sections, and what lies over the picture
     assert not re.search(r'(src|href)="(?!data:)', page)
 
 
@@ -81,6 +86,57 @@ def test_trials_and_failures_are_listed(result: Result, page: str) -> None:
         if trial.failure is None:
             assert f">{trial.scores['steep']:.4g}<" in page
     assert f'<td class="tight">{len(failed)}</td>' in page
+    assert f"trial {failed[0].number}: " in page
+
+
+def test_it_says_which_balls_can_be_made_out(page: str) -> None:
+    assert "1 of the 2 are in view; 2 is hidden, or too small to make out." in page
+    assert page.count("<polygon") == 1
+
+
+def test_what_got_worse_is_told(page: str) -> None:
+    assert "Worse than before: 2to3PW (4 before, 1 after)." in page
+
+
+def test_columns_that_an_interruption_leaves_empty_are_left_out(tmp_path: Path) -> None:
+    tried = 0
+
+    def stopped(design: SensorDesign) -> float:
+        nonlocal tried
+        tried += 1
+        if tried == 4:
+            raise KeyboardInterrupt
+        return design.coating.specularity
+
+    mini = ots.load("gelsight-mini")
+    space = {"coating.specularity": (0.0, 1.0)}
+    found = search(mini, space, stopped, method="random", budget=9)
+    assert found.interrupted
+    text = render_study(found.study)
+    assert "fresh seeds</th>" not in text
+    assert "was interrupted before it scored the best trials with fresh seeds" in text
+    done = render_study(search(mini, space, opposite, method="random", budget=3).study)
+    assert "after, fresh seeds</th>" in done
+
+
+def test_a_moved_cage_is_drawn_and_not_listed_number_by_number() -> None:
+    svelte = ots.load("gelsight-svelte")
+    middle = svelte.cages["M1"].current_points()[13]
+
+    def away(design: SensorDesign) -> float:
+        return float(design.cages["M1"].current_points()[13, 0] - middle[0])
+
+    space = {"cages.M1.points": CagePoints(Around(1.0), points=(13, 14)), "lights.red.flux": (1, 9)}
+    found = search(svelte, space, away, method="random", budget=6)
+    text = render_study(found.study)
+    assert "2 of 27 control points moved" in text
+    assert 'alt="displacements of the control points of M1"' in text
+    assert "<code>cages.M1.points" not in text
+    assert "<code>lights.red.flux</code>" in text
+    (change,) = cage_changes(svelte, found.best.design)
+    assert sorted(int(row[0]) for row in change.rows()) == [13, 14]
+    assert change.moves[13, 0] == pytest.approx(away(found.best.design))
+    assert all(before and after for before, after in change.outlines)  # the mirror, in each layer
 
 
 def test_nothing_escapes_into_the_page(page: str) -> None:

@@ -176,6 +176,36 @@ def pixel_areas(rays: ChiefRays) -> NDArray[np.float64]:
     return np.where(whole, area, 0.0)
 
 
+def pixel_stretching(rays: ChiefRays) -> NDArray[np.float64]:
+    """How much longer than wide a small circle of the picture is on the sensing surface.
+
+    The map from the picture to the surface is linear around a pixel; the value is the ratio of its
+    singular values. 1 keeps all angles; 3 shows a ball as an ellipse three times as long as wide.
+
+    Returns:
+        (h, w), 1 or more; NaN where the pixel or a neighbour does not see the surface.
+    """
+    p = rays.points.astype(np.float64)
+    found = np.full(rays.hit.shape, np.nan)
+    if min(found.shape) < 3:
+        return found
+    along_x = p[1:-1, 2:] - p[1:-1, :-2]
+    along_y = p[2:, 1:-1] - p[:-2, 1:-1]
+    hit = rays.hit
+    whole = hit[1:-1, 2:] & hit[1:-1, :-2] & hit[2:, 1:-1] & hit[:-2, 1:-1] & hit[1:-1, 1:-1]
+    xx, yy, xy = (
+        np.einsum("ijk,ijk->ij", one, other)
+        for one, other in ((along_x, along_x), (along_y, along_y), (along_x, along_y))
+    )
+    # Eigenvalues of the Gram matrix are the squares of the singular values.
+    middle, half = (xx + yy) / 2, np.hypot((xx - yy) / 2, xy)
+    least = np.maximum(middle - half, 1e-12 * middle)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        ratio = np.sqrt((middle + half) / least)
+    found[1:-1, 1:-1] = np.where(whole & (middle > 0.0), ratio, np.nan)
+    return found
+
+
 def sees_nothing(rays: ChiefRays) -> RenderError:
     """The error to raise where no chief ray meets the sensing surface; says what became of them."""
     names = {outcome: outcome.name.lower().replace("_", " ") for outcome in Outcome}

@@ -116,6 +116,19 @@
   });
   for (const group of data.lights) things.push(lightThing(group));
   things.push(cameraThing(data.camera));
+  for (const [name, label, hex, alpha] of [["seen", "chief rays", "#7a3fb8", 0.8],
+    ["lost", "rays that miss the skin", "#8d97a3", 0.55]]) {
+    const ends = data.rays[name] ? decode(data.rays[name], Float32Array) : [];
+    if (ends.length) things.push(rayThing(label, hex, alpha, ends));
+  }
+
+  function rayThing(label, hex, alpha, ends) {
+    return {
+      key: label, label, note: "", swatch: hex, colour: [...rgb(hex), 1], middle: [0, 0, 0],
+      shown: true, cut: false, glow: 0, lines: shape(ends), ink: [...rgb(hex), alpha],
+      solid: shape(new Float32Array(0), new Int8Array(0), new Uint32Array(0)),
+    };
+  }
 
   function lightThing(group) {
     const points = [], normals = [], faces = [], rays = [], reach = data.size * 0.055;

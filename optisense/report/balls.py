@@ -1,0 +1,127 @@
+"""Where a picture shows each of several pressed balls: outlines and numbers to draw over it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from markupsafe import Markup
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+
+LEAST_PIXELS = 12
+"""A ball that covers fewer pixels of the picture (about 4 x 3) can't be made out."""
+
+LEAST_PIECE = 6
+"""Pixels of a separate piece of a ball, as a mirror's edge cuts it, that gets an outline."""
+
+
+LETTERS = 10.0
+"""Width in pixels of a picture that is kept free for a number beside a ball."""
+
+
+@dataclass(frozen=True)
+class Ball:
+    """A ball as a picture shows it.
+
+    Attributes:
+        number: of the ball, from 1.
+        pixels: that it covers.
+        outlines: (k, 2) column and row of the corners of a polygon around each piece of it, in
+            pixels from the upper left, the largest piece first; a folded mirror shows one ball in
+            several pieces.
+    """
+
+    number: int
+    pixels: int
+    outlines: tuple[FloatArray, ...] = ()
+
+    @property
+    def seen(self) -> bool:
+        """Whether it can be made out."""
+        return self.pixels >= LEAST_PIXELS
+
+
+def find_balls(
+    points: NDArray[np.float32], mask: NDArray[np.bool_], places: FloatArray
+) -> tuple[Ball, ...]:
+    """Tell apart the balls of a picture: a pixel belongs to the ball whose place is nearest.
+
+    Args:
+        points: (h, w, 3) mm, what each pixel sees.
+        mask: (h, w), which pixels see a ball.
+        places: (n, 3) mm, of the balls.
+    """
+    from scipy.ndimage import label
+
+    owner = np.full(mask.shape, -1)
+    if mask.any():
+        seen = points[mask].astype(np.float64)
+        owner[mask] = np.linalg.norm(seen[:, None] - places, axis=2).argmin(axis=1)
+    balls = []
+    for number in range(len(places)):
+        own = owner == number
+        pieces, count = label(own)
+        sizes = np.bincount(pieces.ravel(), minlength=count + 1)[1:]
+        large = [piece for piece in np.argsort(-sizes) if sizes[piece] >= LEAST_PIECE]
+        outlines = tuple(_around(pieces == 1 + piece) for piece in large)
+        balls.append(Ball(number + 1, int(own.sum()), outlines))
+    return tuple(balls)
+
+
+def _around(piece: NDArray[np.bool_]) -> FloatArray:
+    """(k, 2): the convex polygon around all pixels of a piece, half a pixel wider than these."""
+    from shapely import MultiPoint
+
+    rows, columns = np.nonzero(piece)
+    middles = np.column_stack([columns, rows]) + 0.5
+    hull = MultiPoint(middles).buffer(1.5, quad_segs=4).convex_hull
+    return np.asarray(hull.exterior.coords)[:-1]
+
+
+def marks_svg(balls: Sequence[Ball], width: int, height: int) -> Markup:
+    """Outlines and numbers of the balls that can be made out, to lie over a picture.
+
+    Args:
+        balls: of the picture.
+        width, height: of the picture, pixels.
+    """
+    shapes = []
+    for ball in balls:
+        if not (ball.seen and ball.outlines):
+            continue
+        for outline in ball.outlines:
+            corners = " ".join(f"{x:.1f},{y:.1f}" for x, y in outline)
+            shapes.append(f'<polygon points="{corners}"/>')
+        shapes.append(_number(ball, width))
+    return Markup(
+        f'<svg class="marks" viewBox="0 0 {width} {height}" aria-hidden="true">'
+        + "".join(shapes)
+        + "</svg>"
+    )
+
+
+def _number(ball: Ball, width: int) -> str:
+    """The ball's number beside its largest piece, where it hides nothing of it."""
+    low, high = ball.outlines[0].min(axis=0), ball.outlines[0].max(axis=0)
+    right = high[0] + LETTERS < width
+    x = high[0] + 1.0 if right else low[0] - 1.0
+    anchor = "start" if right else "end"
+    y = max(low[1] + 4.0, 10.0)
+    return f'<text x="{x:.1f}" y="{y:.1f}" text-anchor="{anchor}">{ball.number}</text>'
+
+
+def told(balls: Sequence[Ball]) -> str:
+    """How many of the balls the picture shows, as a sentence; empty where there are none."""
+    if not balls:
+        return ""
+    hidden = [str(ball.number) for ball in balls if not ball.seen]
+    if not hidden:
+        return f"All {len(balls)} are in view."
+    names = " and ".join([", ".join(hidden[:-1]), hidden[-1]] if len(hidden) > 1 else hidden)
+    return (
+        f"{len(balls) - len(hidden)} of the {len(balls)} are in view; {names} "
+        f"{'is' if len(hidden) == 1 else 'are'} hidden, or too small to make out."
+    )

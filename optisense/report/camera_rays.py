@@ -1,0 +1,73 @@
+"""Chief rays from the camera to the sensing surface, as lines to draw."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from optisense.design.section_drawing import DrawnRay
+
+if TYPE_CHECKING:
+    from optisense.optics import OpticalModel
+
+ACROSS = 13
+"""Rays across the picture: odd, so that one runs along the camera's axis. More of them would hide
+the sensor behind them."""
+
+
+@dataclass(frozen=True)
+class CameraRays:
+    """The ways of a grid of chief rays through glass and by way of mirrors, nothing pressed in.
+
+    Attributes:
+        rays: row by row, from the picture's upper left.
+        shape: rows and columns of the grid, both odd.
+    """
+
+    rays: list[DrawnRay]
+    shape: tuple[int, int]
+
+    @staticmethod
+    def of(model: OpticalModel) -> CameraRays:
+        """Trace the rays of a model.
+
+        Raises:
+            RenderError: the camera makes no sense.
+        """
+        from optisense.optics.chief_rays import Outcome
+        from optisense.optics.ray_paths import trace_paths
+
+        width, height = model.design.camera.resolution
+        rows = 2 * max(1, round(ACROSS * height / width / 2)) + 1
+        paths = trace_paths(model, (ACROSS, rows))
+        lines = np.split(paths.vertices.astype(np.float64), np.cumsum(paths.counts)[:-1])
+        arrived = (paths.outcomes == Outcome.HIT).tolist()
+        return CameraRays(
+            [DrawnRay(line, hit) for line, hit in zip(lines, arrived, strict=True)], (rows, ACROSS)
+        )
+
+    def in_section(self, along_rows: bool) -> list[DrawnRay]:
+        """The rays of the middle row, or of the middle column, of the picture."""
+        rows, columns = self.shape
+        middle = rows // 2 * columns
+        if along_rows:
+            return self.rays[middle : middle + columns]
+        return self.rays[columns // 2 :: columns]
+
+    def segments(self) -> dict[str, NDArray[np.float32]]:
+        """Pairs of ends, (2 k, 3) mm, of every second ray both ways: "seen" of those that reach the
+        sensing surface, and "lost" of those that do not.
+        """
+        found: dict[str, list[NDArray[np.float64]]] = {"seen": [], "lost": []}
+        for row in range(0, self.shape[0], 2):
+            for column in range(0, self.shape[1], 2):
+                ray = self.rays[row * self.shape[1] + column]
+                pairs = np.repeat(ray.points, 2, axis=0)[1:-1]
+                found["seen" if ray.arrived else "lost"].append(pairs)
+        return {
+            name: np.concatenate(pieces or [np.empty((0, 3))]).astype(np.float32)
+            for name, pieces in found.items()
+        }

@@ -1,0 +1,224 @@
+"""Tables on the page of a study: scores, changes, trials, failures, settings."""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from optisense.report.before_after import RayFigures
+from optisense.search.failures import by_cause
+from optisense.search.study import Study, beside
+from optisense.search.trial import Trial
+
+MOST_TRIALS = 200
+"""Trials in the table: the best ones."""
+
+MOST_CHANGES = 40
+"""Parameters in the list of changes, the largest change first."""
+
+MOST_CAUSES = 10
+"""Causes of failure in the table: the commonest ones."""
+
+WORSE = 0.02
+"""A figure of the rays that got worse by a smaller part of itself is as good as before."""
+
+NONE = "–"
+"""A cell for which there is no number."""
+
+ONE_POINT = re.compile(r"cages\.[^.]+\.(?:points|blend)\[")
+"""Parameters that are coordinates of single control points."""
+
+
+class Table(NamedTuple):
+    """Heads and rows of text; rows are as long as the heads."""
+
+    heads: list[str]
+    rows: list[list[str]]
+
+    def without_empty_columns(self) -> Table:
+        """The same without columns that have no entry in any row."""
+        kept = [
+            column
+            for column in range(len(self.heads))
+            if column == 0 or any(row[column] not in ("", NONE) for row in self.rows)
+        ]
+        return Table(
+            [self.heads[column] for column in kept],
+            [[row[column] for column in kept] for row in self.rows],
+        )
+
+
+def scores(study: Study, start: Trial | None, best: Trial | None) -> Table:
+    """Every objective and what stands beside it, before and after, with the study's seed and with
+    fresh ones. Columns without any number are left out.
+    """
+    rows = []
+    for name in study.settings.names:
+        row = [name]
+        for trial in (start, best):
+            row.append(NONE if trial is None else number(trial.scores.get(name, math.nan)))
+        for trial in (start, best):
+            row.append("" if trial is None else fresh(trial, name))
+        rows.append([cell or NONE for cell in row])
+    sides = [{} if trial is None else beside(study, trial) for trial in (start, best)]
+    for name in dict.fromkeys([*sides[0], *sides[1]]):
+        if name not in study.settings.names:
+            cells = [number(side[name]) if name in side else NONE for side in sides]
+            rows.append([name.replace("_", " "), *cells, NONE, NONE])
+    heads = ["", "before", "after", "before, fresh seeds", "after, fresh seeds"]
+    return Table(heads, rows).without_empty_columns()
+
+
+def fresh(trial: Trial, name: str) -> str:
+    """The mean over fresh seeds with its deviation; empty where there is none."""
+    mean, spread = trial.fresh_score(name), trial.fresh_spread(name)
+    if not math.isfinite(mean):
+        return ""
+    if spread > 0.0:
+        return f"{number(mean)} ± {spread:.2g}"
+    return number(mean)
+
+
+def why_no_fresh(study: Study, trials: Sequence[Trial]) -> str:
+    """Why no trial has a score with fresh seeds; empty where some have."""
+    if any(trial.fresh for trial in trials) or not any(math.isfinite(t.score) for t in trials):
+        return ""
+    reasons = {
+        None: "The search is not at its end, where it scores the best trials with fresh seeds",
+        "interrupted": "The search was interrupted before it scored the best trials with fresh "
+        "seeds",
+    }
+    reason = reasons.get(study.store.fact("ended"), "No trial was scored with fresh seeds")
+    return f"{reason}: the best score may be partly luck."
+
+
+def ray_figures(before: RayFigures | None, after: RayFigures | None) -> Table | None:
+    """What the chief rays tell of both designs; None where they were not traced."""
+    if before is None and after is None:
+        return None
+    rows = [
+        [label, *(_figure(side, field, percent) for side in (before, after))]
+        for label, field, percent, _ in _FIGURES
+    ]
+    return Table(["", "before", "after"], rows).without_empty_columns()
+
+
+_FIGURES = (
+    ("AOAP (higher is better)", "aoap", False, 1),
+    ("coverage: triangles of the skin in view", "coverage", True, 1),
+    ("pixels that see the skin", "seeing", True, 1),
+    ("upright rays: mean cosine to the skin's normal", "upright", False, 1),
+    ("2to3PW: evenness of the pixels (higher is better)", "evenness", False, 1),
+    ("stretching, median pixel (1 is undistorted)", "stretching", False, -1),
+    ("stretching of the worst tenth of the pixels, at least", "worst_stretching", False, -1),
+)
+"""Label, attribute of `RayFigures`, whether it is shown in percent, and the sign of better."""
+
+
+def _figure(side: RayFigures | None, field: str, percent: bool) -> str:
+    value = math.nan if side is None else float(getattr(side, field))
+    if not math.isfinite(value):
+        return NONE
+    return f"{100 * value:.1f} %" if percent else f"{value:.4g}"
+
+
+def got_worse(before: RayFigures | None, after: RayFigures | None) -> list[str]:
+    """What the rays tell of in which the second design is worse than the first, each with both
+    numbers; empty where it is nowhere worse.
+    """
+    if before is None or after is None:
+        return []
+    found = []
+    for label, field, percent, sign in _FIGURES:
+        old, new = getattr(before, field), getattr(after, field)
+        if math.isfinite(old) and math.isfinite(new) and sign * (new - old) < -WORSE * abs(old):
+            name = re.split(r"[:(]", label)[0].strip()
+            scale, unit = (100.0, " %") if percent else (1.0, "")
+            found.append(f"{name} ({scale * old:.3g}{unit} before, {scale * new:.3g}{unit} after)")
+    return found
+
+
+def changes(
+    study: Study, start: Trial | None, best: Trial | None, drawn_cages: bool
+) -> list[list[str]]:
+    """Parameter, before and after, the largest change relative to its range first.
+
+    Args:
+        study: the study.
+        start, best: its trials.
+        drawn_cages: whether the control points of cages are told elsewhere and left out.
+    """
+    if best is None:
+        return []
+    space = study.space
+    before = space.start if start is None else start.vector
+    apart = np.abs(space.to_unit(best.vector) - space.to_unit(before))
+    old, new = list(space.values(before).values()), list(best.values.values())
+    return [
+        [space.names[each], value_text(old[each]), value_text(new[each])]
+        for each in np.argsort(-apart, kind="stable")
+        if apart[each] > 0.0 and not (drawn_cages and ONE_POINT.match(space.names[each]))
+    ]
+
+
+def trials(study: Study, found: Sequence[Trial], columns: Sequence[int]) -> Table:
+    """The best trials, with the parameters that matter most."""
+    fine = sorted(
+        (trial for trial in found if math.isfinite(trial.score)), key=lambda trial: -trial.score
+    )
+    rows = []
+    for trial in fine[:MOST_TRIALS]:
+        values = list(trial.values.values())
+        name = f"{trial.number} (start)" if trial.is_start else str(trial.number)
+        row = [name, *(number(trial.scores[each]) for each in study.settings.names)]
+        row.append(fresh(trial, study.objective))
+        rows.append([*row, *(value_text(values[column]) for column in columns)])
+    paths = [study.space.names[column] for column in columns]
+    heads = ["trial", *study.settings.names, f"{study.objective}, fresh seeds", *paths]
+    return Table(heads, rows).without_empty_columns()
+
+
+def failures(found: Sequence[Trial]) -> tuple[Table, int]:
+    """Causes of failure, the commonest first, and how many more there are than are listed."""
+    causes = by_cause((t.number, t.failure) for t in found if t.failure is not None)
+    rows = [
+        [each.text, str(len(each.numbers)), f"trial {each.numbers[0]}: {each.example}"]
+        for each in causes[:MOST_CAUSES]
+    ]
+    return Table(["cause", "trials", "such as"], rows), max(0, len(causes) - MOST_CAUSES)
+
+
+def settings(study: Study) -> list[tuple[str, str]]:
+    """What was searched and how, by name and value."""
+    known = study.settings
+    rows = [("varied", "; ".join(f"{path}: {_plain(v)}" for path, v in known.space.items()))]
+    rows += [(f"option {key}", _plain(value)) for key, value in known.options.items()]
+    rows += [(f"setting {key}", _plain(value)) for key, value in known.settings.items()]
+    if known.rules:
+        rows.append(("rules", ", ".join(known.rules)))
+    ended = study.store.fact("ended")
+    rows += [("begun", known.begun), ("ended", str(ended or "not yet"))]
+    rows += [(f"version of {name}", text) for name, text in known.versions.items()]
+    return rows
+
+
+def number(value: float) -> str:
+    """A score as text."""
+    return f"{value:.4g}" if math.isfinite(value) else "failed"
+
+
+def value_text(value: float | int | str) -> str:
+    """A parameter's value as text."""
+    return f"{value:.5g}" if isinstance(value, float) else str(value)
+
+
+def _plain(value: Any) -> str:
+    if isinstance(value, Mapping) and "kind" in value:
+        inner = {k: v for k, v in value.items() if k not in ("kind", "labels") and v is not None}
+        return f"{value['kind']} " + ", ".join(f"{k} {_plain(v)}" for k, v in inner.items())
+    return value if isinstance(value, str) else json.dumps(value)
