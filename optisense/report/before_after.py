@@ -123,7 +123,7 @@ def ray_figures(evaluation: Evaluation) -> RayFigures:
     Raises:
         RenderError, ObjectiveError: they can't be traced.
     """
-    from optisense.optics.chief_rays import pixel_stretching
+    from optisense.optics.transport.chief_rays import pixel_stretching
 
     scores = evaluate(evaluation, ["aoap", "2to3pw"])
     parts = scores["aoap"].parts

@@ -37,8 +37,8 @@ class CameraRays:
         Raises:
             RenderError: the camera makes no sense.
         """
-        from optisense.optics.chief_rays import Outcome
         from optisense.optics.ray_paths import trace_paths
+        from optisense.optics.transport.chief_rays import Outcome
 
         width, height = model.design.camera.resolution
         rows = 2 * max(1, round(ACROSS * height / width / 2)) + 1
