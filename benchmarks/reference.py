@@ -1,7 +1,7 @@
 """The converged image of the case, by progressive photon mapping, kept in a file.
 
 Photons are traced through the scene with the ball in it and gathered one by one within a small
-radius, which shares neither the pooling nor the shading of the light field that is judged. Only
+radius, which shares neither the pooling nor the shading of the radiance cache that is judged. Only
 the pixels in and around the contact are gathered: that is where error is measured, and it saves
 most of the time.
 """

@@ -32,7 +32,7 @@ NAMES = {
     "image_640x480": "Image 640x480, warm, new photons",
     "model_set_up": "Model set-up (scene, photon guide)",
     "other_contact_new_light": "Other contact, new photons",
-    "other_contact_kept_light": "Other contact, light field kept",
+    "other_contact_kept_light": "Other contact, radiance cache kept",
     "after_flux_change": "After a change of flux",
     "after_first_specularity": "After the first specularity above 0",
     "after_specularity_change": "After a change of specularity",

@@ -122,7 +122,7 @@ def _new_light(case: Case, resolution: tuple[int, int], runs: int) -> dict[str, 
 
 
 def _kept_light(case: Case) -> dict[str, Any]:
-    """Further contacts: with the light field that is there, and with one of their own.
+    """Further contacts: with the radiance cache that is there, and with one of their own.
 
     The ratio of the second to an image of the first contact is what a change of contact costs.
     """

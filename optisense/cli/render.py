@@ -22,8 +22,7 @@ from optisense.cli.options import (
 from optisense.cli.output_folder import ensure_writable
 
 if TYPE_CHECKING:
-    from optisense.optics import Progress as RenderProgress
-    from optisense.optics import TactileImage
+    from optisense.optics import RenderProgress, TactileImage
 
 REPORT = "report.html"
 PICTURE = "image.png"

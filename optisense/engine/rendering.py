@@ -29,7 +29,7 @@ from optisense.engine.session import KeptImage, Session, name_of
 from optisense.errors import RenderError
 
 if TYPE_CHECKING:
-    from optisense.optics import Progress, TactileImage
+    from optisense.optics import RenderProgress, TactileImage
 
 PHOTONS = 1_000_000
 """Of an image where nothing is asked, as of `optisense render`."""
@@ -189,7 +189,7 @@ def relight(session: Session, fields: Relight, job: Job) -> dict[str, Any]:
         name: _changed(name, lights, change).channel_flux()
         for name, change in fields.lights.items()
     }
-    image = kept.image.relit(flux)
+    image = kept.image.relight(flux)
     exposure = kept.exposure if fields.exposure == "same" else _exposure(image, fields.exposure)
     return {
         "image": fields.image,
@@ -219,7 +219,7 @@ def report(session: Session, fields: Report, job: Job) -> dict[str, Any]:
 @handles("chief_rays", ChiefRayGrid, Lane.RENDER)
 def chief_rays(session: Session, fields: ChiefRayGrid, job: Job) -> dict[str, Any]:
     """The ways of chief rays, for drawing."""
-    from optisense.optics import Outcome
+    from optisense.optics import RayOutcome
     from optisense.optics.ray_paths import trace_paths
 
     files = session.files(fields, job.id)
@@ -236,8 +236,8 @@ def chief_rays(session: Session, fields: ChiefRayGrid, job: Job) -> dict[str, An
             "outcomes": files.array("rays.outcomes.npy", paths.outcomes),
         },
         "rays": len(paths.counts),
-        "outcome_names": [each.name.lower() for each in Outcome],
-        "hit": float((paths.outcomes == Outcome.HIT).mean()),
+        "outcome_names": [each.name.lower() for each in RayOutcome],
+        "hit": float((paths.outcomes == RayOutcome.HIT).mean()),
     }
 
 
@@ -277,8 +277,8 @@ def blender_pixels(picture: NDArray[np.uint8]) -> NDArray[np.float32]:
     return LEVELS[opaque]
 
 
-def _teller(job: Job) -> Callable[[Progress], None]:
-    def tell(progress: Progress) -> None:
+def _teller(job: Job) -> Callable[[RenderProgress], None]:
+    def tell(progress: RenderProgress) -> None:
         text = f"{progress.photons / 1e6:.1f} million photons"
         if progress.noise is not None:
             text += f", noise {progress.noise:.1f} %"

@@ -92,7 +92,7 @@ class Renderer:
         if self._model is None:
             self._model = OpticalModel(design, self.variant)
         else:
-            self._model.become(design)
+            self._model.set_design(design)
         return self._model
 
     def draft_model(self, design: SensorDesign) -> OpticalModel:
@@ -107,7 +107,7 @@ class Renderer:
         if self._drafts is None:
             self._drafts = DraftModel(design, self.variant)
         else:
-            self._drafts.become(design)
+            self._drafts.set_design(design)
         made: Usual = self._drafts
         return made
 

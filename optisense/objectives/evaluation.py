@@ -186,18 +186,22 @@ class Evaluation:
         for number in range(len(frames)):
             if image is None or not together:
                 numbers = range(len(frames)) if together else (number,)
-                careful = None if self._reads is None else partial(self._careful, press_of, numbers)
+                pixel_importance = (
+                    None
+                    if self._reads is None
+                    else partial(self._pixel_importance, press_of, numbers)
+                )
                 image = self._render(
                     [contacts[each] for each in numbers],
                     FIRST_IMAGE + (not together) * number * part,
                     part,
-                    careful,
+                    pixel_importance,
                 )
             press = press_of(number, image)
             press.check_seen()
             yield press, image
 
-    def _careful(
+    def _pixel_importance(
         self, press_of: Callable[[int, ChiefRays], Press], numbers: Iterable[int], rays: ChiefRays
     ) -> NDArray[np.float64]:
         """(h, w): which pixels of an image's presses objectives read (see `Reads`).
@@ -251,12 +255,12 @@ class Evaluation:
         Overexposure spreads as far as its blur reaches, so only what lies that near to a contact
         is worked out anew.
         """
-        from optisense.optics.camera.response import BLUR_OF_WIDTH, saturate
+        from optisense.optics.camera.response import BLUR_WIDTH, saturate
 
         exposure, untouched = np.float32(self.exposure), self._untouched_radiance
         response = self._once("untouched response", lambda: saturate(untouched * exposure)).copy()
         if touched.any():
-            reach = int(BLUR_REACH * BLUR_OF_WIDTH * touched.shape[1]) + 2
+            reach = int(BLUR_REACH * BLUR_WIDTH * touched.shape[1]) + 2
             changed, needed = _around(touched, reach), _around(touched, 2 * reach)
             part = untouched[needed].copy()
             part[touched[needed]] = radiance
@@ -279,7 +283,7 @@ class Evaluation:
         contacts: Sequence[Contact],
         done: float,
         part: float,
-        careful: Callable[[ChiefRays], NDArray[np.float64]] | None = None,
+        pixel_importance: Callable[[ChiefRays], NDArray[np.float64]] | None = None,
     ) -> TactileImage:
         """One image, which takes the progress from `done` by `part`.
 
@@ -295,7 +299,7 @@ class Evaluation:
             seed=self.settings.seed,
             progress=lambda progress: self._tell(done + part * progress.fraction, what),
             only_contacts=bool(contacts),
-            careful=careful,
+            pixel_importance=pixel_importance,
         )
         if image.interrupted:
             raise KeyboardInterrupt

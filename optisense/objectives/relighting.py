@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from optisense.errors import ObjectiveError
 from optisense.objectives.evaluation import Evaluation, exposure_for
 from optisense.objectives.press import Press
-from optisense.optics.camera.response import BLUR_OF_WIDTH, KNEE, saturate
+from optisense.optics.camera.response import BLUR_WIDTH, KNEE, saturate
 
 if TYPE_CHECKING:
     from optisense.design import SensorDesign
@@ -115,7 +115,7 @@ class Relighting:
     def image(self, flux: ArrayLike) -> TactileImage:
         """The image of the untouched sensor under these lights."""
         given = np.asarray(flux, dtype=np.float64)
-        return self._image.relit(dict(zip(self.groups, given, strict=True)))
+        return self._image.relight(dict(zip(self.groups, given, strict=True)))
 
     def exposure(self, flux: ArrayLike) -> float:
         """The factor from radiance to what the camera reads, under these lights."""
@@ -154,7 +154,7 @@ class Relighting:
     def _keep(self, press: Press, image: TactileImage) -> _Seen:
         rows, columns = press.box
         height, width = press.mask.shape
-        reach = int(BLUR_REACH * BLUR_OF_WIDTH * width) + SPARE
+        reach = int(BLUR_REACH * BLUR_WIDTH * width) + SPARE
         around = (
             slice(max(0, rows.start - reach), min(height, rows.stop + reach)),
             slice(max(0, columns.start - reach), min(width, columns.stop + reach)),

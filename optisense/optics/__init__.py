@@ -11,18 +11,18 @@ from optisense.lazy_names import load_on_first_use
 
 if TYPE_CHECKING:
     from optisense.optics.imaging.tactile_image import TactileImage
-    from optisense.optics.model import OpticalModel, Progress
-    from optisense.optics.transport.chief_rays import ChiefRays, Outcome
+    from optisense.optics.model import OpticalModel, RenderProgress
+    from optisense.optics.transport.chief_rays import ChiefRays, RayOutcome
 
 _HOMES = {
     "ChiefRays": ".transport.chief_rays",
     "OpticalModel": ".model",
-    "Outcome": ".transport.chief_rays",
-    "Progress": ".model",
+    "RayOutcome": ".transport.chief_rays",
+    "RenderProgress": ".model",
     "TactileImage": ".imaging.tactile_image",
 }
 
-__all__ = ["ChiefRays", "OpticalModel", "Outcome", "Progress", "TactileImage"]
+__all__ = ["ChiefRays", "OpticalModel", "RayOutcome", "RenderProgress", "TactileImage"]
 
 
 def _check_llvm() -> None:

@@ -1,9 +1,10 @@
-"""A model for pictures that follow the hand: coarser in space, and kept from change to change.
+"""Drafts: a model for interactive editing, coarser in space, that keeps what it may between
+designs.
 
-What a changed design makes new costs more than the light of a small picture, so a draft keeps
-whatever it may: shapes of cages that did not move, contacts where the surface did not move, the
-cells of surfaces that did not move, and the photon guide, which stays right for lights that moved
-(no direction is left out) and only loses effect. In contacts it takes few camera samples.
+What a changed design makes new costs more than the light of a small picture, so a draft keeps the
+shapes of cages that did not move, contacts where the surface did not move, the cells of surfaces
+that did not move, and the emission guide, which stays right for lights that moved (no direction is
+left out) and only loses effect. In contacts it takes few camera samples.
 """
 
 from __future__ import annotations
@@ -21,19 +22,20 @@ from optisense.geometry import Contact, SensingSurface, TriangleMesh
 from optisense.geometry.indenters import FACET_ERROR
 from optisense.optics.imaging.tactile_image import TactileImage
 from optisense.optics.model import OpticalModel
-from optisense.optics.radiance_cache.store import CELL_SIZE, SEEN_MARGIN, FieldStore
+from optisense.optics.radiance_cache.store import CELL_SIZE, VIEW_MARGIN, CacheStore
 from optisense.optics.scene.emitters import EmitterTable
 from optisense.optics.scene.ray_scene import Piece, RayScene
 from optisense.optics.scene.surfaces import SurfaceKind
 
-COARSER = 2.4
-"""How much larger the cells of a draft are along a side. Of as few photons as a draft has, wider
-cells make a picture that is nearer to the whole one (9 % instead of 14 % with cells half as wide),
-and a smoothing costs a small part."""
+DRAFT_CELL_SCALE = 2.4
+"""Ratio of a draft's cell size to that of a full image. With as few photons as a draft has, wider
+cells give a picture that is nearer to the full one: 9 % off instead of 14 % with cells half as
+wide. Smoothing them also costs a small part."""
 
 
-GUIDE_REACH = 0.5 * SEEN_MARGIN
-"""mm that shapes may differ from those that a photon guide was learned on."""
+GUIDE_TOLERANCE = 0.5 * VIEW_MARGIN
+"""Largest displacement of a vertex (mm) up to which a draft keeps the emission guide that was
+learned before the shapes changed: half of `VIEW_MARGIN`."""
 
 
 @dataclass(frozen=True)
@@ -47,11 +49,11 @@ class _Shown:
     kept: bool
 
 
-class DraftStore(FieldStore):
-    """Light fields in coarse cells, which takes over what it may from the store before it."""
+class DraftCacheStore(CacheStore):
+    """Radiance caches in coarse cells, which takes over what it may from the store before it."""
 
-    cell_size = COARSER * CELL_SIZE
-    asks_scouts = False  # half of the light's time, for some per cent on flanks of contacts
+    cell_size = DRAFT_CELL_SCALE * CELL_SIZE
+    uses_pilot = False  # half of the light's time, for some per cent on flanks of contacts
 
     def __init__(
         self,
@@ -61,9 +63,9 @@ class DraftStore(FieldStore):
         seen: NDArray[np.floating],
         coloured: bool,
         metallic: bool,
-        before: DraftStore | None,
+        before: DraftCacheStore | None,
     ) -> None:
-        """As of `FieldStore`; `before` is the store of the design before, if there is one."""
+        """As of `CacheStore`; `before` is the store of the design before, if there is one."""
         super().__init__(scene, opaque, table, seen, coloured, metallic)
         self.seen = seen
         self._learned_on = opaque
@@ -79,7 +81,7 @@ class DraftStore(FieldStore):
     def aims_at(self, opaque: list[Piece], table: EmitterTable) -> bool:
         """Whether it knows where lights should send photons in a sensor of these surfaces."""
         known = self._guide is not None and table.count == self._table.count
-        return known and _apart(opaque, self._learned_on) < GUIDE_REACH
+        return known and _apart(opaque, self._learned_on) < GUIDE_TOLERANCE
 
     def light_only(self, groups: Collection[int] | None) -> None:
         """From now on trace the light of these groups alone, or of all (None)."""
@@ -101,7 +103,7 @@ class DraftModel(OpticalModel):
         """As of `OpticalModel`."""
         self._rest: dict[str, TriangleMesh] = {}
         self._bent: dict[str, TriangleMesh] = {}
-        self._before: DraftStore | None = None
+        self._before: DraftCacheStore | None = None
         self._seen: NDArray[np.floating] | None = None
         self._placed: dict[Contact, TriangleMesh] = {}
         self._placed_on: SensingSurface | None = None
@@ -109,12 +111,12 @@ class DraftModel(OpticalModel):
         self._pressed: tuple[int, list[TriangleMesh], RayScene] | None = None
         super().__init__(self._straightened(design), variant)
 
-    def become(self, design: SensorDesign) -> None:
+    def set_design(self, design: SensorDesign) -> None:
         """As of `OpticalModel`."""
         straight, old = self._straightened(design), self.design
         self._before = self.__dict__.get("_store", self._before)
         kept = {name: self.__dict__.get(name) for name in ("surface", "_fixed")}
-        super().become(straight)
+        super().set_design(straight)
         if not _all_but_lights_same(old, straight):
             self._seen = None
             return
@@ -173,7 +175,7 @@ class DraftModel(OpticalModel):
 
     def _relit(self, image: TactileImage) -> TactileImage:
         """The same under the design's own lights."""
-        return image.relit(
+        return image.relight(
             {name: self.design.lights[name].channel_flux() for name in image.unit_layers}
         )
 
@@ -186,7 +188,7 @@ class DraftModel(OpticalModel):
         return scene
 
     @cached_property
-    def _store(self) -> DraftStore:
+    def _store(self) -> DraftCacheStore:
         opaque = [piece for piece in self._pieces if piece.surface.kind is SurfaceKind.OPAQUE]
         before, seen = self._before, self._seen
         if seen is None and before is not None and before.aims_at(opaque, self._emitter_table):
@@ -194,7 +196,7 @@ class DraftModel(OpticalModel):
         if seen is None:
             rays = self.chief_rays((96, 72))
             seen = self._seen = rays.points[rays.hit]
-        return DraftStore(
+        return DraftCacheStore(
             self.scene, opaque, self._emitter_table, seen, self._coloured, self._metallic, before
         )
 

@@ -17,20 +17,24 @@ from numpy.typing import NDArray
 from optisense.errors import RenderError
 from optisense.optics.camera.projection import RayCamera
 from optisense.optics.scene.bsdf import SMOOTH_ALPHA
-from optisense.optics.scene.emitters import Emitter, Shape
+from optisense.optics.scene.emitters import Emitter, EmitterShape
 from optisense.optics.scene.ray_scene import Piece
 from optisense.optics.scene.surfaces import Surface, SurfaceKind
 
 Colour = tuple[float, float, float]
 
 PATH_DEPTH = 64
-"""Surfaces of a path; the light lost beyond is far below a thousandth."""
+"""Largest number of surfaces of a path in the exported scene; the light beyond is far below a
+thousandth."""
 
 SPOT_PIXELS = 512
-WIDEST_SPOT = 80.0
-"""Degrees: Mitsuba's spot paints its profile on a plane across the axis, so it can't reach 90."""
+"""Side (pixels) of the bitmap that holds the profile of a spot light."""
+MAX_SPOT_ANGLE = 80.0
+"""Largest cut-off angle (degrees) of an exported spot light: Mitsuba paints its profile on a plane
+across the axis, which can't reach 90."""
 
 BLACK = {"type": "diffuse", "reflectance": {"type": "rgb", "value": 0.0}}
+"""Mitsuba's BSDF of a surface that absorbs all light."""
 
 
 def mitsuba_scene(
@@ -148,14 +152,14 @@ def _sensor(camera: RayCamera, samples: int) -> dict[str, Any]:
 
 
 def _emitter(emitter: Emitter, power: NDArray[np.floating]) -> dict[str, Any]:
-    if emitter.shape is Shape.POINT:
+    if emitter.shape is EmitterShape.POINT:
         return _point(emitter, power)
     if emitter.intensity is not None or emitter.exponent != 1.0:
         raise RenderError("Mitsuba's area lights are Lambertian", where=f"group {emitter.group}")
     half = np.asarray(emitter.size, float) / 2
     area = 4 * half[0] * half[1]
     kind = "rectangle"
-    if emitter.shape is Shape.DISC:
+    if emitter.shape is EmitterShape.DISC:
         kind, area = "disk", np.pi * half[0] * half[1]
     return {
         "type": kind,
@@ -170,9 +174,9 @@ def _point(emitter: Emitter, power: NDArray[np.floating]) -> dict[str, Any]:
     if profile is not None and profile.polar[-1] >= 180.0 and np.ptp(profile.values) == 0.0:
         position = [float(v) for v in emitter.position]
         return {"type": "point", "position": position, "intensity": _rgb(power / (4 * np.pi))}
-    if profile is None or profile.polar[-1] > WIDEST_SPOT:
+    if profile is None or profile.polar[-1] > MAX_SPOT_ANGLE:
         raise RenderError(
-            f"Mitsuba has no point light that shines up to more than {WIDEST_SPOT} degrees from "
+            f"Mitsuba has no point light that shines up to more than {MAX_SPOT_ANGLE} degrees from "
             "its axis, save evenly all around",
             where=f"group {emitter.group}",
         )

@@ -1,5 +1,6 @@
-"""A sensor design made ready to render: scene, tables, guide and light field are kept between
-images.
+"""An optical model: a sensor design made ready to render, with its scene, tables, emission guide
+and
+radiance caches kept between images.
 """
 
 from __future__ import annotations
@@ -17,26 +18,28 @@ from optisense.geometry import Contact
 from optisense.optics.backend.interrupts import lets_ctrl_c_through
 from optisense.optics.backend.versions import versions
 from optisense.optics.camera.projection import RayCamera
-from optisense.optics.imaging.cached import Careful, ImageLayers, render_field
+from optisense.optics.imaging.cached import ImageLayers, PixelImportance, render_cached
 from optisense.optics.imaging.tactile_image import TactileImage
-from optisense.optics.radiance_cache.store import FieldStore
+from optisense.optics.radiance_cache.store import CacheStore
 from optisense.optics.ray_model import RayModel
 from optisense.optics.scene.contact_scenes import ContactScenes
 from optisense.optics.scene.surfaces import SurfaceKind
 from optisense.optics.transport.chief_rays import ChiefRays, sees_nothing, trace_chief_rays
-from optisense.optics.transport.emission_guide import Guide
+from optisense.optics.transport.emission_guide import EmissionGuide
 
 DEFAULT_PHOTONS = 5_000_000
-"""Photons of a light field where nothing else is asked; it is kept for the next image."""
+"""Photons of a radiance cache where no other limit is given; the cache serves the next images,
+too."""
 
-MOST_PHOTONS = 512_000_000
-"""A noise target gives up here."""
+MAX_PHOTONS = 512_000_000
+"""Number of photons at which tracing ends even if the wanted noise is not reached."""
 
-SPPM_PASS = 1_000_000
+SPPM_PASS_PHOTONS = 1_000_000
+"""Photons of one pass of the `sppm` estimator."""
 
 
 @dataclass(frozen=True)
-class Progress:
+class RenderProgress:
     """How far a render is: fraction 0..1, photons traced, relative noise (per cent) if known,
     seconds so far.
     """
@@ -50,7 +53,7 @@ class Progress:
 class OpticalModel(RayModel):
     """A sensor whose image can be rendered, again and again.
 
-    The scene of the sensor itself, the photon guide and the light field are made once; a
+    The scene of the sensor itself, the photon guide and the radiance cache are made once; a
     contact adds only its own surface, a light's flux or colour only scales its layer, a
     coating's specularity only rewrites its row of the surface table.
     """
@@ -59,10 +62,10 @@ class OpticalModel(RayModel):
     """Whether images may be coarse for the sake of speed."""
 
     @cached_property
-    def _store(self) -> FieldStore:
+    def _store(self) -> CacheStore:
         opaque = [p for p in self._pieces if p.surface.kind is SurfaceKind.OPAQUE]
         rays = self.chief_rays((96, 72))
-        return FieldStore(
+        return CacheStore(
             self.scene,
             opaque,
             self._emitter_table,
@@ -77,13 +80,13 @@ class OpticalModel(RayModel):
             self._store.forget_light(self._coloured, self._metallic)
 
     def forget_light(self) -> None:
-        """Drop the light fields, hundreds of MB; the next image traces its light anew."""
+        """Drop the radiance caches (hundreds of MB); the next image traces its light anew."""
         if "_store" in self.__dict__:
             self._store.forget_light(self._coloured, self._metallic)
             dr.flush_malloc_cache()
 
-    def guide(self) -> Guide:
-        """The photon guide, learned from a pilot pass on first use."""
+    def guide(self) -> EmissionGuide:
+        """The emission guide, learned from a pilot pass on first use."""
         return self._store.guide
 
     @lets_ctrl_c_through
@@ -95,10 +98,10 @@ class OpticalModel(RayModel):
         noise: float | None = None,
         seconds: float | None = None,
         seed: int = 0,
-        progress: Callable[[Progress], None] | None = None,
+        progress: Callable[[RenderProgress], None] | None = None,
         estimator: str = "field",
         only_contacts: bool = False,
-        careful: Careful | None = None,
+        pixel_importance: PixelImportance | None = None,
     ) -> TactileImage:
         """What the camera sees while ``contacts`` press in.
 
@@ -112,12 +115,12 @@ class OpticalModel(RayModel):
             seed: the same seed and settings give the same image, but for rounding, which in single
                 pixels at the edge of a contact turns a shadow ray.
             progress: called now and then.
-            estimator: "field" (pooled light field, fast) or "sppm" (progressive photon mapping,
+            estimator: "field" (pooled radiance cache, fast) or "sppm" (progressive photon mapping,
                 for checking).
             only_contacts: light only the pixels that see an indenter and leave the others dark,
                 several times sooner; for scores that read nothing else.
-            careful: with ``only_contacts``, which pixels (h, w) of the chief rays are read: the
-                part, 0 to 1, of the camera samples that each gets; a few are taken anyway.
+            pixel_importance: with ``only_contacts``, a function of the chief rays that gives the
+                share (h, w), 0 to 1, of the camera samples that each pixel gets; each gets a few.
 
         Returns:
             The image; ``interrupted`` is set if Ctrl-C ended the tracing early.
@@ -143,7 +146,7 @@ class OpticalModel(RayModel):
         def tell(fraction: float, traced: int, reached: float | None) -> None:
             if progress is not None:
                 shown = None if reached is None or not np.isfinite(reached) else 100 * reached
-                progress(Progress(fraction, traced, shown, time.perf_counter() - began))
+                progress(RenderProgress(fraction, traced, shown, time.perf_counter() - began))
 
         if estimator == "sppm":
             layers = self._render_sppm(scenes, camera, rays, photons, seconds, seed, began, tell)
@@ -152,9 +155,9 @@ class OpticalModel(RayModel):
             wanted = photons
             if photons is None and noise is None and seconds is None:
                 wanted = DEFAULT_PHOTONS
-            field = self._store.field(seed, wanted, target, seconds, MOST_PHOTONS, began, tell)
+            field = self._store.field(seed, wanted, target, seconds, MAX_PHOTONS, began, tell)
             lit = time.perf_counter()
-            layers = render_field(
+            layers = render_cached(
                 field,
                 scenes,
                 camera,
@@ -163,7 +166,7 @@ class OpticalModel(RayModel):
                 self._parts.light_areas,
                 seed,
                 only_contacts,
-                careful,
+                pixel_importance,
                 self.is_draft,
             )
             layers.light_seconds = lit - built
@@ -217,7 +220,7 @@ class OpticalModel(RayModel):
     ) -> ImageLayers:
         from optisense.optics.imaging.sppm import render_sppm
 
-        per_light = max(1, SPPM_PASS // self._emitter_table.count)
+        per_light = max(1, SPPM_PASS_PHOTONS // self._emitter_table.count)
         emitted = per_light * self._emitter_table.count
         passes = max(1, -(-(photons or 16 * DEFAULT_PHOTONS) // emitted))
 

@@ -145,9 +145,9 @@ class RayModel:
         Raises:
             DesignError: there is no such value, or it does not fit.
         """
-        self.become(set_value(self.design, path, value))
+        self.set_design(set_value(self.design, path, value))
 
-    def become(self, design: SensorDesign) -> None:
+    def set_design(self, design: SensorDesign) -> None:
         """Take on another design, redoing only what depends on the values that differ.
 
         Fluxes and colours cost nothing, a coating or a camera little; a mirror or blocker that

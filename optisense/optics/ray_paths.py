@@ -15,13 +15,13 @@ from optisense.geometry import Contact
 from optisense.optics.scene.bsdf import refract, surface_kind, surface_region
 from optisense.optics.scene.ray_scene import RayScene, intersect, leave
 from optisense.optics.scene.surfaces import Region, SurfaceKind
-from optisense.optics.transport.chief_rays import MAX_DEPTH, Outcome
+from optisense.optics.transport.chief_rays import MAX_DEPTH, RayOutcome
 
 if TYPE_CHECKING:
     from optisense.optics.model import OpticalModel
 
-TAIL = 5.0
-"""mm that a ray which escapes is drawn on behind the last surface."""
+ESCAPE_LENGTH = 5.0
+"""Length (mm) of the last segment of a ray that escapes."""
 
 
 @dataclass(frozen=True)
@@ -31,7 +31,7 @@ class RayPaths:
     Attributes:
         vertices: (n, 3) float32, mm.
         counts: (rays,) int32, the vertices of each, at least two.
-        outcomes: (rays,) uint8, of `Outcome`.
+        outcomes: (rays,) uint8, of `RayOutcome`.
     """
 
     vertices: NDArray[np.float32]
@@ -65,7 +65,7 @@ def trace_paths(
     count = camera.width * camera.height
     points = [np.broadcast_to(_rows(origin), (count, 3))]
     lengths = np.ones(count, dtype=np.int32)
-    outcomes = np.full(count, int(Outcome.DEPTH_LIMIT), dtype=np.uint8)
+    outcomes = np.full(count, int(RayOutcome.DEPTH_LIMIT), dtype=np.uint8)
     total = np.zeros(count, dtype=bool)
     active = mi.Bool(True) & (index < count)
     for _ in range(MAX_DEPTH):
@@ -81,7 +81,7 @@ def trace_paths(
         closed = going & (told >= 0)
         outcomes[closed] = told[closed]
         total |= going & np.asarray(reflected).astype(bool)
-    outcomes[total & (outcomes != int(Outcome.HIT))] = int(Outcome.TOTAL_REFLECTION)
+    outcomes[total & (outcomes != int(RayOutcome.HIT))] = int(RayOutcome.TOTAL_REFLECTION)
     every = np.stack(points, axis=1)
     chosen = np.arange(every.shape[1])[None, :] < lengths[:, None]
     return RayPaths(every[chosen].astype(np.float32), lengths, outcomes)
@@ -98,15 +98,15 @@ def _step(scene: RayScene, origin: Any, direction: Any, active: Any) -> tuple[An
     arrived = opaque & (region != int(Region.OTHER))
     absorbing = (kind == int(SurfaceKind.ABSORBER)) | (kind == int(SurfaceKind.LIGHT))
     ended = hit.valid & ~arrived & (opaque | absorbing)
-    outcome = dr.select(ended, int(Outcome.ABSORBED), mi.Int32(-1))
-    outcome = dr.select(arrived, int(Outcome.HIT), outcome)
-    outcome = dr.select(hit.valid, outcome, int(Outcome.ESCAPED))
+    outcome = dr.select(ended, int(RayOutcome.ABSORBED), mi.Int32(-1))
+    outcome = dr.select(arrived, int(RayOutcome.HIT), outcome)
+    outcome = dr.select(hit.valid, outcome, int(RayOutcome.ESCAPED))
     reflectance, mirrored, transmitted, _relative = refract(direction, hit.shading_normal, eta)
     mirror = kind == int(SurfaceKind.MIRROR)
     goes_on = active & hit.valid & ~arrived & ~ended
     totally = goes_on & ~mirror & (reflectance >= 1)
     turned = dr.select(mirror | totally, mirrored, transmitted)
-    end = dr.select(hit.valid, hit.point, origin + TAIL * direction)
+    end = dr.select(hit.valid, hit.point, origin + ESCAPE_LENGTH * direction)
     start = dr.select(goes_on, leave(hit.point, hit.normal, turned), origin)
     return end, outcome, totally, start, dr.select(goes_on, turned, direction), goes_on
 

@@ -38,13 +38,13 @@ class CameraRays:
             RenderError: the camera makes no sense.
         """
         from optisense.optics.ray_paths import trace_paths
-        from optisense.optics.transport.chief_rays import Outcome
+        from optisense.optics.transport.chief_rays import RayOutcome
 
         width, height = model.design.camera.resolution
         rows = 2 * max(1, round(ACROSS * height / width / 2)) + 1
         paths = trace_paths(model, (ACROSS, rows))
         lines = np.split(paths.vertices.astype(np.float64), np.cumsum(paths.counts)[:-1])
-        arrived = (paths.outcomes == Outcome.HIT).tolist()
+        arrived = (paths.outcomes == RayOutcome.HIT).tolist()
         return CameraRays(
             [DrawnRay(line, hit) for line, hit in zip(lines, arrived, strict=True)], (rows, ACROSS)
         )

@@ -44,7 +44,7 @@ class ModelKeeper:
             return self._becoming(design)
         model = self._becoming(design.model_copy(update={"coating": self.first.coating}))
         model.guide()  # elsewhere it is learned when the first image is rendered
-        model.become(design)
+        model.set_design(design)
         return model
 
     def _becoming(self, design: SensorDesign) -> OpticalModel:
@@ -53,7 +53,7 @@ class ModelKeeper:
 
             self._model = OpticalModel(design, variant=self.variant)
         else:
-            self._model.become(design)
+            self._model.set_design(design)
         return self._model
 
     def __getstate__(self) -> dict[str, object]:

@@ -57,7 +57,7 @@ class DatasetSettings:
     Attributes:
         contacts: what contacts are drawn from.
         resolution: (width, height) pixels; None for the camera's own.
-        photons: of the light field that all samples share.
+        photons: of the radiance cache that all samples share.
         seed: of everything; sample i depends on it and on i only.
         exposure: a factor on the radiance, or "auto": what suits the untouched sensor. One for
             all samples, as a camera with a fixed exposure.

@@ -16,7 +16,7 @@ from optisense.objectives.projection_warping import projection_warping, triangle
 from optisense.optics.camera.projection import RayCamera
 from optisense.optics.scene.ray_scene import Piece, RayScene
 from optisense.optics.scene.surfaces import Region, Surface, SurfaceKind
-from optisense.optics.transport.chief_rays import ChiefRays, Outcome, trace_chief_rays
+from optisense.optics.transport.chief_rays import ChiefRays, RayOutcome, trace_chief_rays
 
 DISTANCE, FOV = 10.0, 60.0
 SLOPE = np.tan(np.radians(FOV) / 2)
@@ -198,7 +198,7 @@ def test_a_surface_seen_edge_on_does_not_leap() -> None:
 def test_a_sensor_that_sees_nothing_has_a_reason() -> None:
     rays = PlateModel(plate()).chief_rays((10, 8))
     nothing = ChiefRays(
-        **{**rays.__dict__, "outcome": np.full_like(rays.outcome, int(Outcome.ESCAPED))}
+        **{**rays.__dict__, "outcome": np.full_like(rays.outcome, int(RayOutcome.ESCAPED))}
     )
     for objective in (aoap, projection_warping):
         with pytest.raises(ObjectiveError, match="sees"):

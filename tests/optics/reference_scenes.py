@@ -12,16 +12,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from optisense.optics.camera.projection import RayCamera
-from optisense.optics.imaging.cached import render_field
+from optisense.optics.imaging.cached import render_cached
 from optisense.optics.imaging.sppm import render_sppm
 from optisense.optics.mitsuba_export import PATH_DEPTH, Colour, mitsuba_scene
-from optisense.optics.radiance_cache.store import FieldStore
+from optisense.optics.radiance_cache.store import CacheStore
 from optisense.optics.scene.contact_scenes import ContactScenes
-from optisense.optics.scene.emitters import Emitter, EmitterTable, Intensity, Shape, emitter_table
+from optisense.optics.scene.emitters import (
+    Emitter,
+    EmitterShape,
+    EmitterTable,
+    Intensity,
+    emitter_table,
+)
 from optisense.optics.scene.ray_scene import Piece, RayScene
 from optisense.optics.scene.surfaces import Region, Surface, SurfaceKind
 from optisense.optics.transport.chief_rays import ChiefRays, trace_chief_rays
-from optisense.optics.transport.emission_guide import even_guide
+from optisense.optics.transport.emission_guide import uniform_guide
 
 FloatArray = NDArray[np.floating]
 
@@ -73,7 +79,7 @@ class ReferenceScene:
         result = render_sppm(
             self.ray_scene(),
             self.table(),
-            even_guide(len(self.emitters)),
+            uniform_guide(len(self.emitters)),
             self.camera,
             passes,
             per_light,
@@ -84,12 +90,12 @@ class ReferenceScene:
         return self._scaled(result.layers), np.stack([self._scaled(h) for h in result.halves])
 
     def pooled(self, photons: int, seed: int = 0) -> FloatArray:
-        """The pooled light field: radiance (groups, h, w, 3)."""
+        """The pooled radiance cache: radiance (groups, h, w, 3)."""
         scene = self.ray_scene()
         surfaces = [piece.surface for piece in self.pieces]
         opaque = [i for i, s in enumerate(surfaces) if s.kind is SurfaceKind.OPAQUE]
         rays = trace_chief_rays(scene, self.camera, np.zeros(len(scene.faces), dtype=np.int64))
-        store = FieldStore(
+        store = CacheStore(
             scene,
             [self.pieces[i] for i in opaque],
             self.table(),
@@ -102,7 +108,7 @@ class ReferenceScene:
         fixed = RayScene([self.pieces[i] for i in opaque], opaque, scene.table)
         scenes = ContactScenes(scene, fixed, None, mi.Float())
         areas = [emitter.area for emitter in self.emitters]
-        layers = render_field(light, scenes, self.camera, rays, self.emitters, areas, seed)
+        layers = render_cached(light, scenes, self.camera, rays, self.emitters, areas, seed)
         return self._scaled(layers.radiance)
 
     def path(self, samples: int, seed: int = 0, max_depth: int = PATH_DEPTH) -> FloatArray:
@@ -236,7 +242,7 @@ def referee_scene(
             emitter = Emitter(number, place, way, intensity=isotropic())
             power = 4 * np.pi * REFEREE_INTENSITY
         else:
-            emitter = Emitter(number, place, way, shape=Shape.RECTANGLE, size=size)
+            emitter = Emitter(number, place, way, shape=EmitterShape.RECTANGLE, size=size)
             power = np.pi * size[0] * size[1] * REFEREE_RADIANCE
             pieces.append(emitting_face(number, emitter))
         emitters.append(emitter)

@@ -10,7 +10,7 @@ from scipy import ndimage
 from optisense import OpticalModel
 from optisense.geometry import Contact, Sphere
 from optisense.optics.radiance_cache import beams, shading
-from optisense.optics.radiance_cache.angular_variance import skyline
+from optisense.optics.radiance_cache.angular_variance import occluder_horizon
 from optisense.sensors import BUILDERS
 
 BALL = Contact(Sphere(radius=1.5), at=(0.0, 0.0), depth=0.8)
@@ -23,9 +23,9 @@ def mini() -> OpticalModel:
 
 
 def horizon(balls: list[tuple[float, ...]], own: bool = False) -> float:
-    """The skyline seen from the origin, z being up."""
+    """The occluder_horizon seen from the origin, z being up."""
     rows = mi.Float([value for ball in balls for value in ball])
-    sine = skyline(
+    sine = occluder_horizon(
         rows, mi.UInt32(len(balls)), mi.Point3f(0), mi.Vector3f(0, 0, 1), mi.Bool(own)
     )  # fmt: skip
     return float(sine[0])
@@ -57,7 +57,7 @@ def test_a_convex_shape_hides_nothing_of_its_own() -> None:
 def test_diffuse_light_is_the_sum_of_its_beams(
     mini: OpticalModel, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(shading, "CELLS_OF_SAMPLE", 1)  # those that beams are read from
+    monkeypatch.setattr(shading, "CELLS_PER_SAMPLE", 1)  # those that beams are read from
     by_vector = mini.render(**SIZE)
     (field,) = mini._store._done.values()
     field.metallic = True  # without metal in the coating: every beam is gone through all the same
@@ -72,7 +72,7 @@ def test_diffuse_light_is_the_sum_of_its_beams(
 
 
 def test_an_untouched_picture_has_no_grain(mini: OpticalModel) -> None:
-    """What the cells of the light field differ by does not show from pixel to pixel."""
+    """What the cells of the radiance cache differ by does not show from pixel to pixel."""
     picture = mini.render(**SIZE).radiance.sum(axis=2)
     around = ndimage.uniform_filter(picture, 3)
     off = (picture / around - 1)[2:-2, 2:-2]
@@ -96,7 +96,7 @@ def test_beams_that_pass_no_indenter_hide_nothing(
 ) -> None:
     """Shadow rays of all beams, and many more of them, show the same shadows."""
     near = mini.render([BALL], **SIZE)
-    monkeypatch.setattr(beams, "REACH", 1000.0)
+    monkeypatch.setattr(beams, "READ_DISTANCE", 1000.0)
     monkeypatch.setattr(shading, "SHADOW_RAYS", 500.0)
     every = mini.render([BALL], **SIZE)
     untouched = mini.render(**SIZE).radiance

@@ -1,4 +1,4 @@
-"""Weak bins of the light field taken together show what the bins one by one show."""
+"""Weak bins of the radiance cache taken together show what the bins one by one show."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def test_merged_beams_give_the_picture_of_all_bins(
     size = {"resolution": (120, 90), "photons": 200_000}
     merged = model.render(**size)
     count = len(field_of(model).beams.ways)
-    monkeypatch.setattr(beams, "STRONG", -1.0)
+    monkeypatch.setattr(beams, "STRONG_SHARE", -1.0)
     model._store.forget_light(model._coloured, model._metallic)
     apart = model.render(**size)
     assert len(field_of(model).beams.ways) > 1.1 * count
@@ -57,6 +57,6 @@ def test_no_light_is_lost_in_merging() -> None:
 
 
 def field_of(model: OpticalModel):  # type: ignore[no-untyped-def]
-    """The one light field that a model keeps."""
+    """The one radiance cache that a model keeps."""
     (field,) = model._store._done.values()
     return field

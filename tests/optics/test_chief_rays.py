@@ -12,7 +12,7 @@ from optisense.optics.scene.ray_scene import Piece, RayScene
 from optisense.optics.scene.surfaces import Surface, SurfaceKind
 from optisense.optics.transport.chief_rays import (
     ChiefRays,
-    Outcome,
+    RayOutcome,
     pixel_stretching,
     trace_chief_rays,
 )
@@ -86,24 +86,24 @@ def test_a_mirror_at_45_degrees_swaps_two_axes() -> None:
 
 def test_a_ray_that_meets_nothing_escapes() -> None:
     rays = trace([plane(3.0)], camera(direction=(0, 0, -1)))
-    assert (rays.outcome == Outcome.ESCAPED).all()
+    assert (rays.outcome == RayOutcome.ESCAPED).all()
 
 
 @pytest.mark.parametrize("kind", [SurfaceKind.ABSORBER, SurfaceKind.LIGHT, SurfaceKind.OPAQUE])
 def test_a_ray_ends_on_what_is_not_the_sensing_surface(kind: SurfaceKind) -> None:
     half = [(0.0, -50, 0), (0.0, 50, 0), (50.0, 50, 0), (50.0, -50, 0)]
     rays = trace([quad("blocker", half, Surface(kind)), plane(3.0)], camera())
-    assert (rays.outcome[:, :16] == Outcome.ABSORBED).all()
-    assert (rays.outcome[:, 16:] == Outcome.HIT).all()
+    assert (rays.outcome[:, :16] == RayOutcome.ABSORBED).all()
+    assert (rays.outcome[:, 16:] == RayOutcome.HIT).all()
 
 
 def test_rays_caught_in_a_glass_cube_are_totally_reflected() -> None:
     cube = box("cube", (-1, -1, -1), (1, 1, 1), GLASS)
     # To all six faces at 54.7 degrees; the critical angle is 41.8.
     caught = trace([cube], camera((1, 1, 1), 1.0, position=(0.1, 0.05, 0.02)))
-    assert (caught.outcome == Outcome.TOTAL_REFLECTION).all()
+    assert (caught.outcome == RayOutcome.TOTAL_REFLECTION).all()
     free = trace([cube], camera((0, 0, 1), 1.0, position=(0.1, 0.05, 0.02)))
-    assert (free.outcome == Outcome.ESCAPED).all()
+    assert (free.outcome == RayOutcome.ESCAPED).all()
 
 
 def test_a_fisheye_maps_angle_to_radius_evenly() -> None:

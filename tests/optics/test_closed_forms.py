@@ -16,11 +16,11 @@ from reference_scenes import (
 )
 
 from optisense.optics.camera.projection import RayCamera
-from optisense.optics.scene.emitters import Emitter, Intensity, Shape
+from optisense.optics.scene.emitters import Emitter, EmitterShape, Intensity
 from optisense.optics.scene.ray_scene import Piece, RayScene
 from optisense.optics.scene.surfaces import Surface, SurfaceKind
 from optisense.optics.transport.camera_paths import find_visible_points
-from optisense.optics.transport.emission_guide import even_guide
+from optisense.optics.transport.emission_guide import uniform_guide
 from optisense.optics.transport.photons import SURFACE_SHIFT, trace_photons
 
 PHOTONS = 400_000
@@ -48,7 +48,12 @@ class Landings:
         table = ReferenceScene(pieces, emitters, [(1, 1, 1)], RayCamera(*[(0, 0, 1)] * 3, 1, 1, 1))
         count = len(emitters)
         found = trace_photons(
-            RayScene(pieces), table.table(), even_guide(count), photons // count, 1, coloured=False
+            RayScene(pieces),
+            table.table(),
+            uniform_guide(count),
+            photons // count,
+            1,
+            coloured=False,
         )
         n = found.count
         place = np.asarray(found.place)[: 4 * n].reshape(n, 4)
@@ -101,15 +106,15 @@ def parallel_rectangle(x: np.ndarray, y: np.ndarray) -> np.ndarray:
     return (x / a * np.arctan(y / a) + y / b * np.arctan(x / b)) / (2 * np.pi)
 
 
-@pytest.mark.parametrize("shape", [Shape.RECTANGLE, Shape.DISC])
-def test_a_lambertian_area_light_has_its_form_factor(shape: Shape) -> None:
-    height, size = 6.0, (4.0, 2.0) if shape is Shape.RECTANGLE else (3.0, 3.0)
+@pytest.mark.parametrize("shape", [EmitterShape.RECTANGLE, EmitterShape.DISC])
+def test_a_lambertian_area_light_has_its_form_factor(shape: EmitterShape) -> None:
+    height, size = 6.0, (4.0, 2.0) if shape is EmitterShape.RECTANGLE else (3.0, 3.0)
     lamp = Emitter(0, (0, 0, height), (0, 0, -1), (0, 1, 0), shape, size)
     camera = RayCamera((0, 0, 5.9), (0, 0, -1), (0, 1, 0), 60, 32, 24)
     scene = ReferenceScene([floor(GREY)], [lamp], [(POWER,) * 3], camera)
     points = scene.chief_rays().points.astype(float)
     x, y = points[..., 0], points[..., 1]
-    if shape is Shape.RECTANGLE:
+    if shape is EmitterShape.RECTANGLE:
         factor = sum(
             i * j * parallel_rectangle((2 * i - x) / height, (1 * j - y) / height)
             for i in (-1, 1)
@@ -126,14 +131,14 @@ def test_a_lambertian_area_light_has_its_form_factor(shape: Shape) -> None:
 
 
 def test_a_square_light_sends_a_fifth_to_a_square_as_far_as_it_is_wide() -> None:
-    lamp = Emitter(0, (0, 0, 2), (0, 0, -1), (0, 1, 0), Shape.RECTANGLE, (2.0, 2.0))
+    lamp = Emitter(0, (0, 0, 2), (0, 0, -1), (0, 1, 0), EmitterShape.RECTANGLE, (2.0, 2.0))
     got = Landings([floor(BLACK, 1.0)], [lamp]).power.sum()
     # Two equal squares, facing, one side apart (Howell's catalogue, C-11).
     assert got == pytest.approx(0.199825, rel=LANDED)
 
 
 def test_a_light_in_view_has_its_own_radiance() -> None:
-    lamp = Emitter(0, (0, 0, 0), (0, 0, 1), (0, 1, 0), Shape.RECTANGLE, (8.0, 8.0))
+    lamp = Emitter(0, (0, 0, 0), (0, 0, 1), (0, 1, 0), EmitterShape.RECTANGLE, (8.0, 8.0))
     pieces = [emitting_face(0, lamp), floor(GREY, 10, -1.0)]
     scene = ReferenceScene(pieces, [lamp], [(POWER,) * 3], looking_down())
     paired, _ = scene.pairwise(1, 1000)
@@ -206,7 +211,7 @@ def guide_with_plane_above(gap: float) -> tuple[list[Piece], Emitter]:
     pieces.append(quad("above", [(start, -5, z), (start, 5, z), (10, 5, z), (10, -5, z)], BLACK))
     end = [(11.0, -40, -40), (11.0, 40, -40), (11.0, 40, 40), (11.0, -40, 40)]
     pieces.append(quad("end", end, BLACK))
-    lamp = Emitter(0, (-10.2, 0, 0), (1, 0, 0), (0, 0, 1), Shape.RECTANGLE, (2.0, 2.0))
+    lamp = Emitter(0, (-10.2, 0, 0), (1, 0, 0), (0, 0, 1), EmitterShape.RECTANGLE, (2.0, 2.0))
     return pieces, lamp
 
 
@@ -244,7 +249,7 @@ def test_a_closed_box_keeps_its_energy(albedo: float, filling: str) -> None:
 
 def test_a_lamp_in_gel_over_a_coating_lights_it_as_in_air() -> None:
     """Refraction plays no part where light crosses no interface."""
-    lamp = Emitter(0, (0, 0, 2), (0, 0, -1), (0, 1, 0), Shape.RECTANGLE, (1.0, 1.0))
+    lamp = Emitter(0, (0, 0, 2), (0, 0, -1), (0, 1, 0), EmitterShape.RECTANGLE, (1.0, 1.0))
     gel = box("gel", (-10, -10, 0), (10, 10, 4), GLASS, without=["-z"])
     in_air = Landings([floor(BLACK)], [lamp]).power.sum()
     in_gel = Landings([floor(BLACK), gel], [lamp]).power.sum()
@@ -254,7 +259,7 @@ def test_a_lamp_in_gel_over_a_coating_lights_it_as_in_air() -> None:
 def test_photons_of_one_light_add_up_to_its_power() -> None:
     room = [box("room", (-5, -4, -3), (5, 4, 3), BLACK, inward=True)]
     lamps = [
-        Emitter(0, (0, 0, 0), (0, 1, 0), shape=Shape.DISC, size=(1.0, 1.0)),
+        Emitter(0, (0, 0, 0), (0, 1, 0), shape=EmitterShape.DISC, size=(1.0, 1.0)),
         Emitter(0, (1, 0, 0), (1, 1, 0), intensity=isotropic()),
     ]
     assert Landings(room, lamps, 10_000).power.sum() == pytest.approx(2.0, rel=1e-5)

@@ -8,8 +8,8 @@ from reference_scenes import ReferenceScene, diffuse_coating, isotropic, quad
 
 from optisense.optics.camera.projection import RayCamera
 from optisense.optics.imaging.sppm import render_sppm
-from optisense.optics.scene.emitters import Emitter, Shape
-from optisense.optics.transport.emission_guide import even_guide
+from optisense.optics.scene.emitters import Emitter, EmitterShape
+from optisense.optics.transport.emission_guide import uniform_guide
 
 SLOPE = (-0.85, -0.42)
 """Of log error over log photons at a fixed radius: -1/2 for random points, steeper for evenly
@@ -26,9 +26,9 @@ FACTOR = 1.4
 HEIGHT = 4.0
 
 
-def scene(shape: Shape = Shape.POINT) -> ReferenceScene:
+def scene(shape: EmitterShape = EmitterShape.POINT) -> ReferenceScene:
     corners = [(-9.0, -9, 0), (9.0, -9, 0), (9.0, 9, 0), (-9.0, 9, 0)]
-    profile = isotropic() if shape is Shape.POINT else None
+    profile = isotropic() if shape is EmitterShape.POINT else None
     lamp = Emitter(0, (0.5, 0, HEIGHT), (0, 0, -1), (0, 1, 0), shape, (1.0, 1.0), 1.0, profile)
     camera = RayCamera((0, 0, 20), (0, 0, -1), (0, 1, 0), 20.0, 32, 24)
     return ReferenceScene(
@@ -45,7 +45,7 @@ def closed_form(where: ReferenceScene) -> np.ndarray:
 
 def single_pass(where: ReferenceScene, photons: int, radius: float, seed: int) -> np.ndarray:
     result = render_sppm(
-        where.ray_scene(), where.table(), even_guide(1), where.camera, 1, photons, seed,
+        where.ray_scene(), where.table(), uniform_guide(1), where.camera, 1, photons, seed,
         coloured=False, radius=radius,
     )  # fmt: skip
     return result.layers[0, ..., 0].astype(float)
@@ -64,12 +64,12 @@ def test_the_error_falls_as_photons_grow() -> None:
     assert SLOPE[0] < slope < SLOPE[1]
 
 
-@pytest.mark.parametrize("shape", [Shape.POINT, Shape.RECTANGLE])
-def test_the_mean_does_not_drift_with_the_radius(shape: Shape) -> None:
+@pytest.mark.parametrize("shape", [EmitterShape.POINT, EmitterShape.RECTANGLE])
+def test_the_mean_does_not_drift_with_the_radius(shape: EmitterShape) -> None:
     where = scene(shape)
     means = [single_pass(where, 1_000_000, radius, 5).mean() for radius in (0.4, 0.2, 0.1)]
     assert means == pytest.approx([means[-1]] * 3, rel=DRIFT)
-    if shape is Shape.POINT:
+    if shape is EmitterShape.POINT:
         assert means[-1] == pytest.approx(closed_form(where).mean(), rel=DRIFT)
 
 

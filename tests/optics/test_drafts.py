@@ -58,11 +58,11 @@ def test_a_moved_light_is_seen_by_a_draft_that_keeps_cells_and_guide(
 ) -> None:
     draft.render((), SIZE, photons=20_000)
     cells, guide, surface = draft._store.cells, draft.guide(), draft.surface
-    draft.become(moved)
+    draft.set_design(moved)
     assert draft._store.cells is cells and draft.guide() is guide and draft.surface is surface
-    ordinary.become(moved)
+    ordinary.set_design(moved)
     agree(draft, ordinary)
-    ordinary.become(mini)
+    ordinary.set_design(mini)
 
 
 def test_few_photons_show_what_a_moved_light_does(
@@ -71,9 +71,9 @@ def test_few_photons_show_what_a_moved_light_does(
     changes = []
     for model, photons in ((draft, 60_000), (ordinary, PHOTONS)):
         before = blocks(model.render(PRESS, SIZE, photons=photons).radiance)
-        model.become(moved)
+        model.set_design(moved)
         changes.append(blocks(model.render(PRESS, SIZE, photons=photons).radiance) - before)
-        model.become(mini)
+        model.set_design(mini)
     rough, true = (change[:, 0] for change in changes)
     assert np.corrcoef(rough, true)[0, 1] > 0.9
     assert np.abs(changes[0][:, 1:]).max() < 0.3 * np.abs(true).max()  # only red was moved
@@ -83,12 +83,12 @@ def test_a_contact_is_placed_anew_where_it_or_the_surface_moved(
     draft: DraftModel, mini: SensorDesign, moved: SensorDesign
 ) -> None:
     placed, fixed = draft.place(PRESS[0]), draft._fixed
-    draft.become(moved)
+    draft.set_design(moved)
     assert draft.place(PRESS[0]) is placed and draft._fixed is fixed
     aside = ots.Contact(ots.Sphere(radius=1.5), at=(2, 0), depth=0.6)
     shift = draft.place(aside).bounds - placed.bounds
     np.testing.assert_allclose(np.linalg.norm(shift, axis=1), 2.0, atol=1e-6)
-    draft.become(ots.set_value(mini, "cages.skin.points[14].z", 1.0))
+    draft.set_design(ots.set_value(mini, "cages.skin.points[14].z", 1.0))
     assert draft.place(PRESS[0]).bounds[1, 2] > placed.bounds[1, 2] + 0.1
     assert draft._fixed is not fixed
 
@@ -99,18 +99,18 @@ def test_a_moved_camera_or_a_bent_skin_makes_anew_what_depends_on_it(
     draft.render((), SIZE, photons=20_000)
     cells = draft._store.cells
     nearer = ots.set_value(mini, "camera.position.z", mini.camera.position[2] + 2.0)
-    draft.become(nearer)
+    draft.set_design(nearer)
     rays, same = draft.chief_rays(SIZE), OpticalModel(nearer).chief_rays(SIZE)
     np.testing.assert_allclose(rays.points, same.points, atol=1e-4)
     assert draft._store.cells is cells
     bent = ots.set_value(mini, "cages.skin.points[14].z", 1.0)
-    draft.become(bent)
+    draft.set_design(bent)
     assert draft._store.cells is not cells
-    ordinary.become(bent)
+    ordinary.set_design(bent)
     np.testing.assert_allclose(
         draft.chief_rays(SIZE).points, ordinary.chief_rays(SIZE).points, atol=1e-4
     )
-    ordinary.become(mini)
+    ordinary.set_design(mini)
 
 
 def test_a_small_move_leaves_the_noise_of_all_other_light_as_it_was(
@@ -124,7 +124,7 @@ def test_a_small_move_leaves_the_noise_of_all_other_light_as_it_was(
 
     still, other_seed = render(), render(seed=1)
     light = mini.lights["red"].lights[0].position
-    draft.become(ots.set_value(mini, "lights.red.lights[0].position.x", light[0] + 0.05))
+    draft.set_design(ots.set_value(mini, "lights.red.lights[0].position.x", light[0] + 0.05))
     nudged = render()
     assert change(nudged, still, "red") > 0.0
     for group in ("green", "blue"):
@@ -136,7 +136,7 @@ def test_light_that_did_not_move_is_kept_until_the_draft_is_asked_for_again(
 ) -> None:
     other_seed = draft.render(PRESS, SIZE, photons=60_000, seed=1)
     before = draft.render(PRESS, SIZE, photons=60_000)
-    draft.become(moved)
+    draft.set_design(moved)
     nudged = draft.render(PRESS, SIZE, photons=60_000)
     assert nudged.settings["kept_layers"] == ["green", "blue"]
     again = draft.render(PRESS, SIZE, photons=60_000)
@@ -153,7 +153,7 @@ def test_light_that_did_not_move_is_kept_until_the_draft_is_asked_for_again(
 
 def test_other_fluxes_only_scale_a_draft(draft: DraftModel, mini: SensorDesign) -> None:
     before = draft.render(PRESS, SIZE, photons=60_000)
-    draft.become(ots.set_value(mini, "lights.red.flux", 2 * mini.lights["red"].flux))
+    draft.set_design(ots.set_value(mini, "lights.red.flux", 2 * mini.lights["red"].flux))
     dimmed = draft.render(PRESS, SIZE, photons=60_000)
     np.testing.assert_allclose(dimmed.layers["red"], 2 * before.layers["red"], rtol=1e-6)
     assert np.array_equal(dimmed.layers["blue"], before.layers["blue"])
@@ -161,7 +161,7 @@ def test_other_fluxes_only_scale_a_draft(draft: DraftModel, mini: SensorDesign) 
 
 def test_a_skin_that_bends_on_compiles_nothing(draft: DraftModel, mini: SensorDesign) -> None:
     def misses(height: float) -> int:
-        draft.become(ots.set_value(mini, "cages.skin.points[14].z", height))
+        draft.set_design(ots.set_value(mini, "cages.skin.points[14].z", height))
         dr.kernel_history_clear()
         draft.render(PRESS, SIZE, photons=60_000)
         return sum(kernel.get("cache_hit") == 0 for kernel in dr.kernel_history())
@@ -176,7 +176,7 @@ def test_bent_media_are_resolved_when_the_draft_is_asked_for_again(
     draft: DraftModel, mini: SensorDesign
 ) -> None:
     for height in (0.3, 0.5):
-        draft.become(ots.set_value(mini, "cages.skin.points[14].z", height))
+        draft.set_design(ots.set_value(mini, "cages.skin.points[14].z", height))
         bent = draft.render(PRESS, SIZE, photons=60_000)
     assert bent.settings["kept_media"]
     again = draft.render(PRESS, SIZE, photons=60_000)

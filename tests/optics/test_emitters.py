@@ -16,19 +16,19 @@ from optisense.library.ies import read_ies
 from optisense.optics.backend.sequences import sequence_4d
 from optisense.optics.scene.emitters import (
     Emitter,
+    EmitterShape,
     EmitterTable,
     Intensity,
-    Shape,
     emit,
     emitter_table,
     spot_intensity,
 )
 from optisense.optics.scene.surfaces import RAY_OFFSET
 from optisense.optics.transport.emission_guide import (
-    CELLS,
-    FLOOR,
-    even_guide,
+    GUIDE_CELLS,
+    MIN_DENSITY,
     guide_from_density,
+    uniform_guide,
     warp,
 )
 
@@ -108,9 +108,9 @@ def fits(
     return bool(stats.chi2.sf(statistic, thick.sum()) > SIGNIFICANCE)
 
 
-@pytest.mark.parametrize("shape", [Shape.RECTANGLE, Shape.DISC])
+@pytest.mark.parametrize("shape", [EmitterShape.RECTANGLE, EmitterShape.DISC])
 @pytest.mark.parametrize("exponent", [1.0, 6.5])
-def test_flat_lights_radiate_as_a_power_of_the_cosine(shape: Shape, exponent: float) -> None:
+def test_flat_lights_radiate_as_a_power_of_the_cosine(shape: EmitterShape, exponent: float) -> None:
     table = upright(shape=shape, size=(2.0, 1.0), exponent=exponent)
 
     def density(polar: np.ndarray, around: np.ndarray) -> np.ndarray:
@@ -135,11 +135,11 @@ def test_tabulated_lights_radiate_as_their_table(intensity: Intensity) -> None:
 
 
 def test_the_chi_square_test_notices_a_wrong_profile() -> None:
-    table = upright(shape=Shape.RECTANGLE, size=(1.0, 1.0), exponent=1.1)
+    table = upright(shape=EmitterShape.RECTANGLE, size=(1.0, 1.0), exponent=1.1)
     assert not fits(directions(table), lambda p, a: np.cos(np.radians(p)) / np.pi, 90.0)
 
 
-def places(shape: Shape) -> np.ndarray:
+def places(shape: EmitterShape) -> np.ndarray:
     rng = np.random.default_rng(1)
     table = upright(shape=shape, size=(3.0, 1.0))
     u = mi.Point2f(*(mi.Float(rng.random(SAMPLES)) for _ in range(2)))
@@ -154,7 +154,7 @@ def evenly_filled(counts: np.ndarray) -> bool:
 
 
 def test_a_rectangle_emits_evenly_over_its_face() -> None:
-    x, y, z = places(Shape.RECTANGLE)
+    x, y, z = places(EmitterShape.RECTANGLE)
     counts, _, _ = np.histogram2d(x, y, bins=20, range=[[-1.5, 1.5], [-0.5, 0.5]])
     assert counts.sum() == SAMPLES
     assert evenly_filled(counts)
@@ -162,7 +162,7 @@ def test_a_rectangle_emits_evenly_over_its_face() -> None:
 
 
 def test_a_disc_emits_evenly_over_its_face() -> None:
-    x, y, _ = places(Shape.DISC)
+    x, y, _ = places(EmitterShape.DISC)
     square = (x / 1.5) ** 2 + (y / 0.5) ** 2
     turn = np.arctan2(y / 0.5, x / 1.5)
     counts, _, _ = np.histogram2d(square, turn, bins=20, range=[[0, 1], [-np.pi, np.pi]])
@@ -171,7 +171,7 @@ def test_a_disc_emits_evenly_over_its_face() -> None:
 
 
 def test_the_pose_turns_positions_and_directions_alike() -> None:
-    lamp = Emitter(3, (1, 2, 3), (2, 0, 0), (0, 0, 1), Shape.RECTANGLE, (4.0, 2.0))
+    lamp = Emitter(3, (1, 2, 3), (2, 0, 0), (0, 0, 1), EmitterShape.RECTANGLE, (4.0, 2.0))
     table = emitter_table([lamp], 4)
     corner, way, group = emit(
         table, mi.UInt32([0, 0]), mi.Point2f([0, 0.3], [0, 0.1]), mi.Point2f([1, 0.5], [1, 0.5])
@@ -208,7 +208,7 @@ def test_the_flux_of_an_ies_light_is_its_files_lumens() -> None:
 
 def test_a_guides_weights_make_up_for_where_it_sends_photons() -> None:
     rng = np.random.default_rng(3)
-    density_table = rng.random((2, CELLS, CELLS)) ** 4
+    density_table = rng.random((2, GUIDE_CELLS, GUIDE_CELLS)) ** 4
     guide = guide_from_density(density_table)
     u = rng.random((2, SAMPLES))
     for light in range(2):
@@ -221,18 +221,22 @@ def test_a_guides_weights_make_up_for_where_it_sends_photons() -> None:
         weights = np.asarray(weight)
         # Weights times density integrate to 1, as a whole and over every part of the square.
         assert weights.mean() == pytest.approx(1.0, abs=4 * weights.std() / np.sqrt(SAMPLES))
-        index = np.floor(x * CELLS).astype(int) * CELLS + np.floor(y * CELLS).astype(int)
+        index = np.floor(x * GUIDE_CELLS).astype(int) * GUIDE_CELLS + np.floor(
+            y * GUIDE_CELLS
+        ).astype(int)
         assert (index == np.asarray(cell)).mean() > 0.9999  # rounding at borders of cells
-        share = np.bincount(np.asarray(cell), weights, CELLS * CELLS) / SAMPLES
-        noise = np.sqrt(np.bincount(np.asarray(cell), weights**2, CELLS * CELLS)) / SAMPLES
-        assert np.abs((share - CELLS**-2) / noise).max() < 4.5  # 256 cells
-        assert weights.max() <= 1.0001 / FLOOR
+        share = np.bincount(np.asarray(cell), weights, GUIDE_CELLS * GUIDE_CELLS) / SAMPLES
+        noise = (
+            np.sqrt(np.bincount(np.asarray(cell), weights**2, GUIDE_CELLS * GUIDE_CELLS)) / SAMPLES
+        )
+        assert np.abs((share - GUIDE_CELLS**-2) / noise).max() < 4.5  # 256 cells
+        assert weights.max() <= 1.0001 / MIN_DENSITY
 
 
 def test_an_even_guide_moves_nothing() -> None:
     u = np.random.default_rng(4).random((2, 1000)).astype(np.float32)
     moved, weight, _ = warp(
-        even_guide(1), dr.zeros(mi.UInt32, 1000), mi.Point2f(mi.Float(u[0]), mi.Float(u[1]))
+        uniform_guide(1), dr.zeros(mi.UInt32, 1000), mi.Point2f(mi.Float(u[0]), mi.Float(u[1]))
     )
     assert np.abs(np.asarray(moved) - u).max() < 1e-5
     assert np.asarray(weight) == pytest.approx(1.0, abs=1e-5)

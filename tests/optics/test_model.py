@@ -117,11 +117,11 @@ def test_an_image_relit_is_the_image_of_the_design_with_those_lights() -> None:
     plain = model().render([BALL], PIXELS, PHOTONS)
     other = set_value(set_value(design(), "lights.red.flux", 25.0), "lights.blue.colour.g", 0.4)
     expected = OpticalModel(other, "llvm").render([BALL], PIXELS, PHOTONS)
-    relit = plain.relit({name: other.lights[name].channel_flux() for name in ("red", "blue")})
+    relit = plain.relight({name: other.lights[name].channel_flux() for name in ("red", "blue")})
     for name in expected.layers:
         assert relit.layers[name] == pytest.approx(expected.layers[name], rel=1e-4, abs=1e-7)
     with pytest.raises(RenderError, match="no light group 'rde'"):
-        plain.relit({"rde": (1, 1, 1)})
+        plain.relight({"rde": (1, 1, 1)})
 
 
 def test_an_updated_coating_renders_as_a_new_model_of_the_changed_design() -> None:
@@ -149,7 +149,7 @@ def test_a_model_that_became_another_design_sees_what_a_new_model_of_it_sees() -
     ):
         start = set_value(start, path, value)
         media = used._parts.media
-        used.become(start)
+        used.set_design(start)
         assert (used._parts.media is not media) == resolved_anew
         fresh = OpticalModel(start, "llvm")
         got, expected = used.chief_rays(PIXELS), fresh.chief_rays(PIXELS)

@@ -55,7 +55,7 @@ def pairwise_mean(coating: Surface, slab: bool = True, lights: str = "area") -> 
 
 
 def pooled_mean(coating: Surface, slab: bool = True, lights: str = "area") -> float:
-    # The light field is sampled in the middle of each pixel: smaller ones cut the coating's rim
+    # The radiance cache is sampled in the middle of each pixel: smaller ones cut the coating's rim
     # more truly (at 160x120 it is 0.9 % short).
     fine = referee_scene(coating, slab, lights, resolution=(640, 480))
     return float(fine.pooled(POOLED_PHOTONS).sum(axis=0).mean())

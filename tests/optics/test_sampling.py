@@ -6,7 +6,7 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from optisense.optics.backend.sequences import STEPS_OF_SERIES, in_series
+from optisense.optics.backend.sequences import RICHTMYER_STEPS, in_series
 
 SAMPLES = 64
 SERIES = 500
@@ -14,7 +14,7 @@ SERIES = 500
 
 def test_elements_of_a_series_are_spread_evenly_and_series_are_independent() -> None:
     lane = dr.arange(mi.UInt32, SERIES * SAMPLES)
-    for dimension in range(len(STEPS_OF_SERIES)):
+    for dimension in range(len(RICHTMYER_STEPS)):
         values = np.asarray(in_series(lane // SAMPLES, lane % SAMPLES, dimension))
         sets = values.reshape(SERIES, SAMPLES).astype(np.float64)
         assert sets.min() >= 0.0 and sets.max() < 1.0
@@ -31,7 +31,7 @@ def test_elements_of_a_series_are_spread_evenly_and_series_are_independent() -> 
 def test_dimensions_of_a_series_do_not_follow_each_other() -> None:
     lane = dr.arange(mi.UInt32, 20_000)
     columns = np.stack(
-        [np.asarray(in_series(lane, lane * 0, k)) for k in range(len(STEPS_OF_SERIES))]
+        [np.asarray(in_series(lane, lane * 0, k)) for k in range(len(RICHTMYER_STEPS))]
     )
-    off = np.abs(np.corrcoef(columns)) - np.eye(len(STEPS_OF_SERIES))
+    off = np.abs(np.corrcoef(columns)) - np.eye(len(RICHTMYER_STEPS))
     assert off.max() < 5 / np.sqrt(20_000)

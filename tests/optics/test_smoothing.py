@@ -1,4 +1,4 @@
-"""What the kernel of a light field blurs: without any photons, against the light itself."""
+"""What the kernel of a radiance cache blurs: without any photons, against the light itself."""
 
 from __future__ import annotations
 
@@ -110,31 +110,31 @@ def test_even_light_stays_even_up_to_the_edge(kernels) -> None:  # type: ignore[
 
 def test_a_kernel_is_narrower_near_a_lamp_and_no_wider_than_a_cell_allows(kernels) -> None:  # type: ignore[no-untyped-def]
     from optisense.optics.radiance_cache.smoothing import (
-        LEAST,
-        LENGTH,
-        RADIUS,
-        USUAL_DENSITY,
+        MIN_RADIUS_CELLS,
+        REFERENCE_DENSITY,
+        REFERENCE_LENGTH,
+        REFERENCE_RADIUS,
         Kernels,
     )
 
-    distance = np.linspace(0.0, LENGTH, kernels.cells.cells)
+    distance = np.linspace(0.0, REFERENCE_LENGTH, kernels.cells.cells)
     cell = 1 / float(kernels.cells.inverse_size[0])
-    radii = Kernels(kernels.cells, distance, DENSITY).radii(round(USUAL_DENSITY / DENSITY))
+    radii = Kernels(kernels.cells, distance, DENSITY).radii(round(REFERENCE_DENSITY / DENSITY))
     assert np.all(np.diff(radii) >= 0)
-    assert radii[0] == pytest.approx(LEAST * cell)
-    assert radii[-1] == pytest.approx(RADIUS)
+    assert radii[0] == pytest.approx(MIN_RADIUS_CELLS * cell)
+    assert radii[-1] == pytest.approx(REFERENCE_RADIUS)
     # Blur of a light as far away as light varies over, and noise, are in the same relation
     # everywhere: the radius goes as the power 2/3 of the distance.
-    assert radii[len(radii) // 2] == pytest.approx(RADIUS * 0.5 ** (2 / 3), rel=1e-3)
+    assert radii[len(radii) // 2] == pytest.approx(REFERENCE_RADIUS * 0.5 ** (2 / 3), rel=1e-3)
 
 
 def test_a_kernel_widens_as_photons_grow_few_up_to_a_limit(kernels) -> None:  # type: ignore[no-untyped-def]
-    from optisense.optics.radiance_cache.smoothing import WIDEST
+    from optisense.optics.radiance_cache.smoothing import MAX_RADIUS_RATIO
 
     usual = kernels.radii(5_000_000)
     assert kernels.radii(2_500_000) == pytest.approx(usual * 2 ** (1 / 6))
     distance = np.hypot(HEIGHT, np.hypot(*kernels.cells.centres[:, :2].T))
-    assert kernels.radii(1) == pytest.approx(WIDEST * distance)
+    assert kernels.radii(1) == pytest.approx(MAX_RADIUS_RATIO * distance)
     assert np.all(kernels.radii(40_000_000) < usual)
 
 

@@ -14,7 +14,7 @@ from optisense.design.parts import TRANSPARENT_SOLIDS
 from optisense.geometry import Contact, Cylinder, MeshIndenter, Plane, Sphere, TriangleMesh
 from optisense.optics import OpticalModel
 from optisense.optics.imaging.tactile_image import TactileImage
-from optisense.optics.transport.chief_rays import Outcome
+from optisense.optics.transport.chief_rays import RayOutcome
 
 SMALL: dict[str, Any] = {"resolution": (160, 120), "photons": 200_000}
 
@@ -67,7 +67,7 @@ def model(sensor: SensorDesign) -> OpticalModel:
 def test_no_ray_of_the_picture_is_lost(model: OpticalModel) -> None:
     """Each ray meets the sensing surface, or ends on a part that absorbs it."""
     rays = model.chief_rays((160, 120))
-    assert set(np.unique(rays.outcome)) <= {Outcome.HIT, Outcome.ABSORBED}
+    assert set(np.unique(rays.outcome)) <= {RayOutcome.HIT, RayOutcome.ABSORBED}
     if not model.design.parts_of(Role.BLOCKER):
         assert rays.hit.all()
 

@@ -15,7 +15,7 @@ from optisense.errors import DesignError
 from optisense.geometry.containment import inside
 from optisense.optics import OpticalModel
 from optisense.optics.imaging.tactile_image import TactileImage
-from optisense.optics.transport.chief_rays import Outcome
+from optisense.optics.transport.chief_rays import RayOutcome
 
 WIDTH, GEL, TAPE, FILM, WINDOW = 36.0, 3.0, 0.05, 0.02, 6.0
 WHEEL, ROLLER, DEFLECTION, INCLINE = 25.0, 1.0, 35.0, 25.0
@@ -109,7 +109,7 @@ class TestView:
         """Through air, acrylic, the film, tape and gel; over the whole picture."""
         belt = sensors.gelbelt()
         rays = OpticalModel(belt).chief_rays((64, 48))
-        assert (rays.outcome == Outcome.HIT).all()
+        assert (rays.outcome == RayOutcome.HIT).all()
         camera = belt.camera
         right, up, forward = camera.axes()
         x, y = np.meshgrid((np.arange(64) + 0.5) / 32.0 - 1.0, 0.75 - (np.arange(48) + 0.5) / 32.0)

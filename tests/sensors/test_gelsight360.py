@@ -13,7 +13,7 @@ from optisense.design import SensorDesign
 from optisense.errors import DesignError
 from optisense.geometry.containment import inside
 from optisense.optics import OpticalModel
-from optisense.optics.transport.chief_rays import Outcome
+from optisense.optics.transport.chief_rays import RayOutcome
 from optisense.sensors.tip_shape import TipShape
 
 R, HEIGHT, GEL, SHELL = 14.0, 34.0, 3.0, 2.5
@@ -166,7 +166,7 @@ class TestLights:
 
     def test_rays_reach_the_skin_or_end_on_boards_and_base(self, model: OpticalModel) -> None:
         rays = model.chief_rays((160, 120))
-        assert set(np.unique(rays.outcome)) <= {Outcome.HIT, Outcome.ABSORBED}
+        assert set(np.unique(rays.outcome)) <= {RayOutcome.HIT, RayOutcome.ABSORBED}
         assert rays.hit.mean() > 0.9
         assert rays.hit[40:80, 60:100].all()  # forward, nothing is in the way
         radius = np.hypot(rays.points[..., 0], rays.points[..., 1])

@@ -14,7 +14,7 @@ from optisense.design import Role, SensorDesign, set_value
 from optisense.design.cage import as_array
 from optisense.errors import DesignError
 from optisense.optics import OpticalModel
-from optisense.optics.transport.chief_rays import ChiefRays, Outcome
+from optisense.optics.transport.chief_rays import ChiefRays, RayOutcome
 from optisense.sensors.gelsight_svelte import PALM_OUTLINE
 from optisense.sensors.svelte_profile import Palm
 
@@ -129,7 +129,7 @@ class TestLight:
     def test_every_ray_reaches_the_palm_or_ends_on_the_body(
         self, model: OpticalModel, rays: ChiefRays
     ) -> None:
-        assert set(np.unique(rays.outcome)) <= {Outcome.HIT, Outcome.ABSORBED}
+        assert set(np.unique(rays.outcome)) <= {RayOutcome.HIT, RayOutcome.ABSORBED}
         assert model.design.parts["body"].role is Role.BLOCKER
 
     def test_rays_reach_the_palm_in_order(self, rays: ChiefRays) -> None:

@@ -1,5 +1,7 @@
-"""Arrays handed over from numpy, in memory of their own: how numpy aligns an array would become
-part of compiled kernels.
+"""Device arrays copied from NumPy arrays.
+
+The copies lie in memory of their own, because the alignment of a NumPy array would become part of
+compiled kernels, which could then not be used again.
 """
 
 from __future__ import annotations
@@ -11,14 +13,14 @@ from numpy.typing import NDArray
 
 
 def floats(values: NDArray[np.floating]) -> mi.Float:
-    """All values, row after row."""
+    """All values of an array, row after row."""
     held = mi.Float(np.asarray(values, dtype=np.float32).ravel()) + dr.opaque(mi.Float, 0)
     dr.eval(held)
     return held
 
 
 def indices(values: NDArray[np.integer] | NDArray[np.bool_]) -> mi.UInt32:
-    """All values, row after row."""
+    """All values of an array, row after row."""
     held = mi.UInt32(np.asarray(values, dtype=np.uint32).ravel()) + dr.opaque(mi.UInt32, 0)
     dr.eval(held)
     return held

@@ -18,12 +18,16 @@ def _steps(dimensions: int) -> list[int]:
 
 
 STEPS = _steps(4)
+"""Steps of the four-dimensional sequence, in units of 2^-32."""
 STEPS_2D = _steps(2)
-STEPS_OF_SERIES = [round((prime**0.5 % 1) * 2**32) for prime in (2, 3, 5, 7)]
-"""Square roots of primes (Richtmyer): no fraction is near them, so that a few elements are spread
-evenly in each dimension by itself, too. The first of `STEPS` is nearly 6/7."""
-ROUNDS = 8
-"""Of the hash that shifts a series: after the usual four, similar bits give similar shifts."""
+"""Steps of the two-dimensional sequence, in units of 2^-32."""
+RICHTMYER_STEPS = [round((prime**0.5 % 1) * 2**32) for prime in (2, 3, 5, 7)]
+"""Fractional parts of the square roots of primes (Richtmyer's sequence), in units of 2^-32. No
+simple fraction is near them, so that a few elements are spread evenly in each dimension alone, too;
+the first of `STEPS` is nearly 6/7."""
+HASH_ROUNDS = 8
+"""Rounds of the hash that shifts a Richtmyer sequence. With the usual four, similar bits give
+similar shifts."""
 
 
 def unit_float(bits: mi.UInt32) -> mi.Float:
@@ -32,7 +36,7 @@ def unit_float(bits: mi.UInt32) -> mi.Float:
 
 
 def next_random(state: mi.UInt32) -> mi.UInt32:
-    """The next state of a small generator (the step of PCG)."""
+    """The next state of a linear congruential generator (the step of PCG)."""
     return state * 747796405 + 2891336453
 
 
@@ -59,10 +63,15 @@ def sequence_2d(index: mi.UInt32, stream: mi.UInt32, seed: mi.UInt32) -> mi.Poin
 
 
 def in_series(series: mi.UInt32, number: mi.UInt32, dimension: int) -> mi.Float:
-    """One coordinate (of `STEPS_OF_SERIES`) in [0, 1) of element ``number`` of a sequence that
-    random bits have shifted."""
-    shift = mi.sample_tea_32(series, mi.UInt32(dimension), ROUNDS)[0]
-    return unit_float(number * mi.UInt32(STEPS_OF_SERIES[dimension]) + shift)
+    """One coordinate (of `RICHTMYER_STEPS`) in [0, 1) of element ``number`` of a shifted sequence.
+
+    Args:
+        series: random bits that shift the sequence.
+        number: of the element.
+        dimension: of the coordinate.
+    """
+    shift = mi.sample_tea_32(series, mi.UInt32(dimension), HASH_ROUNDS)[0]
+    return unit_float(number * mi.UInt32(RICHTMYER_STEPS[dimension]) + shift)
 
 
 def seed_of(*numbers: int) -> int:

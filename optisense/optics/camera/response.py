@@ -15,12 +15,16 @@ from scipy.ndimage import gaussian_filter
 from optisense.errors import RenderError
 
 KNEE = 1.0
-BLUR_OF_WIDTH = 6.0 / 640.0
-TARGET = 0.55
-"""Automatic exposure puts the 95th percentile of the brightest channel here (of 1), before
-gamma.
-"""
-MOST_EXCESS = 4.0
+"""Exposed level above which a channel is overexposed: the sensor's full well."""
+BLUR_WIDTH = 6.0 / 640.0
+"""Standard deviation of the blur of the overexposure mask, as a fraction of the image width: 6
+pixels of 640, an assumption."""
+EXPOSURE_TARGET = 0.55
+"""Level (of 1, before the sRGB curve) at which automatic exposure puts the 95th percentile of the
+brightest channel."""
+MAX_EXCESS = 4.0
+"""Largest excess over the full well that the mask counts, so that a lamp in view does not whiten
+the whole picture."""
 
 FloatArray = NDArray[np.floating]
 
@@ -30,7 +34,7 @@ def auto_exposure(radiance: FloatArray) -> float:
     brightest = _brightest(np.asarray(radiance))
     seen = brightest[brightest > 0]
     level = float(np.percentile(seen, 95)) if seen.size else 0.0
-    return TARGET / level if level > 0 else 1.0
+    return EXPOSURE_TARGET / level if level > 0 else 1.0
 
 
 def saturate(exposed: FloatArray, width: int | None = None) -> NDArray[np.float32]:
@@ -41,9 +45,9 @@ def saturate(exposed: FloatArray, width: int | None = None) -> NDArray[np.float3
         width: pixels across the whole picture, where this is a part of it.
     """
     exposed = np.asarray(exposed, dtype=np.float32)
-    excess = np.clip(_brightest(exposed) - KNEE, 0.0, MOST_EXCESS)
+    excess = np.clip(_brightest(exposed) - KNEE, 0.0, MAX_EXCESS)
     if excess.any():
-        blur = BLUR_OF_WIDTH * (width or exposed.shape[1])
+        blur = BLUR_WIDTH * (width or exposed.shape[1])
         mask = np.clip(gaussian_filter(excess, blur), 0.0, 1.0)
         exposed = exposed + mask[:, :, None] * (KNEE - np.minimum(exposed, KNEE))
     return np.clip(exposed, 0.0, 1.0, dtype=np.float32)

@@ -16,13 +16,13 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from optisense.optics.scene.bsdf import Coating, coating_of, evaluate_coating
+from optisense.optics.scene.bsdf import CoatingBsdf, coating_of, evaluate_coating
 from optisense.optics.transport.camera_paths import VisiblePoints
 from optisense.optics.transport.photons import GROUP_MASK, PhotonMap
 
-# Cosines of landing below this are raised to it: an isolated grazing photon must not become a
-# bright spot.
-LEAST_COSINE = 0.03
+MIN_COSINE = 0.03
+"""Lower bound on the cosine of incidence that a photon's power is divided by, so that an isolated
+grazing photon does not become a bright spot."""
 
 
 @dataclass
@@ -93,7 +93,7 @@ def build_grid(
 @dr.syntax
 def _gather(
     grid: PhotonGrid,
-    coating: Coating,
+    coating: CoatingBsdf,
     point: mi.Point3f,
     normal: mi.Vector3f,
     face_normal: mi.Vector3f,
@@ -125,7 +125,7 @@ def _gather(
             if distance2 < r2:
                 travel = dr.gather(mi.Vector4f, grid.travel, j)
                 direction = mi.Vector3f(travel.x, travel.y, travel.z)
-                kernel = 2 * (1 - distance2 / r2) / dr.maximum(travel.w, LEAST_COSINE)
+                kernel = 2 * (1 - distance2 / r2) / dr.maximum(travel.w, MIN_COSINE)
                 value = evaluate_coating(coating, normal, -direction, towards_eye) * kernel
                 value = dr.select(dr.dot(face_normal, direction) < 0, value, 0)
                 if dr.hint(grid.coloured, mode="scalar"):

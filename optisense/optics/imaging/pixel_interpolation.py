@@ -1,8 +1,8 @@
-"""Every second pixel of an image where it is smooth, and the others from these.
+"""Interpolation of every second pixel of an image where it is smooth.
 
-Away from contacts the light field varies over many pixels. Where the work is worth it, pixels with
-even row and column are shaded, and another one becomes the mean of the two or four beside it, if
-its chief ray runs between theirs and if they agree.
+Away from contacts the light varies over many pixels. Where it saves time, pixels with even row and
+column are shaded, and another pixel becomes the mean of the two or four beside it, if its chief ray
+runs between theirs and if they agree.
 """
 
 from __future__ import annotations
@@ -18,22 +18,25 @@ from optisense.optics.transport.chief_rays import ChiefRays
 FloatArray = NDArray[np.floating]
 BoolArray = NDArray[np.bool_]
 
-OFF_MIDDLE = 0.2
-"""How far a pixel's surface point may lie from the middle of those beside it, as a part of the way
-from these to their middle: more is an edge."""
-SAME_WAY = 0.995
-"""Least cosine between a pixel's normals and rays and those of the pixels beside it."""
+MAX_OFFSET = 0.2
+"""Largest distance of a pixel's surface point from the middle of those beside it, relative to their
+distance from the middle. More is an edge."""
+MIN_COSINE = 0.995
+"""Smallest cosine between a pixel's normal and ray and those of the pixels beside it."""
 AGREEMENT = 0.1
-"""How much the pixels beside another may differ in all light, relative to their mean or to DIM
-times the image's."""
+"""Largest difference between the pixels beside another in all light, relative to their mean or to
+`DIM` times the image's mean."""
 GROUP_AGREEMENT = 0.3
 """The same in the light of one group, which is noisier."""
 DIM = 0.3
+"""Fraction of the image's mean below which differences are measured against that mean."""
 
 
 def between_rays(rays: ChiefRays, where: BoolArray) -> BoolArray:
-    """(h, w) which pixels of a mask see the untouched surface between the even pixels beside them,
-    which must be in the mask, too."""
+    """(h, w) the pixels of a mask that see the undeformed surface between the even pixels beside
+    them,
+    which must be in the mask, too.
+    """
     plain = where & rays.hit & (rays.region == Region.SENSING)
     out = np.zeros_like(plain)
     for odd, corners in _places(plain):
@@ -43,16 +46,15 @@ def between_rays(rays: ChiefRays, where: BoolArray) -> BoolArray:
         )
         middle = points[1].mean(axis=0)
         reach = np.linalg.norm(points[1] - middle, axis=-1).max(axis=0)
-        between = np.linalg.norm(points[0] - middle, axis=-1) <= OFF_MIDDLE * reach
+        between = np.linalg.norm(points[0] - middle, axis=-1) <= MAX_OFFSET * reach
         for here, beside in (normals, ways):
-            between &= (np.einsum("yxk,nyxk->nyx", here, beside) > SAME_WAY).all(axis=0)
+            between &= (np.einsum("yxk,nyxk->nyx", here, beside) > MIN_COSINE).all(axis=0)
         out[odd] = between & plain[odd] & np.all([plain[c] for c in corners], axis=0)
     return out
 
 
 def agreed(layers: FloatArray, where: BoolArray) -> BoolArray:
-    """(h, w) which pixels of a mask have even ones beside them that agree in their light, which is
-    (groups, h, w, 3)."""
+    """(h, w) the pixels of a mask whose even neighbours agree in their light (groups, h, w, 3)."""
     groups = layers.sum(axis=-1)
     out = where.copy()
     for light, bound in ((groups.sum(axis=0)[None], AGREEMENT), (groups, GROUP_AGREEMENT)):
@@ -67,7 +69,7 @@ def agreed(layers: FloatArray, where: BoolArray) -> BoolArray:
 
 
 def fill(layers: NDArray[np.float32], where: BoolArray) -> None:
-    """Give the pixels of a mask the mean of the even ones beside them, in (groups, h, w, 3)."""
+    """Give the pixels of a mask the mean of their even neighbours, in (groups, h, w, 3)."""
     for odd, corners in _places(where):
         mean = sum(layers[:, c[0], c[1]] for c in corners) / np.float32(len(corners))
         layers[:, odd[0], odd[1]] = np.where(where[odd][..., None], mean, layers[:, odd[0], odd[1]])
@@ -77,8 +79,10 @@ Place = tuple[slice, slice]
 
 
 def _places(image: NDArray[np.generic]) -> Iterator[tuple[Place, list[Place]]]:
-    """Where in (h, w) pixels of odd column, of odd row and of both lie, and the even pixels beside
-    them."""
+    """Slices of the pixels of an image (h, w) with odd column, odd row, or both, and of the even
+    pixels
+    beside each.
+    """
     height, width = ((size + 1) // 2 for size in image.shape)
     for down, right in ((0, 1), (1, 0), (1, 1)):
         rows, columns = height - down, width - right

@@ -3,7 +3,7 @@
 Every pass traces photons through the scene as it is, contacts included, and gathers them at
 fresh visible points with a radius that shrinks as passes^(-1/6) (area as passes^(-1/3), the
 rate of Knaus and Zwicker 2011, alpha = 2/3), so that both noise and bias go to zero. It is
-slower than the light field and is what that is checked against.
+slower than the radiance cache and is what that is checked against.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from optisense.optics.imaging.film import Film
 from optisense.optics.scene.emitters import EmitterTable
 from optisense.optics.scene.ray_scene import RayScene
 from optisense.optics.transport.camera_paths import film_samples, find_visible_points
-from optisense.optics.transport.emission_guide import Guide
+from optisense.optics.transport.emission_guide import EmissionGuide
 from optisense.optics.transport.photons import trace_photons
 
 FIRST_RADIUS = 0.3
@@ -44,7 +44,7 @@ class SppmResult:
 def render_sppm(
     scene: RayScene,
     table: EmitterTable,
-    guide: Guide,
+    guide: EmissionGuide,
     camera: RayCamera,
     passes: int,
     per_light: int,

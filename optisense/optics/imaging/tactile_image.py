@@ -30,7 +30,7 @@ class TactileImage:
         side; NaN where the camera sees none. contact_mask: where an indenter is seen. depth: mm
         that the coating is pushed in along the inward normal, 0 outside contacts. settings:
         what was asked and what was reached, ready for JSON. unit_layers: each group's layer for
-        lights of 1 mW in every channel, from which others follow (see ``relit``).
+        lights of 1 mW in every channel, from which others follow (see ``relight``).
     """
 
     layers: dict[str, NDArray[np.float32]]
@@ -41,7 +41,7 @@ class TactileImage:
     interrupted: bool = False
     unit_layers: dict[str, NDArray[np.float32]] = field(default_factory=dict)
 
-    def relit(self, flux: Mapping[str, ArrayLike]) -> TactileImage:
+    def relight(self, flux: Mapping[str, ArrayLike]) -> TactileImage:
         """The same image under lights of other colours and powers; exact, with no new rendering.
 
         Args:

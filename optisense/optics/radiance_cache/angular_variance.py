@@ -1,4 +1,4 @@
-"""How light of a beam is spread about its mean direction, and what that means for shading."""
+"""The angular variance of a beam about its mean direction, and what it means for shading."""
 
 from __future__ import annotations
 
@@ -8,18 +8,26 @@ import drjit as dr
 import mitsuba as mi
 
 from optisense.optics.backend.sequences import unit_float
-from optisense.optics.scene.bsdf import Coating
+from optisense.optics.scene.bsdf import CoatingBsdf
 
-MOST_SPREAD = 0.1
-"""Of a beam: 1 - its mean cosine, up to which directions are taken to lie on a disc."""
-LEAST_SLOPE = 0.1
-"""Squared sine from the axis of the bins, below which it tells nothing of a direction's spread."""
+MAX_SPREAD = 0.1
+"""Upper bound on 1 - mean cosine of a beam, up to which its directions are treated as a flat
+disc."""
+MIN_SQUARED_SINE = 0.1
+"""Squared sine of the angle to the axis of the bins below which the moment along that axis does not
+tell the variance of a direction."""
 
 
 @dataclass
-class Spread:
-    """Light about the direction ``towards``: the variance of its angle (radians squared) along
-    two directions across, ``along`` the sectors of the bins and ``up`` towards their axis.
+class AngularVariance:
+    """A beam of light about its mean direction.
+
+    Attributes:
+        towards: unit vector towards the light.
+        along: unit vector across it, along the sectors of the bins.
+        up: unit vector across it, towards the axis of the bins.
+        variance_along: variance of the angle (radians squared) in the direction ``along``.
+        variance_up: variance in the direction ``up``.
     """
 
     towards: mi.Vector3f
@@ -29,42 +37,52 @@ class Spread:
     variance_up: mi.Float
 
 
-def beam(value: mi.Vector4f) -> tuple[mi.Vector3f, mi.Float]:
-    """Mean direction of an entry of the field, and the mean cosine with it of the entry's light."""
+def mean_direction(value: mi.Vector4f) -> tuple[mi.Vector3f, mi.Float]:
+    """The mean direction of a cache entry, and the mean cosine of its light with it."""
     mean = mi.Vector3f(value.x, value.y, value.z)
     length = dr.norm(mean)
     return mean / length, dr.minimum(length / value.w, 1.0)
 
 
-def round_spread(towards: mi.Vector3f, cosine: mi.Float) -> Spread:
-    """Light of this mean cosine, spread alike to all sides."""
+def isotropic_variance(towards: mi.Vector3f, cosine: mi.Float) -> AngularVariance:
+    """A beam of this mean cosine whose variance is the same in all directions."""
     frame = mi.Frame3f(towards)
-    half = dr.minimum(1 - cosine, MOST_SPREAD)
-    return Spread(towards, frame.s, frame.t, half, half)
+    half = dr.minimum(1 - cosine, MAX_SPREAD)
+    return AngularVariance(towards, frame.s, frame.t, half, half)
 
 
-def spread(axis: mi.Vector3f, towards: mi.Vector3f, cosine: mi.Float, height: mi.Float) -> Spread:
-    """Light whose squared part along ``axis`` is ``height`` in the mean.
+def angular_variance(
+    axis: mi.Vector3f, towards: mi.Vector3f, cosine: mi.Float, height: mi.Float
+) -> AngularVariance:
+    """A beam from its mean cosine and a second moment.
 
-    For small angles both variances add up to twice what the mean cosine is below 1.
+    For small angles, the sum of both variances is twice the difference of the mean cosine from 1.
+
+    Args:
+        axis: of the bins.
+        towards: mean direction.
+        cosine: mean cosine with it.
+        height: mean squared component of the directions along ``axis``.
     """
     slope = dr.dot(axis, towards)
     flat = 1 - slope * slope
-    half = dr.minimum(1 - cosine, MOST_SPREAD)
-    variance = dr.maximum(height - dr.square(slope * cosine), 0) / dr.maximum(flat, LEAST_SLOPE)
-    variance = dr.select(flat > LEAST_SLOPE, dr.minimum(variance, 2 * half), half)
+    half = dr.minimum(1 - cosine, MAX_SPREAD)
+    variance = dr.maximum(height - dr.square(slope * cosine), 0) / dr.maximum(
+        flat, MIN_SQUARED_SINE
+    )
+    variance = dr.select(flat > MIN_SQUARED_SINE, dr.minimum(variance, 2 * half), half)
     along = dr.cross(axis, towards)
     along = dr.select(flat > 1e-6, along * dr.rsqrt(dr.maximum(flat, 1e-6)), mi.Frame3f(towards).s)
-    return Spread(towards, along, dr.cross(towards, along), 2 * half - variance, variance)
+    return AngularVariance(towards, along, dr.cross(towards, along), 2 * half - variance, variance)
 
 
 def squared_radius(cosine: mi.Float) -> mi.Float:
-    """R^2 of a disc (angular radius R) of this mean cosine, which is 1 - R^2 / 4."""
-    return 4 * dr.minimum(1 - cosine, MOST_SPREAD)
+    """Squared angular radius R^2 of a uniform disc of this mean cosine, which is 1 - R^2 / 4."""
+    return 4 * dr.minimum(1 - cosine, MAX_SPREAD)
 
 
-def within(light: Spread, state: mi.UInt32) -> mi.Vector3f:
-    """A direction of the light, drawn evenly from an ellipse of its variances."""
+def sample_direction(light: AngularVariance, state: mi.UInt32) -> mi.Vector3f:
+    """A direction of a beam, drawn uniformly from the ellipse of its variances."""
     radius = 2 * dr.sqrt(unit_float((state ^ 0x9E3779B9) * 69069))
     sin_a, cos_a = dr.sincos(unit_float(state * 277803737) * dr.two_pi)
     aside = light.along * (cos_a * dr.sqrt(light.variance_along))
@@ -72,19 +90,22 @@ def within(light: Spread, state: mi.UInt32) -> mi.Vector3f:
     return dr.normalize(light.towards + radius * aside)
 
 
-def reach(light: Spread, normal: mi.Vector3f, upright: mi.Vector3f) -> mi.Float:
-    """How far a beam's light is spread in its cosine with a normal: half of a slab of the same
-    deviation.
+def cosine_half_width(
+    light: AngularVariance, normal: mi.Vector3f, upright: mi.Vector3f
+) -> mi.Float:
+    """Half-width of the distribution of a beam's cosine with a normal.
 
-    All light comes from above the undeformed surface (normal ``upright``), which limits it.
+    The distribution is taken to be uniform, with the beam's variance. All light comes from above
+    the
+    undeformed surface (normal ``upright``), which limits the width.
     """
     variance = light.variance_along * dr.square(dr.dot(light.along, normal))
     variance += light.variance_up * dr.square(dr.dot(light.up, normal))
     return dr.minimum(dr.sqrt(3 * variance), dr.abs(dr.dot(upright, light.towards)))
 
 
-def above(direction: mi.Vector3f, normal: mi.Vector3f) -> mi.Vector3f:
-    """A direction, mirrored up if it lies below the plane of a normal."""
+def mirrored_above(direction: mi.Vector3f, normal: mi.Vector3f) -> mi.Vector3f:
+    """A direction, mirrored at the plane of a normal if it lies below it."""
     return direction - normal * (2 * dr.minimum(dr.dot(direction, normal), 0))
 
 
@@ -101,17 +122,18 @@ def passes_near(
 
 
 @dr.syntax
-def skyline(
+def occluder_horizon(
     balls: mi.Float,
     ball_count: mi.UInt32,
     point: mi.Point3f,
     upright: mi.Vector3f,
     own: mi.Bool,
 ) -> mi.Float:
-    """Sine of the elevation (above the plane of ``upright``) below which a ball is in the way.
+    """Sine of the elevation over the plane of ``upright`` below which a ball occludes the light.
 
-    For points with ``own`` the one ball that they lie in does not count: they stand on the convex
-    shape within.
+    For points with ``own``, the one ball that they lie in does not count: they lie on the convex
+    shape
+    within it.
     """
     highest = mi.Float(-1)
     inside = mi.UInt32(0)
@@ -134,12 +156,13 @@ def skyline(
     return dr.select(inside > 1, 1, highest)
 
 
-def widened(coating: Coating, cosine: mi.Float) -> Coating:
+def broadened_coating(coating: CoatingBsdf, cosine: mi.Float) -> CoatingBsdf:
     """A coating as it reflects light that is spread about its mean direction.
 
     The diffuse lobe is linear in direction, so the mean cosine makes it exact. The metallic lobe is
-    blurred as if by light from a disc: the half vector moves half as far as the light, which adds
-    R^2 / 8 to alpha^2.
+    blurred as by light from a disc: the half vector moves half as far as the light, which adds R^2
+    / 8
+    to alpha^2.
     """
     reflectance = coating.reflectance * cosine
     if not coating.metallic:

@@ -1,4 +1,4 @@
-"""Points on the undeformed surface: the light of beams, and what indenters hide of it."""
+"""Points on the undeformed surface: the light of beams, and how much of it indenters occlude."""
 
 from __future__ import annotations
 
@@ -6,33 +6,38 @@ import drjit as dr
 import mitsuba as mi
 
 from optisense.optics.backend.sequences import next_random, unit_float
-from optisense.optics.radiance_cache.angular_variance import round_spread, widened, within
+from optisense.optics.radiance_cache.angular_variance import (
+    broadened_coating,
+    isotropic_variance,
+    sample_direction,
+)
 from optisense.optics.radiance_cache.beams import Beams
 from optisense.optics.radiance_cache.irradiance import vector
-from optisense.optics.scene.bsdf import Coating, albedo_of, evaluate_coating, grey
+from optisense.optics.scene.bsdf import CoatingBsdf, albedo_of, evaluate_coating, grey
 from optisense.optics.transport.camera_paths import VisiblePoints
 
-LEAST_STEP = 1e-20
-"""Of the running sum, where there is no light."""
+MIN_STEP = 1e-20
+"""Lower bound on the step of the systematic sampling; it avoids a division by zero without
+light."""
 
 
 @dr.syntax
 def sum_beams(
     beams: Beams,
     groups: int,
-    coating: Coating,
+    coating: CoatingBsdf,
     points: VisiblePoints,
     cell: mi.UInt32,
     active: mi.Bool,
 ) -> list[mi.Color3f]:
-    """Radiance towards the eye of all beams, for points on the undeformed surface."""
+    """Radiance towards the camera due to all beams, for points on the undeformed surface."""
     totals = [mi.Color3f(0) for _ in range(groups)]
     j = dr.gather(mi.UInt32, beams.starts, cell * groups, active)
     end = dr.gather(mi.UInt32, beams.starts, (cell + 1) * groups, active)
     while j < end:
         towards, cosine, flux, group = beam_at(beams, j)
         reflected = flux * evaluate_coating(
-            widened(coating, cosine), points.normal, towards, points.towards_eye
+            broadened_coating(coating, cosine), points.normal, towards, points.towards_eye
         )
         for g in range(groups):
             totals[g] += dr.select(group == g, reflected, 0)
@@ -43,13 +48,15 @@ def sum_beams(
 def sum_diffuse(
     table: mi.Float,
     groups: int,
-    coating: Coating,
+    coating: CoatingBsdf,
     points: VisiblePoints,
     cell: mi.UInt32,
     active: mi.Bool,
 ) -> list[mi.Color3f]:
-    """The same where coatings are diffuse and grey, from the `irradiance_table`: what all beams
-    bring is what the sum of their vectors brings."""
+    """The same where coatings are diffuse and grey, from the `irradiance_table`: the vector sum of
+    the
+    beams gives what all of them bring.
+    """
     reflectance = dr.select(active, albedo_of(coating) * dr.inv_pi, 0)
     return [
         reflectance * dr.maximum(dr.dot(vector(table, cell * groups + g), points.normal), 0)
@@ -62,7 +69,7 @@ def sum_hidden(
     beams: Beams,
     totals: list[mi.Color3f],
     indenters: mi.Scene,
-    coating: Coating,
+    coating: CoatingBsdf,
     points: VisiblePoints,
     start: mi.Point3f,
     cell: mi.UInt32,
@@ -70,14 +77,16 @@ def sum_hidden(
     random: mi.UInt32,
     shadow_rays: mi.Float,
 ) -> list[mi.Color3f]:
-    """What indenters take away of these ``totals``.
+    """The part of ``totals`` that indenters occlude.
 
-    For all the light of a group there would be so many ``shadow_rays``: ``beams``, those that pass
-    near indenters, get their share of them, evenly spaced in the running sum.
+    Shadow rays are drawn in proportion to the light, evenly spaced in its running sum (systematic
+    sampling). All the light of a group would take ``shadow_rays``; the given ``beams``, those that
+    pass
+    near indenters, take their share of them.
     """
     groups = len(totals)
     hidden = [mi.Color3f(0) for _ in range(groups)]
-    steps = [dr.maximum(grey(total) / shadow_rays, LEAST_STEP) for total in totals]
+    steps = [dr.maximum(grey(total) / shadow_rays, MIN_STEP) for total in totals]
     state = next_random(random)
     running = unit_float(state)
     j = dr.gather(mi.UInt32, beams.starts, cell * groups, active)
@@ -85,9 +94,9 @@ def sum_hidden(
     while j < end:
         towards, cosine, flux, group = beam_at(beams, j)
         reflected = flux * evaluate_coating(
-            widened(coating, cosine), points.normal, towards, points.towards_eye
+            broadened_coating(coating, cosine), points.normal, towards, points.towards_eye
         )
-        step = mi.Float(LEAST_STEP)
+        step = mi.Float(MIN_STEP)
         for g in range(groups):
             step = dr.select(group == g, steps[g], step)
         share = dr.minimum(grey(reflected) / step, shadow_rays)
@@ -98,7 +107,7 @@ def sum_hidden(
         while times > 0:
             state = next_random(state)
             blocked = indenters.ray_test(
-                mi.Ray3f(start, within(round_spread(towards, cosine), state)),
+                mi.Ray3f(start, sample_direction(isotropic_variance(towards, cosine), state)),
                 coherent=False,
                 active=mi.Bool(True),
             )

@@ -1,8 +1,9 @@
-"""The light field as short lists of beams, for points that lie in the undeformed surface.
+"""The radiance cache as short lists of beams, for points on the undeformed surface.
 
-A cell of the field keeps its light in many narrow bins of directions. Most of them hold a little
-scattered light, a few hold the lamps. Where the surface is not tilted, weak bins may be taken four
-together without a visible change (see tests/optics/test_beams.py), which leaves a short list.
+A cell of the cache keeps its light in many narrow direction bins. Most of them hold a little
+scattered light, a few hold the lamps. Where the surface is not tilted, four weak neighbouring bins
+may be merged into one beam without a visible change (see tests/optics/test_beams.py), which leaves
+a short list.
 """
 
 from __future__ import annotations
@@ -18,20 +19,24 @@ from optisense.optics.backend.arrays import floats, indices
 from optisense.optics.radiance_cache.angular_variance import passes_near, squared_radius
 from optisense.optics.scene.surface_cells import SurfaceCells
 
-STRONG = 0.03
-"""Part of the light of a group in a cell from which four neighbouring bins stay apart."""
+STRONG_SHARE = 0.03
+"""Share of a group's light in a cell above which four neighbouring bins stay separate beams."""
 NO_SLOT = 0xFFFFFFFF
-REACH = 1.5
-"""Of the side of a cell: how far from its middle the points are that read its beams."""
+"""Marks a direction bin that the cache does not hold."""
+READ_DISTANCE = 1.5
+"""Largest distance, in cell sides, between a cell's centre and a point that reads its beams."""
 
 
 @dataclass
 class Beams:
-    """Beams in the order of cells, and within these of light groups.
+    """Beams in the order of cells, and of light groups within each cell.
 
-    ``starts`` has one entry for each cell and group, and one more. ``ways`` holds four floats a
-    beam: the unit direction towards its light, and the mean cosine with it of the beam's light;
-    ``fluxes`` the flux density across it (mW/mm^2) in R, G, B, and the light group as bits.
+    Attributes:
+        starts: index of the first beam of each cell and group, and the total number at the end.
+        ways: four floats per beam: the unit direction towards the light, and the mean cosine with
+        it.
+        fluxes: four floats per beam: the flux density across it (mW/mm^2) in R, G, B, and the light
+            group as bits.
     """
 
     starts: mi.UInt32
@@ -49,11 +54,11 @@ def collect_beams(
     entries: int,
     groups: int,
 ) -> Beams:
-    """Beams from the bins of a field.
+    """Beams from the bins of a cache.
 
     Args:
-        moments, colours, coloured: as in ``LightField``.
-        used: which of the bands times sectors bins the field holds, ascending.
+        moments, colours, coloured: as in `RadianceCache`.
+        used: which of the bands times sectors bins the cache holds, ascending.
         bands, sectors: even numbers.
         entries: cells times groups.
         groups: light groups.
@@ -130,7 +135,7 @@ def _collect(
             if dr.hint(write and coloured, mode="scalar"):
                 inks.append(dr.gather(mi.Vector4f, colours, entry, there))
                 ink += inks[i]
-        strong = whole.w > STRONG * total
+        strong = whole.w > STRONG_SHARE * total
         if dr.hint(not (write and coloured), mode="scalar"):
             inks = [mi.Vector4f(value.w) for value in values]
             ink = mi.Vector4f(whole.w)
@@ -154,16 +159,22 @@ def _collect(
     return slot - first
 
 
-def beams_near(beams: Beams, cells: SurfaceCells, groups: int, balls: mi.Float) -> Beams:
-    """Those beams that may touch one of the balls (centre and radius, four floats each) on their
-    way to points of their cell."""
+def cull_beams(beams: Beams, cells: SurfaceCells, groups: int, balls: mi.Float) -> Beams:
+    """The beams that may touch one of the balls on their way to points of their cell.
+
+    Args:
+        beams: all beams.
+        cells: the cells that they belong to.
+        groups: light groups.
+        balls: centre and radius, four floats (mm) each.
+    """
     entries = cells.cells * groups
     centres = np.zeros((cells.cells, 4), dtype=np.float32)
     centres[:, :3] = cells.centres
     middles = floats(centres)
     lane = dr.arange(mi.UInt32, entries)
     near = dr.zeros(mi.UInt32, dr.width(beams.ways) // 4)
-    margin = REACH / cells.inverse_size
+    margin = READ_DISTANCE / cells.inverse_size
     sizes = (dr.opaque(mi.UInt32, groups), dr.opaque(mi.UInt32, dr.width(balls) // 4))
     count = _mark_near(beams, middles, balls, margin, *sizes, lane, near)
     counts = dr.zeros(mi.UInt32, entries + 1)
@@ -189,8 +200,7 @@ def _mark_near(
     lane: mi.UInt32,
     near: mi.UInt32,
 ) -> mi.UInt32:
-    """Set ``near`` to 1 for beams that pass near a ball; returns how many there are of each lane's
-    cell and group."""
+    """Set ``near`` to 1 for beams that pass near a ball, and count them per cell and group."""
     middle = dr.gather(mi.Vector4f, middles, lane // groups)
     point = mi.Point3f(middle.x, middle.y, middle.z)
     count = mi.UInt32(0)

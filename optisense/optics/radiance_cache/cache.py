@@ -1,12 +1,11 @@
-"""The light that falls on the undeformed opaque surfaces, pooled into cells and directions.
+"""The radiance cache: light that falls on the undeformed opaque surfaces, by cell and direction.
 
-Light arriving at the sensing surface varies slowly from place to place; what varies within a
-tenth of a millimetre in a contact is the surface's tilt and what it hides. So photons are
-traced once a design, without contacts, and pooled where they land: each cell and bin of
-directions (bins overlap, see `OVERLAP`) keeps the flux through a plane *across the
-light* (a photon's power over the cosine of its landing) and the mean direction. What a contact
-makes of it is ``shading.py``'s part. The cost of an image then does not depend on the number of
-photons.
+The light that arrives at the sensing surface varies slowly from place to place. What varies within
+a tenth of a millimetre in a contact is the surface's tilt and what it hides. So photons are traced
+once per design, without contacts, and tallied where they land: each surface cell and direction bin
+(bins overlap, see `OVERLAP`) keeps the flux through a plane *across the light* (a photon's power
+over its cosine of incidence) and the mean direction. `shading` looks it up for visible points. The
+cost of an image then does not depend on the number of photons.
 """
 
 from __future__ import annotations
@@ -26,33 +25,42 @@ from optisense.optics.radiance_cache.irradiance import irradiance_table
 from optisense.optics.radiance_cache.smoothing import Kernels, smooth
 from optisense.optics.scene.surface_cells import SurfaceCells, bin_axis, cell_at
 from optisense.optics.transport.photons import GROUP_MASK, HALF_SHIFT, PhotonMap
-from optisense.optics.transport.volume_flux import Slab, above_cell
+from optisense.optics.transport.volume_flux import FluxLayer, layer_cell_at
 
 FloatArray = NDArray[np.floating]
 
-# An isolated photon that grazes the surface must not become a bright beam: cosines below are
-# raised to this.
-LEAST_COSINE = 0.02
-# Equal-area bins of the sphere of directions, about the mean normal of the surfaces.
+MIN_COSINE = 0.02
+"""Lower bound on the cosine of incidence that a photon's power is divided by, so that an isolated
+grazing photon does not become a bright beam."""
 BANDS = 16
+"""Bands of equal area into which the sphere of directions is divided, about the mean normal of the
+surfaces."""
 SECTORS = 16
+"""Sectors of azimuth in each band."""
 BINS = BANDS * SECTORS
+"""Number of direction bins, all of equal solid angle."""
 OVERLAP = 1.0
-"""Bins by which light strays to its neighbours (triangular): each bin holds what a quadratic
-B-spline weights. With sharp edges, a lamp would be counted once or twice by a point above the
-surface, depending on how near an edge it lies, where its light is only somewhat stronger than
-below; the sum over such bins hardly depends on where they lie."""
-OVERLAP_OF_METAL = 0.4
-"""The same where a coating is part metal, which tells directions apart: a compromise."""
-# Where a bin of no light is told from one of little.
-DARK = 1e-7
+"""Half-width, in bins, of the triangular density by which directions are spread over neighbouring
+bins: each bin then holds what a quadratic B-spline weights. With sharp edges between bins, a point
+above the surface would count a lamp twice or not at all, depending on how near an edge the lamp
+lies; sums over overlapping bins hardly depend on where the edges lie."""
+METAL_OVERLAP = 0.4
+"""The half-width where a coating has a metallic lobe, which resolves directions: a compromise
+between the blur of the lobe's highlight and the errors of sharp edges."""
+EMPTY_BIN_SHARE = 1e-7
+"""Share of all the light below which a direction bin counts as empty."""
 
 
 def direction_bin(
     cells: SurfaceCells, direction: mi.Vector3f, bands_off: mi.Float, sectors_off: mi.Float
 ) -> mi.UInt32:
-    """Equal-area bin (of BINS on the sphere) of a unit direction, or the one so many bands and
-    sectors beside it.
+    """The equal-area bin (of `BINS`) of a unit direction, or one beside it.
+
+    Args:
+        cells: their frame is that of the bins.
+        direction: unit vectors.
+        bands_off: offset in bands.
+        sectors_off: offset in sectors.
     """
     x, y, z = (dr.dot(direction, bin_axis(cells, k)) for k in range(3))
     place = (z + 1) * (BANDS / 2) + bands_off
@@ -65,9 +73,9 @@ def direction_bin(
 
 
 def _dither(place: mi.Vector4f, direction: mi.Vector3f, reach: mi.Float) -> list[mi.Float]:
-    """Offsets in bands and sectors, of a triangular density over -reach .. reach, for landings.
+    """Random offsets in bands and sectors, of a triangular density over -reach .. reach.
 
-    They follow from the landing, as landings are in no order.
+    They are a hash of the landing, as landings come in no fixed order.
     """
     first, second, third = (
         dr.reinterpret_array(mi.UInt32, value) for value in (place.x, place.y, direction.x)
@@ -77,7 +85,7 @@ def _dither(place: mi.Vector4f, direction: mi.Vector3f, reach: mi.Float) -> list
 
 
 def bin_centres(cells: SurfaceCells, bins: NDArray[np.integer]) -> mi.Float:
-    """Middle direction of bins, four floats each."""
+    """The middle direction of each bin, four floats each."""
     z = (bins // SECTORS + 0.5) * (2 / BANDS) - 1
     turn = (bins % SECTORS + 0.5) * (2 * np.pi / SECTORS)
     flat = np.sqrt(1 - z * z)
@@ -88,7 +96,7 @@ def bin_centres(cells: SurfaceCells, bins: NDArray[np.integer]) -> mi.Float:
 
 
 class Tables(NamedTuple):
-    """Moments, heights and colours, see `LightField`."""
+    """Moments, heights and colours, as in `RadianceCache`."""
 
     moments: mi.Float
     heights: mi.Float
@@ -96,15 +104,29 @@ class Tables(NamedTuple):
 
 
 @dataclass
-class LightField:
-    """The smoothed field: values of each cell, bin and group; lights of 1 mW.
+class RadianceCache:
+    """The smoothed light of each cell, direction bin and light group, for lights of 1 mW.
 
-    ``moments``: flux density across the light (mW/mm^2) times the direction towards the light
-    (3), flux density (1). ``heights``: the flux density times the square of the direction's
-    part along the axis of the bins. ``colours``: four floats, the flux density per channel R,
-    G, B where surfaces are coloured, else the same array as ``moments``. ``beams``: the same
-    light in short lists. ``raised``: moments, heights and colours of the light half-way up the
-    slab above the cells, if that was asked for (see ``slab.py``).
+    Attributes:
+        cells: the surface cells.
+        bins: number of direction bins that hold light.
+        groups: number of light groups.
+        moments: four floats per entry: the flux density across the light (mW/mm^2) times the
+        direction
+            towards the light (3), and the flux density (1).
+        heights: the flux density times the squared component of the direction along the bins' axis.
+        colours: four floats per entry: the flux density in R, G, B where surfaces are coloured,
+        else
+            the same array as ``moments``.
+        coloured: whether surfaces are coloured.
+        metallic: whether a coating has a metallic lobe.
+        centres: the middle direction of each bin, four floats each.
+        irradiance: the table of `irradiance.irradiance_table`.
+        beams: the same light in short lists of beams.
+        photons: emitted photons.
+        noise: relative RMS noise of the smoothed irradiance.
+        above_surface: the same tables for the light half-way up the flux layer above the cells, if
+            there is one (see `volume_flux`).
     """
 
     cells: SurfaceCells
@@ -120,11 +142,11 @@ class LightField:
     beams: Beams
     photons: int
     noise: float
-    raised: Tables | None = None
+    above_surface: Tables | None = None
 
 
-class FieldTally:
-    """Sums of landings per cell, direction bin and light group, over photon passes."""
+class CacheTally:
+    """Sums of photons per cell, direction bin and light group, over photon passes."""
 
     def __init__(
         self,
@@ -132,10 +154,20 @@ class FieldTally:
         groups: int,
         coloured: bool,
         metallic: bool = True,
-        slab: Slab | None = None,
+        flux_layer: FluxLayer | None = None,
     ) -> None:
-        """``slab``, if light above the surface is wanted, too."""
-        self.slab = slab
+        """Prepare empty tables.
+
+        Args:
+            kernels: the cells and their smoothing.
+            groups: number of light groups.
+            coloured: whether powers are kept per colour channel.
+            metallic: whether a coating has a metallic lobe, which calls for less overlap of the
+            bins.
+            flux_layer: the layer in which the light above the surface is tallied; None for no
+            layer.
+        """
+        self.flux_layer = flux_layer
         self.metallic = metallic
         self.kernels = kernels
         self.cells = cells = kernels.cells
@@ -145,7 +177,7 @@ class FieldTally:
         self.photons = 0
         entries = cells.cells * BINS * groups * 4
         self.landed = self._tables(entries)
-        self.raised = None if slab is None else self._tables(entries)
+        self.above_surface = None if flux_layer is None else self._tables(entries)
         # What photons of even and of odd number bring; their difference tells the noise.
         self.halves = dr.zeros(mi.Float, 2 * cells.cells * groups)
 
@@ -159,30 +191,38 @@ class FieldTally:
         cell, found, bits, scalar = self._tally(photons, self.landed, None)
         row = cell + ((bits >> HALF_SHIFT) & 1) * dr.opaque(mi.UInt32, self.cells.cells)
         dr.scatter_add(self.halves, scalar, row * self.groups + (bits & GROUP_MASK), found)
-        if self.raised is not None and photons.passing is not None:
-            self._tally(photons.passing, self.raised, self.slab)
+        if self.above_surface is not None and photons.passing is not None:
+            self._tally(photons.passing, self.above_surface, self.flux_layer)
         self.passes += 1
         self.photons += photons.emitted
-        dr.eval(self.landed, self.halves, self.raised)
+        dr.eval(self.landed, self.halves, self.above_surface)
 
     def _tally(
-        self, photons: PhotonMap, tables: Tables, slab: Slab | None
+        self, photons: PhotonMap, tables: Tables, flux_layer: FluxLayer | None
     ) -> tuple[mi.UInt32, mi.Bool, mi.UInt32, mi.Float]:
-        """Add photons, landings or in a slab, to tables; returns of each the cell, whether there
-        is one, the bits and the power."""
+        """Add photons to tables.
+
+        Args:
+            photons: those that landed, or those that crossed the flux layer.
+            tables: the sums.
+            flux_layer: the layer that the photons crossed; None if they landed.
+
+        Returns:
+            Of each photon: its cell, whether there is one, its bits and its power.
+        """
         index = dr.arange(mi.UInt32, photons.count)
         place = dr.gather(mi.Vector4f, photons.place, index)
         travel = dr.gather(mi.Vector4f, photons.travel, index)
         bits = dr.reinterpret_array(mi.UInt32, place.w)
         point = mi.Point3f(place.x, place.y, place.z)
-        if slab is None:
+        if flux_layer is None:
             cell, found = cell_at(self.cells, point, mi.Bool(True))
-            across = dr.rcp(dr.maximum(travel.w, LEAST_COSINE))
+            across = dr.rcp(dr.maximum(travel.w, MIN_COSINE))
         else:
-            cell, _, found = above_cell(slab, point, mi.Bool(True))
+            cell, _, found = layer_cell_at(flux_layer, point, mi.Bool(True))
             across = dr.rcp(dr.maximum(travel.w, 1e-6))
         direction = mi.Vector3f(travel.x, travel.y, travel.z)
-        reach = dr.opaque(mi.Float, OVERLAP_OF_METAL if self.metallic else OVERLAP)
+        reach = dr.opaque(mi.Float, METAL_OVERLAP if self.metallic else OVERLAP)
         bin_ = direction_bin(self.cells, -direction, *_dither(place, direction, reach))
         entry = (cell * BINS + bin_) * self.groups + (bits & GROUP_MASK)
         if self.coloured:
@@ -200,10 +240,11 @@ class FieldTally:
         return cell, found, bits, scalar
 
     def noise(self) -> float:
-        """Relative RMS noise of the smoothed irradiance (1 = 100 %), from the difference of
-        both halves.
+        """Relative RMS noise of the smoothed irradiance (1 = 100 %), from the difference of two
+        halves.
 
-        Over all cells that the camera sees, or nearly so, and all groups, in relation to each
+        It is the RMS over all cells in or near the camera's view and all light groups, relative to
+        each
         group's mean; infinite without photons.
         """
         if self.passes < 1:
@@ -220,20 +261,20 @@ class FieldTally:
         return float(np.sqrt((spread[:, lit] / scale[lit] ** 2).mean()))
 
     def _landed(self) -> FloatArray:
-        """(2, cells, groups) mW on each cell, by the photons of even and of odd number."""
+        """(2, cells, groups) mW that landed on each cell, by photons of even and odd number."""
         halves = np.asarray(self.halves, dtype=np.float64) * (2 / self.passes)
         return halves.reshape(2, -1, self.groups)
 
-    def smoothed(self) -> LightField:
-        """The field so far; only bins that hold light are kept."""
+    def smoothed(self) -> RadianceCache:
+        """The radiance cache of the photons so far; only bins that hold light are kept."""
         total = dr.zeros(mi.Float, BINS)
         lanes = dr.arange(mi.UInt32, self.cells.cells * BINS * self.groups)
         value = dr.gather(mi.Float, self.landed.moments, lanes * 4 + 3)
-        if self.raised is not None:
-            value += dr.gather(mi.Float, self.raised.moments, lanes * 4 + 3)
+        if self.above_surface is not None:
+            value += dr.gather(mi.Float, self.above_surface.moments, lanes * 4 + 3)
         dr.scatter_add(total, value, (lanes // self.groups) % BINS)
         power = np.array(total)
-        used = np.flatnonzero(power > DARK * power.sum())
+        used = np.flatnonzero(power > EMPTY_BIN_SHARE * power.sum())
         used = used if len(used) else np.zeros(1, dtype=np.int64)
         bins = indices(used)
         kernel = self.kernels.smoothing(self.photons, self.metallic)
@@ -257,12 +298,12 @@ class FieldTally:
             return Tables(values, sums[1], dr.ravel(sums[2]) if self.coloured else values)
 
         moments, heights, colours = smoothed(*self.landed)
-        raised = None if self.raised is None else smoothed(*self.raised)
+        above_surface = None if self.above_surface is None else smoothed(*self.above_surface)
         table = irradiance_table(
             moments, self.cells.cells, dr.opaque(mi.UInt32, len(used)), self.groups
         )
-        dr.eval(moments, heights, colours, table, raised)
-        return LightField(
+        dr.eval(moments, heights, colours, table, above_surface)
+        return RadianceCache(
             cells=self.cells,
             bins=len(used),
             groups=self.groups,
@@ -285,5 +326,5 @@ class FieldTally:
             ),
             photons=self.photons,
             noise=self.noise(),
-            raised=raised,
+            above_surface=above_surface,
         )

@@ -1,10 +1,10 @@
-"""Light that indenters and the skin near them send to each other.
+"""Interreflection: light that indenters and the skin near them reflect to each other.
 
-The light field holds all light that comes from afar, also after scattering. Inside a contact, a
-point sees an indenter or, standing on one, the skin beside it; what comes from there is sampled by
-rays. It is a few per cent of the whole, so the place that is seen is taken to be diffuse, and the
-field's irradiance there is read from nine spherical-harmonic coefficients per cell and light group
-(Ramamoorthi and Hanrahan 2001), with one shadow ray a group towards the mean of its light.
+The radiance cache holds the light that comes from afar, also after scattering. Inside a contact, a
+point sees an indenter or, from an indenter, the skin beside it. The light from there is sampled by
+rays. It is a few per cent of the whole, so the place that is seen is taken to be diffuse, and its
+irradiance is read from nine spherical-harmonic coefficients per cell and light group (Ramamoorthi
+and Hanrahan 2001), with one shadow ray per group towards the mean direction of its light.
 """
 
 from __future__ import annotations
@@ -13,18 +13,18 @@ import drjit as dr
 import mitsuba as mi
 
 from optisense.optics.backend.sequences import STEPS_2D, next_random, unit_float
-from optisense.optics.radiance_cache.cache import LightField
+from optisense.optics.radiance_cache.cache import RadianceCache
 from optisense.optics.radiance_cache.irradiance import irradiance
-from optisense.optics.scene.bsdf import Coating, albedo_of, sample_coating
+from optisense.optics.scene.bsdf import CoatingBsdf, albedo_of, sample_coating
 from optisense.optics.scene.contact_scenes import ContactScenes
 from optisense.optics.scene.ray_scene import RayScene, intersect, leave
 from optisense.optics.scene.surface_cells import SurfaceCells, cell_at
 from optisense.optics.transport.camera_paths import VisiblePoints
 
 DIRECTIONS = 8
-"""Rays of a camera sample for exchanged light."""
-MOST_PLACES = 8
-"""That scatter exchanged light one after another, at most."""
+"""Directions per camera sample in which interreflected light is looked for."""
+MAX_BOUNCES = 8
+"""Largest number of reflections inside a contact."""
 
 
 @dr.syntax
@@ -34,7 +34,7 @@ def _sample(
     groups: int,
     indenters: RayScene,
     fixed: RayScene,
-    coating: Coating,
+    coating: CoatingBsdf,
     normal: mi.Vector3f,
     face_normal: mi.Vector3f,
     towards_eye: mi.Vector3f,
@@ -94,7 +94,7 @@ def _sample(
                 # On from there, like light that is scattered evenly.
                 state = next_random(state)
                 places += 1
-                walking = (unit_float(state) < survival) & (places < MOST_PLACES)
+                walking = (unit_float(state) < survival) & (places < MAX_BOUNCES)
                 weight *= albedo / survival
                 u = unit_float(state * 277803737)
                 v = unit_float((state ^ 0x9E3779B9) * 69069)
@@ -107,18 +107,26 @@ def _sample(
     return [total / mi.Float(directions) for total in totals]
 
 
-def exchanged(
-    field: LightField,
+def interreflected(
+    field: RadianceCache,
     scenes: ContactScenes,
     points: VisiblePoints,
-    coating: Coating,
+    coating: CoatingBsdf,
     cell: mi.UInt32,
     active: mi.Bool,
     raised: mi.Bool,
 ) -> list[mi.Color3f]:
-    """Radiance towards the eye that points reflect of exchanged light, one colour a group.
+    """Radiance towards the camera that points reflect of interreflected light, one colour per
+    group.
 
-    ``cell`` is where each point looks up the field, ``raised`` whether it is on an indenter.
+    Args:
+        field: the radiance cache.
+        scenes: the scenes of the image, with indenters.
+        points: the visible points.
+        coating: their coating.
+        cell: the cell where each point reads the cache.
+        active: which points count.
+        raised: which points lie on an indenter.
     """
     assert scenes.indenters is not None
     return _sample(

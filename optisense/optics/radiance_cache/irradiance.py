@@ -14,7 +14,7 @@ BAND_0, BAND_1, BAND_2 = 3.141593, 2.094395, 0.785398
 
 
 def harmonics(n: mi.Vector3f) -> tuple[mi.Float, ...]:
-    """The nine real spherical harmonics up to band 2 of unit directions."""
+    """The nine real spherical harmonics of bands 0 to 2 for unit directions."""
     x, y, z = n.x, n.y, n.z
     return (
         mi.Float(0.282095) + 0 * x,
@@ -31,8 +31,10 @@ def harmonics(n: mi.Vector3f) -> tuple[mi.Float, ...]:
 
 @dr.syntax
 def irradiance_table(moments: mi.Float, cells: int, bins: mi.UInt32, groups: int) -> mi.Float:
-    """Twelve floats a cell and group: nine coefficients of irradiance over the normal, and the sum
-    of the light's directions, weighted with its flux density."""
+    """Twelve floats per cell and group: nine coefficients of the irradiance as a function of the
+    normal,
+    and the sum of the light's directions, each weighted with its flux density.
+    """
     lane = dr.arange(mi.UInt32, cells * groups)
     cell, group = lane // groups, lane % groups
     sums = [mi.Float(0) for _ in range(9)]
@@ -60,8 +62,10 @@ def irradiance_table(moments: mi.Float, cells: int, bins: mi.UInt32, groups: int
 def irradiance(
     table: mi.Float, entry: mi.UInt32, normal: mi.Vector3f
 ) -> tuple[mi.Float, mi.Float, mi.Vector3f]:
-    """Irradiance (mW/mm^2) at normals, its mean over all normals, and the vector along which most
-    of its light comes: light that is wholly above a normal's horizon brings its part along it."""
+    """Irradiance (mW/mm^2) at normals, its mean over all normals, and the vector sum of the light.
+
+    Light that is wholly above a normal's horizon contributes the component of its vector along it.
+    """
     a = dr.gather(mi.Vector4f, table, entry * 3)
     b = dr.gather(mi.Vector4f, table, entry * 3 + 1)
     c = dr.gather(mi.Vector4f, table, entry * 3 + 2)
@@ -74,6 +78,6 @@ def irradiance(
 
 
 def vector(table: mi.Float, entry: mi.UInt32) -> mi.Vector3f:
-    """The last of `irradiance` alone."""
+    """The vector sum of the light alone, as in `irradiance`."""
     third = dr.gather(mi.Vector4f, table, entry * 3 + 2)
     return mi.Vector3f(third.y, third.z, third.w)

@@ -1,4 +1,4 @@
-"""What the photons that teach the guide tell about the light, before any image."""
+"""What the photons of the pilot pass tell about the light, before any image."""
 
 from __future__ import annotations
 
@@ -15,16 +15,25 @@ from optisense.optics.transport.photons import GROUP_MASK, HALF_SHIFT, PhotonMap
 
 FloatArray = NDArray[np.floating]
 
-GRAZING = 0.25
-"""Cosine of landing below which what lands far behind a raised point is not what passes there."""
-LEAST_CLEAR = 0.02
-"""Cosines are raised to this, to tell how much of the light grazes."""
+GRAZING_COSINE = 0.25
+"""Cosine of incidence below which light is grazing. It lands so far behind an indenter's place that
+the landings there do not tell the light that passes above it."""
+MIN_COSINE = 0.02
+"""Lower bound on the cosine of incidence when powers are divided by it, so that single photons do
+not dominate the share of grazing light."""
 
 
 @dataclass(frozen=True)
-class Scouts:
-    """Landings: points (n, 3) mm, cosines (n,) with the surface's normal, powers (n,) mW, light
-    groups (n,), and which half of the photons (n,) they are of, 0 or 1."""
+class PilotPhotons:
+    """Landings of the pilot pass.
+
+    Attributes:
+        points: (n, 3) mm.
+        cosines: (n,) cosines of incidence.
+        powers: (n,) mW.
+        groups: (n,) light groups.
+        halves: (n,) 0 or 1, which half of the photons each belongs to.
+    """
 
     points: FloatArray
     cosines: FloatArray
@@ -33,8 +42,8 @@ class Scouts:
     halves: NDArray[np.integer]
 
     @classmethod
-    def of(cls, photons: PhotonMap) -> Scouts:
-        """Those of a pass."""
+    def of(cls, photons: PhotonMap) -> PilotPhotons:
+        """The landings of a photon pass."""
         places = np.asarray(photons.place)[: 4 * photons.count].reshape(-1, 4)
         travels = np.asarray(photons.travel)[: 4 * photons.count].reshape(-1, 4)
         width = 4 if photons.coloured else 1
@@ -49,27 +58,27 @@ class Scouts:
         )
 
     def cells_of(self, cells: SurfaceCells) -> tuple[NDArray[np.integer], NDArray[np.bool_]]:
-        """(n,) the cell that each landed in, and whether there is one."""
+        """(n,) the cell that each landed in, and (n,) whether there is one."""
         point = mi.Point3f(*(floats(self.points[:, k]) for k in range(3)))
         cell, found = cell_at(cells, point, mi.Bool(True))
         dr.eval(cell, found)
         return np.asarray(cell), np.asarray(found)
 
-    def within(self, cells: SurfaceCells, where: NDArray[np.bool_]) -> Scouts:
-        """Those that landed in the cells that matter (cells,)."""
+    def within(self, cells: SurfaceCells, where: NDArray[np.bool_]) -> PilotPhotons:
+        """The landings in the cells that ``where`` (cells,) marks."""
         cell, found = self.cells_of(cells)
         kept = found & where[cell]
-        return Scouts(*(getattr(self, field.name)[kept] for field in fields(self)))
+        return PilotPhotons(*(getattr(self, field.name)[kept] for field in fields(self)))
 
     def landed(self, cells: SurfaceCells, groups: int) -> FloatArray:
-        """(2, cells, groups) mW on each cell, by the two halves."""
+        """(2, cells, groups) mW on each cell, for each half of the photons."""
         cell, found = self.cells_of(cells)
         rows = (self.halves.astype(np.int64) * cells.cells + cell) * groups + self.groups
         power = np.bincount(rows[found], self.powers[found], 2 * cells.cells * groups)
         return np.asarray(power, dtype=np.float64).reshape(2, -1, groups)
 
     def grazing_share(self) -> float:
-        """The part of their flux across the light which lands at a cosine below `GRAZING`."""
-        across = self.powers / np.maximum(self.cosines, LEAST_CLEAR)
-        grazing = self.cosines < GRAZING
+        """The share of the flux across the light that lands at a cosine below `GRAZING_COSINE`."""
+        across = self.powers / np.maximum(self.cosines, MIN_COSINE)
+        grazing = self.cosines < GRAZING_COSINE
         return float(across[grazing].sum() / max(across.sum(), 1e-30))

@@ -1,11 +1,10 @@
-"""What visible points make of the light field: tilt, shadows, and light exchanged inside a contact.
+"""Shading of visible points from the radiance cache: tilt, shadows and interreflection.
 
-A visible point sums the field over bins of directions and reflects each with its own normal. On
-an indenter, which stands off the undeformed surface, a bin is looked up where the light's line
-goes on to meet that surface. A shadow ray tests whether an indenter is in the way; it is drawn
-within the bin's spread, so that lights of some size cast soft shadows. Directions in which a
-point sees an indenter or, from an indenter, the near skin are sampled once more: the light that
-comes from there is the field, shaded at that other place.
+A visible point sums the cache over direction bins and reflects each with its own normal. On an
+indenter, which stands off the undeformed surface, a bin is looked up where the light's line goes on
+to meet that surface. A shadow ray tests whether an indenter is in the way; it is drawn within the
+angular variance of the bin, so that lights of some size cast soft shadows. Light that indenters and
+the skin beside them reflect to each other is added by `interreflection`.
 """
 
 from __future__ import annotations
@@ -15,22 +14,22 @@ import mitsuba as mi
 
 from optisense.optics.backend.sequences import in_series, next_random
 from optisense.optics.radiance_cache.angular_variance import (
-    above,
-    beam,
-    reach,
-    skyline,
-    spread,
+    angular_variance,
+    broadened_coating,
+    cosine_half_width,
+    mean_direction,
+    mirrored_above,
+    occluder_horizon,
+    sample_direction,
     squared_radius,
-    widened,
-    within,
 )
 from optisense.optics.radiance_cache.beam_sums import sum_beams, sum_diffuse, sum_hidden
 from optisense.optics.radiance_cache.beams import Beams
-from optisense.optics.radiance_cache.cache import LEAST_COSINE, LightField
-from optisense.optics.radiance_cache.interreflection import exchanged
+from optisense.optics.radiance_cache.cache import MIN_COSINE, RadianceCache
+from optisense.optics.radiance_cache.interreflection import interreflected
 from optisense.optics.radiance_cache.irradiance import irradiance
 from optisense.optics.scene.bsdf import (
-    Coating,
+    CoatingBsdf,
     albedo_of,
     coating_of,
     evaluate_coating,
@@ -42,22 +41,27 @@ from optisense.optics.scene.ray_scene import leave
 from optisense.optics.scene.surface_cells import SurfaceCells, bin_axis, cell_at, plane_of
 from optisense.optics.scene.surfaces import Region
 from optisense.optics.transport.camera_paths import VisiblePoints
-from optisense.optics.transport.volume_flux import HEIGHT
+from optisense.optics.transport.volume_flux import LAYER_HEIGHT
 
-LEAST_LIGHT = 0.2
-"""Part of the mean irradiance below which the spacing of shadow rays does not go."""
-CHOSEN_BINS = 16.0
-"""Shadow rays of each light group for a camera sample near a contact."""
+MIN_IRRADIANCE_SHARE = 0.2
+"""Share of the mean irradiance that is added to the expected light when shadow rays are spaced, so
+that points in little light do not take many."""
+CONTACT_SHADOW_RAYS = 16.0
+"""Shadow rays per light group of a camera sample in and near contacts."""
 SHADOW_RAYS = 32.0
-"""The same for a sample elsewhere, most of which pass no indenter and are not traced."""
+"""Shadow rays per light group of a camera sample elsewhere, for all the light. Only those of beams
+that pass near an indenter are traced."""
 REFLECTED_SHADOW_RAYS = 4.0
-"""The same for points that are seen in a reflection, of which little reaches the eye."""
-CELLS_OF_SAMPLE = 8
-"""Cells that a sample of diffuse light reads, where reading one is cheap: its mean is smooth."""
-MOST_UP = 1.5
-"""Of half the slab's height, up to which the light is extrapolated; it stays the same above."""
-LEAST_STEP = 1e-20
-"""Of that spacing, where there is no light."""
+"""The same for points seen in the reflection of an interface, of which little reaches the
+camera."""
+CELLS_PER_SAMPLE = 8
+"""Cells that a camera sample averages where coatings are diffuse and reading a cell is cheap."""
+MAX_EXTRAPOLATION = 1.5
+"""Largest height, in units of half the flux layer's height, up to which the light above the surface
+is extrapolated; it is constant above."""
+MIN_STEP = 1e-20
+"""Lower bound on the step of the systematic sampling; it avoids a division by zero without
+light."""
 
 
 @dr.syntax
@@ -73,7 +77,7 @@ def _sum_chosen(
     indenters: mi.Scene,
     fixed: mi.Scene,
     curved: bool,
-    coating: Coating,
+    coating: CoatingBsdf,
     points: VisiblePoints,
     start: mi.Point3f,
     cell: mi.UInt32,
@@ -84,14 +88,15 @@ def _sum_chosen(
     chosen: mi.Float,
     sky: mi.Float,
 ) -> list[mi.Color3f]:
-    """Every bin, looked up along its own line, and shadow rays for some of those that are not
-    wholly above the skyline (``sky``, a sine).
+    """Every bin, looked up along its own line, with shadow rays for some of the bins.
 
-    With ``upper`` tables, of the light half-way up the slab, raised points take what lies between
-    these and those on the surface below them instead.
+    Shadow rays go to bins that are not wholly above the occluder horizon (``sky``, a sine). They
+    are
+    drawn in proportion to the light, evenly spaced in its running sum (systematic sampling); where
+    nothing is occluded, the sum is exact to half a step.
 
-    These are drawn in proportion to what they bring, evenly spaced in the running sum (systematic
-    sampling), so that where nothing is hidden, the sum is exact to half a step.
+    With ``upper`` tables (the light half-way up the flux layer), points on indenters interpolate
+    between these and the tables of the surface below them.
     """
     moments, heights, colours = tables
     totals = [mi.Color3f(0) for _ in range(groups)]
@@ -101,13 +106,13 @@ def _sum_chosen(
     for g in range(groups):
         # About what the bins bring in all: how far apart the shadow rays are in the running sum.
         falling, mean, _ = irradiance(table, cell * groups + g, points.normal)
-        expected = (falling + LEAST_LIGHT * mean) * grey(albedo_of(coating)) * dr.inv_pi
-        steps.append(dr.maximum(expected / chosen, LEAST_STEP))
+        expected = (falling + MIN_IRRADIANCE_SHARE * mean) * grey(albedo_of(coating)) * dr.inv_pi
+        steps.append(dr.maximum(expected / chosen, MIN_STEP))
         # Of the samples of a pixel, each begins at another part of a step.
         running.append(in_series(points.series + (g + 1), points.number, 0))
     upright, offset = plane_of(cells, cell, active)
-    up = dr.select(raised, (dr.dot(upright, points.point) - offset) / (HEIGHT / 2), 0)
-    up = dr.clip(up, 0, MOST_UP)
+    up = dr.select(raised, (dr.dot(upright, points.point) - offset) / (LAYER_HEIGHT / 2), 0)
+    up = dr.clip(up, 0, MAX_EXTRAPOLATION)
     axis = bin_axis(cells, 2)
     k = mi.UInt32(0)
     while active & (k < bins):
@@ -132,16 +137,20 @@ def _sum_chosen(
                 above_it = dr.gather(mi.Vector4f, upper[0], entry, active & raised)
                 value = dr.lerp(value, above_it, up)
             if value.w > 0:
-                towards, cosine = beam(value)
+                towards, cosine = mean_direction(value)
                 height = dr.gather(mi.Float, heights, entry)
                 if upper is not None:
                     height = dr.lerp(height, dr.gather(mi.Float, upper[1], entry, raised), up)
                 height = dr.maximum(height, 0) / value.w
-                light = spread(axis, towards, cosine, height)
+                light = angular_variance(axis, towards, cosine, height)
                 # On the undeformed surface the mean cosine is the sum's already.
-                straying = dr.select(raised, reach(light, points.normal, upright), 0)
+                half_width = dr.select(raised, cosine_half_width(light, points.normal, upright), 0)
                 reflected = evaluate_coating(
-                    widened(coating, cosine), points.normal, towards, points.towards_eye, straying
+                    broadened_coating(coating, cosine),
+                    points.normal,
+                    towards,
+                    points.towards_eye,
+                    half_width,
                 )
                 sine = dr.dot(upright, towards)
                 doubtful = sine - dr.sqrt(squared_radius(cosine)) < sky
@@ -152,7 +161,7 @@ def _sum_chosen(
                 times = dr.floor(running[g]) - before
                 if times > 0:
                     state = next_random(state)
-                    way = above(within(light, state), points.face_normal)
+                    way = mirrored_above(sample_direction(light, state), points.face_normal)
                     blocked = indenters.ray_test(
                         mi.Ray3f(start, way),
                         coherent=False,
@@ -186,11 +195,11 @@ def _place(
 ) -> mi.UInt32:
     """The cell where bin ``k`` is looked up for points.
 
-    On an indenter that is where the line through the point along the bin's middle goes on to meet
-    the undeformed surface, found on the planes of two cells in turn; on a curved surface, lines
-    that graze these planes are followed by a ray. (The middle of what light the bin holds would
-    not do: where a lamp straddles two bins, its halves would be read at places that do not belong
-    together.)
+    On an indenter it is where the line through the point along the bin's middle goes on to meet the
+    undeformed surface, found on the planes of two cells in turn. On a curved surface, lines that
+    graze
+    these planes are followed by a ray. (The mean direction of the bin's light would not do: where a
+    lamp straddles two bins, its halves would be read at places that do not belong together.)
     """
     middle = dr.gather(mi.Vector4f, centres, k)
     towards = mi.Vector3f(middle.x, middle.y, middle.z)
@@ -199,8 +208,8 @@ def _place(
     for _ in range(2 if curved else 1):
         normal, offset = plane_of(cells, there, exists)
         facing = dr.dot(normal, towards)
-        exists &= facing > LEAST_COSINE
-        way = (dr.dot(normal, points.point) - offset) / dr.maximum(facing, LEAST_COSINE)
+        exists &= facing > MIN_COSINE
+        way = (dr.dot(normal, points.point) - offset) / dr.maximum(facing, MIN_COSINE)
         there, found = cell_at(cells, points.point - towards * way + shift, exists)
         exists &= found
     if dr.hint(curved, mode="scalar"):  # noqa: SIM102 (the one is Python's, the other Dr.Jit's)
@@ -215,19 +224,24 @@ def _place(
 
 
 def shade(
-    field: LightField,
+    field: RadianceCache,
     scenes: ContactScenes,
-    near_beams: Beams,
+    culled_beams: Beams,
     points: VisiblePoints,
     thorough: bool,
     reflected: bool,
 ) -> list[mi.Color3f]:
-    """Radiance of visible points towards the eye, for each light group with lights of 1 mW.
+    """Radiance of visible points towards the camera, for each light group with lights of 1 mW.
 
-    ``near_beams`` are those of the field that pass near indenters (`beams_near`); ``reflected``
-    points are seen in the reflection of an interface. ``thorough`` is for points on and near
-    indenters: each bin is looked up along its own line, and light that indenters and the skin near
-    them send to each other is added.
+    Args:
+        field: the radiance cache.
+        scenes: the scenes of the image.
+        culled_beams: the beams of the cache that pass near indenters (`cull_beams`).
+        points: the visible points.
+        thorough: whether the points lie on or near indenters: each bin is then looked up along its
+        own
+            line, and interreflection is added.
+        reflected: whether the points are seen in the reflection of an interface.
     """
     table = scenes.full.table
     active, base, raised = points.valid, points.point, mi.Bool(False)
@@ -250,7 +264,7 @@ def shade(
         far = _sum_chosen(
             field.cells,
             tables,
-            field.raised,
+            field.above_surface,
             field.centres,
             field.irradiance,
             bins,
@@ -267,8 +281,8 @@ def shade(
             raised,
             shift,
             points.random,
-            dr.opaque(mi.Float, CHOSEN_BINS),
-            skyline(
+            dr.opaque(mi.Float, CONTACT_SHADOW_RAYS),
+            occluder_horizon(
                 scenes.balls,
                 dr.opaque(mi.UInt32, dr.width(scenes.balls) // 4),
                 points.point,
@@ -276,7 +290,7 @@ def shade(
                 raised & dr.opaque(mi.Bool, scenes.convex),
             ),
         )
-        near = exchanged(field, scenes, points, coating, cell, active, raised)
+        near = interreflected(field, scenes, points, coating, cell, active, raised)
         return [one + other for one, other in zip(far, near, strict=True)]
     where = (coating, points, cell, active)
     totals: list[mi.Color3f]
@@ -284,15 +298,17 @@ def shade(
         totals = sum_beams(field.beams, field.groups, *where)
     else:
         totals = [mi.Color3f(0) for _ in range(field.groups)]
-        for k in range(CELLS_OF_SAMPLE):
-            number = points.number * CELLS_OF_SAMPLE + k
+        for k in range(CELLS_PER_SAMPLE):
+            number = points.number * CELLS_PER_SAMPLE + k
             beside, _, lit = _interpolating_cell(field.cells, base, seen, points, number)
             light = sum_diffuse(field.irradiance, field.groups, coating, points, beside, lit)
-            totals = [one + each / CELLS_OF_SAMPLE for one, each in zip(totals, light, strict=True)]
+            totals = [
+                one + each / CELLS_PER_SAMPLE for one, each in zip(totals, light, strict=True)
+            ]
     if indenters is None:
         return totals
     hidden = sum_hidden(
-        near_beams,
+        culled_beams,
         totals,
         indenters.scene,
         coating,
@@ -314,9 +330,10 @@ def _interpolating_cell(
     points: VisiblePoints,
     number: mi.UInt32,
 ) -> tuple[mi.UInt32, mi.Vector3f, mi.Bool]:
-    """A random cell next to points, how far these were moved, and whether there is one.
+    """A random cell next to points, the shift that led there, and whether there is one.
 
-    The same for all bins, as light that straddles two bins must not be taken twice; over the
+    It is the same for all bins, as light that straddles two bins must not be counted twice. Over
+    the
     samples of a pixel, which are spread evenly, this interpolates between cells.
     """
     home, found = cell_at(cells, base, active)

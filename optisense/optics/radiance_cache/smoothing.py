@@ -1,8 +1,9 @@
-"""The kernel that a light field is smoothed with, and how wide it is.
+"""The kernels that smooth a radiance cache, and their radii.
 
-Light varies over a length that follows the distance of each cell to the nearest lamp, and the
-surface's bend. Blur grows as the square of the kernel's radius over that length, noise falls as the
-radius grows and as photons do; the radius is the one that makes least of both, so both go to zero.
+Light varies over a length: the distance of the nearest lamp, or less where the pilot photons show
+that it varies faster. Blur grows as the square of the kernel's radius over that length; noise falls
+as the radius and the number of photons grow. The radius minimises the sum of their squares, so both
+go to zero as photons are added.
 """
 
 from __future__ import annotations
@@ -22,41 +23,50 @@ from optisense.optics.scene.surface_cells import SurfaceCells
 
 FloatArray = NDArray[np.floating]
 
-RADIUS = 1.6
-"""mm of the kernel where `USUAL_DENSITY` photons land on a mm^2 and light varies over `LENGTH`."""
-USUAL_DENSITY = 1000.0
-"""Photons on a mm^2."""
-LENGTH = 10.0
-"""mm over which light varies under a lamp as far away."""
-SHRINKS_AS = 1 / 6
-"""Power of the density of photons by which the radius falls: a blur that goes as the square of
-the radius, and noise as its inverse, are then least together; both go to zero (Silverman 1986,
-chapter 4; Knaus and Zwicker 2011)."""
-GROWS_AS = 2 / 3
-"""Power of the length over which light varies by which the radius grows, for the same reason."""
-WIDEST = 0.3
-"""Of that length: the kernel of the fewest photons. What is left of its blur is below 1 % (see
-`sharpening`)."""
-LEAST = 1.5
-"""Of the side of a cell, however near a lamp is; with many photons this shrinks, too."""
-SHRINKS_TO = 1.25
-"""Of the side of a cell, at which the kernel holds the cell and its neighbours."""
-ALIKE = 0.5
-"""Least cosine between the normals of cells that a kernel brings together."""
-READ_WIDTH = 1.5
-"""Squared radius, of the squared side of a cell, by which a kernel is widened where cells hold
-what lands in them and are read from up to half a cell away: three boxes of a cell's side, of
-variance 1/12 each, where that of Epanechnikov's kernel is 1/6 of its squared radius."""
-MOST_SHARPENED = 0.25
-"""Change of a cell's light by the sharpening, at most."""
+REFERENCE_RADIUS = 1.6
+"""Kernel radius (mm) at `REFERENCE_DENSITY` and `REFERENCE_LENGTH`: the one that minimises the sum
+of squared blur and squared noise."""
+REFERENCE_DENSITY = 1000.0
+"""Density of landed photons (1/mm^2) that `REFERENCE_RADIUS` refers to."""
+REFERENCE_LENGTH = 10.0
+"""Length (mm) over which light varies that `REFERENCE_RADIUS` refers to: that under a lamp at this
+distance."""
+DENSITY_EXPONENT = 1 / 6
+"""Exponent of the photon density by which the radius falls. Blur grows as the square of the radius
+and noise as its inverse; this exponent minimises their sum of squares, and both go to zero
+(Silverman 1986, chapter 4; Knaus and Zwicker 2011)."""
+LENGTH_EXPONENT = 2 / 3
+"""Exponent of the length over which light varies by which the radius grows, for the same reason."""
+MAX_RADIUS_RATIO = 0.3
+"""Largest radius as a fraction of the length over which light varies. The blur that remains after
+sharpening is below 1 % (see `Kernels.sharpening`)."""
+MIN_RADIUS_CELLS = 1.5
+"""Smallest radius, in cell sides, for few photons."""
+MIN_RADIUS_CELLS_LIMIT = 1.25
+"""Smallest radius, in cell sides, for any number of photons: the kernel then holds the cell and its
+direct neighbours."""
+MIN_NORMAL_COSINE = 0.5
+"""Smallest cosine between the normals of two cells that a kernel averages."""
+CELL_BLUR = 1.5
+"""Squared radius, in squared cell sides, by which the blur of the cells widens a kernel. Landing in
+a cell and reading from up to half a cell away is three box filters of a cell's side, each of
+variance 1/12; the variance of Epanechnikov's kernel is 1/6 of its squared radius."""
+MAX_SHARPENING = 0.25
+"""Largest relative change of a cell's light by the sharpening."""
 
 
 @dataclass
 class Smoothing:
-    """Kernel-weighted sums among cells: rows of a sparse matrix, by start, neighbour and weight.
+    """Kernel-weighted sums among cells, as the rows of a sparse matrix.
 
-    ``blur`` is the same with what the cells themselves blur (not where a coating is part metal:
-    what else they bring together there makes up for it).
+    Attributes:
+        start: index of the first entry of each row.
+        cell: the neighbour of each entry.
+        weight: the weight of each entry.
+        matrix: the same as a SciPy matrix.
+        blur: the matrix with the blur of the cells themselves added; without it where a coating has
+        a
+            metallic lobe, as the overlap of the bins makes up for it there.
     """
 
     start: mi.UInt32
@@ -75,43 +85,49 @@ class Kernels:
         lamp_distance: FloatArray,
         density: float,
         near: NDArray[np.bool_] | None = None,
-        scouted: FloatArray | None = None,
-        scouts: float = 0.0,
+        pilot_power: FloatArray | None = None,
+        pilot_density: float = 0.0,
     ) -> None:
-        """
+        """Find the length over which light varies in each cell.
+
         Args:
             cells: of the surface.
-            lamp_distance: (cells,) mm, how far the nearest lamp is.
-            density: 1/mm^2, how many photons land on a mm^2, for each that is sent out.
-            near: (cells,) whether the camera sees a cell or one near it: others are hardly
-                smoothed, which saves time.
-            scouted: (2, cells, groups) mW on each cell by two halves of some photons, which tell
-                where light varies faster than its lamps' distance makes it.
-            scouts: 1/mm^2, how many of these photons there are.
+            lamp_distance: (cells,) mm to the nearest lamp.
+            density: landings per mm^2 for each emitted photon (1/mm^2).
+            near: (cells,) whether a cell is in or near the camera's view. Other cells are smoothed
+            with the
+                narrowest kernel, which saves time.
+            pilot_power: (2, cells, groups) mW on each cell, by the two halves of the pilot photons,
+            which
+                show where light varies over less than the distance of the lamps.
+            pilot_density: pilot photons per mm^2 (1/mm^2).
         """
         self.cells = cells
         self.near = np.ones(cells.cells, dtype=bool) if near is None else near
         self.density = density
         self._size = 1 / float(cells.inverse_size[0])
         self._length = np.maximum(np.asarray(lamp_distance), 1e-3)
-        if scouted is not None:
-            found = varies_over(cells, scouted, self._radii(scouts))
+        if pilot_power is not None:
+            found = varies_over(cells, pilot_power, self._radii(pilot_density))
             self._length = np.minimum(self._length, found)
         self._known: dict[tuple[int, bool], Smoothing] = {}
 
     def radii(self, photons: int) -> FloatArray:
-        """(cells,) mm: the kernel's radius in each cell in a field of so many photons."""
+        """(cells,) mm: the kernel radius in each cell for this number of emitted photons."""
         return self._radii(self.density * photons)
 
     def _radii(self, density: float) -> FloatArray:
-        wider = (USUAL_DENSITY / max(density, 1e-9)) ** SHRINKS_AS
-        best = RADIUS * (self._length / LENGTH) ** GROWS_AS * wider
-        least = float(np.clip(LEAST * wider, SHRINKS_TO, LEAST)) * self._size
-        most = np.maximum(WIDEST * self._length, least)
-        return np.where(self.near, np.clip(best, least, most), SHRINKS_TO * self._size)
+        wider = (REFERENCE_DENSITY / max(density, 1e-9)) ** DENSITY_EXPONENT
+        best = REFERENCE_RADIUS * (self._length / REFERENCE_LENGTH) ** LENGTH_EXPONENT * wider
+        least = (
+            float(np.clip(MIN_RADIUS_CELLS * wider, MIN_RADIUS_CELLS_LIMIT, MIN_RADIUS_CELLS))
+            * self._size
+        )
+        most = np.maximum(MAX_RADIUS_RATIO * self._length, least)
+        return np.where(self.near, np.clip(best, least, most), MIN_RADIUS_CELLS_LIMIT * self._size)
 
     def smoothing(self, photons: int, metallic: bool = False) -> Smoothing:
-        """The kernel for a field of so many photons."""
+        """The kernels for this number of emitted photons."""
         key = photons, metallic
         if key not in self._known:
             radii = self.radii(photons)
@@ -128,35 +144,42 @@ class Kernels:
         return self._known[key]
 
     def _blur(self, radii: FloatArray) -> csr_matrix:
-        return kernel_matrix(self.cells, np.sqrt(radii**2 + READ_WIDTH * self._size**2))
+        return kernel_matrix(self.cells, np.sqrt(radii**2 + CELL_BLUR * self._size**2))
 
     def sharpening(self, landed: FloatArray, photons: int, metallic: bool = False) -> FloatArray:
-        """Factors (cells, groups) that undo most of what the kernel and the cells blur.
+        """Factors (cells, groups) that undo most of the blur of the kernel and the cells.
 
-        They take from peaks and give to hollows, by what they make of their own result:
-        multiplicative bias correction (Jones, Linton and Nielsen 1995).
+        The kernel lowers peaks and fills hollows. Applied to its own result, it shows by how much,
+        and the
+        ratio is divided out: multiplicative bias correction (Jones, Linton and Nielsen 1995).
 
         Args:
             landed: (cells, groups) mW on each cell.
-            photons: of the field.
+            photons: emitted photons.
+            metallic: whether a coating has a metallic lobe.
         """
         kernel = self.smoothing(photons, metallic)
         smooth = kernel.matrix @ landed
         again = kernel.blur @ (smooth * self.cells.areas[:, None])
         sharpened = (again > 0) & self.near[:, None]
         factor = np.divide(smooth, again, out=np.ones_like(smooth), where=sharpened)
-        return np.clip(factor, 1 - MOST_SHARPENED, 1 + MOST_SHARPENED)
+        return np.clip(factor, 1 - MAX_SHARPENING, 1 + MAX_SHARPENING)
 
 
 def varies_over(cells: SurfaceCells, halves: FloatArray, radii: FloatArray) -> FloatArray:
-    """(cells,) mm: the distance of a lamp whose light a kernel would blur as much as this light.
+    """(cells,) mm: the length over which light varies.
 
-    Under a lamp at a distance h a kernel of radius r takes r^2 / (2 h^2) of the light. How much it
-    takes of this light is told by what it takes of its own result: by the product of what two
-    halves of the photons tell, which is free of their noise, where it is larger than that. Groups
-    count alike, by their light where it is.
+    It is the distance of a lamp whose light the kernel would blur as much: under a lamp at distance
+    h,
+    a kernel of radius r lowers the peak by r^2 / (2 h^2). The blur is found by applying the kernel
+    to
+    its own result. The product of what two halves of the photons give is free of their noise, and
+    it
+    counts where it is larger than the noise. Light groups count alike, each relative to its own
+    light.
 
     Args:
+        cells: of the surface.
         halves: (2, cells, groups) mW on each cell.
         radii: (cells,) mm of the kernels.
     """
@@ -174,10 +197,11 @@ def varies_over(cells: SurfaceCells, halves: FloatArray, radii: FloatArray) -> F
 
 
 def kernel_matrix(cells: SurfaceCells, radii: FloatArray) -> csr_matrix:
-    """Epanechnikov's kernel around each cell, (cells, cells): sums of mW on cells to mW/mm^2.
+    """Epanechnikov's kernel around each cell, (cells, cells): from mW on cells to mW/mm^2.
 
-    It is normalised by the surface's area under it, so edges and oblique cells lose nothing;
-    surfaces that look elsewhere do not count.
+    The kernel is normalised by the surface's area under it, so edges and oblique cells lose
+    nothing.
+    Cells with another orientation (`MIN_NORMAL_COSINE`) do not count.
     """
     tree = cKDTree(cells.centres)
     near = tree.sparse_distance_matrix(tree, float(radii.max()), output_type="coo_matrix").tocsr()
@@ -186,7 +210,7 @@ def kernel_matrix(cells: SurfaceCells, radii: FloatArray) -> csr_matrix:
     rows = np.repeat(np.arange(cells.cells), np.diff(near.indptr))
     columns = near.indices
     normals = cells.normals
-    alike = np.einsum("ij,ij->i", normals[rows], normals[columns]) > ALIKE
+    alike = np.einsum("ij,ij->i", normals[rows], normals[columns]) > MIN_NORMAL_COSINE
     weight = np.maximum(1 - (near.data / radii[rows]) ** 2, 0.0) * alike
     kept = weight > 0
     rows, columns, weight = rows[kept], columns[kept], weight[kept]
@@ -205,10 +229,17 @@ def smooth(
     groups: int,
     factors: mi.Float,
 ) -> list[Any]:
-    """Kernel-weighted sums over neighbouring cells of the chosen bins, for tables whose entries are
-    of these kinds (`mi.Float` or a vector): first the moments of a light field.
+    """Kernel-weighted sums over neighbouring cells of the chosen bins.
 
-    ``factors`` (cells times groups) multiply the sums.
+    Args:
+        kernel: the weights.
+        cells: number of cells.
+        tables: to be smoothed; the first holds the moments of a radiance cache.
+        kinds: the type of an entry of each table: `mi.Float` or a vector.
+        bins: the chosen bins.
+        stride: bins per cell in the tables.
+        groups: light groups.
+        factors: (cells times groups) by which the sums are multiplied.
     """
     lane = dr.arange(mi.UInt32, cells * dr.width(bins) * groups)
     used = dr.opaque(mi.UInt32, dr.width(bins))  # not part of the kernel, which then is kept

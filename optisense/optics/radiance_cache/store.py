@@ -1,6 +1,4 @@
-"""Light fields of one sensor, kept between images: the guide, the cells, and the tallies of
-each seed.
-"""
+"""The radiance caches of one sensor, kept between images, with the emission guide and the cells."""
 
 from __future__ import annotations
 
@@ -15,46 +13,53 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from optisense.optics.backend.sequences import seed_of
-from optisense.optics.radiance_cache.cache import BINS, FieldTally, LightField
-from optisense.optics.radiance_cache.pilot_photons import Scouts
+from optisense.optics.radiance_cache.cache import BINS, CacheTally, RadianceCache
+from optisense.optics.radiance_cache.pilot_photons import PilotPhotons
 from optisense.optics.radiance_cache.smoothing import Kernels
 from optisense.optics.scene.emitters import EmitterTable
 from optisense.optics.scene.ray_scene import Piece, RayScene
 from optisense.optics.scene.surface_cells import SurfaceCells, build_cells, cells_near
-from optisense.optics.transport.emission_guide import Guide, even_guide, learn_guide
-from optisense.optics.transport.photons import Target, trace_photons, trace_pilot
-from optisense.optics.transport.volume_flux import Slab, slab_above
+from optisense.optics.transport.emission_guide import EmissionGuide, learn_guide, uniform_guide
+from optisense.optics.transport.photons import TargetCells, trace_photons, trace_pilot
+from optisense.optics.transport.volume_flux import FluxLayer, flux_layer_above
 
 PASS_PHOTONS = 500_000
-ONE_PASS = 2.5 * PASS_PHOTONS
+"""Photons of one pass. A pass of this size keeps the photon map near 30 MB; progress and Ctrl-C are
+looked at between passes."""
+MAX_SINGLE_PASS = 2.5 * PASS_PHOTONS
+"""Number of photons below which all are traced in one pass, as each pass has a fixed cost."""
 PILOT_PHOTONS = 300_000
+"""Photons of the pilot pass, from which the emission guide is learned."""
 CELL_SIZE = 0.5
-"""mm; larger where the tally would outgrow its memory."""
-TARGET_SIZE = 1.0
-"""mm, of the cells that tell whether a photon of the pilot lands where the camera looks."""
-MOST_BYTES = 375e6
-SEEN_MARGIN = 2.0
-"""mm around what the camera sees that photons are sent to: an indenter's flank catches light
-that would land there.
-"""
+"""Side (mm) of the surface cells; larger where the tally would exceed `MAX_TALLY_BYTES`."""
+PILOT_CELL_SIZE = 1.0
+"""Side (mm) of the cells that tell whether a pilot photon lands where the camera looks."""
+MAX_TALLY_BYTES = 375e6
+"""Memory (bytes) that the tally of one seed may take. Cells are made larger to stay below it."""
+VIEW_MARGIN = 2.0
+"""Margin (mm) around what the camera sees to which photons are sent: light that lands there would
+meet the flank of an indenter."""
 SMOOTHED_MARGIN = 5.0
-"""mm around what the camera sees, beyond which light is hardly smoothed: little of it is read."""
-KEPT_FIELDS = 2
-MOST_GRAZING = 0.25
-"""Share of such light above which indenters are lit from a field above the surface."""
+"""Margin (mm) around what the camera sees, beyond which cells are smoothed with the narrowest
+kernel only, as few of them are read."""
+MAX_CACHES = 2
+"""Radiance caches that a store keeps; the oldest is dropped when there are more."""
+GRAZING_SHARE_LIMIT = 0.25
+"""Share of grazing light above which indenters are lit by the volume flux above the surface as
+well."""
 
 
 @dataclass
 class _Running:
-    tally: FieldTally
+    tally: CacheTally
     per_light: int
 
 
-class FieldStore:
-    """Traces photons pass by pass and keeps what it finds."""
+class CacheStore:
+    """Traces photons pass by pass, and keeps the tallies and the caches that they give."""
 
     cell_size = CELL_SIZE
-    asks_scouts = True
+    uses_pilot = True
     """Whether the photons that teach the guide also tell how light falls: indenters are then lit
     from a field above the surface where it grazes, and kernels are narrower where it varies."""
     lit: Collection[int] | None = None
@@ -69,8 +74,15 @@ class FieldStore:
         coloured: bool,
         metallic: bool = True,
     ) -> None:
-        """``scene`` without contacts, its opaque pieces, and ``seen`` (n, 3) mm: points that
-        the camera sees.
+        """Keep what the caches depend on; nothing is traced yet.
+
+        Args:
+            scene: the sensor without contacts.
+            opaque: its opaque pieces.
+            table: the lights.
+            seen: (n, 3) mm, points that the camera sees.
+            coloured: whether surfaces are coloured.
+            metallic: whether a coating has a metallic lobe.
         """
         self._seen = seen
         self._scene = scene
@@ -78,52 +90,50 @@ class FieldStore:
         self._coloured = coloured
         self._metallic = metallic
         self._opaque = opaque
-        self._guide: Guide | None = None
-        self._scouts: Scouts | None = None
-        self._above: Slab | None = None
+        self._guide: EmissionGuide | None = None
+        self._pilot: PilotPhotons | None = None
+        self._above: FluxLayer | None = None
         self._cells: SurfaceCells | None = None
         self._kernels: Kernels | None = None
         self._running: dict[tuple[int, int], _Running] = {}
-        self._done: dict[tuple[int, int, int], LightField] = {}
+        self._done: dict[tuple[int, int, int], RadianceCache] = {}
 
     def forget_light(self, coloured: bool, metallic: bool = True) -> None:
-        """Surfaces reflect otherwise now: drop the fields, keep guide and cells."""
+        """Drop the caches, as surfaces reflect in another way now; the guide and the cells stay."""
         self._coloured = coloured
         self._metallic = metallic
         self._running.clear()
         self._done.clear()
 
     @property
-    def _slab(self) -> Slab | None:
-        """The slab above the surface where much of the light nearly grazes it, else None."""
+    def _flux_layer(self) -> FluxLayer | None:
+        """The flux layer, where much of the light is grazing, else None."""
         if not self._grazes:
             return None
         if self._above is None:
-            self._above = slab_above(self.cells)
+            self._above = flux_layer_above(self.cells)
         return self._above
 
     @cached_property
     def _grazes(self) -> bool:
-        """Whether much of the light where the camera looks nearly grazes the surface."""
-        seen = self._seen_scouts
-        return seen is not None and seen.grazing_share() > MOST_GRAZING
+        """Whether much of the light in the camera's view is grazing."""
+        seen = self._seen_pilot
+        return seen is not None and seen.grazing_share() > GRAZING_SHARE_LIMIT
 
     @property
-    def _asked_scouts(self) -> Scouts | None:
-        """The photons that taught the guide, if they are to be asked."""
-        return self._scouts if self.asks_scouts and self.guide else None
+    def _used_pilot(self) -> PilotPhotons | None:
+        """The pilot photons, if they are used for more than the guide."""
+        return self._pilot if self.uses_pilot and self.guide else None
 
     @cached_property
-    def _seen_scouts(self) -> Scouts | None:
-        """Those of them that landed where photons are wanted."""
-        scouts = self._asked_scouts
-        return None if scouts is None else scouts.within(*self._target)
+    def _seen_pilot(self) -> PilotPhotons | None:
+        """The pilot photons that landed in or near the camera's view."""
+        pilot = self._used_pilot
+        return None if pilot is None else pilot.within(*self._target)
 
     @property
-    def guide(self) -> Guide:
-        """Where to send photons: to what the camera sees, learned on first use from a pilot
-        pass.
-        """
+    def guide(self) -> EmissionGuide:
+        """The emission guide, learned from a pilot pass on first use."""
         if self._guide is None:
             lights = self._table.count
             cells, near = self._target
@@ -131,15 +141,15 @@ class FieldStore:
             arrived, landed = trace_pilot(
                 self._scene,
                 self._table,
-                even_guide(lights),
+                uniform_guide(lights),
                 per_light,
                 seed_of(0, 1),
-                Target(cells, mi.UInt32(near.astype(np.uint32))),
+                TargetCells(cells, mi.UInt32(near.astype(np.uint32))),
                 self._coloured,
             )
             self._guide = learn_guide(arrived, lights, per_light)
-            if self.asks_scouts:
-                self._scouts = Scouts.of(landed)
+            if self.uses_pilot:
+                self._pilot = PilotPhotons.of(landed)
         return self._guide
 
     @cached_property
@@ -154,10 +164,11 @@ class FieldStore:
 
     @cached_property
     def _target(self) -> tuple[SurfaceCells, NDArray[np.bool_]]:
-        """Rough cells over all opaque surfaces, and where photons are wanted: in those that the
-        camera sees and around them."""
-        cells = build_cells(*self._opaque_mesh, TARGET_SIZE)
-        return cells, cells_near(cells, self._seen, SEEN_MARGIN)
+        """Coarse cells over all opaque surfaces, and which of them (cells,) lie in or near the
+        view.
+        """
+        cells = build_cells(*self._opaque_mesh, PILOT_CELL_SIZE)
+        return cells, cells_near(cells, self._seen, VIEW_MARGIN)
 
     @property
     def cells(self) -> SurfaceCells:
@@ -169,28 +180,28 @@ class FieldStore:
             entry = BINS * self._table.groups * (36 if self._coloured else 20)
             if self._grazes:
                 entry *= 2
-            least = float(np.sqrt(1.3 * area * entry / MOST_BYTES))
+            least = float(np.sqrt(1.3 * area * entry / MAX_TALLY_BYTES))
             scale = self.cell_size / CELL_SIZE
             self._cells = build_cells(points, triangles, max(self.cell_size, scale * least))
         return self._cells
 
     @property
     def kernels(self) -> Kernels:
-        """How light is smoothed among these cells."""
+        """The smoothing kernels of these cells."""
         if self._kernels is None:
             cells, (rough, where) = self.cells, self._target
             area = float(rough.areas[where].sum())
-            landed, scouts = None, 0.0
-            if self._asked_scouts is not None and self._seen_scouts is not None:
-                landed = self._asked_scouts.landed(cells, self._table.groups)
-                scouts = len(self._seen_scouts.powers) / area
+            landed, pilot_density = None, 0.0
+            if self._used_pilot is not None and self._seen_pilot is not None:
+                landed = self._used_pilot.landed(cells, self._table.groups)
+                pilot_density = len(self._seen_pilot.powers) / area
             self._kernels = Kernels(
                 cells,
                 self._lamp_distance(cells.centres),
                 self.guide.arriving / area,
                 cells_near(cells, self._seen, SMOOTHED_MARGIN),
                 landed,
-                scouts,
+                pilot_density,
             )
         return self._kernels
 
@@ -211,15 +222,24 @@ class FieldStore:
         most: int,
         began: float,
         tell: Callable[[float, int, float | None], None],
-    ) -> tuple[LightField, bool]:
-        """The field after ``photons``, or once ``noise`` (relative) or ``seconds`` (since
-        ``began``) are reached.
+    ) -> tuple[RadianceCache, bool]:
+        """The cache after ``photons``, or once ``noise`` or ``seconds`` are reached.
 
-        Returns the field and whether Ctrl-C ended it early.
+        Args:
+            seed: of the photons.
+            photons: number to emit; None for no such limit.
+            noise: relative RMS noise to reach; None for no such limit.
+            seconds: since ``began``; None for no such limit.
+            most: number of photons at which tracing ends in any case.
+            began: start of the render (`time.perf_counter`).
+            tell: called after each pass with the fraction done, the photons so far and the noise.
+
+        Returns:
+            The cache, and whether Ctrl-C ended the tracing early.
         """
         lights = self._table.count
         # A pass costs a little by itself, so few photons are one.
-        size = photons if photons is not None and photons < ONE_PASS else PASS_PHOTONS
+        size = photons if photons is not None and photons < MAX_SINGLE_PASS else PASS_PHOTONS
         per_light = max(1, size // lights)
         wanted = None if photons is None else max(1, round(photons / (per_light * lights)))
         cap = max(1, most // (per_light * lights))
@@ -235,12 +255,12 @@ class FieldStore:
             or (wanted is None and seconds is None)
         ):
             running = _Running(
-                FieldTally(
+                CacheTally(
                     self.kernels,
                     self._table.groups,
                     self._coloured,
                     self._metallic,
-                    self._slab,
+                    self._flux_layer,
                 ),
                 per_light,
             )
@@ -261,7 +281,7 @@ class FieldStore:
                         first=tally.passes * per_light,
                         coloured=self._coloured,
                         groups=self.lit,
-                        slab=self._slab,
+                        flux_layer=self._flux_layer,
                     )
                 )
                 now = time.perf_counter()
@@ -285,6 +305,6 @@ class FieldStore:
         name = (*key, tally.passes)
         if name not in self._done:
             self._done[name] = tally.smoothed()
-            while len(self._done) > KEPT_FIELDS:
+            while len(self._done) > MAX_CACHES:
                 del self._done[next(iter(self._done))]
         return self._done[name], interrupted

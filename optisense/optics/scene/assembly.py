@@ -15,20 +15,27 @@ from optisense.design.parts import TRANSPARENT_SOLIDS, Role
 from optisense.errors import DesignError
 from optisense.geometry import TriangleMesh
 from optisense.geometry.coplanar import merge_coplanar
-from optisense.optics.scene.emitters import Emitter, Intensity, Shape, frame_of, spot_intensity
+from optisense.optics.scene.emitters import (
+    Emitter,
+    EmitterShape,
+    Intensity,
+    frame_of,
+    spot_intensity,
+)
 from optisense.optics.scene.media import Media, Sheet, Solid, same_faces
 from optisense.optics.scene.ray_scene import Piece
 from optisense.optics.scene.surfaces import Region, Surface, SurfaceKind
 
 SMOOTH_METAL = 0.01
-"""A metal of less roughness (GGX alpha) is an ideal mirror."""
+"""GGX roughness below which a metal is an ideal mirror."""
 
 FLAT = 1e-6
-"""A mesh whose corner normals differ by less from its face normals has flat facets."""
+"""Largest difference between corner and face normals at which a mesh has flat facets."""
 
 DISC_CORNERS = 12
+"""Corners of the polygon that represents a round light window."""
 PROBE = 0.02
-"""The medium before a coating is looked up this far (mm) off it."""
+"""Distance (mm) off a coating at which the medium before it is looked up."""
 
 
 @dataclass(frozen=True)
@@ -141,7 +148,7 @@ def assemble(design: SensorDesign, before: Assembly | None = None, bend: bool = 
     sensing = [meshes[name] for name in design.parts_of(Role.SENSING_SURFACE)]
     emitters, areas = _emitters(design)
     for number, emitter in enumerate(emitters):
-        if emitter.shape is not Shape.POINT:
+        if emitter.shape is not EmitterShape.POINT:
             pieces.append(_window(number, emitter))
     return Assembly(
         pieces=pieces,
@@ -230,7 +237,7 @@ class _Lamp:
     """What all lights of a group have in common; ``area`` mm^2 is that of the window."""
 
     intensity: Intensity | None
-    shape: Shape
+    shape: EmitterShape
     size: tuple[float, float]
     area: float
 
@@ -267,16 +274,16 @@ def _built_in_lamp(name: str) -> _Lamp:
 
 def _lamp(model: LightModel) -> _Lamp:
     if model.kind == "area":
-        shape = Shape.DISC if model.shape == "disc" else Shape.RECTANGLE
-        area = model.size[0] * model.size[1] * (np.pi / 4 if shape is Shape.DISC else 1.0)
+        shape = EmitterShape.DISC if model.shape == "disc" else EmitterShape.RECTANGLE
+        area = model.size[0] * model.size[1] * (np.pi / 4 if shape is EmitterShape.DISC else 1.0)
         return _Lamp(None, shape, model.size, area)
     if model.kind == "spot":
-        return _Lamp(spot_intensity(model.cutoff, model.beam), Shape.POINT, (0.0, 0.0), 0.0)
+        return _Lamp(spot_intensity(model.cutoff, model.beam), EmitterShape.POINT, (0.0, 0.0), 0.0)
     table = model.intensity_table()
     intensity = Intensity(table.vertical_angles, table.horizontal_angles, table.candela)
     if np.ptp(table.candela, axis=0).max() <= 1e-9 * table.candela.max():
         intensity = Intensity(table.vertical_angles, np.zeros(1), table.candela[:1])
-    return _Lamp(intensity, Shape.POINT, (0.0, 0.0), 0.0)
+    return _Lamp(intensity, EmitterShape.POINT, (0.0, 0.0), 0.0)
 
 
 def _window(number: int, emitter: Emitter) -> Piece:
@@ -289,7 +296,7 @@ def _window(number: int, emitter: Emitter) -> Piece:
 @lru_cache(maxsize=1024)
 def _window_of(
     number: int,
-    shape: Shape,
+    shape: EmitterShape,
     size: tuple[float, float],
     position: tuple[float, float, float],
     direction: tuple[float, float, float],
@@ -297,7 +304,7 @@ def _window_of(
 ) -> Piece:
     s, t, _ = frame_of(direction, up)
     half = np.array(size) / 2
-    if shape is Shape.DISC:
+    if shape is EmitterShape.DISC:
         turn = np.arange(DISC_CORNERS) * 2 * np.pi / DISC_CORNERS
         outline = np.stack([np.cos(turn), np.sin(turn)], axis=1) * half
     else:

@@ -16,13 +16,14 @@ import numpy as np
 
 from optisense.optics.scene.surfaces import Surface
 
-ROW = 16
-# Below this roughness a dielectric is treated as smooth.
+FLOATS_PER_SURFACE = 16
+"""Floats per surface in the table of optical data."""
 SMOOTH_ALPHA = 1e-3
+"""GGX roughness below which a dielectric is treated as smooth."""
 
 
 def surface_table(surfaces: list[Surface]) -> mi.Float:
-    """Optical data of all surfaces, ``ROW`` floats each."""
+    """Optical data of all surfaces, ``FLOATS_PER_SURFACE`` floats each."""
     return mi.Float(surface_rows(surfaces).ravel())
 
 
@@ -30,7 +31,7 @@ def surface_rows(surfaces: list[Surface]) -> np.ndarray:
     """(n, 16) float32: kind (as bits), eta, alpha, specularity | reflectance, region | metal
     eta | metal k.
     """
-    rows = np.zeros((len(surfaces), ROW), dtype=np.float32)
+    rows = np.zeros((len(surfaces), FLOATS_PER_SURFACE), dtype=np.float32)
     for row, surface in zip(rows, surfaces, strict=True):
         bits = np.array([int(surface.kind), int(surface.region), surface.light], dtype=np.uint32)
         row[0], row[7], row[11] = bits.view(np.float32)
@@ -42,7 +43,7 @@ def surface_rows(surfaces: list[Surface]) -> np.ndarray:
 
 
 @dataclass
-class Coating:
+class CoatingBsdf:
     """Opaque reflectance of hits: per-lane parameters of the blend.
 
     ``metallic`` is False where it is known that no surface has a metallic lobe, which then is not
@@ -67,23 +68,27 @@ def surface_kind(
 
 def surface_region(table: mi.Float, surface: mi.UInt32, active: mi.Bool) -> mi.UInt32:
     """The region (sensing surface, indenter, other) of surfaces."""
-    return dr.reinterpret_array(mi.UInt32, dr.gather(mi.Float, table, surface * ROW + 7, active))
+    return dr.reinterpret_array(
+        mi.UInt32, dr.gather(mi.Float, table, surface * FLOATS_PER_SURFACE + 7, active)
+    )
 
 
 def surface_light(table: mi.Float, surface: mi.UInt32, active: mi.Bool) -> mi.UInt32:
     """The number of the light whose emitting face a surface is."""
-    return dr.reinterpret_array(mi.UInt32, dr.gather(mi.Float, table, surface * ROW + 11, active))
+    return dr.reinterpret_array(
+        mi.UInt32, dr.gather(mi.Float, table, surface * FLOATS_PER_SURFACE + 11, active)
+    )
 
 
 def coating_of(
     table: mi.Float, surface: mi.UInt32, active: mi.Bool, metallic: bool = True
-) -> Coating:
+) -> CoatingBsdf:
     """The reflective parameters of surfaces."""
     first = dr.gather(mi.Vector4f, table, surface * 4, active)
     base = dr.gather(mi.Vector4f, table, surface * 4 + 1, active)
     eta = dr.gather(mi.Vector4f, table, surface * 4 + 2, active)
     k = dr.gather(mi.Vector4f, table, surface * 4 + 3, active)
-    return Coating(
+    return CoatingBsdf(
         reflectance=mi.Color3f(base.x, base.y, base.z),
         metal_eta=mi.Color3f(eta.x, eta.y, eta.z),
         metal_k=mi.Color3f(k.x, k.y, k.z),
@@ -98,7 +103,7 @@ def grey(colour: mi.Color3f) -> mi.Float:
     return (colour.x + colour.y + colour.z) * (1 / 3)
 
 
-def albedo_of(coating: Coating) -> mi.Color3f:
+def albedo_of(coating: CoatingBsdf) -> mi.Color3f:
     """About how much light the coating sends back, per channel (its metal at normal incidence)."""
     metal = fresnel_metal(mi.Float(1), coating.metal_eta, coating.metal_k)
     return coating.reflectance * (1 - coating.specularity) + metal * coating.specularity
@@ -131,7 +136,7 @@ def _smith(cosine: mi.Float, alpha: mi.Float) -> mi.Float:
 
 
 def evaluate_coating(
-    coating: Coating,
+    coating: CoatingBsdf,
     normal: mi.Vector3f,
     towards_light: mi.Vector3f,
     towards_eye: mi.Vector3f,
@@ -169,7 +174,11 @@ def evaluate_coating(
 
 
 def sample_coating(
-    coating: Coating, normal: mi.Vector3f, incoming: mi.Vector3f, pick: mi.Float, sample: mi.Point2f
+    coating: CoatingBsdf,
+    normal: mi.Vector3f,
+    incoming: mi.Vector3f,
+    pick: mi.Float,
+    sample: mi.Point2f,
 ) -> tuple[mi.Vector3f, mi.Color3f]:
     """A scattered direction and its weight, for light that travels along ``incoming``."""
     frame = mi.Frame3f(normal)

@@ -21,14 +21,15 @@ from optisense.optics.scene.surfaces import RAY_OFFSET
 
 FloatArray = NDArray[np.floating]
 
-# Cells of a tabulated profile: polar, of less probability towards the rim, and for each of them
-# azimuthal, of equal probability.
 POLAR_CELLS = 512
+"""Polar cells of a tabulated profile; they hold less power towards the rim."""
 AZIMUTH_CELLS = 128
-ROW = 20
+"""Azimuthal cells of each polar cell, all of equal power."""
+FLOATS_PER_EMITTER = 20
+"""Floats per light in the emitter table."""
 
 
-class Shape(IntEnum):
+class EmitterShape(IntEnum):
     """Outline of a light's emitting face."""
 
     POINT = 0
@@ -90,7 +91,7 @@ class Emitter:
     position: tuple[float, float, float]
     direction: tuple[float, float, float]
     up: tuple[float, float, float] | None = None
-    shape: Shape = Shape.POINT
+    shape: EmitterShape = EmitterShape.POINT
     size: tuple[float, float] = (0.0, 0.0)
     exponent: float = 1.0
     intensity: Intensity | None = None
@@ -98,7 +99,11 @@ class Emitter:
     @property
     def area(self) -> float:
         """mm^2 of the emitting face, 0 for a point."""
-        filled = {Shape.POINT: 0.0, Shape.RECTANGLE: 1.0, Shape.DISC: np.pi / 4}[self.shape]
+        filled = {
+            EmitterShape.POINT: 0.0,
+            EmitterShape.RECTANGLE: 1.0,
+            EmitterShape.DISC: np.pi / 4,
+        }[self.shape]
         return float(self.size[0] * self.size[1] * filled)
 
     @property
@@ -125,7 +130,9 @@ def frame_of(
 
 @dataclass
 class EmitterTable:
-    """All lights on the device: ``rows`` of ``ROW`` floats, and the inverse tables of profiles."""
+    """All lights on the device: ``rows`` of `FLOATS_PER_EMITTER` floats, and inverse profile
+    tables.
+    """
 
     count: int
     groups: int
@@ -175,7 +182,7 @@ def inverse_tables(intensity: Intensity) -> tuple[FloatArray, FloatArray]:
 
 def emitter_table(emitters: list[Emitter], groups: int) -> EmitterTable:
     """Put lights on the device; lights that share an intensity table share its inverse."""
-    rows = np.zeros((len(emitters), ROW), dtype=np.float32)
+    rows = np.zeros((len(emitters), FLOATS_PER_EMITTER), dtype=np.float32)
     profiles: dict[int, int] = {}
     polar: list[FloatArray] = []
     azimuth: list[FloatArray] = []
@@ -255,7 +262,7 @@ def emit(
     local = profile_direction(table, profile, d.w, angle)
     disc = mi.warp.square_to_uniform_disk_concentric(place)
     square = 2 * place - 1
-    offset = dr.select(shape == int(Shape.DISC), disc, square)
+    offset = dr.select(shape == int(EmitterShape.DISC), disc, square)
     point = mi.Point3f(a.x, a.y, a.z) + s * (offset.x * b.w) + t * (offset.y * c.w) + n * RAY_OFFSET
     direction = s * local.x + t * local.y + n * local.z
     return mi.Point3f(point), mi.Vector3f(direction), group

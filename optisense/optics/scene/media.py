@@ -40,6 +40,7 @@ BENT_TOLERANCE = 0.02
 differ by less over one shape."""
 
 AIR = "air"
+"""Name of the medium around all solids."""
 
 
 @dataclass(frozen=True)

@@ -22,6 +22,7 @@ from optisense.optics.scene.surfaces import RAY_OFFSET, Surface, SurfaceKind
 FloatArray = NDArray[np.floating]
 
 SMOOTH_FACE = 1 << 16
+"""Bit in a face's record that marks interpolated normals."""
 
 
 @dataclass(frozen=True)

@@ -14,10 +14,10 @@ from scipy.spatial import cKDTree
 FloatArray = NDArray[np.floating]
 
 SAMPLES_ACROSS = 7
-"""Samples of the surface along the side of a cell: they tell its area to some per cent."""
+"""Samples of the surface along the side of a cell; they give its area to a few per cent."""
 
-REACH = 3
-"""A point this many grid places off the surface still finds the nearest cell."""
+SEARCH_CELLS = 3
+"""Distance from the surface, in cell sides, within which a point still finds the nearest cell."""
 
 
 @dataclass
@@ -77,8 +77,8 @@ def build_cells(vertices: FloatArray, faces: NDArray[np.integer], size: float) -
     vertices = np.asarray(vertices, dtype=np.float64)
     points, face, areas = surface_samples(vertices, faces, size / SAMPLES_ACROSS)
     # Off any round number, so that a plane does not run along the border between two cells.
-    lower = points.min(axis=1) - (0.37 + REACH) * size
-    counts = np.floor((points.max(axis=1) - lower) / size).astype(int) + 1 + REACH
+    lower = points.min(axis=1) - (0.37 + SEARCH_CELLS) * size
+    counts = np.floor((points.max(axis=1) - lower) / size).astype(int) + 1 + SEARCH_CELLS
     x, y, z = (((points[k] - lower[k]) / size).astype(int) for k in range(3))
     place = x + counts[0] * (y + counts[1] * z)
     places = int(np.prod(counts))
@@ -116,13 +116,13 @@ def build_cells(vertices: FloatArray, faces: NDArray[np.integer], size: float) -
 
 
 def _index(used: NDArray[np.int64], counts: NDArray[np.int64]) -> NDArray[np.uint32]:
-    """Number + 1 of the nearest cell of each grid place within REACH places, else 0."""
+    """Number + 1 of the nearest cell of each grid place within SEARCH_CELLS places, else 0."""
     numbers = np.zeros(int(np.prod(counts)), dtype=np.uint32)
     numbers[used] = np.arange(len(used)) + 1
     grid = numbers.reshape(counts[::-1])
     distance, nearest = distance_transform_edt(grid == 0, return_indices=True)
     spread = grid[tuple(nearest)]
-    return np.asarray(np.where(distance <= REACH, spread, 0).ravel(), dtype=np.uint32)
+    return np.asarray(np.where(distance <= SEARCH_CELLS, spread, 0).ravel(), dtype=np.uint32)
 
 
 def _frame(z: FloatArray) -> FloatArray:
@@ -133,8 +133,10 @@ def _frame(z: FloatArray) -> FloatArray:
 
 
 def bin_axis(cells: SurfaceCells, number: int) -> mi.Vector3f:
-    """One axis of the frame of the bins, of which no kernel knows the numbers: surfaces that bend a
-    little would have each of their own."""
+    """One axis of the frame of the direction bins, as an opaque array, so that kernels do not
+    depend on
+    its numbers: every design with a slightly bent surface would compile its own.
+    """
     return mi.Vector3f(*[dr.opaque(mi.Float, float(part)) for part in cells.axes[number]])
 
 
@@ -158,9 +160,7 @@ def plane_of(cells: SurfaceCells, cell: mi.UInt32, active: mi.Bool) -> tuple[mi.
 def cells_near(
     cells: SurfaceCells, points: NDArray[np.floating], distance: float
 ) -> NDArray[np.bool_]:
-    """(cells,) whether the middle of a cell lies within ``distance`` mm of any of the points
-    (n, 3).
-    """
+    """(cells,) whether a cell's centre lies within ``distance`` mm of any of the points (n, 3)."""
     if len(points) == 0:
         return np.ones(cells.cells, dtype=bool)
     nearest, _ = cKDTree(points).query(cells.centres, distance_upper_bound=distance)

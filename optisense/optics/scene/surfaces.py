@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import IntEnum
 
-# Rays start this far off a surface (mm): a hundred times the rounding of 30 mm in single
-# precision, a hundredth of the thinnest film a design holds (0.02 mm).
 RAY_OFFSET = 2e-4
+"""Distance (mm) off a surface at which rays start: a hundred times the rounding of 30 mm in single
+precision, a hundredth of the thinnest film that a design holds (0.02 mm)."""
 
 
 class SurfaceKind(IntEnum):

@@ -30,6 +30,7 @@ from optisense.optics.scene.ray_scene import RayScene, intersect, leave
 from optisense.optics.scene.surfaces import SurfaceKind
 
 MAX_DEPTH = 24
+"""Largest number of surfaces that a path from the camera meets."""
 
 
 @dataclass

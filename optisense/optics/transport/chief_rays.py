@@ -18,9 +18,10 @@ from optisense.optics.scene.ray_scene import RayScene, intersect, leave
 from optisense.optics.scene.surfaces import Region, SurfaceKind
 
 MAX_DEPTH = 32
+"""Largest number of surfaces that a chief ray meets."""
 
 
-class Outcome(IntEnum):
+class RayOutcome(IntEnum):
     """What became of a chief ray."""
 
     HIT = 0  # reached the sensing surface (or an indenter pressed into it)
@@ -52,7 +53,7 @@ class ChiefRays:
     @property
     def hit(self) -> NDArray[np.bool_]:
         """(h, w): which pixels see the sensing surface."""
-        return self.outcome == Outcome.HIT
+        return self.outcome == RayOutcome.HIT
 
     @property
     def contact_mask(self) -> NDArray[np.bool_]:
@@ -72,7 +73,7 @@ def _trace(
 ) -> tuple[Any, ...]:
     active = mi.Bool(True)
     depth = mi.UInt32(0)
-    outcome = mi.UInt32(int(Outcome.DEPTH_LIMIT))
+    outcome = mi.UInt32(int(RayOutcome.DEPTH_LIMIT))
     total = mi.Bool(False)
     point = mi.Point3f(0)
     normal = mi.Vector3f(0)
@@ -89,9 +90,9 @@ def _trace(
             & ~arrived
             & (opaque | (kind == int(SurfaceKind.ABSORBER)) | (kind == int(SurfaceKind.LIGHT)))
         )
-        outcome = dr.select(active & ~hit.valid, int(Outcome.ESCAPED), outcome)
-        outcome = dr.select(ended, int(Outcome.ABSORBED), outcome)
-        outcome = dr.select(arrived, int(Outcome.HIT), outcome)
+        outcome = dr.select(active & ~hit.valid, int(RayOutcome.ESCAPED), outcome)
+        outcome = dr.select(ended, int(RayOutcome.ABSORBED), outcome)
+        outcome = dr.select(arrived, int(RayOutcome.HIT), outcome)
         side = -dr.sign(dr.dot(direction, hit.normal))
         point = dr.select(arrived, hit.point, point)
         normal = dr.select(arrived, hit.shading_normal * side, normal)
@@ -107,8 +108,8 @@ def _trace(
         origin = dr.select(active, leave(hit.point, hit.normal, direction), origin)
         depth += 1
         active &= depth < limit
-    failed = total & (outcome != int(Outcome.HIT))
-    outcome = dr.select(failed, int(Outcome.TOTAL_REFLECTION), outcome)
+    failed = total & (outcome != int(RayOutcome.HIT))
+    outcome = dr.select(failed, int(RayOutcome.TOTAL_REFLECTION), outcome)
     return outcome, point, normal, direction, region, face
 
 
@@ -208,8 +209,8 @@ def pixel_stretching(rays: ChiefRays) -> NDArray[np.float64]:
 
 def sees_nothing(rays: ChiefRays) -> RenderError:
     """The error to raise where no chief ray meets the sensing surface; says what became of them."""
-    names = {outcome: outcome.name.lower().replace("_", " ") for outcome in Outcome}
-    counts = {names[o]: int((rays.outcome == o).sum()) for o in Outcome}
+    names = {outcome: outcome.name.lower().replace("_", " ") for outcome in RayOutcome}
+    counts = {names[o]: int((rays.outcome == o).sum()) for o in RayOutcome}
     met = ", ".join(f"{name}: {count}" for name, count in counts.items() if count)
     return RenderError(
         "the camera sees nothing of the sensing surface",

@@ -1,9 +1,9 @@
-"""Where to send photons: for each light, a table over the unit square of its emission angles.
+"""Emission guiding: for each light, a sampling density over the unit square of its emission angles.
 
 Light that never reaches the sensing surface (it leaves through a side, or circles in the light
-guide) tells nothing. A pilot pass finds out from which emission angles photons arrive; later
-passes send more photons there and weight them down in exchange, so the estimate stays unbiased:
-no cell gets less than ``FLOOR`` of the even density.
+guide) tells nothing. A pilot pass finds out from which emission angles photons arrive. Later passes
+sample these more densely and weight each photon with the inverse of the density, so the estimate
+stays unbiased: no cell gets less than `MIN_DENSITY` of the uniform density.
 """
 
 from __future__ import annotations
@@ -15,52 +15,60 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-CELLS = 16
-FLOOR = 0.15
+GUIDE_CELLS = 16
+"""Cells along each side of a light's table over the unit square of its emission angles."""
+MIN_DENSITY = 0.15
+"""Lower bound on the sampling density, relative to the uniform one. No angle is left out, so the
+estimate stays unbiased, and no photon weighs more than 1 / 0.15."""
 
 
 @dataclass
-class Guide:
-    """Cumulative tables: rows (lights, CELLS+1), columns (lights, CELLS, CELLS+1); ``arriving`` is
-    the part of the photons sent so that arrive, 1 where nobody knows."""
+class EmissionGuide:
+    """Cumulative tables over the unit square of each light's emission angles.
+
+    Attributes:
+        rows: (lights, GUIDE_CELLS + 1), cumulative over the rows of a light's table.
+        columns: (lights, GUIDE_CELLS, GUIDE_CELLS + 1), cumulative along each row.
+        arriving: the share of the sent photons that land where they are wanted; 1 if unknown.
+    """
 
     rows: mi.Float
     columns: mi.Float
     arriving: float = 1.0
 
 
-def guide_from_density(density: NDArray[np.floating]) -> Guide:
-    """A guide that follows ``density`` (lights, CELLS, CELLS), any scale, floored at FLOOR of
-    its mean.
+def guide_from_density(density: NDArray[np.floating]) -> EmissionGuide:
+    """A guide whose sampling density follows ``density`` (lights, GUIDE_CELLS, GUIDE_CELLS), of
+    any scale, with a lower bound of MIN_DENSITY times its mean.
     """
     even = _floored(np.asarray(density, dtype=np.float64))
     by_row = even.sum(axis=2)
-    rows = np.zeros((len(density), CELLS + 1))
+    rows = np.zeros((len(density), GUIDE_CELLS + 1))
     rows[:, 1:] = np.cumsum(by_row, axis=1) / by_row.sum(axis=1, keepdims=True)
-    columns = np.zeros((len(density), CELLS, CELLS + 1))
+    columns = np.zeros((len(density), GUIDE_CELLS, GUIDE_CELLS + 1))
     columns[:, :, 1:] = np.cumsum(even, axis=2) / by_row[:, :, None]
-    return Guide(
+    return EmissionGuide(
         mi.Float(rows.ravel().astype(np.float32)), mi.Float(columns.ravel().astype(np.float32))
     )
 
 
 def _floored(density: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Densities in relation to the mean of each light, with the floor in."""
+    """Densities relative to the mean of each light, with the lower bound."""
     mean = density.mean(axis=(1, 2), keepdims=True)
     even = np.where(mean > 0, density / np.where(mean > 0, mean, 1), 1.0)
-    return (1 - FLOOR) * even + FLOOR
+    return (1 - MIN_DENSITY) * even + MIN_DENSITY
 
 
-def even_guide(lights: int) -> Guide:
-    """A guide that changes nothing."""
-    return guide_from_density(np.ones((lights, CELLS, CELLS)))
+def uniform_guide(lights: int) -> EmissionGuide:
+    """A guide of uniform density."""
+    return guide_from_density(np.ones((lights, GUIDE_CELLS, GUIDE_CELLS)))
 
 
 def _invert(
     table: mi.Float, start: mi.UInt32, value: mi.Float
 ) -> tuple[mi.UInt32, mi.Float, mi.Float]:
     cell = mi.UInt32(0)
-    step = CELLS // 2
+    step = GUIDE_CELLS // 2
     while step:
         middle = dr.gather(mi.Float, table, start + cell + step)
         cell = dr.select(value >= middle, cell + step, cell)
@@ -72,23 +80,31 @@ def _invert(
 
 
 def warp(
-    guide: Guide, light: mi.UInt32, sample: mi.Point2f
+    guide: EmissionGuide, light: mi.UInt32, sample: mi.Point2f
 ) -> tuple[mi.Point2f, mi.Float, mi.UInt32]:
-    """Moved sample, its weight (1 / density), and the number of its cell."""
-    row, y, dy = _invert(guide.rows, light * (CELLS + 1), sample.x)
-    column, x, dx = _invert(guide.columns, (light * CELLS + row) * (CELLS + 1), sample.y)
-    moved = mi.Point2f((mi.Float(row) + y) / CELLS, (mi.Float(column) + x) / CELLS)
-    weight = dr.rcp(dy * dx * (CELLS * CELLS))
-    return moved, weight, row * CELLS + column
+    """The sample moved by the guide, its weight (1 / density), and the number of its cell."""
+    row, y, dy = _invert(guide.rows, light * (GUIDE_CELLS + 1), sample.x)
+    column, x, dx = _invert(
+        guide.columns, (light * GUIDE_CELLS + row) * (GUIDE_CELLS + 1), sample.y
+    )
+    moved = mi.Point2f((mi.Float(row) + y) / GUIDE_CELLS, (mi.Float(column) + x) / GUIDE_CELLS)
+    weight = dr.rcp(dy * dx * (GUIDE_CELLS * GUIDE_CELLS))
+    return moved, weight, row * GUIDE_CELLS + column
 
 
-def learn_guide(cells: mi.UInt32, lights: int, per_light: int) -> Guide:
-    """A guide from a pilot pass of so many photons a light, sent evenly: ``cells`` holds the cell
-    (over all lights) of every photon that arrived.
+def learn_guide(cells: mi.UInt32, lights: int, per_light: int) -> EmissionGuide:
+    """A guide from a pilot pass of uniform density.
+
+    Args:
+        cells: the cell (over all lights) of every photon that arrived.
+        lights: number of lights.
+        per_light: photons of each light in the pass.
     """
     arrived = np.asarray(cells)
-    arrived = arrived[arrived < lights * CELLS * CELLS]
-    counts = np.bincount(arrived, minlength=lights * CELLS * CELLS).reshape(-1, CELLS, CELLS)
+    arrived = arrived[arrived < lights * GUIDE_CELLS * GUIDE_CELLS]
+    counts = np.bincount(arrived, minlength=lights * GUIDE_CELLS * GUIDE_CELLS).reshape(
+        -1, GUIDE_CELLS, GUIDE_CELLS
+    )
     wanted = np.sqrt(counts)
     guide = guide_from_density(wanted)
     guide.arriving = float((_floored(wanted) * counts).sum() / (per_light * lights))

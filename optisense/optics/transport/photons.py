@@ -29,29 +29,36 @@ from optisense.optics.scene.emitters import EmitterTable, emit
 from optisense.optics.scene.ray_scene import RayScene, intersect, leave
 from optisense.optics.scene.surface_cells import SurfaceCells, cell_at
 from optisense.optics.scene.surfaces import SurfaceKind
-from optisense.optics.transport.emission_guide import CELLS, Guide, warp
-from optisense.optics.transport.volume_flux import PIECES, Slab, crossing
+from optisense.optics.transport.emission_guide import GUIDE_CELLS, EmissionGuide, warp
+from optisense.optics.transport.volume_flux import SAMPLES_PER_SEGMENT, FluxLayer, sample_segment
 
-# Photons are dropped after so many surfaces; in GelSight-like sensors less than 0.1 % of the
-# light gets there.
 MAX_DEPTH = 64
+"""Largest number of surfaces that a photon meets. In GelSight-like sensors less than 0.1 % of the
+light gets so far."""
 
 GROUP_MASK = 0xFF
+"""Bits of a photon's record that hold its light group."""
 HALF_SHIFT = 8
-"""Of the bit that tells photons of odd number from those of even: what both halves differ by tells
-the noise."""
+"""Position of the bit that tells photons of odd number from those of even number. The difference
+between the two halves gives the noise."""
 SURFACE_SHIFT = 9
+"""Position of the first bit of the number of the surface that a photon landed on."""
 
 
 @dataclass
 class PhotonMap:
-    """Landings of photons, all of one pass.
+    """The landings of one photon pass.
 
-    ``emitted`` counts the photons of all lights, those that are not lit in this pass, too.
-    ``place`` holds x, y, z (mm) and bits (light group, surface, half); ``travel`` the unit
-    direction and the cosine with the face normal; ``power`` the photon's share of a light of 1 mW,
-    per channel. ``passing`` are those met in a slab above a surface, if one was given: the slab's
-    height over the way that each stands for is in the place of the cosine.
+    Attributes:
+        count: number of landings.
+        emitted: photons of all lights, including those that are not lit in this pass.
+        place: four floats per landing: x, y, z (mm) and bits (light group, half, surface).
+        travel: four floats per landing: the unit direction and the cosine of incidence.
+        power: the photon's share of a light of 1 mW, per channel if ``coloured``.
+        coloured: whether powers differ between the channels.
+        passing: the photons that crossed the flux layer, if one was given. The layer's height over
+        the
+            length of path that each stands for takes the place of the cosine.
     """
 
     count: int
@@ -63,19 +70,20 @@ class PhotonMap:
     passing: PhotonMap | None = None
 
 
-# Photons that travel long leave most lanes of a vector idle; survivors are gathered anew after
-# so many surfaces.
 STAGES = (4, 4, 6)
-LANDINGS = 1.5
-"""Of a photon, that there is room for at first."""
-FEW = 100_000
-"""Photons of a pass below which gathering survivors costs more than it saves."""
+"""Numbers of surfaces after which the surviving photons are gathered into a dense array. Photons
+with long paths would leave most lanes of a vector idle."""
+LANDINGS_PER_PHOTON = 1.5
+"""Landings per photon that memory is reserved for at first. A pass with more is traced again with
+more room."""
+MIN_GATHERED_PHOTONS = 100_000
+"""Photons of a pass below which gathering the survivors costs more than it saves."""
 
 
 @dataclass
 class _Flight:
-    """Photons under way. ``origin_cell`` is the cell of the guide that each came from;
-    ``number`` its place in the pass, ``group`` its light group and half.
+    """Photons under way; ``number`` is a photon's place in the pass, ``group`` its light group and
+    half.
     """
 
     origin: mi.Point3f
@@ -89,8 +97,10 @@ class _Flight:
 
 
 @dataclass
-class Target:
-    """Cells of surfaces that matter: ``flags`` is 1 in those that the camera sees."""
+class TargetCells:
+    """Surface cells that photons should reach: ``flags`` is 1 in those in or near the camera's
+    view.
+    """
 
     cells: SurfaceCells
     flags: mi.UInt32
@@ -109,7 +119,7 @@ class _Record:
 
 def _launch(
     table: EmitterTable,
-    guide: Guide,
+    guide: EmissionGuide,
     lights: mi.UInt32,
     first: mi.UInt32,
     per_light: mi.UInt32,
@@ -134,7 +144,7 @@ def _launch(
         scattered=dr.full(mi.Bool, False, photons),
         number=place * table.count + light,
     )
-    return flight, light * (CELLS * CELLS) + cell
+    return flight, light * (GUIDE_CELLS * GUIDE_CELLS) + cell
 
 
 @dr.syntax
@@ -145,8 +155,8 @@ def _fly(
     surfaces: mi.Float,
     flight: _Flight,
     record: _Record,
-    target: Target | None,
-    slab: Slab | None,
+    target: TargetCells | None,
+    flux_layer: FluxLayer | None,
     passing: _Record,
     coloured: bool,
     rough: bool,
@@ -171,15 +181,17 @@ def _fly(
         flying = mi.Bool(active)
         active &= hit.valid & (kind != int(SurfaceKind.ABSORBER)) & (kind != int(SurfaceKind.LIGHT))
         opaque = active & (kind == int(SurfaceKind.OPAQUE))
-        if slab is not None:
+        if flux_layer is not None:
             # What has left an opaque surface and meets none is exchange.py's part.
             passes = flying & (opaque | ~scattered)
             bits = mi.UInt32(seed) ^ (flight.number * 747796405) ^ (depth * 0x9E3779B9)
             # Hashed: neighbouring photons have neighbouring bits.
             chance = unit_float(mi.sample_tea_32(bits, mi.UInt32(0))[0])
             piece = mi.UInt32(0)
-            while passes & (piece < PIECES):
-                spot, share, crosses = crossing(slab, hit, origin, direction, chance, piece, opaque)
+            while passes & (piece < SAMPLES_PER_SEGMENT):
+                spot, share, crosses = sample_segment(
+                    flux_layer, hit, origin, direction, chance, piece, opaque
+                )
                 if crosses:
                     slot = dr.scatter_inc(passing.counter, mi.UInt32(0), crosses)
                     kept = crosses & (slot < passing.capacity)
@@ -237,7 +249,7 @@ def _write(
     throughput: mi.Color3f,
     coloured: bool,
 ) -> None:
-    """Write down a landing; ``share`` is the cosine, or what stands for it in a slab."""
+    """Record a landing; ``share`` is the cosine of incidence or its counterpart in a layer."""
     p, d, t = point, direction, throughput
     where = mi.Vector4f(p.x, p.y, p.z, dr.reinterpret_array(mi.Float, bits))
     dr.scatter(record.place, where, slot, kept)
@@ -256,26 +268,28 @@ def _gathered(flight: _Flight, lanes: mi.UInt32) -> _Flight:
 def _trace(
     scene: RayScene,
     table: EmitterTable,
-    guide: Guide,
+    guide: EmissionGuide,
     per_light: int,
     seed: int,
     first: int,
     record: _Record,
-    target: Target | None,
-    slab: Slab | None,
+    target: TargetCells | None,
+    flux_layer: FluxLayer | None,
     passing: _Record,
     coloured: bool,
     lights: mi.UInt32,
 ) -> mi.UInt32:
-    """Fly a pass of some lights stage by stage; returns the guide's cell of each photon, all ones
-    if it never landed.
+    """Trace a pass stage by stage.
+
+    Returns:
+        The guide's cell of each photon, or all ones if it never landed.
     """
     photons = per_light * dr.width(lights)
     a, b, c = (dr.opaque(mi.UInt32, value) for value in (first, per_light, seed))
     flight, cell = _launch(table, guide, lights, a, b, c, photons)
     arrived = dr.zeros(mi.UInt32, photons)
     travelled = 0
-    stages = STAGES if photons > FEW else ()
+    stages = STAGES if photons > MIN_GATHERED_PHOTONS else ()
     for stage in range(len(stages) + 1):
         steps = stages[stage] if stage < len(stages) else MAX_DEPTH - travelled
         travelled += steps
@@ -287,7 +301,7 @@ def _trace(
             flight,
             record,
             target,
-            slab,
+            flux_layer,
             passing,
             coloured,
             scene.rough,
@@ -307,14 +321,18 @@ def _trace(
 def trace_pilot(
     scene: RayScene,
     table: EmitterTable,
-    guide: Guide,
+    guide: EmissionGuide,
     per_light: int,
     seed: int,
-    target: Target,
+    target: TargetCells,
     coloured: bool,
 ) -> tuple[mi.UInt32, PhotonMap]:
-    """For every photon of a pass the guide's cell that it came from, or all ones if it missed
-    the target; and where photons landed.
+    """Trace the pilot pass.
+
+    Returns:
+        For each photon the cell of the guide that it came from, or all ones if it missed the
+        target;
+        and the photon map.
     """
     lights = dr.arange(mi.UInt32, table.count)
     return _traced(scene, table, guide, per_light, seed, 0, target, None, coloured, lights)
@@ -323,60 +341,71 @@ def trace_pilot(
 def trace_photons(
     scene: RayScene,
     table: EmitterTable,
-    guide: Guide,
+    guide: EmissionGuide,
     per_light: int,
     seed: int,
     *,
     first: int = 0,
     coloured: bool,
     groups: Collection[int] | None = None,
-    slab: Slab | None = None,
+    flux_layer: FluxLayer | None = None,
 ) -> PhotonMap:
     """Emit ``per_light`` photons from each light and record where they land.
 
-    ``first`` is the number of photons a light has already sent in earlier passes of the same
-    seed. Each light has 1 mW in all. With ``groups``, only the lights of these are lit, with the
-    same photons that they send among all. What crosses a ``slab`` is recorded, too.
+    Args:
+        scene: the surfaces.
+        table: the lights; each emits 1 mW.
+        guide: the sampling density of emission.
+        per_light: photons of each light.
+        seed: of the pass.
+        first: photons that each light has already sent in earlier passes of the same seed.
+        coloured: whether surfaces are coloured.
+        groups: the light groups that are lit; all if None. Their photons are the same in both
+        cases.
+        flux_layer: photons that cross this layer are recorded, too.
     """
     chosen = [
         k for k, emitter in enumerate(table.emitters) if groups is None or emitter.group in groups
     ]
     lights = indices(np.array(chosen))
-    return _traced(scene, table, guide, per_light, seed, first, None, slab, coloured, lights)[1]
+    return _traced(scene, table, guide, per_light, seed, first, None, flux_layer, coloured, lights)[
+        1
+    ]
 
 
 def _traced(
     scene: RayScene,
     table: EmitterTable,
-    guide: Guide,
+    guide: EmissionGuide,
     per_light: int,
     seed: int,
     first: int,
-    target: Target | None,
-    slab: Slab | None,
+    target: TargetCells | None,
+    flux_layer: FluxLayer | None,
     coloured: bool,
     lights: mi.UInt32,
 ) -> tuple[mi.UInt32, PhotonMap]:
-    """As `_trace`, with where photons landed; where there are more landings than room, the pass is
-    traced once more with more room."""
+    """Trace a pass and collect its landings; one with more landings than room is repeated."""
     photons = per_light * dr.width(lights)
-    room, room_passing = (int(photons * each) + 1024 for each in (LANDINGS, PIECES))
+    room, room_passing = (
+        int(photons * each) + 1024 for each in (LANDINGS_PER_PHOTON, SAMPLES_PER_SEGMENT)
+    )
     while True:
         record = _room(room, coloured)
-        passing = _room(0 if slab is None else room_passing, coloured)
-        flown = (scene, table, guide, per_light, seed, first, record, target, slab, passing)
+        passing = _room(0 if flux_layer is None else room_passing, coloured)
+        flown = (scene, table, guide, per_light, seed, first, record, target, flux_layer, passing)
         cells = _trace(*flown, coloured, lights)
         landed, passed = int(record.counter[0]), int(passing.counter[0])
         if landed <= room and passed <= room_passing:
             break
         room, room_passing = (max(int(1.2 * n), 1024) for n in (landed, passed))
     emitted = per_light * table.count
-    met = None if slab is None else _photon_map(passing, passed, emitted, coloured)
+    met = None if flux_layer is None else _photon_map(passing, passed, emitted, coloured)
     return cells, _photon_map(record, landed, emitted, coloured, met)
 
 
 def _room(capacity: int, coloured: bool) -> _Record:
-    """For so many landings."""
+    """Empty records for this number of landings."""
     size = max(capacity, 1)
     return _Record(
         capacity=dr.opaque(mi.UInt32, capacity),

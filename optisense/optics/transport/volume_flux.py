@@ -1,9 +1,9 @@
-"""Light on its way through the first millimetre above a surface.
+"""Volume flux: light on its way through a thin layer above a surface.
 
-What an indenter raises into the gel catches light that would pass over the undeformed surface, or
-land on it far behind. How much there is, photons tell that cross a slab of this height: the length
-of their way within it, over its volume, is the flux density across the light. Each segment of a
-photon's path is looked at in a few random places.
+An indenter that stands off the undeformed surface catches light that would pass over that surface,
+or land on it far behind. Photons that cross a thin layer give its amount: the length of their paths
+within the layer over its volume is the flux density across the light (a track-length estimator).
+Each segment of a photon's path is tested at a few random places.
 """
 
 from __future__ import annotations
@@ -18,39 +18,42 @@ from optisense.optics.backend.arrays import floats
 from optisense.optics.scene.ray_scene import Hit
 from optisense.optics.scene.surface_cells import SurfaceCells, cell_at, plane_of
 
-HEIGHT = 1.0
-"""mm, of the slab."""
-FARTHEST = 50.0
-"""mm that light without anything in its way is followed."""
-PIECES = 4
-"""In which a segment of a photon's path is looked at, each at one place."""
-GOLDEN = 0.618034
-"""By which the places within pieces differ, so that they lie evenly in the mean of few."""
-TAIL = 1.5
-"""Of the slab's height: how far above the surface the end of a path begins that lands there."""
-LEAST_COSINE = 1e-3
+LAYER_HEIGHT = 1.0
+"""Height (mm) of the layer; presses are usually less deep."""
+MAX_SEGMENT_LENGTH = 50.0
+"""Length (mm) at which a path segment that meets nothing is cut off."""
+SAMPLES_PER_SEGMENT = 4
+"""Number of pieces of a path segment; one random place of each is tested for lying in the layer."""
+GOLDEN_RATIO_FRACTION = 0.618034
+"""Offset (modulo 1) between the places within successive pieces. Multiples of the golden ratio's
+fractional part are spread evenly, however few they are."""
+TAIL_HEIGHTS = 1.5
+"""Height above the surface, in units of `LAYER_HEIGHT`, at which the last part of a landing
+photon's path begins. Half of the pieces divide this part."""
+MIN_COSINE = 1e-3
+"""Lower bound on the cosine of incidence when the length of that last part is computed."""
 
 
 @dataclass
-class Slab:
-    """The slab above ``cells``; ``centres`` are four floats a cell: the middle of its surface."""
+class FluxLayer:
+    """The layer above ``cells``; ``centres`` holds the middle of each, four floats."""
 
     cells: SurfaceCells
     centres: mi.Float
 
 
-def slab_above(cells: SurfaceCells) -> Slab:
-    """The slab above a surface."""
+def flux_layer_above(cells: SurfaceCells) -> FluxLayer:
+    """The layer above a surface."""
     four = np.zeros((cells.cells, 4), dtype=np.float32)
     four[:, :3] = cells.centres
-    return Slab(cells, floats(four))
+    return FluxLayer(cells, floats(four))
 
 
-def above_cell(
-    slab: Slab, point: mi.Point3f, active: mi.Bool
+def layer_cell_at(
+    flux_layer: FluxLayer, point: mi.Point3f, active: mi.Bool
 ) -> tuple[mi.UInt32, mi.Float, mi.Bool]:
-    """The cell that points lie above, how high (mm), and whether they are in the slab."""
-    cells = slab.cells
+    """The cell that points lie above, their height (mm), and whether they are in the layer."""
+    cells = flux_layer.cells
     near, found = cell_at(cells, point, active)
     normal, offset = plane_of(cells, near, found)
     foot = point - normal * (dr.dot(normal, point) - offset)
@@ -58,15 +61,15 @@ def above_cell(
     normal, offset = plane_of(cells, cell, found)
     height = dr.dot(normal, point) - offset
     # Beyond the surface's edge the nearest cell is found, too.
-    middle = dr.gather(mi.Vector4f, slab.centres, cell, found)
+    middle = dr.gather(mi.Vector4f, flux_layer.centres, cell, found)
     aside = foot - mi.Point3f(middle.x, middle.y, middle.z)
     size = dr.rcp(cells.inverse_size)
     beside = dr.maximum(dr.maximum(dr.abs(aside.x), dr.abs(aside.y)), dr.abs(aside.z))
-    return cell, height, found & (height > 0) & (height < HEIGHT) & (beside < size)
+    return cell, height, found & (height > 0) & (height < LAYER_HEIGHT) & (beside < size)
 
 
-def crossing(
-    slab: Slab,
+def sample_segment(
+    flux_layer: FluxLayer,
     hit: Hit,
     origin: mi.Point3f,
     direction: mi.Vector3f,
@@ -74,22 +77,35 @@ def crossing(
     piece: mi.UInt32,
     landing: mi.Bool,
 ) -> tuple[mi.Point3f, mi.Float, mi.Bool]:
-    """A random place on one of the ``PIECES`` of the way of light to where it hits.
+    """A random place on one of the `SAMPLES_PER_SEGMENT` pieces of a path segment.
 
-    Half of them are of its end, where light that is ``landing`` is near the surface. ``chance`` is
-    even over 0..1, one for all pieces of a way.
+    Half of the pieces belong to the segment's end, where the light of a ``landing`` segment is near
+    the
+    surface.
+
+    Args:
+        flux_layer: the layer.
+        hit: where the segment ends.
+        origin: its start.
+        direction: its unit direction.
+        chance: even over 0..1, one for all pieces of a segment.
+        piece: the number of the piece.
+        landing: whether the segment ends on an opaque surface.
 
     Returns:
-        The place; the slab's height over the length of the piece (as the cosine of a landing is
-        that of a slab over the way through it); whether it is in the slab.
+        The place; the layer's height over the length of the piece, which plays the part of the
+        cosine
+        of incidence; and whether the place is in the layer.
     """
-    end = dr.select(hit.valid, hit.distance, FARTHEST)
-    cosine = dr.maximum(dr.abs(dr.dot(direction, hit.normal)), LEAST_COSINE)
-    tail = dr.select(landing, dr.minimum(TAIL * HEIGHT / cosine, end * 0.5), end * 0.5)
-    last = piece >= PIECES // 2
-    length = dr.select(last, tail, end - tail) * (2 / PIECES)
-    first = dr.select(last, end - tail, 0) + length * mi.Float(piece % (PIECES // 2))
-    place = chance + mi.Float(piece) * GOLDEN
+    end = dr.select(hit.valid, hit.distance, MAX_SEGMENT_LENGTH)
+    cosine = dr.maximum(dr.abs(dr.dot(direction, hit.normal)), MIN_COSINE)
+    tail = dr.select(
+        landing, dr.minimum(TAIL_HEIGHTS * LAYER_HEIGHT / cosine, end * 0.5), end * 0.5
+    )
+    last = piece >= SAMPLES_PER_SEGMENT // 2
+    length = dr.select(last, tail, end - tail) * (2 / SAMPLES_PER_SEGMENT)
+    first = dr.select(last, end - tail, 0) + length * mi.Float(piece % (SAMPLES_PER_SEGMENT // 2))
+    place = chance + mi.Float(piece) * GOLDEN_RATIO_FRACTION
     spot = origin + direction * (first + length * (place - dr.floor(place)))
-    _, _, inside = above_cell(slab, mi.Point3f(spot), mi.Bool(True))
-    return mi.Point3f(spot), HEIGHT / length, inside
+    _, _, inside = layer_cell_at(flux_layer, mi.Point3f(spot), mi.Bool(True))
+    return mi.Point3f(spot), LAYER_HEIGHT / length, inside

@@ -10,10 +10,10 @@ from reference_scenes import diffuse_coating, quad
 
 from optisense.geometry import Sphere
 from optisense.optics.camera.projection import RayCamera
-from optisense.optics.imaging.cached import render_field
-from optisense.optics.radiance_cache.store import FieldStore
+from optisense.optics.imaging.cached import render_cached
+from optisense.optics.radiance_cache.store import CacheStore
 from optisense.optics.scene.contact_scenes import ContactScenes
-from optisense.optics.scene.emitters import Emitter, Shape, emitter_table
+from optisense.optics.scene.emitters import Emitter, EmitterShape, emitter_table
 from optisense.optics.scene.ray_scene import Piece, RayScene
 from optisense.optics.scene.surfaces import Region, Surface
 from optisense.optics.transport.chief_rays import trace_chief_rays
@@ -27,10 +27,10 @@ PHOTONS = 1_500_000
 AGREEMENT = 0.03
 """The noise of so many photons is 1.5 %. Read from where light lands, the flank lacks 20 %."""
 LAMP = Emitter(
-    0, (12.0, 0.0, 1.4), (-1.0, 0.0, 0.0), (0.0, 0.0, 1.0), Shape.RECTANGLE, size=(2.4, 2.4)
+    0, (12.0, 0.0, 1.4), (-1.0, 0.0, 0.0), (0.0, 0.0, 1.0), EmitterShape.RECTANGLE, size=(2.4, 2.4)
 )
 OVERHEAD = Emitter(
-    0, (0.0, 0.0, 12.0), (0.0, 0.0, -1.0), (0.0, 1.0, 0.0), Shape.RECTANGLE, size=(2.4, 2.4)
+    0, (0.0, 0.0, 12.0), (0.0, 0.0, -1.0), (0.0, 1.0, 0.0), EmitterShape.RECTANGLE, size=(2.4, 2.4)
 )
 CAMERA = RayCamera((0.0, 0.0, 24.0), (0.0, 0.0, -1.0), (0.0, 1.0, 0.0), 12.0, 64, 48)
 
@@ -52,8 +52,8 @@ def skin() -> Piece:
     return quad("skin", corners, coating(Region.SENSING))
 
 
-def store(scene: RayScene, lamp: Emitter, seen: NDArray[np.floating]) -> FieldStore:
-    return FieldStore(scene, [skin()], emitter_table([lamp], 1), seen, False, False)
+def store(scene: RayScene, lamp: Emitter, seen: NDArray[np.floating]) -> CacheStore:
+    return CacheStore(scene, [skin()], emitter_table([lamp], 1), seen, False, False)
 
 
 def irradiance(points: NDArray[np.floating], normals: NDArray[np.floating]) -> NDArray[np.float64]:
@@ -82,7 +82,7 @@ def test_raised_flank_in_grazing_light_is_lit_as_in_the_open() -> None:
     rays = trace_chief_rays(full, CAMERA)
     light = store(fixed, LAMP, rays.points[rays.hit])
     field = light.field(0, PHOTONS, None, None, PHOTONS, 0.0, lambda *told: None)
-    image = render_field(field, scenes, CAMERA, rays, [LAMP], [0.0], 0).radiance[0, ..., 0]
+    image = render_cached(field, scenes, CAMERA, rays, [LAMP], [0.0], 0).radiance[0, ..., 0]
 
     normals, points = rays.normals.astype(float), rays.points.astype(float)
     flank = (rays.region == Region.INDENTER) & (normals[..., 0] > 0.3)
@@ -96,4 +96,4 @@ def test_raised_flank_in_grazing_light_is_lit_as_in_the_open() -> None:
 def test_only_light_that_grazes_is_followed_above_the_surface(lamp: Emitter, grazes: bool) -> None:
     light = store(RayScene([skin()]), lamp, np.zeros((1, 3)))
     field, _ = light.field(0, 50_000, None, None, 50_000, 0.0, lambda *told: None)
-    assert (field.raised is not None) == grazes
+    assert (field.above_surface is not None) == grazes

@@ -10,7 +10,7 @@ from scipy import stats
 
 from optisense.optics.mitsuba_export import surface_bsdf
 from optisense.optics.scene.bsdf import (
-    Coating,
+    CoatingBsdf,
     evaluate_coating,
     refract,
     sample_coating,
@@ -31,8 +31,8 @@ def surface(specularity: float, alpha: float) -> Surface:
     return Surface(SurfaceKind.OPAQUE, 1.0, alpha, specularity, (0.7, 0.5, 0.2), ETA, K)
 
 
-def coating(specularity: float, alpha: float) -> Coating:
-    return Coating(
+def coating(specularity: float, alpha: float) -> CoatingBsdf:
+    return CoatingBsdf(
         mi.Color3f(0.7, 0.5, 0.2), mi.Color3f(*ETA), mi.Color3f(*K), mi.Float(specularity),
         mi.Float(alpha),
     )  # fmt: skip

@@ -61,11 +61,11 @@ def test_a_sensor_of_many_lights_looks_the_same(monkeypatch: pytest.MonkeyPatch)
     model = OpticalModel(BUILDERS["gelsight360"](), "llvm")
     ball = [Contact(Sphere(radius=2.0), at=(0.0, 0.0), depth=1.0)]
     size = {"resolution": (160, 120), "photons": 300_000}
-    monkeypatch.setattr(cached, "MANY_BEAMS", np.inf)
+    monkeypatch.setattr(cached, "SPARSE_SHADING_BEAMS", np.inf)
     every = model.render(ball, **size)
-    monkeypatch.setattr(cached, "MANY_BEAMS", 0)
+    monkeypatch.setattr(cached, "SPARSE_SHADING_BEAMS", 0)
     second = model.render(ball, **size)
-    monkeypatch.setattr(cached, "MANY_BEAMS", np.inf)
+    monkeypatch.setattr(cached, "SPARSE_SHADING_BEAMS", np.inf)
     noise = model.render(ball, seed=1, **size)
     mask = every.contact_mask
     np.testing.assert_allclose(second.radiance[mask], every.radiance[mask], rtol=1e-4)

@@ -8,8 +8,14 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from optisense.optics.radiance_cache.angular_variance import Spread, above, reach, spread, within
-from optisense.optics.scene.bsdf import Coating, evaluate_coating
+from optisense.optics.radiance_cache.angular_variance import (
+    AngularVariance,
+    angular_variance,
+    cosine_half_width,
+    mirrored_above,
+    sample_direction,
+)
+from optisense.optics.scene.bsdf import CoatingBsdf, evaluate_coating
 
 COUNT = 200_000
 TOWARDS = np.array([0.6, 0.0, 0.8])
@@ -19,8 +25,8 @@ VARIANCES = 0.012, 0.002
 """Radians squared, along and up: discs of 13 and 5 degrees."""
 
 
-def light() -> Spread:
-    return Spread(
+def light() -> AngularVariance:
+    return AngularVariance(
         mi.Vector3f(TOWARDS), mi.Vector3f(ALONG), mi.Vector3f(UP),
         mi.Float(VARIANCES[0]), mi.Float(VARIANCES[1]),
     )  # fmt: skip
@@ -29,7 +35,7 @@ def light() -> Spread:
 def drawn() -> np.ndarray:
     """(COUNT, 3) directions of this light."""
     state = mi.sample_tea_32(dr.arange(mi.UInt32, COUNT), 7)[0]
-    return np.asarray(within(light(), state)).T
+    return np.asarray(sample_direction(light(), state)).T
 
 
 def test_drawn_directions_have_the_variances_of_the_light() -> None:
@@ -44,7 +50,7 @@ def test_the_moments_of_a_field_tell_the_variances() -> None:
     mean = ways.mean(axis=0)
     cosine = np.linalg.norm(mean)
     height = (ways[:, 2] ** 2).mean()
-    found = spread(
+    found = angular_variance(
         mi.Vector3f(0, 0, 1), mi.Vector3f(mean / cosine), mi.Float(cosine), mi.Float(height)
     )
     assert found.variance_along[0] == pytest.approx(VARIANCES[0], rel=0.05)
@@ -61,8 +67,8 @@ def test_light_about_the_horizon_counts_with_what_is_above_it(
     normal = np.cos(lean) * side + np.sin(lean) * TOWARDS
     truth = np.maximum(drawn() @ normal, 0).mean()
     everywhere = mi.Vector3f(TOWARDS)
-    straying = reach(light(), mi.Vector3f(normal), everywhere)
-    coating = Coating(
+    half_width = cosine_half_width(light(), mi.Vector3f(normal), everywhere)
+    coating = CoatingBsdf(
         reflectance=mi.Color3f(np.pi),
         metal_eta=mi.Color3f(1),
         metal_k=mi.Color3f(0),
@@ -71,7 +77,7 @@ def test_light_about_the_horizon_counts_with_what_is_above_it(
         metallic=False,
     )
     got = evaluate_coating(
-        coating, mi.Vector3f(normal), mi.Vector3f(TOWARDS), mi.Vector3f(normal), straying
+        coating, mi.Vector3f(normal), mi.Vector3f(TOWARDS), mi.Vector3f(normal), half_width
     )
     # A slab stands for an ellipse: their halves' means are 0.433 and 0.424 deviations.
     deviation = np.sqrt(VARIANCES[0 if side is ALONG else 1])
@@ -80,15 +86,15 @@ def test_light_about_the_horizon_counts_with_what_is_above_it(
 
 def test_light_of_the_undeformed_surface_is_above_it_whole() -> None:
     upright = mi.Vector3f(np.cos(0.02) * UP + np.sin(0.02) * TOWARDS)
-    straying = reach(light(), upright, upright)
-    assert straying[0] <= np.sin(0.02) + 1e-6
+    half_width = cosine_half_width(light(), upright, upright)
+    assert half_width[0] <= np.sin(0.02) + 1e-6
 
 
 def test_directions_below_a_plane_are_mirrored_up() -> None:
     normal = mi.Vector3f(0, 0, 1)
-    assert np.asarray(above(mi.Vector3f(0.6, 0, -0.8), normal)).ravel() == pytest.approx(
+    assert np.asarray(mirrored_above(mi.Vector3f(0.6, 0, -0.8), normal)).ravel() == pytest.approx(
         [0.6, 0, 0.8]
     )
-    assert np.asarray(above(mi.Vector3f(0.6, 0, 0.8), normal)).ravel() == pytest.approx(
+    assert np.asarray(mirrored_above(mi.Vector3f(0.6, 0, 0.8), normal)).ravel() == pytest.approx(
         [0.6, 0, 0.8]
     )
