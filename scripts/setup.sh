@@ -5,10 +5,9 @@ set -eu
 cd "$(dirname "$0")/.."
 root=$(pwd)
 venv="$root/.venv"
+name=set-up
 unset PYTHONHOME PYTHONPATH VIRTUAL_ENV
-
-say() { printf '%s\n' "$*"; }
-fail() { printf 'set-up: %s\n' "$*" >&2; exit 1; }
+. scripts/system.sh
 
 # --- Python 3.11 or newer -------------------------------------------------------------------
 fits='import sys; sys.exit(sys.version_info < (3, 11))'
@@ -22,56 +21,85 @@ for candidate in ${PYTHON:-} python3 python3.13 python3.12 python3.11 python3.14
 done
 [ -n "$python" ] || fail "Python 3.11 or newer is needed and none was found.
 Install it, then run this again, or name one: make PYTHON=/path/to/python3.12 setup"
+version=$(version_of "$python")
 
-# --- how to install system packages -----------------------------------------------------------
-as_root=
-can_install=no
-if command -v apt-get >/dev/null 2>&1; then
-    if [ "$(id -u)" -eq 0 ]; then
-        can_install=yes
-    elif command -v sudo >/dev/null 2>&1 && { sudo -n true 2>/dev/null || [ -t 0 ]; }; then
-        can_install=yes
-        as_root=sudo
-    fi
-fi
-apt_updated=no
-apt_install() { # the first of the named packages that this system offers
-    if [ "$apt_updated" = no ]; then
-        apt_updated=yes
-        $as_root apt-get update -qq || say "set-up: the package lists could not be refreshed"
-    fi
-    for package in "$@"; do
-        if apt-cache show "$package" >/dev/null 2>&1; then
-            say "Installing $package ..."
-            $as_root env DEBIAN_FRONTEND=noninteractive \
-                apt-get install -y -qq --no-install-recommends "$package" >/dev/null && return 0
-        fi
-    done
-    return 1
+# --- what the machine lacks: seen before anything is downloaded --------------------------------
+has_venv() { "$venv/bin/python" -c "$fits; import pip" >/dev/null 2>&1; }
+probe() { # run a line of Python with .venv's interpreter, or before that is there with the other
+    if has_venv; then set -- "$venv/bin/python" "$1"; else set -- "$python" "$1"; fi
+    PYTHONPATH=$root PYTHONDONTWRITEBYTECODE=1 "$1" -c "$2" >/dev/null 2>&1
 }
+has_llvm() { probe 'from optisense.optics.backend.llvm import find_llvm; find_llvm()'; }
+has_atomic() { probe 'from optisense.optics.backend.llvm import load_atomic; load_atomic()'; }
+llvm_wheel_fits() { [ "$(uname -sm)" = "Linux x86_64" ]; }
 
-# --- .venv ------------------------------------------------------------------------------------
-if ! "$python" -c 'import ensurepip, venv' >/dev/null 2>&1; then
-    version=$("$python" -c 'import sys; print("%d.%d" % sys.version_info[:2])')
-    if [ "$can_install" = yes ]; then
-        apt_install "python$version-venv" python3-venv || true
+has_venv || has_pip_for_venvs "$python" || [ "$can_install" = no ] ||
+    apt_install "python$version-venv" python3-venv || true
+if ! has_llvm; then
+    if [ "$(uname)" = Darwin ] && command -v brew >/dev/null 2>&1; then
+        say "Installing LLVM through Homebrew ..."
+        brew install --quiet llvm || true
+    elif [ "$can_install" = yes ]; then
+        apt_install libllvm19 libllvm18 libllvm20 libllvm21 libllvm17t64 libllvm17 || true
     fi
-    "$python" -c 'import ensurepip, venv' >/dev/null 2>&1 ||
-        fail "$python can't make virtual environments. Type: sudo apt-get install python$version-venv"
 fi
-if ! "$venv/bin/python" -c "$fits; import pip" >/dev/null 2>&1; then
-    say "Making the virtual environment .venv ..."
-    "$python" -m venv --clear "$venv"
-fi
-say "Installing the locked dependencies into .venv (a few minutes the first time) ..."
-"$venv/bin/python" -m pip install --quiet --disable-pip-version-check --no-input \
-    --require-hashes --requirement requirements.lock
-"$venv/bin/python" -m pip install --quiet --disable-pip-version-check --no-input \
-    --no-deps --no-build-isolation --editable .
+has_atomic || [ "$can_install" = no ] || apt_install libatomic1 || true
 
-# --- system libraries that the renderer needs: libLLVM, and on Linux libatomic ---------------------
-renderer_loads() {
-    "$venv/bin/python" - "$@" <<'EOF'
+# --- what could not be installed, and comes another way or not at all ----------------------------
+scratch=$(mktemp -d)
+trap 'rm -rf "$scratch"' EXIT
+lacking=
+packages=
+lacks() { # PACKAGE SENTENCE
+    packages="$packages $1"
+    lacking="$lacking
+  - $2"
+}
+if ! has_venv; then
+    say "Making the virtual environment .venv ..."
+    make_venv "$python" "$venv" ||
+        lacks "python$version-venv" "pip for virtual environments of $python"
+fi
+if ! has_atomic; then
+    if unpack_deb libatomic1 "$scratch"; then
+        say "libatomic goes into .venv, as no system package can be installed."
+        mkdir -p "$venv/lib"
+        cp "$scratch"/usr/lib/*/libatomic.so.1 "$venv/lib/"
+    else
+        lacks libatomic1 "libatomic, a library of the compiler GCC, which the renderer needs"
+    fi
+fi
+llvm_wheel=no
+if ! has_llvm; then
+    if llvm_wheel_fits; then
+        llvm_wheel=yes
+    else
+        lacks libllvm19 "libLLVM 17 or newer, with which the renderer compiles its kernels"
+    fi
+fi
+if [ -n "$lacking" ]; then
+    case "$(uname)" in
+    Darwin) command="brew install llvm" ;;
+    *) command="apt-get install$packages      (or what this system calls them)" ;;
+    esac
+    fail "this machine lacks, and you have no right to install here:$lacking
+Ask an administrator to type
+    $command
+and run this again. Without an administrator, docs/install.md tells how to take them from conda,
+and how to name a libLLVM that lies elsewhere (DRJIT_LIBLLVM_PATH). Nothing was downloaded."
+fi
+
+# --- the dependencies -----------------------------------------------------------------------------
+install() { "$venv/bin/python" -m pip install --quiet --disable-pip-version-check --no-input "$@"; }
+say "Installing the locked dependencies into .venv (a few minutes the first time) ..."
+install --require-hashes --requirement requirements.lock
+install --no-deps --no-build-isolation --editable .
+if [ "$llvm_wheel" = yes ]; then
+    say "Installing libLLVM into .venv, as no system package can be installed ..."
+    install --require-hashes --requirement requirements-llvm.lock
+fi
+
+"$venv/bin/python" - <<'PROBE' || fail "the renderer does not start; see the line above."
 import sys
 from optisense.errors import OptiSenseError
 from optisense.optics.backend.llvm import find_llvm
@@ -80,22 +108,10 @@ try:
     library = find_llvm()
     import_renderer("mitsuba")
 except OptiSenseError as error:
-    sys.exit("" if "--quiet" in sys.argv else f"set-up: {error}")
+    sys.exit(f"set-up: {error}")
 print(f"The renderer will use {library}")
-EOF
-}
-if ! renderer_loads --quiet 2>/dev/null; then
-    if [ "$(uname)" = Darwin ]; then
-        if command -v brew >/dev/null 2>&1; then
-            say "Installing LLVM through Homebrew ..."
-            brew install --quiet llvm || true
-        fi
-    elif [ "$can_install" = yes ]; then
-        apt_install libllvm19 libllvm18 libllvm20 libllvm21 libllvm17t64 libllvm17 || true
-        apt_install libatomic1 || true
-    fi
-    renderer_loads || fail "Type the command above, then run make again."
-fi
+PROBE
 
 touch "$venv/.set-up"
-say "Set-up is done."
+say "Set-up is done. To use it:"
+sh scripts/next_steps.sh

@@ -35,7 +35,7 @@ def test_python_examples_run(page: Path, tmp_path: Path) -> None:
     (tmp_path / "docs").symlink_to(ROOT / "docs")  # as in the project's folder, but to write in
     (tmp_path / "example.py").write_text("\n".join(examples), encoding="utf-8")
     child = subprocess.run(
-        [sys.executable, "example.py"], cwd=tmp_path, capture_output=True, text=True, timeout=300
+        [sys.executable, "example.py"], cwd=tmp_path, capture_output=True, text=True
     )
     assert child.returncode == 0, child.stderr
 

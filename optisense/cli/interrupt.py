@@ -33,10 +33,12 @@ class Interrupt:
 def held_interrupt() -> Iterator[Interrupt]:
     """Hold the first Ctrl-C back until a safe point; the second one acts at once.
 
-    Outside the main thread, where signals can't be handled, nothing changes.
+    Nothing changes outside the main thread, where signals can't be handled, and where Ctrl-C is
+    ignored, as shells arrange it for programs that they start in the background.
     """
     interrupt = Interrupt()
-    if threading.current_thread() is not threading.main_thread():
+    in_main_thread = threading.current_thread() is threading.main_thread()
+    if not in_main_thread or signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
         yield interrupt
         return
     before = signal.signal(signal.SIGINT, interrupt._pressed)

@@ -40,6 +40,8 @@ def main() -> None:
     parser.add_argument("--budget", type=int)
     parser.add_argument("--go-on", action="store_true")
     given = parser.parse_args()
+    # The engine stops a search by this signal, whatever the shell that started it arranged.
+    signal.signal(signal.SIGINT, signal.default_int_handler)
     channel = Channel.of_standard_output()
     working = threading.Event()
     threading.Thread(target=_listen, args=(given.go_on, working), daemon=True).start()

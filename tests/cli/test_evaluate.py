@@ -154,8 +154,7 @@ def test_an_output_folder_that_is_a_file_is_an_error_before_the_work(tmp_path: P
     assert file.read_text() == "mine"
 
 
-def test_ctrl_c_shows_what_is_finished_and_exits_with_130(tmp_path: Path) -> None:
-    script = """
+PRESSED = """
 import signal, sys
 from optisense.cli import app
 from optisense.objectives import registry
@@ -168,17 +167,30 @@ registry._register(registry.Objective("pressed", pressed, "Pressed"))
 app(["evaluate", "gelsight-mini", "-b", "aoap", "-b", "pressed", "-b", "2to3pw",
      "--resolution", "40x30", "--out", sys.argv[1]])
 """
+
+
+def test_ctrl_c_shows_what_is_finished_and_exits_with_130(tmp_path: Path) -> None:
     child = subprocess.run(
-        [sys.executable, "-c", script, str(tmp_path / "out")],
-        capture_output=True,
-        text=True,
-        timeout=300,
+        [sys.executable, "-c", PRESSED, str(tmp_path / "out")], capture_output=True, text=True
     )
     assert child.returncode == 130, child.stderr
     assert "Traceback" not in child.stderr
     assert "AOAP" in child.stdout
     written = json.loads((tmp_path / "out" / "scores.json").read_text())
     assert list(written["scores"]) == ["aoap"]
+
+
+def test_in_the_background_ctrl_c_stays_ignored(tmp_path: Path) -> None:
+    """As a shell without job control arranges it for what it starts by `&`."""
+    background = ["sh", "-c", 'trap "" INT; exec "$@"', "sh"]
+    child = subprocess.run(
+        [*background, sys.executable, "-c", PRESSED, str(tmp_path / "out")],
+        capture_output=True,
+        text=True,
+    )
+    assert child.returncode == 0, child.stderr
+    written = json.loads((tmp_path / "out" / "scores.json").read_text())
+    assert list(written["scores"]) == ["aoap", "pressed", "2to3pw"]
 
 
 def test_help_loads_neither_numpy_nor_the_renderer() -> None:

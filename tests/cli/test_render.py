@@ -40,7 +40,7 @@ def render(*arguments: str, design: str = "gelsight-mini") -> tuple[int, str]:
 def child(script: str, folder: Path) -> subprocess.CompletedProcess[str]:
     """Run a script in a process of its own, with the output folder as its argument."""
     return subprocess.run(
-        [sys.executable, "-c", script, str(folder)], capture_output=True, text=True, timeout=300
+        [sys.executable, "-c", script, str(folder)], capture_output=True, text=True
     )
 
 

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from comparing import SCORE_ROUNDING
 
 import optisense as ots
 from optisense.experiments import Record
@@ -80,7 +81,7 @@ def test_relit_scores_are_those_of_a_design_with_these_colours(tmp_path: Path) -
     ).values["colourings"]
     design = sensor("gelsight-mini", {"lights.red.colour": [0.0, 1.0, 0.0]})
     again = scores({"design": design, **asked}, tmp_path).values["scores"]["normdiff"]
-    assert relit["GGB"]["scores"]["normdiff"] == pytest.approx(again, rel=1e-5)
+    assert relit["GGB"]["scores"]["normdiff"] == pytest.approx(again, rel=SCORE_ROUNDING)
     assert relit["RGB"]["scores"]["normdiff"] > again  # two colours tell less than three
 
 

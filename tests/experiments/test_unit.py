@@ -6,7 +6,6 @@ import json
 import os
 import subprocess
 import sys
-import time
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -139,9 +138,8 @@ def test_what_a_killed_process_had_finished_is_not_done_again(tmp_path: Path) ->
     child = subprocess.Popen([sys.executable, "-c", KILLED, str(tmp_path)], env=environment)
     home = tmp_path / UNITS
     whole = "[!.]*.json"  # not the one being written, whose name begins with a dot
-    began = time.monotonic()
     while len(list(home.glob(whole))) < 3:
-        assert time.monotonic() - began < 120.0 and child.poll() is None
+        assert child.poll() is None
         os.sched_yield()
     child.kill()
     child.wait()

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from comparing import SCORE_ROUNDING, same_light
 
 import optisense as ots
 from optisense.design import SensorDesign, set_value
@@ -49,7 +50,7 @@ def test_presses_are_those_of_a_rendering_under_these_lights(relighting: Relight
     assert relit.exposure == pytest.approx(rendered.exposure, rel=1e-5)
     for one, other in zip(relit.presses, rendered.presses, strict=True):
         assert (one.mask == other.mask).all()
-        np.testing.assert_allclose(one.response, other.response, rtol=1e-4, atol=1e-5)
+        assert same_light(one.response, other.response)
 
 
 @pytest.mark.parametrize("exposure", ["auto", 500.0, 2500.0])
@@ -96,7 +97,7 @@ def test_brighter_lights_of_the_same_colours_change_nothing(relighting: Relighti
         brighter = set_value(brighter, f"lights.{name}.flux", 7.0 * group.flux)
     for name in ("rgb2normal", "normdiff"):
         one, other = (evaluate(relighting.lit(each), name).value for each in (design, brighter))
-        assert one == pytest.approx(other, rel=1e-4)
+        assert one == pytest.approx(other, rel=SCORE_ROUNDING)
 
 
 def test_large_contacts_are_compared_in_parts(

@@ -6,6 +6,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+from comparing import ROUNDING, same_light
 
 from optisense import Contact, OpticalModel, SensorDesign, Sphere
 from optisense.design import set_value
@@ -18,12 +19,6 @@ PIXELS = (80, 60)
 PHOTONS = 400_000
 BALL = Contact(Sphere(radius=1.5), at=(0.0, 0.0), depth=0.8)
 ASIDE = Contact(Sphere(radius=2.0), at=(3.0, -2.0), depth=0.6)
-
-ROUNDING = 2e-5
-"""Relative to the image's mean: sums of some thousand single-precision numbers in any order."""
-TURNED_RAYS = 1e-3, 0.01
-"""Part of an image's pixels where such rounding may draw another shadow ray, and what that may
-change, relative to the mean."""
 
 GUIDED_OTHERWISE = 0.02
 """Relative: two images of one design with photons sent by different guides differ by noise."""
@@ -58,12 +53,7 @@ def render(of: OpticalModel, *contacts: Contact, seed: int = 0) -> TactileImage:
 
 
 def same(a: TactileImage, b: TactileImage) -> bool:
-    part, most = TURNED_RAYS
-    for name, layer in a.layers.items():
-        off = np.abs(layer - b.layers[name]).max(axis=2) / layer.mean()
-        if off.max() > most or (off > ROUNDING).mean() > part:
-            return False
-    return True
+    return all(same_light(layer, b.layers[name]) for name, layer in a.layers.items())
 
 
 def test_layers_add_up_to_the_image() -> None:
@@ -106,7 +96,7 @@ def test_a_flux_scales_its_layer_and_no_other() -> None:
     before = render(changed, BALL)
     changed.update("lights.red.flux", 2 * changed.design.lights["red"].flux)
     after = render(changed, BALL)
-    assert after.layers["red"] == pytest.approx(2 * before.layers["red"], rel=1e-5)
+    assert same_light(after.layers["red"], 2 * before.layers["red"])
     assert same(
         TactileImage({k: after.layers[k] for k in ("green", "blue")}, *[np.zeros(1)] * 3),
         TactileImage({k: before.layers[k] for k in ("green", "blue")}, *[np.zeros(1)] * 3),
@@ -118,8 +108,7 @@ def test_an_image_relit_is_the_image_of_the_design_with_those_lights() -> None:
     other = set_value(set_value(design(), "lights.red.flux", 25.0), "lights.blue.colour.g", 0.4)
     expected = OpticalModel(other, "llvm").render([BALL], PIXELS, PHOTONS)
     relit = plain.relight({name: other.lights[name].channel_flux() for name in ("red", "blue")})
-    for name in expected.layers:
-        assert relit.layers[name] == pytest.approx(expected.layers[name], rel=1e-4, abs=1e-7)
+    assert same(relit, expected)
     with pytest.raises(RenderError, match="no light group 'rde'"):
         plain.relight({"rde": (1, 1, 1)})
 
@@ -182,7 +171,7 @@ def test_only_contacts_lights_what_the_whole_image_shows_there_and_nothing_else(
     np.testing.assert_array_equal(mask, whole.contact_mask)
     assert (only.radiance[~mask] == 0).all()
     # What a pixel shows does not depend on which others are rendered.
-    np.testing.assert_allclose(only.radiance[mask], whole.radiance[mask], rtol=1e-4, atol=1e-9)
+    assert same_light(only.radiance[mask], whole.radiance[mask])
 
 
 def test_ground_truth_of_a_ball_is_a_sphere() -> None:

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from comparing import SCORE_ROUNDING
 
 import optisense as ots
 from optisense.design import SensorDesign, set_value
@@ -52,9 +53,7 @@ class TestScores:
         forth = [one(point, 3).scores["normdiff"] for point in points]
         back = [other(point, 3).scores["normdiff"] for point in reversed(points)][::-1]
         assert all(map(math.isfinite, forth))
-        # Sums over threads differ by rounding, which may turn a shadow ray at the edge of a contact
-        # another way, of which NormDiff sees some hundred-thousandths.
-        assert forth == pytest.approx(back, rel=1e-4)
+        assert forth == pytest.approx(back, rel=SCORE_ROUNDING)
 
     def test_parts_are_kept(self, svelte: SensorDesign) -> None:
         space = SearchSpace({"camera.turn.x": (-1.0, 1.0)}).bind(svelte)

@@ -9,6 +9,7 @@ from itertools import islice
 
 import numpy as np
 import pytest
+from comparing import SCORE_ROUNDING
 
 import optisense as ots
 from optisense.design import SensorDesign
@@ -54,9 +55,13 @@ def test_a_colouring_scores_as_its_own_rendering(result: Result) -> None:
     for trial in np.random.default_rng(2).choice(np.array(tried, dtype=object), 2, replace=False):
         direct = usual(trial.vector, result.study.settings.seed)
         assert direct.failure is None
-        assert trial.scores["rgb2normal"] == pytest.approx(direct.scores["rgb2normal"], abs=1e-4)
+        assert trial.scores["rgb2normal"] == pytest.approx(
+            direct.scores["rgb2normal"], abs=SCORE_ROUNDING
+        )
         assert trial.scores["normdiff"] == pytest.approx(direct.scores["normdiff"], abs=0.3)
-        assert trial.scores["redness"] == pytest.approx(direct.scores["redness"], rel=1e-4)
+        assert trial.scores["redness"] == pytest.approx(
+            direct.scores["redness"], rel=SCORE_ROUNDING
+        )
         assert trial.parts["rgb2normal"]["worst_line"] == pytest.approx(
             direct.parts["rgb2normal"]["worst_line"], abs=1e-3
         )

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import atexit
 import importlib.util
+import math
 import os
 import shlex
 import sys
@@ -63,6 +64,15 @@ def _extension() -> Iterator[None]:
     atexit.register(take_out)
     yield
     take_out()
+
+
+@pytest.fixture(scope="session", autouse=True)
+def _patience(_extension: None) -> None:
+    """A slow machine's engine is waited for: no test depends on speed."""
+    from studio.core import engine
+    from studio.engine import session
+
+    engine.GREETING_SECONDS = session.PATIENCE = math.inf
 
 
 @pytest.fixture(autouse=True)

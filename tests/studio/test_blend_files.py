@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import bpy
 import pytest
+from waiting import until
 
 from studio.engine import session
 from studio.sensor.opening import open_source
@@ -34,11 +34,7 @@ def another(mini: Any, tmp_path: Path) -> Callable[[], Any]:
 def settled() -> None:
     """All that was asked of the engine is answered."""
     engine = session.engine()
-    end = time.monotonic() + 120.0
-    while engine.waiting:
-        engine.poll()
-        assert time.monotonic() < end
-        time.sleep(0.01)
+    until(lambda: not engine.waiting, problem_allowed=True)
 
 
 def test_a_sensor_on_its_way_does_not_arrive_in_another_file(

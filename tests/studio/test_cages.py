@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 import json
-import sys
-import time
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 import bmesh
 import bpy
 import numpy as np
 import pytest
+from recording import draw
+from waiting import until
 
 from studio.core import cage as core
 from studio.core.mesh_file import Mesh
@@ -23,10 +22,6 @@ from studio.scene.collections import object_of, objects_of
 from studio.scene.gather import gather_document
 from studio.shapes.cage_warnings import warnings_of
 from studio.shapes.ui import OPTISENSE_PT_shapes
-
-sys.path.insert(0, str(Path(__file__).parent))
-
-from recording import draw
 
 
 def heights(name: str) -> Any:
@@ -167,10 +162,14 @@ def test_back_to_rest_and_without_a_cage(mini: Any, select: Callable[..., None])
 
 def told(done: Callable[[str], bool]) -> str:
     """What the panel says, as soon as it says that."""
-    end = time.monotonic() + 60.0
-    while not done(texts := " ".join(draw(OPTISENSE_PT_shapes).texts)):
-        assert time.monotonic() < end and not session.state().problem, texts
-        time.sleep(session._tick() or 0.0)
+    texts = ""
+
+    def says_it() -> bool:
+        nonlocal texts
+        texts = " ".join(draw(OPTISENSE_PT_shapes).texts)
+        return done(texts)
+
+    until(says_it)
     return texts
 
 

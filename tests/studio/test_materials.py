@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
 import bpy
 import pytest
+from waiting import until
 
 from studio.engine import catalogue, session
 from studio.materials import gallery
@@ -63,10 +63,7 @@ def test_an_own_material_does_not_change_what_is_chosen(
     session.ask_and_wait("library", kind="material")  # answered after the pictures
     assert bpy.ops.optisense.keep_material(name="my-gel") == {"FINISHED"}
     assert (own_library / "materials" / "my-gel.yaml").is_file()
-    end = time.monotonic() + 60.0
-    while not gallery.picture("material", "my-gel"):
-        assert time.monotonic() < end and not session.state().problem, session.state().problem
-        time.sleep(session._tick() or 0.0)
+    until(lambda: gallery.picture("material", "my-gel"))
     names = [row["name"] for row in catalogue.entries("material")]
     assert names.index("my-gel") < names.index("pdms-soft")
     assert choice.material == "pdms-soft", "as before"

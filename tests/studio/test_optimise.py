@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable
 from pathlib import Path
 from types import SimpleNamespace
@@ -10,6 +9,7 @@ from typing import Any
 
 import bpy
 import pytest
+from waiting import until
 
 from studio.engine import catalogue, handing, session
 from studio.optimise.suggesting import suggestions
@@ -19,12 +19,9 @@ from studio.scene.collections import objects_of
 @pytest.fixture
 def library() -> None:
     """The engine has told what the library has."""
-    engine = session.engine()
-    end = time.monotonic() + 60.0
-    while not all(catalogue.entries(kind) for kind in ("material", "coating", "light", "camera")):
-        engine.poll()
-        assert time.monotonic() < end
-        time.sleep(0.01)
+    session.engine()
+    kinds = ("material", "coating", "light", "camera")
+    until(lambda: all(catalogue.entries(kind) for kind in kinds))
 
 
 def parameters(scene: Any, text: str) -> list[dict[str, Any]]:

@@ -2,22 +2,17 @@
 
 from __future__ import annotations
 
-import sys
-import time
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 import bpy
 import pytest
+from recording import Recording, draw, menus, panels
+from waiting import until
 
 import studio
 from studio.engine import catalogue, session
 from studio.scene.collections import object_of, objects_of
-
-sys.path.insert(0, str(Path(__file__).parent))
-
-from recording import Recording, draw, menus, panels
 
 STEPS = [
     "Sensor",
@@ -176,12 +171,8 @@ def test_a_material_that_was_refused_is_told_beside_its_button(
 
 
 def test_menus_are_filled_by_the_engine(scene: Any) -> None:
-    engine = session.engine()
-    end = time.monotonic() + 60.0
-    while not catalogue.entries("methods") or not catalogue.entries("camera"):
-        engine.poll()
-        assert time.monotonic() < end
-        time.sleep(0.01)
+    session.engine()
+    until(lambda: catalogue.entries("methods") and catalogue.entries("camera"))
     assert {"rgb2normal", "normdiff", "aoap", "2to3pw"} <= {
         entry["name"] for entry in catalogue.entries("objectives")
     }

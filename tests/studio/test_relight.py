@@ -2,23 +2,18 @@
 
 from __future__ import annotations
 
-import time
 from typing import Any
 
 import bpy
 import numpy as np
+from waiting import until
 
-from studio.engine import session
 from studio.simulate import picture, relight
 
 
 def shown() -> np.ndarray:
     """(n,) what the picture's pixels are, once the engine has answered."""
-    end = time.monotonic() + 60.0
-    while relight._open is not None and not relight._open.done:
-        session._tick()
-        assert time.monotonic() < end
-        time.sleep(0.01)
+    until(lambda: relight._open is None or relight._open.done)
     image = bpy.data.images[picture.IMAGE]
     values = np.empty(len(image.pixels), dtype=np.float32)
     image.pixels.foreach_get(values)

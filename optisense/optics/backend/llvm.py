@@ -1,4 +1,4 @@
-"""The libLLVM shared library that the renderer compiles its kernels with: finding a fit one.
+"""The system libraries that the renderer needs: finding a fit libLLVM, and libatomic.
 
 Dr.Jit, the renderer's compiler, loads libLLVM the moment it is imported. With libLLVM 15 or 16 the
 first kernel on an AVX-512 machine aborts the whole process (``Cannot select: fminimum``), and with
@@ -28,6 +28,9 @@ TESTED_LLVM = 19
 
 PATH_VARIABLE = "DRJIT_LIBLLVM_PATH"
 
+ATOMIC_LIBRARY = "libatomic.so.1"
+"""A system library that Dr.Jit is linked to on Linux and that a bare Debian lacks."""
+
 _LIBRARY_PATTERNS = {
     "linux": (
         "/usr/lib/*-linux-gnu*/libLLVM*.so*",
@@ -44,6 +47,8 @@ _LIBRARY_PATTERNS = {
         "/opt/local/libexec/llvm-*/lib/libLLVM*.dylib",
     ),
 }
+
+_FILE_NAMES = {"linux": "libLLVM*.so*", "darwin": "libLLVM*.dylib"}
 
 # "libLLVM.so.19.1", "libLLVM-19.so", "libLLVM-14.0.6.so.1", "libLLVM.19.dylib"
 _VERSION_IN_NAME = re.compile(r"libLLVM(?:-|\.so\.|\.)(\d{2,})(?:\.(\d+))?")
@@ -169,8 +174,43 @@ def system_command(apt: str, dnf: str, pacman: str, zypper: str) -> str:
     return f"install {apt} (or what this system calls it)"
 
 
+def load_atomic() -> None:
+    """Load libatomic on Linux, from the system or from the environment that Python runs in.
+
+    Dr.Jit is linked to it and finds it once it is loaded; without it, Dr.Jit fails with a
+    misleading message.
+
+    Raises:
+        SetupError: there is none; the hint is the command to type.
+    """
+    if sys.platform != "linux":
+        return
+    for place in ("", *(f"{folder}/" for folder in _environment_folders())):
+        try:
+            ctypes.CDLL(place + ATOMIC_LIBRARY)
+            return
+        except OSError:
+            continue
+    raise SetupError(
+        f"the system library {ATOMIC_LIBRARY} is missing, which the renderer needs",
+        where="set-up",
+        hint="Type: " + system_command("libatomic1", "libatomic", "gcc-libs", "libatomic1"),
+    )
+
+
+def _environment_folders() -> list[Path]:
+    """Where a virtual environment, and the one that it was made from, keep libraries.
+
+    Packages such as conda's libllvm19 and libgcc put them there.
+    """
+    return [Path(prefix) / "lib" for prefix in dict.fromkeys((sys.prefix, sys.base_prefix))]
+
+
 def _library_files() -> Iterator[Path]:
     """Files that look like a libLLVM, in the usual places."""
+    if sys.platform in _FILE_NAMES:
+        for folder in _environment_folders():
+            yield from sorted(folder.glob(_FILE_NAMES[sys.platform]))
     for pattern in _LIBRARY_PATTERNS.get(sys.platform, ()):
         yield from sorted(Path("/").glob(pattern.lstrip("/")))
     if sys.platform == "win32":

@@ -18,13 +18,10 @@ from importlib import import_module
 from typing import Any
 
 from optisense.errors import SetupError
-from optisense.optics.backend.llvm import MINIMUM_LLVM, PATH_VARIABLE, find_llvm, system_command
+from optisense.optics.backend.llvm import MINIMUM_LLVM, PATH_VARIABLE, find_llvm, load_atomic
 
 VARIANTS = {"llvm": "llvm_ad_rgb", "cuda": "cuda_ad_rgb"}
 """Mitsuba's name for each variant a user can ask for; ``auto`` picks one."""
-
-ATOMIC_LIBRARY = "libatomic.so.1"
-"""A system library that Dr.Jit is linked to and that a bare Debian lacks."""
 
 
 @dataclass(frozen=True)
@@ -239,15 +236,7 @@ def import_renderer(name: str) -> Any:
     Raises:
         SetupError: it is not installed, or a system library that it needs is not.
     """
-    if sys.platform == "linux":
-        try:
-            ctypes.CDLL(ATOMIC_LIBRARY)  # Dr.Jit needs it, and says so in a misleading way
-        except OSError as error:
-            raise SetupError(
-                f"the system library {ATOMIC_LIBRARY} is missing, which the renderer needs",
-                where="set-up",
-                hint="Type: " + system_command("libatomic1", "libatomic", "gcc-libs", "libatomic1"),
-            ) from error
+    load_atomic()
     try:
         return import_module(name)
     except Exception as error:  # Dr.Jit turns a failed import into a NameError

@@ -20,7 +20,8 @@ class SerialRunner(Runner):
     """Works a trial out when it is submitted.
 
     A render that Ctrl-C ends early still gives an image, and a score that must not count. So the
-    first Ctrl-C waits until the trial is finished; the second drops it.
+    first Ctrl-C waits until the trial is finished; the second drops it. Where Ctrl-C is ignored, as
+    shells arrange it for programs that they start in the background, it stays ignored.
     """
 
     def __init__(self, evaluator: Evaluator, told: Callable[[], None] | None = None) -> None:
@@ -58,7 +59,8 @@ class SerialRunner(Runner):
         """Nothing is running."""
 
     def __enter__(self) -> SerialRunner:
-        if threading.current_thread() is threading.main_thread():
+        in_main_thread = threading.current_thread() is threading.main_thread()
+        if in_main_thread and signal.getsignal(signal.SIGINT) is not signal.SIG_IGN:
             self._before = signal.signal(signal.SIGINT, self._press)
         return self
 
