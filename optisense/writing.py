@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import json
 import os
+import re
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
@@ -77,6 +78,50 @@ def write_text(path: Path, text: str, what: str = "the file", hint: str = FREE_S
     """
     with written_whole(path, what, hint) as temporary:
         temporary.write_text(text, encoding="utf-8")
+
+
+HEAD = 4096
+"""Bytes at the start of an HTML page among which its head is looked for."""
+
+
+def is_own_page(path: Path, kind: str) -> bool:
+    """Whether a file is an HTML page that this program has written.
+
+    Args:
+        path: of the file.
+        kind: of the page, which its head names: "render", "scores", "search" or "tolerance".
+    """
+    try:
+        with path.open("rb") as file:
+            head = file.read(HEAD)
+    except OSError:
+        return False
+    mark = rf'<meta name="generator" content="OptiSense [^"]*; {re.escape(kind)}">'
+    return re.search(mark.encode(), head) is not None
+
+
+def remove_own_page(path: Path, kind: str) -> None:
+    """Remove a page that this program wrote about results which others now replace.
+
+    A file of that name that is anything else is a user's, and stays.
+
+    Args:
+        path: of the page.
+        kind: as of `is_own_page`.
+
+    Raises:
+        OutputError: the page can't be removed.
+    """
+    if not is_own_page(path, kind):
+        return
+    try:
+        path.unlink()
+    except OSError as error:
+        raise OutputError(
+            f"the page of earlier results can't be removed: {error.strerror}",
+            where=str(path),
+            hint="Remove it, or choose another folder",
+        ) from error
 
 
 def write_json(

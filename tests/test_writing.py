@@ -8,7 +8,13 @@ from pathlib import Path
 import pytest
 
 from optisense.errors import OutputError
-from optisense.writing import write_json, write_text, written_together, written_whole
+from optisense.writing import (
+    remove_own_page,
+    write_json,
+    write_text,
+    written_together,
+    written_whole,
+)
 
 
 def test_files_appear_together_when_all_are_written(tmp_path: Path) -> None:
@@ -53,3 +59,16 @@ def test_json_reads_back(tmp_path: Path) -> None:
     values = {"name": "größe", "numbers": [1, 2.5, None]}
     write_json(tmp_path / "values.json", values)
     assert json.loads((tmp_path / "values.json").read_text("utf-8")) == values
+
+
+def test_only_pages_of_this_program_and_kind_are_removed(tmp_path: Path) -> None:
+    page = tmp_path / "report.html"
+    head = '<!DOCTYPE html><meta name="generator" content="OptiSense 0.1.0; {}">'
+    for others in ("<!DOCTYPE html><p>my own page about OptiSense", head.format("search"), ""):
+        page.write_text(others)
+        remove_own_page(page, "render")
+        assert page.read_text() == others
+    page.write_text(head.format("render"))
+    remove_own_page(page, "render")
+    assert not page.exists()
+    remove_own_page(page, "render")  # it is gone already

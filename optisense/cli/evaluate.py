@@ -28,7 +28,7 @@ from optisense.cli.options import (
     seed_option,
 )
 from optisense.cli.output_folder import ensure_writable
-from optisense.writing import write_text
+from optisense.writing import remove_own_page, write_text
 
 if TYPE_CHECKING:
     from optisense.objectives import Objective
@@ -152,6 +152,8 @@ def _write(scored: Scored, folder: Path, objectives: list[Objective]) -> None:
     write_text(folder / JSON_FILE, text)
     if objectives:
         write_score_report(folder / REPORT_FILE, scored, objectives)
+    else:  # a page of earlier scores would contradict these
+        remove_own_page(folder / REPORT_FILE, "scores")
 
 
 def _print_table(scored: Scored) -> None:

@@ -24,7 +24,6 @@ from optisense.cli.output_folder import ensure_writable
 if TYPE_CHECKING:
     from optisense.optics import RenderProgress, TactileImage
 
-REPORT = "report.html"
 PICTURE = "image.png"
 ONE_PICTURE = 1_000_000
 """Photons for a single picture. A program that keeps its model pays once and takes more."""
@@ -101,6 +100,7 @@ def render(
 
     from optisense.cli.placing import place_contacts
     from optisense.optics import OpticalModel
+    from optisense.optics.imaging.tactile_image import REPORT_FILE
     from optisense.report import write_report
     from optisense.report.camera_rays import CameraRays
 
@@ -125,7 +125,7 @@ def render(
     image.settings["contacts"] = list(contact or [])
     image.save(out, brightness)
     write_report(
-        out / REPORT,
+        out / REPORT_FILE,
         sensor,
         image,
         contacts,
@@ -161,6 +161,8 @@ def _progress_bar() -> Iterator[Callable[[RenderProgress], None]]:
 
 
 def _say_what_came(image: TactileImage, folder: Path) -> None:
+    from optisense.optics.imaging.tactile_image import REPORT_FILE
+
     height, width = image.contact_mask.shape
     settings = image.settings
     facts = [f"{width} x {height} pixels", f"{settings['photons'] / 1e6:.2g} million photons"]
@@ -169,4 +171,4 @@ def _say_what_came(image: TactileImage, folder: Path) -> None:
     facts.append(f"{settings['seconds']['total']:.2g} s")
     output.print(", ".join(facts), style="dim")
     output.print(f"picture: {folder / PICTURE}", markup=False)
-    output.print(f"report:  {folder / REPORT}", markup=False)
+    output.print(f"report:  {folder / REPORT_FILE}", markup=False)

@@ -23,7 +23,7 @@ from optisense.cli.options import (
 )
 from optisense.cli.output_folder import ensure_writable
 from optisense.cli.progress import counting_bar
-from optisense.writing import write_text
+from optisense.writing import remove_own_page, write_text
 
 if TYPE_CHECKING:
     from optisense.search.sensitivity import Estimate
@@ -126,6 +126,8 @@ def _write(found: Tolerance, folder: Path, text: str, report: bool) -> None:
     write_text(folder / JSON_FILE, text + "\n")
     if report:
         write_tolerance_report(folder / REPORT_FILE, found)
+    else:  # a page of earlier figures would contradict these
+        remove_own_page(folder / REPORT_FILE, "tolerance")
 
 
 def _print(found: Tolerance) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import errno
 import json
 import os
+import re
 from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
@@ -17,7 +18,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from optisense.errors import RenderError
 from optisense.optics.camera.response import auto_exposure, picture
-from optisense.writing import written_together
+from optisense.writing import remove_own_page, written_together
+
+REPORT_FILE = "report.html"
+"""The page that `optisense render` writes beside an image."""
 
 
 @dataclass
@@ -84,7 +88,9 @@ class TactileImage:
     def save(self, folder: str | Path, exposure: float | str = "auto") -> None:
         """Write image.png, radiance.exr, normals.npy, contact_mask.npy, `layers/*.exr`, run.json.
 
-        They are written under temporary names and appear when all are whole.
+        They are written under temporary names and appear when all are whole. What an earlier
+        image left in the folder goes: its layers of groups that this image does not have, and the
+        page (report.html) that was written about it. Other files stay.
 
         Raises:
             OutputError: a file can't be written, for instance because the disk is full.
@@ -101,8 +107,20 @@ class TactileImage:
                 list(pool.map(_bitmap, bitmaps.values(), paths))
             np.save(stage(out / "normals.npy"), self.normals)
             np.save(stage(out / "contact_mask.npy"), self.contact_mask)
-            text = json.dumps(self.settings, indent=2) + "\n"
+            text = json.dumps({**self.settings, "layers": list(self.layers)}, indent=2) + "\n"
             stage(out / "run.json").write_text(text, encoding="utf-8")
+            for stale in _layers_before(out) - set(self.layers):
+                (out / "layers" / f"{stale}.exr").unlink(missing_ok=True)
+            remove_own_page(out / REPORT_FILE, "render")
+
+
+def _layers_before(folder: Path) -> set[str]:
+    """The layers that an earlier image wrote into a folder, by its run.json."""
+    try:
+        names = json.loads((folder / "run.json").read_text(encoding="utf-8"))["layers"]
+        return {name for name in names if re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9_-]*", name)}
+    except (OSError, ValueError, LookupError, TypeError):
+        return set()
 
 
 def _scaled(layer: NDArray[np.float32], factors: NDArray[np.float32]) -> NDArray[np.float32]:

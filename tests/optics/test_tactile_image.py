@@ -1,0 +1,51 @@
+"""Saved images: a folder holds one image and what was written about that one."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+
+from optisense.optics import TactileImage
+from optisense.report import write_report
+from optisense.sensors import gelsight_mini
+
+
+def image(*groups: str) -> TactileImage:
+    return TactileImage(
+        layers={name: np.full((4, 6, 3), 0.2, dtype=np.float32) for name in groups},
+        normals=np.tile(np.float32([0, 0, -1]), (4, 6, 1)),
+        contact_mask=np.zeros((4, 6), dtype=bool),
+        points=np.zeros((4, 6, 3), dtype=np.float32),
+    )
+
+
+def files(folder: Path) -> set[str]:
+    return {str(path.relative_to(folder)) for path in folder.rglob("*") if path.is_file()}
+
+
+def test_another_image_takes_away_what_was_written_about_the_first(tmp_path: Path) -> None:
+    first = image("red", "green")
+    first.save(tmp_path)
+    write_report(tmp_path / "report.html", gelsight_mini(), first)
+    (tmp_path / "notes.txt").write_text("mine")
+    (tmp_path / "layers" / "blue.exr").write_text("mine too")
+    image("red").save(tmp_path)
+    left = files(tmp_path)
+    assert "report.html" not in left
+    assert "layers/green.exr" not in left
+    assert {"notes.txt", "layers/blue.exr", "layers/red.exr", "image.png"} <= left
+
+
+def test_files_of_others_stay_whatever_run_json_says(tmp_path: Path) -> None:
+    folder = tmp_path / "image"
+    folder.mkdir()
+    (folder / "report.html").write_text("<!DOCTYPE html><p>my own report")
+    (tmp_path / "mine.exr").write_text("mine")
+    for text in ('{"layers": ["../../mine", "../mine", 3]}', "[1]", '{"layers": 3}', "no JSON"):
+        (folder / "run.json").write_text(text)
+        image("red").save(folder)
+        assert (tmp_path / "mine.exr").read_text() == "mine"
+        assert "my own report" in (folder / "report.html").read_text()
+    assert json.loads((folder / "run.json").read_text())["layers"] == ["red"]
