@@ -53,6 +53,16 @@ def dataset(
         float,
         typer.Option(min=0.0, max=89.0, metavar="DEGREES", help="The most it tilts, about 2 axes."),
     ] = 0.0,
+    margin: Annotated[
+        float,
+        typer.Option(
+            min=0.0,
+            max=49.0,
+            metavar="PERCENT",
+            help="Of the picture's width that stays free between a contact and the picture's "
+            "edge; 0 lets the edge cut contacts.",
+        ),
+    ] = 2.0,
     resolution: Annotated[
         str | None,
         typer.Option(
@@ -107,8 +117,9 @@ def dataset(
     from optisense.tasks import ContactDraw, DatasetSettings, generate
     from optisense.tasks.dataset import LABELS, Dataset
 
+    indenters = tuple(indenter or ("sphere:1.5",))
     settings = DatasetSettings(
-        contacts=ContactDraw(tuple(indenter or ("sphere:1.5",)), depths, rotations, tilt),
+        contacts=ContactDraw(indenters, depths, rotations, tilt, margin / 100),
         resolution=size,
         photons=photons,
         seed=seed,

@@ -19,6 +19,10 @@ if TYPE_CHECKING:
 PLACES_SEEN = 320, 240
 """Places are drawn among the points that this many rays of the camera meet."""
 
+MARGIN = 0.02
+"""Part of the picture's width that stays free around a contact: 6 of 320 pixels, 0.4 mm on a
+GelSight Mini, so that the shading just outside the contact is in the picture too."""
+
 INDENTER_FORM = "Write sphere:RADIUS, cylinder:RADIUS[,LENGTH], plane or mesh:FILE[,SCALE]"
 
 FloatArray = NDArray[np.float64]
@@ -79,6 +83,21 @@ def parse_indenter(text: str) -> Indenter:
         raise ContactError(error.message, where=f"indenter '{text}'", hint=hint) from error
 
 
+def keeps_margin(mask: NDArray[np.bool_], margin: float) -> bool:
+    """Whether a contact stays clear of the picture's edge.
+
+    Args:
+        mask: (h, w), true where the contact is seen.
+        margin: part of the width that must stay free; 0 is always kept.
+    """
+    if margin == 0.0:
+        return True
+    inner = mask.copy()
+    free = max(1, round(margin * mask.shape[1]))
+    inner[free:-free, free:-free] = False
+    return not inner.any()
+
+
 class Places:
     """The places of a sensing surface that the camera sees, to draw from evenly by area."""
 
@@ -93,6 +112,7 @@ class Places:
         height, width = rays.hit.shape
         self._spots = np.column_stack([(columns + 0.5) / width, (rows + 0.5) / height])
         self._share = np.cumsum(weights[rows, columns])
+        self._middle = int(np.linalg.norm((self._spots - 0.5) * (width, height), axis=1).argmin())
 
     @classmethod
     def of(cls, model: OpticalModel) -> Places:
@@ -101,6 +121,11 @@ class Places:
 
         rays = model.chief_rays(PLACES_SEEN)
         return cls(rays, pixel_areas(rays))
+
+    @property
+    def middle(self) -> FloatArray:
+        """(3,) mm: the place that the picture shows nearest to its middle."""
+        return self._points[self._middle]
 
     def draw(self, rng: np.random.Generator) -> tuple[FloatArray, FloatArray]:
         """A place: its point (3,) mm, and where the image shows it, (2,) parts of its size."""
@@ -128,12 +153,15 @@ class ContactDraw:
         depth: mm, least and most.
         rotation: degrees about the outward normal, least and most.
         tilt: degrees; turns about two axes in the surface are drawn from -tilt to tilt.
+        margin: part of the picture's width that stays free between a contact and the picture's
+            edge, from 0 to less than a half; 0 lets the edge cut contacts.
     """
 
     indenters: tuple[str, ...] = ("sphere:1.5",)
     depth: tuple[float, float] = (0.3, 1.0)
     rotation: tuple[float, float] = (0.0, 360.0)
     tilt: float = 0.0
+    margin: float = MARGIN
 
     def __post_init__(self) -> None:
         if not self.indenters:
@@ -145,6 +173,8 @@ class ContactDraw:
             raise TaskError(f"the least depth is {self.depth[0]:g}", hint="Give mm above 0")
         if not 0 <= self.tilt < 90:
             raise TaskError(f"the tilt is {self.tilt:g}", hint="Give 0 to less than 90 degrees")
+        if not 0 <= self.margin < 0.5:
+            raise TaskError(f"the margin is {self.margin:g}", hint="Give 0 to less than 0.5")
 
     def parsed(self) -> dict[str, Indenter]:
         """The indenters by their texts.

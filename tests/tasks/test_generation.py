@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import shutil
 from dataclasses import replace
 from pathlib import Path
@@ -193,3 +194,54 @@ def test_a_dataset_of_a_sensor_with_an_own_lamp_opens_and_continues_elsewhere(
     # Another machine has the folder, and not the lamp.
     monkeypatch.setenv("OPTISENSE_LIBRARY", str(tmp_path / "elsewhere"))
     assert len(generate(OpticalModel(load(folder / "design")), folder, 3, settings)) == 3
+
+
+FEW = 20_000  # photons, where only chief rays matter
+
+
+def edge_distance(mask: np.ndarray) -> int:
+    """Pixels that are free between a mask and the nearest edge."""
+    rows, columns = np.nonzero(mask)
+    height, width = mask.shape
+    return int(min(rows.min(), columns.min(), height - 1 - rows.max(), width - 1 - columns.max()))
+
+
+def test_contacts_stay_clear_of_the_edge_unless_they_may_be_cut(
+    mini: OpticalModel, tmp_path: Path
+) -> None:
+    settings = DatasetSettings(
+        ContactDraw(("sphere:1.5",)), resolution=(100, 75), photons=FEW, seed=1
+    )
+    kept = generate(mini, tmp_path / "kept", 16, settings)
+    assert min(edge_distance(sample.mask) for sample in kept) >= 2  # of 100 pixels
+    cut = replace(settings, contacts=replace(settings.contacts, margin=0.0))
+    free = generate(mini, tmp_path / "cut", 16, cut)
+    assert min(edge_distance(sample.mask) for sample in free) == 0
+    assert len(kept.failures) == len(free.failures) == 0
+    # A draw that kept its margin by itself is the same in both.
+    same = [a for a, b in zip(kept.labels, free.labels, strict=True) if a["x"] == b["x"]]
+    assert len(same) >= 5
+
+
+def test_an_indenter_larger_than_the_view_keeps_no_margin(
+    mini: OpticalModel, tmp_path: Path
+) -> None:
+    draw = ContactDraw(("sphere:40",), depth=(1.0, 1.5))
+    settings = DatasetSettings(draw, resolution=(60, 45), photons=FEW, seed=1)
+    made = generate(mini, tmp_path / "large", 3, settings)
+    assert len(made) == 3
+    assert all(edge_distance(sample.mask) == 0 for sample in made)
+
+
+def test_a_dataset_of_a_release_without_margins_goes_on_without_one(
+    mini: OpticalModel, tmp_path: Path
+) -> None:
+    settings = DatasetSettings(ContactDraw(margin=0.0), resolution=(60, 45), photons=FEW)
+    generate(mini, tmp_path / "old", 1, settings)
+    file = tmp_path / "old" / "dataset.json"
+    info = json.loads(file.read_text())
+    del info["settings"]["contacts"]["margin"]
+    file.write_text(json.dumps(info))
+    assert len(generate(mini, tmp_path / "old", 2, settings)) == 2
+    with pytest.raises(TaskError, match=r"margin was 0\.0, is 0\.02"):
+        generate(mini, tmp_path / "old", 2, replace(settings, contacts=ContactDraw()))
