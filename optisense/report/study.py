@@ -23,6 +23,7 @@ from optisense.report.cage_changes import CageChange, cage_changes, cage_figure
 from optisense.report.drawing import figure_uri
 from optisense.report.files import template
 from optisense.report.pictures import MOST_STRETCHED, data_uri, stretching_colours
+from optisense.report.tolerance import shown_size
 from optisense.search.methods import find
 from optisense.search.study import Study, best_of, front_among
 from optisense.search.trial import Trial
@@ -157,7 +158,9 @@ def _robust(study: Study) -> str:
     settings = study.settings
     if settings.errors is None:
         return ""
-    paths = ", ".join(f"{path} {size:g}" for path, (_, size) in settings.errors.items())
+    paths = ", ".join(
+        f"{path} {shown_size(path, size)}" for path, (_, size) in settings.errors.items()
+    )
     return (
         f"Scores are what nine of ten manufactured sensors reach (P10 over {settings.samples} of "
         f"them), with errors of making: {paths}."

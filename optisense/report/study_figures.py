@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from optisense.design import SensorDesign
 from optisense.design.section import section
-from optisense.report.drawing import AMBER, BLUE, GREY, PALE, RED, new_figure
+from optisense.report.drawing import AMBER, BLUE, GREY, PALE, RED, legend_above, new_figure
 from optisense.search.parameters import Choice
 from optisense.search.trial import Trial
 
@@ -77,7 +77,7 @@ def convergence(trials: Sequence[Trial], names: Sequence[str]) -> Figure:
             )
         axes.set_ylabel(name)
         axes.grid(alpha=0.25)
-        axes.legend(loc="lower right", fontsize=8, framealpha=0.9)
+        legend_above(axes, columns=4)
     panels[-1].set_xlabel("trial")
     return figure
 
@@ -214,7 +214,7 @@ def front(
     axes.set_xlabel(f"{one} (higher is better)")
     axes.set_ylabel(f"{other} (higher is better)")
     axes.grid(alpha=0.25)
-    axes.legend(fontsize=9)
+    legend_above(axes, columns=4)
     return figure
 
 

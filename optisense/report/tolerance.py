@@ -12,8 +12,17 @@ from jinja2 import DictLoader, Environment, StrictUndefined
 from markupsafe import Markup
 
 from optisense import __version__
-from optisense.report.drawing import AMBER, BLUE, GREY, RED, figure_uri, new_figure
+from optisense.report.drawing import (
+    AMBER,
+    BLUE,
+    GREY,
+    RED,
+    figure_uri,
+    legend_above,
+    new_figure,
+)
 from optisense.report.files import template
+from optisense.search.making import unit_of
 from optisense.search.sensitivity import Estimate
 from optisense.search.tolerance import Spreading, Tolerance
 from optisense.writing import write_text
@@ -53,7 +62,7 @@ def render_tolerance(tolerance: Tolerance) -> str:
         interrupted=tolerance.interrupted,
         objectives=[_objective(name, each) for name, each in tolerance.results.items()],
         errors=[
-            (path, f"{spread.size:g}", _kind(spread.kind))
+            (path, shown_size(path, spread.size), _kind(spread.kind))
             for path, spread in tolerance.errors.spreads.items()
         ],
         failures=sorted(tolerance.failures.items(), key=lambda item: -item[1]),
@@ -82,7 +91,7 @@ def spread_figure(name: str, found: Spreading) -> Figure:
             left.axvline(each.value, color=colour, lw=1.5, label=f"{key.upper()} {each.value:.4g}")
     left.set_xlabel(name)
     left.set_ylabel("sensors")
-    left.legend(fontsize=8)
+    legend_above(left)
     names = list(shares)
     values = np.array([share.value for share in shares.values()])
     ends = np.array([[each.value - each.low, each.high - each.value] for each in shares.values()])
@@ -93,12 +102,18 @@ def spread_figure(name: str, found: Spreading) -> Figure:
     noise = noise_share(found)
     if noise > 0.0:
         right.axvline(noise, color=GREY, ls=":", lw=1.4, label="noise of the image alone")
-        right.legend(fontsize=8)
+        legend_above(right)
     right.invert_yaxis()
     right.set_xlim(left=0.0)
     right.set_xlabel("share of the variance (total effect)")
     right.tick_params(axis="y", labelsize=9)
     return figure
+
+
+def shown_size(path: str, size: float) -> str:
+    """The size of an error with its unit, such as ``0.1 mm``."""
+    unit = unit_of(path)
+    return f"{size:g}{unit}" if unit == "°" else f"{size:g} {unit}".rstrip()
 
 
 def noise_share(found: Spreading) -> float:

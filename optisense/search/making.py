@@ -61,6 +61,29 @@ class Spread:
         return np.asarray(truncnorm.ppf(share, -CUT, CUT) * self.size)
 
 
+UNITS = {
+    "position": "mm",
+    "shift": "mm",
+    "points": "mm",
+    "size": "mm",
+    "angle": "°",
+    "turn": "°",
+    "fov": "°",
+    "cutoff": "°",
+    "beam": "°",
+    "flux": "mW",
+}
+"""Units of the quantities that a path may end with; all others are plain numbers."""
+
+
+def unit_of(path: str) -> str:
+    """The unit of what a path names, such as ``mm``; empty for a plain number."""
+    names = [re.sub(r"\[\d+\]$", "", step) for step in path.split(".")]
+    while len(names) > 1 and names[-1] in ("x", "y", "z", "r", "g", "b"):
+        names.pop()
+    return UNITS.get(names[-1], "")
+
+
 class MakingErrors:
     """Everything that may come out other than designed, by path.
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -12,7 +13,7 @@ from typer.testing import CliRunner
 import optisense as ots
 from optisense.cli import app
 from optisense.design import SensorDesign, set_value
-from optisense.report.tolerance import noise_share, render_tolerance
+from optisense.report.tolerance import noise_share, render_tolerance, shown_size, spread_figure
 from optisense.search import Spread
 from optisense.search.tolerance import Tolerance, tolerance
 
@@ -97,3 +98,28 @@ def test_bad_input_is_told(options: list[str], message: str) -> None:
     done = CliRunner().invoke(app, ["tolerance", "gelsight-mini", *options])
     assert done.exit_code == 2
     assert message in " ".join(done.output.split())
+
+
+def test_sizes_of_errors_have_their_unit() -> None:
+    for path, text in {
+        "lights.position": "0.05 mm",
+        "lights.red.lights[0].position.x": "0.05 mm",
+        "cages.M1.points": "0.05 mm",
+        "cages.M1.points[3].z": "0.05 mm",
+        "lights.angle": "0.05°",
+        "camera.turn.x": "0.05°",
+        "camera.fov": "0.05°",
+        "lights.red.flux": "0.05 mW",
+        "coating.specularity": "0.05",
+        "coating.reflectance.g": "0.05",
+        "materials.gel.ior": "0.05",
+    }.items():
+        assert shown_size(path, 0.05) == text
+
+
+def test_legends_stand_above_their_plots(found: Tolerance) -> None:
+    noisy = replace(found.results["score"], noise=0.5 * found.results["score"].deviation)
+    figure = spread_figure("score", noisy)
+    figure.draw_without_rendering()
+    for axes in figure.axes:
+        assert axes.get_legend().get_window_extent().y0 >= axes.get_window_extent().y1 - 1.0
