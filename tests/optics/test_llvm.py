@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import sys
 from pathlib import Path
 
 import pytest
@@ -100,3 +101,34 @@ def test_a_bad_path_from_the_user_is_an_error(
     with pytest.raises(SetupError, match=complaint) as caught:
         llvm.find_llvm()
     assert llvm.PATH_VARIABLE in str(caught.value)
+
+
+@pytest.fixture
+def environment(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Path:
+    """The folder for libraries of an empty environment, in which Python seems to run."""
+    monkeypatch.setattr("sys.prefix", str(tmp_path))
+    monkeypatch.setattr("sys.base_prefix", str(tmp_path))
+    folder = tmp_path / "lib"
+    folder.mkdir()
+    return folder
+
+
+def test_an_environment_may_bring_its_own_libllvm(environment: Path) -> None:
+    """As the wheels and conda packages of machines on which nobody may install packages do."""
+    real = llvm.find_llvm().path.resolve()
+    own = environment / f"libLLVM-{llvm.TESTED_LLVM}.so"
+    assert own not in {library.path for library in llvm.installed_llvms()}
+    own.write_bytes(real.read_bytes())
+    assert own in {library.path for library in llvm.installed_llvms()}
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="only Linux has libatomic")
+def test_an_environment_may_bring_its_own_libatomic(
+    environment: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(llvm, "ATOMIC_LIBRARY", "libof-a-test.so.1")
+    with pytest.raises(SetupError, match="is missing") as told:
+        llvm.load_atomic()
+    assert "libatomic" in str(told.value.hint)
+    (environment / "libof-a-test.so.1").write_bytes(llvm.find_llvm().path.read_bytes())
+    llvm.load_atomic()  # any library that can be loaded will do for this

@@ -46,7 +46,8 @@ def select_variant(variant: str = "auto") -> str:
         is not activated.
 
     Raises:
-        SetupError: an unknown variant, no GPU for ``cuda``, or no fit libLLVM for ``llvm``.
+        SetupError: an unknown variant, no GPU for ``cuda``, no fit libLLVM for ``llvm``, or no
+            libatomic.
     """
     if variant not in ("auto", *VARIANTS):
         raise SetupError(
@@ -54,6 +55,7 @@ def select_variant(variant: str = "auto") -> str:
             where="--variant",
             hint=f"Choose one of: auto, {', '.join(VARIANTS)}",
         )
+    load_atomic()  # before anything imports Dr.Jit
     llvm_error = None
     try:
         _prepare_llvm()
