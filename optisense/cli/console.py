@@ -10,30 +10,59 @@ import functools
 import os
 import sys
 import traceback
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack
+from contextvars import ContextVar
 from typing import ParamSpec, TypeVar
 
 import typer
-from rich.console import Console
+from rich.console import Console, ConsoleOptions, RenderableType
+from rich.segment import Segment
 
 from optisense.errors import OptiSenseError, OutputError, SetupError
+from optisense.text import visible
 
 EXIT_FAILURE = 1
 EXIT_BAD_INPUT = 2
 EXIT_INTERRUPTED = 130
 
-output = Console(highlight=False, soft_wrap=True)
-messages = Console(stderr=True, highlight=False, soft_wrap=True)
+
+class PlainConsole(Console):
+    """A console that shows control characters in text, which may be a stranger's, and obeys none.
+
+    Colours and bars are made of control segments and styles, which stay.
+    """
+
+    def render(
+        self, renderable: RenderableType, options: ConsoleOptions | None = None
+    ) -> Iterator[Segment]:
+        """See `rich.console.Console.render`."""
+        for segment in super().render(renderable, options):
+            if segment.control or segment.text.isprintable():
+                yield segment
+            else:
+                yield Segment(visible(segment.text), segment.style)
+
+
+output = PlainConsole(highlight=False, soft_wrap=True)
+messages = PlainConsole(stderr=True, highlight=False, soft_wrap=True)
 
 _P = ParamSpec("_P")
 _R = TypeVar("_R")
 _debug = False
+_ending: ContextVar[ExitStack] = ContextVar("ending")
+"""What is to be called when the command ends."""
 
 
 def set_debug(debug: bool) -> None:
     """Show tracebacks of unexpected errors from here on, or don't."""
     global _debug
     _debug = debug
+
+
+def at_end(call: Callable[[], object]) -> None:
+    """Call something when the command that runs ends, however it ends."""
+    _ending.get().callback(call)
 
 
 def say_error(message: str, *, where: str | None = None, hint: str | None = None) -> None:
@@ -55,7 +84,10 @@ def ends_well(command: Callable[_P, _R]) -> Callable[_P, _R]:
     @functools.wraps(command)
     def run(*args: _P.args, **kwargs: _P.kwargs) -> _R:
         try:
-            return command(*args, **kwargs)
+            with ExitStack() as ending:
+                before = _ending.set(ending)
+                ending.callback(_ending.reset, before)
+                return command(*args, **kwargs)
         except OptiSenseError as error:
             say_error(error.message, where=error.where, hint=error.hint)
             failure = isinstance(error, (OutputError, SetupError))

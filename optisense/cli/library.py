@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from rich.table import Table
 
-from optisense.cli.console import ends_well, messages, output
+from optisense.cli.console import PlainConsole, ends_well, messages, output
 from optisense.errors import LibraryError
 
 if TYPE_CHECKING:
@@ -205,12 +205,11 @@ def _say_added(added: Added) -> None:
 
 def _print_table(table: Table) -> None:
     """Print a table, each row on a line of its own where a program reads along."""
-    from rich.console import Console
 
     if output.is_terminal:
         output.print(table, soft_wrap=False)
     else:
-        Console(file=output.file, width=PIPED_WIDTH, highlight=False).print(table)
+        PlainConsole(file=output.file, width=PIPED_WIDTH, highlight=False).print(table)
 
 
 def _describe(title: str, entry: AnyEntry, own: bool) -> None:

@@ -43,8 +43,8 @@ def _inside_folder(path: str) -> str:
     parts = path.split("/")
     if "\\" in path or ":" in path or "\0" in path or path.startswith("/") or ".." in parts:
         raise ValueError("must be a path inside the design folder, with '/' between its parts")
-    if not parts[-1]:
-        raise ValueError("must name a file")
+    if not parts[-1] or not path.isprintable():
+        raise ValueError("must name a file, without control characters")
     return path
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from html import escape
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -12,6 +11,7 @@ from numpy.typing import NDArray
 from optisense.design.looks import ROLE_LOOKS
 from optisense.design.parts import Role
 from optisense.design.section import Section, section
+from optisense.text import to_html
 
 if TYPE_CHECKING:
     from optisense.design.sensor_design import SensorDesign
@@ -116,7 +116,7 @@ def section_svg(design: SensorDesign, rays: Sequence[DrawnRay] = ()) -> str:
     return (
         f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {whole:.0f} {tall:.0f}" '
         f'width="{whole:.0f}" height="{tall:.0f}" role="img" '
-        f'aria-label="section through {escape(design.name, quote=True)}" '
+        f'aria-label="section through {to_html(design.name)}" '
         'style="background:#fff;max-width:100%;height:auto;font:12px sans-serif">'
         + "".join(shapes)
         + "</svg>"
@@ -185,7 +185,7 @@ def _labels(labels: list[_Label], column: float, tall: float) -> list[str]:
             f'<path d="M{label.x:.1f} {label.y:.1f}L{column - 6:.1f} {y:.1f}" fill="none" '
             f'stroke="{INK}" stroke-width="0.5" stroke-opacity="0.7"/>'
             f'<circle cx="{label.x:.1f}" cy="{label.y:.1f}" r="1.5" fill="{INK}"/>'
-            f'<text x="{column:.1f}" y="{y + 4:.1f}" fill="{INK}">{escape(label.text)}</text>'
+            f'<text x="{column:.1f}" y="{y + 4:.1f}" fill="{INK}">{to_html(label.text)}</text>'
         )
     return shapes
 

@@ -19,6 +19,7 @@ from optisense.design.near import suggestion
 from optisense.design.parts import Part, Role
 from optisense.errors import DesignError
 from optisense.geometry import TriangleMesh
+from optisense.text import to_html
 
 SCHEMA_VERSION = 1
 
@@ -194,15 +195,14 @@ class SensorDesign(Model):
 
     def _repr_html_(self) -> str:
         """A labelled section, for notebooks."""
-        from html import escape
 
         from optisense.design.section_drawing import section_svg
 
         try:
             drawing = section_svg(self)
         except (DesignError, KeyError, ValueError):  # half-made: parts without meshes
-            drawing = escape(", ".join(f"{n} ({p.role.value})" for n, p in self.parts.items()))
-        return f"<div><b>{escape(self.name)}</b><br>{drawing}</div>"
+            drawing = to_html(", ".join(f"{n} ({p.role.value})" for n, p in self.parts.items()))
+        return f"<div><b>{to_html(self.name)}</b><br>{drawing}</div>"
 
     def where(self, *path: str | int) -> str:
         """File and line of a value when the design was read from a file, else its dotted path."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import html
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -11,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from optisense.errors import ObjectiveError
+from optisense.text import to_html
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -86,10 +86,10 @@ class Score:
     def _repr_html_(self) -> str:
         """A table for notebooks: the value and all single numbers among the parts."""
         shown = self.failure if self.failure is not None else f"<b>{self.value:.4g}</b>"
-        rows = [(self.name, shown if self.failure is None else html.escape(str(shown)))]
+        rows = [(self.name, shown if self.failure is None else to_html(str(shown)))]
         for key, value in self.parts.items():
             if isinstance(value, bool | int | float | str):
-                rows.append((html.escape(key.replace("_", " ")), html.escape(shown_number(value))))
+                rows.append((to_html(key.replace("_", " ")), to_html(shown_number(value))))
         body = "".join(f"<tr><th>{key}</th><td>{value}</td></tr>" for key, value in rows)
         return f"<table>{body}</table>"
 

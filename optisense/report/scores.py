@@ -20,6 +20,7 @@ from optisense.objectives.score import Score, shown_number
 from optisense.objectives.scored import Scored
 from optisense.report.camera_rays import CameraRays
 from optisense.report.files import template
+from optisense.text import shown_in_html
 from optisense.writing import write_text
 
 DOTS_PER_INCH = 110
@@ -52,6 +53,7 @@ def render_scores(scored: Scored, objectives: list[Objective]) -> str:
     environment = Environment(
         loader=DictLoader({"scores": template("scores.html.j2")}),
         autoescape=True,
+        finalize=shown_in_html,
         undefined=StrictUndefined,
         trim_blocks=True,
         lstrip_blocks=True,

@@ -27,6 +27,7 @@ from optisense.report.tolerance import shown_size
 from optisense.search.methods import find
 from optisense.search.study import Study, best_of, front_among
 from optisense.search.trial import Trial
+from optisense.text import shown_in_html
 from optisense.writing import write_text
 
 MOST_COLUMNS = 8
@@ -79,6 +80,7 @@ def render_study(study: Study, looks: Mapping[str, Look] | None = None) -> str:
     environment = Environment(
         loader=DictLoader({"study": template("study.html.j2")}),
         autoescape=True,
+        finalize=shown_in_html,
         undefined=StrictUndefined,
         trim_blocks=True,
         lstrip_blocks=True,

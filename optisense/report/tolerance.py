@@ -25,6 +25,7 @@ from optisense.report.files import template
 from optisense.search.making import unit_of
 from optisense.search.sensitivity import Estimate
 from optisense.search.tolerance import Spreading, Tolerance
+from optisense.text import shown_in_html
 from optisense.writing import write_text
 
 if TYPE_CHECKING:
@@ -46,6 +47,7 @@ def render_tolerance(tolerance: Tolerance) -> str:
     environment = Environment(
         loader=DictLoader({"tolerance": template("tolerance.html.j2")}),
         autoescape=True,
+        finalize=shown_in_html,
         undefined=StrictUndefined,
         trim_blocks=True,
         lstrip_blocks=True,

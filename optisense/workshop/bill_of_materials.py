@@ -12,6 +12,7 @@ from optisense.design import Dielectric, Role, SensorDesign
 from optisense.errors import LibraryError
 from optisense.library import AnyEntry
 from optisense.library.facts import light_in_words, summary
+from optisense.text import cell, markdown
 from optisense.workshop.placement import light_entry, typical_colour
 from optisense.workshop.shapes import Shape, shapes
 
@@ -72,14 +73,15 @@ class Bill:
         )  # fmt: skip
         for item in self.items:
             writer.writerow(
-                (item.kind, item.name, f"{item.quantity:.4g}", item.unit, item.used_for,
-                 item.description, item.maker, item.part, item.package, item.note)
+                (item.kind, item.name, f"{item.quantity:.4g}", item.unit, cell(item.used_for),
+                 cell(item.description), cell(item.maker), cell(item.part), cell(item.package),
+                 cell(item.note))
             )  # fmt: skip
         return text.getvalue()
 
     def markdown(self) -> str:
         """The bill to read, a table for each kind."""
-        lines = [f"# Bill of materials: {_plain(self.title)}", ""]
+        lines = [f"# Bill of materials: {markdown(self.title)}", ""]
         for kind, heading in HEADINGS.items():
             items = [item for item in self.items if item.kind == kind]
             if items:
@@ -226,10 +228,6 @@ def _table(items: Sequence[Item]) -> list[str]:
         "note": [item.note for item in items],
     }
     kept = {title: cells for title, cells in columns.items() if any(cells)}
-    rows = [list(kept), ["---"] * len(kept), *zip(*kept.values(), strict=True)]
-    return ["| " + " | ".join(_plain(cell) for cell in row) + " |" for row in rows]
-
-
-def _plain(text: str) -> str:
-    """Text within a Markdown table."""
-    return " ".join(text.split()).replace("|", "\\|")
+    rows = [list(kept), *zip(*kept.values(), strict=True)]
+    lines = ["| " + " | ".join(markdown(text) for text in row) + " |" for row in rows]
+    return [lines[0], "| " + " | ".join(["---"] * len(kept)) + " |", *lines[1:]]

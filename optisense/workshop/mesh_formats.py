@@ -10,6 +10,7 @@ from xml.sax.saxutils import quoteattr
 import numpy as np
 
 from optisense.geometry import TriangleMesh
+from optisense.text import one_line, to_html
 from optisense.workshop.shapes import Shape
 
 LONG_AGO = (1980, 1, 1, 0, 0, 0)
@@ -104,6 +105,5 @@ def _mesh(mesh: TriangleMesh) -> Iterator[str]:
 
 def _text(text: str) -> str:
     """Text between XML tags, without what XML can't hold."""
-    from xml.sax.saxutils import escape
 
-    return escape("".join(letter for letter in text if letter.isprintable()))
+    return to_html(one_line(text))

@@ -1,0 +1,65 @@
+"""Text from files of others, made fit for a terminal, Markdown, HTML and spreadsheets.
+
+A design, a study or a library entry may come from a stranger. Its names and descriptions may hold
+characters that move the cursor or clear the screen, reverse the order of what follows, end a
+table's cell, or are HTML. Whatever shows such text asks here; nothing else escapes it.
+"""
+
+from __future__ import annotations
+
+import html
+import re
+import unicodedata
+
+LINE_BREAKS = "\n\t"
+"""Control characters that are only white space."""
+
+DIRECTIONS = frozenset("\u061c\u200e\u200f\u202a\u202b\u202c\u202d\u202e\u2066\u2067\u2068\u2069")
+"""Characters that change the direction of the text after them."""
+
+MARKDOWN = re.compile(r"[\\`*{}\[\]#!|~$]|(?<!\w)_|_(?!\w)")
+"""What marks text up in Markdown; '_' within a word does not."""
+
+
+def visible(text: str) -> str:
+    """Text whose control characters are shown as Python writes them, such as ``\\x1b``.
+
+    Line breaks and tabs stay. For terminals.
+    """
+    if text.isprintable():
+        return text
+    return "".join(_shown(letter) for letter in text)
+
+
+def one_line(text: str) -> str:
+    """The same with single spaces for all white space."""
+    return visible(" ".join(text.split()))
+
+
+def markdown(text: str) -> str:
+    """Text in a line or a table's cell of Markdown, where nothing in it is mark-up or HTML."""
+    return MARKDOWN.sub(r"\\\g<0>", html.escape(one_line(text), quote=False))
+
+
+def to_html(text: str) -> str:
+    """Text in HTML or SVG, in an element or a quoted attribute."""
+    return html.escape(visible(text), quote=True)
+
+
+def shown_in_html(value: object) -> object:
+    """What templates that escape by themselves are to escape instead of a value."""
+    return visible(value) if type(value) is str else value
+
+
+def cell(text: str) -> str:
+    """Text in a CSV file that spreadsheets open, where it is no formula."""
+    shown = visible(text)
+    return f"'{shown}" if shown.startswith(("=", "+", "-", "@")) else shown
+
+
+def _shown(letter: str) -> str:
+    if letter in LINE_BREAKS:
+        return letter
+    if unicodedata.category(letter) in ("Cc", "Cs") or letter in DIRECTIONS:
+        return letter.encode("unicode_escape", "surrogatepass").decode("ascii")
+    return letter
