@@ -69,6 +69,10 @@ class OutputError(OptiSenseError):
     """A file or folder that can't be written."""
 
 
+class FolderInUseError(OutputError):
+    """A folder that another process is writing to."""
+
+
 class TaskError(OptiSenseError):
     """A perception task, or a dataset, that can't be made or read as asked."""
 

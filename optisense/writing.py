@@ -14,7 +14,38 @@ from uuid import uuid4
 
 from optisense.errors import OutputError
 
+TEMPORARY = re.compile(r"\..+\.(?P<process>[0-9]{1,9})-[0-9a-f]{8}(\.[^.]+)?")
+"""Names of temporary files, which hold the number of the process that writes them."""
+
 FREE_SPACE = "Free space on this disk or choose another folder"
+
+
+def inside(folder: Path, relative: str) -> Path:
+    """Where to write a file of a folder; its subfolder is made.
+
+    Args:
+        folder: the folder that the user named, which may be a link itself.
+        relative: path of the file in it.
+
+    Raises:
+        OutputError: a link in the folder leads out of it, or its subfolder can't be made.
+    """
+    final = folder / relative
+    if not Path(os.path.realpath(final.parent)).is_relative_to(os.path.realpath(folder)):
+        raise OutputError(
+            f"'{relative}' leads out of the folder through a link",
+            where=str(folder),
+            hint="Remove the link, or name another folder",
+        )
+    try:
+        final.parent.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise OutputError(
+            f"the folder can't be made: {error.strerror or error}",
+            where=str(final.parent),
+            hint=FREE_SPACE,
+        ) from error
+    return final
 
 
 @contextmanager

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import signal
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -13,10 +14,11 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
-@pytest.fixture(autouse=True)
-def _no_own_library(
-    monkeypatch: pytest.MonkeyPatch, tmp_path_factory: pytest.TempPathFactory
-) -> None:
-    """Keep the library of whoever runs the tests out of them."""
-    folder: Path = tmp_path_factory.getbasetemp() / "no-own-library"
-    monkeypatch.setenv("OPTISENSE_LIBRARY", str(folder))
+@pytest.fixture(autouse=True, scope="session")
+def _nothing_of_the_user(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
+    """Keep the library and the state folder of whoever runs the tests out of them."""
+    folder: Path = tmp_path_factory.getbasetemp()
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("OPTISENSE_LIBRARY", str(folder / "no-own-library"))
+        patch.setenv("XDG_STATE_HOME", str(folder / "state"))
+        yield

@@ -8,7 +8,6 @@ from typing import Annotated
 import typer
 
 from optisense.cli.console import ends_well, output
-from optisense.errors import OutputError
 
 
 @ends_well
@@ -34,14 +33,8 @@ def apply(
 
     opened = Study.open(study)
     try:
-        if out.is_file():
-            raise OutputError("this is a file, not a folder", where=str(out))
-        if out.is_dir() and any(out.iterdir()):
-            raise OutputError(
-                "the folder is not empty", where=str(out), hint="Name a folder that doesn't exist"
-            )
         chosen = opened.trial(trial)
-        save_design(design_of(opened, chosen), out)
+        save_design(design_of(opened, chosen), out, new=True)
         output.print(f"{out / 'design.yaml'}", markup=False)
         output.print(f"trial {chosen.number}: {opened.objective} {chosen.score:.4g}", markup=False)
     finally:

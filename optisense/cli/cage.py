@@ -11,7 +11,7 @@ from rich.table import Table
 
 from optisense.cli.console import ends_well, messages, output
 from optisense.cli.options import DesignArgument
-from optisense.errors import DesignError, OutputError
+from optisense.errors import DesignError
 
 if TYPE_CHECKING:
     from optisense.design import SensorDesign
@@ -320,19 +320,12 @@ def _write(source: str, design: SensorDesign, cage: str | None, out: Path) -> No
 
     own = Path(source)
     own = own.parent if own.is_file() else own
-    if out.is_file():
-        raise OutputError("this is a file, not a folder", where=str(out))
-    if out.is_dir() and any(out.iterdir()) and not (own.is_dir() and out.samefile(own)):
-        raise OutputError(
-            "the folder is not empty",
-            where=str(out),
-            hint="Name a folder that doesn't exist, or the design's own",
-        )
+    is_own = own.is_dir() and out.is_dir() and out.samefile(own)
     problems = cage_problems(design)
     raise_problems(problems, f"design '{design.name}'")
     for problem in problems:
         messages.print(f"odd: {problem}", markup=False, style="yellow")
-    save_design(design, out)
+    save_design(design, out, new=not is_own)
     if cage is not None:
         output.print(f"cage {cage}: {_shape(design, cage)}", markup=False)
     output.print(f"{out / 'design.yaml'}", markup=False)

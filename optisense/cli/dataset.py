@@ -15,7 +15,7 @@ from optisense.cli.options import (
     parse_exposure,
     parse_resolution,
 )
-from optisense.cli.output_folder import ensure_writable
+from optisense.cli.output_folder import take_folder
 from optisense.cli.progress import counting_bar
 
 if TYPE_CHECKING:
@@ -130,7 +130,7 @@ def dataset(
     )
     settings.contacts.parsed()
     sensor = load(design)
-    ensure_writable(out)
+    take_folder(out)
 
     from optisense.optics import OpticalModel
 

@@ -27,7 +27,7 @@ from optisense.cli.options import (
     score_settings,
     seed_option,
 )
-from optisense.cli.output_folder import ensure_writable
+from optisense.cli.output_folder import take_folder
 from optisense.writing import remove_own_page, write_text
 
 if TYPE_CHECKING:
@@ -90,7 +90,7 @@ def evaluate(
     Settings(**shared)
     sensor = load(design)
     if out is not None:
-        ensure_writable(out)
+        take_folder(out)
 
     from optisense.objectives.scored import Scored
     from optisense.optics import OpticalModel

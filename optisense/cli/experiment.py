@@ -65,7 +65,7 @@ def experiment(
         _print_list()
         return
 
-    from optisense.cli.output_folder import ensure_writable
+    from optisense.cli.output_folder import ensure_writable, take_folder
     from optisense.experiments import find, prepare, run, write_page
     from optisense.experiments.bench import Bench
     from optisense.search.executors import processors
@@ -73,7 +73,7 @@ def experiment(
     chosen = find(name)
     for each in chosen:
         each.settings(quick, seeds)
-    ensure_writable(out)
+    take_folder(out)
     if page is not None:
         ensure_writable(page.parent)
     count = min(processors(), MOST_WORKERS) if workers is None else workers

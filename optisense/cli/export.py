@@ -9,7 +9,7 @@ import typer
 
 from optisense.cli.console import ends_well, messages, output
 from optisense.cli.options import DesignArgument
-from optisense.cli.output_folder import ensure_writable
+from optisense.cli.output_folder import take_folder
 
 FORMATS = ("stl", "obj", "3mf", "step")
 
@@ -49,7 +49,7 @@ def export(
         from optisense.workshop.step_format import require_step
 
         require_step()
-    ensure_writable(out)
+    take_folder(out)
 
     from optisense.workshop import export as write
     from optisense.workshop.shapes import is_air, shapes

@@ -9,7 +9,9 @@ from typing import TYPE_CHECKING, Annotated, cast
 import typer
 
 from optisense.cli.console import ends_well, messages, output
+from optisense.cli.output_folder import take_folder
 from optisense.errors import DesignError, OptiSenseError, OutputError
+from optisense.folders import is_empty
 
 if TYPE_CHECKING:
     from optisense.sensors.from_meshes import Recipe
@@ -96,8 +98,8 @@ def _from_built_in(name: str, folder: Path, overwrite: bool) -> None:
     from optisense.sensors import build, save_design
 
     design = build(name)
-    _check_folder(folder, overwrite)
-    save_design(design, folder)
+    is_new = _take_folder(folder, overwrite)
+    save_design(design, folder, new=is_new)
     _say_what_next(folder)
 
 
@@ -111,7 +113,7 @@ def _from_cad(source: Path, folder: Path, units: str | None, yes: bool, overwrit
         save_recipe,
     )
 
-    _check_folder(folder, overwrite)
+    is_new = _take_folder(folder, overwrite)
     if not source.exists():
         raise DesignError(
             "there is no such recipe, folder or CAD file",
@@ -149,7 +151,7 @@ def _from_cad(source: Path, folder: Path, units: str | None, yes: bool, overwrit
                 markup=False,
             )
         raise
-    save_design(made.design, folder)
+    save_design(made.design, folder, new=is_new)
     save_recipe(recipe, folder / RECIPE_FILE)
     for note in made.notes:
         messages.print(f"note: {note}", markup=False, style="yellow")
@@ -168,11 +170,11 @@ def _units(text: str | None) -> Units | None:
     return cast("Units | None", text)
 
 
-def _check_folder(folder: Path, overwrite: bool) -> None:
-    if folder.is_file():
-        raise OutputError("this is a file, not a folder", where=str(folder))
-    if not folder.is_dir() or not any(folder.iterdir()):
-        return
+def _take_folder(folder: Path, overwrite: bool) -> bool:
+    """Take the folder for this command; returns whether it is empty."""
+    take_folder(folder)
+    if is_empty(folder):
+        return True
     if not overwrite:
         raise OutputError(
             "the folder is not empty",
@@ -184,8 +186,9 @@ def _check_folder(folder: Path, overwrite: bool) -> None:
         raise OutputError(
             "there is no design in this folder, and it is not empty",
             where=str(folder),
-            hint="Name a folder that doesn't exist",
+            hint="Name a folder that doesn't exist, or empty this one",
         )
+    return False
 
 
 def _say_guesses(recipe: Recipe, guessed: bool) -> None:

@@ -5,11 +5,26 @@ from __future__ import annotations
 import tempfile
 from pathlib import Path
 
+from optisense.cli.console import at_end
 from optisense.errors import OutputError
+from optisense.folders import hold
+
+
+def take_folder(folder: Path) -> None:
+    """Make the folder if need be, and keep other processes from writing to it until the command
+    ends.
+
+    Raises:
+        FolderInUseError: another process is writing to it.
+        OutputError: it can't be written, found out before the work instead of after it.
+    """
+    at_end(hold(folder))
 
 
 def ensure_writable(folder: Path) -> None:
-    """Make the folder if need be, and try whether a file can be written into it.
+    """Make the folder if need be, and try whether one file can be written into it.
+
+    This is for pages that are written whole into folders of others, such as a study that runs.
 
     Raises:
         OutputError: it can't, found out before the work instead of after it.

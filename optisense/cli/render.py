@@ -19,11 +19,10 @@ from optisense.cli.options import (
     parse_exposure,
     parse_resolution,
 )
-from optisense.cli.output_folder import ensure_writable
+from optisense.cli.output_folder import take_folder
 
 if TYPE_CHECKING:
-    from optisense.optics import OpticalModel, RenderProgress, TactileImage
-    from optisense.report.real_sensor import RealComparison
+    from optisense.optics import RenderProgress, TactileImage
 
 PICTURE = "image.png"
 ONE_PICTURE = 1_000_000
@@ -97,7 +96,7 @@ def render(
     from optisense.sensors import load
 
     sensor = load(design)
-    ensure_writable(out)
+    take_folder(out)
 
     from optisense.cli.placing import place_contacts
     from optisense.optics import OpticalModel
@@ -125,8 +124,6 @@ def render(
             )
     image.settings["contacts"] = list(contact or [])
     image.save(out, brightness)
-    with messages.status("comparing with a real sensor"):
-        real = _beside_real(model, image)
     write_report(
         out / REPORT_FILE,
         sensor,
@@ -135,25 +132,12 @@ def render(
         exposure=brightness,
         indenters=place_contacts(model, contacts),
         rays=CameraRays.of(model),
-        real=real,
     )
     _say_what_came(image, out)
     if image.interrupted:
         messages.print("interrupted: the files hold what was finished until then")
     if interrupt.requested:
         raise typer.Exit(EXIT_INTERRUPTED)
-
-
-def _beside_real(model: OpticalModel, image: TactileImage) -> RealComparison | None:
-    """The comparison with a real picture, where there is one of this very sensor."""
-    from optisense.report.real_sensor import MOST_PHOTONS, compare_with_real, has_real_picture
-
-    if image.interrupted or not has_real_picture(model.design):
-        return None
-    # As many as were asked for, so that the light that is there serves again.
-    photons = image.settings["photons_asked"] or image.settings["photons"]
-    photons = min(int(photons), MOST_PHOTONS)
-    return compare_with_real(model, photons, int(image.settings["seed"]))
 
 
 @contextmanager

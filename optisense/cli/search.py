@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import json
+import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from optisense.cli.asking import ask_yes
 from optisense.cli.console import EXIT_INTERRUPTED, ends_well, messages, output
 from optisense.cli.options import (
     SettingOption,
@@ -87,6 +89,14 @@ def search(
     resume: Annotated[
         bool, typer.Option("--resume", help="Go on with the study in --out.")
     ] = False,
+    trust: Annotated[
+        bool,
+        typer.Option(
+            "--trust",
+            help="With --resume: run the Python files that the study names, also where it was not "
+            "begun by you on this machine and you don't name them again.",
+        ),
+    ] = False,
     seed: Annotated[
         int | None, seed_option("The same seed gives the same search.", show_default="0")
     ] = None,
@@ -150,7 +160,7 @@ def search(
     from optisense.search import run_study
 
     given = _given(vary, objective, method, seed, setting, option, rule, may_cross, error, samples)
-    study = _resumed(out, design, given) if resume else _begun(out, design, budget, given)
+    study = _resumed(out, design, given, trust) if resume else _begun(out, design, budget, given)
     try:
         with search_progress(study.settings.method) as show:
             result = run_study(
@@ -226,10 +236,11 @@ def _begun(out: Path, design: str | None, budget: int | None, given: dict[str, A
     return Study.create(out, load(design), Plan(space=space, budget=budget, **given))
 
 
-def _resumed(out: Path, design: str | None, given: dict[str, Any]) -> Study:
+def _resumed(out: Path, design: str | None, given: dict[str, Any], trust: bool) -> Study:
     """The study in a folder; what was given as well must be what it was begun with."""
     from optisense.search import SearchSpace, Study
     from optisense.search.plan import reference, rule_reference
+    from optisense.search.trust import not_trusted
     from optisense.sensors import load
 
     study = Study.open(out, None if design is None else load(design))
@@ -246,7 +257,21 @@ def _resumed(out: Path, design: str | None, given: dict[str, Any]) -> Study:
     if "errors" in given:
         wanted["errors"] = given["errors"].to_plain()
     study.expect(wanted)
+    named = {*wanted.get("objectives", ()), *wanted.get("rules", ())}
+    strange = [each for each in not_trusted(study.references) if each not in named]
+    if trust or not strange or _may_run(strange):
+        study.trust()
     return study
+
+
+def _may_run(strange: list[str]) -> bool:
+    """Ask whether Python code that the user has not named may be run; no where nobody answers."""
+    if not (sys.stdin.isatty() and sys.stderr.isatty()):
+        return False
+    messages.print("This study runs Python code that you have not named:", style="yellow")
+    for each in strange:
+        messages.print(f"  {each}", markup=False)
+    return ask_yes("Do you trust it", default=False)
 
 
 def _options(texts: list[str] | None) -> dict[str, Any]:

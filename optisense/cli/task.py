@@ -18,7 +18,7 @@ from optisense.cli.options import (
     parse_contacts,
     parse_resolution,
 )
-from optisense.cli.output_folder import ensure_writable
+from optisense.cli.output_folder import take_folder
 from optisense.cli.progress import counting_bar
 
 if TYPE_CHECKING:
@@ -237,7 +237,7 @@ def reconstruction(
     )
     sensor = load(design)
     if out is not None:
-        ensure_writable(out)
+        take_folder(out)
 
     from optisense.optics import OpticalModel
     from optisense.tasks.figures import draw_reconstruction
@@ -290,7 +290,7 @@ def _perceive(
 
     sensor = load(design)
     if out is not None:
-        ensure_writable(out)
+        take_folder(out)
 
     from optisense.optics import OpticalModel
     from optisense.tasks import perceive

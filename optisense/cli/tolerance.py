@@ -21,7 +21,7 @@ from optisense.cli.options import (
     score_settings,
     seed_option,
 )
-from optisense.cli.output_folder import ensure_writable
+from optisense.cli.output_folder import take_folder
 from optisense.cli.progress import counting_bar
 from optisense.writing import remove_own_page, write_text
 
@@ -92,7 +92,7 @@ def tolerance(
     errors = parse_errors(error) if error else None
     sensor = load(design)
     if out is not None:
-        ensure_writable(out)
+        take_folder(out)
     with counting_bar("sensors") as show:
         found = find_tolerance(
             sensor,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -58,8 +59,8 @@ class IesEmitter(Model):
                 f"the IES file '{self.file}' has no folder",
                 hint="Load the design or the library entry that names it from its folder",
             )
-        folder = self._folder.resolve()
-        path = (folder / self.file).resolve()
+        folder = Path(os.path.realpath(self._folder))
+        path = Path(os.path.realpath(folder / self.file))
         if not path.is_relative_to(folder):
             raise LibraryError(
                 f"the IES file '{self.file}' lies outside its folder", where=str(folder)

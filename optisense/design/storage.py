@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 from typing import Any
 
@@ -15,9 +16,10 @@ from optisense.design.problems import design_error, raise_problems
 from optisense.design.sensor_design import SCHEMA_VERSION, SensorDesign
 from optisense.design.yaml_reader import Lines, read_yaml
 from optisense.design.yaml_writer import to_yaml
-from optisense.errors import DesignError, MeshError, OutputError
+from optisense.errors import DesignError, MeshError
+from optisense.folders import begun, held
 from optisense.geometry import TriangleMesh
-from optisense.writing import written_together
+from optisense.writing import inside, written_together
 
 DESIGN_FILE = "design.yaml"
 HEAD = "Sensor design. Lengths in mm, angles in degrees, powers in mW."
@@ -60,29 +62,46 @@ def load_design(path: str | Path) -> SensorDesign:
     return design
 
 
-def save_design(design: SensorDesign, folder: str | Path) -> None:
+def save_design(design: SensorDesign, folder: str | Path, *, new: bool = False) -> None:
     """Write a design folder: design.yaml with a comment on each unit, meshes as OBJ.
 
     Each file is written whole under a temporary name; only when all are there are they renamed
     into place, design.yaml last. Other files in the folder are left alone.
 
+    Args:
+        design: what to write.
+        folder: made if need be.
+        new: whether the folder must be empty or absent; a design that can't be written leaves
+            nothing in it then, and what a killed process has left of one is removed first.
+
     Raises:
         DesignError: a part has no mesh, or two parts with different meshes (or two light groups
             with different IES files) share a file.
-        OutputError: the folder can't be written.
+        FolderInUseError: another process is writing to the folder.
+        OutputError: the folder can't be written, or is not empty though it must be.
     """
     folder = Path(folder)
+    if new:
+        with begun(folder, files_of(design)):
+            save_design(design, folder)
+        return
     meshes = {name: _as_obj(part.mesh) for name, part in design.parts.items()}
     _check_saveable(design, meshes)
     saved = design.copy()
     for name, file in meshes.items():
         saved.parts[name].mesh = file
-    with written_together("the design") as stage:
+    with held(folder), written_together("the design") as stage:
         for file, name in {file: name for name, file in meshes.items()}.items():
-            design.meshes[name].save_obj(stage(_within(folder, file)))
+            design.meshes[name].save_obj(stage(inside(folder, file)))
         for file, data in _ies_files(design).items():
-            stage(_within(folder, file)).write_bytes(data)
-        stage(_within(folder, DESIGN_FILE)).write_text(to_yaml(saved, HEAD), encoding="utf-8")
+            stage(inside(folder, file)).write_bytes(data)
+        stage(inside(folder, DESIGN_FILE)).write_text(to_yaml(saved, HEAD), encoding="utf-8")
+
+
+def files_of(design: SensorDesign) -> list[str]:
+    """The files that `save_design` writes, relative to the folder."""
+    meshes = dict.fromkeys(_as_obj(part.mesh) for part in design.parts.values())
+    return [*meshes, *_ies_files(design), DESIGN_FILE]
 
 
 def _check_version(data: dict[str, Any], lines: Lines, source: str) -> None:
@@ -107,8 +126,8 @@ def _check_version(data: dict[str, Any], lines: Lines, source: str) -> None:
 
 def _inside(folder: Path, relative: str, where: str) -> Path:
     """The file at a path that must not leave the folder, links followed."""
-    path = (folder / relative).resolve()
-    if not path.is_relative_to(folder.resolve()):
+    path = Path(os.path.realpath(folder / relative))  # a link to itself stays as it is
+    if not path.is_relative_to(os.path.realpath(folder)):
         raise DesignError(
             f"'{relative}' leads out of the design folder",
             where=where,
@@ -181,16 +200,3 @@ def _same(one: TriangleMesh, other: TriangleMesh) -> bool:
         and one.faces.shape == other.faces.shape
         and bool((one.vertices == other.vertices).all() and (one.faces == other.faces).all())
     )
-
-
-def _within(folder: Path, relative: str) -> Path:
-    """A file in the folder, links followed."""
-    final = folder / relative
-    final.parent.mkdir(parents=True, exist_ok=True)
-    if not final.parent.resolve().is_relative_to(folder.resolve()):
-        raise OutputError(
-            f"'{relative}' leads out of the design folder",
-            where=str(folder),
-            hint="Remove the link in the folder",
-        )
-    return final

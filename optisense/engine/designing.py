@@ -28,7 +28,7 @@ from optisense.engine.protocol import Fields
 from optisense.engine.rendering import OfDesign, design_of
 from optisense.engine.requests import Lane, handles
 from optisense.engine.session import Session
-from optisense.errors import DesignError, MeshError, OutputError
+from optisense.errors import DesignError, MeshError
 from optisense.geometry import TriangleMesh, cage_weights
 from optisense.library import with_own_lights
 from optisense.sensors.registry import BUILDERS
@@ -114,13 +114,7 @@ def save(session: Session, fields: Save, job: Job) -> dict[str, Any]:
     """Write a design folder."""
     folder = Path(fields.to)
     design = design_of(session, fields, job)
-    if folder.exists() and not folder.is_dir():
-        raise OutputError("this is a file, not a folder", where=str(folder))
-    if fields.only_new and folder.is_dir() and any(folder.iterdir()):
-        raise OutputError(
-            "the folder is not empty", where=str(folder), hint="Name a folder that doesn't exist"
-        )
-    save_design(with_own_lights(design), folder)
+    save_design(with_own_lights(design), folder, new=fields.only_new)
     return {"folder": str(folder)}
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -150,7 +151,7 @@ class Designs:
             return kept[1]
         design = load_design(file)
         for part, value in design.parts.items():  # the same file is the same mesh
-            mesh = self.mesh(str((file.parent / value.mesh).resolve()))
+            mesh = self.mesh(os.path.realpath(file.parent / value.mesh))
             design.meshes[part] = self._checked(mesh, part, value.role)
         design._source, design._lines = None, {}  # from here on a place is a dotted path
         self._folders[name] = _stamps(design, file), design
@@ -247,8 +248,8 @@ def _inside(folder: Path | None, relative: str, where: str) -> Path:
         raise DesignError(
             f"'{relative}' is in no folder", where=where, hint="Name the design's folder"
         )
-    path = (folder / relative).resolve()
-    if not path.is_relative_to(folder.resolve()):
+    path = Path(os.path.realpath(folder / relative))
+    if not path.is_relative_to(os.path.realpath(folder)):
         raise DesignError(f"'{relative}' leads out of the design folder", where=where)
     if not path.is_file():
         raise DesignError(f"there is no file '{relative}' in the design folder", where=where,

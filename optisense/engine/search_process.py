@@ -13,6 +13,7 @@ from typing import Any
 
 from optisense import errors
 from optisense.errors import OptiSenseError, SearchError
+from optisense.folders import holder_of
 
 PROCESS_FILE = "process.json"
 """In the study's folder while one of these processes runs it: how to end it."""
@@ -99,34 +100,28 @@ class SearchProcess:
 
 def is_running(folder: Path) -> bool:
     """Whether any process runs a study at present."""
-    from optisense.search.store import Lock
-    from optisense.search.study_folder import LOCK_FILE
-
-    if not (folder / LOCK_FILE).exists():
-        return False
-    try:
-        Lock(folder / LOCK_FILE).release()
-    except OptiSenseError:
-        return True
-    return False
+    return holder_of(folder) is not None
 
 
 def stop_other(folder: Path) -> bool:
     """Ask the process that runs a study to end; false where none does.
 
     Raises:
-        SearchError: it runs, but not by an engine.
+        SearchError: it runs, but not by an engine of this machine.
     """
-    if not is_running(folder):
+    holder = holder_of(folder)
+    if holder is None:
         return False
     try:
         number = int(json.loads((folder / PROCESS_FILE).read_text(encoding="utf-8"))["pid"])
     except (OSError, ValueError, KeyError, TypeError):
+        number = None
+    if number != holder.process or holder.is_elsewhere:
         raise SearchError(
-            "the study is run by a program that can't be stopped from here",
+            f"the study is run by a program that can't be stopped from here: {holder}",
             where=str(folder),
             hint="Press Ctrl-C where it was started; nothing that it has finished is lost",
-        ) from None
+        )
     with contextlib.suppress(ProcessLookupError):
         os.kill(number, signal.SIGINT)
     return True

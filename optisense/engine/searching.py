@@ -20,7 +20,6 @@ from optisense.engine.requests import Lane, handles
 from optisense.engine.scoring import own_objectives
 from optisense.engine.search_process import SearchProcess, is_running, stop_other
 from optisense.engine.session import Session
-from optisense.errors import OutputError
 from optisense.sensors import save_design
 
 if TYPE_CHECKING:
@@ -201,13 +200,9 @@ def apply(session: Session, fields: Apply, job: Job) -> dict[str, Any]:
     from optisense.search.applied import design_of as design_of_trial
 
     folder = Path(fields.to)
-    if folder.is_dir() and any(folder.iterdir()):
-        raise OutputError(
-            "the folder is not empty", where=str(folder), hint="Name a folder that doesn't exist"
-        )
     with _opened(_absolute(fields.study)) as study:
         chosen = study.trial(fields.trial)
-        save_design(design_of_trial(study, chosen), folder)
+        save_design(design_of_trial(study, chosen), folder, new=True)
         return {"folder": str(folder), "number": chosen.number}
 
 

@@ -13,9 +13,10 @@ from optisense.design.near import suggestion
 from optisense.design.sensor_design import Status
 from optisense.design.yaml_reader import read_yaml
 from optisense.errors import LibraryError
+from optisense.folders import held
 from optisense.library.entries import AnyEntry, LightEntry, Source, TypicalLight
 from optisense.library.loader import is_own, kind_named, names
-from optisense.library.own_parts import write_own
+from optisense.library.own_parts import WHERE_TO_STORE, own_folder, write_own
 from optisense.library.reading import KINDS, Kind, kind_of, read_entry
 
 NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,63}")
@@ -78,7 +79,7 @@ def add_file(file: str | Path, kind: str | None = None, name: str | None = None)
     if isinstance(entry.value, IesEmitter):
         ies = entry.value.path().read_bytes()
         entry.value.file = f"{name}.ies"
-    return Added(singular, name, entry, write_own(singular, name, entry, ies))
+    return Added(singular, name, entry, _stored(singular, name, entry, ies))
 
 
 def add_ies(
@@ -144,7 +145,7 @@ def add_ies(
         },
         sources=sources,
     )
-    return Added("light", name, entry, write_own("light", name, entry, data))
+    return Added("light", name, entry, _stored("light", name, entry, data))
 
 
 def check_new_name(name: str) -> None:
@@ -166,6 +167,13 @@ def check_new_name(name: str) -> None:
                 hint="Choose another name with --name"
                 + (", or delete the old file" if is_own(kind, name) else ""),
             )
+
+
+def _stored(kind: Kind, name: str, entry: AnyEntry, ies: bytes | None) -> Path:
+    """Write an entry unless another process has taken its name meanwhile; returns its file."""
+    with held(own_folder(), wait=True, hint=WHERE_TO_STORE):
+        check_new_name(name)
+        return write_own(kind, name, entry, ies)
 
 
 def parse_colour(text: str) -> tuple[str, Colour]:

@@ -24,6 +24,9 @@ HEADS: dict[Kind, str] = {
 }
 
 
+WHERE_TO_STORE = "Name a folder that you may write to in the environment variable OPTISENSE_LIBRARY"
+
+
 def own_folder() -> Path:
     """Where the user's own parts are kept; the folder need not exist."""
     named = os.environ.get("OPTISENSE_LIBRARY")
@@ -42,7 +45,7 @@ def own_files(kind: Kind) -> dict[str, Path]:
 
 
 def write_own(kind: Kind, name: str, entry: AnyEntry, ies: bytes | None = None) -> Path:
-    """Write an entry into the user's folder, whole or not at all.
+    """Write an entry into the user's folder, whose lock is held, whole or not at all.
 
     Args:
         ies: the bytes of the IES file of a light; it is written beside the entry first, under
@@ -55,8 +58,7 @@ def write_own(kind: Kind, name: str, entry: AnyEntry, ies: bytes | None = None) 
         OutputError: the folder can't be written.
     """
     file = own_folder() / f"{kind}s" / f"{name}.yaml"
-    hint = "Name a folder that you may write to in the environment variable OPTISENSE_LIBRARY"
-    with written_together("your library", hint) as stage:
+    with written_together("your library", WHERE_TO_STORE) as stage:
         if ies is not None:
             stage(file.with_suffix(".ies")).write_bytes(ies)
         stage(file).write_text(to_yaml(entry, HEADS[kind]), encoding="utf-8")

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from optisense.design import SensorDesign
-from optisense.errors import OptiSenseError, SearchError
+from optisense.errors import FolderInUseError, OptiSenseError, SearchError
 from optisense.search.evaluation import Evaluator, Goal
 from optisense.search.executors import (
     DaskRunner,
@@ -101,6 +101,7 @@ def search(
             raise SearchError("a study to go on with needs its folder", hint="Give out=FOLDER")
         study = Study.open(out, design, goals, named.constraints)
         study.expect(plan.settings_for(design).comparable())
+        study.trust()  # the caller names the same files
     else:
         study = Study.create(out, design, plan)
     return run_study(
@@ -154,10 +155,31 @@ def run_study(
 
     try:
         return Run(study, make_runner, progress, limit, variant).go()
-    except OptiSenseError:
-        if not study.trials:  # no worker could work: there is nothing to go on with
-            study.discard()
+    except FolderInUseError:
         raise
+    except OptiSenseError as error:
+        error.hint = _hint_after(error, study)
+        raise
+    finally:
+        study.unlock()
+
+
+def _hint_after(error: OptiSenseError, study: Study) -> str | None:
+    """What to do about an error of a run, and what has become of the study.
+
+    A study that was begun for this run, and in which nothing was scored, is removed, so that the
+    same call can be given again.
+    """
+    if study.folder is None or (isinstance(error, SearchError) and error.hint):
+        return error.hint
+    trials = study.trials
+    if trials or not study.is_new:
+        kept = f"{len(trials)} finished trial{'' if len(trials) == 1 else 's'}"
+        told = f"The study keeps its {kept}: go on with --resume --out {study.folder}"
+    else:
+        study.discard()
+        told = "No trial was finished and no study is left: give the same command again"
+    return f"{error.hint}. {told}" if error.hint else told
 
 
 def as_goals(objective: Goal | Sequence[Goal]) -> list[Goal]:

@@ -168,29 +168,27 @@ class Run:
         self._began = self._told = time.monotonic()
 
     def go(self) -> Result:
-        """Run to the end, or until Ctrl-C.
+        """Run to the end, or until Ctrl-C; the study stays locked, for the caller to unlock.
 
         Raises:
-            SearchError: another process runs this study, or all trials fail.
+            FolderInUseError: another process runs this study.
+            SearchError: all trials fail.
             SetupError, OutputError: nothing can be scored, or written.
         """
         study = self.study
         study.lock()
         interrupted, ended = False, ""
-        try:
-            self._count_known()
-            with self._make_runner(self._evaluator) as runner:
-                self._began = time.monotonic()
-                try:
-                    self._score_start(runner)
-                    ended = self._search(runner)
-                    self._report("trials", now=True)
-                    self._report("fresh seeds", now=True)
-                    rescore(study, lambda jobs: self._work_fresh(runner, jobs))
-                except KeyboardInterrupt:
-                    interrupted, ended = True, "interrupted"
-        finally:
-            study.unlock()
+        self._count_known()
+        with self._make_runner(self._evaluator) as runner:
+            self._began = time.monotonic()
+            try:
+                self._score_start(runner)
+                ended = self._search(runner)
+                self._report("trials", now=True)
+                self._report("fresh seeds", now=True)
+                rescore(study, lambda jobs: self._work_fresh(runner, jobs))
+            except KeyboardInterrupt:
+                interrupted, ended = True, "interrupted"
         study.store.set_fact("ended", ended)
         return Result(study, interrupted, ended, tuple(self._notes))
 

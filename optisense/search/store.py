@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 
 from optisense.errors import OptiSenseError, OutputError, SearchError
 from optisense.search.outcome import Outcome
+from optisense.search.reader import Reader
 
 FloatArray = NDArray[np.float64]
 
@@ -71,58 +72,124 @@ class Row:
 
 
 class Store:
-    """The trials of one study. Only one process may write to it (see `lock`)."""
+    """The trials of one study.
 
-    def __init__(self, path: Path | None, objectives: Sequence[str], *, new: bool) -> None:
-        """Open a store.
+    A store that was opened is read, which writes nothing in its folder and sees what another
+    process writes meanwhile; `write` makes it ready to be written to, by one process at a time.
+    """
+
+    def __init__(self, path: Path | None, objectives: Sequence[str]) -> None:
+        """Use `create` or `open`."""
+        self.path = path
+        self.objectives = list(objectives)
+        self._db: sqlite3.Connection | None = None
+        self._reader = None if path is None else Reader(path)
+
+    @staticmethod
+    def create(path: Path | None, objectives: Sequence[str]) -> Store:
+        """Make a store, to be written to.
 
         Args:
-            path: of the file; None keeps everything in memory.
+            path: of the file, which must not exist; None keeps everything in memory.
             objectives: in the order of the stored scores.
-            new: whether it is made now.
+
+        Raises:
+            OutputError: it can't be written.
+        """
+        store = Store(path, objectives)
+        with _told(path):
+            store._connect("rwc")
+            with store._together() as db:
+                for statement in _TABLES.split(";"):
+                    db.execute(statement)
+                db.execute(f"pragma user_version = {STORE_VERSION}")
+        return store
+
+    @staticmethod
+    def open(path: Path, objectives: Sequence[str]) -> Store:
+        """Open a store to read it.
 
         Raises:
             SearchError: the file is no store, or one of a newer version.
-            OutputError: it can't be written.
+            OutputError: it can't be read.
         """
-        self.path = path
-        self.objectives = list(objectives)
-        name = ":memory:" if path is None else str(path)
-        with _told(path):
-            # Progress and reports may ask from another thread; calls never overlap.
-            self._db = sqlite3.connect(name, isolation_level=None, check_same_thread=False)
-            self._db.execute("pragma journal_mode = wal")
-            self._db.execute("pragma synchronous = normal")
-            if new:
-                with self._together():
-                    for statement in _TABLES.split(";"):
-                        self._db.execute(statement)
-                    self._db.execute(f"pragma user_version = {STORE_VERSION}")
-            version = self._db.execute("pragma user_version").fetchone()[0]
+        store = Store(path, objectives)
+        with store._read() as db:
+            version = db.execute("pragma user_version").fetchone()[0]
         if version != STORE_VERSION:
-            self._db.close()
             newer = version > STORE_VERSION
             raise SearchError(
                 f"the store has version {version}; this release reads {STORE_VERSION}",
-                where=name,
+                where=str(path),
                 hint="A newer release wrote it: update OptiSense Studio" if newer else None,
             )
+        return store
+
+    def write(self) -> None:
+        """Get ready to write; the caller holds the lock of the folder.
+
+        Raises:
+            OutputError: it can't be written.
+        """
+        if self._db is None:
+            if self.path is not None and self.path.is_symlink():
+                raise OutputError(
+                    "the store is a link",
+                    where=str(self.path),
+                    hint="Put the file itself into the study's folder",
+                )
+            with _told(self.path):
+                self._connect("rw")
+
+    def only_read(self) -> None:
+        """Close the file for writing; the write-ahead log is merged into it."""
+        if self.path is not None:
+            self.close()
 
     def close(self) -> None:
-        """Close the file; the write-ahead log is merged into it."""
-        self._db.close()
+        """Close the file; a store in memory is gone."""
+        if self._db is not None:
+            with _told(self.path):
+                self._db.close()
+            self._db = None
+
+    def _connect(self, mode: str) -> None:
+        """Open the file for writing; `mode` as in an address of SQLite."""
+        name = ":memory:" if self.path is None else f"{self.path.absolute().as_uri()}?mode={mode}"
+        # Progress and reports may ask from another thread; calls never overlap.
+        self._db = sqlite3.connect(name, uri=True, isolation_level=None, check_same_thread=False)
+        self._db.execute("pragma journal_mode = wal")
+        self._db.execute("pragma synchronous = normal")
+
+    @property
+    def _writer(self) -> sqlite3.Connection:
+        assert self._db is not None, "the store is not open for writing"
+        return self._db
+
+    @contextmanager
+    def _read(self) -> Iterator[sqlite3.Connection]:
+        """A connection to read with."""
+        with _told(self.path):
+            if self._db is not None:
+                yield self._db
+            else:
+                assert self._reader is not None
+                with self._reader.connected() as db:
+                    yield db
 
     def set_fact(self, name: str, value: object) -> None:
         """Keep a JSON-ready value under a name."""
         with _told(self.path):
-            self._db.execute(
+            self._writer.execute(
                 "insert or replace into facts values (?, ?)", (name, json.dumps(value))
             )
 
     def fact(self, name: str) -> Any:
         """The value under a name, or None."""
-        row = self._db.execute("select value from facts where name = ?", (name,)).fetchone()
-        return None if row is None else json.loads(row[0])
+        with self._read() as db:
+            row = db.execute("select value from facts where name = ?", (name,)).fetchone()
+            with self._readable(f"the fact '{name}'"):
+                return None if row is None else json.loads(row[0])
 
     def propose(self, generation: int, vectors: FloatArray, place: int = 0) -> None:
         """Write the points (k, n) of a generation, all in one commit.
@@ -137,8 +204,8 @@ class Store:
             (first + k, generation, place + k, np.ascontiguousarray(vector, "<f8").tobytes())
             for k, vector in enumerate(vectors)
         ]
-        with _told(self.path), self._together():
-            self._db.executemany(
+        with _told(self.path), self._together() as db:
+            db.executemany(
                 "insert into trials (number, generation, place, vector) values (?, ?, ?, ?)", rows
             )
 
@@ -155,7 +222,7 @@ class Store:
             number,
         )
         with _told(self.path):
-            changed = self._db.execute(
+            changed = self._writer.execute(
                 "update trials set done = 1, scores = ?, failure = ?, parts = ?, gradient = ?, "
                 "seconds = ?, worker = ?, finished = ? where number = ? and done = 0",
                 values,
@@ -166,7 +233,7 @@ class Store:
     def finish_fresh(self, number: int, seed: int, outcome: Outcome) -> None:
         """Write what a trial scores with another seed."""
         with _told(self.path):
-            self._db.execute(
+            self._writer.execute(
                 "insert or replace into fresh_scores values (?, ?, ?, ?)",
                 (number, seed, self._packed(outcome.scores), outcome.failure),
             )
@@ -179,15 +246,18 @@ class Store:
         )
         chosen = () if generation is None else (generation,)
         where = "" if generation is None else " where generation = ?"
-        found = self._db.execute(f"{query}{where} order by number", chosen)
+        with self._read() as db:
+            found = db.execute(f"{query}{where} order by number", chosen).fetchall()
         return [self._row(row) for row in found]
 
     def fresh_scores(self) -> dict[int, dict[int, Outcome]]:
         """What trials score with other seeds, by number and seed."""
         found: dict[int, dict[int, Outcome]] = {}
-        rows = self._db.execute("select number, seed, scores, failure from fresh_scores")
+        with self._read() as db:
+            rows = db.execute("select number, seed, scores, failure from fresh_scores").fetchall()
         for number, seed, scores, failure in rows:
-            found.setdefault(number, {})[seed] = Outcome(self._unpacked(scores), failure)
+            with self._readable(f"a fresh score of trial {number}"):
+                found.setdefault(number, {})[seed] = Outcome(self._unpacked(scores), failure)
         return found
 
     def last_generation(self) -> int:
@@ -201,22 +271,32 @@ class Store:
         )
 
     def _count(self, query: str) -> int:
-        return int(self._db.execute(query).fetchone()[0])
+        with self._read() as db:
+            return int(db.execute(query).fetchone()[0])
 
     def _row(self, row: Sequence[Any]) -> Row:
         number, generation, place, vector, done, scores, failure, parts, gradient = row[:9]
-        outcome = None
-        if done:
-            outcome = Outcome(
-                scores=self._unpacked(scores),
-                failure=failure,
-                parts=json.loads(parts) if parts else {},
-                seconds=row[9],
-                gradient=None if gradient is None else np.frombuffer(gradient, "<f8").copy(),
-                worker=row[10] or "",
-            )
-        point = np.frombuffer(vector, "<f8").copy()
-        return Row(number, generation, place, point, outcome, row[11])
+        with self._readable(f"trial {number}"):
+            outcome = None
+            if done:
+                outcome = Outcome(
+                    scores=self._unpacked(scores),
+                    failure=failure,
+                    parts=json.loads(parts) if parts else {},
+                    seconds=row[9],
+                    gradient=None if gradient is None else np.frombuffer(gradient, "<f8").copy(),
+                    worker=row[10] or "",
+                )
+            point = np.frombuffer(vector, "<f8").copy()
+            return Row(number, generation, place, point, outcome, row[11])
+
+    @contextmanager
+    def _readable(self, what: str) -> Iterator[None]:
+        """Values that are not what this class writes as an error that says where they are."""
+        try:
+            yield
+        except (ValueError, TypeError, RecursionError) as error:
+            raise damaged(what, self.path, str(error)) from error
 
     def _packed(self, scores: Mapping[str, float]) -> bytes:
         values = [scores.get(name, math.nan) for name in self.objectives]
@@ -226,65 +306,57 @@ class Store:
         return dict(zip(self.objectives, np.frombuffer(blob, "<f8").tolist(), strict=True))
 
     @contextmanager
-    def _together(self) -> Iterator[None]:
+    def _together(self) -> Iterator[sqlite3.Connection]:
         """One transaction: all or nothing."""
-        self._db.execute("begin immediate")
+        db = self._writer
+        db.execute("begin immediate")
         try:
-            yield
+            yield db
+            db.execute("commit")
         except BaseException:
-            if self._db.in_transaction:  # SQLite has rolled back already where the disk is full
-                self._db.execute("rollback")
+            if db.in_transaction:  # SQLite has rolled back already where the disk is full
+                db.execute("rollback")
             raise
-        self._db.execute("commit")
 
 
-class Lock:
-    """Held by the one process that runs a study; it is free again when that process ends."""
-
-    def __init__(self, path: Path) -> None:
-        """Take it.
-
-        Raises:
-            SearchError: another process has it.
-            OutputError: the folder can't be written.
-        """
-        with _told(path):
-            self._db = sqlite3.connect(path, timeout=0.0, isolation_level=None)
-        try:
-            self._db.execute("begin exclusive")
-        except sqlite3.OperationalError as error:
-            self._db.close()
-            if "locked" not in str(error):
-                raise _error(error, path) from error
-            raise SearchError(
-                "another process is running this study",
-                where=str(path.parent),
-                hint="Wait for it, or end it: nothing that it has finished is lost",
-            ) from None
-
-    def release(self) -> None:
-        """Give it back."""
-        self._db.close()
+def damaged(what: str, path: Path | None, why: str) -> SearchError:
+    """What a user is told of a store that holds something else than it should."""
+    return SearchError(
+        f"{what} can't be read: {why}",
+        where=None if path is None else str(path),
+        hint="The file is damaged: use a copy of it, or begin a new study",
+    )
 
 
 @contextmanager
 def _told(path: Path | None) -> Iterator[None]:
-    """SQLite's errors as ours."""
+    """SQLite's errors, and those of its files, as ours."""
     try:
         yield
-    except sqlite3.Error as error:
+    except (sqlite3.Error, OSError) as error:
         raise _error(error, path) from error
 
 
-def _error(error: sqlite3.Error, path: Path | None) -> OptiSenseError:
+def _error(error: Exception, path: Path | None) -> OptiSenseError:
     where = None if path is None else str(path)
     text = str(error)
     if "full" in text:
-        return OutputError(
-            "the disk is full",
+        return OutputError("the disk is full", where=where, hint="Free some space on it")
+    if any(sign in text for sign in ("not a database", "malformed", "no such table")):
+        return SearchError(
+            f"this is not a study's store, or it is damaged: {text}",
             where=where,
-            hint="Free some space and go on with --resume: all finished trials are kept",
+            hint="Use a copy of it, or begin a new study",
         )
-    if "not a database" in text or "malformed" in text:
-        return SearchError(f"this is not a study's store: {text}", where=where)
-    return OutputError(f"the store can't be used: {text}", where=where)
+    hint = next((hint for sign, hint in REMEDIES.items() if sign in text), None)
+    return OutputError(f"the store can't be used: {text}", where=where, hint=hint)
+
+
+REMEDIES = {
+    "disk I/O error": "The disk is full, was disconnected or fails: free space on it and check it",
+    "unable to open": "Check that the file may be read, and its folder be written to for a search",
+    "readonly": "Copy the study to a folder that may be written to",
+    "locked": "End the other program that has the file open",
+    "Permission denied": "Ask its owner for the right to read it",
+}
+"""What to do about other errors of SQLite, by words in them."""

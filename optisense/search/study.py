@@ -12,7 +12,6 @@ from __future__ import annotations
 
 import json
 import math
-import shutil
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -22,6 +21,7 @@ import numpy as np
 
 from optisense.design import SensorDesign
 from optisense.errors import SearchError
+from optisense.folders import FolderLock
 from optisense.library import with_own_lights
 from optisense.search.constraints import Constraint
 from optisense.search.difference import differences, fingerprint, notes, plain_differences
@@ -30,17 +30,10 @@ from optisense.search.evaluation import DesignEvaluator, Goal
 from optisense.search.plan import ONLY_HERE, Plan, file_prints, known_goals, known_rules
 from optisense.search.settings import StudySettings
 from optisense.search.space import SearchSpace
-from optisense.search.store import Lock, Row, Store
-from optisense.search.study_folder import (
-    LOCK_FILE,
-    STORE_FILE,
-    as_begun,
-    check_free,
-    kept,
-    listed,
-    only_whole,
-)
+from optisense.search.store import Row, Store
+from optisense.search.study_folder import STORE_FILE, as_begun, begin, kept, listed
 from optisense.search.trial import Trial
+from optisense.search.trust import not_trusted, trust
 
 
 class Study:
@@ -61,6 +54,7 @@ class Study:
         goals: Sequence[Goal],
         rules: Sequence[Constraint],
         store: Store,
+        lock: FolderLock | None = None,
     ) -> None:
         """Use `create` or `open`."""
         self.folder = folder
@@ -68,11 +62,12 @@ class Study:
         self.goals = list(goals)
         self.space = SearchSpace.from_plain(settings.space, rules).bind(design)
         self.store = store
-        self._lock: Lock | None = None
+        self._lock = lock
+        self._trusted = folder is None
 
     @staticmethod
     def create(folder: str | Path | None, design: SensorDesign, plan: Plan) -> Study:
-        """Begin a study; nothing is scored yet.
+        """Begin a study; nothing is scored yet. It holds the lock of its folder until it is closed.
 
         Args:
             folder: where to keep it; None keeps it in memory.
@@ -83,25 +78,36 @@ class Study:
             SearchError: the plan makes no sense, or there is a study in the folder already.
             DesignError: a path leads nowhere.
             ObjectiveError: an objective or a setting is unknown.
-            OutputError: the folder can't be written.
+            FolderInUseError: another process is writing to the folder.
+            OutputError: the folder is not empty, or can't be written.
         """
         place = None if folder is None else Path(folder)
-        if place is not None:
-            check_free(place)
         design = with_own_lights(design)
-        settings = plan.settings_for(design)
+        rules = plan.space.constraints
         if place is None:
-            store = Store(None, settings.names, new=True)
-            return Study(None, settings, design, plan.goals, plan.space.constraints, store)
-        with only_whole(place):
+            settings = plan.settings_for(design)
+            in_memory = Store.create(None, settings.names)
+            return Study(None, settings, design, plan.goals, rules, in_memory)
+        lock = begin(place, design)
+        store: Store | None = None
+        try:
+            settings = plan.settings_for(design)
             design = kept(place, design)
             settings = replace(settings, fingerprint=fingerprint(design))
-            store = Store(place / STORE_FILE, settings.names, new=True)
+            store = Store.create(place / STORE_FILE, settings.names)
             store.set_fact("settings", settings.fingerprint_of_all())
             store.set_fact("study", settings.comparable())
             store.set_fact("design", notes(design))
-            study = Study(place, settings, design, plan.goals, plan.space.constraints, store)
+            study = Study(place, settings, design, plan.goals, rules, store, lock)
             settings.save(place)  # last: from here on it is a study
+            study.trust()
+        except BaseException:
+            if store is not None:
+                store.close()
+            lock.undo()
+            lock.release()
+            raise
+        lock.is_whole()
         return study
 
     @staticmethod
@@ -111,7 +117,7 @@ class Study:
         goals: Sequence[Goal] | None = None,
         rules: Sequence[Constraint] | None = None,
     ) -> Study:
-        """Open a study to look at it or to go on with it.
+        """Open a study to look at it or to go on with it; nothing in its folder is written.
 
         Args:
             folder: of the study.
@@ -126,7 +132,7 @@ class Study:
         settings = StudySettings.load(place)
         if not (place / STORE_FILE).is_file():
             raise SearchError(f"the study has no {STORE_FILE}", where=str(place))
-        store = Store(place / STORE_FILE, settings.names, new=False)
+        store = Store.open(place / STORE_FILE, settings.names)
         try:
             own = as_begun(place, settings, store)
             if design is not None:
@@ -162,13 +168,27 @@ class Study:
                 hint="Go on with it as it was begun, or begin a new one with another --out",
             )
 
+    @property
+    def references(self) -> list[str]:
+        """How its objectives and rules are named."""
+        return [*self.settings.objectives, *self.settings.rules]
+
+    def trust(self) -> None:
+        """Let the Python files that it names be run, now and later; see `optisense.search.trust`.
+
+        The user has named them, or has been asked.
+        """
+        self._trusted = True
+        trust(self.references)
+
     def evaluator(self, variant: str = "auto") -> DesignEvaluator:
         """What scores its points, on a variant of the renderer.
 
         Raises:
-            SearchError: a goal or rule is known only to the program that began the study.
+            SearchError: a goal or rule is known only to the program that began the study, or is
+                in a Python file that the user has not named.
         """
-        known = [*self.settings.objectives, *self.settings.rules]
+        known = self.references
         unknown = [each.removeprefix(ONLY_HERE) for each in known if each.startswith(ONLY_HERE)]
         lacks_goals = len(self.goals) < len(self.settings.names)
         lacks_rules = len(self.space.space.constraints) < len(self.settings.rules)
@@ -177,7 +197,7 @@ class Study:
                 f"only the program that began this study knows {', '.join(unknown)}",
                 hint="Go on with it from that program",
             )
-        now = file_prints([*self.settings.objectives, *self.settings.rules])
+        now = file_prints(known)
         for path, print_before in self.settings.files.items():
             if now.get(path) != print_before:
                 raise SearchError(
@@ -185,6 +205,13 @@ class Study:
                     where=path,
                     hint="Undo the change, or begin a new study",
                 )
+        strange = [] if self._trusted else not_trusted(known)
+        if strange:
+            raise SearchError(
+                f"the study runs Python code that you have not named: {', '.join(strange)}",
+                where=str(self.folder),
+                hint="Read it; if you trust it, go on once with optisense search --resume --trust",
+            )
         settings = self.settings
         return DesignEvaluator(
             self.space, self.goals, settings.settings, apart=settings.apart, variant=variant
@@ -260,30 +287,47 @@ class Study:
         )
 
     def lock(self) -> None:
-        """Keep other processes from running it.
+        """Keep other processes from writing to it, and open its store for writing.
 
         Raises:
-            SearchError: one does already.
+            FolderInUseError: another process is writing to it.
+            OutputError: it can't be written.
         """
-        if self.folder is not None and self._lock is None:
-            self._lock = Lock(self.folder / LOCK_FILE)
+        if self.folder is None:
+            return
+        if self._lock is None:
+            self._lock = FolderLock(self.folder)
+        self.store.write()
+
+    @property
+    def is_new(self) -> bool:
+        """Whether it was created here, and not unlocked since."""
+        return self._lock is not None and self._lock.has_made
 
     def unlock(self) -> None:
-        """Let others run it."""
+        """Let others write to it; it can still be read."""
         if self._lock is not None:
+            self.store.only_read()
             self._lock.release()
             self._lock = None
 
     def discard(self) -> None:
-        """Close a study in which nothing was scored, and remove its folder."""
-        self.close()
-        if self.folder is not None:
-            shutil.rmtree(self.folder, ignore_errors=True)
+        """Close a study that nothing was scored in, and remove the files that were made for it.
+
+        A study that was opened and not created here is closed only: its files are another's.
+        """
+        self.store.close()
+        if self._lock is not None:
+            self._lock.undo()
+            self._lock.release()
+            self._lock = None
 
     def close(self) -> None:
         """Close its files; one that is in memory is gone."""
-        self.unlock()
         self.store.close()
+        if self._lock is not None:
+            self._lock.release()
+            self._lock = None
 
 
 def beside(study: Study, trial: Trial) -> dict[str, float]:

@@ -1,70 +1,53 @@
-"""The folder of a study: free before, whole or gone, and as it was begun."""
+"""The folder of a study: how it is begun, and whether it is as it was begun."""
 
 from __future__ import annotations
 
-import shutil
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 
 from optisense.design import SensorDesign, load_design, save_design
-from optisense.errors import OutputError, SearchError
+from optisense.design.storage import files_of
+from optisense.errors import SearchError
+from optisense.folders import LOCK_FILE, FolderLock
 from optisense.search.difference import differences_from, fingerprint, plain_differences
 from optisense.search.settings import STUDY_FILE, StudySettings
 from optisense.search.store import Store
 
 DESIGN_FOLDER = "design"
 STORE_FILE = "trials.sqlite"
-LOCK_FILE = ".lock"
+SQLITE_ENDINGS = ("", "-wal", "-shm", "-journal")
+"""What SQLite adds to the name of a store for the files that it keeps beside it."""
 
 MOST_SHOWN = 8
 """Differences that an error lists."""
 
 
-def check_free(folder: Path) -> None:
-    """Refuse a folder that holds something already.
+def begin(folder: Path, design: SensorDesign) -> FolderLock:
+    """Take the lock of a folder for a new study, and write down which files it will have.
 
     Raises:
-        SearchError: it does.
-        OutputError: it is no folder.
+        SearchError: there is a study in it.
+        FolderInUseError: another process is writing to it.
+        OutputError: it is not empty, or can't be written.
     """
-    if (folder / STUDY_FILE).exists():
-        raise SearchError(
-            "there is a study in this folder already",
-            where=str(folder),
-            hint="Go on with it by --resume, or name another folder",
-        )
-    if folder.exists() and not folder.is_dir():
-        raise OutputError("this is a file, not a folder", where=str(folder))
-    if folder.is_dir() and any(folder.iterdir()):
-        raise SearchError(
-            "the folder is not empty", where=str(folder), hint="Name a folder that doesn't exist"
-        )
-
-
-@contextmanager
-def only_whole(folder: Path) -> Iterator[None]:
-    """Whatever is in a folder that was free before is removed again where the work fails."""
-    existed = folder.exists()
+    lock = FolderLock(folder)
     try:
-        yield
+        if (folder / STUDY_FILE).exists():
+            raise SearchError(
+                "there is a study in this folder already",
+                where=str(folder),
+                hint="Go on with it by --resume, or name another folder",
+            )
+        lock.check_empty()
+        inner = [f"{DESIGN_FOLDER}/{file}" for file in (*files_of(design), LOCK_FILE)]
+        lock.will_make([*inner, *(STORE_FILE + end for end in SQLITE_ENDINGS), STUDY_FILE])
     except BaseException:
-        if existed:
-            for each in folder.iterdir():
-                shutil.rmtree(each) if each.is_dir() else each.unlink()
-        else:
-            shutil.rmtree(folder, ignore_errors=True)
+        lock.release()
         raise
+    return lock
 
 
 def kept(folder: Path, design: SensorDesign) -> SensorDesign:
     """The design as it will be read again, so that a resumed study has the very same one."""
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise OutputError(
-            f"the study's folder can't be made: {error.strerror or error}", where=str(folder)
-        ) from error
     save_design(design, folder / DESIGN_FOLDER)
     return load_design(folder / DESIGN_FOLDER)
 

@@ -71,7 +71,7 @@ def load(name_or_folder: str | Path) -> SensorDesign:
     return load_design(path)
 
 
-def save_design(design: SensorDesign, folder: str | Path) -> None:
+def save_design(design: SensorDesign, folder: str | Path, *, new: bool = False) -> None:
     """Write a design folder that opens on any machine; see `optisense.design.save_design`.
 
     Lights that are the user's own parts are described in the design itself, since other machines
@@ -80,7 +80,7 @@ def save_design(design: SensorDesign, folder: str | Path) -> None:
     Raises:
         OptiSenseError: the design can't be saved, or an own part not be read.
     """
-    storage.save_design(library.with_own_lights(design), folder)
+    storage.save_design(library.with_own_lights(design), folder, new=new)
 
 
 def check(design: SensorDesign) -> list[Problem]:

@@ -8,14 +8,14 @@ from contextlib import closing
 from dataclasses import asdict, dataclass, field
 from functools import partial
 from pathlib import Path
-from shutil import rmtree
-from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from optisense.design import SensorDesign, load_design
+from optisense.design.storage import files_of
 from optisense.errors import ContactError, TaskError
+from optisense.folders import LOCK_FILE, FolderLock, held
 from optisense.geometry import Contact, Indenter
 from optisense.library import with_own_lights
 from optisense.sensors import save_design
@@ -35,7 +35,7 @@ from optisense.tasks.dataset import (
 from optisense.tasks.draws import ContactDraw, DrawnContact, Places, keeps_margin
 from optisense.tasks.records import KEPT, Table, read_json, refuse_differences, write_whole
 from optisense.tasks.untouched import UntouchedSurface
-from optisense.writing import write_json
+from optisense.writing import inside, write_json
 
 if TYPE_CHECKING:
     from optisense.optics import OpticalModel, TactileImage
@@ -47,8 +47,6 @@ that is thrown away costs chief rays and no rendering."""
 
 LEAST_PIXELS = 4
 """A contact that shows fewer pixels counts as unseen."""
-
-FOLDERS = ("images", "arrays", "radiance", DESIGN)
 
 _CONTACT, _CAMERA = 1, 2  # what a seed is for
 
@@ -106,14 +104,16 @@ def generate(
         The dataset. Contacts that could not be made are among its failures.
 
     Raises:
-        TaskError: the folder holds something else, or a dataset made otherwise.
+        TaskError: the folder holds a dataset made otherwise.
+        FolderInUseError: another process is writing to the folder.
         ContactError, MeshError: an indenter can't be read.
-        OutputError: a file can't be written.
+        OutputError: the folder holds something else, or a file can't be written.
         KeyboardInterrupt: Ctrl-C; what is finished is kept, and calling again continues.
     """
     if count < 1:
         raise TaskError(f"{count} samples are asked for", hint="Ask for 1 or more")
-    with closing(_Maker(model, Path(folder), settings or DatasetSettings())) as maker:
+    chosen = settings or DatasetSettings()
+    with held(folder) as lock, closing(_Maker(model, Path(folder), chosen, lock)) as maker:
         missing = [index for index in range(count) if index not in maker.done()]
         for number, index in enumerate(missing):
             if progress is not None:
@@ -127,7 +127,9 @@ def generate(
 class _Maker:
     """One dataset being made."""
 
-    def __init__(self, model: OpticalModel, folder: Path, settings: DatasetSettings) -> None:
+    def __init__(
+        self, model: OpticalModel, folder: Path, settings: DatasetSettings, lock: FolderLock
+    ) -> None:
         self._model = model
         self._folder = folder
         self._settings = settings
@@ -136,7 +138,7 @@ class _Maker:
             indenter.mesh(1.0)  # reads mesh files, so that a wrong one is told before any work
         width, height = settings.resolution or model.design.camera.resolution
         self._resolution = int(width), int(height)
-        self._exposure = self._begin()
+        self._exposure = self._exposure_of_all(lock)
         self._untouched = UntouchedSurface.of(model.chief_rays(self._resolution))
         self._places = Places.of(model)
         self._larger_than_view = {
@@ -144,7 +146,6 @@ class _Maker:
         }
         self._labels = Table(folder / LABELS, COLUMNS)
         self._failures = Table(folder / FAILURES, ("index", "reason"))
-        self._sweep()
 
     def done(self) -> set[int]:
         """The indices that need no more work."""
@@ -152,7 +153,7 @@ class _Maker:
         return {int(row["index"]) for row in rows}
 
     def close(self) -> None:
-        """Let another process continue."""
+        """Close the tables."""
         self._labels.close()
         self._failures.close()
 
@@ -203,15 +204,7 @@ class _Maker:
             return True  # each draw tells why
         return keeps_margin(mask, draw.margin)
 
-    def _sweep(self) -> None:
-        """Remove what a killed run left half written."""
-        for name in FOLDERS:
-            for path in (self._folder / name).glob(".*"):
-                path.unlink(missing_ok=True)
-        for path in self._folder.glob(".radiance-*"):
-            rmtree(path, ignore_errors=True)
-
-    def _begin(self) -> float:
+    def _exposure_of_all(self, lock: FolderLock) -> float:
         """Check or write what is common to all samples; returns the exposure."""
         common = self._common()
         info_file = self._folder / INFO
@@ -224,15 +217,20 @@ class _Maker:
             now = common | {"design": design_values(with_own_lights(self._model.design))}
             refuse_differences("a dataset", self._folder, known, now)
             return float(before["exposure"])
-        if self._folder.is_dir() and any(self._folder.iterdir()):
-            # A run that ended before its first sample leaves some of these.
-            strange = {path.name for path in self._folder.iterdir()} - {*FOLDERS, BACKGROUND}
-            if any(not name.startswith(".") for name in strange):
-                raise TaskError(
-                    "the folder is not empty and holds no dataset",
-                    where=str(self._folder),
-                    hint="Name a folder that doesn't exist",
-                )
+        lock.check_empty()
+        design = with_own_lights(self._model.design)
+        inner = [f"{DESIGN}/{file}" for file in (*files_of(design), LOCK_FILE)]
+        lock.will_make([*inner, BACKGROUND, INFO])
+        try:
+            exposure = self._begin(common)
+        except BaseException:
+            lock.undo()
+            raise
+        lock.is_whole()
+        return exposure
+
+    def _begin(self, common: dict[str, Any]) -> float:
+        """Write what is common to all samples; returns the exposure."""
         image = self._model.render(
             resolution=self._resolution,
             photons=self._settings.photons,
@@ -245,9 +243,6 @@ class _Maker:
 
         asked = self._settings.exposure
         exposure = float(auto_exposure(image.radiance) if asked == "auto" else asked)
-        for name in FOLDERS:
-            if name != "radiance" or self._settings.radiance:
-                (self._folder / name).mkdir(parents=True, exist_ok=True)
         save_design(self._model.design, self._folder / DESIGN)
         arrays = {
             "image": image.picture(exposure),
@@ -263,7 +258,7 @@ class _Maker:
             "units": {"length": "mm", "angle": "degrees", "radiance": "mW/(mm^2 sr)"},
             "columns": NUMBER_COLUMNS,
         }
-        write_json(info_file, info, "the results", KEPT)
+        write_json(self._folder / INFO, info, "the results", KEPT)  # last: now it is a dataset
         return exposure
 
     def _common(self) -> dict[str, Any]:
@@ -305,13 +300,11 @@ class _Maker:
         )
         depth = self._untouched.image_depth(image)
         arrays = {"depth": depth, "normals": image.normals, "mask": image.contact_mask}
-        write_whole(self._folder / f"images/{name}.png", lambda p: write_picture(p, picture))
-        write_whole(self._folder / f"arrays/{name}.npz", partial(_save_arrays, arrays))
+        picture_file = inside(self._folder, f"images/{name}.png")
+        write_whole(picture_file, lambda path: write_picture(path, picture))
+        write_whole(inside(self._folder, f"arrays/{name}.npz"), partial(_save_arrays, arrays))
         if settings.radiance:
-            with TemporaryDirectory(prefix=".radiance-", dir=self._folder) as temporary:
-                image.save(temporary, self._exposure)
-                made = Path(temporary) / "radiance.exr"
-                made.replace(self._folder / f"radiance/{name}.exr")
+            write_whole(inside(self._folder, f"radiance/{name}.exr"), image.save_radiance)
         width, height = self._resolution
         contact = drawn.contact
         assert contact.point is not None

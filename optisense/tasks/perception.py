@@ -8,6 +8,7 @@ quantity from them. Each task module says what is pressed and which numbers are 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import ExitStack
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
@@ -16,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from optisense.errors import TaskError
+from optisense.folders import held
 from optisense.geometry import Contact
 from optisense.objectives.score import json_ready
 from optisense.tasks.camera_noise import MEASURED_NOISE, add_camera_noise
@@ -213,8 +215,12 @@ def collect(
         raise TaskError(f"the camera noise is {settings.camera_noise}", hint="Give 0 or more")
     task.check(model)
     names = (*task.features, *task.targets)
-    table = None if folder is None else _open_table(folder, task, model, settings, names)
-    try:
+    with ExitStack() as kept:
+        table = None
+        if folder is not None:
+            kept.enter_context(held(folder))
+            table = _open_table(folder, task, model, settings, names)
+            kept.callback(table.close)
         rows = [] if table is None else [_numbers(row, names) for row in table.rows]
         camera = None
         for index in range(len(rows), settings.count):
@@ -227,9 +233,6 @@ def collect(
                 table.add(dict(zip(names, row, strict=True)))
         if progress is not None:
             progress(settings.count, settings.count)
-    finally:
-        if table is not None:
-            table.close()
     values = np.array(rows[: settings.count], dtype=np.float64)
     split = len(task.features)
     return Samples(values[:, :split], values[:, split:])
@@ -296,7 +299,6 @@ def _open_table(
     settings: SampleSettings,
     names: Sequence[str],
 ) -> Table:
-    folder.mkdir(parents=True, exist_ok=True)
     now = _described(task, model, settings) | {
         "design": design_values(model.design),
         "meshes": mesh_digests(model.design),

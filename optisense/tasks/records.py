@@ -1,14 +1,13 @@
 """Folders that grow sample by sample and survive being killed at any moment.
 
-Two rules make that so: a file is written under a temporary name and renamed when it is whole, and
-a sample exists once its row does, which is written last. `generation` and the
-samples of perception tasks both keep to them.
+Three rules make that so: one process at a time writes to a folder (see `optisense.folders`), a
+file is written under a temporary name and renamed when it is whole, and a sample exists once its
+row does, which is written last. `generation` and the samples of perception tasks keep to them.
 """
 
 from __future__ import annotations
 
 import csv
-import fcntl
 import io
 import json
 import os
@@ -53,34 +52,30 @@ def read_json(path: Path) -> dict[str, Any]:
 
 
 class Table:
-    """A CSV file with named columns that grows row by row, by one process at a time."""
+    """A CSV file with named columns that grows row by row; its folder's lock must be held."""
 
     def __init__(self, path: Path, columns: Sequence[str]) -> None:
         """Open it, or start it with its heading. A last row that was cut off is dropped.
 
         Raises:
-            TaskError: the file has other columns, or another process is adding to it.
+            TaskError: the file has other columns, or is a link.
             OutputError: it can't be written.
         """
         self.path = path
         self.columns = list(columns)
         heading = _line(self.columns)
         try:
+            if path.is_symlink():  # rows are appended, which would write to another place
+                raise TaskError(
+                    "the table is a link", where=str(path), hint="Put the file itself there"
+                )
             if not path.exists():
                 write_whole(path, lambda file: file.write_text(heading, "utf-8"))
             self._file = path.open("r+b")
-            # The lock goes with the process, however that ends.
-            fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)
             content = self._file.read()
             whole = content[: content.rfind(b"\n") + 1]
             self._file.truncate(len(whole))
             self._file.seek(len(whole))
-        except BlockingIOError as error:
-            raise TaskError(
-                "another process is adding to this folder",
-                where=str(path.parent),
-                hint="Wait for it, or name another folder",
-            ) from error
         except OSError as error:
             raise _cannot_write(path, error) from error
         if not whole.startswith(heading.encode("utf-8")):
@@ -109,7 +104,7 @@ class Table:
         self.rows.append(text)
 
     def close(self) -> None:
-        """Let others add to it."""
+        """Close the file."""
         self._file.close()
 
 

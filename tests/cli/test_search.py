@@ -52,7 +52,7 @@ def study(mine: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     assert "best: trial 4, near -" in result.output
     assert "(start -0.09)" in result.output
     assert "coating.specularity = 0.3" in result.output
-    assert "6 trials failed; the last: too shiny" in result.output
+    assert "6 trials failed:\n  6  too shiny" in result.output
     assert f"optisense apply {folder} --trial best" in result.output
     return folder
 

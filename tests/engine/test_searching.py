@@ -179,7 +179,7 @@ def test_a_cancelled_search_keeps_its_trials_and_goes_on_later(
     engine.until(lambda m: m["id"] == number and m.get("event") == "trial" and m["done"] >= 1)
     assert engine.ask("study", study=study)["running"]
     busy = engine.refused("resume", study=study)
-    assert busy["kind"] == "SearchError" and "another process" in busy["message"]
+    assert busy["kind"] == "FolderInUseError" and "another process" in busy["message"]
     assert engine.ask("cancel", of=number) == {"cancelled": True}
     stopped = engine.result(number)
     assert stopped["interrupted"] and 1 <= stopped["done"] < 100

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import os
 import sqlite3
 from pathlib import Path
 from types import ModuleType
@@ -13,7 +14,7 @@ import numpy as np
 import pytest
 
 from optisense.design import SensorDesign, save_design, set_value
-from optisense.errors import OutputError, SearchError
+from optisense.errors import FolderInUseError, OutputError, SearchError
 from optisense.search import Plan, Progress, SearchSpace, Study, search
 from optisense.search.plan import PHOTONS
 from optisense.search.run import run_study
@@ -290,7 +291,7 @@ class TestFolder:
             search(mini, SPACE, goals.nearness, budget=5, out=folder)
         (tmp_path / "mine").mkdir()
         (tmp_path / "mine" / "design").write_text("something of mine")
-        with pytest.raises(SearchError, match="not empty"):
+        with pytest.raises(OutputError, match="not empty"):
             search(mini, SPACE, goals.nearness, budget=5, out=tmp_path / "mine")
         assert (tmp_path / "mine" / "design").read_text() == "something of mine"
 
@@ -333,7 +334,7 @@ class TestFolder:
     def test_two_processes_do_not_run_one_study(self, folder: Path, goals: ModuleType) -> None:
         one, other = (Study.open(folder, goals=[goals.nearness]) for _ in range(2))
         one.lock()
-        with pytest.raises(SearchError, match="another process is running this study"):
+        with pytest.raises(FolderInUseError, match=f"process {os.getpid()} on"):
             run_study(other, limit=10)
         one.unlock()
         assert len(run_study(other, limit=10).trials) == 11
@@ -341,8 +342,9 @@ class TestFolder:
     def test_a_full_disk_is_told_and_loses_nothing(self, folder: Path, goals: ModuleType) -> None:
         """SQLite's own limit on the number of pages stands for the end of the disk."""
         study = Study.open(folder, goals=[goals.nearness])
-        pages = study.store._db.execute("pragma page_count").fetchone()[0]
-        study.store._db.execute(f"pragma max_page_count = {pages}")
+        study.lock()
+        pages = study.store._writer.execute("pragma page_count").fetchone()[0]
+        study.store._writer.execute(f"pragma max_page_count = {pages}")
         with pytest.raises(OutputError, match="disk is full") as told:
             run_study(study, limit=2000)
         assert "--resume" in str(told.value.hint)

@@ -13,7 +13,7 @@ from comparing import same_pictures
 
 from optisense import OpticalModel, SensorDesign, library, load
 from optisense.design import LightGroup
-from optisense.errors import ContactError, TaskError
+from optisense.errors import ContactError, OutputError, TaskError
 from optisense.tasks import ContactDraw, Dataset, DatasetSettings, generate
 
 COUNT = 4
@@ -145,7 +145,7 @@ def test_the_design_lies_beside_its_pictures(made: Dataset) -> None:
 
 def test_a_folder_with_other_things_in_it_is_left_alone(mini: OpticalModel, tmp_path: Path) -> None:
     (tmp_path / "thesis.txt").write_text("mine")
-    with pytest.raises(TaskError, match="not empty"):
+    with pytest.raises(OutputError, match="not empty"):
         generate(mini, tmp_path, 1, SETTINGS)
     assert files(tmp_path) == {"thesis.txt"}
 

@@ -42,14 +42,6 @@ def test_cut_off_anywhere_it_continues_to_the_same_file(tmp_path: Path) -> None:
         assert path.read_bytes() == content
 
 
-def test_two_writers_are_refused(tmp_path: Path) -> None:
-    first = Table(tmp_path / "t.csv", COLUMNS)
-    with pytest.raises(TaskError, match="another process"):
-        Table(tmp_path / "t.csv", COLUMNS)
-    first.close()
-    Table(tmp_path / "t.csv", COLUMNS).close()
-
-
 def test_other_columns_are_refused(tmp_path: Path) -> None:
     filled(tmp_path / "t.csv")
     with pytest.raises(TaskError, match="other columns"):

@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from optisense.errors import RenderError
 from optisense.optics.camera.response import auto_exposure, picture
-from optisense.writing import remove_own_page, written_together
+from optisense.writing import inside, remove_own_page, written_together
 
 REPORT_FILE = "report.html"
 """The page that `optisense render` writes beside an image."""
@@ -85,6 +85,14 @@ class TactileImage:
         mi.Bitmap(self.picture()).write(stream, mi.Bitmap.FileFormat.PNG)
         return bytes(stream.raw_buffer())
 
+    def save_radiance(self, path: Path) -> None:
+        """Write the linear radiance as an EXR file.
+
+        Raises:
+            OSError: it can't be written.
+        """
+        _bitmap(self.radiance, path)
+
     def save(self, folder: str | Path, exposure: float | str = "auto") -> None:
         """Write image.png, radiance.exr, normals.npy, contact_mask.npy, `layers/*.exr`, run.json.
 
@@ -102,7 +110,7 @@ class TactileImage:
         bitmaps = {"image.png": self.picture(exposure), "radiance.exr": self.radiance}
         bitmaps |= {f"layers/{name}.exr": layer for name, layer in self.layers.items()}
         with written_together("the results") as stage:
-            paths = [stage(out / name) for name in bitmaps]
+            paths = [stage(inside(out, name)) for name in bitmaps]
             with ThreadPoolExecutor() as pool:  # compresses outside Python's lock
                 list(pool.map(_bitmap, bitmaps.values(), paths))
             np.save(stage(out / "normals.npy"), self.normals)

@@ -1,0 +1,478 @@
+"""Folders that one process at a time writes to, and what a killed process has left in them.
+
+A command that writes into a folder takes its lock before the first byte. The lock is the file
+`.optisense.lock` in the folder, locked with `flock`: the kernel gives the lock back when the
+process ends, however it ends, so that a lock is never stale on its own machine and a process
+number that another program has got since means nothing. The file tells who holds the lock, and
+which files it is about to make; it is removed when the lock is given back. A lock file that
+nobody holds was left by a process that was killed, and the files that it names are removed by the
+next command. No other file is ever removed.
+
+`flock` reaches across machines only where a network file system supports it. So a lock file that
+was left by another machine is not judged: the error names the machine and how to clear it. The
+machine is recognised by its boot identifier, which containers on it share, or by its name.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import errno
+import fcntl
+import json
+import os
+import socket
+import sys
+import threading
+import weakref
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
+from dataclasses import asdict, dataclass, replace
+from datetime import datetime
+from pathlib import Path, PurePosixPath
+from typing import Any
+
+from optisense.errors import FolderInUseError, OutputError
+from optisense.writing import FREE_SPACE, TEMPORARY
+
+LOCK_FILE = ".optisense.lock"
+
+BOOT_FILE = Path("/proc/sys/kernel/random/boot_id")
+"""Identifies the running kernel on Linux; absent elsewhere."""
+
+SUBFOLDERS = (
+    "arrays",
+    "cameras",
+    "coatings",
+    "design",
+    "design/meshes",
+    "images",
+    "layers",
+    "lights",
+    "materials",
+    "meshes",
+    "radiance",
+    "units",
+)
+"""Where commands write temporary files besides the folder itself."""
+
+MOST_TEXT = 1_000_000
+"""Bytes of a lock file that are read; the files of a design of 1000 parts take 40,000."""
+
+
+@dataclass(frozen=True)
+class Holder:
+    """What a lock file tells.
+
+    Attributes:
+        process: number of the process that wrote it.
+        host: name of its machine.
+        boot: boot identifier of its machine; empty where there is none.
+        began: local time, ISO 8601.
+        command: what the process was called with.
+        making: files that it was about to make, relative to the folder; empty once they are whole.
+        folders: folders that it was about to make for them.
+    """
+
+    process: int
+    host: str
+    boot: str
+    began: str
+    command: str
+    making: tuple[str, ...] = ()
+    folders: tuple[str, ...] = ()
+
+    @staticmethod
+    def of_this_process() -> Holder:
+        """Who this process is."""
+        words = [Path(sys.argv[0]).name if sys.argv else "python", *sys.argv[1:2]]
+        return Holder(
+            process=os.getpid(),
+            host=socket.gethostname(),
+            boot=_boot(),
+            began=datetime.now().astimezone().isoformat(timespec="seconds"),
+            command=" ".join(words),
+        )
+
+    @property
+    def is_elsewhere(self) -> bool:
+        """Whether it is on another machine, as far as can be told."""
+        if self.boot and self.boot == _boot():
+            return False
+        return self.host != socket.gethostname()
+
+    def __str__(self) -> str:
+        return f"process {self.process} on {self.host}, '{self.command}', since {self.began}"
+
+
+class FolderLock:
+    """The right of one process to write into a folder.
+
+    Attributes:
+        folder: the folder.
+    """
+
+    def __init__(self, folder: str | Path, *, wait: bool = False, hint: str = FREE_SPACE) -> None:
+        """Take the lock, making the folder if need be, and clean up after killed processes.
+
+        Args:
+            folder: which.
+            wait: whether to wait for another process instead of failing.
+            hint: what the user may do where the folder can't be written.
+
+        Raises:
+            FolderInUseError: another process holds it; says which.
+            OutputError: the folder can't be made or written.
+        """
+        self.folder = Path(folder)
+        self._path = self.folder / LOCK_FILE
+        self._hint = hint
+        self._me = Holder.of_this_process()
+        self._made_folders: list[Path] = []
+        self._made_files: tuple[str, ...] = ()
+        self._made_subfolders: tuple[str, ...] = ()
+        self._end: weakref.finalize[..., FolderLock] | None = None
+        try:
+            self._file, left = self._open(wait)
+            self._end = weakref.finalize(self, _give_back, self._file, self._path, os.getpid())
+            own = os.fstat(self._file).st_uid == os.getuid()
+            half = left is not None and own and not _is_whole(self.folder, left)
+            files, folders = (left.making, left.folders) if left and half else ((), ())
+            sweep(self.folder, (*SUBFOLDERS, *folders))
+            _remove(self.folder, files, folders)
+            self._write(self._me)
+        except OSError as error:
+            self.release()
+            raise _cannot_write(self.folder, error, self._hint) from error
+        except BaseException:
+            self.release()
+            raise
+
+    def check_empty(self) -> None:
+        """Check that nothing is in the folder but the lock.
+
+        Raises:
+            OutputError: something is there.
+        """
+        if not is_empty(self.folder):
+            raise OutputError(
+                "the folder is not empty",
+                where=str(self.folder),
+                hint="Name a folder that doesn't exist, or empty this one",
+            )
+
+    def will_make(self, files: Iterable[str]) -> None:
+        """Write down which new files are about to be made.
+
+        If this process is killed before `is_whole`, the next one to take the lock removes them.
+
+        Args:
+            files: paths relative to the folder; none may exist. The last is made last: where it
+                is found later, all of them are whole.
+
+        Raises:
+            OutputError: one of them exists, or the lock file can't be written.
+        """
+        names = tuple(PurePosixPath(file).as_posix() for file in files)
+        for name in names:
+            if os.path.lexists(self.folder / name):
+                raise OutputError(
+                    "the file exists already",
+                    where=str(self.folder / name),
+                    hint="Name a folder that doesn't exist, or empty this one",
+                )
+        parents = {
+            parent.as_posix()
+            for name in names
+            for parent in PurePosixPath(name).parents
+            if parent.parts and not (self.folder / parent).exists()
+        }
+        self._made_files += names
+        self._made_subfolders += tuple(sorted(parents, reverse=True))  # the innermost first
+        try:
+            self._write(replace(self._me, making=self._made_files, folders=self._made_subfolders))
+        except OSError as error:
+            raise _cannot_write(self.folder, error, self._hint) from error
+
+    def is_whole(self) -> None:
+        """Say that the files of `will_make` are there; from here on only `undo` removes them."""
+        with contextlib.suppress(OSError):
+            self._write(self._me)
+
+    @property
+    def has_made(self) -> bool:
+        """Whether there is something to undo."""
+        return bool(self._made_files)
+
+    def undo(self) -> None:
+        """Remove the files of `will_make`, and their folders where nothing else is in them."""
+        _remove(self.folder, self._made_files, self._made_subfolders)
+        self._made_files = self._made_subfolders = ()
+
+    def release(self) -> None:
+        """Give the lock back; a folder that was made for it and is empty is removed."""
+        if self._end is not None:
+            self._end()
+        for folder in self._made_folders:
+            with contextlib.suppress(OSError):
+                folder.rmdir()
+        self._made_folders = []
+
+    def _open(self, wait: bool) -> tuple[int, Holder | None]:
+        """The lock file, locked, and what a killed process has left in it."""
+        while True:
+            self._make_folder()
+            flags = os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW | os.O_CLOEXEC
+            try:
+                file = os.open(self._path, flags, 0o666)
+            except FileNotFoundError:  # another process has just removed the folder that it made
+                continue
+            try:
+                fcntl.flock(file, fcntl.LOCK_EX | (0 if wait else fcntl.LOCK_NB))
+                if _is_still(file, self._path):
+                    left = _read(file)
+                    if left is None or not left.is_elsewhere:
+                        return file, left
+                    raise _elsewhere(self.folder, left)
+            except BlockingIOError:
+                raise _in_use(self.folder, _read(file)) from None
+            except BaseException:
+                os.close(file)
+                raise
+            os.close(file)  # its holder has removed it since it was opened
+
+    def _make_folder(self) -> None:
+        """Make the folder and those above it, and remember which were missing."""
+        missing = []
+        folder = self.folder
+        while not folder.exists() and folder != folder.parent:
+            missing.append(folder)
+            folder = folder.parent
+        for each in reversed(missing):
+            with contextlib.suppress(FileExistsError):
+                each.mkdir()
+                self._made_folders.insert(0, each)
+        if not self.folder.is_dir():
+            hint = "Name a folder" if self._hint == FREE_SPACE else self._hint
+            raise OutputError("this is a file, not a folder", where=str(self.folder), hint=hint)
+
+    def _write(self, holder: Holder) -> None:
+        data = (json.dumps(asdict(holder), indent=1) + "\n").encode("utf-8")
+        if os.pwrite(self._file, data, 0) < len(data):
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(self._path))
+        os.ftruncate(self._file, len(data))
+
+
+_held: dict[tuple[int, int, int], tuple[FolderLock, int]] = {}
+"""Locks taken by `hold`, and how often: by thread, and device and number of the folder."""
+
+
+def hold(folder: str | Path, *, wait: bool = False, hint: str = FREE_SPACE) -> Callable[[], None]:
+    """Take the lock of a folder, or take part in the one that this thread has taken by `hold`.
+
+    Returns:
+        The function that gives it back.
+
+    Raises:
+        FolderInUseError, OutputError: as `FolderLock`.
+    """
+    place = Path(folder)
+    key = _key(place)
+    lock, times = _held.get(key, (None, 0)) if key else (None, 0)
+    if lock is None:
+        lock = FolderLock(place, wait=wait, hint=hint)
+        key = _key(place)
+    assert key is not None
+    _held[key] = lock, times + 1
+
+    def give_back() -> None:
+        lock, times = _held.pop(key)
+        if times > 1:
+            _held[key] = lock, times - 1
+        else:
+            lock.release()
+
+    return give_back
+
+
+@contextmanager
+def held(folder: str | Path, *, wait: bool = False, hint: str = FREE_SPACE) -> Iterator[FolderLock]:
+    """`hold` for the time of a block; yields the lock."""
+    give_back = hold(folder, wait=wait, hint=hint)
+    try:
+        key = _key(Path(folder))
+        assert key is not None
+        yield _held[key][0]
+    finally:
+        give_back()
+
+
+@contextmanager
+def begun(folder: str | Path, files: Iterable[str]) -> Iterator[None]:
+    """Begin a folder: it must be empty, and a block that fails leaves nothing of its own in it.
+
+    Args:
+        folder: made if need be.
+        files: that the block makes, relative to the folder, the last of them last.
+
+    Raises:
+        FolderInUseError: another process is writing to it.
+        OutputError: it is not empty, or can't be written.
+    """
+    with held(folder) as lock:
+        lock.check_empty()
+        lock.will_make(files)
+        try:
+            yield
+        except BaseException:
+            lock.undo()
+            raise
+        lock.is_whole()
+
+
+def is_empty(folder: Path) -> bool:
+    """Whether nothing is in a folder but perhaps its lock."""
+    return all(each.name == LOCK_FILE for each in folder.iterdir())
+
+
+def holder_of(folder: Path) -> Holder | None:
+    """Which process writes to a folder at present; looks only, and writes nothing."""
+    try:
+        file = os.open(folder / LOCK_FILE, os.O_RDONLY | os.O_NOFOLLOW | os.O_CLOEXEC)
+    except OSError:
+        return None
+    try:
+        told = _read(file)
+        fcntl.flock(file, fcntl.LOCK_SH | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return told or UNKNOWN
+    except OSError:
+        return None
+    else:
+        return told if told is not None and told.is_elsewhere else None
+    finally:
+        os.close(file)
+
+
+def sweep(folder: Path, subfolders: Iterable[str]) -> None:
+    """Remove the temporary files of processes that have ended from a folder whose lock is held."""
+    for place in (folder, *(folder / name for name in subfolders)):
+        with contextlib.suppress(OSError):
+            if _leaves(folder, place) or ".." in place.parts:
+                continue
+            for each in place.iterdir():
+                found = TEMPORARY.fullmatch(each.name)
+                if found and not _lives(int(found["process"])) and not each.is_dir():
+                    each.unlink()
+
+
+UNKNOWN = Holder(0, "this machine", "", "now", "unknown")
+"""Stands for a holder that has not written down yet who it is."""
+
+
+def _key(folder: Path) -> tuple[int, int, int] | None:
+    try:
+        found = folder.stat()
+    except OSError:
+        return None
+    return threading.get_ident(), found.st_dev, found.st_ino
+
+
+def _give_back(file: int, path: Path, process: int) -> None:
+    """Remove a lock file and close it, unless this is a copy of the process that took it."""
+    if os.getpid() == process:
+        with contextlib.suppress(OSError):
+            if _is_still(file, path):
+                path.unlink()
+    with contextlib.suppress(OSError):
+        os.close(file)
+
+
+def _is_still(file: int, path: Path) -> bool:
+    """Whether an open file is the one at a path."""
+    try:
+        there = path.lstat()
+    except OSError:
+        return False
+    here = os.fstat(file)
+    return (here.st_dev, here.st_ino) == (there.st_dev, there.st_ino)
+
+
+def _read(file: int) -> Holder | None:
+    """What a lock file says; None where it says nothing that can be read."""
+    try:
+        data: Any = json.loads(os.pread(file, MOST_TEXT, 0))
+        texts = {name: str(data[name]) for name in ("host", "boot", "began", "command")}
+        making, folders = ([str(each) for each in data[name]] for name in ("making", "folders"))
+        return Holder(int(data["process"]), **texts, making=tuple(making), folders=tuple(folders))
+    except (OSError, ValueError, KeyError, TypeError, RecursionError):
+        return None
+
+
+def _remove(folder: Path, files: Iterable[str], folders: Iterable[str]) -> None:
+    """Remove files of a folder, and folders in it that are empty then; links are not followed."""
+    for name, remove in [
+        *((name, Path.unlink) for name in files),
+        *((name, Path.rmdir) for name in folders),
+    ]:
+        path = folder / name
+        with contextlib.suppress(OSError, ValueError):
+            if not _leaves(folder, path.parent) and ".." not in path.parts:
+                remove(path)
+
+
+def _leaves(folder: Path, place: Path) -> bool:
+    """Whether a place is outside of a folder, links followed."""
+    return not Path(os.path.realpath(place)).is_relative_to(os.path.realpath(folder))
+
+
+def _is_whole(folder: Path, left: Holder) -> bool:
+    """Whether a killed process had made all its files; the last is made last."""
+    try:
+        return bool(left.making) and os.path.lexists(folder / left.making[-1])
+    except ValueError:  # a name that no file can have
+        return False
+
+
+def _lives(process: int) -> bool:
+    try:
+        os.kill(process, 0)
+    except ProcessLookupError:
+        return False
+    except (OSError, OverflowError):
+        return True
+    return True
+
+
+def _boot() -> str:
+    try:
+        return BOOT_FILE.read_text(encoding="ascii").strip()
+    except OSError:
+        return ""
+
+
+def _in_use(folder: Path, holder: Holder | None) -> FolderInUseError:
+    return FolderInUseError(
+        f"another process is writing to this folder: {holder or UNKNOWN}",
+        where=str(folder),
+        hint="Wait for it, or end it: nothing that it has finished is lost",
+    )
+
+
+def _elsewhere(folder: Path, holder: Holder) -> FolderInUseError:
+    return FolderInUseError(
+        f"another machine seems to be writing to this folder: {holder}",
+        where=str(folder),
+        hint=f"If that process has ended, delete {folder / LOCK_FILE}",
+    )
+
+
+def _cannot_write(folder: Path, error: OSError, hint: str) -> OutputError:
+    if error.errno == errno.ELOOP:
+        return OutputError(
+            "the lock file is a link", where=str(folder / LOCK_FILE), hint="Delete the link"
+        )
+    return OutputError(
+        f"the folder can't be written: {error.strerror or error}",
+        where=str(folder),
+        hint=hint,
+    )
