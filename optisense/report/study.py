@@ -24,8 +24,9 @@ from optisense.report.drawing import figure_uri
 from optisense.report.files import template
 from optisense.report.pictures import MOST_STRETCHED, data_uri, stretching_colours
 from optisense.report.tolerance import shown_size
+from optisense.search.best import best_of
 from optisense.search.methods import find
-from optisense.search.study import Study, best_of, front_among
+from optisense.search.study import Study, front_among
 from optisense.search.trial import Trial
 from optisense.text import shown_in_html
 from optisense.writing import write_text

@@ -12,6 +12,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
+from optisense.search.best import ranked
 from optisense.search.methods import find
 from optisense.search.outcome import Outcome
 from optisense.search.study import Study
@@ -39,14 +40,14 @@ def rescore(study: Study, work: Work) -> None:
     """Score the start and the best again; what was scored before is kept."""
     seeds = fresh_seeds(study.settings.seed)
     trials = study.trials
-    fine = [trial for trial in trials if math.isfinite(trial.score)]
+    fine = ranked(trials)
     start = [trial for trial in fine if trial.is_start]
-    ranked = sorted((t for t in fine if not t.is_start), key=lambda t: -t.score)
+    others = [trial for trial in fine if not trial.is_start]
     if find(study.settings.method).several:
         _score([*start, *_spread_out(study)], seeds, work)
         return
     best = -math.inf
-    for number, trial in enumerate(ranked[:MOST]):
+    for number, trial in enumerate(others[:MOST]):
         if trial.score <= best:
             return  # even with its luck it is not better
         scored = [trial, *start] if number == 0 else [trial]

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from optisense.errors import OptiSenseError, SearchError
+from optisense.search.best import tie_note
 from optisense.search.evaluation import Evaluator
 from optisense.search.executors import Runner
 from optisense.search.failures import cause_of
@@ -190,7 +191,12 @@ class Run:
             except KeyboardInterrupt:
                 interrupted, ended = True, "interrupted"
         study.store.set_fact("ended", ended)
-        return Result(study, interrupted, ended, tuple(self._notes))
+        if not interrupted and self._done == self._failed > 0 and math.isnan(self._start_score):
+            raise self._all_failed()
+        several = self.method.several  # its result is a front, not one best trial
+        tie = None if several else tie_note(study.trials)
+        notes = [*self._notes, tie] if tie is not None else self._notes
+        return Result(study, interrupted, ended, tuple(notes))
 
     def _search(self, runner: Runner) -> str:
         """All generations; returns why the search is over."""
@@ -313,14 +319,18 @@ class Run:
             self._scored[row.vector.tobytes()] = outcome
             self._best = score if math.isnan(self._best) else max(self._best, score)
         enough = ALL_FAIL_WITH_START if math.isnan(self._start_score) else ALL_FAIL
-        if self._failed == self._done >= min(enough, self.limit):
-            reasons = max(self._reasons.values(), key=len)
-            raise SearchError(
-                f"all {self._done} trials so far have failed, {len(reasons)} of them because: "
-                f"{reasons[0]}",
-                hint="Change the bounds, or see with `optisense evaluate` whether the design can "
-                "be scored at all",
-            )
+        if self._failed == self._done >= enough:
+            raise self._all_failed()
+
+    def _all_failed(self) -> SearchError:
+        """What to say of a study in which no trial has a score."""
+        reasons = max(self._reasons.values(), key=len)
+        return SearchError(
+            f"all {self._done} trials so far have failed, {len(reasons)} of them because: "
+            f"{reasons[0]}",
+            hint="Change the bounds, or see with `optisense evaluate` whether the design can be "
+            "scored at all",
+        )
 
     def _compare(self, asked: np.ndarray, rows: Sequence[Row]) -> None:
         """Whether the method proposes what it did before."""

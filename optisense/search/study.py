@@ -11,7 +11,6 @@ STUDY/
 from __future__ import annotations
 
 import json
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -23,6 +22,7 @@ from optisense.design import SensorDesign
 from optisense.errors import SearchError
 from optisense.folders import FolderLock
 from optisense.library import with_own_lights
+from optisense.search.best import best_of
 from optisense.search.constraints import Constraint
 from optisense.search.difference import differences, fingerprint, notes, plain_differences
 from optisense.search.dominance import front as front_of
@@ -239,7 +239,7 @@ class Study:
 
     @property
     def best(self) -> Trial | None:
-        """The best trial by the first objective: by fresh seeds where some were scored so."""
+        """The best trial by the first objective; see `optisense.search.best` for the rule."""
         return best_of(self.trials)
 
     @property
@@ -344,15 +344,6 @@ def beside(study: Study, trial: Trial) -> dict[str, float]:
             parts = trial.parts.get(name, {})
             found |= {part: float(parts[part]) for part in find(name).beside if part in parts}
     return found
-
-
-def best_of(trials: Sequence[Trial]) -> Trial | None:
-    """The best by fresh seeds where some were scored so, else by the study's seed."""
-    fine = [trial for trial in trials if math.isfinite(trial.score)]
-    again = [trial for trial in fine if math.isfinite(trial.fresh_score())]
-    if again:
-        return max(again, key=lambda trial: (trial.fresh_score(), trial.score))
-    return max(fine, key=lambda trial: trial.score, default=None)
 
 
 def front_among(trials: Sequence[Trial], names: Sequence[str]) -> list[Trial]:

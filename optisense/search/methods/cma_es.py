@@ -21,6 +21,9 @@ from optisense.search.outcome import Outcome
 
 MOST_POPULATION = 100_000
 
+LEAST_DIMENSIONS = 2
+"""Dimensions that pycma needs at least; a search over fewer parameters adds idle ones."""
+
 
 class CmaEs(Method):
     """CMA-ES from the design as it is, with restarts from elsewhere when it has converged.
@@ -29,6 +32,10 @@ class CmaEs(Method):
     holds their spread wide enough to reach the next one. A choice is treated as the integer of
     its option, in the order given: with more than two options that are not in any order, a grid
     over the choices is the better search.
+
+    pycma does not support one dimension: it takes a scaling of one number for one that is not
+    initialized yet, and fails where a bound is met. A search over one parameter therefore runs in
+    two dimensions, the second of which changes nothing.
     """
 
     name = "cma-es"
@@ -75,6 +82,7 @@ class CmaEs(Method):
         whole = problem.space.whole
         self._unit = np.where(whole, 1.0, problem.space.upper - problem.space.lower)
         self._origin = np.where(whole, 0.0, problem.space.lower)
+        self._idle = max(0, LEAST_DIMENSIONS - size)
         # Its matrices are small: threads only wait for each other, and round differently.
         self._linear_algebra = ThreadpoolController().select(user_api="blas")
         self._asked: list[FloatArray] = []
@@ -87,7 +95,8 @@ class CmaEs(Method):
                 if self.restarts is not None and self.restarted >= self.restarts:
                     return np.empty((0, self.space.size))
                 self.restarted += 1
-                self.population *= 2
+                # A generation beyond the budget would never be finished, so nothing is learned.
+                self.population = max(self.population, min(2 * self.population, self._most()))
                 self._begin(self.space.from_unit(self._random.random(self.space.size)))
             self._asked = self._strategy.ask()
         return self._point(np.array(self._asked))
@@ -111,14 +120,20 @@ class CmaEs(Method):
             "population": self.population,
         }
 
+    def _most(self) -> int:
+        """The largest population of a restart."""
+        return min(MOST_POPULATION, self.problem.budget + self.problem.budget % 2)
+
     def _begin(self, start: FloatArray) -> None:
         import cma
 
         lower, upper = self._inner(self.space.lower), self._inner(self.space.upper)
+        lower[self.space.size :], upper[self.space.size :] = 0.0, 1.0
         whole = np.flatnonzero(self.space.whole)
         # Half a step beyond the first and last whole number, so that each has as much room.
         lower[whole], upper[whole] = lower[whole] - 0.499, upper[whole] + 0.499
-        spread = np.where(self.space.whole, self.space.upper - self.space.lower, 1.0)
+        spread = np.ones(self.space.size + self._idle)
+        spread[whole] = (self.space.upper - self.space.lower)[whole]
         inner = self._inner(start)
         options: dict[str, Any] = {
             "bounds": [lower.tolist(), upper.tolist()],
@@ -138,12 +153,16 @@ class CmaEs(Method):
             np.random.set_state(before)
 
     def _inner(self, vectors: FloatArray) -> FloatArray:
-        """Points (..., n) as pycma sees them: numbers 0 to 1, whole ones as they are."""
-        return np.asarray((np.asarray(vectors) - self._origin) / self._unit)
+        """Points (..., n) as pycma sees them: numbers 0 to 1, whole ones as they are, and a half
+        for each idle dimension.
+        """
+        points = (np.asarray(vectors) - self._origin) / self._unit
+        idle = np.full((*points.shape[:-1], self._idle), 0.5)
+        return np.concatenate([points, idle], axis=-1)
 
     def _point(self, inner: FloatArray) -> FloatArray:
-        """(k, n) points of the space for what pycma proposes."""
-        point = self._origin + inner * self._unit
+        """(k, n) points of the space for what pycma proposes; idle dimensions are left out."""
+        point = self._origin + inner[:, : self.space.size] * self._unit
         point = np.where(self.space.whole, np.round(point), point)
         return np.clip(point, self.space.lower, self.space.upper)
 

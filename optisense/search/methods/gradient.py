@@ -176,10 +176,15 @@ class SlopeEvaluator:
         rays = model.differentiable_rays(self.parts, size, fade)
         slopes = SMOOTH[self.objective](rays)
         back = rays.pull_back(slopes.cosine, slopes.weight, slopes.points)
-        if self._jacobian is None or not holds(self._jacobian, space, design, vector):
-            self._jacobian = jacobian(space, np.array(vector, dtype=np.float64), self.parts)
-        gradient = self._jacobian.camera @ back.camera
-        for name, slope in self._jacobian.parts.items():
+        # The Jacobian of the start serves all points where shapes move linearly. It may not be
+        # that of whichever point came first: a study that is resumed would differ in rounding.
+        if self._jacobian is None:
+            self._jacobian = jacobian(space, space.start, self.parts)
+        moves = self._jacobian
+        if not holds(moves, space, design, vector):
+            moves = jacobian(space, np.array(vector, dtype=np.float64), self.parts)
+        gradient = moves.camera @ back.camera
+        for name, slope in moves.parts.items():
             gradient = gradient + np.tensordot(slope, back.parts[name], axes=2)
         return slopes, gradient
 

@@ -1,0 +1,82 @@
+"""Which trial is the best, and what is said where several share the best score.
+
+The rule: the highest score by fresh seeds where some trials were scored so, else the highest score
+by the study's seed. Of trials that share it the one nearest to the start is the best, since it
+changes least, and of equally near ones the one that was proposed first. So the start itself wins
+every tie, and the same trials always have the same best one, in whatever order workers finished.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+
+from optisense.search.parameters import Choice
+from optisense.search.trial import Trial
+
+
+def distance(trial: Trial) -> float:
+    """How far a trial is from the start.
+
+    Each parameter counts as a share (0 to 1) of its range, options of a choice as 0 (the same) or
+    1 (another one), and the shares are added up as the sides of a right angle are.
+    """
+    space = trial.space
+    share = np.abs(trial.vector - space.start) / (space.upper - space.lower)
+    choices = np.array([isinstance(each.kind, Choice) for each in space.parameters])
+    return float(np.linalg.norm(np.where(choices, share > 0.0, share)))
+
+
+def ranked(trials: Iterable[Trial]) -> list[Trial]:
+    """Trials with a score by the study's own seed, the best first; see the rule above."""
+    fine = [trial for trial in trials if math.isfinite(trial.score)]
+    return sorted(fine, key=lambda trial: (-trial.score, distance(trial), trial.number))
+
+
+def best_of(trials: Sequence[Trial]) -> Trial | None:
+    """The best trial by the rule above; None where no trial has a score."""
+    fine = ranked(trials)
+    again = [trial for trial in fine if math.isfinite(trial.fresh_score())]
+    if again:
+        # `min` keeps the first of equals, and `fine` is in the order of the rule.
+        return min(again, key=lambda trial: (-trial.fresh_score(), -trial.score))
+    return fine[0] if fine else None
+
+
+def tied(trials: Sequence[Trial]) -> list[Trial]:
+    """The trials that share the best score, each point once, the best trial first.
+
+    Those that fresh seeds have shown to be worse are left out.
+    """
+    best = best_of(trials)
+    if best is None:
+        return []
+    fresh = best.fresh_score()
+    points: dict[bytes, Trial] = {best.vector.tobytes(): best}
+    for trial in ranked(trials):
+        own = trial.fresh_score()
+        worse = math.isfinite(own) and math.isfinite(fresh) and own < fresh
+        if trial.score == best.score and not worse:
+            points.setdefault(trial.vector.tobytes(), trial)
+    return list(points.values())
+
+
+def tie_note(trials: Sequence[Trial]) -> str | None:
+    """What the user should know where several trials share the best score; None where none do."""
+    same = tied(trials)
+    if len(same) < 2:
+        return None
+    best = same[0]
+    points = {trial.vector.tobytes() for trial in trials if math.isfinite(trial.score)}
+    if len(same) == len(points):
+        return (
+            f"all {len(same)} designs that were scored have the same score: within these bounds "
+            f"{best.objective or 'it'} does not depend on what was varied"
+        )
+    named = "the start, which changes nothing, is" if best.is_start else f"trial {best.number} is"
+    return (
+        f"{len(same)} trials share the best score; {named} named the best, as the nearest to the "
+        "start"
+    )

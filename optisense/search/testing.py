@@ -1,0 +1,288 @@
+"""What every search method must do, as tests: for this package's methods, and for your own.
+
+In a test file of yours, to be run by pytest::
+
+    from optisense.search.testing import MethodContract
+
+    class TestMine(MethodContract):
+        method = "mine"
+
+Each test runs whole studies in memory, on functions of the design that need no image.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Mapping
+from functools import cache
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from optisense.design import SensorDesign, get_value
+from optisense.errors import SearchError
+from optisense.search.best import tied
+from optisense.search.evaluation import Goal
+from optisense.search.parameters import Choice
+from optisense.search.plan import Plan
+from optisense.search.run import run_study
+from optisense.search.running import Result
+from optisense.search.space import BoundSpace, SearchSpace
+from optisense.search.study import Study
+
+FloatArray = NDArray[np.float64]
+Landscape = Callable[[FloatArray], float]
+"""The score of a point (n,), whose coordinates are shares of their ranges, 0 to 1."""
+
+LANDSCAPES: dict[str, Landscape] = {
+    "a hill": lambda share: -float(((share - 0.3) ** 2).sum()),
+    "best at the lower bounds": lambda share: -float(share.sum()),
+    "best at the upper bounds": lambda share: float(share.sum()),
+    "flat": lambda share: 0.25,
+    "a few steps, so that many tie": lambda share: float(np.floor(3.0 * share).max()),
+    "a quarter of it is NaN": lambda share: float(share[0]) if share[0] < 0.75 else math.nan,
+    "a quarter of it is infinite": lambda share: float(share[0]) if share[0] < 0.75 else math.inf,
+    "very large numbers": lambda share: 1e300 * float(share.sum()),
+}
+"""Scores that methods have stumbled over."""
+
+MANY = 50
+"""Spaces of more parameters are searched by one score only: others tell nothing new."""
+
+
+@cache
+def gelsight_mini() -> SensorDesign:
+    """The design that the studies start from."""
+    from optisense.sensors import load
+
+    return load("gelsight-mini")
+
+
+def general_spaces() -> dict[str, dict[str, object]]:
+    """Spaces of every size and kind; numbers have steps, so that a grid can search them too."""
+    design = gelsight_mini()
+    lights = [
+        f"lights.{group}.lights[{index}].{what}.{axis}"
+        for group in design.lights
+        for index in range(len(design.lights[group].lights))
+        for what in ("position", "direction")
+        for axis in "xyz"
+    ]
+    others = [f"camera.position.{axis}" for axis in "xyz"]
+    others += [f"coating.{what}.{channel}" for what in ("eta", "k") for channel in "rgb"]
+    others += ["camera.fov"]
+    hundred = {path: get_value(design, path) for path in [*lights, *others]}
+    colour = ["red", "green", "blue"]
+    return {
+        "one number": {"camera.fov": (40.0, 60.0, 7)},
+        "two numbers": {"coating.specularity": (0.0, 1.0, 3), "camera.position.x": (-1.0, 3.0, 5)},
+        "100 numbers": {
+            path: (float(now) - 0.4, float(now) + 0.4) for path, now in hundred.items()
+        },
+        "one whole number": {"camera.resolution[0]": (318, 322)},
+        "one choice": {"lights.red.colour": colour},
+        "whole numbers and choices": {
+            "camera.resolution[0]": (318, 322),
+            "lights.red.colour": colour,
+            "lights.blue.colour": colour,
+        },
+        "a number, a whole number and a choice": {
+            "coating.specularity": (0.0, 1.0, 3),
+            "camera.resolution[0]": (318, 322),
+            "lights.red.colour": colour,
+        },
+    }
+
+
+class MethodContract:
+    """The contract; a subclass names the method.
+
+    Attributes:
+        method: its name.
+        options: of its own, to test it with.
+        budget: trials of each study.
+        goals: how many objectives it needs.
+        reaches: the best trial must come as near to the best of one or two numbers as this part of
+            the range; None where the method promises nothing.
+        rounding: how far apart two runs of one study may be, as a part of the ranges and scores: 0
+            unless trials themselves come out otherwise in their last digits.
+    """
+
+    method: str
+    options: Mapping[str, Any] = {}
+    budget: int = 18
+    goals: int = 1
+    reaches: float | None = None
+    rounding: float = 0.0
+
+    def design(self) -> SensorDesign:
+        """Where the studies start."""
+        return gelsight_mini()
+
+    def spaces(self) -> dict[str, dict[str, object]]:
+        """What may change, by a name for messages."""
+        return general_spaces()
+
+    def landscapes(self) -> dict[str, str | Landscape]:
+        """The scores to search by, by a name for messages; a text is an objective's name."""
+        return dict(LANDSCAPES)
+
+    def settings(self) -> dict[str, Any]:
+        """Settings of objectives, where the landscapes are objectives."""
+        return {}
+
+    def coordinates(self, space: BoundSpace, design: SensorDesign) -> FloatArray:
+        """(n,) the point of a space that a design was made from, read back from the design."""
+        found = []
+        for parameter in space.parameters:
+            target = parameter.targets[0]
+            value = get_value(design, target.path)
+            if isinstance(parameter.kind, Choice):
+                options = [_plain(option) for option in parameter.kind.options]
+                found.append(float(options.index(_plain(value))))
+            else:
+                found.append((float(value) - target.offset) / target.scale)
+        return np.array(found)
+
+    def study(
+        self, space: Mapping[str, object], goal: str | Landscape, budget: int, seed: int = 0
+    ) -> Study:
+        """A new study in memory.
+
+        Raises:
+            SearchError: the method refuses the space.
+        """
+        design = self.design()
+        goals: list[Goal] = []
+        for number in range(self.goals):
+            goals.append(goal if isinstance(goal, str) else self._function(space, goal, number))
+        plan = Plan(
+            space=SearchSpace(space),
+            goals=goals,
+            method=self.method,
+            options=dict(self.options),
+            budget=budget,
+            seed=seed,
+            settings=self.settings(),
+        )
+        return Study.create(None, design, plan)
+
+    def cases(self) -> Iterator[tuple[str, Mapping[str, object], str | Landscape]]:
+        """Each space with each landscape, and a name for messages."""
+        for space_name, space in self.spaces().items():
+            for number, (name, goal) in enumerate(self.landscapes().items()):
+                if number and len(space) > MANY:
+                    break
+                yield f"{space_name}, {name}", space, goal
+
+    def run(
+        self, space: Mapping[str, object], goal: str | Landscape, budget: int | None = None
+    ) -> Result:
+        """A whole study."""
+        return run_study(self.study(space, goal, budget or self.budget))
+
+    def test_it_searches_every_space_by_every_score(self) -> None:
+        for case, space, goal in self.cases():
+            result = self.run(space, goal)
+            assert result.ended in ("the budget is spent", "the method has finished"), case
+            new = [trial for trial in result.trials if not trial.is_start]
+            assert 1 <= len(new) <= self.budget, case
+            for trial in new:
+                result.study.space.check(trial.vector)
+            scores = [trial.score for trial in result.trials if math.isfinite(trial.score)]
+            assert result.best.score == max(scores), case
+
+    def test_a_budget_of_one_is_one_trial(self) -> None:
+        goal = next(iter(self.landscapes().values()))
+        for name, space in self.spaces().items():
+            result = self.run(space, goal, 1)
+            assert len(result.trials) == 2, name  # the start is not counted
+
+    def test_a_study_that_was_stopped_goes_on_as_if_it_had_not_been(self) -> None:
+        for case, space, goal in self.cases():
+            if case.endswith(("bounds", "large numbers", "infinite")):
+                continue  # nothing else than in the others can be forgotten
+            whole = self.run(space, goal)
+            study = self.study(space, goal, self.budget)
+            for limit in (self.budget // 8 + 1, self.budget // 2, self.budget):
+                parts = run_study(study, limit=limit)
+            _same(parts, whole, self.rounding, case)
+            assert parts.notes == whole.notes, case
+
+    def test_ties_are_told_and_the_start_wins_those_that_it_shares(self) -> None:
+        if self.goals > 1 or "flat" not in self.landscapes():
+            return  # several goals have a front and no best one
+        for name, space in self.spaces().items():
+            result = self.run(space, self.landscapes()["flat"])
+            assert result.best.is_start, name
+            same = tied(result.trials)
+            assert len(same) == len({trial.vector.tobytes() for trial in result.trials}), name
+            if len(same) > 1:
+                assert any("have the same score" in note for note in result.notes), name
+
+    def test_where_all_trials_fail_the_reason_is_told(self) -> None:
+        if not all(callable(goal) for goal in self.landscapes().values()):
+            return  # objectives of the package fail where their own tests say
+
+        def broken(share: FloatArray) -> float:
+            raise ValueError("no such sensor can be made")
+
+        for space in self.spaces().values():
+            with pytest.raises(SearchError, match="no such sensor can be made"):
+                self.run(space, broken)
+
+    def test_failed_trials_cost_nothing_else(self) -> None:
+        """The design as it is scores, and every other one fails: the start is the best."""
+        if not all(callable(goal) for goal in self.landscapes().values()):
+            return
+
+        def only_start(share: FloatArray) -> float:
+            return 1.0 if (share == start).all() else math.nan
+
+        for name, space in self.spaces().items():
+            bound = SearchSpace(space).bind(self.design())
+            start = (bound.start - bound.lower) / (bound.upper - bound.lower)
+            if self.goals == 1:
+                assert self.run(space, only_start).best.is_start, name
+
+    def test_it_finds_the_best_of_one_and_two_numbers(self) -> None:
+        if self.reaches is None:
+            return
+        for case, space, goal in self.cases():
+            if not case.startswith(("one number", "two numbers")) or "best at" not in case:
+                continue
+            best = self.run(space, goal, 4 * self.budget).best
+            share = best.space.to_unit(best.vector)
+            wanted = 1.0 if "upper" in case else 0.0
+            assert np.abs(share - wanted).max() <= self.reaches, case
+
+    def _function(
+        self, space: Mapping[str, object], landscape: Landscape, number: int
+    ) -> Callable[[SensorDesign], float]:
+        """A goal from a landscape; the second goal is highest where the first one is lowest."""
+        bound = SearchSpace(space).bind(self.design())
+
+        def score(design: SensorDesign) -> float:
+            share = (self.coordinates(bound, design) - bound.lower) / (bound.upper - bound.lower)
+            return landscape(np.clip(1.0 - share if number else share, 0.0, 1.0))
+
+        score.__name__ = f"score_{number}"
+        return score
+
+
+def _same(one: Result, other: Result, rounding: float, case: str) -> None:
+    """Two results have the same trials: to the last bit where `rounding` is 0."""
+    pairs = list(zip(one.trials, other.trials, strict=True))
+    for first, second in pairs:
+        assert (first.number, first.generation) == (second.number, second.generation), case
+        assert first.failure == second.failure, case
+        share = one.study.space.to_unit(np.stack([first.vector, second.vector]))
+        np.testing.assert_allclose(share[0], share[1], rtol=0.0, atol=rounding, err_msg=case)
+        old, new = (np.array(list(trial.scores.values())) for trial in (first, second))
+        np.testing.assert_allclose(old, new, rtol=rounding, atol=rounding, err_msg=case)
+
+
+def _plain(value: object) -> object:
+    return tuple(value) if isinstance(value, list | tuple) else value

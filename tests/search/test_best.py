@@ -1,0 +1,87 @@
+"""Which trial is the best, and that ties are named as ties."""
+
+from __future__ import annotations
+
+import json
+import math
+from itertools import permutations
+
+import numpy as np
+import pytest
+
+from optisense.design import SensorDesign
+from optisense.search import Result, search
+from optisense.search.best import best_of, distance, tie_note, tied
+from optisense.search.outcome import Outcome
+from optisense.search.space import BoundSpace, SearchSpace
+from optisense.search.trial import Trial
+
+
+@pytest.fixture(scope="module")
+def space(mini: SensorDesign) -> BoundSpace:
+    """The start is (0, 0, red): specularity, place, colour."""
+    return SearchSpace(
+        {
+            "coating.specularity": (0.0, 1.0),
+            "camera.position.x": (-2.0, 2.0),
+            "lights.red.colour": ["red", "green", "blue"],
+        }
+    ).bind(mini)
+
+
+def trial(space: BoundSpace, number: int, point: list[float], score: float) -> Trial:
+    outcome = Outcome({"s": score}) if math.isfinite(score) else Outcome.of_failure(["s"], "no")
+    generation = -1 if number == 0 else 0
+    return Trial(number, generation, np.array(point), outcome, space, "s")
+
+
+def test_the_distance_adds_up_shares_of_ranges(space: BoundSpace) -> None:
+    assert distance(trial(space, 1, [0.3, 1.6, 0], 1.0)) == pytest.approx(0.5)
+    assert distance(trial(space, 1, [0.0, 0.0, 2], 1.0)) == 1.0  # options are in no order
+
+
+def test_of_equal_trials_the_nearest_to_the_start_is_the_best(space: BoundSpace) -> None:
+    trials = [
+        trial(space, 0, [0.0, 0.0, 0], 1.0),
+        trial(space, 1, [0.9, 0.0, 0], 2.0),
+        trial(space, 2, [0.1, 0.0, 0], 2.0),
+        trial(space, 3, [0.1, 0.0, 0], 2.0),  # the same point again
+        trial(space, 4, [0.0, 0.4, 0], 2.0),  # as near as trial 2, and proposed later
+        trial(space, 5, [0.2, 0.0, 0], math.nan),
+    ]
+    for order in permutations(trials):
+        best = best_of(order)
+        assert best is not None and best.number == 2
+        assert {each.number for each in tied(order)} == {1, 2, 4}
+    note = tie_note(trials)
+    assert note is not None
+    assert note.startswith("3 trials share the best score; trial 2 is named the best")
+
+
+def test_the_start_wins_ties(space: BoundSpace) -> None:
+    trials = [trial(space, k, [0.1 * k, 0.0, 0], 1.0) for k in range(4)]
+    trials.append(trial(space, 4, [0.9, 0.0, 0], 0.5))
+    best = best_of(trials[::-1])
+    assert best is not None and best.is_start
+    assert "4 trials share the best score; the start" in str(tie_note(trials))
+    assert "does not depend on what was varied" in str(tie_note(trials[:4]))
+
+
+def test_one_best_trial_is_no_tie(space: BoundSpace) -> None:
+    trials = [trial(space, k, [0.1 * k, 0.0, 0], float(k)) for k in range(4)]
+    assert tie_note(trials) is None
+    assert tie_note([]) is None
+    assert best_of([trial(space, 0, [0.0, 0.0, 0], math.nan)]) is None
+
+
+def test_a_search_tells_its_ties_the_same_way_each_time(mini: SensorDesign) -> None:
+    def plateau(design: SensorDesign) -> float:
+        return float(design.coating.specularity >= 0.5)
+
+    def run() -> Result:
+        return search(mini, {"coating.specularity": (0.0, 1.0, 11)}, plateau, method="grid")
+
+    first, second = run(), run()
+    assert first.best.values == second.best.values == {"coating.specularity": 0.5}
+    assert first.notes == second.notes
+    assert json.dumps(first.notes).count("6 trials share the best score") == 1
