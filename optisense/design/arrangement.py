@@ -1,4 +1,4 @@
-"""How parts and camera stand to each other: solids in one place, a camera that looks elsewhere."""
+"""How parts stand to each other, and where the picture is: solids in one place, straight rays."""
 
 from __future__ import annotations
 
@@ -8,13 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from optisense.design.camera import Camera
-from optisense.design.parts import TRANSPARENT_SOLIDS, Role
+from optisense.design.parts import TRANSPARENT_SOLIDS
 from optisense.design.problems import Problem
 from optisense.design.sensor_design import SensorDesign
 from optisense.geometry import TriangleMesh
 from optisense.geometry.common_space import common_space
 from optisense.geometry.meeting import CONTACT
-from optisense.geometry.rays import ray_hits
 
 EQUAL_INDEX = 1e-6
 """Solids whose refractive indices differ by less are one to the light."""
@@ -53,36 +52,7 @@ def overlaps(design: SensorDesign, meshes: dict[str, TriangleMesh]) -> list[Prob
     return problems
 
 
-def out_of_view(design: SensorDesign, meshes: dict[str, TriangleMesh]) -> list[Problem]:
-    """A camera in whose straight view no sensing surface is.
-
-    Rays bend on their way, so this is a warning; the picture tells. With mirrors it says nothing.
-
-    Args:
-        meshes: the deformed meshes, mm.
-    """
-    skins = [meshes[name] for name in design.parts_of(Role.SENSING_SURFACE) if name in meshes]
-    if not skins or design.parts_of(Role.MIRROR):
-        return []
-    camera = design.camera
-    position = np.array(camera.position)
-    if any(_in_picture(camera, skin.vertices).any() for skin in skins):
-        return []
-    directions = _directions(camera)
-    if any(len(ray_hits(skin, position + 0 * directions, directions).ray) for skin in skins):
-        return []
-    return [
-        Problem(
-            "the sensing surface is not where the camera looks",
-            design.where("camera", "direction"),
-            "Point the camera's direction at it, or move the camera, unless the parts bend the "
-            "light that far",
-            severity="warning",
-        )
-    ]
-
-
-def _in_picture(camera: Camera, points: NDArray[np.float64]) -> NDArray[np.bool_]:
+def in_picture(camera: Camera, points: NDArray[np.float64]) -> NDArray[np.bool_]:
     """(n,) whether points lie in the picture, seen straight."""
     right, up, depth = camera.axes() @ (points - np.array(camera.position)).T
     aside = np.hypot(right, up)
@@ -100,7 +70,7 @@ def _in_picture(camera: Camera, points: NDArray[np.float64]) -> NDArray[np.bool_
     return inside
 
 
-def _directions(camera: Camera) -> NDArray[np.float64]:
+def straight_rays(camera: Camera) -> NDArray[np.float64]:
     """(k, 3) the directions of some places spread over the picture."""
     half = np.radians(0.5 * camera.fov)
     edge = half if camera.projection == "equidistant" else float(np.tan(half))

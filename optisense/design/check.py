@@ -8,8 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from optisense.design.addressing import get_value
-from optisense.design.arrangement import out_of_view, overlaps
+from optisense.design.arrangement import overlaps
 from optisense.design.cage_checks import cage_problems, half_caged
+from optisense.design.camera_checks import lens_problems, place_problems, view_problems
 from optisense.design.limits import unit_slips
 from optisense.design.near import suggestion
 from optisense.design.parts import TRANSPARENT_SOLIDS, Role
@@ -33,8 +34,9 @@ def check_design(design: SensorDesign, light_names: Collection[str] | None = Non
     """All that can be found wrong with a design without tracing light through it.
 
     Meshes that are empty, not closed or not finite, unit slips, missing meshes, unknown lights,
-    lights or a camera inside something opaque, a sensing surface that faces the wrong way, lies
-    off the elastomer or out of the camera's view, what cages have folded or pushed together,
+    lights or a camera inside something opaque, a camera inside a solid or too near to a part, a
+    field of view that no lens has, a sensing surface that faces the wrong way, lies off the
+    elastomer or mostly out of the camera's view, what cages have folded or pushed together,
     cages that would tear a sensing surface off its elastomer, solids that overlap with one
     priority, and provenance of values that don't exist. (Fields, ranges and references between
     parts are checked as soon as a design is made.)
@@ -50,6 +52,7 @@ def check_design(design: SensorDesign, light_names: Collection[str] | None = Non
     for name in design.parts:
         problems += _check_mesh(design, name, meshes)
     problems += unit_slips(design)
+    problems += lens_problems(design.camera, design.where("camera", "fov"))
     problems += _check_lights(design, light_names)
     if not any(problem.severity == "error" for problem in problems):
         try:
@@ -60,7 +63,8 @@ def check_design(design: SensorDesign, light_names: Collection[str] | None = Non
         else:
             problems += _check_poses(design, meshes)
             problems += _check_sensing_surfaces(design, meshes)
-            problems += out_of_view(design, meshes)
+            problems += place_problems(design, meshes)
+            problems += view_problems(design, meshes)
             bent = cage_problems(design, meshes)
             problems += bent
             problems += half_caged(design, meshes)

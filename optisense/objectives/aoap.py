@@ -20,7 +20,24 @@ COVERAGE_WEIGHT = 0.01
 """k1 of the paper. Coverage hardly counts at this weight: look at it beside the value."""
 
 
-@objective("aoap", title="AOAP", draw=figures.draw_aoap, beside=("coverage",), reads=no_pixels)
+LEAST_PIXELS = 100
+"""Pixels that must see the surface: a mean over fewer says little about a camera."""
+
+
+def bounds(*, coverage_weight: float) -> tuple[float, float]:
+    """The lowest and the highest score: cosine and coverage are each 0 to 1."""
+    return 0.0, 1.0 + coverage_weight
+
+
+@objective(
+    "aoap",
+    title="AOAP",
+    draw=figures.draw_aoap,
+    beside=("coverage",),
+    reads=no_pixels,
+    range=bounds,
+    needs=f"{LEAST_PIXELS} pixels that see the surface",
+)
 def aoap(
     evaluation: Evaluation, *, coverage_weight: float = COVERAGE_WEIGHT
 ) -> tuple[float, dict[str, Any], dict[str, Any]]:
@@ -31,19 +48,21 @@ def aoap(
 
     Args:
         evaluation: the sensor.
-        coverage_weight: k1.
+        coverage_weight: k1, from 0 to 1; at 1 seeing the whole surface counts as much as looking
+            straight at it.
     """
-    refuse_outside("coverage_weight", coverage_weight, 0.0)
-    rays = evaluation.chief_rays
+    refuse_outside("coverage_weight", coverage_weight, 0.0, 1.0)
+    rays = evaluation.judged_rays
     hit = rays.hit
-    if not hit.any():
+    if np.count_nonzero(hit) < LEAST_PIXELS:
         raise ObjectiveError(
-            "the camera sees nothing of the sensing surface",
-            hint="Check the camera's position, direction and field of view",
+            f"{np.count_nonzero(hit)} of the {LEAST_PIXELS} pixels that it needs see the sensing "
+            "surface",
+            hint="Use a higher ray_resolution, or check the camera's position and direction",
         )
     faces = evaluation.sensing_faces
     seen = np.bincount(rays.face[hit], minlength=faces)[:faces] > 0
-    cosine = np.where(hit, rays.incidence, np.float32(0))
+    cosine = np.where(hit, np.clip(rays.incidence, 0.0, 1.0), np.float32(0))
     mean_cosine = float(cosine.mean(dtype=np.float64))
     coverage = float(seen.mean())
     areas = evaluation.model.sensing.face_areas

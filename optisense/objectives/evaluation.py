@@ -12,10 +12,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from optisense.design import SensorDesign
+from optisense.design.camera_checks import camera_fault
 from optisense.errors import ObjectiveError, OptiSenseError
 from optisense.geometry import Contact, SensingSurface, Sphere, locate
 from optisense.objectives.press import Press
-from optisense.objectives.settings import Settings, size_for
+from optisense.objectives.settings import VIEW_ACROSS, Settings, size_for
+from optisense.objectives.view import View, view_of
 
 if TYPE_CHECKING:
     from optisense.optics import ChiefRays, OpticalModel, TactileImage
@@ -100,6 +102,36 @@ class Evaluation:
         """One chief ray a pixel of `ray_resolution`, of the untouched sensor."""
         return self._once("chief rays", lambda: self.model.chief_rays(self.ray_resolution))
 
+    def check_camera(self) -> None:
+        """Make sure that there can be such a camera.
+
+        Raises:
+            ObjectiveError: it is inside a part, or no lens has its field of view.
+        """
+        fault = self._once(
+            "camera", lambda: camera_fault(self.design, self.design.deformed_meshes())
+        )
+        if fault is not None:
+            raise ObjectiveError(fault.message, hint=fault.hint)
+
+    @property
+    def view(self) -> View:
+        """How much the camera sees, by rays of its own (see `settings.VIEW_ACROSS`)."""
+        size = size_for(self.design.camera.resolution, VIEW_ACROSS)
+        return self._once(
+            "view", lambda: view_of(self.model.chief_rays(size), self.model.sensing.face_areas)
+        )
+
+    @property
+    def judged_rays(self) -> ChiefRays:
+        """The chief rays of a camera that sees enough to be scored by them.
+
+        Raises:
+            ObjectiveError: it sees less than `Settings.least_skin` or `Settings.least_picture`.
+        """
+        self.view.refuse_less(self.settings)
+        return self.chief_rays
+
     @property
     def untouched(self) -> TactileImage:
         """The image of the untouched sensor."""
@@ -146,8 +178,14 @@ class Evaluation:
         return cast("_T", made)
 
     def _contacts(self) -> list[Contact]:
+        """Presses at the places that the user named, or at nine that cover what is seen.
+
+        Raises:
+            ObjectiveError: nine places would crowd on the little that the camera sees.
+        """
         ball = Sphere(self.settings.radius)
         if self.settings.places is None:
+            self.view.refuse_less(self.settings)
             return self.model.nine_contacts(ball, self.settings.depth)
         return [Contact(ball, at=at, depth=self.settings.depth) for at in self.settings.places]
 

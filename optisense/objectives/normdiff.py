@@ -49,6 +49,12 @@ RING = 10_000
 LEAST_PIXELS = 50
 """Indented pixels of a press."""
 
+MOST_WEIGHT = 100.0
+"""Of a range in the sum: the other one no longer counts."""
+
+MOST_LEAST_PIXELS = 1_000_000
+"""That can be asked of a press: more than any has."""
+
 
 CROWD = 0.75
 """The part of the camera samples that a pixel gets which is read together with many others. With
@@ -82,12 +88,19 @@ def in_crowd(press: Press, *, least_pixels: int, **settings: Any) -> FloatArray:
     return np.where(indented_pixels(press, least_pixels), CROWD, 0.0)
 
 
+def bounds(*, theta_weight: float, phi_weight: float, **others: object) -> tuple[float, float]:
+    """The lowest and the highest score: each range is 0 to 180 degrees."""
+    return -180.0 * (theta_weight + phi_weight), 0.0
+
+
 @objective(
     "normdiff",
     title="NormDiff",
     draw=figures.draw_normdiff,
     beside=("theta_range", "phi_range"),
     reads=in_crowd,
+    range=bounds,
+    needs=f"each press seen, with {LEAST_PIXELS} indented pixels",
 )
 def normdiff(
     evaluation: Evaluation,
@@ -111,9 +124,14 @@ def normdiff(
         least_pixels: indented pixels that a press must have.
     """
     refuse_outside("noise", noise, 0.0, 1.0)
-    refuse_outside("theta_weight", theta_weight, 0.0)
-    refuse_outside("phi_weight", phi_weight, 0.0)
-    refuse_outside("least_pixels", least_pixels, 1)
+    refuse_outside("theta_weight", theta_weight, 0.0, MOST_WEIGHT)
+    refuse_outside("phi_weight", phi_weight, 0.0, MOST_WEIGHT)
+    if theta_weight == phi_weight == 0.0:
+        raise ObjectiveError(
+            "both weights are 0, so every sensor would be perfect",
+            hint="Give theta_weight or phi_weight a number above 0",
+        )
+    refuse_outside("least_pixels", least_pixels, 1, MOST_LEAST_PIXELS)
     refuse_kind(colours)
     places: list[dict[str, Any]] = []
     maps = []

@@ -28,6 +28,12 @@ BAND = 24
 MOST_EVEN = 1e-6
 """Deviations below this part of the mean are rounding of single-precision points."""
 
+LEAST_TRIANGLES = 100
+"""Triangles between pixels that must lie on the surface: the deviation of fewer is luck."""
+
+MOST_JUMP = 1000.0
+"""Edges are never so many times as long as their neighbours: nothing would be left out."""
+
 
 class TriangleAreas(NamedTuple):
     """(h-1, w-1, 2) mm² of each pixel quad's two triangles, NaN where one is left out; and how
@@ -45,6 +51,8 @@ class TriangleAreas(NamedTuple):
     draw=figures.draw_projection_warping,
     beside=("mean_area",),
     reads=no_pixels,
+    range=(0.0, 1.0 / MOST_EVEN),
+    needs=f"{LEAST_TRIANGLES} triangles between pixels on the surface",
 )
 def projection_warping(
     evaluation: Evaluation, *, jump: float = JUMP
@@ -58,14 +66,15 @@ def projection_warping(
         jump: an edge so many times as long as its neighbours leaps over a fold or a gap, and its
             triangles are left out.
     """
-    refuse_outside("jump", jump, 1.0, open_low=True)
-    rays = evaluation.chief_rays
+    refuse_outside("jump", jump, 1.0, MOST_JUMP, open_low=True)
+    rays = evaluation.judged_rays
     found = triangle_areas(rays.points, rays.hit, jump)
     areas = found.areas[np.isfinite(found.areas)].astype(np.float64)
-    if len(areas) < 2:
+    if len(areas) < LEAST_TRIANGLES:
         raise ObjectiveError(
-            "the camera sees too little of the sensing surface: no two triangles of pixels",
-            hint="Check the camera's position, direction and field of view",
+            f"{len(areas)} of the {LEAST_TRIANGLES} triangles between pixels that it needs lie on "
+            "the sensing surface",
+            hint="Use a higher ray_resolution, or check the camera's position and direction",
         )
     mean = float(areas.mean())
     deviation = float(areas.std())

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+import math
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -30,6 +31,10 @@ ENTRY_POINTS = "optisense.objectives"
 
 BUILT_IN = ("rgb2normal", "normdiff", "aoap", "2to3pw")
 
+UNBOUNDED = (-math.inf, math.inf)
+
+Range = tuple[float, float] | Callable[..., tuple[float, float]]
+
 _F = TypeVar("_F", bound="Callable[..., Any]")
 
 
@@ -47,6 +52,10 @@ class Objective:
         reads: takes a `Press`, not exposed, and the settings as keyword arguments, and returns
             which pixels (h, w) are read: True or 1 where they are read one by one, less where a
             part of the camera samples will do; all of the contact's where it is None.
+        range: the lowest and the highest value that it can return, or a function of the settings
+            (keyword arguments) that returns both; a value outside is no score.
+        needs: the least evidence that it scores by, in words, beside what every score needs
+            (`Settings.least_skin` and `Settings.least_picture`).
     """
 
     name: str
@@ -55,6 +64,8 @@ class Objective:
     draw: Drawing | None = None
     beside: tuple[str, ...] = ()
     reads: Callable[..., Any] | None = None
+    range: Range = UNBOUNDED
+    needs: str = ""
 
     def __call__(self, evaluation: Evaluation, **settings: Any) -> Any:
         """Call the function itself, without any checks of what it returns."""
@@ -69,6 +80,25 @@ class Objective:
             for parameter in parameters[1:]
             if parameter.default is not parameter.empty
         }
+
+    def bounds(self, settings: Mapping[str, Any] | None = None) -> tuple[float, float]:
+        """The lowest and the highest value with own settings; those that are not given are usual.
+
+        Raises:
+            ObjectiveError: the range is not two numbers in their order.
+        """
+        found = self.range
+        if callable(found):
+            found = found(**{**self.settings, **(settings or {})})
+        try:
+            low, high = (float(bound) for bound in found)
+            if low < high:
+                return low, high
+        except (TypeError, ValueError):
+            pass
+        raise ObjectiveError(
+            f"the range of {self.name} is {found!r}", hint="Give (lowest, highest)"
+        )
 
     @property
     def summary(self) -> str:
@@ -87,6 +117,8 @@ def objective(
     draw: Drawing | None = None,
     beside: tuple[str, ...] = (),
     reads: Callable[..., Any] | None = None,
+    range: Range = UNBOUNDED,
+    needs: str = "",
 ) -> Callable[[_F], _F]:
     """Register a function as an objective; higher values must be better.
 
@@ -96,13 +128,16 @@ def objective(
         draw: makes a figure of the score; a plain one if left out.
         beside: names of parts to show beside the value wherever it stands.
         reads: which pixels of a press are read, if not all one by one (see `Objective`).
+        range: the lowest and the highest value, as of `Objective`; any number if left out.
+        needs: the least evidence that it scores by, in words.
 
     Raises:
         ObjectiveError: the name is taken or malformed, or the function takes no evaluation.
     """
 
     def register(function: _F) -> _F:
-        _register(Objective(name, function, title or name, draw, beside, reads))
+        given = Objective(name, function, title or name, draw, beside, reads, range, needs)
+        _register(given)
         return function
 
     return register

@@ -29,6 +29,12 @@ COLOURS = "picture"
 LEAST_PIXELS = 8
 """On a line; a straight fit through fewer says little."""
 
+MOST_LEAST_PIXELS = 10_000
+"""That can be asked of a line or a press: more than any of them has."""
+
+MOST_DIRECTIONS = 360
+"""One a degree: lines that are nearer to each other have the same pixels."""
+
 
 @dataclass(frozen=True)
 class Fit:
@@ -67,6 +73,8 @@ def on_lines(
     draw=figures.draw_rgb2normal,
     beside=("worst_line",),
     reads=on_lines,
+    range=(0.0, 1.0),
+    needs=f"each press seen, with {LEAST_PIXELS} pixels on each line",
 )
 def rgb2normal(
     evaluation: Evaluation,
@@ -89,7 +97,7 @@ def rgb2normal(
         least_pixels: that a line must have.
     """
     _refuse_directions(directions, half_lines)
-    refuse_outside("least_pixels", least_pixels, 3)
+    refuse_outside("least_pixels", least_pixels, 3, MOST_LEAST_PIXELS)
     refuse_kind(colours)
     angles = np.arange(directions) * 360.0 / directions
     places: list[dict[str, Any]] = []
@@ -149,6 +157,10 @@ def lines_of(
 
 
 def _refuse_directions(directions: int, half_lines: bool) -> None:
+    if directions > MOST_DIRECTIONS:
+        raise ObjectiveError(
+            f"{directions} directions are too many", hint=f"Use up to {MOST_DIRECTIONS}"
+        )
     if directions < 1 or (directions % 2 and not half_lines):
         raise ObjectiveError(
             f"{directions} directions have no opposite ones", hint="Use an even number from 2"

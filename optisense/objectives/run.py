@@ -104,8 +104,11 @@ def run_objective(
         return Score(objective.name, math.nan, reason, {}, seconds, objective.title)
 
     try:
+        if isinstance(evaluation, Evaluation):  # others are made from one with the same camera
+            evaluation.check_camera()
         result = objective(evaluation, **(settings or {}))
         value, parts, arrays, draw = _read(result)
+        low, high = objective.bounds(settings)
         parts = json_ready(parts)
     except SetupError:
         raise
@@ -115,6 +118,10 @@ def run_objective(
         return failed(f"{type(error).__name__}: {error} ({place_of(error)})")
     if not math.isfinite(value):
         return failed(f"the objective returned {value}, which is no score")
+    if not low <= value <= high:
+        return failed(
+            f"the objective returned {value:g}, which is outside its range from {low:g} to {high:g}"
+        )
     return Score(
         objective=objective.name,
         value=value,

@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass
 from typing import Any, Literal
 
+from optisense.design.camera_checks import LEAST_PICTURE, LEAST_SKIN
 from optisense.errors import ObjectiveError
 
 BALL_RADIUS = 1.5
@@ -23,6 +24,21 @@ ACROSS = 640
 side of a fingertip is too few pixels to judge; images of 640 cost little more."""
 
 
+VIEW_ACROSS = 160
+"""Chief rays across the image by which both shares are measured, whatever the resolution of the
+scores: on the built-in sensors they differ by less than 0.02 from those of 640."""
+
+MOST_PIXELS = 16_384
+"""Pixels along a side of an image: what the renderer holds in memory, and more than any camera has
+that fits into a sensor."""
+
+MOST_PHOTONS = 10_000_000_000
+"""Photons of an image: days of work, so more are a slip."""
+
+MOST_RADIUS = 1000.0
+"""mm, of the ball that presses: larger than any sensor, to which it is flat."""
+
+
 @dataclass(frozen=True)
 class Settings:
     """Images and rays that objectives share. Lengths in mm.
@@ -38,6 +54,9 @@ class Settings:
         together: press at all places in one image, where contacts do not overlap.
         exposure: factor on the radiance; "auto" exposes the untouched sensor well and keeps that,
             or less where contacts would be overexposed (`evaluation.exposure_for`).
+        least_skin: share of the sensing surface's area that the camera must see, 0 to 1, or there
+            is no score.
+        least_picture: share of the pixels that must see the sensing surface, 0 to 1.
     """
 
     resolution: tuple[int, int] | None = None
@@ -49,15 +68,20 @@ class Settings:
     places: tuple[tuple[float, float], ...] | None = None
     together: bool = False
     exposure: float | Literal["auto"] = "auto"
+    least_skin: float = LEAST_SKIN
+    least_picture: float = LEAST_PICTURE
 
     def __post_init__(self) -> None:
         for name in ("resolution", "ray_resolution"):
             size = getattr(self, name)
             if size is not None:
                 object.__setattr__(self, name, _size(name, size))
-        if self.photons is not None and not (_is_whole(self.photons) and self.photons > 0):
+        if self.photons is not None and not (
+            _is_whole(self.photons) and 0 < self.photons <= MOST_PHOTONS
+        ):
             raise ObjectiveError(
-                f"photons are {self.photons!r}", hint="Give a whole number above 0"
+                f"photons are {self.photons!r}",
+                hint=f"Give a whole number from 1 to {MOST_PHOTONS:,}",
             )
         if not (_is_whole(self.seed) and 0 <= self.seed < 2**32):
             raise ObjectiveError(f"the seed is {self.seed!r}", hint="Give a whole number from 0")
@@ -72,6 +96,17 @@ class Settings:
                 f"a ball of radius {self.radius!r} mm can't be judged {self.depth!r} mm deep",
                 hint="Press deeper than 0 and less deep than the radius",
             )
+        if self.radius > MOST_RADIUS:
+            raise ObjectiveError(
+                f"a ball of radius {self.radius!r} mm is larger than any sensor",
+                hint=f"Give a radius up to {MOST_RADIUS:g} mm",
+            )
+        for name in ("least_skin", "least_picture"):
+            share = getattr(self, name)
+            if not (is_number(share) and 0.0 <= share <= 1.0):
+                raise ObjectiveError(
+                    f"the setting '{name}' is {share!r}", hint="Give a share from 0 to 1"
+                )
         if self.places is not None:
             object.__setattr__(self, "places", _pairs(self.places))
 
@@ -112,10 +147,11 @@ def _size(name: str, size: Any) -> tuple[int, int]:
     if (
         not isinstance(size, tuple | list)
         or len(size) != 2
-        or not all(_is_whole(side) and side > 0 for side in size)
+        or not all(_is_whole(side) and 0 < side <= MOST_PIXELS for side in size)
     ):
         raise ObjectiveError(
-            f"the {name.replace('_', ' ')} is {size!r}", hint="Give width and height in pixels"
+            f"the {name.replace('_', ' ')} is {size!r}",
+            hint=f"Give width and height in pixels, each from 1 to {MOST_PIXELS:,}",
         )
     return int(size[0]), int(size[1])
 

@@ -59,6 +59,28 @@ def unlit_evaluation() -> Evaluation:
     return Evaluation(OpticalModel(design), settings)
 
 
+ODD_CAMERAS = (
+    ("camera.fov", 0.01),
+    ("camera.fov", 179.0),
+    ("camera.position.z", -900.0),
+    ("camera.position.z", 100.0),
+    ("camera.position.z", -2.0),
+)
+"""A spot of the skin, the skin as a spot, seen from far away, from behind, from inside the gel."""
+
+
+@cache
+def odd_evaluation(path: str, value: float) -> Evaluation:
+    """A GelSight Mini with one number of its camera changed."""
+    from optisense.design import set_value
+    from optisense.optics import OpticalModel
+    from optisense.sensors import load
+
+    design = set_value(load("gelsight-mini"), path, value)
+    settings = Settings(resolution=(40, 30), ray_resolution=(80, 60), photons=10_000)
+    return Evaluation(OpticalModel(design), settings)
+
+
 class ObjectiveContract:
     """The contract; a subclass names the objective.
 
@@ -115,6 +137,21 @@ class ObjectiveContract:
         before = gelsight_mini().design.model_dump_json()
         self.score()
         assert gelsight_mini().design.model_dump_json() == before
+
+    def test_its_range_is_told_and_kept(self) -> None:
+        low, high = self.found().bounds(self.settings)
+        assert low < high
+        assert low <= self.score().value <= high
+
+    def test_cameras_that_see_little_give_a_score_in_its_range_or_a_reason(self) -> None:
+        low, high = self.found().bounds(self.settings)
+        for path, value in ODD_CAMERAS:
+            score = evaluate(odd_evaluation(path, value), self.found(), **self.settings)
+            if score.failure is None:
+                assert low <= score.value <= high, f"{path} = {value}"
+            else:
+                assert math.isnan(score.value), f"{path} = {value}"
+                assert len(score.failure) > 10, f"{path} = {value}"
 
     def test_a_sensor_without_light_gives_a_score_or_a_reason(self) -> None:
         score = evaluate(unlit_evaluation(), self.found(), **self.settings)

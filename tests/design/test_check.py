@@ -196,9 +196,22 @@ class TestView:
     def test_a_fisheye_sees_what_is_beside_it(self, plain: SensorDesign) -> None:
         wide = set_value(plain, "camera.projection", "equidistant")
         wide = set_value(set_value(wide, "camera.fov", 240.0), "camera.direction", [1, 0, 0])
-        assert check_design(wide) == []
+        assert "fills 0 % of the picture" in only(check_design(wide), "warning").message
         narrow = set_value(wide, "camera.fov", 100.0)
         assert "not where" in only(check_design(narrow), "warning").message
+
+    def test_a_surface_that_is_a_spot_in_the_picture(self, plain: SensorDesign) -> None:
+        far = set_value(plain, "camera.position", [0, 0, -300])
+        problem = only(check_design(far), "warning")
+        assert "fills 0 % of the picture" in problem.message
+
+    def test_a_spot_of_the_surface(self, plain: SensorDesign) -> None:
+        plain.meshes["skin"] = TriangleMesh.grid((10, 8), (100, 80)).flipped()
+        near = set_value(plain, "camera.position", [0, 0, -6])
+        warnings = [p for p in check_design(near) if "in the picture" in p.message]
+        # 20 degrees from 6 mm: 2.12 mm by 1.59 mm of 10 mm by 8 mm, and a little more where the
+        # cage bends the surface away.
+        assert [p.message[:3] in ("4 %", "5 %") for p in warnings] == [True]
 
     def test_mirrors_may_show_it(self, design: SensorDesign) -> None:
         away = set_value(design, "camera.direction", [0, 0, -1])

@@ -75,7 +75,7 @@ def test_images_are_rendered_once_for_all_objectives(
     shared = Evaluation(model, Settings(**SMALL))
     evaluate(shared, ["aoap", "2to3pw"])
     assert rendered == []
-    assert traced == [SMALL["ray_resolution"]]
+    assert traced == [(160, 120), SMALL["ray_resolution"]]  # how much is seen comes first
     evaluate(shared, ["rgb2normal", "normdiff"])
     evaluate(shared, "normdiff", noise=0.1)
     assert sorted(rendered) == [0, 1, 1]

@@ -44,13 +44,13 @@ class RaysOf:
 
     def __init__(self, plate: TriangleMesh, rays: ChiefRays | None = None) -> None:
         self.model = PlateModel(plate)
-        self.chief_rays = rays or self.model.chief_rays(PIXELS)
+        self.chief_rays = self.judged_rays = rays or self.model.chief_rays(PIXELS)
         self.sensing_faces = len(plate.faces)
 
 
 def evaluation(plate: TriangleMesh, rays: ChiefRays | None = None) -> Any:
     stand_in: Any = RaysOf(plate, rays)
-    assert hasattr(Evaluation, "chief_rays")
+    assert hasattr(Evaluation, "judged_rays")
     assert hasattr(Evaluation, "sensing_faces")
     return stand_in
 

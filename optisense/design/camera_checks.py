@@ -1,0 +1,213 @@
+"""What no camera can be or see: angles without a lens, a place inside a part, a view past the skin.
+
+Only a pinhole is known of a design's camera, so its lens is taken for as small as the smallest
+camera there is.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from optisense.design.arrangement import in_picture, straight_rays
+from optisense.design.camera import Camera
+from optisense.design.parts import TRANSPARENT_SOLIDS, Role
+from optisense.design.problems import Problem
+from optisense.design.sensor_design import SensorDesign
+from optisense.geometry import TriangleMesh
+from optisense.geometry.containment import inside
+from optisense.geometry.rays import ray_hits
+from optisense.geometry.surface import closest_points
+
+WIDEST_PERSPECTIVE = 135.0
+"""Degrees from corner to corner: the widest lens on sale that keeps straight lines straight is
+Venus Optics' Laowa 9 mm f/5.6, with 135 degrees. At 179 degrees a pixel at the edge of the picture
+would get less than a hundred-millionth of the light of one in the middle (the fourth power of the
+cosine)."""
+
+WIDEST_FISHEYE = 280.0
+"""Degrees across the image: the widest fisheye for small cameras is Entaniya's M12 280."""
+
+NARROWEST = 1.0
+"""Degrees across the image. A sensing surface as wide as a fingertip, 17 mm, fills one degree from
+1000 mm away, the farthest that a camera of a design may be (`limits.LARGEST`): a telecentric lens,
+which has no angle, is a pinhole so far away."""
+
+SMALLEST_CAMERA = 0.65
+"""mm: width of the smallest camera module on sale, OmniVision's OVM6948 (0.65 x 0.65 x 1.158
+mm)."""
+
+LEAST_SKIN = 0.25
+"""Share of the sensing surface's area that the camera should see; no objective scores less. The
+built-in sensors see 0.44 (GelBelt) to 0.76 (GelSight360). Scores reward a camera that looks at one
+spot, and the more the smaller it is, so without a limit a search ends at a field of view of nearly
+nothing."""
+
+LEAST_PICTURE = 0.2
+"""Share of the picture that should show the sensing surface; no objective scores less. The built-in
+sensors have 0.31 (GelSight Svelte) to 1. 2to3PW does not count the other pixels, so without a limit
+the best camera is far away and shows the sensor as a few pixels."""
+
+
+def lens_problems(camera: Camera, where: str) -> list[Problem]:
+    """A field of view that no lens has.
+
+    Args:
+        camera: of the design.
+        where: the place of the field of view in the design.
+    """
+    if camera.fov < NARROWEST:
+        return [
+            Problem(
+                f"no lens of a sensor sees as little as {camera.fov:g} degrees",
+                where,
+                f"Give {NARROWEST:g} degrees or more",
+            )
+        ]
+    if camera.projection == "equidistant":
+        if camera.fov <= WIDEST_FISHEYE:
+            return []
+        return [
+            Problem(
+                f"no fisheye lens sees {camera.fov:g} degrees",
+                where,
+                f"Give {WIDEST_FISHEYE:g} degrees or less",
+            )
+        ]
+    width, height = camera.resolution
+    diagonal = float(np.hypot(1.0, height / width))
+    corner = np.degrees(2.0 * np.arctan(diagonal * np.tan(np.radians(camera.fov / 2.0))))
+    if corner <= WIDEST_PERSPECTIVE:
+        return []
+    half = np.tan(np.radians(WIDEST_PERSPECTIVE / 2.0)) / diagonal
+    most = np.floor(10.0 * np.degrees(2.0 * np.arctan(half))) / 10.0
+    return [
+        Problem(
+            f"no perspective lens sees {camera.fov:g} degrees across the image "
+            f"({corner:.0f} from corner to corner)",
+            where,
+            f"Give {most:g} degrees or less, or use 'projection: equidistant'",
+        )
+    ]
+
+
+def place_problems(design: SensorDesign, meshes: dict[str, TriangleMesh]) -> list[Problem]:
+    """A camera inside a transparent solid, or so near to a part that its lens is in it.
+
+    Inside opaque solids it is found with the lights. A camera that is cast into a solid stands in
+    a cavity of it: a sphere about the pupil bends no ray, as the lens is made for that medium.
+
+    Args:
+        meshes: the deformed meshes, mm.
+    """
+    position = np.array(design.camera.position)
+    at = "({:g}, {:g}, {:g})".format(*design.camera.position)
+    where = design.where("camera", "position")
+    for name, mesh in meshes.items():
+        role = design.parts[name].role
+        if role in TRANSPARENT_SOLIDS and mesh.is_closed and inside(position[None], mesh)[0]:
+            return [
+                Problem(
+                    f"the camera is inside the solid part '{name}' ({role.value}) at {at}",
+                    where,
+                    "Move it out, or make a cavity for it in the part's mesh, such as a sphere "
+                    "about the camera's position",
+                )
+            ]
+    for name, mesh in meshes.items():
+        distance = _distance(position, mesh)
+        if distance < 0.5 * SMALLEST_CAMERA:
+            return [
+                Problem(
+                    f"the camera is {distance:.2g} mm from part '{name}' at {at}: even the "
+                    f"smallest camera is {SMALLEST_CAMERA:g} mm wide, so its lens is in the part",
+                    where,
+                    f"Move it {0.5 * SMALLEST_CAMERA:.2g} mm or more away",
+                )
+            ]
+    return []
+
+
+def camera_fault(design: SensorDesign, meshes: dict[str, TriangleMesh]) -> Problem | None:
+    """The first reason why there can be no such camera; None when there can.
+
+    Args:
+        meshes: the deformed meshes, mm.
+    """
+    found = lens_problems(design.camera, design.where("camera", "fov"))
+    found = found or place_problems(design, meshes)
+    return found[0] if found else None
+
+
+def view_problems(design: SensorDesign, meshes: dict[str, TriangleMesh]) -> list[Problem]:
+    """A camera in whose straight view there is too little of the sensing surface.
+
+    Rays bend on their way, so this is a warning; scores look at the bent ones. With mirrors it
+    says nothing.
+
+    Args:
+        meshes: the deformed meshes, mm.
+    """
+    skins = [meshes[name] for name in design.parts_of(Role.SENSING_SURFACE) if name in meshes]
+    if not skins or design.parts_of(Role.MIRROR):
+        return []
+    camera, position = design.camera, np.array(design.camera.position)
+    areas = [skin.face_areas for skin in skins]
+    seen = [
+        float(area[in_picture(camera, skin.triangles.mean(axis=1))].sum())
+        for skin, area in zip(skins, areas, strict=True)
+    ]
+    rays = straight_rays(camera)
+    blockers = [meshes[name] for name in design.parts_of(Role.BLOCKER) if name in meshes]
+    nearest = _first(skins, position, rays)
+    picture = float((np.isfinite(nearest) & (nearest < _first(blockers, position, rays))).mean())
+    where = design.where("camera", "direction")
+    if picture == 0.0 and not any(in_picture(camera, skin.vertices).any() for skin in skins):
+        return [
+            Problem(
+                "the sensing surface is not where the camera looks",
+                where,
+                "Point the camera's direction at it, or move the camera, unless the parts bend the "
+                "light that far",
+                severity="warning",
+            )
+        ]
+    share = sum(seen) / max(sum(float(area.sum()) for area in areas), 1e-300)
+    fine = all(np.sqrt(area.max()) < 0.1 * np.sqrt(area.sum()) for area in areas)
+    if picture < LEAST_PICTURE:
+        return [_small(f"the sensing surface fills {100 * picture:.0f} % of the picture", where)]
+    if fine and share < LEAST_SKIN:
+        return [_small(f"{100 * share:.0f} % of the sensing surface is in the picture", where)]
+    return []
+
+
+def _small(message: str, where: str) -> Problem:
+    return Problem(
+        f"{message}, seen straight",
+        where,
+        "Move the camera or change its field of view, unless the parts bend the light that far; "
+        f"scores need {100 * LEAST_PICTURE:g} % of the picture and {100 * LEAST_SKIN:g} % of the "
+        "surface",
+        severity="warning",
+    )
+
+
+def _first(
+    meshes: list[TriangleMesh], position: NDArray[np.float64], rays: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """(k,) mm from a point to the first of some meshes along rays (k, 3), infinite if none."""
+    nearest = np.full(len(rays), np.inf)
+    for mesh in meshes:
+        hits = ray_hits(mesh, position + 0 * rays, rays)
+        np.minimum.at(nearest, hits.ray, hits.distance)
+    return nearest
+
+
+def _distance(point: NDArray[np.float64], mesh: TriangleMesh) -> float:
+    """mm from a point to a mesh; infinite where the mesh is farther than the smallest camera."""
+    low, high = mesh.face_bounds
+    near = ((low < point + SMALLEST_CAMERA) & (high > point - SMALLEST_CAMERA)).all(axis=1)
+    if not near.any():
+        return float("inf")
+    part = mesh.with_faces(mesh.faces[near])
+    return float(np.linalg.norm(closest_points(part, point) - point, axis=1).min())

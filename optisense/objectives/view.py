@@ -1,0 +1,75 @@
+"""How much of its sensing surface a camera sees: the evidence that every score rests on."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from optisense.errors import ObjectiveError
+from optisense.objectives.projection_warping import triangle_areas
+from optisense.objectives.settings import Settings
+
+if TYPE_CHECKING:
+    from optisense.optics import ChiefRays
+
+
+@dataclass(frozen=True)
+class View:
+    """What a camera sees of the untouched sensor.
+
+    Attributes:
+        picture: share of the pixels that see the sensing surface, 0 to 1.
+        skin: share of the sensing surface's area that the pixels see, 0 to 1. It is the area
+            between the points of neighbouring pixels, so it depends neither on the size of the
+            mesh's triangles nor, but for the borders, on the number of pixels.
+    """
+
+    picture: float
+    skin: float
+
+    def refuse_less(self, settings: Settings) -> None:
+        """Make sure that the camera sees enough for a score to mean something.
+
+        Raises:
+            ObjectiveError: a share is below its limit in the settings.
+        """
+        if self.picture == 0.0:
+            raise ObjectiveError(
+                "the camera sees nothing of the sensing surface",
+                hint="Check the camera's position, direction and field of view",
+            )
+        for name, seen, least, what in (
+            (
+                "least_picture",
+                self.picture,
+                settings.least_picture,
+                "of the pixels see the sensing surface",
+            ),
+            (
+                "least_skin",
+                self.skin,
+                settings.least_skin,
+                "of the sensing surface's area is seen",
+            ),
+        ):
+            if seen < least:
+                raise ObjectiveError(
+                    f"only {100 * seen:.2g} % {what}, and a score needs {100 * least:g} %",
+                    hint="Check the camera's position, direction and field of view, or lower the "
+                    f"setting '{name}'",
+                )
+
+
+def view_of(rays: ChiefRays, face_areas: NDArray[np.float64]) -> View:
+    """What chief rays see.
+
+    Args:
+        rays: of the untouched sensor.
+        face_areas: (m,) mm², of the sensing surface's triangles.
+    """
+    seen = float(np.nansum(triangle_areas(rays.points, rays.hit).areas, dtype=np.float64))
+    # A place that two mirrors show counts twice.
+    return View(float(rays.hit.mean()), min(1.0, seen / float(face_areas.sum())))

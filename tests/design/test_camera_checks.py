@@ -1,0 +1,94 @@
+"""Cameras that there can't be."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from optisense import sensors
+from optisense.design import Problem, SensorDesign, check_design, set_value
+from optisense.design.camera_checks import camera_fault
+from optisense.geometry import TriangleMesh
+
+
+@pytest.fixture(scope="module")
+def mini() -> SensorDesign:
+    return sensors.gelsight_mini()
+
+
+def errors(design: SensorDesign) -> list[Problem]:
+    return [problem for problem in check_design(design) if problem.severity == "error"]
+
+
+def fault(design: SensorDesign) -> str | None:
+    found = camera_fault(design, design.deformed_meshes())
+    return None if found is None else found.message
+
+
+@pytest.mark.parametrize("name", sensors.registry.BUILDERS)
+def test_the_cameras_of_the_built_in_sensors_are_fine(name: str) -> None:
+    design = sensors.load(name)
+    assert fault(design) is None
+    assert errors(design) == []
+
+
+@pytest.mark.parametrize(
+    ("projection", "fov", "said"),
+    [
+        ("perspective", 0.01, "as little as 0.01 degrees"),
+        ("perspective", 1.0, None),
+        # At 4:3, 125.2 degrees across are 2 atan(5/4 tan(62.6)) = 135 from corner to corner.
+        ("perspective", 125.2, None),
+        ("perspective", 125.3, "no perspective lens sees 125.3 degrees"),
+        ("perspective", 179.0, "no perspective lens sees 179 degrees"),
+        ("equidistant", 179.0, None),
+        ("equidistant", 280.0, None),
+        ("equidistant", 281.0, "no fisheye lens sees 281 degrees"),
+        ("equidistant", 0.5, "as little as 0.5 degrees"),
+    ],
+)
+def test_angles_that_no_lens_has(
+    mini: SensorDesign, projection: str, fov: float, said: str | None
+) -> None:
+    design = set_value(set_value(mini, "camera.projection", projection), "camera.fov", fov)
+    found = errors(design)
+    if said is None:
+        assert found == [] and fault(design) is None
+    else:
+        (problem,) = found
+        assert said in problem.message and problem.where == "camera.fov"
+        assert fault(design) == problem.message
+
+
+@pytest.mark.parametrize(
+    ("height", "part"),
+    [(-2.0, "gel"), (-6.0, "guide"), (-8.5, "guide"), (-10.0, None), (-22.25, None)],
+)
+def test_a_camera_inside_a_solid(mini: SensorDesign, height: float, part: str | None) -> None:
+    design = set_value(mini, "camera.position.z", height)
+    said = fault(design)
+    if part is None:
+        assert said is None and errors(design) == []
+    else:
+        assert said is not None and f"inside the solid part '{part}'" in said
+        assert [problem.message for problem in errors(design)] == [said]
+
+
+def test_a_camera_nearer_to_a_part_than_half_the_smallest_camera(mini: SensorDesign) -> None:
+    back = float(mini.meshes["guide"].bounds[0, 2])
+    near = set_value(mini, "camera.position.z", back - 0.32)
+    assert "0.32 mm from part 'guide'" in str(fault(near))
+    assert fault(set_value(mini, "camera.position.z", back - 0.33)) is None
+
+
+def test_a_camera_in_a_cavity_of_the_gel_is_fine(mini: SensorDesign) -> None:
+    """A camera that is cast into the gel: an octahedron about the pupil is cut out of the mesh."""
+    corners = np.concatenate([np.eye(3), -np.eye(3)])
+    faces = [[0, 1, 2], [1, 3, 2], [3, 4, 2], [4, 0, 2], [1, 0, 5], [3, 1, 5], [4, 3, 5], [0, 4, 5]]
+    gel = mini.meshes["gel"]
+    design = set_value(mini, "camera.position.z", -2.0)
+    assert "inside the solid part 'gel'" in str(fault(design))
+    hole = TriangleMesh(corners + np.array(design.camera.position), np.array(faces)).flipped()
+    design = design.copy()
+    design.meshes["gel"] = TriangleMesh.joined([gel, hole])
+    assert fault(design) is None
