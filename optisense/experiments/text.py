@@ -170,11 +170,20 @@ figures: where a statement does not hold here, the text says so, and what explai
 worked out from the numbers. *Cannot be told* means that the differences are within what seeds
 scatter by.
 
+Without a name the command lists the experiments. A quick run makes fewer evaluations at lower
+quality; this one takes about twenty seconds:
+
 ```console
 $ optisense experiment
-$ optisense experiment mini-shapes --quick --out results
+$ optisense experiment svelte-mirror --quick --seeds 1 --out quick-results
+```
+
+All experiments in full take about an hour on two processors:
+
+```console long
 $ optisense experiment all --out results
 ```
 
-A run that was stopped goes on where it was with the same command: what is finished in the folder
-is not done again. All in one go is shorter than one by one: experiments share sensors and light."""
+The same command continues a run that was stopped: what is finished in the folder is not done again.
+Running all experiments together is faster than one after the other, because they share sensors and
+light."""
