@@ -25,7 +25,7 @@ WINDOW_STAMP := .blender-window/.set-up
 
 LOCK := --universal --python-version 3.11 --generate-hashes --no-emit-index-url --upgrade
 
-.PHONY: help setup demo test quick-test lint types import-rules docs pytest quick-pytest \
+.PHONY: help setup demo test quick-test lint types import-rules docs docs-as-typed pytest quick-pytest \
     studio-tests test-blender studio-window-test package-test extension setup-blender \
     format bench lock clean
 
@@ -38,6 +38,7 @@ help:
 	@echo "make extension      build and validate the Blender extension: dist/optisense_studio.zip"
 	@echo "make package-test   build the wheel, install it elsewhere and render with it"
 	@echo "make docs     build the documentation as a site, and check its links: site/index.html"
+	@echo "make docs-as-typed  type all commands of README and docs as shown, also the long ones (hours)"
 	@echo "make bench    measure speed and accuracy (minutes)"
 	@echo "make setup    only the set-up: .venv and the libLLVM the renderer needs"
 	@echo "make format   let ruff tidy the code"
@@ -74,6 +75,10 @@ import-rules: setup
 docs: setup
 	$(BIN)/sphinx-build -q -W --keep-going -c docs -b html . site
 	@echo "the documentation: site/index.html"
+
+# The quick commands are typed by the tests; this one types those that take long, too.
+docs-as-typed: setup
+	$(BIN)/python -m pytest tests/docs -m long -rP -o faulthandler_timeout=36000
 
 pytest: setup
 	$(BIN)/python -m pytest

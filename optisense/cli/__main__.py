@@ -1,6 +1,6 @@
 """``python -m optisense.cli`` is ``optisense``."""
 
-from optisense.__main__ import main
+from optisense.cli.app import main
 
 if __name__ == "__main__":
     main()

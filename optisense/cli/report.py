@@ -7,9 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from optisense.cli.console import ends_well, output
-from optisense.cli.progress import Line, progress_line
-from optisense.time_left import Step
+from optisense.cli.console import ends_well, messages, output
 
 if TYPE_CHECKING:
     from optisense.report.before_after import Look
@@ -57,30 +55,14 @@ def report(
         if page.is_dir():
             raise typer.BadParameter(f"'{page}' is a folder", param_hint="--out")
         ensure_writable(page.parent)
-        with progress_line(*_steps(photons, pictures)) as line:
-            looks = _looks(opened, photons, pictures, line)
-            line.begin(WRITING)
-            write_study_report(page, opened, looks)
+        looks = _looks(opened, photons, pictures)
+        write_study_report(page, opened, looks)
     finally:
         opened.close()
     output.print(f"report: {page}", markup=False)
 
 
-WRITING = "writing the page"
-
-
-def _steps(photons: int, pictures: bool) -> list[Step]:
-    """The steps, with their usual times (seconds on two cores of a desktop processor, GelSight
-    Mini)."""
-    look = 5.0 + 2.2 * photons / 1e6 if pictures else 1.0
-    return [
-        Step("the sensor before the search", 1, 3.0 + look),
-        Step("the sensor after the search", 1, look),
-        Step(WRITING, 1, 3.0),
-    ]
-
-
-def _looks(study: Study, photons: int, pictures: bool, line: Line) -> dict[str, Look]:
+def _looks(study: Study, photons: int, pictures: bool) -> dict[str, Look]:
     """Chief rays of the start and of the best trial, and pictures where they are asked for.
 
     Raises:
@@ -96,13 +78,12 @@ def _looks(study: Study, photons: int, pictures: bool, line: Line) -> dict[str, 
     found = {}
     verb = "rendering" if pictures else "tracing the rays of"
     for label, design in designs.items():
-        step = f"the sensor {label} the search"
-        line.begin(step, text=f"{verb} {step}")
-        try:
-            settings = study.settings.settings
-            found[label] = look(design, settings, pictures=pictures, photons=photons)
-        except SetupError:
-            if pictures:
-                raise
-            return {}
+        with messages.status(f"{verb} the sensor {label} the search"):
+            try:
+                settings = study.settings.settings
+                found[label] = look(design, settings, pictures=pictures, photons=photons)
+            except SetupError:
+                if pictures:
+                    raise
+                return {}
     return found

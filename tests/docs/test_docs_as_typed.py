@@ -1,0 +1,187 @@
+"""Everything that README and docs show to type works, typed page by page and block by block.
+
+`make docs-as-typed` also types the blocks that take minutes.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import resource
+import shlex
+import shutil
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from optisense.cli import app
+
+from .markdown import RUN, Block, blocks, code_spans
+from .terminal import Outcome, Terminal, reader_environment
+
+ROOT = Path(__file__).parents[2]
+PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
+BLOCKS = {page: blocks(page) for page in PAGES}
+
+IN_THE_CLONE = ("README.md", "install.md", "your-sensor.md")
+"""Pages that say that their commands are typed in the folder of the clone."""
+ACTIVATING = ("README.md",)
+"""Pages that activate the virtual environment themselves."""
+CLONED = ("Makefile", "README.md", "docs", "pyproject.toml", "requirements*.lock", "scripts")
+"""What these pages use of a clone. The package itself is the one under test."""
+
+LIMIT = 1200.0
+"""Seconds that a command or Python block may take. The slowest one takes 10 s on two processors, so
+only one that hangs takes so long."""
+LONG_LIMIT = 6 * 3600.0
+"""The same for blocks that say that they are long, of which the longest one takes an hour."""
+
+TIME = re.compile(r"\b(seconds|minutes?|an hour|hours)\b")
+"""How a page says how long something takes."""
+NAMES_AN_OPTION = re.compile(r"\.\.\.| --\S+$")
+"""Code that names an option or several commands and is no whole command: `optisense task ...`."""
+
+
+def typed(page: Path) -> list[Block]:
+    """The blocks that a test types or saves."""
+    return [
+        block
+        for block in BLOCKS[page]
+        if block.save or (block.language in RUN and block.not_run is None)
+    ]
+
+
+def ids(page: Path) -> str:
+    return page.stem
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("page", [page for page in PAGES if typed(page)], ids=ids)
+def test_a_page_works_as_typed(page: Path, tmp_path: Path) -> None:
+    type_page(page, [block for block in typed(page) if not block.long], tmp_path)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(
+    "page", [page for page in PAGES if any(block.long for block in BLOCKS[page])], ids=ids
+)
+def test_a_page_works_as_typed_with_its_long_commands(page: Path, tmp_path: Path) -> None:
+    type_page(page, typed(page), tmp_path)
+
+
+def test_a_long_block_says_how_long_it_takes_and_has_a_quick_variant_beside_it() -> None:
+    for page, shown in BLOCKS.items():
+        lines = page.read_text(encoding="utf-8").splitlines()
+        for at, block in enumerate(shown):
+            if not block.long:
+                continue
+            beside = [
+                other
+                for other in shown[max(at - 1, 0) : at + 2]
+                if other in typed(page)
+                and not other.long
+                and verbs(other) & verbs(block)
+                and TIME.search(between(lines, block, other))
+            ]
+            assert beside, f"{block.place} has no quick variant, or does not say how long it takes"
+
+
+def test_a_saved_file_is_named_in_the_text_beside_its_block() -> None:
+    for page, shown in BLOCKS.items():
+        lines = page.read_text(encoding="utf-8").splitlines()
+        for block in shown:
+            if block.save is not None:
+                before = " ".join(lines[max(block.line - 6, 0) : block.line - 1])
+                assert f"`{block.save}`" in before, block.place
+
+
+def test_commands_that_are_not_typed_exist_with_their_options() -> None:
+    """Of blocks that are not run or long, and of commands within sentences and tables."""
+    commands = [
+        (block.place, command)
+        for shown in BLOCKS.values()
+        for block in shown
+        if block.long or block.not_run is not None
+        for command in block.commands
+    ]
+    commands += [
+        (page.name, span)
+        for page in PAGES
+        for span in code_spans(page)
+        if not NAMES_AN_OPTION.search(span)
+    ]
+    checked = [each for each in commands if each[1].startswith("optisense ")]
+    assert len(checked) > 20
+    for place, command in checked:
+        words = shlex.split(command.removeprefix("optisense "), comments=True)
+        result = CliRunner().invoke(app, [*words, "--help"])
+        assert result.exit_code == 0, f"{place}: {command}\n{result.output}"
+
+
+def type_page(page: Path, shown: list[Block], work: Path) -> None:
+    """Type the blocks in the folder of a clone, or in an empty one, as the page says."""
+    folder = work / "folder"
+    folder.mkdir()
+    if page.name in IN_THE_CLONE:
+        clone(folder)
+    environment = reader_environment(work / "library")
+    programs = str(Path(sys.executable).parent)
+    found = [each for each in environment["PATH"].split(os.pathsep) if each != programs]
+    if page.name not in ACTIVATING:
+        found.insert(0, programs)
+    environment["PATH"] = os.pathsep.join(found)
+    before = processor_seconds()
+    with Terminal(folder, environment) as terminal:
+        for block in shown:
+            for command, outcome in type_block(block, terminal):
+                print(f"{block.place}: {outcome.seconds:5.1f} s  {command.splitlines()[0]}")
+                assert outcome.exit_code == block.exit_code, (
+                    f"{block.place}: {command}\nexit code {outcome.exit_code}, "
+                    f"not {block.exit_code}\n{outcome.output[-4000:]}"
+                )
+    print(f"{page.name}: {processor_seconds() - before:.0f} processor seconds")
+
+
+def processor_seconds() -> float:
+    """What the ended children of this process took of the processors, their children included."""
+    spent = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return spent.ru_utime + spent.ru_stime
+
+
+def clone(folder: Path) -> None:
+    """Copy what pages use of a clone, with the virtual environment that the tests run in.
+
+    The environment is complete: make must not set it up anew for this copy. So the files are old.
+    """
+    assert (Path(sys.prefix) / ".set-up").exists(), "make sets up the environment of the tests"
+    for source in (source for name in CLONED for source in ROOT.glob(name)):
+        (shutil.copytree if source.is_dir() else shutil.copy)(source, folder / source.name)
+    for file in folder.rglob("*"):
+        os.utime(file, (0, 0))
+    (folder / ".venv").symlink_to(sys.prefix)
+
+
+def type_block(block: Block, terminal: Terminal) -> Iterator[tuple[str, Outcome]]:
+    """Each command of a block, or its text, and how it ended."""
+    limit = LONG_LIMIT if block.long else LIMIT
+    if block.save is not None:
+        (terminal.folder / block.save).write_text(block.text, encoding="utf-8")
+    elif block.language == "python":
+        yield block.text, terminal.type_python(block.text, block.place, limit=limit)
+    else:
+        for command in block.commands:
+            yield command, terminal.type(command, enter=block.enter, limit=limit)
+
+
+def verbs(block: Block) -> set[str]:
+    """The commands of a block without their arguments, such as ``optisense search``."""
+    return {" ".join(command.split()[:2]) for command in block.commands}
+
+
+def between(lines: list[str], one: Block, other: Block) -> str:
+    """The text from three lines before the first of two blocks to the second one."""
+    first, second = sorted((one.line, other.line))
+    return " ".join(lines[max(first - 4, 0) : second])

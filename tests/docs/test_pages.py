@@ -1,0 +1,48 @@
+"""What the documents refer to is there: files, make's targets, public names."""
+
+from __future__ import annotations
+
+import importlib
+import re
+from pathlib import Path
+
+from .markdown import blocks
+
+ROOT = Path(__file__).parents[2]
+PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").glob("*.md"))]
+
+
+def test_links_lead_somewhere() -> None:
+    links = [
+        (page, target)
+        for page in PAGES
+        for target in re.findall(r"\]\(([^)#\s]+)[^)]*\)", page.read_text(encoding="utf-8"))
+        if not re.match(r"[a-z]+:", target)
+    ]
+    assert len(links) > 100
+    assert [
+        (page.name, target) for page, target in links if not (page.parent / target).exists()
+    ] == []
+
+
+def test_make_targets_exist() -> None:
+    makefile = (ROOT / "Makefile").read_text(encoding="utf-8")
+    targets = {
+        target
+        for page in PAGES
+        for block in blocks(page)
+        for target in re.findall(r"^\$ make ([a-z-]+)", block.text, re.MULTILINE)
+    }
+    assert {"demo", "test"} <= targets
+    assert {
+        each for each in targets if not re.search(rf"^{each}:", makefile, re.MULTILINE)
+    } == set()
+
+
+def test_the_reference_lists_every_public_name() -> None:
+    text = (ROOT / "docs" / "api.md").read_text(encoding="utf-8")
+    packages = re.findall(r"^\.\. automodule:: (\S+)$", text, re.MULTILINE)
+    assert len(packages) > 8
+    for package in packages:  # the site shows what `dir` tells, also of names imported on first use
+        module = importlib.import_module(package)
+        assert set(getattr(module, "__all__", [])) <= set(dir(module)), package
