@@ -46,6 +46,7 @@ help:
 	@echo "make clean    remove .venv, caches and the demo's output"
 
 setup: $(STAMP)
+	$(if $(filter setup,$(MAKECMDGOALS)),@printf '\nTo use it:\n'; sh scripts/next_steps.sh,@:)
 
 $(STAMP): pyproject.toml requirements.lock requirements-llvm.lock scripts/setup.sh scripts/system.sh
 	@PYTHON="$(PYTHON)" sh scripts/setup.sh

@@ -33,6 +33,8 @@ has_llvm() { probe 'from optisense.optics.backend.llvm import find_llvm; find_ll
 has_atomic() { probe 'from optisense.optics.backend.llvm import load_atomic; load_atomic()'; }
 llvm_wheel_fits() { [ "$(uname -sm)" = "Linux x86_64" ]; }
 
+[ -z "${DRJIT_LIBLLVM_PATH:-}" ] || has_llvm || fail "DRJIT_LIBLLVM_PATH=$DRJIT_LIBLLVM_PATH is no \
+libLLVM of version 17 or newer that can be loaded. Unset it, or name another."
 has_venv || has_pip_for_venvs "$python" || [ "$can_install" = no ] ||
     apt_install "python$version-venv" python3-venv || true
 if ! has_llvm; then
@@ -85,8 +87,12 @@ if [ -n "$lacking" ]; then
     fail "this machine lacks, and you have no right to install here:$lacking
 Ask an administrator to type
     $command
-and run this again. Without an administrator, docs/install.md tells how to take them from conda,
-and how to name a libLLVM that lies elsewhere (DRJIT_LIBLLVM_PATH). Nothing was downloaded."
+and run this again. Without one, take what is lacking from conda:
+    conda create -n optisense -c conda-forge python=3.12 libllvm19 libgcc
+    conda activate optisense
+    make PYTHON=\"\$CONDA_PREFIX/bin/python\" setup
+A libLLVM in an unusual place is named by DRJIT_LIBLLVM_PATH=/path/to/libLLVM.so.
+docs/install.md says more. No dependency was downloaded yet."
 fi
 
 # --- the dependencies -----------------------------------------------------------------------------
@@ -113,5 +119,4 @@ print(f"The renderer will use {library}")
 PROBE
 
 touch "$venv/.set-up"
-say "Set-up is done. To use it:"
-sh scripts/next_steps.sh
+say "Set-up is done."
