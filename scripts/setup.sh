@@ -24,7 +24,7 @@ Install it, then run this again, or name one: make PYTHON=/path/to/python3.12 se
 version=$(version_of "$python")
 
 # --- what the machine lacks: seen before anything is downloaded --------------------------------
-has_venv() { "$venv/bin/python" -c "$fits; import pip" >/dev/null 2>&1; }
+has_venv() { "$venv/bin/python" -c "import pip; $fits" >/dev/null 2>&1; }
 probe() { # run a line of Python with .venv's interpreter, or before that is there with the other
     if has_venv; then set -- "$venv/bin/python" "$1"; else set -- "$python" "$1"; fi
     PYTHONPATH=$root PYTHONDONTWRITEBYTECODE=1 "$1" -c "$2" >/dev/null 2>&1

@@ -67,7 +67,7 @@ fi
 for package in $packages; do
     apt_install "$package" || true
 done
-if ! "$venv/bin/python" -c "$fits; import pip" >/dev/null 2>&1; then
+if ! "$venv/bin/python" -c "import pip; $fits" >/dev/null 2>&1; then
     if ! has_pip_for_venvs "$python" && [ "$can_install" = yes ]; then
         apt_install "python$(version_of "$python")-venv" python3-venv || true
     fi

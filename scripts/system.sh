@@ -60,7 +60,8 @@ make_venv() { # PYTHON FOLDER: a virtual environment with pip, by whatever bring
     else # Debian keeps pip for virtual environments in a package of its own
         unpack_deb python3-pip-whl "$2/debian" || return 1
         set -- "$2" "$2"/debian/usr/share/python-wheels/pip-*.whl
-        "$1/bin/python" "$2/pip" --quiet --disable-pip-version-check install --no-index "$2"
+        "$1/bin/python" "$2/pip" --quiet --disable-pip-version-check install --no-index "$2" ||
+            return 1
         rm -rf "$1/debian"
     fi
 }
