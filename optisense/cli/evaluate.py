@@ -170,7 +170,7 @@ def _print_table(scored: Scored) -> None:
         if score.failure is not None:
             shown, note = "[red]failed[/red]", ""
         else:
-            shown, note = f"{scored.mean(name):.4g}", score.beside
+            shown, note = f"{scored.mean(name):.4g}", scored.beside(name)
         row = [score.name, shown]
         if len(scored.runs) > 1:
             spread = scored.spread(name)

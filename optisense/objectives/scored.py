@@ -58,6 +58,13 @@ class Scored:
         values = self.values(name)
         return deviation_of(values) if len(values) > 1 else None
 
+    def beside(self, name: str) -> str:
+        """The parts to show beside a score, of the first seed, which is named if there are more."""
+        shown = self.scores[name].beside
+        if not shown or len(self.runs) == 1:
+            return shown
+        return f"{shown} (seed {self.runs[0].evaluation.settings.seed})"
+
     def failed(self) -> bool:
         """Whether any score of any seed failed."""
         return any(s.failure is not None for run in self.runs for s in run.scores.values())

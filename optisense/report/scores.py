@@ -109,7 +109,7 @@ def _row(scored: Scored, name: str, score: Score) -> dict[str, str]:
         "value": "failed" if failed else f"{scored.mean(name):.4g}",
         "spread": "" if spread is None else f"± {spread:.2g}",
         "seconds": f"{score.seconds:.2f} s",
-        "note": score.failure or score.beside,
+        "note": score.failure or scored.beside(name),
     }
 
 

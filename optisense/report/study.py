@@ -104,7 +104,7 @@ def render_study(study: Study, looks: Mapping[str, Look] | None = None) -> str:
         overlay=_overlay(study, best),
         scores=tables.scores(study, start, best),
         no_fresh=tables.why_no_fresh(study, trials),
-        rays=tables.ray_figures(*figures),
+        rays=tables.ray_figures(*figures) if moves_rays(study) else None,
         worse=tables.got_worse(*figures),
         stretching=[
             (label, data_uri(stretching_colours(each.map)))
@@ -123,6 +123,13 @@ def render_study(study: Study, looks: Mapping[str, Look] | None = None) -> str:
         settings=tables.settings(study),
         version=__version__,
         css=Markup(template("report.css")),
+    )
+
+
+def moves_rays(study: Study) -> bool:
+    """Whether a parameter of a study may change the ways of chief rays."""
+    return study.space.reshapes or any(
+        name.startswith(("camera.", "materials.", "parts.")) for name in study.space.names
     )
 
 

@@ -79,6 +79,7 @@ def convergence(trials: Sequence[Trial], names: Sequence[str]) -> Figure:
         axes.grid(alpha=0.25)
         legend_above(axes, columns=4)
     panels[-1].set_xlabel("trial")
+    panels[-1].xaxis.get_major_locator().set_params(integer=True)
     return figure
 
 
