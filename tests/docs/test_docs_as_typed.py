@@ -41,6 +41,8 @@ LONG_LIMIT = 6 * 3600.0
 
 TIME = re.compile(r"\b(seconds|minutes?|an hour|hours)\b")
 """How a page says how long something takes."""
+COMMAND = re.compile(r"^(\$ )?(optisense|make|python3?|pip|conda|docker|\.|export) ", re.MULTILINE)
+"""A line of a block that begins as a command of the shell does."""
 NAMES_AN_OPTION = re.compile(r"\.\.\.| --\S+$")
 """Code that names an option or several commands and is no whole command: `optisense task ...`."""
 
@@ -96,6 +98,14 @@ def test_a_saved_file_is_named_in_the_text_beside_its_block() -> None:
             if block.save is not None:
                 before = " ".join(lines[max(block.line - 6, 0) : block.line - 1])
                 assert f"`{block.save}`" in before, block.place
+
+
+def test_commands_stand_in_console_blocks() -> None:
+    """Elsewhere nothing would type them."""
+    for shown in BLOCKS.values():
+        for block in shown:
+            found = COMMAND.search(block.text)
+            assert block.language == "console" or not found, f"{block.place}: {found}"
 
 
 def test_commands_that_are_not_typed_exist_with_their_options() -> None:
