@@ -84,8 +84,14 @@ docs-as-typed: setup
 pytest: setup
 	$(BIN)/python -m pytest
 
+# What guards most for its time: shapes and design files, light against closed forms, a render from
+# start to end, finding objectives, search spaces, and the talk with the engine.
+QUICK := tests/test_environment.py tests/test_package.py tests/test_errors.py tests/test_writing.py \
+    tests/geometry tests/design tests/sensors/test_every_sensor.py tests/optics/test_llvm.py \
+    tests/optics/test_closed_forms.py tests/objectives/test_registry.py tests/search/test_space.py \
+    tests/search/test_methods.py tests/cli/test_render.py tests/engine/test_conversation.py
 quick-pytest: setup
-	$(BIN)/python -m pytest -m quick
+	$(BIN)/python -m pytest -m "not slow" $(QUICK)
 
 setup-blender: $(BLENDER_STAMP)
 
