@@ -39,7 +39,7 @@ for wanted in $needed; do
     done
 done
 [ -n "$python" ] || cannot "Blender's module needs Python $(echo "$needed" | sed 's/ / or /'), and \
-none was found. Install it, or name one: make BLENDER_PYTHON=/path/to/python3.11 studio-tests"
+none was found. Install it (without an administrator: uv python install 3.11), or name one: make BLENDER_PYTHON=/path/to/python3.11 studio-tests"
 
 # --- libraries of a desktop that the module links to, and the packages of Debian that bring them ---
 libraries="libGL.so.1:libgl1 libX11.so.6:libx11-6 libXext.so.6:libxext6 libXfixes.so.3:libxfixes3

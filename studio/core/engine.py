@@ -274,7 +274,8 @@ class Engine:
             self._process.wait(SHUTDOWN_SECONDS)
         except subprocess.TimeoutExpired:
             self._process.kill()
-            self._process.wait(SHUTDOWN_SECONDS)
+            with contextlib.suppress(subprocess.TimeoutExpired):  # the system is slow to end it
+                self._process.wait(SHUTDOWN_SECONDS)
         self._gone = True
         self._close_files()
 
