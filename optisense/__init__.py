@@ -6,7 +6,6 @@ the package neither loads the renderer nor needs libLLVM.
 
 from __future__ import annotations
 
-from importlib.metadata import PackageNotFoundError, version
 from typing import TYPE_CHECKING
 
 from optisense.lazy_names import load_on_first_use
@@ -18,8 +17,10 @@ if TYPE_CHECKING:
     from optisense.optics import OpticalModel
     from optisense.search import SearchSpace, search
     from optisense.sensors import check, load, save_design
+    from optisense.version import __version__
 
 _HOMES = {
+    "__version__": ".version",
     "Contact": ".geometry",
     "Cylinder": ".geometry",
     "MeshIndenter": ".geometry",
@@ -39,11 +40,6 @@ _HOMES = {
     "search": ".search",  # a package that can be called: see there
     "set_value": ".design",
 }
-
-try:
-    __version__ = version("optisense")
-except PackageNotFoundError:  # running from a source folder that is not installed
-    __version__ = "0+unknown"
 
 __all__ = [
     "Contact",

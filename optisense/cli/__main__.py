@@ -1,6 +1,6 @@
 """``python -m optisense.cli`` is ``optisense``."""
 
-from optisense.cli.app import main
+from optisense.__main__ import main
 
 if __name__ == "__main__":
     main()

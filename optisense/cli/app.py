@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from optisense import __version__
-from optisense.cli import console
+from optisense.cli import console, stopping
 from optisense.cli.commands import Commands
 from optisense.cli.leaving import run_and_leave
 
@@ -55,4 +55,5 @@ render."""
 def main() -> None:
     """Run the command line with the process's arguments and exit."""
     gc.set_threshold(NEW_OBJECTS)
+    stopping.watch()
     run_and_leave(app)

@@ -16,10 +16,21 @@ from optisense.cli.options import (
     parse_resolution,
 )
 from optisense.cli.output_folder import take_folder
-from optisense.cli.progress import counting_bar
+from optisense.cli.progress import progress_line
+from optisense.cli.sampling import (
+    BUILDING,
+    LOADING,
+    loading_steps,
+    sample_steps,
+    shown_samples,
+)
 
 if TYPE_CHECKING:
     from optisense.tasks import Dataset
+
+
+SAMPLES = "samples"
+"""The step of the progress."""
 
 
 @ends_well
@@ -113,31 +124,37 @@ def dataset(
     depths = parse_range(depth, "--depth")
     rotations = parse_range(rotation, "--rotation")
 
-    from optisense.sensors import load
-    from optisense.tasks import ContactDraw, DatasetSettings, generate
-    from optisense.tasks.dataset import LABELS, Dataset
-
-    indenters = tuple(indenter or ("sphere:1.5",))
-    settings = DatasetSettings(
-        contacts=ContactDraw(indenters, depths, rotations, tilt, margin / 100),
-        resolution=size,
-        photons=photons,
-        seed=seed,
-        exposure=brightness,
-        camera_noise=camera_noise,
-        radiance=radiance,
-        estimator=estimator,
-    )
-    settings.contacts.parsed()
-    sensor = load(design)
-    take_folder(out)
-
-    from optisense.optics import OpticalModel
-
+    steps = [*loading_steps(), *sample_steps(SAMPLES, photons, count, 0.6, 0.2)]
     try:
-        with counting_bar("samples") as show:
-            made = generate(OpticalModel(sensor, variant), out, count, settings, show)
+        with progress_line(*steps) as line:
+            line.begin(LOADING)
+            from optisense.sensors import load
+            from optisense.tasks import ContactDraw, DatasetSettings, generate
+
+            indenters = tuple(indenter or ("sphere:1.5",))
+            settings = DatasetSettings(
+                contacts=ContactDraw(indenters, depths, rotations, tilt, margin / 100),
+                resolution=size,
+                photons=photons,
+                seed=seed,
+                exposure=brightness,
+                camera_noise=camera_noise,
+                radiance=radiance,
+                estimator=estimator,
+            )
+            settings.contacts.parsed()
+            sensor = load(design)
+            take_folder(out)
+
+            from optisense.optics import OpticalModel
+
+            line.begin(BUILDING)
+            model = OpticalModel(sensor, variant)
+            show = shown_samples(line, SAMPLES, "reading the dataset")
+            made = generate(model, out, count, settings, show)
     except KeyboardInterrupt:
+        from optisense.tasks.dataset import LABELS, Dataset
+
         if (out / LABELS).exists():
             finished = len(Dataset.load(out))
             messages.print(f"{finished} of {count} samples are there; the same command continues")

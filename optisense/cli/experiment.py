@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from optisense.cli.console import EXIT_INTERRUPTED, ends_well, messages, output
-from optisense.cli.progress import counting_bar
+from optisense.cli.progress import progress_line
+from optisense.time_left import Step, TimeLeft
 
 if TYPE_CHECKING:
     from optisense.experiments import Experiment
+    from optisense.experiments.bench import Tell
 
 
 @ends_well
@@ -79,10 +83,10 @@ def experiment(
     count = min(processors(), MOST_WORKERS) if workers is None else workers
     try:
         if len(chosen) > 1:
-            with counting_bar(name, left=False) as show:
+            with _shown_units(name, count) as show:
                 prepare(chosen, Bench(out, count, show), quick, seeds)
         for each in chosen:
-            with counting_bar(each.name, left=False) as show:
+            with _shown_units(each.name, count) as show:
                 result = run(each, Bench(out, count, show), quick, seeds)
             _print_result(each, result, out)
     except KeyboardInterrupt:
@@ -95,6 +99,29 @@ def experiment(
 
 MOST_WORKERS = 8
 """Unless the user says otherwise: each takes two gigabytes."""
+
+
+@contextmanager
+def _shown_units(name: str, workers: int) -> Iterator[Tell]:
+    """The units of an experiment's step on a progress line.
+
+    An experiment may ask more when a step has been answered, so the time left is the step's.
+    """
+    with progress_line() as line:
+        line.say(f"{name}: loading")
+        time_left: TimeLeft | None = None
+        begun = 0, 0
+
+        def show(done: int, count: int, label: str) -> None:
+            nonlocal time_left, begun
+            if time_left is None or count != begun[1] or done < begun[0]:
+                time_left = TimeLeft([Step("units", count, warm_up=min(workers, count - 1))])
+                time_left.begin("units", done=done)
+                begun = done, count
+            time_left.advance(done)
+            line.show(name, done, count, time_left.seconds_left, [label] if label else [])
+
+        yield show
 
 
 def _print_list() -> None:

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from types import FrameType
 
-from optisense.cli.console import messages
+from optisense.cli import stopping
 
 
 class Interrupt:
@@ -26,7 +26,7 @@ class Interrupt:
         if self.requested:
             raise KeyboardInterrupt
         self.requested = True
-        messages.print("stopping; Ctrl-C again drops the picture", style="yellow")
+        stopping.say()
 
 
 @contextmanager

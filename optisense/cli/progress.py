@@ -1,94 +1,200 @@
-"""Progress on standard error: bars on a terminal, lines in a log."""
+"""Progress on standard error: one live line on a terminal, a line now and then in a log."""
 
 from __future__ import annotations
 
+import math
+import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING
 
+from optisense.cli import stopping
 from optisense.cli.console import messages
+from optisense.time_left import Step, TimeLeft
 
 if TYPE_CHECKING:
-    from rich.progress import Progress, ProgressColumn
+    from rich.text import Text
 
-LINE_EVERY = 30.0
-"""Seconds between lines where standard error is no terminal."""
+LOG_EVERY = 30.0
+"""Least seconds between lines where standard error is no terminal."""
+
+REFRESHES = 4
+"""A second, of the live line."""
+
+MOST_BAR, LEAST_BAR = 30, 8
+"""Columns of the bar; it is left out where less than the least would remain."""
 
 
-@contextmanager
-def passing_bar(what: str, *columns: ProgressColumn) -> Iterator[Progress]:
-    """A bar on standard error that vanishes at its end; silent when that is no terminal.
+class Line:
+    """The progress of a command: the step at hand, the time left, and what is known so far.
 
-    Args:
-        what: stands before the bar.
-        columns: stand behind it.
+    ``scoring trial 12/40 ━━━━━━━━━━━━╸━━━━━━━━━━━  0:42, 3:10 left  best 0.6123``
     """
-    from rich.progress import BarColumn, Progress, TextColumn
 
-    with Progress(
-        TextColumn(what),
-        BarColumn(bar_width=32),
-        *columns,
-        console=messages,
-        transient=True,
-        disable=not messages.is_terminal,
-    ) as bar:
-        yield bar
+    def __init__(
+        self, steps: Sequence[Step] = (), clock: Callable[[], float] = time.monotonic
+    ) -> None:
+        """Start the clock.
 
+        Args:
+            steps: what will be done, for the time left; none if `show` is told the time left.
+            clock: tells seconds.
+        """
+        self.time_left = TimeLeft(steps, clock=clock)
+        self._clock = clock
+        self._began = self._shown = self._logged = clock()
+        self._what = "starting"
+        self._count = ""
+        self._notes: tuple[str, ...] = ()
+        self._left: float | None = None
+        self._told_fraction = 0.0
+        self._log_lines = False
+        self._lock = threading.Lock()
 
-class Counter(Protocol):
-    """Told how much is done: pieces finished, of how many if known, and a word on it."""
+    def begin(
+        self, step: str, count: float | None = None, done: float = 0.0, text: str | None = None
+    ) -> None:
+        """Begin a step of the work.
 
-    def __call__(self, done: int, count: int | None, note: str = "") -> None:
-        """Show it."""
+        Args:
+            step: its name.
+            count, done: see `TimeLeft.begin`.
+            text: what to call it; its name if None.
+        """
+        with self._lock:
+            self.time_left.begin(step, count, done)
+        self.say(text or step, done, count)
 
+    def advance(self, done: float, count: float | None = None, *notes: str) -> None:
+        """So many pieces of the step are done; ``count`` of all pieces shows both numbers."""
+        with self._lock:
+            self.time_left.advance(done)
+        self.say(self._what, done, count, *notes)
 
-@contextmanager
-def counting_bar(what: str, *, left: bool = True, note: str = "") -> Iterator[Counter]:
-    """A bar that counts finished pieces of work; lines in a log where there is no terminal.
-
-    Args:
-        what: stands before the bar.
-        left: whether to show the time left, as if all pieces took as long as those so far.
-        note: stands behind the bar until something else is told.
-    """
-    if not messages.is_terminal:
-        yield LogLines(what)
-        return
-    from rich.progress import (
-        MofNCompleteColumn,
-        TextColumn,
-        TimeElapsedColumn,
-        TimeRemainingColumn,
-    )
-
-    columns = [MofNCompleteColumn(), TimeElapsedColumn()]
-    if left:
-        columns += [TextColumn("left"), TimeRemainingColumn()]
-    with passing_bar(what, *columns, TextColumn("{task.fields[note]}")) as bar:
-        task = bar.add_task(what, total=None, note=note)
-
-        def show(done: int, count: int | None, note: str = "") -> None:
-            bar.update(task, completed=done, total=count, note=note)
-
-        yield show
-
-
-class LogLines:
-    """A line now and then, for a log: ``all: 120 of 431, 14.2 min, cylinder, seed 1``."""
-
-    def __init__(self, what: str) -> None:
-        """``what`` begins each line."""
+    def say(
+        self, what: str, done: float | None = None, count: float | None = None, *notes: str
+    ) -> None:
+        """Change the words: what is done, how many of how many, and notes, the foremost first."""
         self._what = what
-        self._began = self._told = time.monotonic()
+        self._count = f"{int(done or 0)}/{int(count)}" if count is not None else ""
+        self._notes = notes
+        if self._log_lines:
+            self._log()
 
-    def __call__(self, done: int, count: int | None, note: str = "") -> None:
-        """Tell it, if the last line is some time ago."""
-        now = time.monotonic()
-        if now - self._told < LINE_EVERY:
+    def show(
+        self,
+        what: str,
+        done: float | None,
+        count: float | None,
+        left: float,
+        notes: Sequence[str] = (),
+    ) -> None:
+        """Show progress that somebody else has estimated: seconds left, NaN if unknown."""
+        self._left, self._shown = left, self._clock()
+        self.say(what, done, count, *notes)
+
+    @property
+    def seconds_left(self) -> float:
+        """Until the end; NaN if that is unknown."""
+        if self._left is not None and math.isnan(self._left):
+            return math.nan
+        if self._left is not None:
+            return max(0.0, self._left - (self._clock() - self._shown))
+        with self._lock:
+            return self.time_left.seconds_left
+
+    @property
+    def fraction(self) -> float:
+        """The share of the whole time that has passed; it never falls."""
+        left, elapsed = self.seconds_left, self._clock() - self._began
+        if math.isfinite(left):
+            now = elapsed / max(elapsed + left, 1e-9)
+            self._told_fraction = max(self._told_fraction, now)
+        return self._told_fraction
+
+    def text(self, columns: int) -> Text:
+        """The line, in no more than so many columns."""
+        from rich.text import Text
+
+        left = self.seconds_left
+        head = " ".join(part for part in (self._what, self._count) if part)
+        clock = duration(self._clock() - self._began)
+        if math.isfinite(left):
+            clock += f", {duration(left)} left"
+        room = columns - len(clock) - 2
+        if len(head) > room:
+            short = f"{head[: room - 1]}…  " if room > 1 else ""
+            return Text(f"{short}{clock}"[:columns])
+        notes = ""
+        for note in self._notes:
+            if len(head) + 1 + LEAST_BAR + 2 + len(clock) + len(notes) + 2 + len(note) > columns:
+                break
+            notes += f"  {note}"
+        bar = min(MOST_BAR, columns - len(head) - 1 - 2 - len(clock) - len(notes))
+        line = Text(head)
+        if bar >= LEAST_BAR:
+            full = round(self.fraction * bar)
+            line.append(" ")
+            line.append("━" * full, style="bar.complete")
+            line.append("─" * (bar - full), style="bar.back")
+        line.append(f"  {clock}")
+        line.append(notes, style="dim")
+        return line
+
+    def _log(self) -> None:
+        """A line in a log, if the last one is some time ago."""
+        now = self._clock()
+        if now - self._logged < LOG_EVERY:
             return
-        self._told = now
-        parts = [f"{done} of {count}" if count else f"{done}"]
-        parts.append(f"{(now - self._began) / 60.0:.1f} min")
-        messages.print(f"{self._what}: {', '.join(parts + [note] * bool(note))}", markup=False)
+        self._logged = now
+        parts = [f"{self._what} {self._count}".strip(), f"{duration(now - self._began)} so far"]
+        if math.isfinite(self.seconds_left):
+            parts.append(f"{duration(self.seconds_left)} left")
+        messages.print(", ".join([*parts, *self._notes]), markup=False)
+
+
+@contextmanager
+def progress_line(*steps: Step, waits: Callable[[Line], str] | None = None) -> Iterator[Line]:
+    """A line of progress that vanishes at its end; lines now and then where there is no terminal.
+
+    Args:
+        steps: what will be done.
+        waits: what Ctrl-C waits for, if it does not act at once; see `stopping.waiting`.
+    """
+    line = Line(steps, time.monotonic)
+    with stopping.waiting(None if waits is None else lambda: waits(line)):
+        if not messages.is_terminal:
+            line._log_lines = True
+            yield line
+            return
+        from rich.live import Live
+
+        def drawn() -> Text:
+            return line.text(messages.width - 1)
+
+        with Live(
+            get_renderable=drawn,
+            console=messages,
+            refresh_per_second=REFRESHES,
+            transient=True,
+            redirect_stdout=False,
+            redirect_stderr=False,
+        ):
+            yield line
+
+
+def duration(seconds: float) -> str:
+    """Hours, minutes and seconds as 1:02:03 or 2:03."""
+    minutes, rest = divmod(round(seconds), 60)
+    hours, minutes = divmod(minutes, 60)
+    return f"{hours}:{minutes:02}:{rest:02}" if hours else f"{minutes}:{rest:02}"
+
+
+def about(seconds: float) -> str:
+    """A time in words, to end a phrase: ", about 12 s"; nothing if it is unknown."""
+    if not math.isfinite(seconds):
+        return ""
+    if seconds < 100.0:
+        return f", about {max(1, math.ceil(seconds))} s"
+    return f", about {math.ceil(seconds / 60.0)} min"

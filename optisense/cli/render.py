@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -20,6 +18,8 @@ from optisense.cli.options import (
     parse_resolution,
 )
 from optisense.cli.output_folder import take_folder
+from optisense.cli.progress import Line, about, progress_line
+from optisense.time_left import Step
 
 if TYPE_CHECKING:
     from optisense.optics import RenderProgress, TactileImage
@@ -93,46 +93,55 @@ def render(
         raise typer.BadParameter("give one of them, not both", param_hint="--noise, --seconds")
     contacts = parse_contacts(contact)
 
-    from optisense.sensors import load
+    with (
+        progress_line(*_steps(photons, noise, seconds), waits=_waits) as line,
+        held_interrupt() as interrupt,
+    ):
+        line.begin(LOADING)
+        from optisense.sensors import load
 
-    sensor = load(design)
-    take_folder(out)
+        sensor = load(design)
+        take_folder(out)
 
-    from optisense.cli.placing import place_contacts
-    from optisense.optics import OpticalModel
-    from optisense.optics.imaging.tactile_image import REPORT_FILE
-    from optisense.report import write_report
-    from optisense.report.camera_rays import CameraRays
+        from optisense.cli.placing import place_contacts
+        from optisense.optics import OpticalModel
+        from optisense.optics.imaging.tactile_image import REPORT_FILE
+        from optisense.report import write_report
+        from optisense.report.camera_rays import CameraRays
 
-    with _progress_bar() as show:
+        interrupt.raise_if_requested()
+        line.begin(BUILDING)
+        line.time_left.expect(SHADING, count=_pictures(size or sensor.camera.resolution))
         model = OpticalModel(sensor, variant=variant)
+        interrupt.raise_if_requested()
+        told = RenderStages(line)
 
         def report_progress(progress: RenderProgress) -> None:
-            show(progress)
-            if progress.fraction < 1:
+            told(progress)
+            if progress.photons and told.stage == TRACING:  # a picture can be made of these
                 interrupt.raise_if_requested()
 
-        with held_interrupt() as interrupt:
-            image = model.render(
-                contacts,
-                resolution=size,
-                photons=photons if photons or noise or seconds else ONE_PICTURE,
-                noise=noise,
-                seconds=seconds,
-                seed=seed,
-                progress=report_progress,
-            )
-    image.settings["contacts"] = list(contact or [])
-    image.save(out, brightness)
-    write_report(
-        out / REPORT_FILE,
-        sensor,
-        image,
-        contacts,
-        exposure=brightness,
-        indenters=place_contacts(model, contacts),
-        rays=CameraRays.of(model),
-    )
+        image = model.render(
+            contacts,
+            resolution=size,
+            photons=photons if photons or noise or seconds else ONE_PICTURE,
+            noise=noise,
+            seconds=seconds,
+            seed=seed,
+            progress=report_progress,
+        )
+        line.begin(WRITING)
+        image.settings["contacts"] = list(contact or [])
+        image.save(out, brightness)
+        write_report(
+            out / REPORT_FILE,
+            sensor,
+            image,
+            contacts,
+            exposure=brightness,
+            indenters=place_contacts(model, contacts),
+            rays=CameraRays.of(model),
+        )
     _say_what_came(image, out)
     if image.interrupted:
         messages.print("interrupted: the files hold what was finished until then")
@@ -140,24 +149,78 @@ def render(
         raise typer.Exit(EXIT_INTERRUPTED)
 
 
-@contextmanager
-def _progress_bar() -> Iterator[Callable[[RenderProgress], None]]:
-    """A bar on standard error with photons, noise and time; silent when that is no terminal."""
-    from rich.progress import TextColumn, TimeElapsedColumn
+LOADING, BUILDING, WRITING = "loading", "building the scene", "writing the report"
+TRACING, SHADING = "tracing photons", "shading the picture"
 
-    from optisense.cli.progress import passing_bar
+NOISE_PHOTONS = 4.0
+"""Million photons that a noise target is expected to take, before the noise is known."""
 
-    percent, note = TextColumn("{task.percentage:>3.0f} %"), TextColumn("{task.fields[note]}")
-    with passing_bar("rendering", percent, note, TimeElapsedColumn()) as bar:
-        task = bar.add_task("render", total=1.0, note="preparing the scene")
+USUAL_PIXELS = 320 * 240
+"""Of a picture whose shading takes the usual time."""
 
-        def show(progress: RenderProgress) -> None:
-            note = f"{progress.photons / 1e6:.1f} million photons"
-            if progress.noise is not None:
-                note += f", noise {progress.noise:.1f} %"
-            bar.update(task, completed=progress.fraction, note=note)
 
-        yield show
+def _steps(photons: int | None, noise: float | None, seconds: float | None) -> list[Step]:
+    """The steps of a render and their usual times (seconds on two cores of a desktop processor,
+    GelSight Mini, some kernels compiled and others found in the cache)."""
+    tracing = Step(TRACING, (photons or ONE_PICTURE) / 1e6, 2.2)
+    if photons is None and noise is not None:
+        tracing = Step(TRACING, NOISE_PHOTONS, 2.2)
+    if photons is None and seconds is not None:
+        tracing = Step(TRACING, 1.0, max(1.0, seconds - 5.0))
+    return [
+        Step(LOADING, 1, 2.4),
+        Step(BUILDING, 1, 0.8),
+        Step("preparing the scene", 1, 0.4),
+        Step("tracing pilot photons", 1, 1.4),
+        tracing,
+        Step("smoothing the light", 1, 0.9),
+        Step(SHADING, 1, 2.0),
+        Step(WRITING, 1, 0.8),
+    ]
+
+
+def _pictures(resolution: tuple[int, int]) -> float:
+    """How many pictures of the usual size take as long to shade as one of this size."""
+    return 0.5 + 0.5 * resolution[0] * resolution[1] / USUAL_PIXELS
+
+
+def _waits(line: Line) -> str:
+    """What a first Ctrl-C waits for: the light so far is made into a picture."""
+    left = line.time_left
+    rest = left.seconds_left - left.seconds_left_of(TRACING)
+    return f"finishing the picture{about(rest)}"
+
+
+class RenderStages:
+    """Shows the stages of a render on a progress line.
+
+    Attributes:
+        stage: the one at hand.
+    """
+
+    def __init__(self, line: Line) -> None:
+        """``line`` has a step for each stage."""
+        self._line = line
+        self.stage = ""
+
+    def __call__(self, progress: RenderProgress) -> None:
+        """Show it."""
+        from optisense.optics.backend.stages import Stage
+
+        if progress.stage is Stage.DONE:
+            return
+        if progress.stage.value != self.stage:
+            self.stage = progress.stage.value
+            self._line.begin(self.stage)
+        notes = [f"{progress.photons / 1e6:.1f} million photons"] if progress.photons else []
+        if progress.noise is not None:
+            notes.append(f"noise {progress.noise:.1f} %")
+        what = self.stage
+        if self.stage == TRACING:
+            self._line.time_left.advance(progress.part * self._line.time_left.count)
+            if not progress.photons:
+                what = "compiling, " + what
+        self._line.say(what, None, None, *notes)
 
 
 def _say_what_came(image: TactileImage, folder: Path) -> None:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from optisense.cli import stopping
 from optisense.cli.asking import ask_yes
 from optisense.cli.console import EXIT_INTERRUPTED, ends_well, messages, output
 from optisense.cli.options import (
@@ -162,7 +163,7 @@ def search(
     given = _given(vary, objective, method, seed, setting, option, rule, may_cross, error, samples)
     study = _resumed(out, design, given, trust) if resume else _begun(out, design, budget, given)
     try:
-        with search_progress(study.settings.method) as show:
+        with search_progress(workers if cluster is None else 0) as show:
             result = run_study(
                 study,
                 workers=workers,
@@ -170,9 +171,7 @@ def search(
                 limit=budget,
                 variant=variant,
                 progress=show,
-                told=lambda: messages.print(
-                    "stopping after this trial; Ctrl-C again drops it", style="yellow"
-                ),
+                told=stopping.say,
             )
         if as_json:
             print(json.dumps(summary(result), indent=2, allow_nan=False))

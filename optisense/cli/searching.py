@@ -7,38 +7,62 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
-from optisense.cli.progress import counting_bar
+from optisense.cli.progress import about, progress_line
 
 if TYPE_CHECKING:
     from optisense.search import Progress
 
 
 @contextmanager
-def search_progress(method: str) -> Iterator[Callable[[Progress], None]]:
-    """Trials done, with the best score so far, trials an hour and the time left."""
-    with counting_bar(method, left=False, note="getting ready") as show:
-        yield lambda progress: show(progress.done, progress.total, note(progress))
+def search_progress(workers: int) -> Iterator[Callable[[Progress], None]]:
+    """Trials done and the time left, with the best score so far, failures and trials an hour.
+
+    With one worker Ctrl-C waits for the trial at hand; others drop theirs at once.
+    """
+    last: list[Progress] = []
+    waits = (lambda line: _waits(last)) if workers == 1 else None
+    with progress_line(waits=waits) as line:
+        line.say("loading")
+
+        def show(progress: Progress) -> None:
+            last[:] = [progress]
+            line.show(*what(progress), progress.seconds_left, notes(progress))
+
+        yield show
 
 
-def note(progress: Progress) -> str:
-    """What stands beside the bar."""
-    if progress.stage != "trials":
-        return f"best {_score(progress.best)}; scoring the best again with {progress.stage}"
-    parts = [f"best {_score(progress.best)} (start {_score(progress.start)})"]
-    if progress.trials_per_hour > 0.0:
-        parts.append(f"{progress.trials_per_hour:,.0f} trials/h")
+def what(progress: Progress) -> tuple[str, int | None, int | None]:
+    """What is being done, how many are done and of how many."""
+    if progress.stage == "start":
+        return "scoring the start", None, None
+    if progress.stage == "trials":
+        return "trials", progress.done, progress.total
+    if not progress.total:
+        return "scoring the best again", None, None
+    return "scoring the best again", progress.done, progress.total
+
+
+def notes(progress: Progress) -> list[str]:
+    """What stands beside the bar, the foremost first."""
+    parts = []
+    if math.isfinite(progress.best):
+        parts.append(f"best {_score(progress.best)} (start {_score(progress.start)})")
     if progress.failed:
         parts.append(f"{progress.failed} failed")
-    if math.isfinite(progress.seconds_left):
-        parts.append(f"{duration(progress.seconds_left)} left")
-    return "  ".join(parts)
+    if progress.trials_per_hour > 0.0 and progress.stage == "trials":
+        parts.append(f"{progress.trials_per_hour:,.0f} trials/h")
+    return parts
 
 
-def duration(seconds: float) -> str:
-    """Hours, minutes and seconds as 1:02:03."""
-    minutes, rest = divmod(round(seconds), 60)
-    hours, minutes = divmod(minutes, 60)
-    return f"{hours}:{minutes:02}:{rest:02}" if hours else f"{minutes}:{rest:02}"
+def _waits(last: list[Progress]) -> str:
+    """What a first Ctrl-C waits for where trials are worked out in this process."""
+    if not last or last[0].stage == "start":
+        return "finishing the score of the start"
+    if last[0].stage != "trials":
+        return "finishing the score at hand"
+    hourly = last[0].trials_per_hour
+    took = about(3600.0 / hourly) if hourly > 0.0 else ""
+    return f"finishing trial {last[0].done + 1}{took}"
 
 
 def _score(value: float) -> str:

@@ -19,7 +19,14 @@ from optisense.cli.options import (
     parse_resolution,
 )
 from optisense.cli.output_folder import take_folder
-from optisense.cli.progress import counting_bar
+from optisense.cli.progress import progress_line
+from optisense.cli.sampling import (
+    BUILDING,
+    LOADING,
+    loading_steps,
+    sample_steps,
+    shown_samples,
+)
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -84,6 +91,9 @@ OutOption = Annotated[
     ),
 ]
 JsonOption = Annotated[bool, typer.Option("--json", help="Print JSON instead of a table.")]
+
+PICTURES = "pictures"
+"""The step of the progress of reconstructions."""
 
 PHOTONS = 5_000_000
 SAMPLES = 200
@@ -224,6 +234,7 @@ def reconstruction(
 
     from optisense.sensors import load
     from optisense.tasks import ReconstructionSettings, reconstruct
+    from optisense.tasks.reconstruction import unseen_objects
 
     settings = ReconstructionSettings(
         method=method,
@@ -238,12 +249,16 @@ def reconstruction(
     sensor = load(design)
     if out is not None:
         take_folder(out)
+    count = presses + len(contacts or unseen_objects())
+    with progress_line(*loading_steps(), *sample_steps(PICTURES, photons, count, 0.3, 0.2)) as line:
+        line.begin(LOADING)
+        from optisense.optics import OpticalModel
+        from optisense.tasks.figures import draw_reconstruction
 
-    from optisense.optics import OpticalModel
-    from optisense.tasks.figures import draw_reconstruction
-
-    with counting_bar("pictures") as show:
-        result = reconstruct(OpticalModel(sensor, variant), settings, contacts, show)
+        line.begin(BUILDING)
+        model = OpticalModel(sensor, variant)
+        show = shown_samples(line, PICTURES, "comparing")
+        result = reconstruct(model, settings, contacts, show)
     if out is not None:
         _write(out, result.to_dict(), draw_reconstruction(result, sensor.camera.axes()))
     if as_json:
@@ -292,17 +307,22 @@ def _perceive(
     if out is not None:
         take_folder(out)
 
-    from optisense.optics import OpticalModel
-    from optisense.tasks import perceive
-    from optisense.tasks.figures import draw_perception
-
     results = []
-    with _keeping(out):
+    steps = loading_steps()
+    for task in tasks:
+        steps += sample_steps(task.name, settings.photons, settings.count, 0.2, 3.0)
+    with _keeping(out), progress_line(*steps) as line:
+        line.begin(LOADING)
+        from optisense.optics import OpticalModel
+        from optisense.tasks import perceive
+        from optisense.tasks.figures import draw_perception
+
+        line.begin(BUILDING)
         model = OpticalModel(sensor, variant)
         for task in tasks:
             folder = out if out is None or len(tasks) == 1 else out / task.name
-            with counting_bar(task.name) as show:
-                results.append(perceive(task, model, settings, neighbours, folder, show))
+            show = shown_samples(line, task.name, f"{task.name}: reading the samples")
+            results.append(perceive(task, model, settings, neighbours, folder, show))
             if folder is not None:
                 _write(folder, results[-1].to_dict(), draw_perception(results[-1]))
     if as_json:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from optisense.cli import stopping
 from optisense.cli.console import EXIT_INTERRUPTED, ends_well, messages, output
 from optisense.cli.options import (
     DesignArgument,
@@ -22,7 +23,7 @@ from optisense.cli.options import (
     seed_option,
 )
 from optisense.cli.output_folder import take_folder
-from optisense.cli.progress import counting_bar
+from optisense.cli.progress import about, progress_line
 from optisense.writing import remove_own_page, write_text
 
 if TYPE_CHECKING:
@@ -85,15 +86,22 @@ def tolerance(
         raise typer.BadParameter("needs a folder: --out DIR", param_hint="--report")
     settings = score_settings(setting, photons, resolution)
 
-    from optisense.search.text import parse_errors
-    from optisense.search.tolerance import tolerance as find_tolerance
-    from optisense.sensors import load
+    last: list[tuple[int, float]] = []
+    with progress_line(waits=(lambda line: _waits(last)) if workers == 1 else None) as line:
+        line.say("loading")
+        from optisense.search.text import parse_errors
+        from optisense.search.tolerance import tolerance as find_tolerance
+        from optisense.sensors import load
 
-    errors = parse_errors(error) if error else None
-    sensor = load(design)
-    if out is not None:
-        take_folder(out)
-    with counting_bar("sensors") as show:
+        errors = parse_errors(error) if error else None
+        sensor = load(design)
+        if out is not None:
+            take_folder(out)
+
+        def show(done: int, count: int, left: float) -> None:
+            last[:] = [(done, left / max(1, count - done))]
+            line.show(_what(done), done, count, left)
+
         found = find_tolerance(
             sensor,
             list(objective or ["rgb2normal"]),
@@ -104,6 +112,7 @@ def tolerance(
             settings=settings,
             variant=variant,
             progress=show,
+            told=stopping.say,
         )
     text = json.dumps(found.to_dict(), indent=2, allow_nan=False)
     if out is not None:
@@ -116,8 +125,27 @@ def tolerance(
             for name in [JSON_FILE, *([REPORT_FILE] if report else [])]:
                 output.print(f"written: {out / name}", markup=False)
     if found.interrupted:
-        messages.print(f"interrupted: this rests on the {found.sensors} sensors until then")
+        kept = "" if out is not None else "; with --out DIR it is kept"
+        messages.print(
+            f"interrupted: this rests on the {found.sensors} sensors until then{kept}",
+            markup=False,
+        )
         raise typer.Exit(EXIT_INTERRUPTED)
+
+
+def _what(done: int) -> str:
+    """What is being scored: first the design itself, with several seeds, then sensors."""
+    from optisense.search.tolerance import NOISE_SEEDS
+
+    return "scoring the design itself" if done <= NOISE_SEEDS else "scoring sensors"
+
+
+def _waits(last: list[tuple[int, float]]) -> str:
+    """What a first Ctrl-C waits for: the score at hand."""
+    if not last:
+        return "finishing the score at hand"
+    done, each = last[0]
+    return f"finishing score {done + 1}{about(each)}"
 
 
 def _write(found: Tolerance, folder: Path, text: str, report: bool) -> None:
@@ -141,7 +169,7 @@ def _print(found: Tolerance) -> None:
         table.add_row(
             name,
             _number(each.nominal),
-            *(_number(value.value) for value in each.percentiles.values()),
+            *(_number(value.value) if found.sensors else "" for value in each.percentiles.values()),
             f"± {each.deviation:.2g}" if math.isfinite(each.deviation) else "",
             f"± {each.noise:.2g}" if each.noise > 0.0 else "",
         )

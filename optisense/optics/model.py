@@ -16,6 +16,7 @@ import numpy as np
 from optisense.errors import RenderError
 from optisense.geometry import Contact
 from optisense.optics.backend.interrupts import lets_ctrl_c_through
+from optisense.optics.backend.stages import Stage, TellStage, fraction_done
 from optisense.optics.backend.versions import versions
 from optisense.optics.camera.projection import RayCamera
 from optisense.optics.imaging.cached import ImageLayers, PixelImportance, render_cached
@@ -40,10 +41,19 @@ SPPM_PASS_PHOTONS = 1_000_000
 
 @dataclass(frozen=True)
 class RenderProgress:
-    """How far a render is: fraction 0..1, photons traced, relative noise (per cent) if known,
-    seconds so far.
+    """How far a render is.
+
+    Attributes:
+        stage: what is being done.
+        part: how much of the photons is traced, 0 to 1.
+        fraction: of the whole render, 0 to 1, roughly.
+        photons: traced so far.
+        noise: relative, in per cent; None if it is not known.
+        seconds: so far.
     """
 
+    stage: Stage
+    part: float
     fraction: float
     photons: int
     noise: float | None
@@ -136,17 +146,22 @@ class OpticalModel(RayModel):
             if value is not None and not value > 0:
                 raise RenderError(f"{name} is {value}", hint="give a number above 0")
         began = time.perf_counter()
+
+        def tell(stage: Stage, part: float, traced: int, reached: float | None) -> None:
+            if progress is not None:
+                shown = None if reached is None or not np.isfinite(reached) else 100 * reached
+                now = time.perf_counter() - began
+                progress(
+                    RenderProgress(stage, part, fraction_done(stage, part), traced, shown, now)
+                )
+
+        tell(Stage.PREPARING, 0.0, 0, None)
         camera = self.camera(resolution)
         scenes = self._scenes(contacts)
         rays = trace_chief_rays(scenes.full, camera)
         if not rays.hit.any():
             raise sees_nothing(rays)
         built = time.perf_counter()
-
-        def tell(fraction: float, traced: int, reached: float | None) -> None:
-            if progress is not None:
-                shown = None if reached is None or not np.isfinite(reached) else 100 * reached
-                progress(RenderProgress(fraction, traced, shown, time.perf_counter() - began))
 
         if estimator == "sppm":
             layers = self._render_sppm(scenes, camera, rays, photons, seconds, seed, began, tell)
@@ -157,6 +172,7 @@ class OpticalModel(RayModel):
                 wanted = DEFAULT_PHOTONS
             field = self._store.field(seed, wanted, target, seconds, MAX_PHOTONS, began, tell)
             lit = time.perf_counter()
+            tell(Stage.SHADING, 1.0, field[0].photons, field[0].noise)
             layers = render_cached(
                 field,
                 scenes,
@@ -171,7 +187,7 @@ class OpticalModel(RayModel):
             )
             layers.light_seconds = lit - built
         ended = time.perf_counter()
-        tell(1.0, layers.photons, layers.noise)
+        tell(Stage.DONE, 1.0, layers.photons, layers.noise)
         units = dict(zip(self.groups, layers.radiance, strict=True))
         image = TactileImage(
             layers={
@@ -216,7 +232,7 @@ class OpticalModel(RayModel):
         seconds: float | None,
         seed: int,
         began: float,
-        tell: Callable[[float, int, float | None], None],
+        tell: TellStage,
     ) -> ImageLayers:
         from optisense.optics.imaging.sppm import render_sppm
 
@@ -225,7 +241,7 @@ class OpticalModel(RayModel):
         passes = max(1, -(-(photons or 16 * DEFAULT_PHOTONS) // emitted))
 
         def stop(done: int) -> bool:
-            tell(done / passes, done * emitted, None)
+            tell(Stage.PHOTONS, done / passes, done * emitted, None)
             return seconds is not None and time.perf_counter() - began > seconds
 
         result = render_sppm(

@@ -26,8 +26,8 @@ MOST = 5
 
 _FRESH = 0xF2E5
 
-Work = Callable[[Sequence[tuple[Trial, int]]], list[Outcome]]
-"""Scores trials with seeds."""
+Work = Callable[[Sequence[tuple[Trial, int]], int], list[Outcome]]
+"""Scores trials with seeds, and is told how many such scores may follow."""
 
 
 def fresh_seeds(seed: int, count: int = SEEDS) -> list[int]:
@@ -59,7 +59,9 @@ def rescore(study: Study, work: Work) -> None:
 def _score(trials: Sequence[Trial], seeds: Sequence[int], work: Work) -> list[float]:
     """The mean over fresh seeds of each trial; one seed suffices where it changes nothing."""
     first = [(trial, seeds[0]) for trial in trials if seeds[0] not in trial.fresh]
-    outcomes = dict(zip((t.number for t, _ in first), work(first), strict=True)) if first else {}
+    rest = len(trials) * (len(seeds) - 1)
+    found = work(first, rest) if first else []
+    outcomes = dict(zip((t.number for t, _ in first), found, strict=True))
     fresh = {t.number: {**t.fresh} for t in trials}
     for number, outcome in outcomes.items():
         fresh[number][seeds[0]] = outcome
@@ -70,7 +72,7 @@ def _score(trials: Sequence[Trial], seeds: Sequence[int], work: Work) -> list[fl
         if seed not in fresh[trial.number]
         and dict(fresh[trial.number][seeds[0]].scores) != dict(trial.scores)
     ]
-    for (trial, seed), outcome in zip(more, work(more) if more else [], strict=True):
+    for (trial, seed), outcome in zip(more, work(more, 0) if more else [], strict=True):
         fresh[trial.number][seed] = outcome
     return [
         float(

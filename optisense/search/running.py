@@ -21,11 +21,13 @@ from optisense.search.failures import cause_of
 from optisense.search.making import MakingErrors
 from optisense.search.methods import Method, Problem, make
 from optisense.search.outcome import Outcome
+from optisense.search.rescoring import SEEDS as FRESH_SEEDS
 from optisense.search.rescoring import rescore
 from optisense.search.settings import package_versions
 from optisense.search.store import START, Row
 from optisense.search.study import Study
 from optisense.search.trial import Trial
+from optisense.time_left import Step, TimeLeft
 
 ALL_FAIL = 20
 """A study whose first trials all fail stops after so many, ..."""
@@ -39,20 +41,33 @@ SAME_POINT = 1e-9
 TICK = 0.2
 """Seconds between looks at the clock while trials are worked out."""
 
+START_STAGE, TRIALS, FRESH = "start", "trials", "fresh seeds"
+
+USUAL_FRESH = 9
+"""Scores with fresh seeds that a search is expected to need: three for the start, for the best
+trial, and for one that might be better."""
+
+FRESH_SHARE = 0.8
+"""The first score with a fresh seed takes as long as a trial, or so much of the first trial's time
+if that is more: where trials share the light that is traced for the first one, another seed needs
+its own. The rest of the first one's time is taken to be compiling."""
+
 
 @dataclass(frozen=True)
 class Progress:
     """How far a study is.
 
     Attributes:
-        stage: "trials", or "fresh seeds" while the best are scored again.
-        done: finished trials, those of earlier runs included; the start is not counted.
-        total: trials that there may be.
+        stage: "start" while the design as it is is scored, "trials", or "fresh seeds" while the
+            best are scored again.
+        done: finished trials, those of earlier runs included; the start is not counted. Scores in
+            the stage "fresh seeds".
+        total: trials that there may be; scores that are wanted in the stage "fresh seeds".
         failed: of the finished ones.
         best: the best score so far, NaN before there is one.
         start: score of the start.
-        trials_per_hour: in this run.
-        seconds_left: until the budget is spent; NaN before that can be known.
+        trials_per_hour: at the pace of the last ones; 0 before that can be known.
+        seconds_left: until the end, scoring the best again included; NaN before that can be known.
         facts: what the method tells of itself.
     """
 
@@ -162,11 +177,16 @@ class Run:
         self._tell = tell or (lambda progress: None)
         self._notes: list[str] = []
         self._finished: queue.SimpleQueue[tuple[int, Future[Outcome]]] = queue.SimpleQueue()
-        self._done = self._failed = self._new = 0
+        self._done = self._failed = 0
+        self._first_seconds = 0.0
         self._reasons: dict[str, list[str]] = {}
         self._scored: dict[bytes, Outcome] = {}
         self._best = self._start_score = math.nan
-        self._began = self._told = time.monotonic()
+        self._told = time.monotonic()
+        self._stage = START_STAGE
+        self._time_left = TimeLeft([])
+        self._fresh_done = self._fresh_count = 0
+        self._trials_an_hour = 0.0
 
     def go(self) -> Result:
         """Run to the end, or until Ctrl-C; the study stays locked, for the caller to unlock.
@@ -181,13 +201,18 @@ class Run:
         interrupted, ended = False, ""
         self._count_known()
         with self._make_runner(self._evaluator) as runner:
-            self._began = time.monotonic()
+            self._time_left = TimeLeft(
+                [Step(START_STAGE), Step(TRIALS, self.limit), Step(FRESH, USUAL_FRESH)],
+                runner.workers,
+            )
             try:
+                self._begin(START_STAGE)
                 self._score_start(runner)
+                self._begin(TRIALS, self._done)
                 ended = self._search(runner)
-                self._report("trials", now=True)
-                self._report("fresh seeds", now=True)
-                rescore(study, lambda jobs: self._work_fresh(runner, jobs))
+                self._report(now=True)
+                self._begin(FRESH)
+                rescore(study, lambda jobs, more: self._work_fresh(runner, jobs, more))
             except KeyboardInterrupt:
                 interrupted, ended = True, "interrupted"
         study.store.set_fact("ended", ended)
@@ -244,8 +269,12 @@ class Run:
         def finished(number: int, outcome: Outcome) -> None:
             self.study.store.finish(number, outcome)
             self._count(by_number[number], outcome)
-            self._new += 1
-            self._report("trials")
+            if self._stage == TRIALS:
+                self._time_left.advance(self._done, outcome.seconds, outcome.worker)
+            else:
+                self._time_left.advance(1.0, outcome.seconds, outcome.worker)
+            self._expect_fresh(outcome)
+            self._report()
 
         jobs = []
         for row in by_number.values():
@@ -256,14 +285,22 @@ class Run:
                 finished(row.number, replace(known, seconds=0.0))
         self._each(runner, jobs, finished)
 
-    def _work_fresh(self, runner: Runner, jobs: Sequence[tuple[Trial, int]]) -> list[Outcome]:
-        """Score trials with other seeds."""
+    def _work_fresh(
+        self, runner: Runner, jobs: Sequence[tuple[Trial, int]], more: int
+    ) -> list[Outcome]:
+        """Score trials with other seeds; `more` such scores may follow."""
         found: dict[int, Outcome] = {}
+        self._fresh_count = self._fresh_done + len(jobs) + more
+        self._time_left.expect(FRESH, count=self._fresh_count)
+        self._report(now=True)
 
         def finished(number: int, outcome: Outcome) -> None:
             trial, seed = jobs[number]
             self.study.store.finish_fresh(trial.number, seed, outcome)
             found[number] = outcome
+            self._fresh_done += 1
+            self._time_left.advance(self._fresh_done, outcome.seconds, outcome.worker)
+            self._report(now=True)
 
         numbered = [(k, trial.vector, seed) for k, (trial, seed) in enumerate(jobs)]
         self._each(runner, numbered, finished)
@@ -287,7 +324,7 @@ class Run:
             try:
                 number, done = self._finished.get(timeout=TICK)
             except queue.Empty:
-                self._report("trials")
+                self._report()
                 continue
             open_jobs -= 1
             finished(number, _outcome(done))
@@ -351,23 +388,41 @@ class Run:
             f"({why}): it goes on from the trials that are there"
         )
 
-    def _report(self, stage: str, now: bool = False) -> None:
+    def _begin(self, stage: str, done: float = 0.0) -> None:
+        """A stage begins; `done` of its pieces were finished by earlier runs."""
+        self._stage = stage
+        self._time_left.begin(stage, done=done)
+        self._report(now=True)
+
+    def _expect_fresh(self, outcome: Outcome) -> None:
+        """Learn from a score how long one with a fresh seed will take."""
+        if self._stage == START_STAGE:
+            self._first_seconds = outcome.seconds
+        pace = self._time_left.pace
+        if math.isfinite(pace):
+            first = FRESH_SHARE * self._first_seconds / self._time_left.workers
+            several = USUAL_FRESH / FRESH_SEEDS
+            each = (max(pace, first) + (several - 1.0) * pace) / several
+            self._time_left.expect(FRESH, seconds=each)
+            if self._stage == TRIALS and pace > 0.0:
+                self._trials_an_hour = 3600.0 / pace
+
+    def _report(self, now: bool = False) -> None:
         clock = time.monotonic()
         if not now and clock - self._told < TICK / 2:
             return
         self._told = clock
-        rate = self._new / max(clock - self._began, 1e-9)
-        left = (self.limit - self._done) / rate if rate > 0 else math.nan
+        fresh = self._stage == FRESH
         self._tell(
             Progress(
-                stage=stage,
-                done=self._done,
-                total=self.limit,
+                stage=self._stage,
+                done=self._fresh_done if fresh else self._done,
+                total=self._fresh_count if fresh else self.limit,
                 failed=self._failed,
                 best=self._best,
                 start=self._start_score,
-                trials_per_hour=3600.0 * rate,
-                seconds_left=left,
+                trials_per_hour=self._trials_an_hour,
+                seconds_left=self._time_left.seconds_left,
                 facts=self.method.describe(),
             )
         )

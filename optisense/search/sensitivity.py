@@ -61,8 +61,10 @@ def paired_errors(bound: BoundErrors, rows: int, seed: int) -> FloatArray:
 
 
 def percentile_of(scores: ArrayLike, share: float) -> Estimate:
-    """A percentile of scores (rows, k), failed ones (NaN) below all others."""
+    """A percentile of scores (rows, k), failed ones (NaN) below all others; NaN without any row."""
     values = np.asarray(scores, dtype=np.float64)
+    if not values.size:
+        return Estimate(np.nan, np.nan, np.nan)
     again = [percentile(values[rows].ravel(), share) for rows in _resampled(len(values))]
     return _estimate(percentile(values.ravel(), share), again)
 

@@ -24,6 +24,7 @@ from optisense.search.outcome import Outcome
 from optisense.search.rescoring import fresh_seeds
 from optisense.search.robust import HIGH, LOW, MIDDLE
 from optisense.search.sensitivity import Estimate, paired_errors, percentile_of, total_effect
+from optisense.time_left import Step, TimeLeft
 
 FloatArray = NDArray[np.float64]
 
@@ -44,8 +45,8 @@ axis), of the specularity, of each coordinate of a control point (mm), of a refr
 Assumptions for a sensor that is built by hand: LEDs soldered to a board that is glued in, a printed
 mould, silicone and resin of another batch."""
 
-Tell = Callable[[int, int], None]
-"""Called with the number of finished sensors and of all."""
+Tell = Callable[[int, int, float], None]
+"""Called with the number of finished scores, of all, and the seconds left (NaN if unknown)."""
 
 
 @dataclass(frozen=True)
@@ -142,6 +143,7 @@ def tolerance(
     settings: Mapping[str, Any] | None = None,
     variant: str = "auto",
     progress: Tell | None = None,
+    told: Callable[[], None] | None = None,
 ) -> Tolerance:
     """Try sensors with errors of making, all with the same seed of the light.
 
@@ -155,12 +157,15 @@ def tolerance(
         settings: of the objectives.
         variant: of the renderer: "auto", "llvm" or "cuda".
         progress: called now and then.
+        told: called when Ctrl-C waits for a sensor in this process to finish.
 
     Returns:
         Percentiles of the scores, and each source's share in their variance. Ctrl-C ends it
-        early with what is finished.
+        early with what is finished: shares need four rows of sensors (one sensor, and one more for
+        each source of error), percentiles any sensor.
 
     Raises:
+        KeyboardInterrupt: Ctrl-C came before the design itself had its score.
         SearchError: an error makes no sense, or the design itself has no score.
         DesignError: a path leads nowhere; names the near match.
         ObjectiveError: an objective or a setting is unknown.
@@ -179,21 +184,28 @@ def tolerance(
     nominal = bound.points(np.zeros(bound.size))
     jobs = [(nominal, each) for each in (seed, *fresh_seeds(seed, NOISE_SEEDS))]
     jobs += [(point, seed) for point in points.reshape(-1, bound.size)]
-    with _runner(evaluator, workers) as runner:
-        found, interrupted = _work(runner, jobs, len(jobs), progress or (lambda done, of: None))
+    with _runner(evaluator, workers, told) as runner:
+        found, interrupted = _work(runner, jobs, progress or (lambda done, of, left: None))
     itself, again, tried = found[:1], found[1 : 1 + NOISE_SEEDS], found[1 + NOISE_SEEDS :]
     whole = len([each for each in tried if each is not None]) // count
-    if not itself or itself[0] is None or whole < LEAST_PAIRS_TO_TELL:
+    if itself[0] is None:
         raise KeyboardInterrupt
     if itself[0].failed:
         raise SearchError(f"the design itself has no score: {itself[0].failure}")
-    outcomes = [each for each in tried[: whole * count] if each is not None]
+    if whole > 0:
+        outcomes = [each for each in tried[: whole * count] if each is not None]
+        shape = whole, count
+    else:  # not even one row: sensors by themselves
+        outcomes = [each for each in tried if each is not None]
+        shape = len(outcomes), 1
+        finished = [number for number, each in enumerate(tried) if each is not None]
+        points = points.reshape(-1, 1, bound.size)[finished]
     repeats = [itself[0], *(each for each in again if each is not None)]
     return Tolerance(
         design=design,
         errors=making,
         results={
-            name: _spreading(name, repeats, outcomes, making.sources, whole)
+            name: _spreading(name, repeats, outcomes, making.sources, shape)
             for name in evaluator.names
         },
         sensors=len(outcomes),
@@ -201,13 +213,9 @@ def tolerance(
         interrupted=interrupted,
         seconds=time.perf_counter() - began,
         settings=evaluator.settings,
-        values=points[:whole],
+        values=points[: shape[0]],
         names=bound.space.names,
     )
-
-
-LEAST_PAIRS_TO_TELL = 4
-"""Rows below which an interrupted run tells nothing."""
 
 
 def _spreading(
@@ -215,11 +223,15 @@ def _spreading(
     repeats: Sequence[Outcome],
     outcomes: Sequence[Outcome],
     sources: Sequence[str],
-    rows: int,
+    shape: tuple[int, int],
 ) -> Spreading:
-    values = np.array([each.scores.get(name, math.nan) for each in outcomes]).reshape(rows, -1)
+    values = np.array([each.scores.get(name, math.nan) for each in outcomes]).reshape(shape)
     same = np.array([each.scores.get(name, math.nan) for each in repeats])
-    shares = {source: total_effect(values, number) for number, source in enumerate(sources)}
+    rows_are_whole = shape[1] > 1 or len(sources) == 1
+    shares = {
+        source: total_effect(values, number) if rows_are_whole and shape[0] else None
+        for number, source in enumerate(sources)
+    }
     order = sorted(shares, key=lambda source: -_size(shares[source]))
     return Spreading(
         nominal=float(same[0]),
@@ -230,36 +242,41 @@ def _spreading(
     )
 
 
-def _runner(evaluator: DesignEvaluator, workers: int) -> Runner:
-    return SerialRunner(evaluator) if workers == 1 else ProcessPool(evaluator, workers)
+def _runner(evaluator: DesignEvaluator, workers: int, told: Callable[[], None] | None) -> Runner:
+    return SerialRunner(evaluator, told) if workers == 1 else ProcessPool(evaluator, workers)
 
 
 def _work(
-    runner: Runner, jobs: Sequence[tuple[FloatArray, int]], count: int, tell: Tell
+    runner: Runner, jobs: Sequence[tuple[FloatArray, int]], tell: Tell
 ) -> tuple[list[Outcome | None], bool]:
     """The outcome of each job, None where Ctrl-C came first; and whether it came."""
     found: list[Outcome | None] = [None] * len(jobs)
     running: dict[Future[Outcome], int] = {}
+    time_left = TimeLeft([Step("sensors", len(jobs))], runner.workers)
+    time_left.begin("sensors")
     done = 0
+
+    def collect() -> None:
+        nonlocal done
+        finished, _ = wait(running, return_when=FIRST_COMPLETED)
+        for future in finished:
+            outcome = future.result()
+            found[running.pop(future)] = outcome
+            done += 1
+            time_left.advance(done, outcome.seconds, outcome.worker)
+        tell(done, len(jobs), time_left.seconds_left)
+
+    tell(0, len(jobs), math.nan)
     try:
         for number, (point, seed) in enumerate(jobs):
             running[runner.submit(point, seed)] = number
             while len(running) >= runner.window:
-                done += _collect(running, found)
-                tell(done, count)
+                collect()
         while running:
-            done += _collect(running, found)
-            tell(done, count)
+            collect()
     except KeyboardInterrupt:
         return found, True
     return found, False
-
-
-def _collect(running: dict[Future[Outcome], int], found: list[Outcome | None]) -> int:
-    finished, _ = wait(running, return_when=FIRST_COMPLETED)
-    for future in finished:
-        found[running.pop(future)] = future.result()
-    return len(finished)
 
 
 def _size(share: Estimate | None) -> float:

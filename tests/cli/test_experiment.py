@@ -59,14 +59,14 @@ def test_all_are_prepared_in_one_go_and_lines_tell_where_there_is_no_terminal(
         kept_failure(unit, folder)
 
     monkeypatch.setattr("optisense.experiments.bench.work_out", fail)
-    monkeypatch.setattr("optisense.cli.progress.LINE_EVERY", 0.0)
+    monkeypatch.setattr("optisense.cli.progress.LOG_EVERY", 0.0)
     monkeypatch.setattr(ProcessPool, "__init__", lambda *_: pytest.fail("one process is asked for"))
     command = ["experiment", "all", "--quick", "--workers", "1", "--out", str(tmp_path)]
     result = runner.invoke(app, command)
     assert result.exit_code == 130
     for words in ("cylinder, specularity", "light design", "resin 0", "CMA-ES", "tasks on", "tip"):
         assert any(words in label for label in asked)
-    assert f"all: {len(asked) - 1} of " in result.stderr
+    assert f"all {len(asked) - 1}/" in result.stderr
 
 
 def kept_failure(unit: Unit, folder: Path) -> None:

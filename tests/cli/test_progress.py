@@ -3,39 +3,137 @@
 from __future__ import annotations
 
 import io
+import math
 import re
 
 import pytest
 from rich.console import Console
 
 from optisense.cli import progress
-from optisense.cli.progress import counting_bar
+from optisense.cli.progress import Line, about, duration, progress_line
+from optisense.search import Progress
+from optisense.time_left import Step
+
+
+class Clock:
+    """Tells the time that it was set to."""
+
+    def __init__(self) -> None:
+        self.now = 0.0
+
+    def __call__(self) -> float:
+        return self.now
+
+
+CLOCK_AND_LEFT = re.compile(r"(\d+:)?\d+:\d\d(, (\d+:)?\d+:\d\d left)?")
+SEARCHES = [
+    Progress("start", 0, 2000, 0, math.nan, math.nan, 0.0, math.nan),
+    Progress("trials", 7, 2000, 0, 0.98765, 0.80712, 0.0, math.nan),
+    Progress("trials", 1234, 2000, 17, 0.98765, 0.80712, 126_632.0, 35.4),
+    Progress("trials", 65_612, 65_612, 1_017, -0.0098765, -10.807, 126_632.0, 616_444.0),
+    Progress("fresh seeds", 2, 9, 17, 0.98765, 0.80712, 126_632.0, 61.0),
+]
+
+
+@pytest.mark.parametrize("columns", [20, 40, 60, 80, 200])
+@pytest.mark.parametrize("told", SEARCHES)
+def test_a_search_fits_the_terminal(told: Progress, columns: int) -> None:
+    from optisense.cli.searching import notes, what
+
+    clock = Clock()
+    line = Line(clock=clock)
+    clock.now = 4321.0
+    line.show(*what(told), told.seconds_left, notes(told))
+    text = line.text(columns - 1).plain
+    assert len(text) < columns
+    assert CLOCK_AND_LEFT.search(text) or columns < 40
+    if columns >= 60:
+        assert text.startswith(what(told)[0])
+        if told.stage == "trials":
+            assert f"{told.done}/{told.total}" in text
+        if math.isfinite(told.seconds_left):
+            assert f"{duration(told.seconds_left)} left" in text
+    if columns >= 80 and told.best == 0.98765 and told.stage == "trials":
+        assert "best 0.9877 (start 0.8071)" in text
+    if columns == 200 and told.failed and told.stage == "trials":
+        assert "126,632 trials/h" in text
+        assert f"{told.failed} failed" in text
+
+
+def test_a_line_names_the_step_and_counts_the_whole_time() -> None:
+    clock = Clock()
+    line = Line([Step("loading", 1, 2.0), Step("tracing photons", 10, 1.0)], clock=clock)
+    line.begin("loading")
+    assert line.text(79).plain.startswith("loading ─")
+    clock.now = 2.0
+    line.begin("tracing photons")
+    clock.now = 7.0
+    line.advance(5, 10, "noise 2.4 %")
+    text = line.text(79).plain
+    assert text.startswith("tracing photons 5/10 ━")
+    assert text.endswith("0:07, 0:05 left  noise 2.4 %")
+    assert text.count("━") == pytest.approx(7 / 12 * (text.count("━") + text.count("─")), abs=1)
+
+
+def test_the_bar_never_goes_back_and_the_clock_never_stops() -> None:
+    clock = Clock()
+    line = Line([Step("seeds", 6, 10.0)], clock=clock)
+    line.begin("seeds")
+    full, clocks = 0, []
+    for number in range(6):
+        for part in (0.3, 0.2, 1.0):  # objectives of a seed begin anew
+            clock.now += 5.0
+            line.advance(number + part)
+            text = line.text(79).plain
+            assert text.count("━") >= full
+            full = text.count("━")
+            clocks.append(CLOCK_AND_LEFT.search(text)[0].split(",")[0])  # type: ignore[index]
+    assert clocks == [duration(5.0 * k) for k in range(1, 19)]
+
+
+def test_what_somebody_else_estimated_runs_down() -> None:
+    clock = Clock()
+    line = Line(clock=clock)
+    line.show("trials", 3, 9, 60.0)
+    clock.now = 20.0
+    assert "0:20, 0:40 left" in line.text(79).plain
+    clock.now = 90.0
+    assert "1:30, 0:00 left" in line.text(79).plain
 
 
 def test_in_a_log_a_line_comes_now_and_then(monkeypatch: pytest.MonkeyPatch) -> None:
-    clock = iter([0.0, 10.0, 45.0, 50.0, 80.0])
-    monkeypatch.setattr(progress.time, "monotonic", lambda: next(clock))
     log = io.StringIO()
     monkeypatch.setattr(progress, "messages", Console(file=log, width=120))
-    with counting_bar("samples") as show:
-        for done in range(1, 5):
-            show(done, None if done == 4 else 9, f"contact {done}")
+    clock = Clock()
+    monkeypatch.setattr(progress.time, "monotonic", clock)
+    with progress_line(Step("samples", 9)) as line:
+        line.begin("samples")
+        for done, now in enumerate([10.0, 45.0, 50.0, 80.0], start=1):
+            clock.now = now
+            line.advance(done, 9, f"contact {done}")
     assert log.getvalue().splitlines() == [
-        "samples: 2 of 9, 0.8 min, contact 2",
-        "samples: 4, 1.3 min, contact 4",
+        "samples 2/9, 0:45 so far, 2:38 left, contact 2",
+        "samples 4/9, 1:20 so far, 1:40 left, contact 4",
     ]
 
 
-@pytest.mark.parametrize("left", [True, False])
-def test_on_a_terminal_a_bar_counts(monkeypatch: pytest.MonkeyPatch, left: bool) -> None:
+def test_on_a_terminal_one_line_is_drawn_and_goes(monkeypatch: pytest.MonkeyPatch) -> None:
     screen = io.StringIO()
-    console = Console(file=screen, force_terminal=True, width=120)
+    console = Console(file=screen, force_terminal=True, width=80)
     monkeypatch.setattr(progress, "messages", console)
-    with counting_bar("samples", left=left, note="getting ready") as show:
-        show(3, 9, "contact 3")
+    with progress_line(Step("samples", 9)) as line:
+        line.begin("samples")
+        line.advance(3, 9, "contact 3")
+    assert screen.getvalue().endswith("\x1b[2K")
     shown = re.sub(r"\x1b\[[0-9;?]*[A-Za-z]", "", screen.getvalue())
-    assert "samples" in shown
-    assert "getting ready" in shown
-    assert "3/9" in shown
+    assert "samples 3/9" in shown
     assert "contact 3" in shown
-    assert ("left" in shown) == left
+
+
+@pytest.mark.parametrize(
+    ("seconds", "words"),
+    [(math.nan, ""), (0.2, ", about 1 s"), (11.4, ", about 12 s"), (170.0, ", about 3 min")],
+)
+def test_times_in_words(seconds: float, words: str) -> None:
+    assert about(seconds) == words
+    assert duration(3725.0) == "1:02:05"

@@ -14,8 +14,7 @@ from typer.testing import CliRunner
 
 import optisense as ots
 from optisense.cli import app
-from optisense.cli.searching import duration, note
-from optisense.search import Progress, Study
+from optisense.search import Study
 
 OBJECTIVE = """
 import os
@@ -239,10 +238,3 @@ def test_methods_are_listed() -> None:
     assert result.exit_code == 0
     for name in ("grid", "random", "cma-es", "gradient", "pareto", "types", "light-colours"):
         assert any(line.startswith(name) for line in result.output.splitlines())
-
-
-def test_what_stands_beside_the_bar() -> None:
-    progress = Progress("trials", 30, 100, 2, 0.61234, 0.236, 7200.0, 35.4)
-    assert note(progress) == "best 0.6123 (start 0.236)  7,200 trials/h  2 failed  0:35 left"
-    assert "fresh seeds" in note(Progress("fresh seeds", 9, 9, 0, 0.5, 0.2, 1.0, 0.0))
-    assert duration(3725.0) == "1:02:05"

@@ -103,7 +103,7 @@ class ReferenceScene:
             self._coloured(),
         )
         light = store.field(
-            seed, photons, None, None, 2 * photons, 0.0, lambda fraction, traced, noise: None
+            seed, photons, None, None, 2 * photons, 0.0, lambda stage, part, traced, noise: None
         )
         fixed = RayScene([self.pieces[i] for i in opaque], opaque, scene.table)
         scenes = ContactScenes(scene, fixed, None, mi.Float())

@@ -67,7 +67,12 @@ def test_progress_tells_of_best_rate_and_time_left(mini: SensorDesign, goals: Mo
     assert 0 < last.done <= 40
     assert last.trials_per_hour > 0
     assert last.start <= last.best <= 0.0
-    assert last.seconds_left == pytest.approx((40 - last.done) * 3600.0 / last.trials_per_hour)
+    stages = [each.stage for each in seen]
+    assert list(dict.fromkeys(stages)) == ["start", "trials", "fresh seeds"]
+    assert math.isnan(seen[0].seconds_left)  # nothing is known before the start has its score
+    assert last.seconds_left >= 0.0
+    assert all(each.done <= each.total for each in seen)
+    assert 0 < seen[-1].done <= seen[-1].total
 
 
 def test_a_failed_trial_is_kept_with_its_reason(mini: SensorDesign) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Collection
+from collections.abc import Collection
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from optisense.optics.backend.sequences import seed_of
+from optisense.optics.backend.stages import Stage, TellStage
 from optisense.optics.radiance_cache.cache import BINS, CacheTally, RadianceCache
 from optisense.optics.radiance_cache.pilot_photons import PilotPhotons
 from optisense.optics.radiance_cache.smoothing import Kernels
@@ -221,7 +222,7 @@ class CacheStore:
         seconds: float | None,
         most: int,
         began: float,
-        tell: Callable[[float, int, float | None], None],
+        tell: TellStage,
     ) -> tuple[RadianceCache, bool]:
         """The cache after ``photons``, or once ``noise`` or ``seconds`` are reached.
 
@@ -232,7 +233,7 @@ class CacheStore:
             seconds: since ``began``; None for no such limit.
             most: number of photons at which tracing ends in any case.
             began: start of the render (`time.perf_counter`).
-            tell: called after each pass with the fraction done, the photons so far and the noise.
+            tell: called when a stage begins and after each pass; see `TellStage`.
 
         Returns:
             The cache, and whether Ctrl-C ended the tracing early.
@@ -248,6 +249,8 @@ class CacheStore:
             done = self._done.get((*key, wanted))
             if done is not None:
                 return done, False
+        if self._guide is None:
+            tell(Stage.PILOT, 0.0, 0, None)
         running = self._running.get(key)
         if (
             running is None
@@ -268,6 +271,9 @@ class CacheStore:
         tally = running.tally
         limit = cap if wanted is None else wanted
         check, reached, interrupted = 1, None, False
+        if tally.passes < limit:
+            self.guide  # noqa: B018  learned before photons are counted
+            tell(Stage.PHOTONS, 0.0, tally.photons, None)
         try:
             while tally.passes < limit:
                 started = time.perf_counter()
@@ -297,13 +303,14 @@ class CacheStore:
                     fraction = max(fraction, min(0.95, (now - began) / seconds))
                     if now - began + (now - started) > 0.8 * seconds:
                         break
-                tell(0.95 * fraction, tally.photons, reached)
+                tell(Stage.PHOTONS, fraction, tally.photons, reached)
         except KeyboardInterrupt:
             if tally.passes < 1:
                 raise
             interrupted = True
         name = (*key, tally.passes)
         if name not in self._done:
+            tell(Stage.SMOOTHING, 1.0, tally.photons, reached)
             self._done[name] = tally.smoothed()
             while len(self._done) > MAX_CACHES:
                 del self._done[next(iter(self._done))]

@@ -1,0 +1,197 @@
+"""What a command shows of its progress on a terminal of 80 columns, held against the truth.
+
+Runs a command in a pseudo-terminal, looks at the screen twice a second, and tells how wide the
+progress line is, which stages it names, how good its time left is, how long it stands still, and
+how long the command takes to end after Ctrl-C:
+
+    python -m benchmarks.progress_line -- evaluate gelsight-mini --seeds 3
+    python -m benchmarks.progress_line --interrupt 20 -- tolerance gelsight-mini
+
+Needs pyte, a terminal in Python (``pip install "optisense[bench]"``). POSIX only.
+"""
+
+from __future__ import annotations
+
+import argparse
+import fcntl
+import json
+import os
+import pty
+import re
+import select
+import signal
+import struct
+import sys
+import termios
+import time
+from dataclasses import dataclass, field
+
+import pyte
+
+LOOK_EVERY = 0.5
+"""Seconds between looks at the screen."""
+
+ROWS = 50
+SHARES = (0.1, 0.25, 0.5, 0.75)
+"""Parts of the whole time at which the promised total is compared with the real one."""
+
+LEFT = re.compile(r"((?:\d+:)?\d+:\d\d) left|left ((?:\d+:)?\d+:\d\d)")
+CLOCK = re.compile(r"(?:\d+:)?\d+:\d\d")
+LIVE = re.compile(r"[━─╸╺]|" + CLOCK.pattern)
+"""What tells a progress line from the messages above it: a bar or a clock."""
+
+
+@dataclass
+class Look:
+    """What the screen showed."""
+
+    seconds: float
+    line: str
+    left: float | None
+
+
+@dataclass
+class Watched:
+    """A whole run.
+
+    Attributes:
+        looks: at the progress line, in order.
+        seconds: the run took.
+        code: its exit code; minus the signal that killed it.
+        obeyed: seconds from the first Ctrl-C to the end, None where none was pressed.
+        answered: seconds from Ctrl-C until the screen said something about it.
+        screen: what it showed in the end.
+    """
+
+    looks: list[Look] = field(default_factory=list)
+    seconds: float = 0.0
+    code: int = 0
+    obeyed: float | None = None
+    answered: float | None = None
+    screen: list[str] = field(default_factory=list)
+
+
+def watch(command: list[str], columns: int, presses: list[float]) -> Watched:
+    """Run a command in a terminal of so many columns; Ctrl-C after each of ``presses`` seconds."""
+    pid, terminal = pty.fork()
+    if pid == 0:
+        os.execvp(command[0], command)
+    fcntl.ioctl(terminal, termios.TIOCSWINSZ, struct.pack("HHHH", ROWS, columns, 0, 0))
+    screen = pyte.Screen(columns, ROWS)
+    stream = pyte.ByteStream(screen)
+    found = Watched()
+    began = time.monotonic()
+    look_at, waiting, pressed = LOOK_EVERY, list(presses), None
+    while True:
+        ready, _, _ = select.select([terminal], [], [], 0.05)
+        now = time.monotonic() - began
+        if ready:
+            try:
+                told = os.read(terminal, 65536)
+            except OSError:
+                break
+            if not told:
+                break
+            stream.feed(told)
+            if pressed is not None and found.answered is None and _answers(screen):
+                found.answered = now - pressed
+        if waiting and now >= waiting[0]:
+            waiting.pop(0)
+            pressed = pressed or now
+            os.write(terminal, b"\x03")
+        if now >= look_at:
+            look_at += LOOK_EVERY
+            line = _line(screen)
+            found.looks.append(Look(now, line, _left(line)))
+    _, status = os.waitpid(pid, 0)
+    found.seconds = time.monotonic() - began
+    found.code = os.waitstatus_to_exitcode(status)
+    found.obeyed = None if pressed is None else found.seconds - pressed
+    found.screen = [line.rstrip() for line in screen.display if line.strip()]
+    return found
+
+
+def _answers(screen: pyte.Screen) -> bool:
+    return any(re.search(r"Ctrl-C|interrupted|stopping", line) for line in screen.display)
+
+
+def _line(screen: pyte.Screen) -> str:
+    """The progress line: the lowest one with a bar or a clock, with the line that it runs over."""
+    lines = [line.rstrip() for line in screen.display]
+    for number in range(len(lines) - 1, -1, -1):
+        if LIVE.search(lines[number]):
+            return lines[number]
+    return next((line for line in reversed(lines) if line), "")
+
+
+def _left(line: str) -> float | None:
+    found = LEFT.search(line)
+    if found is None:
+        return None
+    parts = [int(part) for part in (found[1] or found[2]).split(":")]
+    return float(sum(part * 60**power for power, part in enumerate(reversed(parts))))
+
+
+def _stage(line: str) -> str:
+    """A line without what changes while a stage lasts."""
+    plain = re.sub(r"[━─╸╺]+", " ", CLOCK.sub("", line))
+    return re.sub(r"\s+", " ", re.sub(r"[-+]?\d[\d.,e]*", "#", plain)).strip()
+
+
+def told(found: Watched) -> dict[str, object]:
+    """The figures of a run."""
+    stages: list[str] = []
+    for look in found.looks:
+        stage = _stage(look.line)
+        if stage and stage not in stages:
+            stages.append(stage)
+    still, longest, line, bare, longest_bare = 0.0, 0.0, None, 0.0, 0.0
+    before = None
+    for look in found.looks:
+        still, line = (look.seconds, look.line) if look.line != line else (still, line)
+        longest = max(longest, look.seconds - still)
+        # The same but for the clock: nothing but time goes by.
+        shown = CLOCK.sub("", look.line)
+        bare, before = (look.seconds, shown) if shown != before else (bare, before)
+        longest_bare = max(longest_bare, look.seconds - bare)
+    promised = {}
+    for share in SHARES:
+        at = share * found.seconds
+        look = next((each for each in found.looks if each.seconds >= at), None)
+        ratio = None if look is None or look.left is None else look.seconds + look.left
+        promised[f"{share:.0%}"] = None if ratio is None else round(ratio / found.seconds, 2)
+    return {
+        "seconds": round(found.seconds, 1),
+        "exit code": found.code,
+        "widest": max((len(look.line) for look in found.looks), default=0),
+        "promised total over real": promised,
+        "longest without any change": round(longest, 1),
+        "longest without change but of the clock": round(longest_bare, 1),
+        "Ctrl-C answered after": None if found.answered is None else round(found.answered, 2),
+        "Ctrl-C obeyed after": None if found.obeyed is None else round(found.obeyed, 2),
+        "stages": stages,
+    }
+
+
+def main() -> None:
+    """Measure one command and print its figures as JSON."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--columns", type=int, default=80)
+    parser.add_argument("--interrupt", type=float, action="append", default=[], metavar="SECONDS")
+    parser.add_argument("--lines", action="store_true", help="print the line of each look too")
+    parser.add_argument("--screen", action="store_true", help="print the last screen too")
+    parser.add_argument("arguments", nargs="+", help="of optisense")
+    given = parser.parse_args()
+    command = [sys.executable, "-m", "optisense.cli", *given.arguments]
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+    found = watch(command, given.columns, given.interrupt)
+    if given.lines:
+        for look in found.looks:
+            print(f"{look.seconds:7.1f}  {look.line}")
+    if given.screen:
+        print("\n".join(found.screen))
+    print(json.dumps(told(found), indent=2, ensure_ascii=False))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,128 @@
+"""Ctrl-C and SIGTERM: an answer at once, an end at the next safe point, or at once if asked again.
+
+Python runs its signal handlers in the main thread and between two of its own instructions, so they
+wait while the renderer compiles or computes. A thread is told of the signal at once: it says what
+the command waits for, and ends the process a little after a second signal.
+"""
+
+from __future__ import annotations
+
+import os
+import select
+import signal
+import sys
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from types import FrameType
+from typing import NoReturn
+
+from optisense.cli.console import EXIT_INTERRUPTED, messages
+
+EXIT_TERMINATED = 143
+"""128 and the number of SIGTERM, as shells count."""
+
+SILENCE = 1.0
+"""Seconds after Ctrl-C in which a command may end without having to say what it waits for."""
+
+GRACE = 1.5
+"""Seconds after a second signal in which the command may still end by itself."""
+
+
+class _State:
+    """Of this process: the signals so far, and what a first one waits for."""
+
+    def __init__(self) -> None:
+        self.signals = 0
+        self.terminated = False
+        self.said = False
+        self.waits: Callable[[], str] | None = None
+
+
+_state = _State()
+
+
+@contextmanager
+def waiting(waits: Callable[[], str] | None) -> Iterator[None]:
+    """While this lasts, a first Ctrl-C waits for something, which ``waits`` tells in words.
+
+    Such as "finishing trial 7, about 12 s". None where Ctrl-C acts at once.
+    """
+    before, _state.waits = _state.waits, waits
+    try:
+        yield
+    finally:
+        _state.waits = before
+
+
+def say() -> None:
+    """Say what a first Ctrl-C waits for; said once."""
+    if _state.said:
+        return
+    _state.said = True
+    what = "stopping after the step at hand" if _state.waits is None else _state.waits()
+    if _state.terminated:
+        said = f"SIGTERM: {what}; another one stops at once"
+    else:
+        said = f"Ctrl-C: {what}; press again to stop at once"
+    messages.print(said, style="yellow", markup=False)
+
+
+def exit_code(code: int) -> int:
+    """What a process ends with that would end with ``code``: 143 where SIGTERM stopped it."""
+    return EXIT_TERMINATED if _state.terminated and code == EXIT_INTERRUPTED else code
+
+
+def requested() -> bool:
+    """Whether Ctrl-C was pressed, or SIGTERM came."""
+    return _state.signals > 0
+
+
+def watch() -> None:
+    """Answer signals in this process from here on: called once, by the command line's start.
+
+    SIGTERM then stops a command as Ctrl-C does. A SIGINT that is ignored, as of programs that a
+    shell runs in the background, stays so.
+    """
+    reader, writer = os.pipe()
+    os.set_blocking(writer, False)
+    if signal.getsignal(signal.SIGINT) is not signal.SIG_IGN:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
+    signal.signal(signal.SIGTERM, _terminate)
+    signal.set_wakeup_fd(writer, warn_on_full_buffer=False)
+    threading.Thread(target=_answer, args=(reader,), name="signals", daemon=True).start()
+
+
+def _terminate(number: int, frame: FrameType | None) -> None:
+    """SIGTERM does what Ctrl-C does at this moment."""
+    _state.terminated = True
+    handler = signal.getsignal(signal.SIGINT)
+    if callable(handler):
+        handler(signal.SIGINT, frame)
+    else:
+        raise KeyboardInterrupt
+
+
+def _answer(reader: int) -> None:
+    """Say at once what is waited for, and end the process a little after a second signal."""
+    while True:
+        for number in os.read(reader, 16):
+            if number not in (signal.SIGINT, signal.SIGTERM):
+                continue
+            _state.signals += 1
+            _state.terminated |= number == signal.SIGTERM
+            if _state.signals > 1:
+                timer = threading.Timer(GRACE, _leave)
+                timer.daemon = True
+                timer.start()
+            elif _state.waits is not None or not select.select([reader], [], [], SILENCE)[0]:
+                say()
+
+
+def _leave() -> NoReturn:
+    """End this process as it is. Files are written whole or not at all, so none is left half."""
+    if sys.stderr.isatty():
+        sys.stderr.write("\r\x1b[2K\x1b[?25h")  # the live line goes, the cursor comes back
+    sys.stderr.write("stopped at once\n")
+    sys.stderr.flush()
+    os._exit(exit_code(EXIT_INTERRUPTED))

@@ -1,0 +1,39 @@
+"""The stages of a render, which progress tells of."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from enum import Enum
+
+
+class Stage(Enum):
+    """What is being done; its value says it in words."""
+
+    PREPARING = "preparing the scene"
+    PILOT = "tracing pilot photons"
+    PHOTONS = "tracing photons"
+    SMOOTHING = "smoothing the light"
+    SHADING = "shading the picture"
+    DONE = "done"
+
+
+TellStage = Callable[[Stage, float, int, float | None], None]
+"""Called with the stage, the part of the photons that is traced (0 to 1), their number, and the
+relative noise if it is known."""
+
+_BEFORE = {
+    Stage.PREPARING: 0.0,
+    Stage.PILOT: 0.02,
+    Stage.PHOTONS: 0.05,
+    Stage.SMOOTHING: 0.8,
+    Stage.SHADING: 0.85,
+    Stage.DONE: 1.0,
+}
+"""The fraction of a render of five million photons that is over when a stage begins, roughly."""
+
+
+def fraction_done(stage: Stage, part: float) -> float:
+    """How much of a render is done, 0 to 1, roughly; ``part`` of its photons is traced."""
+    if stage is not Stage.PHOTONS:
+        return _BEFORE[stage]
+    return _BEFORE[stage] + part * (_BEFORE[Stage.SMOOTHING] - _BEFORE[stage])

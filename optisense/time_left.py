@@ -1,0 +1,225 @@
+"""How long work will still take, estimated from the pieces that are finished.
+
+Work is a sequence of steps, and a step is a number of like pieces: trials, sensors, photon passes.
+What is measured of a step tells how long its other pieces take. What has not begun yet is expected
+to take its usual time, longer or shorter by as much as the steps before it differed from theirs.
+The first piece of each worker also loads and compiles programs, so it says nothing about the
+others and is left out.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections import deque
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+USUAL_PIECES = 0.5
+"""Pieces that the usual time of a piece counts as, where it is averaged with measured ones: enough
+to steady an estimate from a part of the first piece, little against two whole ones."""
+
+ROUNDS = 3
+"""Pieces per worker after which the time between pieces is measured by the clock. Before that the
+pieces' own times are averaged, since pieces of several workers end in bunches."""
+
+REMEMBERED = 400
+"""Times at which pieces ended that are kept; of more, every second one is dropped."""
+
+
+@dataclass
+class Step:
+    """A part of the work.
+
+    Attributes:
+        name: what it is called.
+        count: its pieces; fractions of pieces may be done.
+        seconds: a piece usually takes, all workers together; None if nobody can know beforehand.
+        warm_up: first pieces that also load and compile, and say nothing about the others.
+    """
+
+    name: str
+    count: float = 1.0
+    seconds: float | None = None
+    warm_up: float = 0.0
+
+
+class TimeLeft:
+    """Estimates the time left of work in steps.
+
+    Attributes:
+        workers: processes that pieces are spread over.
+    """
+
+    def __init__(
+        self,
+        steps: Sequence[Step],
+        workers: int = 1,
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
+        """Start the clock; no step has begun.
+
+        Args:
+            steps: in their order.
+            workers: processes that pieces with times of their own are spread over.
+            clock: tells seconds.
+        """
+        self._steps = list(steps)
+        self.workers = max(1, workers)
+        self._clock = clock
+        self._began = clock()
+        self._current = -1
+        self._expected, self._measured = 0.0, 0.0
+        self._fraction = 0.0
+        self._known_workers: set[str] = set()
+        self._start_step(0.0)
+
+    def _start_step(self, done: float) -> None:
+        now = self._clock()
+        self._done = self._first = done
+        self._step_began = self._advanced = now
+        self._ends: deque[tuple[float, float]] = deque([(now, done)])
+        self._own_seconds, self._own_count, self._has_own = 0.0, 0, False
+
+    @property
+    def elapsed(self) -> float:
+        """Seconds since the clock was started."""
+        return self._clock() - self._began
+
+    def begin(self, name: str, count: float | None = None, done: float = 0.0) -> None:
+        """Begin a step and end the one before it; steps in between are skipped.
+
+        Args:
+            name: of the step, which comes after the current one.
+            count: of its pieces, if that is better known now.
+            done: pieces that were finished earlier, at no cost now.
+
+        Raises:
+            ValueError: no step of this name follows.
+        """
+        later = [step.name for step in self._steps[self._current + 1 :]]
+        if name not in later:
+            raise ValueError(f"no step '{name}' follows: {later}")
+        self._close_step()
+        self._current += 1 + later.index(name)
+        if count is not None:
+            self._steps[self._current].count = count
+        self._start_step(done)
+
+    def expect(self, name: str, count: float | None = None, seconds: float | None = None) -> None:
+        """Correct what is expected of a step: its pieces, or seconds a piece."""
+        step = next(step for step in self._steps if step.name == name)
+        step.count = step.count if count is None else count
+        step.seconds = step.seconds if seconds is None else seconds
+
+    def advance(self, done: float, seconds: float | None = None, worker: str = "") -> None:
+        """Tell how many pieces of the current step are done, parts of pieces included.
+
+        Args:
+            done: those done before `begin` included.
+            seconds: the last piece took by itself, where several workers are at work.
+            worker: that did it. The first piece of each is not used for the estimate.
+        """
+        now = self._clock()
+        if done <= self._done and seconds is None:
+            return
+        self._done, self._advanced = done, now
+        if seconds is not None:
+            if worker not in self._known_workers:
+                self._known_workers.add(worker)
+                if not self._has_own:  # the clock counts from here, too
+                    self._ends = deque([(now, done)])
+                return
+            if not self._has_own:
+                self._ends = deque([(now, done)])
+            self._has_own = True
+            self._own_seconds += seconds
+            self._own_count += 1
+        elif self._steps[self._current].warm_up > self._ends[0][1] - self._first:
+            self._ends = deque([(now, done)])
+            return
+        self._ends.append((now, done))
+        if len(self._ends) > REMEMBERED:
+            self._ends = deque([self._ends[0], *list(self._ends)[1::2]])
+
+    @property
+    def count(self) -> float:
+        """Pieces of the current step."""
+        return self._steps[self._current].count
+
+    @property
+    def seconds_left(self) -> float:
+        """Until everything is done; NaN where that can't be known yet."""
+        return sum((self.seconds_left_of(step.name) for step in self._steps), 0.0)
+
+    def seconds_left_of(self, name: str) -> float:
+        """Seconds that a step will still take; NaN where that can't be known yet."""
+        place = next(place for place, step in enumerate(self._steps) if step.name == name)
+        step = self._steps[place]
+        if place < self._current or step.count <= 0.0:
+            return 0.0
+        if place > self._current:
+            return step.count * self._usual(step)
+        rest = max(0.0, step.count - self._done)
+        if rest == 0.0:
+            return 0.0
+        # Of the piece at hand `since` is over; one that takes longer may end any moment.
+        since = self._clock() - self._advanced
+        return max(rest * self.pace - since, (rest - 1.0) * self.pace, 0.0)
+
+    @property
+    def fraction(self) -> float:
+        """The share of the whole time that has passed, 0 to 1; it never falls."""
+        left = self.seconds_left
+        if math.isfinite(left):
+            elapsed = self.elapsed
+            self._fraction = max(self._fraction, elapsed / max(elapsed + left, 1e-9))
+        return min(self._fraction, 1.0)
+
+    @property
+    def pace(self) -> float:
+        """Seconds from piece to piece of the current step; NaN where that can't be known yet."""
+        step = self._steps[self._current]
+        usual = self._usual(step)
+        if self._has_own or self._known_workers:
+            if not self._has_own:
+                return usual
+            began, first = self._window()
+            end, done = self._ends[-1]
+            if done - self._ends[0][1] >= ROUNDS * self.workers and done > first:
+                return (end - began) / (done - first)
+            known = 0.0 if math.isnan(usual) else USUAL_PIECES
+            own = self._own_seconds / self.workers + (known * usual if known else 0.0)
+            return own / (self._own_count + known)
+        began, first = self._window()
+        end, done = self._ends[-1]
+        if done <= first:
+            return usual
+        if not math.isfinite(usual):
+            return (end - began) / (done - first)
+        return (end - began + USUAL_PIECES * usual) / (done - first + USUAL_PIECES)
+
+    def _window(self) -> tuple[float, float]:
+        """When the pieces that the pace is measured by began, and how many were done then.
+
+        These are the later half of those that have been done: the pace may change.
+        """
+        if len(self._ends) < 2 * ROUNDS * self.workers:
+            return self._ends[0]
+        return self._ends[len(self._ends) // 2]
+
+    def _usual(self, step: Step) -> float:
+        """Seconds that a piece usually takes, at the speed that this machine has shown."""
+        if step.seconds is None:
+            return math.nan
+        speed = self._measured / self._expected if self._expected > 0.0 else 1.0
+        return step.seconds * speed
+
+    def _close_step(self) -> None:
+        """Compare what the current step took with what it usually takes."""
+        if self._current < 0:
+            return
+        step = self._steps[self._current]
+        if step.seconds is not None and step.count > self._first:
+            self._expected += step.seconds * (step.count - self._first)
+            self._measured += self._clock() - self._step_began
