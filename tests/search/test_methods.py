@@ -13,6 +13,7 @@ from optisense.search.methods import Method, Problem, find, make, names, registe
 from optisense.search.methods.base import values_to_maximise
 from optisense.search.outcome import Outcome
 from optisense.search.space import BoundSpace, SearchSpace
+from optisense.sensors import load
 
 FloatArray = np.ndarray
 Score = Callable[[FloatArray], float]
@@ -132,6 +133,14 @@ def test_cma_es_starts_at_the_design(valley: BoundSpace) -> None:
     away = (points - valley.start) / (valley.upper - valley.lower)
     assert np.abs(away.mean(axis=0)).max() < 4 * 0.01 / 20
     assert np.allclose(away.std(axis=0), 0.01, rtol=0.2)
+
+
+def test_cma_es_searches_a_single_number() -> None:
+    """pycma fails there where it would keep the deviation within the bounds."""
+    space = SearchSpace({"coating.specularity": (0.0, 1.0)}).bind(load("gelsight-mini"))
+    score = bowl(space)
+    asked = drive(make("cma-es", Problem(space, ("s",), 9999, seed=2)), score, 30)
+    assert best_of(asked, score) > -1e-4
 
 
 def test_cma_es_restarts_with_more(two_numbers: BoundSpace) -> None:

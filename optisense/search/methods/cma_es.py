@@ -146,6 +146,9 @@ class CmaEs(Method):
             "verb_disp": 0,
             "maxiter": math.inf,
         }
+        if self.space.size == 1:
+            # pycma 4.5 fails where it limits the only deviation, which may not outgrow the bounds.
+            options["maxstd"] = math.inf
         with self._own_randomness(), warnings.catch_warnings():
             warnings.simplefilter("ignore")
             before = np.random.get_state()
