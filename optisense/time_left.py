@@ -150,6 +150,8 @@ class TimeLeft:
     @property
     def seconds_left(self) -> float:
         """Until everything is done; NaN where that can't be known yet."""
+        if not self._steps:
+            return math.nan
         return sum((self.seconds_left_of(step.name) for step in self._steps), 0.0)
 
     def seconds_left_of(self, name: str) -> float:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 import sys
+from contextlib import ExitStack
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -158,12 +160,18 @@ def search(
     if out is None:
         raise typer.BadParameter("name a folder for the study", param_hint="--out")
 
-    from optisense.search import run_study
-
-    given = _given(vary, objective, method, seed, setting, option, rule, may_cross, error, samples)
-    study = _resumed(out, design, given, trust) if resume else _begun(out, design, budget, given)
-    try:
+    given = partial(
+        _given, vary, objective, method, seed, setting, option, rule, may_cross, error, samples
+    )
+    with ExitStack() as stack:
+        # It may ask whether code is trusted, so it comes before the progress.
+        study = _resumed(out, design, given(), trust) if resume else None
         with search_progress(workers if cluster is None else 0) as show:
+            from optisense.search import run_study
+
+            if study is None:
+                study = _begun(out, design, budget, given())
+            stack.callback(study.close)
             result = run_study(
                 study,
                 workers=workers,
@@ -177,8 +185,6 @@ def search(
             print(json.dumps(summary(result), indent=2, allow_nan=False))
         else:
             print_result(result, out)
-    finally:
-        study.close()
     if result.interrupted:
         messages.print(
             f"interrupted: everything is kept; go on with: optisense search --resume --out {out}",

@@ -51,6 +51,8 @@ def notes(progress: Progress) -> list[str]:
         parts.append(f"{progress.failed} failed")
     if progress.trials_per_hour > 0.0 and progress.stage == "trials":
         parts.append(f"{progress.trials_per_hour:,.0f} trials/h")
+    elif progress.doing:
+        parts.append(progress.doing)
     return parts
 
 

@@ -98,9 +98,9 @@ def tolerance(
         if out is not None:
             take_folder(out)
 
-        def show(done: int, count: int, left: float) -> None:
+        def show(done: int, count: int, left: float, doing: str) -> None:
             last[:] = [(done, left / max(1, count - done))]
-            line.show(_what(done), done, count, left)
+            line.show(_what(done), done, count, left, [doing] if doing else [])
 
         found = find_tolerance(
             sensor,

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from optisense.design import SensorDesign
 from optisense.errors import OptiSenseError, SearchError, SetupError
 from optisense.objectives import Objective, Score, Settings, evaluate
+from optisense.objectives.evaluation import Tell
 from optisense.objectives.files import place_of
 from optisense.objectives.registry import resolve
 from optisense.objectives.run import split_settings
@@ -99,6 +100,7 @@ class DesignEvaluator:
         self._resolved: list[Objective] | None = None
         self.renders = bool(self._objectives)
         self.variant = variant
+        self._tell: Tell | None = None
         self._check_settings()
 
     def __call__(self, vector: FloatArray, seed: int) -> Outcome:
@@ -131,6 +133,10 @@ class DesignEvaluator:
         failure = "; ".join(failures) or None
         return Outcome(scores, failure, parts, time.perf_counter() - began)
 
+    def listen(self, tell: Tell) -> None:
+        """Call ``tell`` while images are rendered in this process; copies elsewhere don't."""
+        self._tell = tell
+
     def failed(self, reason: str, began: float) -> Outcome:
         """An outcome without scores; `began` by `time.perf_counter`."""
         return Outcome.of_failure(self.names, reason, time.perf_counter() - began)
@@ -138,7 +144,7 @@ class DesignEvaluator:
     def objective_scores(self, design: SensorDesign, seed: int) -> Mapping[str, Score]:
         """Scores by the objectives, plain functions left out; a quicker way may stand in here."""
         model = self.keeper.model(design)
-        return evaluate(model, self._ready(), seed=seed, **self.settings)
+        return evaluate(model, self._ready(), tell=self._tell, seed=seed, **self.settings)
 
     def _score(
         self, design: SensorDesign, seed: int
@@ -167,7 +173,7 @@ class DesignEvaluator:
         return self._resolved
 
     def __getstate__(self) -> dict[str, object]:
-        return {**self.__dict__, "_resolved": None}
+        return {**self.__dict__, "_resolved": None, "_tell": None}
 
     def _check_settings(self) -> None:
         if not self._objectives:

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from optisense.errors import OptiSenseError
+from optisense.objectives.evaluation import Tell
 from optisense.search.evaluation import DesignEvaluator
 from optisense.search.making import SAMPLES, BoundErrors, MakingErrors, even_shares
 from optisense.search.outcome import Outcome
@@ -39,6 +40,10 @@ class RobustEvaluator:
         self.samples = samples
         self._drawn: dict[int, FloatArray] = {}
         self._errors(errors.bind(usual.space.prepared))
+
+    def listen(self, tell: Tell) -> None:
+        """See `DesignEvaluator.listen`."""
+        self.usual.listen(tell)
 
     def __call__(self, vector: FloatArray, seed: int) -> Outcome:
         """See `optisense.search.evaluation.Evaluator`."""

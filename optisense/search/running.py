@@ -16,7 +16,7 @@ import numpy as np
 from optisense.errors import OptiSenseError, SearchError
 from optisense.search.best import tie_note
 from optisense.search.evaluation import Evaluator
-from optisense.search.executors import Runner
+from optisense.search.executors import Runner, SerialRunner
 from optisense.search.failures import cause_of
 from optisense.search.making import MakingErrors
 from optisense.search.methods import Method, Problem, make
@@ -69,6 +69,7 @@ class Progress:
         trials_per_hour: at the pace of the last ones; 0 before that can be known.
         seconds_left: until the end, scoring the best again included; NaN before that can be known.
         facts: what the method tells of itself.
+        doing: what the trial at hand is at, where it is worked out in this process.
     """
 
     stage: str
@@ -80,6 +81,7 @@ class Progress:
     trials_per_hour: float
     seconds_left: float
     facts: dict[str, Any] = field(default_factory=dict)
+    doing: str = ""
 
 
 @dataclass(frozen=True)
@@ -187,6 +189,7 @@ class Run:
         self._time_left = TimeLeft([])
         self._fresh_done = self._fresh_count = 0
         self._trials_an_hour = 0.0
+        self._doing = ""
 
     def go(self) -> Result:
         """Run to the end, or until Ctrl-C; the study stays locked, for the caller to unlock.
@@ -205,6 +208,8 @@ class Run:
                 [Step(START_STAGE), Step(TRIALS, self.limit), Step(FRESH, USUAL_FRESH)],
                 runner.workers,
             )
+            if isinstance(runner, SerialRunner):
+                runner.listen(self._listen)
             try:
                 self._begin(START_STAGE)
                 self._score_start(runner)
@@ -407,6 +412,11 @@ class Run:
             if self._stage == TRIALS and pace > 0.0:
                 self._trials_an_hour = 3600.0 / pace
 
+    def _listen(self, fraction: float, text: str) -> None:
+        """A trial in this process tells what it is at."""
+        self._doing = text
+        self._report()
+
     def _report(self, now: bool = False) -> None:
         clock = time.monotonic()
         if not now and clock - self._told < TICK / 2:
@@ -424,6 +434,7 @@ class Run:
                 trials_per_hour=self._trials_an_hour,
                 seconds_left=self._time_left.seconds_left,
                 facts=self.method.describe(),
+                doing=self._doing,
             )
         )
 

@@ -45,8 +45,9 @@ axis), of the specularity, of each coordinate of a control point (mm), of a refr
 Assumptions for a sensor that is built by hand: LEDs soldered to a board that is glued in, a printed
 mould, silicone and resin of another batch."""
 
-Tell = Callable[[int, int, float], None]
-"""Called with the number of finished scores, of all, and the seconds left (NaN if unknown)."""
+Tell = Callable[[int, int, float, str], None]
+"""Called with the number of finished scores, of all, the seconds left (NaN if unknown), and with
+what the score at hand is at, where it is worked out in this process."""
 
 
 @dataclass(frozen=True)
@@ -185,7 +186,7 @@ def tolerance(
     jobs = [(nominal, each) for each in (seed, *fresh_seeds(seed, NOISE_SEEDS))]
     jobs += [(point, seed) for point in points.reshape(-1, bound.size)]
     with _runner(evaluator, workers, told) as runner:
-        found, interrupted = _work(runner, jobs, progress or (lambda done, of, left: None))
+        found, interrupted = _work(runner, jobs, progress or (lambda done, of, left, doing: None))
     itself, again, tried = found[:1], found[1 : 1 + NOISE_SEEDS], found[1 + NOISE_SEEDS :]
     whole = len([each for each in tried if each is not None]) // count
     if itself[0] is None:
@@ -264,9 +265,11 @@ def _work(
             found[running.pop(future)] = outcome
             done += 1
             time_left.advance(done, outcome.seconds, outcome.worker)
-        tell(done, len(jobs), time_left.seconds_left)
+        tell(done, len(jobs), time_left.seconds_left, "")
 
-    tell(0, len(jobs), math.nan)
+    tell(0, len(jobs), math.nan, "")
+    if isinstance(runner, SerialRunner):
+        runner.listen(lambda part, doing: tell(done, len(jobs), time_left.seconds_left, doing))
     try:
         for number, (point, seed) in enumerate(jobs):
             running[runner.submit(point, seed)] = number

@@ -94,6 +94,10 @@ def test_the_bar_never_goes_back_and_the_clock_never_stops() -> None:
 def test_what_somebody_else_estimated_runs_down() -> None:
     clock = Clock()
     line = Line(clock=clock)
+    clock.now = 8.0
+    line.say("loading")
+    assert line.text(79).plain == f"loading {'─' * 30}  0:08"
+    clock.now = 0.0
     line.show("trials", 3, 9, 60.0)
     clock.now = 20.0
     assert "0:20, 0:40 left" in line.text(79).plain

@@ -55,6 +55,20 @@ class TestScores:
         assert all(map(math.isfinite, forth))
         assert forth == pytest.approx(back, rel=SCORE_ROUNDING)
 
+    def test_what_is_rendered_is_told_here_and_not_by_copies(self, mini: SensorDesign) -> None:
+        space = SearchSpace({"coating.specularity": (0.0, 1.0)}).bind(mini)
+        settings = {"photons": 20_000, "resolution": (40, 30)}
+        evaluator = DesignEvaluator(space, ["normdiff"], settings)
+        heard: list[str] = []
+        evaluator.listen(lambda fraction, text: heard.append(text))
+        evaluator(space.start, 0)
+        assert "tracing photons" in heard
+        assert "press 1 of 9" in heard
+        heard.clear()
+        copy = pickle.loads(pickle.dumps(evaluator))
+        copy(space.start, 0)
+        assert not heard
+
     def test_parts_are_kept(self, svelte: SensorDesign) -> None:
         space = SearchSpace({"camera.turn.x": (-1.0, 1.0)}).bind(svelte)
         outcome = DesignEvaluator(space, ["aoap"])(space.start, 0)

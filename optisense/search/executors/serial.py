@@ -55,6 +55,12 @@ class SerialRunner(Runner):
         future.set_result(outcome)
         return future
 
+    def listen(self, tell: Callable[[float, str], None]) -> None:
+        """Call ``tell`` with what a trial is at, if its evaluator can tell."""
+        listen = getattr(self._evaluator, "listen", None)
+        if listen is not None:
+            listen(tell)
+
     def close(self) -> None:
         """Nothing is running."""
 

@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any
 from optisense.design import SensorDesign
 from optisense.errors import SearchError
 from optisense.objectives import Evaluation, Objective, Score, Settings
+from optisense.objectives.evaluation import Tell
 from optisense.objectives.registry import pixels_read
 from optisense.objectives.relighting import Relighting
 from optisense.objectives.relit_scores import RelitScore, has_quick_form, quick_form
@@ -84,7 +85,7 @@ class RelitEvaluator(DesignEvaluator):
             while len(self._lit) >= KEPT_SEEDS:
                 self._lit.popitem(last=False)
             model = self.keeper.model(self.space.prepared)
-            self._lit[seed] = _Lit(model, self._ready(), self.settings, seed)
+            self._lit[seed] = _Lit(model, self._ready(), self.settings, seed, self._tell)
         self._lit.move_to_end(seed)
         return self._lit[seed].scores(design)
 
@@ -101,11 +102,12 @@ class _Lit:
         objectives: Sequence[Objective],
         settings: Mapping[str, Any],
         seed: int,
+        tell: Tell | None,
     ) -> None:
         shared, self._own = split_settings(settings, objectives)
         reads = pixels_read(objectives, self._own)
         given = Settings(**shared, seed=seed)
-        self._relighting = Relighting(Evaluation(model, given, reads=reads))
+        self._relighting = Relighting(Evaluation(model, given, tell, reads))
         model.forget_light()  # the layers hold all that is needed of it
         self._objectives = objectives
         self._quick: dict[str, RelitScore] = {}
