@@ -36,6 +36,8 @@ def apply(
         chosen = opened.trial(trial)
         save_design(design_of(opened, chosen), out, new=True)
         output.print(f"{out / 'design.yaml'}", markup=False)
-        output.print(f"trial {chosen.number}: {opened.objective} {chosen.score:.4g}", markup=False)
+        output.print(
+            f"trial {chosen.number}: {opened.objective} {chosen.fair_score:.4g}", markup=False
+        )
     finally:
         opened.close()

@@ -69,15 +69,9 @@ def print_result(result: Result, out: Path) -> None:
         return
     name = study.objective
     said = "best so far" if result.interrupted else "best"
-    line = f"{said}: trial {best.number}, {name} {best.score:.4g}"
-    if start is not None and math.isfinite(start.score):
-        line += f" (start {start.score:.4g})"
-    output.print(line, markup=False)
-    fresh = best.fresh_score()
-    if math.isfinite(fresh) and fresh != best.score:
-        spread = best.fresh_spread()
-        text = f"{fresh:.4g} ± {spread:.2g}" if math.isfinite(spread) else f"{fresh:.4g}"
-        output.print(f"with fresh seeds: {text}")
+    output.print(f"{said}: trial {best.number}, {name} {_headline(best, start)}", markup=False)
+    if best.fair_score != best.score:
+        output.print(f"  by the search's own seed, by which it was chosen: {best.score:.4g}")
     for line in _beside(study, best, start):
         output.print(line, markup=False)
     values = list(best.values.items())
@@ -92,6 +86,18 @@ def print_result(result: Result, out: Path) -> None:
         output.print("no trial is better than the start")
     elif not result.interrupted:
         output.print(f"Take it:  optisense apply {out} --trial best --out better", style="dim")
+
+
+def _headline(best: Trial, start: Trial | None) -> str:
+    """The best score and the start's, by fresh seeds where they were scored."""
+    text = f"{best.fair_score:.4g}"
+    if best.fair_score != best.score:
+        spread = best.fresh_spread()
+        text += f" ± {spread:.2g}" if math.isfinite(spread) else ""
+        text += " with fresh seeds"
+    if start is not None and math.isfinite(start.fair_score):
+        text += f" (start {start.fair_score:.4g})"
+    return text
 
 
 def _failures(failed: Sequence[Trial]) -> str:

@@ -84,7 +84,7 @@ def _to_open(design: str) -> str:
     from optisense import sensors
 
     sensors.load(design)  # says what is wrong before Blender starts
-    return str(Path(design).resolve()) if Path(design).exists() else design
+    return os.path.realpath(design) if Path(design).exists() else design
 
 
 def _start(blender: Path, design: str | None) -> int:

@@ -186,16 +186,17 @@ def _print_shares(name: str, found: Spreading) -> None:
     table = Table(box=None, pad_edge=False)
     table.add_column(f"which error matters for {name}")
     table.add_column("share of the variance", justify="right")
+    table.add_column("standard error", justify="right")
     table.add_column("90 % interval", justify="right")
     for source, share in found.shares.items():
         table.add_row(source, *_share(share))
     output.print(table)
 
 
-def _share(share: Estimate | None) -> tuple[str, str]:
+def _share(share: Estimate | None) -> tuple[str, str, str]:
     if share is None:
-        return "unknown", ""
-    return f"{share.value:.2f}", f"{share.low:.2f} to {share.high:.2f}"
+        return "unknown", "", ""
+    return f"{share.value:.2f}", f"{share.error:.2f}", f"{share.low:.2f} to {share.high:.2f}"
 
 
 def _number(value: float) -> str:

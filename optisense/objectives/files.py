@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import os
 import sys
 import traceback
 from pathlib import Path
@@ -24,7 +25,7 @@ def run_file(path: Path) -> dict[str, Any]:
     """
     if not path.is_file():
         raise ObjectiveError(f"there is no file '{path}'", hint="Give FILE.py:FUNCTION")
-    whole = path.resolve()
+    whole = Path(os.path.realpath(path))
     name = f"optisense_user_{path.stem}_{hashlib.sha256(str(whole).encode()).hexdigest()[:8]}"
     try:
         source = whole.read_bytes()

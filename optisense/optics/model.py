@@ -20,7 +20,7 @@ from optisense.optics.backend.stages import Stage, TellStage, fraction_done
 from optisense.optics.backend.versions import versions
 from optisense.optics.camera.projection import RayCamera
 from optisense.optics.imaging.cached import ImageLayers, PixelImportance, render_cached
-from optisense.optics.imaging.tactile_image import TactileImage
+from optisense.optics.imaging.tactile_image import RADIANCE_UNIT, TactileImage
 from optisense.optics.radiance_cache.store import CacheStore
 from optisense.optics.ray_model import RayModel
 from optisense.optics.scene.contact_scenes import ContactScenes
@@ -145,6 +145,10 @@ class OpticalModel(RayModel):
         for name, value in (("photons", photons), ("noise", noise), ("seconds", seconds)):
             if value is not None and not value > 0:
                 raise RenderError(f"{name} is {value}", hint="give a number above 0")
+        if photons is not None:
+            if not float(photons).is_integer():
+                raise RenderError(f"photons is {photons}", hint="give a whole number")
+            photons = int(photons)  # 12e6 is a float
         began = time.perf_counter()
 
         def tell(stage: Stage, part: float, traced: int, reached: float | None) -> None:
@@ -205,6 +209,7 @@ class OpticalModel(RayModel):
             "seed": seed,
             "resolution": [camera.width, camera.height],
             "estimator": estimator,
+            "units": {"radiance": RADIANCE_UNIT, "length": "mm"},
             "photons": layers.photons,
             "photons_asked": photons,
             "noise_asked_percent": noise,

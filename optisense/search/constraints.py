@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Sequence
 from itertools import combinations
 from pathlib import Path
@@ -72,7 +73,7 @@ class UserRule:
         file, colon, self.function = text.rpartition(":")
         if not colon or not file.endswith(".py") or not self.function:
             raise SearchError(f"'{text}' names no rule", hint="Write FILE.py:FUNCTION")
-        self.path = Path(file).resolve()
+        self.path = Path(os.path.realpath(file))
         self._loaded: Constraint | None = None
 
     def __call__(self, design: SensorDesign) -> bool | str | None:

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
+import os
 import time
 from collections.abc import Callable, Mapping, Sequence
-from pathlib import Path
 from typing import Any, Protocol
 
 import numpy as np
@@ -203,5 +203,5 @@ def placed(goal: Goal) -> Goal:
         return goal
     file, colon, function = goal.rpartition(":")
     if colon and file.endswith(".py"):
-        return f"{Path(file).resolve()}:{function}"
-    return str(Path(goal).resolve()) if goal.endswith(".py") else goal
+        return f"{os.path.realpath(file)}:{function}"
+    return os.path.realpath(goal) if goal.endswith(".py") else goal

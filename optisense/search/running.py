@@ -450,4 +450,5 @@ def _outcome(done: Future[Outcome]) -> Outcome:
         return done.result()
     if isinstance(error, OptiSenseError):
         raise error
-    raise SearchError(f"a trial could not be worked out: {error}") from error
+    why = str(error) or type(error).__name__
+    raise SearchError(f"a trial could not be worked out: {why}") from error

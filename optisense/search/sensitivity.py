@@ -33,11 +33,17 @@ LEAST_PAIRS = 4
 
 @dataclass(frozen=True)
 class Estimate:
-    """A number with the interval that holds it in nine of ten cases (bootstrap)."""
+    """A number with the interval that holds it in nine of ten cases (bootstrap).
+
+    Attributes:
+        value, low, high: the number and the ends of the interval.
+        error: its standard error: the standard deviation of the bootstrap.
+    """
 
     value: float
     low: float
     high: float
+    error: float = 0.0
 
 
 def paired_errors(bound: BoundErrors, rows: int, seed: int) -> FloatArray:
@@ -75,6 +81,9 @@ def total_effect(scores: ArrayLike, source: int) -> Estimate | None:
     Args:
         scores: (rows, 1 + sources) of the sensors of `paired_errors`, NaN where one failed.
         source: its number.
+
+    Returns:
+        The share, at most 1, with the standard error of the estimate before it was cut there.
     """
     values = np.asarray(scores, dtype=np.float64)
     if values.shape[1] == 1:
@@ -83,7 +92,18 @@ def total_effect(scores: ArrayLike, source: int) -> Estimate | None:
     if known.sum() < LEAST_PAIRS:
         return None
     again = [_share(values[rows], source) for rows in _resampled(len(values))]
-    return _estimate(_share(values, source), again)
+    return _within_bounds(_estimate(_share(values, source), again))
+
+
+def _within_bounds(share: Estimate) -> Estimate:
+    """A share without what chance adds above 1.
+
+    The formula is unbiased and so can give 1.65 where a share is near 1 and sensors are few. The
+    true share is never above 1, so cutting there brings each estimate, and each end of an
+    interval, nearer to it or leaves it. The standard error is that of the estimate before.
+    """
+    value, low, high = (min(1.0, each) for each in (share.value, share.low, share.high))
+    return Estimate(value, low, high, share.error)
 
 
 def _share(values: FloatArray, source: int) -> float:
@@ -103,6 +123,6 @@ def _resampled(rows: int) -> NDArray[np.int64]:
 def _estimate(value: float, again: list[float]) -> Estimate:
     known = [each for each in again if np.isfinite(each)]
     if not known or not np.isfinite(value):
-        return Estimate(value, np.nan, np.nan)
+        return Estimate(value, np.nan, np.nan, np.nan)
     low, high = np.quantile(known, INTERVAL).tolist()
-    return Estimate(value, low, high)
+    return Estimate(value, low, high, float(np.std(known)))

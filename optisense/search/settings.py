@@ -10,6 +10,8 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
+from pydantic import TypeAdapter, ValidationError
+
 from optisense.errors import SearchError
 from optisense.writing import write_text
 
@@ -112,7 +114,13 @@ class StudySettings:
             missing = {each.name for each in fields(StudySettings)} - set(data)
             if missing:
                 raise SearchError(f"{', '.join(sorted(missing))} is missing", where=str(path))
-            return StudySettings(**data)
+            found_settings = StudySettings(**data)  # refuses unknown names
+            TypeAdapter(StudySettings).validate_python(data)
+            return found_settings
+        except ValidationError as error:
+            first = error.errors()[0]
+            place = ".".join(str(each) for each in first["loc"])
+            raise SearchError(f"'{place}' is wrong: {first['msg']}", where=str(path)) from None
         except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
             raise SearchError(f"the study can't be read: {error}", where=str(path)) from error
 

@@ -260,6 +260,22 @@ class Store:
                 found.setdefault(number, {})[seed] = Outcome(self._unpacked(scores), failure)
         return found
 
+    def check_points(self, size: int) -> None:
+        """Check that each trial has a point of so many numbers.
+
+        Raises:
+            SearchError: one has not.
+        """
+        with self._read() as db:
+            wrong = db.execute(
+                "select number from trials where typeof(vector) != 'blob' or length(vector) != ? "
+                "limit 1",
+                (8 * size,),
+            ).fetchone()
+        if wrong is not None:
+            why = f"its point is not of {size} numbers"
+            raise damaged(f"trial {wrong[0]}", self.path, why)
+
     def last_generation(self) -> int:
         """The number of the last generation; `START` - 1 where there is none."""
         return self._count(f"select coalesce(max(generation), {START - 1}) from trials")
@@ -281,14 +297,15 @@ class Store:
             if done:
                 outcome = Outcome(
                     scores=self._unpacked(scores),
-                    failure=failure,
-                    parts=json.loads(parts) if parts else {},
-                    seconds=row[9],
+                    failure=None if failure is None else str(failure),
+                    parts=_objects(json.loads(parts)) if parts else {},
+                    seconds=float(row[9]),
                     gradient=None if gradient is None else np.frombuffer(gradient, "<f8").copy(),
-                    worker=row[10] or "",
+                    worker=str(row[10] or ""),
                 )
             point = np.frombuffer(vector, "<f8").copy()
-            return Row(number, generation, place, point, outcome, row[11])
+            finished = None if row[11] is None else float(row[11])
+            return Row(number, int(generation), int(place), point, outcome, finished)
 
     @contextmanager
     def _readable(self, what: str) -> Iterator[None]:
@@ -317,6 +334,17 @@ class Store:
             if db.in_transaction:  # SQLite has rolled back already where the disk is full
                 db.execute("rollback")
             raise
+
+
+def _objects(parts: Any) -> dict[str, Any]:
+    """Parts of scores as they were read from JSON.
+
+    Raises:
+        TypeError: they are no objects by name.
+    """
+    if not isinstance(parts, dict) or not all(isinstance(each, dict) for each in parts.values()):
+        raise TypeError("the parts of its scores are no objects")
+    return parts
 
 
 def damaged(what: str, path: Path | None, why: str) -> SearchError:

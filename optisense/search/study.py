@@ -147,7 +147,9 @@ class Study:
             store.close()
             raise
         known = known_goals(settings, goals)
-        return Study(place, settings, own, known, known_rules(settings, rules), store)
+        study = Study(place, settings, own, known, known_rules(settings, rules), store)
+        store.check_points(study.space.size)
+        return study
 
     def expect(self, wanted: Mapping[str, Any]) -> None:
         """Refuse to go on with other settings than those that the study was begun with.

@@ -7,7 +7,7 @@ import time
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, wait
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from typing import Any
 
 import numpy as np
@@ -293,7 +293,7 @@ def _plain(each: Spreading) -> dict[str, Any]:
     def estimate(value: Estimate | None) -> dict[str, float | None] | None:
         if value is None:
             return None
-        return {"value": number(value.value), "low": number(value.low), "high": number(value.high)}
+        return {name: number(each) for name, each in asdict(value).items()}
 
     return {
         "nominal": number(each.nominal),

@@ -79,6 +79,15 @@ class Trial:
         values = [outcome.scores.get(name, math.nan) for outcome in self.fresh.values()]
         return float(np.mean(values)) if values else math.nan
 
+    @property
+    def fair_score(self) -> float:
+        """Of the first objective, by fresh seeds where they were scored.
+
+        The score by the study's seed, by which a trial was chosen, is too high on average.
+        """
+        fresh = self.fresh_score()
+        return fresh if math.isfinite(fresh) else self.score
+
     def fresh_spread(self, objective: str | None = None) -> float:
         """Standard deviation over the other seeds; NaN if there are less than two."""
         name = objective or self.objective

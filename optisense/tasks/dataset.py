@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -126,7 +127,13 @@ class Dataset:
         return self._arrays(BACKGROUND)
 
     def _existing(self, name: str) -> Path:
-        path = self.folder / name
+        path = Path(os.path.realpath(self.folder / name.split("\0")[0]))
+        if "\0" in name or not path.is_relative_to(os.path.realpath(self.folder)):
+            raise TaskError(
+                f"'{name}' leads out of the dataset's folder",
+                where=str(self.folder / LABELS),
+                hint="A stranger may have made it so: copy files that you trust into the folder",
+            )
         if not path.is_file():
             raise TaskError(
                 f"the dataset lacks the file '{name}'",

@@ -20,6 +20,9 @@ from optisense.errors import RenderError
 from optisense.optics.camera.response import auto_exposure, picture
 from optisense.writing import inside, remove_own_page, written_together
 
+RADIANCE_UNIT = "mW/(mm^2 sr)"
+"""Of each of the three channels of radiance files and layers."""
+
 REPORT_FILE = "report.html"
 """The page that `optisense render` writes beside an image."""
 
@@ -139,8 +142,11 @@ def _scaled(layer: NDArray[np.float32], factors: NDArray[np.float32]) -> NDArray
 
 
 def _bitmap(values: NDArray[Any], path: Path) -> None:
+    bitmap = mi.Bitmap(np.ascontiguousarray(values))
+    if path.suffix == ".exr":
+        bitmap.metadata()["unit"] = RADIANCE_UNIT
     try:
-        mi.Bitmap(np.ascontiguousarray(values)).write(str(path))
+        bitmap.write(str(path))
     except RuntimeError as error:
         raise OSError(errno.EIO, str(error), str(path)) from error
     if path.stat().st_size == 0:  # it says nothing when the disk is full

@@ -43,6 +43,6 @@ def _shapes(recipe: Recipe) -> list[Shape]:
 def _from(file: Path, folder: Path) -> str:
     """A file's path from a folder; in full where no such path leads to it (another drive)."""
     try:
-        return Path(os.path.relpath(file.resolve(), folder.resolve())).as_posix()
+        return Path(os.path.relpath(os.path.realpath(file), os.path.realpath(folder))).as_posix()
     except ValueError:
-        return file.resolve().as_posix()
+        return Path(os.path.realpath(file)).as_posix()
