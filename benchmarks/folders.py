@@ -64,6 +64,7 @@ class Bench:
             stderr=subprocess.STDOUT,
             text=True,
             env=self._environment,
+            cwd=self.here,  # else Python takes the program from the current folder
         )
 
     def run(self, *words: object) -> int:
