@@ -12,6 +12,7 @@ from optisense.engine.failures import Cancelled
 from optisense.engine.files import Files
 from optisense.engine.jobs import Job
 from optisense.engine.search_process import SearchProcess, is_running
+from optisense.time_left import Step, TimeLeft
 
 if TYPE_CHECKING:
     from optisense.search import Study
@@ -56,8 +57,7 @@ class Following:
         self._best = -math.inf
         self._left = threading.Event()
         self._done = self._failed = 0
-        self._began = time.monotonic()
-        self._before: int | None = None
+        self._time_left: TimeLeft | None = None
 
     def result(self) -> dict[str, Any]:
         """Follow it to its end.
@@ -117,8 +117,10 @@ class Following:
         self._told.update(row.number for row in new)
         self._done = sum(row.generation >= 0 for row in rows)
         self._failed = sum(row.generation >= 0 and _failed(row) for row in rows)
-        if self._before is None:
-            self._before = self._done
+        if self._time_left is None:
+            # The first trial that is waited for also compiles.
+            self._time_left = TimeLeft([Step("trials", self._total(study), warm_up=1)])
+            self._time_left.begin("trials", done=self._done)
         if not new:
             return
         best = max((_score(row, study.objective) for row in new), default=-math.inf)
@@ -129,15 +131,15 @@ class Following:
             if is_best or len(new) <= MOST_AT_ONCE or row is new[-1]:
                 self._tell(study, row, is_best)
         total = self._total(study)
-        speed = (self._done - self._before) / max(time.monotonic() - self._began, 1e-6)
-        left = (total - self._done) / speed if speed > 0 else None
+        self._time_left.advance(self._done)
+        left = self._time_left.seconds_left
         self._job.tell(
             "progress",
             done=self._done,
             total=total,
             failed=self._failed,
             fraction=min(1.0, self._done / max(1, total)),
-            seconds_left=None if left is None else round(max(0.0, left), 1),
+            seconds_left=round(left, 1) if math.isfinite(left) else None,
             text=f"{self._done} of {total} trials",
         )
 
