@@ -124,7 +124,7 @@ def dataset(
     depths = parse_range(depth, "--depth")
     rotations = parse_range(rotation, "--rotation")
 
-    steps = [*loading_steps(), *sample_steps(SAMPLES, photons, count, 0.6, 0.2)]
+    steps = [*loading_steps(), *sample_steps(SAMPLES, photons, count, 0.9, 0.2)]
     try:
         with progress_line(*steps) as line:
             line.begin(LOADING)

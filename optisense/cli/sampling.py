@@ -9,7 +9,7 @@ from optisense.time_left import Step
 
 LOADING, BUILDING = "loading", "building the scene"
 
-MILLION_PHOTONS = 2.2
+MILLION_PHOTONS = 1.6
 """Seconds to trace so many, on two cores of a desktop processor, GelSight Mini."""
 
 

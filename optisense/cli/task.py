@@ -310,7 +310,7 @@ def _perceive(
     results = []
     steps = loading_steps()
     for task in tasks:
-        steps += sample_steps(task.name, settings.photons, settings.count, 0.2, 3.0)
+        steps += sample_steps(task.name, settings.photons, settings.count, 0.35, 3.0)
     with _keeping(out), progress_line(*steps) as line:
         line.begin(LOADING)
         from optisense.optics import OpticalModel

@@ -335,7 +335,10 @@ class Evaluation:
         """
 
         def tell(progress: RenderProgress) -> None:
-            self._tell(done + part * progress.fraction, what or progress.stage.value)
+            text = what or progress.stage.value
+            if progress.fraction == 1.0:  # what comes now is the objective's own work
+                text = "judging the images"
+            self._tell(done + part * progress.fraction, text)
 
         image = self.model.render(
             contacts,
