@@ -21,7 +21,7 @@ SEARCH = (
     *("--vary", "cages.M1.points.z=+-2"),
 )
 PHOTONS = "3000000"
-WIDTH, HEIGHT, SCALE = 1280, 2312, 0.64
+WIDTH, HEIGHT, SCALE = 1280, 2036, 0.64
 """Of the browser's window in pixels, and what a pixel of it is in the picture."""
 BROWSERS = ("chromium", "chromium-browser", "google-chrome", "chrome")
 
