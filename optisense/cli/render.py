@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from optisense.cli.console import EXIT_INTERRUPTED, ends_well, messages, output
-from optisense.cli.interrupt import held_interrupt
+from optisense.cli.interrupt import Interrupt, held_interrupt
 from optisense.cli.options import (
     ContactOption,
     DesignArgument,
@@ -22,7 +22,8 @@ from optisense.cli.progress import Line, about, progress_line
 from optisense.time_left import Step
 
 if TYPE_CHECKING:
-    from optisense.optics import RenderProgress, TactileImage
+    from optisense.optics import OpticalModel, RenderProgress, TactileImage
+    from optisense.report.real_sensor import RealComparison
 
 PICTURE = "image.png"
 ONE_PICTURE = 1_000_000
@@ -108,6 +109,7 @@ def render(
         from optisense.optics.imaging.tactile_image import REPORT_FILE
         from optisense.report import write_report
         from optisense.report.camera_rays import CameraRays
+        from optisense.report.real_sensor import has_real_picture
 
         interrupt.raise_if_requested()
         line.begin(BUILDING)
@@ -133,6 +135,10 @@ def render(
         line.begin(WRITING)
         image.settings["contacts"] = list(contact or [])
         image.save(out, brightness)
+        real = None
+        if has_real_picture(sensor) and not image.interrupted and not interrupt.requested:
+            line.say(COMPARING)
+            real = _beside_real(model, image, interrupt)
         write_report(
             out / REPORT_FILE,
             sensor,
@@ -141,6 +147,7 @@ def render(
             exposure=brightness,
             indenters=place_contacts(model, contacts),
             rays=CameraRays.of(model),
+            real=real,
         )
     _say_what_came(image, out)
     if image.interrupted:
@@ -151,6 +158,7 @@ def render(
 
 LOADING, BUILDING, WRITING = "loading", "building the scene", "writing the report"
 TRACING, SHADING = "tracing photons", "shading the picture"
+COMPARING = "comparing with a real sensor"
 
 NOISE_PHOTONS = 4.0
 """Million photons that a noise target is expected to take, before the noise is known."""
@@ -189,6 +197,23 @@ def _waits(line: Line) -> str:
     left = line.time_left
     rest = left.seconds_left - left.seconds_left_of(TRACING)
     return f"finishing the picture{about(rest)}"
+
+
+def _beside_real(
+    model: OpticalModel, image: TactileImage, interrupt: Interrupt
+) -> RealComparison | None:
+    """The comparison with the real picture of this sensor; None where Ctrl-C ended it."""
+    from optisense.report.real_sensor import MOST_PHOTONS, compare_with_real
+
+    # As many photons as were asked for, so that the light that is there serves again.
+    photons = min(image.settings["photons_asked"] or image.settings["photons"], MOST_PHOTONS)
+    seed = image.settings["seed"]
+    try:
+        return compare_with_real(
+            model, photons, seed, lambda progress: interrupt.raise_if_requested()
+        )
+    except KeyboardInterrupt:
+        return None
 
 
 class RenderStages:

@@ -22,6 +22,7 @@ from optisense.report import tables
 from optisense.report.camera_rays import CameraRays
 from optisense.report.files import template
 from optisense.report.pictures import data_uri, mask_overlay, normal_colours
+from optisense.report.real_sensor import RealComparison
 from optisense.report.scene_view import scene_data
 from optisense.text import shown_in_html
 from optisense.writing import write_text
@@ -67,6 +68,7 @@ def write_report(
     exposure: float | Literal["auto"] = "auto",
     indenters: Mapping[str, TriangleMesh] | None = None,
     rays: CameraRays | None = None,
+    real: RealComparison | None = None,
 ) -> Path:
     """Write a render as one self-contained HTML page.
 
@@ -78,6 +80,7 @@ def write_report(
         exposure: of the picture, as for `TactileImage.picture`.
         indenters: the contacts' shapes in the design's frame (mm), drawn in the 3-D view.
         rays: chief rays of the camera (`CameraRays.of` a model), drawn there too.
+        real: how far the sensor is from a real one (`compare_with_real`), if that is known.
 
     Returns:
         The path.
@@ -86,7 +89,9 @@ def write_report(
         OutputError: the file can't be written.
     """
     path = Path(path)
-    page = render_page(design, image, contacts, exposure=exposure, indenters=indenters, rays=rays)
+    page = render_page(
+        design, image, contacts, exposure=exposure, indenters=indenters, rays=rays, real=real
+    )
     write_text(path, page)
     return path
 
@@ -99,6 +104,7 @@ def render_page(
     exposure: float | Literal["auto"] = "auto",
     indenters: Mapping[str, TriangleMesh] | None = None,
     rays: CameraRays | None = None,
+    real: RealComparison | None = None,
 ) -> str:
     """The page of `write_report` as text."""
     height, width = image.contact_mask.shape
@@ -123,6 +129,7 @@ def render_page(
         groups=[_group(name, group) for name, group in design.lights.items()],
         contacts=tables.contact_rows(contacts),
         settings=tables.setting_rows(image.settings),
+        real=None if real is None else _real(real),
         assumed=assumed,
         sourced=sourced,
         version=__version__,
@@ -169,6 +176,20 @@ def _place_to_look_at(mask: NDArray[np.bool_]) -> tuple[int, int]:
     if len(rows) == 0:
         return width // 2, height // 2
     return round(float(columns.mean())), round(float(rows.mean()))
+
+
+def _real(found: RealComparison) -> dict[str, Any]:
+    red, green, blue = (f"{value:.2f}" for value in found.shading)
+    return {
+        "pictures": [
+            ("a real sensor", data_uri(found.real)),
+            ("this model", data_uri(found.model)),
+        ],
+        "difference": f"{found.difference:.0f}",
+        "own_spread": f"{found.own_spread:.0f}",
+        "shading": f"{red} in red, {green} in green and {blue} in blue",
+        "rows": found.rows(),
+    }
 
 
 def _group(name: str, group: LightGroup) -> dict[str, Any]:

@@ -1,0 +1,161 @@
+"""A built-in sensor beside a picture of a real one: the same press, and how far the two differ."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from importlib.resources import as_file, files
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from optisense.design import SensorDesign
+from optisense.geometry import Contact, Sphere
+
+if TYPE_CHECKING:
+    from optisense.optics import OpticalModel, RenderProgress
+
+FloatArray = NDArray[np.float64]
+
+SENSOR = "gelsight-mini"
+"""The built-in sensor that a picture is there of."""
+
+PICTURE = "gelsight-mini-ball.png"
+"""A picture of a real GelSight Mini, 320 x 240; `real/NOTICE.md` says where it is from."""
+
+BALL_RADIUS = 4.75
+"""mm, of the ball in the picture (its publishers)."""
+
+BALL_PLACE = 261.8, 147.5
+"""Column and row of the ball's middle in the picture, found in it to about 2.5 pixels."""
+
+CONTACT_RADIUS = 2.1
+"""mm: 33.5 pixels of the picture, which shows about 0.0625 mm a pixel."""
+
+MOST_PHOTONS = 1_000_000
+"""Photons of the model's picture; its noise is then far below the differences."""
+
+AROUND = 1.6
+"""The background is measured farther from the ball than so many radii of its contact, where nothing
+of its shadow falls."""
+
+DARK, BRIGHT = 5.0, 95.0
+"""Percentiles of the background between which its evenness is measured."""
+
+
+@dataclass(frozen=True)
+class RealComparison:
+    """A real picture, the model's picture of the same press, and figures of both.
+
+    Attributes:
+        real, model: (h, w, 3) uint8; the model's exposure gives it the real median brightness.
+        difference: root mean square difference of pixels, levels of 255.
+        own_spread: the same of the real picture's pixels from their mean, to compare with.
+        shares: (2, 3) of the real and of the model's light, parts of it in red, green and blue.
+        evenness: (2, 3) linear brightness of the background's dark over its bright parts.
+        shading: (3,) correlation of both pictures' linear brightness over the ball.
+    """
+
+    real: NDArray[np.uint8]
+    model: NDArray[np.uint8]
+    difference: float
+    own_spread: float
+    shares: FloatArray
+    evenness: FloatArray
+    shading: FloatArray
+
+    def rows(self) -> list[tuple[str, str, str]]:
+        """What is measured, of the real and of the model's picture, in red, green and blue."""
+        shares, evenness = 100.0 * self.shares, self.evenness
+        return [
+            ("light in red / green / blue, %", _channels(shares[0], 0), _channels(shares[1], 0)),
+            (
+                "dark over bright parts of the background",
+                _channels(evenness[0], 2),
+                _channels(evenness[1], 2),
+            ),
+        ]
+
+
+def has_real_picture(design: SensorDesign) -> bool:
+    """Whether a design is the sensor that a real picture is there of."""
+    from optisense.library import with_own_lights
+    from optisense.search.difference import differences
+    from optisense.sensors import load
+
+    if set(design.parts) != set((built_in := load(SENSOR)).parts):
+        return False
+    return not differences(with_own_lights(built_in), with_own_lights(design))
+
+
+def compare_with_real(
+    model: OpticalModel,
+    photons: int = MOST_PHOTONS,
+    seed: int = 0,
+    progress: Callable[[RenderProgress], None] | None = None,
+) -> RealComparison:
+    """Press the ball of the real picture into a model, at the same place and as wide.
+
+    Args:
+        model: of the sensor that `has_real_picture`.
+        photons: to trace; the light of an earlier image with as many serves again.
+        seed: of the light.
+        progress: called while the picture is rendered; may raise KeyboardInterrupt.
+
+    Raises:
+        KeyboardInterrupt: Ctrl-C ended the rendering.
+        OptiSenseError: the model can't be rendered.
+    """
+    from optisense.optics.camera.response import picture
+    from optisense.tasks.dataset import read_picture
+
+    with as_file(files("optisense.report") / "real" / PICTURE) as path:
+        real = read_picture(path)
+    height, width = real.shape[:2]
+    column, row = BALL_PLACE
+    x, y, z = model.chief_rays((width, height)).points[int(row), int(column)].tolist()
+    depth = BALL_RADIUS - math.sqrt(BALL_RADIUS**2 - CONTACT_RADIUS**2)
+    contact = Contact(Sphere(BALL_RADIUS), point=(x, y, z), depth=depth)
+    image = model.render(
+        [contact], resolution=(width, height), photons=photons, seed=seed, progress=progress
+    )
+    if image.interrupted:
+        raise KeyboardInterrupt
+    seen = np.asarray(image.radiance, dtype=np.float64)
+    linear = _linear(real)
+    exposure = float(np.median(linear) / np.median(seen))
+    drawn = picture(image.radiance, exposure)
+    rows, columns = np.mgrid[:height, :width] + 0.5
+    radius = math.sqrt(image.contact_mask.sum() / math.pi)
+    away = np.hypot(columns - column, rows - row) > AROUND * radius
+    mask = image.contact_mask
+    backgrounds = [linear[away], seen[away]]
+    edges = [np.percentile(each, [DARK, BRIGHT], axis=0) for each in backgrounds]
+    levels = real.astype(np.float64)
+    return RealComparison(
+        real=real,
+        model=drawn,
+        difference=_rms(drawn - levels),
+        own_spread=_rms(levels - levels.mean(axis=(0, 1))),
+        shares=np.array([each.mean(axis=0) / each.mean(axis=0).sum() for each in backgrounds]),
+        evenness=np.array([dark / bright for dark, bright in edges]),
+        shading=np.array(
+            [np.corrcoef(linear[mask][:, c], seen[mask][:, c])[0, 1] for c in range(3)]
+        ),
+    )
+
+
+def _channels(values: FloatArray, digits: int) -> str:
+    return " / ".join(f"{value:.{digits}f}" for value in values)
+
+
+def _rms(values: FloatArray) -> float:
+    return float(np.sqrt((values**2).mean()))
+
+
+def _linear(picture: NDArray[np.uint8]) -> FloatArray:
+    """(h, w, 3), 0 to 1: what an sRGB picture encodes (IEC 61966-2-1)."""
+    encoded = picture.astype(np.float64) / 255.0
+    return np.where(encoded <= 0.04045, encoded / 12.92, ((encoded + 0.055) / 1.055) ** 2.4)
