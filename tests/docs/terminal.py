@@ -44,13 +44,18 @@ class Outcome:
     seconds: float
 
 
-def reader_environment(library: Path) -> dict[str, str]:
+def reader_environment(own: Path) -> dict[str, str]:
     """The environment of somebody who reads the page: that of the tests without what is theirs.
 
-    Parts that the reader adds to the parts library go to the folder `library`.
+    The folder `own` takes what commands keep for a user: parts that are added to the library, and
+    which files were named before. The home folder stays, with the kernels that are compiled.
     """
     kept = {name: value for name, value in os.environ.items() if not name.startswith(_LEFT_OUT)}
-    return kept | {"OPTISENSE_LIBRARY": str(library), "TERM": "dumb"}
+    return kept | {
+        "OPTISENSE_LIBRARY": str(own / "library"),
+        "XDG_STATE_HOME": str(own / "state"),
+        "TERM": "dumb",
+    }
 
 
 class Terminal:

@@ -137,7 +137,7 @@ def type_page(page: Path, shown: list[Block], work: Path) -> None:
     folder.mkdir()
     if page.name in IN_THE_CLONE:
         clone(folder)
-    environment = reader_environment(work / "library")
+    environment = reader_environment(work / "own")
     programs = str(Path(sys.executable).parent)
     found = [each for each in environment["PATH"].split(os.pathsep) if each != programs]
     if page.name not in ACTIVATING:

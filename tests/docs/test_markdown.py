@@ -8,8 +8,6 @@ import pytest
 
 from .markdown import Block, blocks, code_spans
 
-pytestmark = pytest.mark.quick
-
 
 def shown(folder: Path, text: str) -> list[Block]:
     page = folder / "page.md"

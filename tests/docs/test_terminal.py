@@ -10,15 +10,13 @@ import pytest
 
 from .terminal import Terminal, reader_environment
 
-pytestmark = pytest.mark.quick
-
 LIMIT = 300.0
 """Seconds; only a command that hangs takes so long."""
 
 
 @pytest.fixture
 def terminal(tmp_path: Path) -> Iterator[Terminal]:
-    with Terminal(tmp_path, reader_environment(tmp_path / "library")) as opened:
+    with Terminal(tmp_path, reader_environment(tmp_path / "own")) as opened:
         yield opened
 
 
@@ -68,4 +66,4 @@ def test_nothing_of_the_test_run_is_in_the_environment(
     monkeypatch.setenv("MAKEFLAGS", "-n")
     environment = reader_environment(tmp_path)
     assert not {"PYTHONPATH", "MAKEFLAGS", "PYTEST_CURRENT_TEST"} & set(environment)
-    assert environment["OPTISENSE_LIBRARY"] == str(tmp_path)
+    assert environment["OPTISENSE_LIBRARY"] == str(tmp_path / "library")
