@@ -105,7 +105,6 @@ def test_it_is_given_again_and_ends_well(command: str, tmp_path: Path) -> None:
         [sys.executable, "-c", SCRIPT, command, str(tmp_path)],
         capture_output=True,
         text=True,
-        timeout=300,
     )
     assert found.returncode == 0, found.stdout + found.stderr
     assert int(found.stdout.split()[-1]) >= 10

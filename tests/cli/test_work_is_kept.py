@@ -18,9 +18,6 @@ from optisense.errors import OptiSenseError
 from optisense.folders import FolderLock
 from optisense.search import SearchSpace, Study, search
 
-PATIENCE = 300
-"""Seconds after which a process is taken to hang; on a busy machine a start takes ten."""
-
 OWN_FILE = '''
 import os
 from pathlib import Path
@@ -99,7 +96,7 @@ def started(*words: object) -> subprocess.Popen[str]:
 
 
 def ended(process: subprocess.Popen[str]) -> tuple[int, str]:
-    said, _ = process.communicate(timeout=PATIENCE)
+    said, _ = process.communicate()
     return process.returncode, said
 
 
