@@ -126,6 +126,7 @@
     return {
       key: label, label, note: "", swatch: hex, colour: [...rgb(hex), 1], middle: [0, 0, 0],
       shown: true, cut: false, glow: 0, lines: shape(ends), ink: [...rgb(hex), alpha],
+      faint: [...rgb(hex).map((x) => 0.4 + 0.6 * x), 0.45 * alpha],
       solid: shape(new Float32Array(0), new Int8Array(0), new Uint32Array(0)),
     };
   }
@@ -314,6 +315,13 @@
     gl.enable(gl.CULL_FACE);
     for (const thing of shown.filter((t) => t.colour[3] < 1).sort((a, b) => far(b) - far(a)))
       for (const face of [gl.FRONT, gl.BACK]) { gl.cullFace(face); solid(thing); }
+    // Rays shine faintly through whatever hides them: most of a camera's way lies inside a body.
+    gl.disable(gl.DEPTH_TEST);
+    for (const thing of shown.filter((t) => t.faint)) {
+      use(lines, thing, thing.faint, 0);
+      gl.bindVertexArray(thing.lines.vao);
+      gl.drawArrays(gl.LINES, 0, thing.lines.count);
+    }
     gl.bindVertexArray(null);
   }
 
