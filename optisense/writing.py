@@ -31,7 +31,9 @@ def inside(folder: Path, relative: str) -> Path:
         OutputError: a link in the folder leads out of it, or its subfolder can't be made.
     """
     final = folder / relative
-    if not Path(os.path.realpath(final.parent)).is_relative_to(os.path.realpath(folder)):
+    if not Path(os.path.realpath(final.parent)).is_relative_to(os.path.realpath(folder)) or (
+        final.is_symlink() and final.is_dir()
+    ):
         raise OutputError(
             f"'{relative}' leads out of the folder through a link",
             where=str(folder),

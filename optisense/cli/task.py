@@ -316,11 +316,12 @@ def _perceive(
         from optisense.optics import OpticalModel
         from optisense.tasks import perceive
         from optisense.tasks.figures import draw_perception
+        from optisense.writing import inside
 
         line.begin(BUILDING)
         model = OpticalModel(sensor, variant)
         for task in tasks:
-            folder = out if out is None or len(tasks) == 1 else out / task.name
+            folder = out if out is None or len(tasks) == 1 else inside(out, task.name)
             show = shown_samples(line, task.name, f"{task.name}: reading the samples")
             results.append(perceive(task, model, settings, neighbours, folder, show))
             if folder is not None:

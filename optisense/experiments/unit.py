@@ -22,7 +22,7 @@ from optisense import __version__
 from optisense.errors import ExperimentError, OptiSenseError, OutputError, SetupError
 from optisense.objectives.score import json_ready
 from optisense.search.settings import package_versions
-from optisense.writing import write_json, written_together
+from optisense.writing import inside, write_json, written_together
 
 UNITS = "units"
 """Folder, within that of all results, of what units found."""
@@ -138,11 +138,11 @@ def work_out(unit: Unit, folder: Path) -> None:
         OutputError: nothing can be written.
     """
     home = folder / UNITS
-    own = home / unit.key
+    own = inside(folder, f"{UNITS}/{unit.key}")
     began, spent = time.perf_counter(), time.process_time()
     failure, found = None, Found({})
     try:
-        own.mkdir(parents=True, exist_ok=True)
+        own.mkdir(exist_ok=True)
         found = unit.work(unit.inputs, own)
     except (SetupError, OutputError):
         raise

@@ -33,9 +33,9 @@ from optisense.tasks.dataset import (
     write_picture,
 )
 from optisense.tasks.draws import ContactDraw, DrawnContact, Places, keeps_margin
-from optisense.tasks.records import KEPT, Table, read_json, refuse_differences, write_whole
+from optisense.tasks.records import Table, read_json, refuse_differences, write_whole
 from optisense.tasks.untouched import UntouchedSurface
-from optisense.writing import inside, write_json
+from optisense.writing import inside, write_json, written_whole
 
 if TYPE_CHECKING:
     from optisense.optics import OpticalModel, TactileImage
@@ -249,7 +249,8 @@ class _Maker:
             "points": image.points,
             "normals": image.normals,
         }
-        write_whole(self._folder / BACKGROUND, partial(_save_arrays, arrays))
+        with written_whole(self._folder / BACKGROUND, "the dataset") as temporary:
+            _save_arrays(arrays, temporary)
         info = {
             "schema_version": SCHEMA_VERSION,
             **common,
@@ -258,7 +259,7 @@ class _Maker:
             "units": {"length": "mm", "angle": "degrees", "radiance": "mW/(mm^2 sr)"},
             "columns": NUMBER_COLUMNS,
         }
-        write_json(self._folder / INFO, info, "the results", KEPT)  # last: now it is a dataset
+        write_json(self._folder / INFO, info, "the dataset")  # last: now it is a dataset
         return exposure
 
     def _common(self) -> dict[str, Any]:
