@@ -214,8 +214,22 @@ class TimeLeft:
         """Seconds that a piece usually takes, at the speed that this machine has shown."""
         if step.seconds is None:
             return math.nan
-        speed = self._measured / self._expected if self._expected > 0.0 else 1.0
-        return step.seconds * speed
+        return step.seconds * self._slowness
+
+    @property
+    def _slowness(self) -> float:
+        """Seconds that work takes here for each second of its usual time.
+
+        The piece at hand counts once it is late.
+        """
+        before = self._measured / self._expected if self._expected > 0.0 else 1.0
+        step = self._steps[self._current] if self._current >= 0 else None
+        if step is None or step.seconds is None:
+            return before
+        pieces = min(self._done + 1.0, step.count) - self._first
+        expected = self._expected + step.seconds * max(0.0, pieces)
+        measured = self._measured + self._clock() - self._step_began
+        return max(before, measured / expected) if expected > 0.0 else before
 
     def _close_step(self) -> None:
         """Compare what the current step took with what it usually takes."""

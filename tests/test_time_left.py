@@ -79,6 +79,15 @@ def test_later_steps_take_longer_where_the_earlier_ones_did(clock: Clock) -> Non
     assert left.seconds_left == pytest.approx(3.0 * (4.0 + 30.0) / 12.0)
 
 
+def test_a_step_that_is_late_makes_the_later_ones_longer(clock: Clock) -> None:
+    left = TimeLeft([Step("before", 1, 10.0), Step("after", 1, 8.0)], clock=clock)
+    left.begin("before")
+    clock.now = 5.0
+    assert left.seconds_left == pytest.approx(13.0)
+    clock.now = 20.0  # at least twice as slow as usual
+    assert left.seconds_left == pytest.approx(16.0)
+
+
 def test_a_later_step_counts_from_the_beginning(clock: Clock) -> None:
     left = TimeLeft([Step("trials", 10), Step("fresh seeds", 6)], clock=clock)
     left.begin("trials")
