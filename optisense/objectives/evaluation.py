@@ -348,9 +348,8 @@ class Evaluation:
             progress=tell,
             only_contacts=bool(contacts),
             pixel_importance=pixel_importance,
+            partial=False,
         )
-        if image.interrupted:
-            raise KeyboardInterrupt
         return image
 
 

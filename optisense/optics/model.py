@@ -112,6 +112,7 @@ class OpticalModel(RayModel):
         estimator: str = "field",
         only_contacts: bool = False,
         pixel_importance: PixelImportance | None = None,
+        partial: bool = True,
     ) -> TactileImage:
         """What the camera sees while ``contacts`` press in.
 
@@ -131,6 +132,8 @@ class OpticalModel(RayModel):
                 several times sooner; for scores that read nothing else.
             pixel_importance: with ``only_contacts``, a function of the chief rays that gives the
                 share (h, w), 0 to 1, of the camera samples that each pixel gets; each gets a few.
+            partial: whether Ctrl-C after the first photons gives an image of those so far; else
+                it is raised at once.
 
         Returns:
             The image; ``interrupted`` is set if Ctrl-C ended the tracing early.
@@ -174,7 +177,9 @@ class OpticalModel(RayModel):
             wanted = photons
             if photons is None and noise is None and seconds is None:
                 wanted = DEFAULT_PHOTONS
-            field = self._store.field(seed, wanted, target, seconds, MAX_PHOTONS, began, tell)
+            field = self._store.field(
+                seed, wanted, target, seconds, MAX_PHOTONS, began, tell, partial
+            )
             lit = time.perf_counter()
             tell(Stage.SHADING, 1.0, field[0].photons, field[0].noise)
             layers = render_cached(

@@ -179,9 +179,8 @@ class CalibratedSensor:
             resolution=self._resolution,
             photons=self._settings.photons,
             seed=self._settings.seed,
+            partial=False,
         )
-        if image.interrupted:
-            raise KeyboardInterrupt
         return image
 
     def _picture(self, image: TactileImage, seed: list[int]) -> NDArray[np.uint8]:

@@ -236,9 +236,8 @@ class _Maker:
             photons=self._settings.photons,
             seed=self._settings.seed,
             estimator=self._settings.estimator,
+            partial=False,
         )
-        if image.interrupted:
-            raise KeyboardInterrupt
         from optisense.optics.camera.response import auto_exposure
 
         asked = self._settings.exposure
@@ -288,9 +287,8 @@ class _Maker:
             photons=self._settings.photons,
             seed=self._settings.seed,
             estimator=self._settings.estimator,
+            partial=False,
         )
-        if image.interrupted:
-            raise KeyboardInterrupt
         return image
 
     def _write(self, index: int, attempt: int, drawn: DrawnContact, image: TactileImage) -> None:

@@ -268,9 +268,8 @@ class _Camera:
             seed=self._settings.seed,
             estimator=self._settings.estimator,
             only_contacts=bool(contacts) and self._task.contact_only,
+            partial=False,
         )
-        if image.interrupted:
-            raise KeyboardInterrupt
         return image
 
 

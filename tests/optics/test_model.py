@@ -11,7 +11,8 @@ from comparing import ROUNDING, same_light
 from optisense import Contact, OpticalModel, SensorDesign, Sphere
 from optisense.design import set_value
 from optisense.errors import LibraryError, RenderError
-from optisense.optics import TactileImage
+from optisense.optics import RenderProgress, TactileImage
+from optisense.optics.backend.stages import Stage
 from optisense.optics.radiance_cache.cache import SECTORS
 from optisense.sensors import BUILDERS
 
@@ -238,3 +239,21 @@ def test_light_in_a_contact_hardly_depends_on_how_bins_of_directions_lie() -> No
     for where, least in ((inside, 0.01), (middle, TURNED)):
         straight, turned = (image.radiance[where].mean(axis=0, dtype=float) for image in images)
         assert turned == pytest.approx(straight, rel=least)
+
+
+@pytest.mark.parametrize("partial", [True, False])
+def test_ctrl_c_after_the_first_photons_ends_in_an_image_if_one_is_wanted(partial: bool) -> None:
+    fresh = OpticalModel(design(), "llvm")
+
+    def press(progress: RenderProgress) -> None:
+        if progress.stage is Stage.PHOTONS and progress.photons:
+            raise KeyboardInterrupt
+
+    def pressed() -> TactileImage:
+        return fresh.render(resolution=(40, 30), photons=4_000_000, progress=press, partial=partial)
+
+    if partial:
+        assert pressed().interrupted
+        return
+    with pytest.raises(KeyboardInterrupt):
+        pressed()

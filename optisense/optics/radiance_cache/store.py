@@ -223,6 +223,7 @@ class CacheStore:
         most: int,
         began: float,
         tell: TellStage,
+        partial: bool = True,
     ) -> tuple[RadianceCache, bool]:
         """The cache after ``photons``, or once ``noise`` or ``seconds`` are reached.
 
@@ -234,6 +235,7 @@ class CacheStore:
             most: number of photons at which tracing ends in any case.
             began: start of the render (`time.perf_counter`).
             tell: called when a stage begins and after each pass; see `TellStage`.
+            partial: whether Ctrl-C after the first pass ends the tracing; else it is raised.
 
         Returns:
             The cache, and whether Ctrl-C ended the tracing early.
@@ -305,7 +307,7 @@ class CacheStore:
                         break
                 tell(Stage.PHOTONS, fraction, tally.photons, reached)
         except KeyboardInterrupt:
-            if tally.passes < 1:
+            if tally.passes < 1 or not partial:
                 raise
             interrupted = True
         name = (*key, tally.passes)
