@@ -72,6 +72,22 @@ def cage_problems(design: SensorDesign, meshes: Meshes | None = None) -> list[Pr
     return problems
 
 
+def fold_problems(design: SensorDesign) -> list[Problem]:
+    """Parts that cages have folded, collapsed, turned inside out or bent through themselves.
+
+    Raises:
+        DesignError: a vertex of a caged part lies outside the cage's box.
+    """
+    moved = {name: cage for name, cage in design.cages.items() if _has_moved(cage)}
+    bent = design.deformed_meshes() if moved else {}
+    problems: list[Problem] = []
+    for cage_name, cage in moved.items():
+        for name in cage.parts:
+            if name in bent and name in design.meshes:
+                problems += _folds(design, cage_name, name, bent[name])
+    return problems
+
+
 def half_caged(design: SensorDesign, meshes: Meshes) -> list[Problem]:
     """Warnings of cages around a sensing surface without the solid that it coats, or around that
     solid alone: to bend one is to tear the two apart. A cage that has moved is left to

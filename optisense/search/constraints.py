@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from optisense.design import Role, SensorDesign
+from optisense.design.cage_checks import fold_problems
 from optisense.design.parts import TRANSPARENT_SOLIDS
 from optisense.errors import SearchError
 from optisense.geometry import TriangleMesh
@@ -59,6 +60,23 @@ class PartsApart:
         if (one, other) not in self._known:
             self._known[one, other] = _crossing(self._meshes[one], self._meshes[other]) is not None
         return self._known[one, other]
+
+
+class Unfolded:
+    """No cage may come to fold a part or turn it inside out: nobody can make such a shape.
+
+    A design that is folded from the beginning is left alone, as `PartsApart` leaves parts alone
+    that cut through each other from the beginning.
+    """
+
+    def __init__(self, design: SensorDesign) -> None:
+        """Look at the design that the search starts from."""
+        self._always = {problem.where for problem in fold_problems(design)}
+
+    def __call__(self, design: SensorDesign) -> str | None:
+        """Which part is folded, or None."""
+        new = [each for each in fold_problems(design) if each.where not in self._always]
+        return new[0].message if new else None
 
 
 class UserRule:

@@ -18,7 +18,7 @@ from optisense.objectives.evaluation import Tell
 from optisense.objectives.files import place_of
 from optisense.objectives.registry import resolve
 from optisense.objectives.run import split_settings
-from optisense.search.constraints import Constraint, PartsApart, why_forbidden
+from optisense.search.constraints import Constraint, PartsApart, Unfolded, why_forbidden
 from optisense.search.models import RAYS_ONLY, ModelKeeper
 from optisense.search.outcome import Outcome
 from optisense.search.space import BoundSpace
@@ -95,6 +95,8 @@ class DesignEvaluator:
         self.constraints: list[Constraint] = list(space.space.constraints)
         if space.reshapes and (apart is None or apart):
             self.constraints.append(PartsApart(space.design))
+        if any(name.startswith("cages.") for name in space.names):
+            self.constraints.append(Unfolded(space.design))
         rays_only = set(self.names) <= RAYS_ONLY | set(self._functions)
         self.keeper = ModelKeeper(space.prepared, lit=not rays_only, variant=variant)
         self._resolved: list[Objective] | None = None

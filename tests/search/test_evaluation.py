@@ -128,7 +128,7 @@ class TestConstraints:
         evaluator = DesignEvaluator(space, ["aoap"])
         assert evaluator(point, 0).failure == said
         free = DesignEvaluator(space, ["aoap"], apart=False)
-        assert free.constraints == []
+        assert not any(isinstance(rule, PartsApart) for rule in free.constraints)
 
     def test_a_rule_from_a_file(self, mini: SensorDesign, tmp_path: Path) -> None:
         file = tmp_path / "rules.py"
@@ -193,3 +193,41 @@ class TestDifferences:
         renamed = mini.model_copy(update={"name": "other", "description": "text"})
         assert differences(mini, renamed) == []
         assert fingerprint(renamed) == fingerprint(mini)
+
+
+@pytest.mark.parametrize(("x", "z"), [(17.375, -4.25), (-12.625, -1.25)])
+def test_a_gel_that_is_turned_inside_out_has_no_score(
+    mini: SensorDesign, x: float, z: float
+) -> None:
+    """A corner of the gel, pulled past the other corners, scored better by AOAP than the start."""
+    space = SearchSpace(
+        {"cages.skin.points[0].x": (-20.0, 20.0), "cages.skin.points[0].z": (-5.0, 0.0)}
+    ).bind(mini)
+    evaluator = DesignEvaluator(space, ["aoap"], {"ray_resolution": [80, 60]})
+    assert evaluator(space.start, 0).failure is None
+    outcome = evaluator(np.array([x, z]), 0)
+    assert "part 'gel' is turned inside out" in str(outcome.failure)
+
+
+@pytest.mark.parametrize(
+    ("path", "value", "reason"),
+    [
+        ("camera.fov", 0.01, "no lens of a sensor sees as little as 0.01 degrees"),
+        ("camera.fov", 5.0, "of the sensing surface's area is seen"),
+        ("camera.fov", 179.0, "no perspective lens sees 179 degrees"),
+        ("camera.position.z", -2.0, "inside the solid part 'gel'"),
+        ("camera.position.z", -8.0, "inside the solid part 'guide'"),
+        ("camera.position.z", -900.0, "of the pixels see the sensing surface"),
+        ("camera.position.z", 100.0, "sees nothing of the sensing surface"),
+    ],
+)
+def test_a_camera_that_sees_nothing_worth_a_score_has_none(
+    mini: SensorDesign, path: str, value: float, reason: str
+) -> None:
+    """Each of these won a search over this one parameter, or could have."""
+    other = 52.0 if path == "camera.fov" else -22.0
+    space = SearchSpace({path: (min(value, other), max(value, other))}).bind(mini)
+    for objective in ("aoap", "2to3pw"):
+        evaluator = DesignEvaluator(space, [objective], {"ray_resolution": [80, 60]})
+        outcome = evaluator(np.array([value]), 0)
+        assert outcome.failure is not None and reason in outcome.failure, objective
