@@ -18,7 +18,7 @@ SMALL = ("--resolution", "32x24", "--photons", "60000", "--seed", "5")
 def run(*arguments: str) -> tuple[int, str]:
     result = CliRunner().invoke(app, ["task", *arguments])
     assert "Traceback" not in result.output
-    return result.exit_code, result.output
+    return result.exit_code, result.stdout if "--json" in arguments else result.output
 
 
 def test_misalignment_prints_writes_and_continues(tmp_path: Path) -> None:
