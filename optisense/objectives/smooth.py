@@ -1,8 +1,9 @@
 """AOAP and 2to3PW as smooth functions of chief rays, with their derivatives.
 
-The scores themselves jump when a ray begins or ceases to arrive. Here each ray has a weight that
-fades towards open edges (`OpticalModel.differentiable_rays`), and the sums are weighted; AOAP's
-coverage, which counts triangles, is left out.
+The scores themselves jump when a ray begins or ceases to arrive. Here each ray has a weight, the
+area of the picture that it stands for, which changes smoothly when the boundary beside it moves
+(`OpticalModel.differentiable_rays`), and the sums are weighted. AOAP's coverage, which counts the
+triangles seen, becomes the integral of their number for each mm² over what is seen.
 """
 
 from __future__ import annotations
@@ -13,22 +14,33 @@ from typing import NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from optisense.objectives.aoap import COVERAGE_WEIGHT
 from optisense.objectives.projection_warping import MOST_EVEN
 
 FloatArray = NDArray[np.float64]
 
 
 class Rays(Protocol):
-    """Rays that arrive, in the order of `hit`: (h, w) bool, (k,), (k,), (k, 3) mm."""
+    """Chief rays of a picture.
+
+    Attributes:
+        codes: (h, w) 0 where a ray does not arrive; neighbours of one number arrive the same way.
+        cosine: (k,) of those that arrive, row after row: between ray and normal.
+        weight: (k,) pixels that each stands for.
+        points: (k, 3) mm, where they arrive.
+        density: (k,) 1/mm², the part of the surface's triangles that lies in one mm² there.
+    """
 
     @property
-    def hit(self) -> NDArray[np.bool_]: ...
+    def codes(self) -> NDArray[np.uint32]: ...
     @property
     def cosine(self) -> FloatArray: ...
     @property
     def weight(self) -> FloatArray: ...
     @property
     def points(self) -> FloatArray: ...
+    @property
+    def density(self) -> FloatArray: ...
 
 
 class Slopes(NamedTuple):
@@ -40,62 +52,110 @@ class Slopes(NamedTuple):
     points: FloatArray | None
 
 
-def smooth_aoap(rays: Rays) -> Slopes:
-    """The mean over all pixels of weight times cosine between ray and normal."""
-    count = rays.hit.size
+def smooth_aoap(rays: Rays, *, coverage_weight: float = COVERAGE_WEIGHT) -> Slopes:
+    """The mean over all pixels of weight times cosine between ray and normal, and k1 times the part
+    of the surface's triangles that are seen.
+    """
+    count = rays.codes.size
+    triangles = _PixelTriangles(rays)
+    density = coverage_weight * triangles.mean_of_corners(rays.density)
     value = float((rays.cosine * rays.weight).sum() / count)
-    return Slopes(value, rays.weight / count, rays.cosine / count, None)
+    value += float((density * triangles.weight * triangles.area).sum())
+    by_weight = rays.cosine / count + triangles.by_weight(density * triangles.area)
+    # What lies within the view is seen before and after, however the points on it move: only where
+    # points at its border move does more come into view. Around all others these sums vanish.
+    moved = triangles.by_points(triangles.weight)
+    by_points = coverage_weight * rays.density[:, None] * moved
+    return Slopes(value, rays.weight / count, by_weight, by_points)
 
 
 def smooth_projection_warping(rays: Rays) -> Slopes:
     """Weighted mean over weighted standard deviation of the areas between neighbouring pixels'
-    points; a triangle weighs the product of its corners' weights.
+    points.
     """
-    corners = _pixel_triangles(rays.hit)
-    if len(corners) < 2:
+    triangles = _PixelTriangles(rays)
+    area, weight = triangles.area, triangles.weight
+    if len(area) < 2:
         return Slopes(0.0, None, np.zeros_like(rays.weight), None)
-    a, b, c = (rays.points[corners[:, k]] for k in range(3))
-    cross = np.cross(b - a, c - a)
-    length = np.linalg.norm(cross, axis=1)
-    area = 0.5 * length
-    shares = rays.weight[corners]
-    weight = shares.prod(axis=1)
     total = max(float(weight.sum()), 1e-12)
     mean = float((weight * area).sum()) / total
-    variance = float((weight * (area - mean) ** 2).sum()) / total
+    variance = max(float((weight * (area - mean) ** 2).sum()) / total, 0.0)
     spread = max(np.sqrt(variance), MOST_EVEN * mean)
 
     by_mean, by_spread = 1.0 / spread, -mean / spread**2
     off = area - mean
     by_area = weight / total * (by_mean + by_spread * off / spread)
     by_weight = (by_mean * off + by_spread * (off**2 - variance) / (2 * spread)) / total
-
-    unit = cross / np.maximum(length, 1e-30)[:, None]
-    points = np.zeros_like(rays.points)
-    for own, first, second in ((0, b, c), (1, c, a), (2, a, b)):
-        # An area grows with a corner's way from the opposite side, by half that side's length.
-        np.add.at(points, corners[:, own], by_area[:, None] * 0.5 * np.cross(unit, second - first))
-    weights = np.zeros_like(rays.weight)
-    for own, (one, other) in enumerate(((1, 2), (2, 0), (0, 1))):
-        np.add.at(weights, corners[:, own], by_weight * shares[:, one] * shares[:, other])
-    return Slopes(mean / spread, None, weights, points)
+    slopes = triangles.by_weight(by_weight)
+    return Slopes(mean / spread, None, slopes, triangles.by_points(by_area))
 
 
-SMOOTH: dict[str, Callable[[Rays], Slopes]] = {
+SMOOTH: dict[str, Callable[..., Slopes]] = {
     "aoap": smooth_aoap,
     "2to3pw": smooth_projection_warping,
 }
-"""By the name of the objective."""
+"""By the name of the objective. Settings of the objective that count here are keyword arguments."""
 
 
-def _pixel_triangles(hit: NDArray[np.bool_]) -> NDArray[np.int64]:
-    """(t, 3) numbers of arriving rays: two triangles for each quad of pixels, where all three
-    corners arrive.
+class _PixelTriangles:
+    """Two triangles for each quad of pixels, where all three corners arrive the same way.
+
+    Attributes:
+        area: (t,) mm².
+        weight: (t,) 1, and more or less by the weights of its corners: where rays weigh so many
+            pixels more, their triangles weigh as much more as the two triangles that a pixel has.
     """
-    number = np.full(hit.shape, -1, dtype=np.int64)
+
+    def __init__(self, rays: Rays) -> None:
+        self._rays = rays
+        self._corners = corners = _same_way(rays.codes)
+        self._places = tuple(rays.points[corners[:, k]] for k in range(3))
+        a, b, c = self._places
+        cross = np.cross(b - a, c - a)
+        length = np.linalg.norm(cross, axis=1)
+        self._unit = cross / np.maximum(length, 1e-30)[:, None]
+        self.area = 0.5 * length
+        count = np.bincount(corners.ravel(), minlength=len(rays.weight))
+        # Triangles that a ray has, as a part of the two that a pixel stands for.
+        self._share = 2.0 / np.maximum(count, 1)
+        self.weight = 1.0 + ((rays.weight - 1.0) * self._share)[corners].sum(axis=1)
+
+    def mean_of_corners(self, values: FloatArray) -> FloatArray:
+        """(t,) from values of rays (k,)."""
+        mean: FloatArray = values[self._corners].mean(axis=1)
+        return mean
+
+    def by_points(self, by_area: FloatArray) -> FloatArray:
+        """(k, 3) derivatives of a number by rays' points, given those by areas (t,)."""
+        points = np.zeros_like(self._rays.points)
+        a, b, c = self._places
+        for own, first, second in ((0, b, c), (1, c, a), (2, a, b)):
+            # An area grows with a corner's way from the opposite side, by half that side's length.
+            slope = by_area[:, None] * 0.5 * np.cross(self._unit, second - first)
+            np.add.at(points, self._corners[:, own], slope)
+        return points
+
+    def by_weight(self, by_weight: FloatArray) -> FloatArray:
+        """(k,) derivatives of a number by rays' weights, given those by triangles' (t,)."""
+        weights = np.zeros_like(self._rays.weight)
+        for own in range(3):
+            np.add.at(weights, self._corners[:, own], by_weight)
+        return weights * self._share
+
+
+def _same_way(codes: NDArray[np.uint32]) -> NDArray[np.int64]:
+    """(t, 3) numbers of arriving rays."""
+    hit = codes > 0
+    number = np.full(codes.shape, -1, dtype=np.int64)
     number[hit] = np.arange(int(hit.sum()))
-    here, right, below, across = number[:-1, :-1], number[:-1, 1:], number[1:, :-1], number[1:, 1:]
-    upper = np.stack([here, right, below], axis=-1).reshape(-1, 3)
-    lower = np.stack([across, below, right], axis=-1).reshape(-1, 3)
-    both = np.concatenate([upper, lower])
-    return both[(both >= 0).all(axis=1)]
+
+    def corners(values: NDArray[np.generic]) -> list[NDArray[np.generic]]:
+        here, right = values[:-1, :-1], values[:-1, 1:]
+        below, across = values[1:, :-1], values[1:, 1:]
+        halves = np.stack([here, right, below]), np.stack([across, below, right])
+        return [half.reshape(3, -1).T for half in halves]
+
+    rays = np.concatenate(corners(number))
+    ways = np.concatenate(corners(codes))
+    same = (ways[:, 0] > 0) & (ways[:, 0] == ways[:, 1]) & (ways[:, 0] == ways[:, 2])
+    return rays[same].astype(np.int64)

@@ -235,15 +235,12 @@ class RayModel:
         self,
         moving: Sequence[str] = (),
         resolution: tuple[int, int] | None = None,
-        fade: float = 1.0,
     ) -> DifferentiableRays:
         """Chief rays, with derivatives by the shapes of surfaces and by the camera.
 
         Args:
             moving: parts whose vertices are asked about: mirrors, blockers, sensing surfaces.
             resolution: (width, height) pixels; the camera's own by default.
-            fade: mm; within so much of an open edge of a mirror or of the sensing surface a
-                ray's weight falls to 0.
 
         Raises:
             RenderError: no ray arrives, or a moving part is no such surface.
@@ -252,7 +249,7 @@ class RayModel:
 
         meshes = self.design.deformed_meshes()
         chosen = {name: meshes[name] for name in moving}
-        return DifferentiableRays(self._fine.scene, self.camera(resolution), chosen, fade)
+        return DifferentiableRays(self._fine.scene, self.camera(resolution), chosen)
 
     def nine_contacts(self, indenter: Indenter | None = None, depth: float = 0.8) -> list[Contact]:
         """One contact at each of nine places that cover the visible sensing surface evenly.

@@ -12,10 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from optisense.geometry import Contact
-from optisense.optics.scene.bsdf import refract, surface_kind, surface_region
-from optisense.optics.scene.ray_scene import RayScene, intersect, leave
-from optisense.optics.scene.surfaces import Region, SurfaceKind
-from optisense.optics.transport.chief_rays import MAX_DEPTH, RayOutcome
+from optisense.optics.scene.ray_scene import RayScene
+from optisense.optics.transport.chief_rays import MAX_DEPTH, RayOutcome, next_step
 
 if TYPE_CHECKING:
     from optisense.optics.model import OpticalModel
@@ -89,26 +87,15 @@ def trace_paths(
 
 def _step(scene: RayScene, origin: Any, direction: Any, active: Any) -> tuple[Any, ...]:
     """One surface further: where it is met, the outcome or -1, whether all light was reflected,
-    and the ray that goes on; by the rules of `optisense.optics.transport.chief_rays`.
+    and the ray that goes on.
     """
-    hit = intersect(scene.scene, scene.rows, scene.corners, origin, direction, active, True)
-    kind, eta, _alpha = surface_kind(scene.table, hit.surface, hit.valid)
-    region = surface_region(scene.table, hit.surface, hit.valid)
-    opaque = hit.valid & (kind == int(SurfaceKind.OPAQUE))
-    arrived = opaque & (region != int(Region.OTHER))
-    absorbing = (kind == int(SurfaceKind.ABSORBER)) | (kind == int(SurfaceKind.LIGHT))
-    ended = hit.valid & ~arrived & (opaque | absorbing)
-    outcome = dr.select(ended, int(RayOutcome.ABSORBED), mi.Int32(-1))
-    outcome = dr.select(arrived, int(RayOutcome.HIT), outcome)
-    outcome = dr.select(hit.valid, outcome, int(RayOutcome.ESCAPED))
-    reflectance, mirrored, transmitted, _relative = refract(direction, hit.shading_normal, eta)
-    mirror = kind == int(SurfaceKind.MIRROR)
-    goes_on = active & hit.valid & ~arrived & ~ended
-    totally = goes_on & ~mirror & (reflectance >= 1)
-    turned = dr.select(mirror | totally, mirrored, transmitted)
-    end = dr.select(hit.valid, hit.point, origin + ESCAPE_LENGTH * direction)
-    start = dr.select(goes_on, leave(hit.point, hit.normal, turned), origin)
-    return end, outcome, totally, start, dr.select(goes_on, turned, direction), goes_on
+    step = next_step(scene.scene, scene.rows, scene.corners, scene.table, origin, direction, active)
+    valid = step.hit.valid
+    outcome = dr.select(step.ended, int(RayOutcome.ABSORBED), mi.Int32(-1))
+    outcome = dr.select(step.arrived, int(RayOutcome.HIT), outcome)
+    outcome = dr.select(valid, outcome, int(RayOutcome.ESCAPED))
+    end = dr.select(valid, step.hit.point, origin + ESCAPE_LENGTH * direction)
+    return end, outcome, step.totally, step.origin, step.direction, step.goes_on
 
 
 def _rows(values: object) -> NDArray[np.float32]:

@@ -15,7 +15,10 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
 
+from optisense.optics.backend.arrays import indices
 from optisense.optics.scene.bsdf import SMOOTH_ALPHA, surface_table
 from optisense.optics.scene.surfaces import RAY_OFFSET, Surface, SurfaceKind
 
@@ -23,6 +26,9 @@ FloatArray = NDArray[np.floating]
 
 SMOOTH_FACE = 1 << 16
 """Bit in a face's record that marks interpolated normals."""
+
+SAME_WAY = 1e-4
+"""Flat facets whose unit normals agree to about this (0.006 degrees) are one plane to rays."""
 
 
 @dataclass(frozen=True)
@@ -62,17 +68,19 @@ class Piece:
         return corners
 
     @cached_property
-    def open_edges(self) -> NDArray[np.int64]:
-        """(e, 2) vertices of the edges that one triangle only has, whether vertices are split
-        or not.
+    def patches(self) -> NDArray[np.int64]:
+        """(m,) the number of the smooth patch that each triangle belongs to, from 0: triangles
+        that share vertices and their normals, or, of flat facets, those that face the same way.
         """
-        _, same = np.unique(np.round(self.vertices, 6), axis=0, return_inverse=True)
+        if self.normals is None:
+            way = np.round(self.rows[:, :3] / SAME_WAY).astype(np.int64)
+            return np.unique(way, axis=0, return_inverse=True)[1].reshape(-1)
+        count = len(self.vertices)
         faces = np.asarray(self.faces, dtype=np.int64)
-        edges = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
-        ends = np.sort(same.reshape(-1)[edges], axis=1)
-        key = ends[:, 0] * len(self.vertices) + ends[:, 1]
-        _, first, counts = np.unique(key, return_index=True, return_counts=True)
-        return edges[first[counts == 1]]
+        ends = np.concatenate([faces[:, :2], faces[:, 1:]])
+        joined = coo_array((np.ones(len(ends), dtype=bool), ends.T), shape=(count, count))
+        _, number = connected_components(joined, directed=False)
+        return np.unique(number[faces[:, 0]], return_inverse=True)[1].reshape(-1)
 
 
 @dataclass
@@ -133,6 +141,15 @@ class RayScene:
         self.rough = any(
             s.kind is SurfaceKind.DIELECTRIC and s.alpha > SMOOTH_ALPHA for s in surfaces
         )
+
+    @cached_property
+    def patches(self) -> mi.UInt32:
+        """For each triangle, the number of the smooth patch that it belongs to (see `Piece`)."""
+        numbers, start = [], 0
+        for piece in self.pieces:
+            numbers.append(piece.patches + start)
+            start += int(piece.patches.max(initial=-1)) + 1
+        return indices(np.concatenate(numbers))
 
     def intersect(
         self, origin: mi.Point3f, direction: mi.Vector3f, active: mi.Bool, coherent: bool = False

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import IntEnum
-from typing import Any
+from typing import Any, NamedTuple
 
 import drjit as dr
 import mitsuba as mi
@@ -12,13 +12,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from optisense.errors import RenderError
+from optisense.optics.backend.arrays import floats
 from optisense.optics.camera.projection import RayCamera
 from optisense.optics.scene.bsdf import refract, surface_kind, surface_region
-from optisense.optics.scene.ray_scene import RayScene, intersect, leave
+from optisense.optics.scene.ray_scene import Hit, RayScene, intersect, leave
 from optisense.optics.scene.surfaces import Region, SurfaceKind
 
 MAX_DEPTH = 32
 """Largest number of surfaces that a chief ray meets."""
+
+HASH_FACTOR = 0x9E3779B1
+"""Multiplier that mixes the patches of a ray's path into one number: 2^32 over the golden ratio,
+as in Knuth's multiplicative hashing."""
 
 
 class RayOutcome(IntEnum):
@@ -61,12 +66,67 @@ class ChiefRays:
         return self.hit & (self.region == Region.INDENTER)
 
 
+class Step(NamedTuple):
+    """What chief rays do at the next surface that they meet.
+
+    Attributes:
+        hit: where that is.
+        eta: the surface's relative refractive index.
+        region: of `Region`.
+        arrived: the ray ends on the sensing surface or an indenter.
+        ended: it ends on another opaque surface, a blocker or a light.
+        totally: it is totally reflected.
+        turned: it is reflected, by a mirror or totally; else it is refracted.
+        goes_on: it neither ends nor escapes.
+        origin, direction: of the ray that goes on; unchanged where none does.
+    """
+
+    hit: Hit
+    eta: mi.Float
+    region: mi.UInt32
+    arrived: mi.Bool
+    ended: mi.Bool
+    totally: mi.Bool
+    turned: mi.Bool
+    goes_on: mi.Bool
+    origin: mi.Point3f
+    direction: mi.Vector3f
+
+
+def next_step(
+    scene: mi.Scene,
+    rows: mi.Float,
+    corners: mi.Float,
+    surfaces: mi.Float,
+    origin: mi.Point3f,
+    direction: mi.Vector3f,
+    active: mi.Bool,
+) -> Step:
+    """One surface further, by ideal refraction and reflection; symbolic loops may call it."""
+    hit = intersect(scene, rows, corners, origin, direction, active, True)
+    kind, eta, _alpha = surface_kind(surfaces, hit.surface, hit.valid)
+    region = surface_region(surfaces, hit.surface, hit.valid)
+    opaque = hit.valid & (kind == int(SurfaceKind.OPAQUE))
+    arrived = opaque & (region != int(Region.OTHER))
+    absorbing = (kind == int(SurfaceKind.ABSORBER)) | (kind == int(SurfaceKind.LIGHT))
+    ended = hit.valid & ~arrived & (opaque | absorbing)
+    goes_on = active & hit.valid & ~arrived & ~ended
+    reflectance, reflected, transmitted, _relative = refract(direction, hit.shading_normal, eta)
+    mirror = kind == int(SurfaceKind.MIRROR)
+    totally = goes_on & ~mirror & (reflectance >= 1)
+    turned = goes_on & (mirror | totally)
+    onward = dr.select(goes_on, dr.select(turned, reflected, transmitted), direction)
+    start = dr.select(goes_on, leave(hit.point, hit.normal, onward), origin)
+    return Step(hit, eta, region, arrived, ended, totally, turned, goes_on, start, onward)
+
+
 @dr.syntax
 def _trace(
     scene: mi.Scene,
     rows: mi.Float,
     corners: mi.Float,
     surfaces: mi.Float,
+    patches: mi.UInt32 | None,
     origin: mi.Point3f,
     direction: mi.Vector3f,
     limit: mi.UInt32,
@@ -79,38 +139,60 @@ def _trace(
     normal = mi.Vector3f(0)
     region = mi.UInt32(0)
     face = mi.UInt32(0)
+    path = mi.UInt32(0)
     while active:
-        hit = intersect(scene, rows, corners, origin, direction, active, True)
-        kind, eta, _alpha = surface_kind(surfaces, hit.surface, hit.valid)
-        where = surface_region(surfaces, hit.surface, hit.valid)
-        opaque = hit.valid & (kind == int(SurfaceKind.OPAQUE))
-        arrived = opaque & (where != int(Region.OTHER))
-        ended = (
-            hit.valid
-            & ~arrived
-            & (opaque | (kind == int(SurfaceKind.ABSORBER)) | (kind == int(SurfaceKind.LIGHT)))
-        )
+        step = next_step(scene, rows, corners, surfaces, origin, direction, active)
+        hit = step.hit
         outcome = dr.select(active & ~hit.valid, int(RayOutcome.ESCAPED), outcome)
-        outcome = dr.select(ended, int(RayOutcome.ABSORBED), outcome)
-        outcome = dr.select(arrived, int(RayOutcome.HIT), outcome)
+        outcome = dr.select(step.ended, int(RayOutcome.ABSORBED), outcome)
+        outcome = dr.select(step.arrived, int(RayOutcome.HIT), outcome)
         side = -dr.sign(dr.dot(direction, hit.normal))
-        point = dr.select(arrived, hit.point, point)
-        normal = dr.select(arrived, hit.shading_normal * side, normal)
-        region = dr.select(arrived, where, region)
-        face = dr.select(arrived, hit.face, face)
-        active &= hit.valid & ~arrived & ~ended
-        reflectance, reflected, transmitted, _relative = refract(direction, hit.shading_normal, eta)
-        mirror = kind == int(SurfaceKind.MIRROR)
-        totally = active & ~mirror & (reflectance >= 1)
-        total |= totally
-        turned = dr.select(mirror | totally, reflected, transmitted)
-        direction = dr.select(active, turned, direction)
-        origin = dr.select(active, leave(hit.point, hit.normal, direction), origin)
+        point = dr.select(step.arrived, hit.point, point)
+        normal = dr.select(step.arrived, hit.shading_normal * side, normal)
+        region = dr.select(step.arrived, step.region, region)
+        face = dr.select(step.arrived, hit.face, face)
+        if patches is not None:
+            patch = dr.gather(mi.UInt32, patches, hit.face, hit.valid)
+            code = patch * 2 + dr.select(step.totally, mi.UInt32(1), mi.UInt32(0))
+            path = dr.select(hit.valid, (path ^ code) * HASH_FACTOR + 1, path)
+        total |= step.totally
+        origin = step.origin
+        direction = step.direction
         depth += 1
-        active &= depth < limit
+        active = step.goes_on & (depth < limit)
     failed = total & (outcome != int(RayOutcome.HIT))
     outcome = dr.select(failed, int(RayOutcome.TOTAL_REFLECTION), outcome)
-    return outcome, point, normal, direction, region, face
+    return outcome, point, normal, direction, region, face, path
+
+
+def trace_path_codes(
+    scene: RayScene, camera: RayCamera, x: NDArray[np.floating], y: NDArray[np.floating]
+) -> NDArray[np.uint32]:
+    """Which smooth patches chief rays meet one after the other, and where they are totally
+    reflected, as one number for each ray: rays of the same number move smoothly into one another.
+
+    Args:
+        scene: the surfaces.
+        camera: whose rays.
+        x, y: (k,) film positions, pixels.
+
+    Returns:
+        (k,): 0 for rays that do not arrive at the sensing surface, and never 0 for the others.
+    """
+    origin, direction = camera.rays(floats(x), floats(y))
+    traced = _trace(
+        scene.scene,
+        scene.rows,
+        scene.corners,
+        scene.table,
+        scene.patches,
+        origin,
+        direction,
+        dr.opaque(mi.UInt32, MAX_DEPTH),
+    )
+    outcome, path = traced[0], traced[-1]
+    codes = dr.select(outcome == int(RayOutcome.HIT), path | 1, 0)
+    return np.asarray(codes).astype(np.uint32)
 
 
 def trace_chief_rays(
@@ -126,11 +208,12 @@ def trace_chief_rays(
     x = mi.Float(index % camera.width) + 0.5
     y = mi.Float(index // camera.width) + 0.5
     origin, direction = camera.rays(x, y)
-    outcome, point, normal, arriving, region, face = _trace(
+    outcome, point, normal, arriving, region, face, _path = _trace(
         scene.scene,
         scene.rows,
         scene.corners,
         scene.table,
+        None,
         origin,
         direction,
         dr.opaque(mi.UInt32, MAX_DEPTH),

@@ -2,24 +2,18 @@
 
 A ray's way is followed a second time, each hit written as a smooth function of the corners of the
 triangle that was met; which triangles these are is taken as given. What that misses is rays that
-begin or cease to arrive because an edge moves past them. So a ray's weight fades to nothing
-towards the open edges of the mirrors it meets and of the sensing surface: the weighted sum over
-rays is then a continuous function, and its derivative knows of edges (the idea of smoothing
-visibility: Loubet, Holzschuch and Jakob, "Reparameterizing discontinuous integrands for
-differentiable rendering", ACM Trans. Graph. 38(6), 2019, treat it without bias; here the fading
-is part of the function). Edges of blockers that cut off rays are not followed.
+begin or cease to arrive, or arrive another way, because an edge moves past them. These boundaries
+in the picture are found between pixels (`ray_edges`), and how they move is part of the derivative.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import drjit as dr
 import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
 from optisense.errors import RenderError
 from optisense.geometry import TriangleMesh
@@ -27,15 +21,13 @@ from optisense.geometry.mesh import CREASE
 from optisense.geometry.shading_normals import smooth_corners
 from optisense.optics.backend.arrays import floats, indices
 from optisense.optics.camera.projection import RayCamera
-from optisense.optics.scene.bsdf import refract, surface_kind, surface_region
-from optisense.optics.scene.ray_scene import Piece, RayScene, intersect, leave
-from optisense.optics.scene.surfaces import Region, SurfaceKind
-from optisense.optics.transport.chief_rays import MAX_DEPTH, sees_nothing, trace_chief_rays
+from optisense.optics.scene.bsdf import refract
+from optisense.optics.scene.ray_scene import Piece, RayScene, leave
+from optisense.optics.scene.surfaces import Region
+from optisense.optics.transport.chief_rays import sees_nothing, trace_chief_rays, trace_path_codes
+from optisense.optics.transport.ray_edges import Cause, Stop, find_edges, walk
 
 FloatArray = NDArray[np.float64]
-
-SAMPLE_PITCH = 0.2
-"""mm; open edges are looked up by points so far apart along them."""
 
 
 @dataclass(frozen=True)
@@ -52,23 +44,27 @@ class RayGradient:
     camera: FloatArray
 
 
+class NoDerivativeError(RenderError):
+    """Chief rays have no derivative by something that moves."""
+
+
 class DifferentiableRays:
     """Chief rays of one shape of a sensor, with the graph of how they came about.
 
     Attributes:
+        codes: (h, w) of `trace_path_codes`: 0 where a ray does not arrive; neighbours of one
+            number arrive the same way.
         hit: (h, w) which arrive.
         cosine: (k,) of those, in the order of `hit`: between ray and normal, 1 is upright.
-        weight: (k,) 1 away from open edges, fading to 0 on them.
+        weight: (k,) the area of the picture that each stands for, pixels: 1, and more or less
+            beside a boundary, by where it lies between two pixels.
         points: (k, 3) mm.
+        density: (k,) 1/mm²; the part of all triangles of the sensing surface that lies in one mm²
+            where each arrives.
+        edges: the boundaries; None where there are none.
     """
 
-    def __init__(
-        self,
-        scene: RayScene,
-        camera: RayCamera,
-        moving: dict[str, TriangleMesh],
-        fade: float,
-    ) -> None:
+    def __init__(self, scene: RayScene, camera: RayCamera, moving: dict[str, TriangleMesh]) -> None:
         """Trace, and record.
 
         Args:
@@ -76,16 +72,16 @@ class DifferentiableRays:
             camera: whose rays.
             moving: meshes of the parts whose vertices are asked about. They are sheets: pieces
                 of the same name.
-            fade: mm; within so much of an open edge a ray's weight falls to 0.
 
         Raises:
-            RenderError: no ray arrives, or a moving part is no sheet.
+            NoDerivativeError: a moving part is no sheet.
+            RenderError: no ray arrives.
         """
         pieces = scene.pieces
         known = {piece.name for piece in pieces}
         for name in moving:
             if name not in known:
-                raise RenderError(
+                raise NoDerivativeError(
                     f"chief rays have no derivative by the shape of part '{name}'",
                     hint="Only surfaces can move here (mirrors, sensing surfaces, blockers)",
                 )
@@ -95,73 +91,157 @@ class DifferentiableRays:
         self._scene = scene if same else RayScene(self._pieces, table=scene.table, robust=True)
         self._starts = np.cumsum([0] + [len(p.vertices) for p in self._pieces])
         self._camera = camera
-        self._fade = fade
-        rays = trace_chief_rays(self._scene, camera)
-        self.hit = rays.hit
+        shape = camera.height, camera.width
+        middle = np.arange(camera.width * camera.height)
+        x, y = middle % camera.width + 0.5, middle // camera.width + 0.5
+        self.codes = codes = trace_path_codes(self._scene, camera, x, y).reshape(shape)
+        self.hit = codes > 0
         if not self.hit.any():
-            raise sees_nothing(rays)
-        self._edges = _OpenEdges(self._pieces, self._starts)
-        self._record()
-
-    def _record(self) -> None:
-        scene = self._scene
-        pixel = indices(np.flatnonzero(self.hit.ravel()))
-        x = mi.Float(pixel % self._camera.width) + 0.5
-        y = mi.Float(pixel // self._camera.width) + 0.5
-        self._vertices = floats(scene.vertices)
-        self._pose = self._camera.pose()
+            raise sees_nothing(trace_chief_rays(self._scene, camera))
+        self.edges = find_edges(self._scene, camera, codes)
+        self._vertices = floats(self._scene.vertices)
+        self._faces = indices(self._scene.faces)
+        self._pose = camera.pose()
+        turning = self._boundary_slopes()
         dr.enable_grad(self._vertices, *self._pose)
-        faces = indices(scene.faces)
-        normals = self._vertex_normals()
+        self._normals = self._vertex_normals()
+        self._record(x[self.hit.ravel()], y[self.hit.ravel()])
+        self.weight = self._record_edges(*turning)
 
-        origin, direction = self._camera.rays(x, y, self._pose)
-        dr.eval(origin, direction)
-        count = dr.width(pixel)
-        active = dr.full(mi.Bool, True, count)
-        weight = dr.ones(mi.Float, count)
-        cosine = dr.zeros(mi.Float, count)
-        arrived_at = dr.zeros(mi.Point3f, count)
-        for _ in range(MAX_DEPTH):
-            met = intersect(
-                scene.scene,
-                scene.rows,
-                scene.corners,
-                dr.detach(origin),
-                dr.detach(direction),
-                active,
-            )
-            kind, eta, _alpha = surface_kind(scene.table, met.surface, met.valid)
-            region = surface_region(scene.table, met.surface, met.valid)
-            arrived = met.valid & (kind == int(SurfaceKind.OPAQUE)) & (region != int(Region.OTHER))
-            mirror = met.valid & (kind == int(SurfaceKind.MIRROR))
-            reflectance, _, _, _ = refract(dr.detach(direction), met.shading_normal, eta)
-            turns = mirror | (reflectance >= 1)
-            face = met.face
-            rough = met.shading_normal != met.normal
-            smooth = met.valid & (rough.x | rough.y | rough.z)
-            dr.eval(face, arrived, mirror, turns, smooth, eta)
-
-            point, normal, shading = _hit(
-                self._vertices, faces, normals, face, smooth, origin, direction, active
-            )
-            weight *= self._fading(point, face, active & (arrived | mirror))
-            cosine = dr.select(arrived, dr.abs(dr.dot(direction, shading)), cosine)
-            arrived_at = dr.select(arrived, point, arrived_at)
-            active &= met.valid & ~arrived
-            # A ray that is turned back takes no part in refraction, whose root has no slope there.
-            relative = dr.select(turns, 1.0, eta)
-            _, _, transmitted, _ = refract(direction, shading, relative)
-            reflected = direction - shading * (2 * dr.dot(direction, shading))
-            onward = dr.select(turns, dr.normalize(reflected), transmitted)
-            origin = dr.select(active, leave(point, dr.detach(normal), dr.detach(onward)), origin)
-            direction = dr.select(active, onward, direction)
-            dr.eval(origin, direction, weight, cosine, arrived_at, active)
-            if not dr.any(active):
-                break
-        self._outputs = cosine, weight, arrived_at
+    def _record(self, x: FloatArray, y: FloatArray) -> None:
+        """Rays that arrive, as functions of what moves."""
+        origin, direction = self._camera.rays(floats(x), floats(y), self._pose)
+        cosine = dr.zeros(mi.Float, len(x))
+        arrived_at = dr.zeros(mi.Point3f, len(x))
+        face = dr.zeros(mi.UInt32, len(x))
+        for stop in walk(self._scene, origin, direction):
+            point, shading, origin, direction, before = self._follow(stop, origin, direction)
+            cosine = dr.select(stop.arrived, dr.abs(dr.dot(before, shading)), cosine)
+            arrived_at = dr.select(stop.arrived, point, arrived_at)
+            face = dr.select(stop.arrived, stop.face, face)
+            dr.eval(origin, direction, cosine, arrived_at, face)
+        self._outputs = cosine, arrived_at
         self.cosine = np.asarray(dr.detach(cosine), dtype=np.float64)
-        self.weight = np.asarray(dr.detach(weight), dtype=np.float64)
         self.points = np.asarray(dr.detach(arrived_at), dtype=np.float64).T
+        areas = self._sensing_areas()
+        self.density = 1.0 / (np.count_nonzero(areas) * areas[np.asarray(face)])
+
+    def _sensing_areas(self) -> FloatArray:
+        """(f,) mm² of the triangles of sensing surfaces, 0 for all others."""
+        areas = []
+        for piece in self._pieces:
+            area = TriangleMesh(piece.vertices, piece.faces).face_areas
+            areas.append(area * (piece.surface.region is Region.SENSING))
+        return np.concatenate(areas)
+
+    def _follow(
+        self, stop: Stop, origin: mi.Point3f, direction: mi.Vector3f
+    ) -> tuple[mi.Point3f, mi.Vector3f, mi.Point3f, mi.Vector3f, mi.Vector3f]:
+        """Where rays meet a surface, its shading normal, the rays that go on (unchanged where
+        none does), and the way in which they arrived."""
+        point, normal, shading = _hit(
+            self._vertices,
+            self._faces,
+            self._normals,
+            stop.face,
+            stop.smooth,
+            origin,
+            direction,
+            stop.valid,
+        )
+        # A ray that is turned back takes no part in refraction, whose root has no slope there.
+        relative = dr.select(stop.turned | ~stop.goes_on, 1.0, stop.eta)
+        _, _, transmitted, _ = refract(direction, shading, relative)
+        reflected = direction - shading * (2 * dr.dot(direction, shading))
+        onward = dr.select(stop.turned, dr.normalize(reflected), transmitted)
+        start = leave(point, dr.detach(normal), dr.detach(onward))
+        return (
+            point,
+            shading,
+            dr.select(stop.goes_on, start, origin),
+            dr.select(stop.goes_on, onward, direction),
+            direction,
+        )
+
+    def _boundary_slopes(self) -> tuple[FloatArray, FloatArray]:
+        """(k,) how the function that is 0 on each boundary changes along x and y of the film, a
+        pixel.
+        """
+        if self.edges is None:
+            return np.zeros(0), np.zeros(0)
+        self._normals = self._vertex_normals()
+        x, y = floats(self.edges.x), floats(self.edges.y)
+        dr.enable_grad(x, y)
+        dr.backward(dr.sum(self._boundary(x, y)))
+        return tuple(np.asarray(dr.grad(v), dtype=np.float64) for v in (x, y))  # type: ignore[return-value]
+
+    def _boundary(self, x: mi.Float, y: mi.Float) -> mi.Float:
+        """A function of film positions (and of all that moves) that is 0 on the boundaries."""
+        edges = self.edges
+        assert edges is not None
+        depth, cause, first, second = (
+            indices(v) for v in (edges.depth, edges.cause, edges.first, edges.second)
+        )
+        at_edge, at_crossing, at_limit = (
+            cause == int(c) for c in (Cause.EDGE, Cause.CROSSING, Cause.TOTAL_REFLECTION)
+        )
+        value = dr.zeros(mi.Float, len(edges.x))
+        # Up to the surface that parts two rays both take the same way as the one between them.
+        origin, direction = self._camera.rays(x, y, self._pose)
+        for number, stop in enumerate(walk(self._scene, origin, direction)):
+            here = depth == number
+            _, shading, start, onward, _ = self._follow(stop, origin, direction)
+            cosine = dr.dot(direction, shading)
+            into = dr.select(cosine < 0, dr.rcp(stop.eta), stop.eta)
+            refracts = 1 - dr.square(into) * (1 - dr.square(cosine))
+            value = dr.select(here & at_limit & stop.valid, refracts, value)
+            a = dr.gather(mi.Point3f, self._vertices, first, here & at_edge)
+            b = dr.gather(mi.Point3f, self._vertices, second, here & at_edge)
+            aside = dr.cross(b - a, direction)
+            passes = dr.dot(aside, origin - a) / dr.maximum(dr.norm(dr.detach(aside)), 1e-12)
+            value = dr.select(here & at_edge, passes, value)
+            ahead = self._distance(first, origin, direction, here & at_crossing)
+            ahead -= self._distance(second, origin, direction, here & at_crossing)
+            value = dr.select(here & at_crossing, ahead, value)
+            origin = dr.select(depth > number, start, origin)
+            direction = dr.select(depth > number, onward, direction)
+            dr.eval(origin, direction, value)
+        return value
+
+    def _distance(
+        self, face: mi.UInt32, origin: mi.Point3f, direction: mi.Vector3f, active: mi.Bool
+    ) -> mi.Float:
+        """mm along rays to the planes of triangles; 0 where not active."""
+        corner = dr.gather(mi.Vector3u, self._faces, face, active)
+        a, b, c = (dr.gather(mi.Point3f, self._vertices, corner[k], active) for k in range(3))
+        cross = dr.cross(b - a, c - a)
+        steep = dr.select(active, dr.dot(direction, cross), 1.0)
+        return dr.select(active, dr.dot(a - origin, cross) / steep, 0.0)
+
+    def _record_edges(self, by_x: FloatArray, by_y: FloatArray) -> FloatArray:
+        """The boundaries as functions of what moves; returns the weights of the rays that arrive.
+
+        A boundary point stands for the boundary's crossing of a row or a column of pixels. By
+        how much a boundary's slant counts to the one and the other, squares of its normal's
+        components say, which add up to 1.
+        """
+        weight = np.ones(int(self.hit.sum()))
+        edges = self.edges
+        if edges is None:
+            return weight
+        self._value = self._boundary(floats(edges.x), floats(edges.y))
+        square = by_x**2 + by_y**2
+        along = np.where(edges.along_x, by_x, by_y)
+        known = (edges.cause != Cause.UNKNOWN) & np.isfinite(square) & (square > 0)
+        self._per_value = np.where(known, -along / np.where(known, square, 1.0), 0.0)
+        share = np.where(known, along**2 / np.where(known, square, 1.0), 0.0)
+        order = np.cumsum(self.hit.ravel()) - 1
+        self._sides = []
+        for pixel, sign in ((edges.before, 1.0), (edges.after, -1.0)):
+            there = self.hit.ravel()[pixel]
+            self._sides.append((there, order[pixel]))
+            np.add.at(weight, order[pixel][there], (sign * share * edges.side)[there])
+        return weight
 
     def _vertex_normals(self) -> mi.Float:
         """Normals of all vertices; those of moving sheets as functions of their vertices."""
@@ -176,20 +256,6 @@ class DifferentiableRays:
                 normals = normals + _smooth_normals(self._vertices, corners, len(fixed))
         return normals
 
-    def _fading(self, point: mi.Point3f, face: mi.UInt32, active: mi.Bool) -> mi.Float:
-        places = np.asarray(dr.detach(point), dtype=np.float64).T
-        first, second = self._edges.nearest(
-            places, np.asarray(face), np.asarray(active), self._fade
-        )
-        near = indices(first >= 0) > 0
-        a = dr.gather(mi.Point3f, self._vertices, indices(first.clip(0)), near)
-        b = dr.gather(mi.Point3f, self._vertices, indices(second.clip(0)), near)
-        along = dr.normalize(b - a)
-        aside = dr.cross(point - a, along)
-        distance = dr.sqrt(dr.squared_norm(aside) + 1e-12)
-        share = dr.clip(distance / self._fade, 0, 1)
-        return dr.select(near, share * share * (3 - 2 * share), 1.0)
-
     def pull_back(
         self,
         cosine: FloatArray | None = None,
@@ -202,11 +268,14 @@ class DifferentiableRays:
             cosine, weight: (k,), points: (k, 3): derivatives of the number by these; None for 0.
         """
         loss = mi.Float(0)
-        for output, slope in zip(self._outputs, (cosine, weight, points), strict=True):
+        for output, slope in zip(self._outputs, (cosine, points), strict=True):
             if slope is None:
                 continue
             given = dr.unravel(type(output), floats(slope)) if slope.ndim > 1 else floats(slope)
             loss += dr.sum(dr.dot(output, given))
+        if weight is not None and self.edges is not None:
+            sides = [np.where(there, weight[number], 0.0) for there, number in self._sides]
+            loss += dr.sum(self._value * floats(self._per_value * (sides[0] - sides[1])))
         dr.backward(loss)
         moved = np.asarray(dr.grad(self._vertices), dtype=np.float64).reshape(-1, 3)
         parts = {}
@@ -245,48 +314,6 @@ class _Sheet:
         total = np.zeros((self.count, 3))
         np.add.at(total, self.source, slopes)
         return total
-
-
-class _OpenEdges:
-    """The open edges of mirrors and sensing surfaces, found by place."""
-
-    def __init__(self, pieces: Sequence[Piece], starts: NDArray[np.integer]) -> None:
-        self._faces_before = np.cumsum([0] + [len(piece.faces) for piece in pieces])
-        self._trees: dict[int, tuple[cKDTree, NDArray[np.integer], NDArray[np.integer]]] = {}
-        for number, (piece, start) in enumerate(zip(pieces, starts[:-1], strict=True)):
-            surface = piece.surface
-            if surface.kind is not SurfaceKind.MIRROR and surface.region is not Region.SENSING:
-                continue
-            edges = piece.open_edges
-            if not len(edges):
-                continue
-            ends = np.asarray(piece.vertices, dtype=np.float64)[edges]
-            length = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
-            counts = np.maximum(2, np.ceil(length / SAMPLE_PITCH).astype(int) + 1)
-            which = np.repeat(np.arange(len(edges)), counts)
-            step = np.arange(len(which)) - np.repeat(np.cumsum(counts) - counts, counts)
-            share = (step / (counts[which] - 1))[:, None]
-            places = ends[which, 0] * (1 - share) + ends[which, 1] * share
-            self._trees[number] = cKDTree(places), which, edges + start
-
-    def nearest(
-        self,
-        places: FloatArray,
-        faces: NDArray[np.integer],
-        active: NDArray[np.bool_],
-        reach: float,
-    ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-        """(k,) vertices at the ends of the open edge nearest to each place; -1 where none is."""
-        first = np.full(len(places), -1, dtype=np.int64)
-        second = first.copy()
-        number = np.searchsorted(self._faces_before, faces, side="right") - 1
-        for piece, (tree, which, edges) in self._trees.items():
-            rows = np.flatnonzero(active & (number == piece))
-            distance, sample = tree.query(places[rows], distance_upper_bound=reach + SAMPLE_PITCH)
-            found = np.isfinite(distance)
-            edge = which[sample[found]]
-            first[rows[found]], second[rows[found]] = edges[edge, 0], edges[edge, 1]
-        return first, second
 
 
 def _hit(

@@ -172,8 +172,7 @@ class SlopeEvaluator:
         model = self.usual.keeper.model(design)
         width, height = design.camera.resolution
         size = self.resolution, max(1, round(self.resolution * height / width))
-        fade = self.fade or FADE * float(np.ptp(model.sensing.bounds, axis=0).max())
-        rays = model.differentiable_rays(self.parts, size, fade)
+        rays = model.differentiable_rays(self.parts, size)
         slopes = SMOOTH[self.objective](rays)
         back = rays.pull_back(slopes.cosine, slopes.weight, slopes.points)
         # The Jacobian of the start serves all points where shapes move linearly. It may not be

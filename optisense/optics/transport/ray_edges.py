@@ -1,0 +1,242 @@
+"""Where chief rays of neighbouring pixels part ways, and what parts them.
+
+Between two pixels whose rays take different ways there is a boundary in the picture: the edge of a
+part, or of another part in front of it, a line where two parts meet, or the limit of total
+reflection. Its place between the two pixels is found by bisection, and its cause by following the
+two rays beside it to the first surface where they differ. Each cause is a function that is 0 on
+the boundary and smooth beside it, so that derivatives tell how the boundary moves (the boundary
+integral of Li, Aittala, Durand and Lehtinen, "Differentiable Monte Carlo ray tracing through edge
+sampling", ACM Trans. Graph. 37(6), 2018, with the edges found between pixels, which works through
+mirrors and refracting surfaces alike).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import IntEnum
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+from numpy.typing import NDArray
+
+from optisense.optics.backend.arrays import floats
+from optisense.optics.camera.projection import RayCamera
+from optisense.optics.scene.ray_scene import RayScene
+from optisense.optics.transport.chief_rays import MAX_DEPTH, next_step, trace_path_codes
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+
+HALVINGS = 11
+"""Bisections of the gap between two pixels: boundaries are found to 1/2048 of a pixel, which on a
+sensor is about the rounding of single-precision points."""
+
+NEAR = 8.0
+"""An edge is taken to be what parts two rays if it passes the nearer hit within so many times the
+rays' distance there. They are on both sides of it; some of them meet it at a slant."""
+
+ROUNDING = 1e-4
+"""mm by which single-precision rays may miss an edge that they pass, some 50 mm from the camera."""
+
+
+class Cause(IntEnum):
+    """What parts two neighbouring rays."""
+
+    UNKNOWN = 0  # e.g. a part thinner than the two rays' distance
+    EDGE = 1  # of the triangle that the ray meets which is stopped first
+    CROSSING = 2  # two surfaces cut through each other
+    TOTAL_REFLECTION = 3  # one ray is totally reflected, the other one is not
+
+
+@dataclass(frozen=True)
+class Edges:
+    """Points of boundaries in a picture, each between two neighbouring pixels.
+
+    Attributes:
+        before, after: (k,) numbers of the pixels, row after row; `after` is right of `before` or
+            below it.
+        along_x: (k,) whether they are neighbours in a row.
+        x, y: (k,) film position of the boundary, pixels.
+        side: (k,) film position, pixels along the row or column, from the middle between the two.
+        depth: (k,) how many surfaces the ray meets before the one that parts it.
+        cause: (k,) of `Cause`.
+        first, second: (k,) an EDGE's vertices, or the triangles of a CROSSING; of TOTAL_REFLECTION
+            `first` is the triangle.
+    """
+
+    before: IntArray
+    after: IntArray
+    along_x: NDArray[np.bool_]
+    x: FloatArray
+    y: FloatArray
+    side: FloatArray
+    depth: IntArray
+    cause: IntArray
+    first: IntArray
+    second: IntArray
+
+
+@dataclass(frozen=True)
+class Stop:
+    """A surface on the way of rays, all arrays as long as there are rays.
+
+    Attributes:
+        origin, direction: of the ray that arrives here.
+        distance: mm to the surface.
+        face: triangle met; smooth: whether its normal varies.
+        eta: relative refractive index; turned: whether the ray is reflected.
+        totally: whether totally; valid: whether a surface is met at all.
+        arrived: whether it is the sensing surface or an indenter; goes_on: whether the ray goes on.
+    """
+
+    origin: mi.Point3f
+    direction: mi.Vector3f
+    distance: mi.Float
+    face: mi.UInt32
+    smooth: mi.Bool
+    eta: mi.Float
+    turned: mi.Bool
+    totally: mi.Bool
+    valid: mi.Bool
+    arrived: mi.Bool
+    goes_on: mi.Bool
+
+
+def walk(scene: RayScene, origin: mi.Point3f, direction: mi.Vector3f) -> list[Stop]:
+    """All surfaces that rays meet one after the other, without derivatives."""
+    stops = []
+    origin, direction = dr.detach(origin), dr.detach(direction)
+    active = dr.full(mi.Bool, True, dr.width(direction))
+    for _ in range(MAX_DEPTH):
+        step = next_step(
+            scene.scene, scene.rows, scene.corners, scene.table, origin, direction, active
+        )
+        hit = step.hit
+        bent = hit.shading_normal != hit.normal
+        stop = Stop(
+            origin,
+            direction,
+            hit.distance,
+            hit.face,
+            hit.valid & (bent.x | bent.y | bent.z),
+            step.eta,
+            step.turned,
+            step.totally,
+            hit.valid,
+            step.arrived,
+            step.goes_on,
+        )
+        dr.eval(stop.__dict__, step.origin, step.direction)
+        stops.append(stop)
+        origin, direction, active = step.origin, step.direction, step.goes_on
+        if not dr.any(active):
+            break
+    return stops
+
+
+def find_edges(scene: RayScene, camera: RayCamera, codes: NDArray[np.uint32]) -> Edges | None:
+    """All boundaries between pixels of which one sees the sensing surface; None if there are none.
+
+    Args:
+        scene: the surfaces.
+        camera: whose picture.
+        codes: (h, w) of `trace_path_codes`, through the middle of each pixel.
+    """
+    number = np.arange(codes.size).reshape(codes.shape)
+    across = codes[:, 1:] != codes[:, :-1]
+    down = codes[1:] != codes[:-1]
+    before = np.concatenate([number[:, :-1][across], number[:-1][down]])
+    after = np.concatenate([number[:, 1:][across], number[1:][down]])
+    if not len(before):
+        return None
+    along_x = np.arange(len(before)) < np.count_nonzero(across)
+    low = np.stack([before % camera.width, before // camera.width], axis=1) + 0.5
+    way = np.stack([along_x, ~along_x], axis=1).astype(float)
+    start, end = np.zeros(len(before)), np.ones(len(before))
+    first = codes.ravel()[before]
+    for _ in range(HALVINGS):
+        middle = (start + end) / 2
+        place = low + middle[:, None] * way
+        same = trace_path_codes(scene, camera, place[:, 0], place[:, 1]) == first
+        start, end = np.where(same, middle, start), np.where(same, end, middle)
+    middle = (start + end) / 2
+    place = low + middle[:, None] * way
+    beside = low + start[:, None] * way, low + end[:, None] * way
+    depth, cause, one, other = _causes(scene, camera, *beside)
+    return Edges(
+        before, after, along_x, place[:, 0], place[:, 1], middle - 0.5, depth, cause, one, other
+    )
+
+
+def _causes(
+    scene: RayScene, camera: RayCamera, left: FloatArray, right: FloatArray
+) -> tuple[IntArray, IntArray, IntArray, IntArray]:
+    """Depth, cause, first and second (each (k,), see `Edges`) of what parts the rays through two
+    film positions (k, 2) each.
+    """
+    count = len(left)
+    both = np.concatenate([left, right])
+    stops = walk(scene, *camera.rays(floats(both[:, 0]), floats(both[:, 1])))
+    patches = np.asarray(scene.patches).astype(np.int64)
+    depth = np.zeros(count, dtype=np.int64)
+    cause, first, second = depth.copy(), depth.copy(), depth.copy()
+    waiting = np.ones(count, dtype=bool)
+    for number, stop in enumerate(stops):
+        valid = np.asarray(stop.valid).astype(bool)
+        face = np.asarray(stop.face).astype(np.int64)
+        patch = np.where(valid, patches[np.where(valid, face, 0)], -1)
+        totally = np.asarray(stop.totally).astype(bool)
+        parted = patch[:count] != patch[count:]
+        here = waiting & (parted | (totally[:count] != totally[count:]))
+        waiting &= ~here
+        rows = np.flatnonzero(here)
+        depth[rows] = number
+        apart = parted[rows]
+        limit = rows[~apart]
+        cause[limit], first[limit] = Cause.TOTAL_REFLECTION, face[limit]
+        rows = rows[apart]
+        if len(rows):
+            found = _nearest_edges(scene, stop, valid, face, rows, count)
+            cause[rows], first[rows], second[rows] = found
+    return depth, cause, first, second
+
+
+def _nearest_edges(
+    scene: RayScene,
+    stop: Stop,
+    valid: NDArray[np.bool_],
+    face: IntArray,
+    rows: IntArray,
+    count: int,
+) -> tuple[IntArray, IntArray, IntArray]:
+    """Cause, first and second (see `Edges`) for pairs of rays that meet different patches."""
+    origin = np.asarray(stop.origin, dtype=np.float64).T
+    direction = np.asarray(stop.direction, dtype=np.float64).T
+    distance = np.where(valid, np.asarray(stop.distance, dtype=np.float64), np.inf)
+    one, other = rows, rows + count
+    near = np.minimum(distance[one], distance[other])
+    reach = [origin[ray] + near[:, None] * direction[ray] for ray in (one, other)]
+    gap = np.linalg.norm(reach[0] - reach[1], axis=1)
+    within = NEAR * gap + ROUNDING
+
+    best = np.full(len(rows), np.inf)
+    first, second = np.zeros(len(rows), dtype=np.int64), np.zeros(len(rows), dtype=np.int64)
+    for ray in (one, other):
+        # What lies farther away does not end here, it is covered.
+        stopped = valid[ray] & (distance[ray] <= near + within)
+        corners = np.asarray(scene.faces, dtype=np.int64)[np.where(valid[ray], face[ray], 0)]
+        for k in range(3):
+            a, b = corners[:, k], corners[:, (k + 1) % 3]
+            start, end = (np.asarray(scene.vertices, dtype=np.float64)[v] for v in (a, b))
+            aside = np.cross(end - start, direction[ray])
+            length = np.maximum(np.linalg.norm(aside, axis=1), 1e-12)
+            off = np.abs(np.einsum("ij,ij->i", aside, origin[ray] - start)) / length
+            better = stopped & (off < best)
+            best[better], first[better], second[better] = off[better], a[better], b[better]
+    edge = best <= within
+    crossing = ~edge & valid[one] & valid[other]
+    cause = np.where(edge, Cause.EDGE, np.where(crossing, Cause.CROSSING, Cause.UNKNOWN))
+    first = np.where(crossing, face[one], first)
+    second = np.where(crossing, face[other], second)
+    return cause.astype(np.int64), first, second
