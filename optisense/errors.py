@@ -57,6 +57,10 @@ class RenderError(OptiSenseError):
     """A design or a setting that can't be rendered."""
 
 
+class NoDerivativeError(RenderError):
+    """Chief rays have no derivative by something that moves."""
+
+
 class ObjectiveError(OptiSenseError):
     """An objective that is unknown or can't be loaded, or a sensor that it can't score."""
 

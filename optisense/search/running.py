@@ -225,7 +225,7 @@ class Run:
             raise self._all_failed()
         several = self.method.several  # its result is a front, not one best trial
         tie = None if several else tie_note(study.trials)
-        notes = [*self._notes, tie] if tie is not None else self._notes
+        notes = [*self._notes, *self.method.notes(), *([] if tie is None else [tie])]
         return Result(study, interrupted, ended, tuple(notes))
 
     def _search(self, runner: Runner) -> str:

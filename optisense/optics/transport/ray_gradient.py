@@ -15,7 +15,7 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from optisense.errors import RenderError
+from optisense.errors import NoDerivativeError
 from optisense.geometry import TriangleMesh
 from optisense.geometry.mesh import CREASE
 from optisense.geometry.shading_normals import smooth_corners
@@ -42,10 +42,6 @@ class RayGradient:
 
     parts: dict[str, FloatArray]
     camera: FloatArray
-
-
-class NoDerivativeError(RenderError):
-    """Chief rays have no derivative by something that moves."""
 
 
 class DifferentiableRays:
@@ -108,7 +104,7 @@ class DifferentiableRays:
         self._record(x[self.hit.ravel()], y[self.hit.ravel()])
         self.weight = self._record_edges(*turning)
 
-    def _record(self, x: FloatArray, y: FloatArray) -> None:
+    def _record(self, x: NDArray[np.floating], y: NDArray[np.floating]) -> None:
         """Rays that arrive, as functions of what moves."""
         origin, direction = self._camera.rays(floats(x), floats(y), self._pose)
         cosine = dr.zeros(mi.Float, len(x))
@@ -130,7 +126,8 @@ class DifferentiableRays:
         """(f,) mm² of the triangles of sensing surfaces, 0 for all others."""
         areas = []
         for piece in self._pieces:
-            area = TriangleMesh(piece.vertices, piece.faces).face_areas
+            a, b, c = (np.asarray(piece.vertices, np.float64)[piece.faces[:, k]] for k in range(3))
+            area = 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1)
             areas.append(area * (piece.surface.region is Region.SENSING))
         return np.concatenate(areas)
 

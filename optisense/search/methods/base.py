@@ -95,6 +95,10 @@ class Method(ABC):
         """Facts about the state for progress and reports, ready for JSON."""
         return {}
 
+    def notes(self) -> list[str]:
+        """What the user should know when the search is over."""
+        return []
+
 
 def values_to_maximise(outcomes: Sequence[Outcome], objective: str) -> FloatArray:
     """(k,) scores; failed trials count a little less than the worst that did not fail.
