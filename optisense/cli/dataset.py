@@ -150,7 +150,7 @@ def dataset(
 
             line.begin(BUILDING)
             model = OpticalModel(sensor, variant)
-            show = shown_samples(line, SAMPLES, "reading the dataset")
+            show = shown_samples(line, model, SAMPLES, "reading the dataset")
             made = generate(model, out, count, settings, show)
     except KeyboardInterrupt:
         from optisense.tasks.dataset import LABELS, Dataset

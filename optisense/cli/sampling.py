@@ -3,9 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import TYPE_CHECKING
 
 from optisense.cli.progress import Line
 from optisense.time_left import Step
+
+if TYPE_CHECKING:
+    from optisense.optics import OpticalModel, RenderProgress
 
 LOADING, BUILDING = "loading", "building the scene"
 
@@ -35,18 +39,29 @@ def sample_steps(name: str, photons: int, count: int, seconds: float, after: flo
     ]
 
 
-def shown_samples(line: Line, name: str, after: str) -> Callable[[int, int], None]:
+def shown_samples(
+    line: Line, model: OpticalModel, name: str, after: str
+) -> Callable[[int, int], None]:
     """What is to be called with the number of samples that are done, and of all.
 
     Args:
         line: has the steps of `sample_steps`.
+        model: of the sensor; tells of the light while it is traced.
         name: of the samples.
         after: what follows them.
     """
     line.begin(_light(name), text=f"{name}: tracing light")
     first: list[int] = []
+    in_light = True
+
+    def light(progress: RenderProgress) -> None:
+        if in_light:
+            line.time_left.advance(progress.fraction)
+            line.say(f"{name}: {progress.stage.value}")
 
     def show(done: int, count: int) -> None:
+        nonlocal in_light
+        in_light = in_light and (not first or done == first[0])
         if not first:
             first.append(done)
             line.say(f"{name}: tracing light", done, count)
@@ -57,6 +72,7 @@ def shown_samples(line: Line, name: str, after: str) -> Callable[[int, int], Non
         elif done > first[0]:
             line.advance(done, count)
 
+    model.listener = light
     return show
 
 

@@ -257,7 +257,7 @@ def reconstruction(
 
         line.begin(BUILDING)
         model = OpticalModel(sensor, variant)
-        show = shown_samples(line, PICTURES, "comparing")
+        show = shown_samples(line, model, PICTURES, "comparing")
         result = reconstruct(model, settings, contacts, show)
     if out is not None:
         _write(out, result.to_dict(), draw_reconstruction(result, sensor.camera.axes()))
@@ -322,7 +322,7 @@ def _perceive(
         model = OpticalModel(sensor, variant)
         for task in tasks:
             folder = out if out is None or len(tasks) == 1 else inside(out, task.name)
-            show = shown_samples(line, task.name, f"{task.name}: reading the samples")
+            show = shown_samples(line, model, task.name, f"{task.name}: reading the samples")
             results.append(perceive(task, model, settings, neighbours, folder, show))
             if folder is not None:
                 _write(folder, results[-1].to_dict(), draw_perception(results[-1]))

@@ -71,6 +71,9 @@ class OpticalModel(RayModel):
     is_draft = False
     """Whether images may be coarse for the sake of speed."""
 
+    listener: Callable[[RenderProgress], None] | None = None
+    """Called with the progress of images for which `render` is given nobody else."""
+
     @cached_property
     def _store(self) -> CacheStore:
         opaque = [p for p in self._pieces if p.surface.kind is SurfaceKind.OPAQUE]
@@ -154,11 +157,13 @@ class OpticalModel(RayModel):
             photons = int(photons)  # 12e6 is a float
         began = time.perf_counter()
 
+        listener = progress or self.listener
+
         def tell(stage: Stage, part: float, traced: int, reached: float | None) -> None:
-            if progress is not None:
+            if listener is not None:
                 shown = None if reached is None or not np.isfinite(reached) else 100 * reached
                 now = time.perf_counter() - began
-                progress(
+                listener(
                     RenderProgress(stage, part, fraction_done(stage, part), traced, shown, now)
                 )
 

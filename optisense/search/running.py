@@ -190,6 +190,7 @@ class Run:
         self._fresh_done = self._fresh_count = 0
         self._trials_an_hour = 0.0
         self._doing = ""
+        self._pace = math.nan
 
     def go(self) -> Result:
         """Run to the end, or until Ctrl-C; the study stays locked, for the caller to unlock.
@@ -296,7 +297,7 @@ class Run:
         """Score trials with other seeds; `more` such scores may follow."""
         found: dict[int, Outcome] = {}
         self._fresh_count = self._fresh_done + len(jobs) + more
-        self._time_left.expect(FRESH, count=self._fresh_count)
+        self._expect_fresh_scores(self._fresh_count)
         self._report(now=True)
 
         def finished(number: int, outcome: Outcome) -> None:
@@ -405,12 +406,18 @@ class Run:
             self._first_seconds = outcome.seconds
         pace = self._time_left.pace
         if math.isfinite(pace):
-            first = FRESH_SHARE * self._first_seconds / self._time_left.workers
-            several = USUAL_FRESH / FRESH_SEEDS
-            each = (max(pace, first) + (several - 1.0) * pace) / several
-            self._time_left.expect(FRESH, seconds=each)
+            self._pace = pace
+            self._expect_fresh_scores(USUAL_FRESH)
             if self._stage == TRIALS and pace > 0.0:
                 self._trials_an_hour = 3600.0 / pace
+
+    def _expect_fresh_scores(self, count: int) -> None:
+        """Expect so many scores with fresh seeds, the first one of each seed with its own light."""
+        first = max(self._pace, FRESH_SHARE * self._first_seconds / self._time_left.workers)
+        seeds = min(count, FRESH_SEEDS)
+        each = (seeds * first + (count - seeds) * self._pace) / count
+        known = each if math.isfinite(each) else None
+        self._time_left.expect(FRESH, count=count, seconds=known)
 
     def _listen(self, fraction: float, text: str) -> None:
         """A trial in this process tells what it is at."""
