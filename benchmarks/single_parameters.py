@@ -6,10 +6,11 @@ draws what the camera of each winner sees, so that a person can judge all of the
 
     python -m benchmarks.single_parameters FOLDER [--sensor NAME]
 
-It takes about ten minutes on two cores. Finished searches are kept in FOLDER/searches.json; started
-again, it goes on where it was. FOLDER/SENSOR-OBJECTIVE.png are the contact sheets: on each picture
-the sensing surface has a checkerboard of 2 mm, darker where it is seen askance; what is not the
-sensing surface is blue. A red frame is a winner other than the sensor as it is.
+The 43 searches of a GelSight Mini take up to ten minutes on two busy cores, and those of all six
+sensors about an hour. Finished searches are kept in FOLDER/searches.json; started again, it goes on
+where it was. FOLDER/SENSOR-OBJECTIVE.png are the contact sheets: on each picture the sensing
+surface has a checkerboard of 2 mm, darker where it is seen askance; what is not the sensing surface
+is blue. A red frame is a winner other than the sensor as it is.
 
 Parameters of one kind stand for each other: of the points of a cage one at a corner, one in the
 middle of a side and one in the middle of the face that is sensed are searched, of the lights and
