@@ -164,7 +164,7 @@ def test_of_two_datasets_in_one_folder_one_wins_whole(tmp_path: Path) -> None:
     small = ["--count", 1, "--photons", 20000, "--resolution", "32x24"]
     processes = [
         started("dataset", sensor, "--out", out, "--seed", seed, *small)
-        for sensor, seed in (("gelsight-mini", 1), ("gelsight-svelte", 2))
+        for sensor, seed in (("gelsight-mini", 1), ("gelsight-mini", 2))
     ]
     results = [ended(process) for process in processes]
     codes = [code for code, _ in results]
@@ -174,7 +174,7 @@ def test_of_two_datasets_in_one_folder_one_wins_whole(tmp_path: Path) -> None:
     made = json.loads((out / "dataset.json").read_text())
     assert made["settings"]["seed"] == 1 + codes.index(0)
     assert made["design_name"] == ots.load(out / "design").name
-    again = ran("dataset", ("gelsight-mini", "gelsight-svelte")[codes.index(0)], "--out", out,
+    again = ran("dataset", "gelsight-mini", "--out", out,
                 "--seed", 1 + codes.index(0), *small)  # fmt: skip
     assert again[0] == 0, again[1]
 
@@ -271,7 +271,7 @@ def read_only(folder: Path) -> Iterator[None]:
     try:
         yield
     finally:
-        subprocess.run(["umount", str(folder)], check=True)
+        subprocess.run(["umount", "--lazy", str(folder)], check=True)
 
 
 @pytest.mark.slow
@@ -347,7 +347,7 @@ def test_a_full_disk_is_told_as_it_is(tmp_path: Path) -> None:
         assert finished > 10
         assert mine.read_text() == "mine"
     finally:
-        subprocess.run(["umount", str(disk)], check=True)
+        subprocess.run(["umount", "--lazy", str(disk)], check=True)
 
 
 @pytest.mark.slow
