@@ -81,8 +81,8 @@ class RealComparison:
 
 def has_real_picture(design: SensorDesign) -> bool:
     """Whether a design is the sensor that a real picture is there of."""
+    from optisense.design.difference import differences
     from optisense.library import with_own_lights
-    from optisense.search.difference import differences
     from optisense.sensors import load
 
     if set(design.parts) != set((built_in := load(SENSOR)).parts):

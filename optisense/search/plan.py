@@ -9,11 +9,11 @@ from pathlib import Path
 from typing import Any
 
 from optisense.design import SensorDesign
+from optisense.design.difference import fingerprint
 from optisense.errors import SearchError
 from optisense.objectives import Objective
 from optisense.objectives.settings import size_for
 from optisense.search.constraints import Constraint, UserRule
-from optisense.search.difference import fingerprint
 from optisense.search.evaluation import DesignEvaluator, Goal, goal_name, placed
 from optisense.search.making import SAMPLES, MakingErrors
 from optisense.search.methods import Problem, find, make

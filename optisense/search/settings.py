@@ -28,7 +28,7 @@ class StudySettings:
 
     Attributes:
         design: the design's name.
-        fingerprint: of the design (see `optisense.search.difference`).
+        fingerprint: of the design (see `optisense.design.difference`).
         space: as of `SearchSpace.to_plain`.
         objectives: how to find them: names, FILE.py:FUNCTION, or "function:NAME" for functions
             that only the program which began the study knows.

@@ -19,12 +19,12 @@ from typing import Any
 import numpy as np
 
 from optisense.design import SensorDesign
+from optisense.design.difference import differences, fingerprint, notes, plain_differences
 from optisense.errors import SearchError
 from optisense.folders import FolderLock
 from optisense.library import with_own_lights
 from optisense.search.best import best_of
 from optisense.search.constraints import Constraint
-from optisense.search.difference import differences, fingerprint, notes, plain_differences
 from optisense.search.dominance import front as front_of
 from optisense.search.evaluation import DesignEvaluator, Goal
 from optisense.search.plan import ONLY_HERE, Plan, file_prints, known_goals, known_rules

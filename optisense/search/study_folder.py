@@ -5,10 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 
 from optisense.design import SensorDesign, load_design, save_design
+from optisense.design.difference import differences_from, fingerprint, plain_differences
 from optisense.design.storage import files_of
 from optisense.errors import SearchError
 from optisense.folders import LOCK_FILE, FolderLock
-from optisense.search.difference import differences_from, fingerprint, plain_differences
 from optisense.search.settings import STUDY_FILE, StudySettings
 from optisense.search.store import Store
 

@@ -13,10 +13,10 @@ from comparing import SCORE_ROUNDING
 
 import optisense as ots
 from optisense.design import SensorDesign, set_value
+from optisense.design.difference import differences, fingerprint
 from optisense.errors import ObjectiveError, SearchError
 from optisense.search import Around, SearchSpace
 from optisense.search.constraints import PartsApart, UserRule, why_forbidden
-from optisense.search.difference import differences, fingerprint
 from optisense.search.evaluation import DesignEvaluator
 
 LOW = {"photons": 200_000, "resolution": (160, 120), "together": True}
