@@ -11,7 +11,7 @@ import pytest
 
 from optisense.design import SensorDesign
 from optisense.errors import SearchError
-from optisense.search import Around
+from optisense.search import Around, CagePoints
 from optisense.search.methods import names
 from optisense.search.methods.registry import HOMES
 from optisense.search.space import BoundSpace
@@ -118,7 +118,9 @@ class TestGradient(MethodContract):
             "one number": {"camera.fov": (38.0, 42.0)},
             "one number that is at its bound": {"camera.fov": (40.146, 42.0)},
             "two numbers": {"camera.position.x": (-0.5, 0.5), "camera.position.z": (-0.5, 0.5)},
-            "81 numbers": {"cages.M1.points": Around(0.3)},
+            "nine numbers": {
+                "cages.M1.points": CagePoints(Around(0.3), points=tuple(range(9)), axes="x")
+            },
         }
 
     def landscapes(self) -> dict[str, str | Landscape]:
