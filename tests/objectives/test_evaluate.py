@@ -22,6 +22,8 @@ from optisense.objectives.normdiff import CROWD, indented_pixels
 from optisense.objectives.registry import find, pixels_read
 from optisense.objectives.rgb2normal import lines_of
 from optisense.optics.camera.response import auto_exposure, saturate
+from optisense.optics.radiance_cache import store
+from optisense.optics.transport.photons import trace_photons
 
 SMALL: dict[str, Any] = {
     "resolution": (160, 120),
@@ -248,16 +250,19 @@ def test_ctrl_c_is_not_a_failure(evaluation: Evaluation) -> None:
 def test_light_cut_short_by_ctrl_c_gives_no_score(
     model: OpticalModel, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    render = OpticalModel.render
+    traced = 0
 
-    def cut_short(self: OpticalModel, *arguments: Any, **options: Any) -> Any:
-        image = render(self, *arguments, **options)
-        image.interrupted = True
-        return image
+    def cut_short(*arguments: Any, **options: Any) -> Any:
+        nonlocal traced
+        if traced == 1:
+            raise KeyboardInterrupt
+        traced += 1
+        return trace_photons(*arguments, **options)
 
-    monkeypatch.setattr(OpticalModel, "render", cut_short)
-    with pytest.raises(KeyboardInterrupt):
-        evaluate(model, "rgb2normal", **SMALL)
+    monkeypatch.setattr(store, "trace_photons", cut_short)
+    with pytest.raises(KeyboardInterrupt):  # after the first of several passes
+        evaluate(model, "rgb2normal", **{**SMALL, "photons": 2 * store.MAX_SINGLE_PASS, "seed": 77})
+    assert traced == 1
 
 
 def test_progress_only_grows(model: OpticalModel) -> None:
