@@ -228,6 +228,21 @@ class SensorDesign(Model):
         return design
 
 
+def refuse_no_design(given: object) -> None:
+    """Refuse what is given in place of a design, such as the name of one.
+
+    Raises:
+        DesignError: it is no `SensorDesign`; says how to load one.
+    """
+    if isinstance(given, SensorDesign):
+        return
+    named = repr(str(given)) if isinstance(given, str | Path) else "FOLDER_OR_NAME"
+    raise DesignError(
+        f"a design is needed, not {type(given).__name__} {given!r:.60}",
+        hint=f"Load one with optisense.load({named})",
+    )
+
+
 def dotted(path: tuple[str | int, ...]) -> str:
     """'lights.red.lights[0].position' of its keys and indices."""
     text = ""

@@ -6,12 +6,14 @@ import math
 import time
 from collections.abc import Iterable, Mapping
 from dataclasses import fields, replace
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
 
 from optisense.design import SensorDesign
 from optisense.design.near import suggestion
+from optisense.design.sensor_design import refuse_no_design
 from optisense.errors import ObjectiveError, OptiSenseError, SetupError
 from optisense.objectives.evaluation import Evaluation, Tell
 from optisense.objectives.files import place_of
@@ -177,6 +179,8 @@ def _check_kind(name: str, value: Any, default: Any) -> None:
 
 
 def _model(sensor: OpticalModel | SensorDesign) -> OpticalModel:
+    if isinstance(sensor, str | Path):
+        refuse_no_design(sensor)
     if isinstance(sensor, SensorDesign):
         from optisense.optics import OpticalModel
 

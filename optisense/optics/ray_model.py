@@ -11,6 +11,7 @@ import numpy as np
 
 from optisense import geometry
 from optisense.design import SensorDesign, set_value
+from optisense.design.sensor_design import refuse_no_design
 from optisense.errors import ContactError, OptiSenseError, RenderError
 from optisense.geometry import (
     Contact,
@@ -66,6 +67,7 @@ class RayModel:
         """
         from optisense.optics.backend.variant import use_variant
 
+        refuse_no_design(design)
         self.variant = use_variant(variant)
         self.design = design.copy()
         self._assemble()

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from optisense.design import SensorDesign
+from optisense.design.sensor_design import refuse_no_design
 from optisense.errors import FolderInUseError, OptiSenseError, SearchError
 from optisense.search.evaluation import Evaluator, Goal
 from optisense.search.executors import (
@@ -79,6 +80,7 @@ def search(
         ObjectiveError: an objective is unknown.
         SetupError: the renderer or the cluster can't be reached.
     """
+    refuse_no_design(design)
     goals = as_goals(objective)
     named = space if isinstance(space, SearchSpace) else SearchSpace(space)
     making = errors

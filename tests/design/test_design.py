@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+from typing import Any
+
 import numpy as np
 import pytest
 from pydantic import ValidationError
 
+import optisense as ots
 from optisense.design import Cage, Camera, LightGroup, Point, SensorDesign
+from optisense.errors import DesignError
 
 
 def test_channel_flux_adds_up_to_the_flux(design: SensorDesign) -> None:
@@ -72,3 +77,14 @@ def test_changes_in_place_are_checked(design: SensorDesign) -> None:
         design.camera.fov = float("inf")
     with pytest.raises(ValidationError):
         design.coating.specularity = 2.0
+
+
+@pytest.mark.parametrize("given", ["gelsight-mini", Path("my-sensor"), None])
+def test_a_name_in_place_of_a_design_says_how_to_load_it(given: Any) -> None:
+    for use in (
+        ots.OpticalModel,
+        lambda each: ots.search(each, {"camera.fov": (40, 60)}, "aoap"),
+        *([lambda each: ots.evaluate(each, "aoap")] if given is not None else []),
+    ):
+        with pytest.raises(DesignError, match=r"a design is needed.*optisense\.load"):
+            use(given)
