@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import os
 import subprocess
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -16,7 +18,9 @@ LIMIT = 300.0
 
 @pytest.fixture
 def terminal(tmp_path: Path) -> Iterator[Terminal]:
-    with Terminal(tmp_path, reader_environment(tmp_path / "own")) as opened:
+    # The readers' `python` is that of the activated environment; Debian itself has only `python3`.
+    python = {"PATH": f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"}
+    with Terminal(tmp_path, reader_environment(tmp_path / "own") | python) as opened:
         yield opened
 
 
