@@ -32,7 +32,7 @@ SENSORS = ("gelsight-mini", "gelbelt", "gelsight360", "gelsight-svelte")
 OBJECTIVES = ("aoap", "2to3pw")
 DIRECTIONS = 10
 STEPS = (0.04, 0.02)
-"""Of the parameters' ranges, to both sides."""
+"""Steps of the central differences to either side, as fractions of the parameters' ranges."""
 STABLE = 0.05
 """Differences over the two steps that agree to this part of themselves are what derivatives are
 compared with."""

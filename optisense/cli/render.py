@@ -164,7 +164,7 @@ NOISE_PHOTONS = 4.0
 """Million photons that a noise target is expected to take, before the noise is known."""
 
 USUAL_PIXELS = 320 * 240
-"""Of a picture whose shading takes the usual time."""
+"""Pixels of a picture for which the usual time of shading is stated."""
 
 
 def _steps(photons: int | None, noise: float | None, seconds: float | None) -> list[Step]:

@@ -30,7 +30,7 @@ GRACE = 1.5
 
 
 class _State:
-    """Of this process: the signals so far, and what a first one waits for."""
+    """The signals that this process has received, and what a first one waits for."""
 
     def __init__(self) -> None:
         self.signals = 0

@@ -50,10 +50,10 @@ LEAST_PIXELS = 50
 """Indented pixels of a press."""
 
 MOST_WEIGHT = 100.0
-"""Of a range in the sum: the other one no longer counts."""
+"""Largest weight of a range in the sum; at this weight the other range hardly counts."""
 
 MOST_LEAST_PIXELS = 1_000_000
-"""That can be asked of a press: more than any has."""
+"""Largest number of pixels that a press may be asked to have; no press has as many."""
 
 
 CROWD = 0.75

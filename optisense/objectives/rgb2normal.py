@@ -30,7 +30,7 @@ LEAST_PIXELS = 8
 """On a line; a straight fit through fewer says little."""
 
 MOST_LEAST_PIXELS = 10_000
-"""That can be asked of a line or a press: more than any of them has."""
+"""Largest number of pixels that a line or press may be asked to have; none has as many."""
 
 MOST_DIRECTIONS = 360
 """One a degree: lines that are nearer to each other have the same pixels."""

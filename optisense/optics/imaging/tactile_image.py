@@ -21,7 +21,7 @@ from optisense.optics.camera.response import auto_exposure, picture
 from optisense.writing import inside, remove_own_page, written_together
 
 RADIANCE_UNIT = "mW/(mm^2 sr)"
-"""Of each of the three channels of radiance files and layers."""
+"""Unit of radiance in each of the three channels of radiance files and layers."""
 
 REPORT_FILE = "report.html"
 """The page that `optisense render` writes beside an image."""
