@@ -83,7 +83,3 @@ class TaskError(OptiSenseError):
 
 class SearchError(OptiSenseError):
     """A search space, a method or a study that makes no sense, or can't go on."""
-
-
-class ExperimentError(OptiSenseError):
-    """An experiment that is unknown, or whose results can't be read."""

@@ -21,7 +21,6 @@ _HOMES = {
     "apply": "apply",
     "report": "report",
     "tolerance": "tolerance",
-    "experiment": "experiment",
     "export": "export",
     "studio": "studio",
     "engine": "engine",

@@ -190,7 +190,6 @@ def test_of_two_datasets_in_one_folder_one_wins_whole(tmp_path: Path) -> None:
         ["task", "cylinder-radius", "gelsight-mini", "--out"],
         ["tolerance", "gelsight-mini", "--out"],
         ["evaluate", "gelsight-mini", "--out"],
-        ["experiment", "mini-shapes", "--quick", "--out"],
     ],
     ids=lambda words: words[0],
 )

@@ -18,6 +18,7 @@ import pytest
 from typer.testing import CliRunner
 
 from optisense.cli import app
+from paper.__main__ import app as paper_app
 
 from .markdown import RUN, Block, blocks, code_spans
 from .terminal import Outcome, Terminal, reader_environment
@@ -26,11 +27,19 @@ ROOT = Path(__file__).parents[2]
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
 BLOCKS = {page: blocks(page) for page in PAGES}
 
-IN_THE_CLONE = ("README.md", "install.md", "your-sensor.md")
+IN_THE_CLONE = ("README.md", "experiments.md", "install.md", "your-sensor.md")
 """Pages that say that their commands are typed in the folder of the clone."""
 ACTIVATING = ("README.md",)
 """Pages that activate the virtual environment themselves."""
-CLONED = ("Makefile", "README.md", "docs", "pyproject.toml", "requirements*.lock", "scripts")
+CLONED = (
+    "Makefile",
+    "README.md",
+    "docs",
+    "paper",
+    "pyproject.toml",
+    "requirements*.lock",
+    "scripts",
+)
 """What these pages use of a clone. The package itself is the one under test."""
 
 LIMIT = 1200.0
@@ -123,12 +132,13 @@ def test_commands_that_are_not_typed_exist_with_their_options() -> None:
         for span in code_spans(page)
         if not NAMES_AN_OPTION.search(span)
     ]
-    checked = [each for each in commands if each[1].startswith("optisense ")]
-    assert len(checked) > 20
-    for place, command in checked:
-        words = shlex.split(command.removeprefix("optisense "), comments=True)
-        result = CliRunner().invoke(app, [*words, "--help"])
-        assert result.exit_code == 0, f"{place}: {command}\n{result.output}"
+    for start, program, least in (("optisense ", app, 20), ("python -m paper ", paper_app, 5)):
+        checked = [each for each in commands if each[1].startswith(start)]
+        assert len(checked) > least
+        for place, command in checked:
+            words = shlex.split(command.removeprefix(start), comments=True)
+            result = CliRunner().invoke(program, [*words, "--help"])
+            assert result.exit_code == 0, f"{place}: {command}\n{result.output}"
 
 
 def type_page(page: Path, shown: list[Block], work: Path) -> None:

@@ -1,6 +1,6 @@
 """The questions that experiments ask: scores, pictures, tasks, searches, and what they take.
 
-Each function here is the work of units (see `optisense.experiments.unit`): it gets plain values and
+Each function here is the work of units (see `paper.unit`): it gets plain values and
 returns plain values. A model is kept from one unit to the next of the same sensor, in a way that
 the answer does not depend on what was asked before.
 """
@@ -16,11 +16,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from optisense.design import SensorDesign, set_value
-from optisense.experiments.unit import Found
 from optisense.geometry import Contact, parse_contact
 from optisense.objectives import Evaluation, Score, Settings, evaluate
 from optisense.search.models import RAYS_ONLY, ModelKeeper
 from optisense.sensors import BUILDERS
+from paper.unit import Found
 
 if TYPE_CHECKING:
     from optisense.optics import OpticalModel
@@ -151,7 +151,7 @@ def picture(inputs: Plain, folder: Path) -> Found:
     """What the camera sees: `design`, `contacts`, `resolution`, `photons`, `seed`.
 
     Contacts are texts as on the command line, or `NINE` with `depth`; an indenter named
-    ``object:NAME`` is one of `optisense.experiments.objects`. Also tells how bright the picture is,
+    ``object:NAME`` is one of `paper.objects`. Also tells how bright the picture is,
     before exposure: `radiance`, the mean over the sensing surface and the channels.
     """
     model = _model(inputs["design"], lit=True)
@@ -284,7 +284,7 @@ def _model(plain: Plain, lit: bool) -> OpticalModel:
 
 
 def _contact(text: str) -> Contact:
-    from optisense.experiments.objects import OBJECTS
+    from paper.objects import OBJECTS
 
     kind, _, place = text.partition("@")
     if not kind.startswith("object:"):

@@ -5,9 +5,9 @@ from __future__ import annotations
 import itertools
 from typing import Any
 
-from optisense.experiments import EXPERIMENTS, Unit
-from optisense.experiments.evaluations import perception, picture, scores, searched, sensor
-from optisense.experiments.shares import LEAST_UNITS, shares
+from paper import EXPERIMENTS, Unit
+from paper.evaluations import perception, picture, scores, searched, sensor
+from paper.shares import LEAST_UNITS, shares
 
 
 def score(name: str, seed: int, change: dict[str, Any] | None = None, **dimensions: float) -> Unit:

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from optisense.design.near import suggestion
-from optisense.errors import ExperimentError
-from optisense.experiments import (
+from paper import (
     gelbelt_lights,
     gelsight360,
     mini_shapes,
@@ -13,7 +12,8 @@ from optisense.experiments import (
     svelte_mirror,
     tasks,
 )
-from optisense.experiments.experiment import Experiment
+from paper.errors import ExperimentError
+from paper.experiment import Experiment
 
 EXPERIMENTS: dict[str, Experiment] = {
     module.EXPERIMENT.name: module.EXPERIMENT

@@ -14,13 +14,13 @@ import yaml
 from numpy.typing import NDArray
 
 from optisense import __version__
-from optisense.errors import ExperimentError
-from optisense.experiments.bench import Bench
-from optisense.experiments.claims import Claim, Table
-from optisense.experiments.unit import Record, Unit
 from optisense.objectives.score import json_ready
 from optisense.search.settings import package_versions
 from optisense.writing import write_json, write_text, written_whole
+from paper.bench import Bench
+from paper.claims import Claim, Table
+from paper.errors import ExperimentError
+from paper.unit import Record, Unit
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -79,7 +79,7 @@ class Experiment:
         Raises:
             ExperimentError: less than one seed.
         """
-        file = files("optisense.experiments") / f"{self.name.replace('-', '_')}.yaml"
+        file = files("paper") / f"{self.name.replace('-', '_')}.yaml"
         stored = yaml.safe_load(file.read_text(encoding="utf-8"))
         chosen: Values = {**stored["full"], **(stored["quick"] if quick else {})}
         if seeds is not None:
@@ -173,7 +173,7 @@ def write(
     Raises:
         OutputError: they can't be written.
     """
-    from optisense.experiments.text import chapter
+    from paper.text import chapter
 
     with written_whole(folder / PICTURE, "a picture") as temporary:
         experiment.draw(dict(result["numbers"]), pictures).savefig(temporary, dpi=DOTS_PER_INCH)

@@ -10,10 +10,10 @@ from typing import Any
 
 import pytest
 
-from optisense.errors import ExperimentError
-from optisense.experiments import EXPERIMENTS, Experiment, Finding, Record, find, write_page
-from optisense.experiments.experiment import PICTURE, RESULT, TEXT, gaps, write
 from optisense.objectives.score import json_ready
+from paper import EXPERIMENTS, Experiment, Finding, Record, find, write_page
+from paper.errors import ExperimentError
+from paper.experiment import PICTURE, RESULT, TEXT, gaps, write
 
 Answered = Callable[..., tuple[Finding, list[Record]]]
 """See conftest.py."""
@@ -125,7 +125,7 @@ def test_gelbelts_lights(winner: int, verdict: str, answered: Answered) -> None:
 
 
 def test_gelsight360_in_the_papers_order_and_in_the_opposite_one(answered: Answered) -> None:
-    from optisense.experiments.gelsight360_claims import PAPER
+    from paper.gelsight360_claims import PAPER
 
     def papers(sign: float) -> Any:
         def score(objective: str, design: dict[str, Any], seed: int) -> float:

@@ -11,8 +11,8 @@ import pytest
 from comparing import SCORE_ROUNDING
 
 import optisense as ots
-from optisense.experiments import Record
-from optisense.experiments.evaluations import (
+from paper import Record
+from paper.evaluations import (
     NINE,
     axes_ratio,
     design_of,
@@ -25,9 +25,9 @@ from optisense.experiments.evaluations import (
     stretch,
     variants_of_score,
 )
-from optisense.experiments.gelsight360 import every_colouring
-from optisense.experiments.objects import OBJECTS
-from optisense.experiments.timing import image_times
+from paper.gelsight360 import every_colouring
+from paper.objects import OBJECTS
+from paper.timing import image_times
 
 IMAGES = {"resolution": [160, 120], "photons": 60_000, "seed": 3}
 SAME = 1e-6

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from optisense.experiments.spread import best, is_larger, number, shown, spearman, spread
+from paper.spread import best, is_larger, number, shown, spearman, spread
 
 
 def test_mean_and_deviation_of_a_sample() -> None:

@@ -4,12 +4,12 @@ An experiment asks units (single evaluations, each kept in a file of its own), m
 they find, and holds these against the paper's statements. Settings are in a YAML file beside each.
 """
 
-from optisense.experiments.bench import Bench
-from optisense.experiments.claims import Claim, Table
-from optisense.experiments.experiment import Experiment, Finding, prepare, run
-from optisense.experiments.registry import EXPERIMENTS, find
-from optisense.experiments.text import write_page
-from optisense.experiments.unit import Found, Record, Unit
+from paper.bench import Bench
+from paper.claims import Claim, Table
+from paper.experiment import Experiment, Finding, prepare, run
+from paper.registry import EXPERIMENTS, find
+from paper.text import write_page
+from paper.unit import Found, Record, Unit
 
 __all__ = [
     "EXPERIMENTS",

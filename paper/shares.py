@@ -9,8 +9,8 @@ from __future__ import annotations
 import json
 from collections.abc import Iterable
 
-from optisense.experiments.unit import Unit
 from optisense.objectives.score import json_ready
+from paper.unit import Unit
 
 LEAST_UNITS = 6
 """Of a share, where so many have the same sensor: fewer build it anew often, more are spread badly

@@ -8,22 +8,22 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from optisense.experiments.claims import Table
-from optisense.experiments.evaluations import (
+from optisense.objectives.normdiff import LEAST_PIXELS as LEAST_OF_NORMDIFF
+from optisense.objectives.rgb2normal import LEAST_PIXELS as LEAST_OF_RGB2NORMAL
+from paper.claims import Table
+from paper.evaluations import (
     relit_scores,
     scores,
     searched,
     sensor,
     variants_of_score,
 )
-from optisense.experiments.experiment import Experiment, Finding, Pictures, Steps, Values
-from optisense.experiments.figures import COLOURS, finish, line
-from optisense.experiments.gelsight360_claims import LITTLE_NOISE, PAPER, claims
-from optisense.experiments.mini_shapes import OBJECTIVES
-from optisense.experiments.spread import number, shown, spearman, spread
-from optisense.experiments.unit import Record, Unit
-from optisense.objectives.normdiff import LEAST_PIXELS as LEAST_OF_NORMDIFF
-from optisense.objectives.rgb2normal import LEAST_PIXELS as LEAST_OF_RGB2NORMAL
+from paper.experiment import Experiment, Finding, Pictures, Steps, Values
+from paper.figures import COLOURS, finish, line
+from paper.gelsight360_claims import LITTLE_NOISE, PAPER, claims
+from paper.mini_shapes import OBJECTIVES
+from paper.spread import number, shown, spearman, spread
+from paper.unit import Record, Unit
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

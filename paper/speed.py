@@ -11,13 +11,13 @@ import platform
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from optisense.experiments.claims import Claim, Table
-from optisense.experiments.evaluations import sensor
-from optisense.experiments.experiment import Experiment, Finding, Pictures, Steps, Values
-from optisense.experiments.figures import finish
-from optisense.experiments.spread import number, shown, spread
-from optisense.experiments.timing import image_times
-from optisense.experiments.unit import Unit
+from paper.claims import Claim, Table
+from paper.evaluations import sensor
+from paper.experiment import Experiment, Finding, Pictures, Steps, Values
+from paper.figures import finish
+from paper.spread import number, shown, spread
+from paper.timing import image_times
+from paper.unit import Unit
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

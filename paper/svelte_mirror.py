@@ -10,12 +10,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from optisense.experiments.claims import Claim, Table
-from optisense.experiments.evaluations import picture, scores, searched, sensor, stretch
-from optisense.experiments.experiment import Experiment, Finding, Pictures, Steps, Values
-from optisense.experiments.figures import finish, image
-from optisense.experiments.spread import Spread, shown, spread
-from optisense.experiments.unit import Record, Unit
+from paper.claims import Claim, Table
+from paper.evaluations import picture, scores, searched, sensor, stretch
+from paper.experiment import Experiment, Finding, Pictures, Steps, Values
+from paper.figures import finish, image
+from paper.spread import Spread, shown, spread
+from paper.unit import Record, Unit
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -1,4 +1,4 @@
-"""``optisense experiment``: the paper's tables and figures, made again."""
+"""``python -m paper``: the paper's tables and figures, made again."""
 
 from __future__ import annotations
 
@@ -9,15 +9,25 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from optisense.cli import stopping
 from optisense.cli.console import EXIT_INTERRUPTED, ends_well, messages, output
+from optisense.cli.leaving import run_and_leave
 from optisense.cli.progress import progress_line
 from optisense.time_left import Step, TimeLeft
 
 if TYPE_CHECKING:
-    from optisense.experiments import Experiment
-    from optisense.experiments.bench import Tell
+    from paper import Experiment
+    from paper.bench import Tell
+
+app = typer.Typer(
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    rich_markup_mode="rich",
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
 
 
+@app.command()
 @ends_well
 def experiment(
     name: Annotated[
@@ -36,7 +46,7 @@ def experiment(
         typer.Option(
             "--out", "-o", metavar="DIR", help="Folder of results; what is in it is not done again."
         ),
-    ] = Path("experiments"),
+    ] = Path("paper-results"),
     seeds: Annotated[
         int | None,
         typer.Option(
@@ -70,9 +80,9 @@ def experiment(
         return
 
     from optisense.cli.output_folder import ensure_writable, take_folder
-    from optisense.experiments import find, prepare, run, write_page
-    from optisense.experiments.bench import Bench
     from optisense.search.executors import processors
+    from paper import find, prepare, run, write_page
+    from paper.bench import Bench
 
     chosen = find(name)
     for each in chosen:
@@ -127,7 +137,7 @@ def _shown_units(name: str, workers: int) -> Iterator[Tell]:
 def _print_list() -> None:
     from rich.table import Table
 
-    from optisense.experiments import EXPERIMENTS
+    from paper import EXPERIMENTS
 
     table = Table(box=None, pad_edge=False, show_header=False)
     for each in EXPERIMENTS.values():
@@ -147,3 +157,13 @@ def _print_result(experiment: Experiment, result: dict[str, Any], out: Path) -> 
     minutes = result["seconds"]["processor"] / 60.0
     told = f"  {result['units']} evaluations, {minutes:.1f} processor minutes"
     output.print(f"{told}; results: {out / experiment.name}", markup=False)
+
+
+def main() -> None:
+    """Run the command with the process's arguments and exit."""
+    stopping.watch()
+    run_and_leave(app)
+
+
+if __name__ == "__main__":
+    main()

@@ -13,12 +13,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from optisense.experiments.claims import Claim, Table
-from optisense.experiments.experiment import Experiment, Finding, Pictures, Steps, Values
-from optisense.experiments.figures import finish
-from optisense.experiments.robustness_questions import CONCLUSIONS, QUESTIONS, Question
-from optisense.experiments.spread import number, spread
-from optisense.experiments.unit import Unit
+from paper.claims import Claim, Table
+from paper.experiment import Experiment, Finding, Pictures, Steps, Values
+from paper.figures import finish
+from paper.robustness_questions import CONCLUSIONS, QUESTIONS, Question
+from paper.spread import number, spread
+from paper.unit import Unit
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

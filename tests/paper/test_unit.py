@@ -13,10 +13,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from optisense.errors import ExperimentError, ObjectiveError, SetupError
-from optisense.experiments import Bench, Found, Unit
-from optisense.experiments.evaluations import scores, sensor
-from optisense.experiments.unit import UNITS, kept
+from optisense.errors import ObjectiveError, SetupError
+from paper import Bench, Found, Unit
+from paper.errors import ExperimentError
+from paper.evaluations import scores, sensor
+from paper.unit import UNITS, kept
 
 asked: list[Any] = []
 stop_at: set[Any] = set()
@@ -76,7 +77,7 @@ def test_another_input_or_release_is_another_question(
 ) -> None:
     Bench(tmp_path).run(units(5))
     Bench(tmp_path).run(units(6))
-    monkeypatch.setattr("optisense.experiments.unit.__version__", "another")
+    monkeypatch.setattr("paper.unit.__version__", "another")
     Bench(tmp_path).run(units(5))
     assert asked == [5, 6, 5]
 
@@ -120,8 +121,8 @@ def test_processes_find_the_same_as_one(tmp_path: Path) -> None:
 KILLED = """
 import sys
 from pathlib import Path
-from optisense.experiments import Bench, Unit
-from optisense.experiments.evaluations import scores, sensor
+from paper import Bench, Unit
+from paper.evaluations import scores, sensor
 
 def rays(width):
     inputs = {"design": sensor("gelsight-mini"), "objectives": ["aoap"],

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from optisense.experiments import Experiment, Finding, Record, Unit
+from paper import Experiment, Finding, Record, Unit
 
 Score = Callable[[str, dict[str, Any], int], float | None]
 """Of an objective, a design as plain values, and a seed."""

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from optisense.experiments.evaluations import design_of
-from optisense.experiments.unit import Found
+from paper.evaluations import design_of
+from paper.unit import Found
 
 if TYPE_CHECKING:
     from optisense.optics import TactileImage

@@ -8,12 +8,12 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from optisense.errors import ExperimentError
-from optisense.experiments.claims import AGREES, DISAGREES, OPEN
 from optisense.writing import write_text
+from paper.claims import AGREES, DISAGREES, OPEN
+from paper.errors import ExperimentError
 
 if TYPE_CHECKING:
-    from optisense.experiments.experiment import Experiment
+    from paper.experiment import Experiment
 
 MOST_GAPS = 6
 """Gaps that are told one by one."""
@@ -71,7 +71,7 @@ def _how(name: str, result: Mapping[str, Any]) -> str:
     seeds = result["settings"].get("seeds")
     over = f", {seeds} seed{'s' if seeds > 1 else ''}" if seeds else ""
     return (
-        f"Made by `optisense experiment {name}{' --quick' if result['quick'] else ''}`: "
+        f"Made by `python -m paper {name}{' --quick' if result['quick'] else ''}`: "
         f"{result['units']} evaluations{over}, {seconds['processor'] / 60:.1f} processor minutes. "
         "± is the standard deviation over seeds."
     )
@@ -83,7 +83,7 @@ def read_result(folder: Path) -> dict[str, Any]:
     Raises:
         ExperimentError: there is none, or it can't be read.
     """
-    from optisense.experiments.experiment import RESULT
+    from paper.experiment import RESULT
 
     path = folder / RESULT
     try:
@@ -107,7 +107,7 @@ def write_page(page: Path, results: Path, experiments: list[Experiment]) -> None
         ExperimentError: an experiment has no result.
         OutputError: something can't be written.
     """
-    from optisense.experiments.experiment import PICTURE, RESULT
+    from paper.experiment import PICTURE, RESULT
 
     beside = page.with_suffix("")
     beside.mkdir(parents=True, exist_ok=True)
@@ -127,7 +127,7 @@ def write_page(page: Path, results: Path, experiments: list[Experiment]) -> None
         rows.append(f"| [{experiment.title}](#{_anchor(experiment.title)}) | {told} |")
     head = [
         "# The paper's tables and figures, made again",
-        "Written by `optisense experiment all --page FILE`; do not edit.",
+        "Written by `python -m paper all --page FILE`; do not edit.",
         INTRODUCTION,
         "\n".join(["| experiment | the paper's statements |", "| --- | --- |", *rows]),
         f"In all: {', '.join(_counted(count, verdict) for verdict, count in counts.items())}.",
@@ -170,18 +170,19 @@ figures: where a statement does not hold here, the text says so, and what explai
 worked out from the numbers. *Cannot be told* means that the differences are within what seeds
 scatter by.
 
-Without a name the command lists the experiments. A quick run makes fewer evaluations at lower
-quality; this one takes about twenty seconds:
+The experiments are a part of the source and not of the installed package: their commands are typed
+in the folder of the clone. Without a name the command lists the experiments. A quick run makes
+fewer evaluations at lower quality; this one takes about twenty seconds:
 
 ```console
-$ optisense experiment
-$ optisense experiment svelte-mirror --quick --seeds 1 --out quick-results
+$ python -m paper
+$ python -m paper svelte-mirror --quick --seeds 1 --out quick-results
 ```
 
 All experiments in full take about an hour on two processors:
 
 ```console long
-$ optisense experiment all --out results
+$ python -m paper all --out results
 ```
 
 The same command continues a run that was stopped: what is finished in the folder is not done again.

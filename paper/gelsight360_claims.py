@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from optisense.experiments.claims import Claim
-from optisense.experiments.experiment import Values
-from optisense.experiments.mini_shapes import OBJECTIVES
-from optisense.experiments.spread import best, number, shown, spearman
+from paper.claims import Claim
+from paper.experiment import Values
+from paper.mini_shapes import OBJECTIVES
+from paper.spread import best, number, shown, spearman
 
 PAPER = {
     "GRRGGRRG": {"normdiff": -37.745, "rgb2normal": 0.909},

@@ -19,10 +19,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from optisense import __version__
-from optisense.errors import ExperimentError, OptiSenseError, OutputError, SetupError
+from optisense.errors import OptiSenseError, OutputError, SetupError
 from optisense.objectives.score import json_ready
 from optisense.search.settings import package_versions
 from optisense.writing import inside, write_json, written_together
+from paper.errors import ExperimentError
 
 UNITS = "units"
 """Folder, within that of all results, of what units found."""

@@ -9,13 +9,13 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from optisense.experiments.claims import Claim, Table
-from optisense.experiments.evaluations import perception, sensor
-from optisense.experiments.experiment import Experiment, Finding, Pictures, Steps, Values
-from optisense.experiments.figures import COLOURS, finish, line
-from optisense.experiments.mini_shapes import OBJECTIVES, SHAPES, curves, score_units
-from optisense.experiments.spread import is_larger, number, shown, spearman, spread
-from optisense.experiments.unit import Unit
+from paper.claims import Claim, Table
+from paper.evaluations import perception, sensor
+from paper.experiment import Experiment, Finding, Pictures, Steps, Values
+from paper.figures import COLOURS, finish, line
+from paper.mini_shapes import OBJECTIVES, SHAPES, curves, score_units
+from paper.spread import is_larger, number, shown, spearman, spread
+from paper.unit import Unit
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

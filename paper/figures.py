@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from optisense.experiments.spread import Spread
 from optisense.report.drawing import AMBER, BLUE, GREY, RED
+from paper.spread import Spread
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -6,16 +6,16 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from optisense.experiments import (
+from paper import (
     gelbelt_lights,
     gelsight360,
     gelsight360_claims,
     svelte_mirror,
 )
-from optisense.experiments.evaluations import NINE, picture, relit_scores, scores, sensor
-from optisense.experiments.experiment import Values
-from optisense.experiments.mini_shapes import OBJECTIVES
-from optisense.experiments.unit import Record, Unit
+from paper.evaluations import NINE, picture, relit_scores, scores, sensor
+from paper.experiment import Values
+from paper.mini_shapes import OBJECTIVES
+from paper.unit import Record, Unit
 
 LOW, HIGH = "0.2", "0.6"
 """Specularities of the Mini's coating that are compared."""

@@ -8,12 +8,12 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from optisense.experiments.claims import Claim, Table
-from optisense.experiments.evaluations import NINE, picture, scores, sensor
-from optisense.experiments.experiment import Experiment, Finding, Pictures, Steps, Values
-from optisense.experiments.figures import COLOURS, finish, image, line
-from optisense.experiments.spread import best, number, shown, spread
-from optisense.experiments.unit import Unit
+from paper.claims import Claim, Table
+from paper.evaluations import NINE, picture, scores, sensor
+from paper.experiment import Experiment, Finding, Pictures, Steps, Values
+from paper.figures import COLOURS, finish, image, line
+from paper.spread import best, number, shown, spread
+from paper.unit import Unit
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

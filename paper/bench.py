@@ -10,11 +10,11 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from optisense.errors import ExperimentError
-from optisense.experiments.shares import shares
-from optisense.experiments.unit import Record, Unit, kept, work_out
 from optisense.search.executors import ProcessPool
 from optisense.search.outcome import Outcome
+from paper.errors import ExperimentError
+from paper.shares import shares
+from paper.unit import Record, Unit, kept, work_out
 
 Tell = Callable[[int, int, str], None]
 """Called with the number of finished units, of all units, and the label of one."""
