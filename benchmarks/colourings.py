@@ -24,11 +24,11 @@ from benchmarks.results import machine
 from optisense.design import SensorDesign, set_value
 from optisense.objectives import Evaluation, Settings
 from optisense.optics import OpticalModel
-from optisense.search import Plan, Result, SearchSpace, Study, Trial
-from optisense.search.evaluation import Evaluator
+from optisense.search import Plan, SearchResult, SearchSpace, Study, Trial
+from optisense.search.evaluation.evaluator import Evaluator
 from optisense.search.executors import SerialRunner
-from optisense.search.rescoring import fresh_seeds
-from optisense.search.running import Run
+from optisense.search.study.loop import StudyRun
+from optisense.search.study.rescoring import fresh_seeds
 
 FOLDER = Path(__file__).parent
 OBJECTIVES = ("rgb2normal", "normdiff")
@@ -63,7 +63,7 @@ def main() -> None:
         settings={"photons": photons},
     )
     runner = KeptRunner()
-    result = Run(Study.create(options.out, design, plan), runner.begin).go()
+    result = StudyRun(Study.create(options.out, design, plan), runner.begin).go()
     total, processor = time.perf_counter() - began, time.process_time() - spent
     trials = [trial for trial in result.trials if not trial.is_start]
     seconds = [trial.outcome.seconds for trial in result.trials]
@@ -145,7 +145,7 @@ class KeptRunner:
 
 
 def compared(
-    result: Result, evaluator: Evaluator, trials: list[Trial], photons: int, console: Console
+    result: SearchResult, evaluator: Evaluator, trials: list[Trial], photons: int, console: Console
 ) -> Iterator[dict[str, Any]]:
     """Five colourings, drawn at random: scored from layers and rendered by themselves.
 

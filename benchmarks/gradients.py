@@ -19,11 +19,11 @@ from rich.console import Console
 import optisense
 from benchmarks.results import machine
 from optisense.errors import NoDerivativeError
-from optisense.search import Around, Result, SearchSpace, search
-from optisense.search.evaluation import DesignEvaluator
+from optisense.search import Around, SearchResult, SearchSpace, search
+from optisense.search.evaluation.evaluator import DesignEvaluator
 from optisense.search.methods.base import Problem
 from optisense.search.methods.gradient import Gradient, SlopeEvaluator
-from optisense.search.space import BoundSpace
+from optisense.search.space.search_space import BoundSpace
 
 FloatArray = NDArray[np.float64]
 
@@ -115,7 +115,7 @@ def searches() -> dict[str, Any]:
     """The view of GelSight360 by AOAP: by gradient, and by CMA-ES."""
     found: dict[str, Any] = {}
     for method, budget in VIEW_BUDGET.items():
-        result: Result = search(
+        result: SearchResult = search(
             optisense.load("gelsight360"), VIEW, "aoap", method=method, budget=budget
         )
         best = result.best

@@ -23,9 +23,9 @@ from benchmarks.results import machine
 from benchmarks.workers import workers
 from optisense.design import SensorDesign
 from optisense.search import Around, Outcome, Plan, SearchSpace, Study, run_study
-from optisense.search.evaluation import Evaluator
+from optisense.search.evaluation.evaluator import Evaluator
 from optisense.search.executors import ProcessPool, Runner, SerialRunner
-from optisense.search.running import Run
+from optisense.search.study.loop import StudyRun
 
 FOLDER = Path(__file__).parent
 PARTS = ("overhead", "workers", "coatings", "gradient", "mirror")
@@ -55,7 +55,7 @@ class Nothing:
     renders = False
 
     def __call__(self, vector: np.ndarray, seed: int) -> Outcome:
-        """See `optisense.search.evaluation.Evaluator`."""
+        """See `optisense.search.evaluation.evaluator.Evaluator`."""
         return Outcome({"nothing": -float(np.abs(vector).sum())})
 
 
@@ -96,7 +96,7 @@ def overhead() -> dict[str, Any]:
                 space=SearchSpace(MIRROR), goals=[nothing], budget=OVERHEAD_TRIALS, apart=False
             )
             study = Study.create(Path(folder) / "study", design, plan)
-            run = Run(study, make_runner)
+            run = StudyRun(study, make_runner)
             cpu, wall, children = time.process_time(), time.perf_counter(), _children()
             run.go()
             cpu, wall = time.process_time() - cpu, time.perf_counter() - wall

@@ -34,10 +34,10 @@ from optisense.design import SensorDesign, get_value, set_value
 from optisense.design.limits import LARGEST
 from optisense.errors import OptiSenseError
 from optisense.optics import OpticalModel
-from optisense.search.best import best_of, tied
-from optisense.search.evaluation import DesignEvaluator
-from optisense.search.space import SearchSpace
-from optisense.search.trial import Trial
+from optisense.search.evaluation.evaluator import DesignEvaluator
+from optisense.search.space.search_space import SearchSpace
+from optisense.search.study.best import best_of, tied
+from optisense.search.study.trial import Trial
 from optisense.sensors import load
 from optisense.sensors.registry import BUILDERS
 from optisense.writing import write_text

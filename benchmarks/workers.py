@@ -17,11 +17,11 @@ import numpy as np
 import optisense
 from optisense.design import SensorDesign
 from optisense.search import Outcome, Plan, SearchSpace, Study
-from optisense.search.evaluation import Evaluator
+from optisense.search.evaluation.evaluator import Evaluator
 from optisense.search.executors import ProcessPool, Runner
 from optisense.search.executors.pool import processors
-from optisense.search.running import Run
-from optisense.search.store import Row
+from optisense.search.study.loop import StudyRun
+from optisense.search.study.store import Row
 
 BLEND = {"cages.M1.blend": (0.0, 1.0)}
 """Between the flat and the most curved mirror: no part cuts through another, no trial fails."""
@@ -49,7 +49,7 @@ class Clocked:
         self.evaluator = evaluator
 
     def __call__(self, vector: np.ndarray, seed: int) -> Outcome:
-        """See `optisense.search.evaluation.Evaluator`."""
+        """See `optisense.search.evaluation.evaluator.Evaluator`."""
         began = time.process_time()
         outcome = self.evaluator(vector, seed)
         spent = time.process_time() - began
@@ -102,7 +102,7 @@ def _measured(design: SensorDesign, plan: Plan, count: int, threads: int) -> dic
     def runner(evaluator: Evaluator) -> Runner:
         return ProcessPool(Clocked(evaluator), count, threads=threads)
 
-    Run(study, runner, stop).go()
+    StudyRun(study, runner, stop).go()
     study.close()
     rates = [(len(rows) - 1) / (rows[-1].finished - rows[0].finished) for rows in counted]  # type: ignore[operator]
     cpu = [row.outcome.parts["clock"]["cpu"] for rows in counted for row in rows[1:] if row.outcome]

@@ -11,11 +11,12 @@ from typing import TYPE_CHECKING
 from optisense.lazy_names import load_on_first_use
 
 if TYPE_CHECKING:
+    from optisense import search
     from optisense.design import SensorDesign, get_value, load_design, set_value
     from optisense.geometry import Contact, Cylinder, MeshIndenter, Plane, Sphere
     from optisense.objectives import Score, evaluate, objective
     from optisense.optics import OpticalModel
-    from optisense.search import SearchSpace, search
+    from optisense.search import SearchSpace
     from optisense.sensors import check, load, save_design
     from optisense.version import __version__
 
@@ -37,7 +38,7 @@ _HOMES = {
     "load_design": ".design",
     "objective": ".objectives",
     "save_design": ".sensors",
-    "search": ".search",  # a package that can be called: see there
+    "search": ".search",  # the package; a search is `optisense.search.search(...)`
     "set_value": ".design",
 }
 

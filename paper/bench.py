@@ -10,8 +10,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from optisense.search.evaluation.outcome import Outcome
 from optisense.search.executors import ProcessPool
-from optisense.search.outcome import Outcome
 from paper.errors import ExperimentError
 from paper.shares import shares
 from paper.unit import Record, Unit, kept, work_out
@@ -117,7 +117,7 @@ class _Worker:
         self._folder = folder
 
     def __call__(self, vector: NDArray[np.float64], seed: int) -> Outcome:
-        """See `optisense.search.evaluation.Evaluator`; what was found is in the units' files."""
+        """See `Evaluator` of searches; the results are in the units' files."""
         for unit in self._shares[int(vector[0])]:
             if kept(unit, self._folder) is None:  # it may be there: of a process that died
                 work_out(unit, self._folder)

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from optisense.design import SensorDesign, set_value
 from optisense.geometry import Contact, parse_contact
 from optisense.objectives import Evaluation, Score, Settings, evaluate
-from optisense.search.models import RAYS_ONLY, ModelKeeper
+from optisense.search.evaluation.models import RAYS_ONLY, ModelKeeper
 from optisense.sensors import BUILDERS
 from paper.unit import Found
 

@@ -21,7 +21,7 @@ from pathlib import Path
 
 import optisense as ots
 from optisense.search import Plan, SearchSpace, Study, search
-from optisense.search.applied import design_of
+from optisense.search.study.applied import design_of
 from optisense.sensors import save_design
 
 EVENTS = {"open", "os.mkdir", "os.rename", "os.remove", "os.rmdir", "sqlite3.connect"}

@@ -43,8 +43,8 @@ def test_every_public_name_loads_and_is_listed(package: str) -> None:
         assert name in vars(module)
 
 
-def test_search_is_a_package_and_can_be_called() -> None:
+def test_search_is_a_package_with_the_function_in_it() -> None:
     from optisense import search
 
     assert search is sys.modules["optisense.search"]
-    assert callable(search)
+    assert callable(search.search)

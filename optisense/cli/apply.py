@@ -28,7 +28,7 @@ def apply(
 ) -> None:
     """Write the better design that a search has found."""
     from optisense.search import Study
-    from optisense.search.applied import design_of
+    from optisense.search.study.applied import design_of
     from optisense.sensors import save_design
 
     opened = Study.open(study)

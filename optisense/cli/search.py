@@ -132,7 +132,7 @@ def search(
         typer.Option(
             "--error",
             metavar="PATH=SIZE",
-            help="An error of making (standard deviation). With one or more, what nine of ten "
+            help="A manufacturing error (standard deviation). With one or more, what nine of ten "
             "manufactured sensors reach is maximised.",
             show_default=False,
         ),
@@ -206,8 +206,8 @@ def _given(
     samples: int | None,
 ) -> dict[str, Any]:
     """What the user gave, read, as arguments of `optisense.search.Plan`."""
-    from optisense.search.constraints import UserRule
-    from optisense.search.text import parse_errors, parse_space
+    from optisense.search.space.constraints import UserRule
+    from optisense.search.space.text import parse_errors, parse_space
 
     found: dict[str, Any] = {
         "space": parse_space(vary) if vary else None,
@@ -244,8 +244,8 @@ def _begun(out: Path, design: str | None, budget: int | None, given: dict[str, A
 def _resumed(out: Path, design: str | None, given: dict[str, Any], trust: bool) -> Study:
     """The study in a folder; what was given as well must be what it was begun with."""
     from optisense.search import SearchSpace, Study
-    from optisense.search.plan import reference, rule_reference
-    from optisense.search.trust import not_trusted
+    from optisense.search.study.plan import reference, rule_reference
+    from optisense.search.study.trust import not_trusted
     from optisense.sensors import load
 
     study = Study.open(out, None if design is None else load(design))

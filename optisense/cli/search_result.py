@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from optisense.cli.console import messages, output
 
 if TYPE_CHECKING:
-    from optisense.search import Result, Study, Trial
+    from optisense.search import SearchResult, Study, Trial
 
 MOST_CAUSES = 4
 """Causes of failure that are printed; the report lists more."""
@@ -19,7 +19,7 @@ MOST_VALUES = 12
 """Parameters of the best trial that are printed; all are in the study."""
 
 
-def summary(result: Result) -> dict[str, Any]:
+def summary(result: SearchResult) -> dict[str, Any]:
     """The result, ready for JSON."""
     trials = result.trials
     best = result.study.best
@@ -51,11 +51,11 @@ def _or_none(value: float) -> float | None:
     return value if math.isfinite(value) else None
 
 
-def _several(result: Result) -> bool:
+def _several(result: SearchResult) -> bool:
     return len(result.study.settings.names) > 1
 
 
-def print_result(result: Result, out: Path) -> None:
+def print_result(result: SearchResult, out: Path) -> None:
     """The best trial, what stands beside it, and what to do next."""
     study = result.study
     for note in result.notes:
@@ -102,7 +102,7 @@ def _headline(best: Trial, start: Trial | None) -> str:
 
 def _failures(failed: Sequence[Trial]) -> str:
     """How many trials failed, and the commonest causes."""
-    from optisense.search.failures import by_cause
+    from optisense.search.study.failures import by_cause
 
     causes = by_cause((trial.number, trial.failure or "") for trial in failed)
     lines = [f"{len(failed)} {'trial' if len(failed) == 1 else 'trials'} failed:"]
@@ -114,7 +114,7 @@ def _failures(failed: Sequence[Trial]) -> str:
 
 def _beside(study: Study, best: Trial, start: Trial | None) -> list[str]:
     """What must be seen with the score: other objectives, and parts such as the coverage."""
-    from optisense.search.study import beside
+    from optisense.search.study.study import beside
 
     before = {} if start is None else beside(study, start)
     return [
@@ -123,7 +123,7 @@ def _beside(study: Study, best: Trial, start: Trial | None) -> list[str]:
     ]
 
 
-def _print_front(result: Result) -> None:
+def _print_front(result: SearchResult) -> None:
     """The trials that no other beats in all objectives."""
     from rich.table import Table
 

@@ -10,28 +10,28 @@ from typing import TYPE_CHECKING
 from optisense.cli.progress import about, progress_line
 
 if TYPE_CHECKING:
-    from optisense.search import Progress
+    from optisense.search import SearchProgress
 
 
 @contextmanager
-def search_progress(workers: int) -> Iterator[Callable[[Progress], None]]:
+def search_progress(workers: int) -> Iterator[Callable[[SearchProgress], None]]:
     """Trials done and the time left, with the best score so far, failures and trials an hour.
 
     With one worker Ctrl-C waits for the trial at hand; others drop theirs at once.
     """
-    last: list[Progress] = []
+    last: list[SearchProgress] = []
     waits = (lambda line: _waits(last)) if workers == 1 else None
     with progress_line(waits=waits) as line:
         line.say("loading")
 
-        def show(progress: Progress) -> None:
+        def show(progress: SearchProgress) -> None:
             last[:] = [progress]
             line.show(*what(progress), progress.seconds_left, notes(progress))
 
         yield show
 
 
-def what(progress: Progress) -> tuple[str, int | None, int | None]:
+def what(progress: SearchProgress) -> tuple[str, int | None, int | None]:
     """What is being done, how many are done and of how many."""
     if progress.stage == "start":
         return "scoring the start", None, None
@@ -42,7 +42,7 @@ def what(progress: Progress) -> tuple[str, int | None, int | None]:
     return "scoring the best again", progress.done, progress.total
 
 
-def notes(progress: Progress) -> list[str]:
+def notes(progress: SearchProgress) -> list[str]:
     """What stands beside the bar, the foremost first."""
     parts = []
     if math.isfinite(progress.best):
@@ -56,7 +56,7 @@ def notes(progress: Progress) -> list[str]:
     return parts
 
 
-def _waits(last: list[Progress]) -> str:
+def _waits(last: list[SearchProgress]) -> str:
     """What a first Ctrl-C waits for where trials are worked out in this process."""
     if not last or last[0].stage == "start":
         return "finishing the score of the start"

@@ -1,4 +1,4 @@
-"""``optisense tolerance``: what errors of making do to a design's score."""
+"""``optisense tolerance``: what manufacturing errors do to a design's score."""
 
 from __future__ import annotations
 
@@ -27,8 +27,8 @@ from optisense.cli.progress import about, progress_line
 from optisense.writing import remove_own_page, write_text
 
 if TYPE_CHECKING:
-    from optisense.search.sensitivity import Estimate
-    from optisense.search.tolerance import Spreading, Tolerance
+    from optisense.search.tolerance.analysis import ScoreDistribution, Tolerance
+    from optisense.search.tolerance.sensitivity import Estimate
 
 JSON_FILE = "tolerance.json"
 REPORT_FILE = "tolerance.html"
@@ -89,8 +89,8 @@ def tolerance(
     last: list[tuple[int, float]] = []
     with progress_line(waits=(lambda line: _waits(last)) if workers == 1 else None) as line:
         line.say("loading")
-        from optisense.search.text import parse_errors
-        from optisense.search.tolerance import tolerance as find_tolerance
+        from optisense.search.space.text import parse_errors
+        from optisense.search.tolerance.analysis import tolerance as find_tolerance
         from optisense.sensors import load
 
         errors = parse_errors(error) if error else None
@@ -135,7 +135,7 @@ def tolerance(
 
 def _what(done: int) -> str:
     """What is being scored: first the design itself, with several seeds, then sensors."""
-    from optisense.search.tolerance import NOISE_SEEDS
+    from optisense.search.tolerance.analysis import NOISE_SEEDS
 
     return "scoring the design itself" if done <= NOISE_SEEDS else "scoring sensors"
 
@@ -180,7 +180,7 @@ def _print(found: Tolerance) -> None:
         output.print(f"{count} of {found.sensors} sensors fail: {reason}", markup=False)
 
 
-def _print_shares(name: str, found: Spreading) -> None:
+def _print_shares(name: str, found: ScoreDistribution) -> None:
     from rich.table import Table
 
     table = Table(box=None, pad_edge=False)

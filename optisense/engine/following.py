@@ -16,7 +16,7 @@ from optisense.time_left import Step, TimeLeft
 
 if TYPE_CHECKING:
     from optisense.search import Study
-    from optisense.search.store import Row
+    from optisense.search.study.store import Row
 
 LOOK_EVERY = 0.25
 """Seconds between looks at the study; longer where a look itself takes long."""
@@ -43,7 +43,7 @@ class Following:
 
         Args:
             folder: of the study.
-            job: whom to tell.
+            job: the request that gets the events.
             files: where meshes of the best go.
             child: the process that runs it, if that is the engine's own.
             budget: trials in all; the study's own if None.
@@ -70,7 +70,7 @@ class Following:
 
         study = Study.open(self._folder)
         try:
-            self._job.tell(
+            self._job.send(
                 "begun",
                 study=str(self._folder),
                 pid=None if self._child is None else self._child.pid,
@@ -133,7 +133,7 @@ class Following:
         total = self._total(study)
         self._time_left.advance(self._done)
         left = self._time_left.seconds_left
-        self._job.tell(
+        self._job.send(
             "progress",
             done=self._done,
             total=total,
@@ -149,7 +149,7 @@ class Following:
 
         trial = study.trial_of(row)
         shapes = bent_shapes(trial.design, self._files, study.space.design) if is_best else {}
-        self._job.tell(
+        self._job.send(
             "trial",
             **trial_row(study, trial),
             done=self._done,

@@ -24,7 +24,7 @@ GLANCE = 0.002
 Send = Callable[[Mapping[str, Any]], None]
 
 
-class Courtesy:
+class PriorityGate:
     """Lets short work go first.
 
     The renderer keeps Python's lock while it waits for its kernels. Another thread gets a turn only
@@ -56,7 +56,7 @@ class Courtesy:
 
 
 class Job:
-    """A request that is being worked on: what its handler needs to tell of it.
+    """A request that is being worked on: its handler reports through it.
 
     Attributes:
         id: of the request.
@@ -83,7 +83,7 @@ class Job:
         self._leaving = False
         self._lock = threading.Lock()
 
-    def tell(self, event: str, **content: Any) -> None:
+    def send(self, event: str, **content: Any) -> None:
         """Send an event."""
         self._send({"id": self.id, "event": event, **content})
 
@@ -99,7 +99,7 @@ class Job:
         now = time.monotonic()
         if now - self._told >= EVENTS_EVERY:
             self._told = now
-            self.tell("progress", fraction=round(fraction, 4), text=text, **content)
+            self.send("progress", fraction=round(fraction, 4), text=text, **content)
 
     def check(self) -> None:
         """A safe point.

@@ -119,7 +119,7 @@ def warm(session: Session, fields: Warm, job: Job) -> dict[str, Any]:
     model = session.renderer.model(design)
     job.progress(0.2, "building the sensor")
     size = _draft_size(design)
-    model.render((), size, photons=DRAFT_PHOTONS, progress=_teller(job))
+    model.render((), size, photons=DRAFT_PHOTONS, progress=_progress_of(job))
     if fields.contacts:
         job.progress(0.7, "pressing once")
         model.render(contacts_of(["sphere:1.5@0,0:0.2"]), size, photons=DRAFT_PHOTONS)
@@ -154,7 +154,7 @@ def simulate(session: Session, fields: Simulate, job: Job) -> dict[str, Any]:
             noise=fields.noise,
             seconds=fields.seconds,
             seed=fields.seed,
-            progress=_teller(job),
+            progress=_progress_of(job),
         )
     image.settings["contacts"] = [_text(given) for given in fields.contacts]
     exposure = _exposure(image, fields.exposure)
@@ -277,8 +277,8 @@ def blender_pixels(picture: NDArray[np.uint8]) -> NDArray[np.float32]:
     return LEVELS[opaque]
 
 
-def _teller(job: Job) -> Callable[[RenderProgress], None]:
-    def tell(progress: RenderProgress) -> None:
+def _progress_of(job: Job) -> Callable[[RenderProgress], None]:
+    def report(progress: RenderProgress) -> None:
         text = f"{progress.photons / 1e6:.1f} million photons"
         if progress.noise is not None:
             text += f", noise {progress.noise:.1f} %"
@@ -290,7 +290,7 @@ def _teller(job: Job) -> Callable[[RenderProgress], None]:
             seconds=round(progress.seconds, 3),
         )
 
-    return tell
+    return report
 
 
 def _exposure(image: TactileImage, given: float | Literal["auto", "same"]) -> float:

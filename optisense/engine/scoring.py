@@ -74,19 +74,19 @@ def evaluate(session: Session, fields: Evaluate, job: Job) -> dict[str, Any]:
     model = session.renderer.model(design)
     done = 0
 
-    def tell(fraction: float, text: str) -> None:
+    def report(fraction: float, text: str) -> None:
         job.progress((done + min(max(fraction, 0.0), 1.0)) / len(wanted), text)
 
-    evaluation = Evaluation(model, settings, tell, pixels_read(wanted, own))
+    evaluation = Evaluation(model, settings, report, pixels_read(wanted, own))
     rows = []
     for each in wanted:
-        tell(0.0, each.title)
+        report(0.0, each.title)
         score = run_objective(each, evaluation, own[each.name])
         job.check()
         row = score.to_dict() | {"beside": score.beside, "figure": None}
         if fields.figures:
             row["figure"] = _figure(score, files)
-        job.tell("score", score=row)
+        job.send("score", score=row)
         rows.append(row)
         done += 1
     return {"scores": rows}

@@ -24,7 +24,7 @@ from optisense.sensors import save_design
 
 if TYPE_CHECKING:
     from optisense.search import Study, Trial
-    from optisense.search.space import BoundSpace
+    from optisense.search.space.search_space import BoundSpace
 
 
 class Nothing(Fields):
@@ -90,7 +90,7 @@ def methods(session: Session, fields: Nothing, job: Job) -> dict[str, Any]:
 def space(session: Session, fields: Space, job: Job) -> dict[str, Any]:
     """What may change, looked up in a design."""
     from optisense.search import SearchSpace
-    from optisense.search.text import parse_space
+    from optisense.search.space.text import parse_space
 
     design = design_of(session, fields, job)
     bound = SearchSpace(parse_space(fields.vary)).bind(design)
@@ -101,7 +101,7 @@ def space(session: Session, fields: Space, job: Job) -> dict[str, Any]:
 def search(session: Session, fields: Search, job: Job) -> dict[str, Any]:
     """Begin a study and follow it to its end."""
     files = session.files(fields, job.id)
-    with session.courtesy:
+    with session.priority_gate:
         child = _begun(session, fields, job)
     return Following(child.folder, job, files, child).result()
 
@@ -109,7 +109,7 @@ def search(session: Session, fields: Search, job: Job) -> dict[str, Any]:
 def _begun(session: Session, fields: Search, job: Job) -> SearchProcess:
     """The process that runs a new study."""
     from optisense.search import Plan, SearchSpace, Study
-    from optisense.search.text import parse_space
+    from optisense.search.space.text import parse_space
 
     folder = _absolute(fields.study)
     design = design_of(session, fields, job)
@@ -135,7 +135,7 @@ def resume(session: Session, fields: Resume, job: Job) -> dict[str, Any]:
     """Go on with a study and follow it to its end."""
     files = session.files(fields, job.id)
     folder = _absolute(fields.study)
-    with session.courtesy, _opened(folder) as study:
+    with session.priority_gate, _opened(folder) as study:
         study.lock()  # what is wrong with it is told before a process is started
     child = SearchProcess(folder, fields.workers, fields.budget, fields.go_on)
     return Following(folder, job, files, child, fields.budget).result()
@@ -179,7 +179,7 @@ def about_study(session: Session, fields: OfStudy, job: Job) -> dict[str, Any]:
 @handles("trial", OneTrial, Lane.QUICK)
 def trial(session: Session, fields: OneTrial, job: Job) -> dict[str, Any]:
     """One trial as a design."""
-    from optisense.search.applied import design_of as design_of_trial
+    from optisense.search.study.applied import design_of as design_of_trial
 
     files = session.files(fields, job.id)
     with _opened(_absolute(fields.study)) as study:
@@ -197,7 +197,7 @@ def trial(session: Session, fields: OneTrial, job: Job) -> dict[str, Any]:
 @handles("apply", Apply, Lane.QUICK)
 def apply(session: Session, fields: Apply, job: Job) -> dict[str, Any]:
     """Write a trial as a design folder."""
-    from optisense.search.applied import design_of as design_of_trial
+    from optisense.search.study.applied import design_of as design_of_trial
 
     folder = Path(fields.to)
     with _opened(_absolute(fields.study)) as study:
@@ -218,7 +218,7 @@ def curve_row(trial: Trial) -> dict[str, Any]:
 
 def trial_row(study: Study, trial: Trial) -> dict[str, Any]:
     """A trial without its design."""
-    from optisense.search.study import beside
+    from optisense.search.study.study import beside
 
     return {
         **curve_row(trial),

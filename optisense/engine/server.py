@@ -129,7 +129,7 @@ class Engine:
             request.id,
             self._channel.send,
             draft=bool(getattr(fields, "draft", False)),
-            give_way=self.session.courtesy.give_way if kind.lane is Lane.RENDER else None,
+            give_way=self.session.priority_gate.give_way if kind.lane is Lane.RENDER else None,
         )
         with self._changed:
             self._open[request.id] = job
@@ -219,7 +219,7 @@ class _Work:
         self.job = job
         self._short = kind.lane is Lane.QUICK
         if self._short:
-            engine.session.courtesy.__enter__()
+            engine.session.priority_gate.__enter__()
 
     def run(self) -> None:
         """Do it and answer."""
@@ -249,7 +249,7 @@ class _Work:
 
     def _answer(self, message: Mapping[str, Any]) -> None:
         if self._short:
-            self._engine.session.courtesy.__exit__()
+            self._engine.session.priority_gate.__exit__()
         self._engine.answered(self.job, message)
 
 

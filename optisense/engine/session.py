@@ -13,7 +13,7 @@ from optisense.design import SensorDesign
 from optisense.engine.designs import Designs
 from optisense.engine.failures import ProtocolError
 from optisense.engine.files import Files
-from optisense.engine.jobs import Courtesy
+from optisense.engine.jobs import PriorityGate
 from optisense.engine.protocol import Fields
 from optisense.geometry import Contact, TriangleMesh
 
@@ -124,7 +124,7 @@ class Session:
         designs: what was read.
         renderer: the model.
         images: what was rendered.
-        courtesy: lets short work go first.
+        priority_gate: lets short work go first.
     """
 
     def __init__(self) -> None:
@@ -133,7 +133,7 @@ class Session:
         self.designs = Designs()
         self.renderer = Renderer()
         self.images = Images()
-        self.courtesy = Courtesy()
+        self.priority_gate = PriorityGate()
 
     def files(self, fields: Fields, number: int | str) -> Files:
         """Where the files of a request go.

@@ -24,7 +24,8 @@ if TYPE_CHECKING:
 
 _T = TypeVar("_T")
 
-Tell = Callable[[float, str], None]
+ProgressCallback = Callable[[float, str], None]
+"""Called with the finished fraction (0 to 1) of the work and a few words on what is being done."""
 """Called with a fraction 0..1 of the rendering that is done, and with what is being done."""
 
 Reads = Callable[[Press], NDArray[np.float64]]
@@ -59,7 +60,7 @@ class Evaluation:
         self,
         model: OpticalModel,
         settings: Settings | None = None,
-        tell: Tell | None = None,
+        progress: ProgressCallback | None = None,
         reads: Reads | None = None,
     ) -> None:
         """Judge a model; nothing is rendered yet.
@@ -67,7 +68,7 @@ class Evaluation:
         Args:
             model: the sensor's.
             settings: of images and rays.
-            tell: called while images are rendered.
+            progress: called while images are rendered.
             reads: which pixels of a press the objectives read, if not all one by one. The others
                 decide about the exposure only, and are rendered roughly (`registry.pixels_read`).
         """
@@ -75,7 +76,7 @@ class Evaluation:
         self._reads = reads
         self.settings = settings or Settings()
         self.seconds: dict[str, float] = {}
-        self._tell = tell or (lambda fraction, text: None)
+        self._progress = progress or (lambda fraction, text: None)
         self._made: dict[str, Any] = {}
 
     @property
@@ -334,18 +335,18 @@ class Evaluation:
             KeyboardInterrupt: Ctrl-C ended it early; a score of half the light would mislead.
         """
 
-        def tell(progress: RenderProgress) -> None:
+        def report(progress: RenderProgress) -> None:
             text = what or progress.stage.value
             if progress.fraction == 1.0:  # what comes now is the objective's own work
                 text = "judging the images"
-            self._tell(done + part * progress.fraction, text)
+            self._progress(done + part * progress.fraction, text)
 
         image = self.model.render(
             contacts,
             resolution=self.resolution,
             photons=self.settings.photons,
             seed=self.settings.seed,
-            progress=tell,
+            progress=report,
             only_contacts=bool(contacts),
             pixel_importance=pixel_importance,
             partial=False,

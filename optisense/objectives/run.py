@@ -15,7 +15,7 @@ from optisense.design import SensorDesign
 from optisense.design.near import suggestion
 from optisense.design.sensor_design import refuse_no_design
 from optisense.errors import ObjectiveError, OptiSenseError, SetupError
-from optisense.objectives.evaluation import Evaluation, Tell
+from optisense.objectives.evaluation import Evaluation, ProgressCallback
 from optisense.objectives.files import place_of
 from optisense.objectives.registry import Objective, pixels_read, resolve
 from optisense.objectives.score import Score, json_ready
@@ -32,7 +32,7 @@ def evaluate(
     sensor: OpticalModel | SensorDesign | Evaluation,
     objectives: str | Objective,
     *,
-    tell: Tell | None = None,
+    progress: ProgressCallback | None = None,
     **settings: Any,
 ) -> Score: ...
 
@@ -42,7 +42,7 @@ def evaluate(
     sensor: OpticalModel | SensorDesign | Evaluation,
     objectives: Iterable[str | Objective],
     *,
-    tell: Tell | None = None,
+    progress: ProgressCallback | None = None,
     **settings: Any,
 ) -> dict[str, Score]: ...
 
@@ -51,7 +51,7 @@ def evaluate(
     sensor: OpticalModel | SensorDesign | Evaluation,
     objectives: str | Objective | Iterable[str | Objective],
     *,
-    tell: Tell | None = None,
+    progress: ProgressCallback | None = None,
     **settings: Any,
 ) -> Score | dict[str, Score]:
     """Score a sensor.
@@ -62,7 +62,7 @@ def evaluate(
     Args:
         sensor: a model, a design, or what an earlier call shared.
         objectives: a name or several; a user's own as "file.py:function".
-        tell: called while images are rendered.
+        progress: called while images are rendered.
         settings: fields of `Settings`, and keyword arguments of the objectives.
 
     Returns:
@@ -84,7 +84,7 @@ def evaluate(
         evaluation = sensor
     else:
         reads = pixels_read(wanted, own)
-        evaluation = Evaluation(_model(sensor), replace(Settings(), **shared), tell, reads)
+        evaluation = Evaluation(_model(sensor), replace(Settings(), **shared), progress, reads)
     scores = {each.name: run_objective(each, evaluation, own[each.name]) for each in wanted}
     if isinstance(objectives, str | Objective):
         return scores[wanted[0].name]

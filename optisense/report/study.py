@@ -24,10 +24,10 @@ from optisense.report.drawing import figure_uri
 from optisense.report.files import template
 from optisense.report.pictures import MOST_STRETCHED, data_uri, stretching_colours
 from optisense.report.tolerance import shown_size
-from optisense.search.best import best_of
 from optisense.search.methods import find
-from optisense.search.study import Study, front_among
-from optisense.search.trial import Trial
+from optisense.search.study.best import best_of
+from optisense.search.study.study import Study, front_among
+from optisense.search.study.trial import Trial
 from optisense.text import shown_in_html
 from optisense.writing import write_text
 
@@ -173,7 +173,7 @@ def _robust(study: Study) -> str:
     )
     return (
         f"Scores are what nine of ten manufactured sensors reach (P10 over {settings.samples} of "
-        f"them), with errors of making: {paths}."
+        f"them), with manufacturing errors: {paths}."
     )
 
 

@@ -12,8 +12,8 @@ from numpy.typing import ArrayLike, NDArray
 from optisense.design import SensorDesign
 from optisense.design.section import section
 from optisense.report.drawing import AMBER, BLUE, GREY, PALE, RED, legend_above, new_figure
-from optisense.search.parameters import Choice
-from optisense.search.trial import Trial
+from optisense.search.space.parameters import Choice
+from optisense.search.study.trial import Trial
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

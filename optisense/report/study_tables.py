@@ -11,9 +11,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from optisense.report.before_after import RayFigures
-from optisense.search.failures import by_cause
-from optisense.search.study import Study, beside
-from optisense.search.trial import Trial
+from optisense.search.study.failures import by_cause
+from optisense.search.study.study import Study, beside
+from optisense.search.study.trial import Trial
 
 MOST_TRIALS = 200
 """Trials in the table: the best ones."""

@@ -1,4 +1,4 @@
-"""The page of a tolerance: how scores spread, and which error of making matters most."""
+"""The page of a tolerance: how scores spread, and which manufacturing error matters most."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ from optisense.report.drawing import (
     new_figure,
 )
 from optisense.report.files import template
-from optisense.search.making import unit_of
-from optisense.search.sensitivity import Estimate
-from optisense.search.tolerance import Spreading, Tolerance
+from optisense.search.space.manufacturing import unit_of
+from optisense.search.tolerance.analysis import ScoreDistribution, Tolerance
+from optisense.search.tolerance.sensitivity import Estimate
 from optisense.text import shown_in_html
 from optisense.writing import write_text
 
@@ -65,7 +65,7 @@ def render_tolerance(tolerance: Tolerance) -> str:
         objectives=[_objective(name, each) for name, each in tolerance.results.items()],
         errors=[
             (path, shown_size(path, spread.size), _kind(spread.kind))
-            for path, spread in tolerance.errors.spreads.items()
+            for path, spread in tolerance.errors.distributions.items()
         ],
         failures=sorted(tolerance.failures.items(), key=lambda item: -item[1]),
         settings=[(key, str(value)) for key, value in tolerance.settings.items()],
@@ -74,7 +74,7 @@ def render_tolerance(tolerance: Tolerance) -> str:
     )
 
 
-def spread_figure(name: str, found: Spreading) -> Figure:
+def spread_figure(name: str, found: ScoreDistribution) -> Figure:
     """The scores of all sensors with their percentiles, and the share of each error."""
     shares = {source: share for source, share in found.shares.items() if share is not None}
     figure = new_figure(11.0, max(3.2, 1.4 + 0.42 * len(shares)))
@@ -118,14 +118,14 @@ def shown_size(path: str, size: float) -> str:
     return f"{size:g}{unit}" if unit == "°" else f"{size:g} {unit}".rstrip()
 
 
-def noise_share(found: Spreading) -> float:
+def noise_share(found: ScoreDistribution) -> float:
     """The part of the variance that the noise of the image makes up; at most 1."""
     if not (found.noise > 0.0 and found.deviation > 0.0):
         return 0.0
     return min(1.0, (found.noise / found.deviation) ** 2)
 
 
-def _objective(name: str, found: Spreading) -> dict[str, Any]:
+def _objective(name: str, found: ScoreDistribution) -> dict[str, Any]:
     return {
         "name": name,
         "nominal": f"{found.nominal:.4g}",

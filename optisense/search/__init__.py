@@ -1,23 +1,21 @@
-"""Find a better design: spaces of parameters, methods that search them, studies that keep it all.
+"""Find a better design: search spaces, search methods, and the studies that keep every trial.
 
-The package can be called, so that `optisense.search(design, space, ...)` searches.
+A design, a `SearchSpace` and an objective come in; a `SearchResult` with its `Study` comes out.
+`search` does it in one call. The rooms, from the bottom up: `space` (what may change),
+`evaluation` (a point of the space to its scores), `methods` (which points to score next),
+`executors` (which process scores them), `study` (the folder and the loop), `tolerance`
+(manufacturing errors).
 """
 
-from __future__ import annotations
-
-import sys
-from types import ModuleType
-from typing import Any
-
-from optisense.search.making import MakingErrors, Spread
-from optisense.search.outcome import Outcome
-from optisense.search.parameters import Around, CagePoints, Choice, Continuous, Integer
-from optisense.search.plan import Plan
-from optisense.search.run import run_study, search
-from optisense.search.running import Progress, Result
-from optisense.search.space import BoundSpace, SearchSpace
-from optisense.search.study import Study
-from optisense.search.trial import Trial
+from optisense.search.evaluation.outcome import Outcome
+from optisense.search.run_search import run_study, search
+from optisense.search.space.manufacturing import ManufacturingErrors, ToleranceDistribution
+from optisense.search.space.parameters import Around, CagePoints, Choice, Continuous, Integer
+from optisense.search.space.search_space import BoundSpace, SearchSpace
+from optisense.search.study.plan import Plan
+from optisense.search.study.progress import SearchProgress, SearchResult
+from optisense.search.study.study import Study
+from optisense.search.study.trial import Trial
 
 __all__ = [
     "Around",
@@ -26,25 +24,15 @@ __all__ = [
     "Choice",
     "Continuous",
     "Integer",
-    "MakingErrors",
+    "ManufacturingErrors",
     "Outcome",
     "Plan",
-    "Progress",
-    "Result",
+    "SearchProgress",
+    "SearchResult",
     "SearchSpace",
-    "Spread",
     "Study",
+    "ToleranceDistribution",
     "Trial",
     "run_study",
     "search",
 ]
-
-
-class _Callable(ModuleType):
-    """A module that can be called like its function `search`."""
-
-    def __call__(self, *args: Any, **settings: Any) -> Result:
-        return search(*args, **settings)
-
-
-sys.modules[__name__].__class__ = _Callable

@@ -23,14 +23,14 @@ from numpy.typing import NDArray
 
 from optisense.design import SensorDesign, get_value
 from optisense.errors import SearchError
-from optisense.search.best import tied
-from optisense.search.evaluation import Goal
-from optisense.search.parameters import Choice
-from optisense.search.plan import Plan
-from optisense.search.run import run_study
-from optisense.search.running import Result
-from optisense.search.space import BoundSpace, SearchSpace
-from optisense.search.study import Study
+from optisense.search.evaluation.evaluator import Goal
+from optisense.search.run_search import run_study
+from optisense.search.space.parameters import Choice
+from optisense.search.space.search_space import BoundSpace, SearchSpace
+from optisense.search.study.best import tied
+from optisense.search.study.plan import Plan
+from optisense.search.study.progress import SearchResult
+from optisense.search.study.study import Study
 
 FloatArray = NDArray[np.float64]
 Landscape = Callable[[FloatArray], float]
@@ -179,7 +179,7 @@ class MethodContract:
 
     def run(
         self, space: Mapping[str, object], goal: str | Landscape, budget: int | None = None
-    ) -> Result:
+    ) -> SearchResult:
         """A whole study."""
         return run_study(self.study(space, goal, budget or self.budget))
 
@@ -272,7 +272,7 @@ class MethodContract:
         return score
 
 
-def _same(one: Result, other: Result, rounding: float, case: str) -> None:
+def _same(one: SearchResult, other: SearchResult, rounding: float, case: str) -> None:
     """Two results have the same trials: to the last bit where `rounding` is 0."""
     pairs = list(zip(one.trials, other.trials, strict=True))
     for first, second in pairs:

@@ -93,9 +93,9 @@ class CalibratedSensor:
         self,
         model: OpticalModel,
         settings: ReconstructionSettings,
-        tell: Callable[[int], None] = lambda done: None,
+        progress: Callable[[int], None] = lambda done: None,
     ) -> None:
-        """Press the balls and fit the reader. tell: called with the number of balls pressed."""
+        """Press the balls and fit the reader. progress: called with the number of balls pressed."""
         from optisense.optics.camera.response import auto_exposure
 
         self._model = model
@@ -110,7 +110,7 @@ class CalibratedSensor:
         self._exposure = auto_exposure(blank.radiance)
         # A real one is the mean of many pictures, without noise.
         self._background = blank.picture(self._exposure).astype(np.float64)
-        samples = [np.hstack(self._press(i)) for i in _told(settings.presses, tell)]
+        samples = [np.hstack(self._press(i)) for i in _counted(settings.presses, progress)]
         chosen = np.concatenate(samples)
         if len(chosen) > MOST_SAMPLES:
             rng = np.random.default_rng([settings.seed, _SAMPLES])
@@ -210,7 +210,7 @@ def _pixels_to_learn(
     return chosen
 
 
-def _told(count: int, tell: Callable[[int], None]) -> Iterator[int]:
+def _counted(count: int, progress: Callable[[int], None]) -> Iterator[int]:
     for number in range(count):
-        tell(number)
+        progress(number)
         yield number

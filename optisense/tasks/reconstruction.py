@@ -148,18 +148,18 @@ def reconstruct(
     wanted = unseen_objects() if objects is None else dict(objects)
     count = settings.presses + len(wanted)
 
-    def tell(done: int) -> None:
+    def report(done: int) -> None:
         if progress is not None:
             progress(done, count)
 
     for contact in wanted.values():
         model.place(contact)  # so that one that does not fit is told before any work
-    sensor = CalibratedSensor(model, settings, tell)
+    sensor = CalibratedSensor(model, settings, report)
     read = {}
     for number, (name, contact) in enumerate(wanted.items()):
-        tell(settings.presses + number)
+        report(settings.presses + number)
         read[name] = reconstruct_one(sensor, contact, number, name)
-    tell(count)
+    report(count)
     return ReconstructionResult(model.design.name, read, settings, sensor.fitted_pixels)
 
 

@@ -11,7 +11,7 @@ from rich.console import Console
 
 from optisense.cli import progress
 from optisense.cli.progress import Line, about, duration, progress_line
-from optisense.search import Progress
+from optisense.search import SearchProgress
 from optisense.time_left import Step
 
 
@@ -27,17 +27,17 @@ class Clock:
 
 CLOCK_AND_LEFT = re.compile(r"(\d+:)?\d+:\d\d(, (\d+:)?\d+:\d\d left)?")
 SEARCHES = [
-    Progress("start", 0, 2000, 0, math.nan, math.nan, 0.0, math.nan),
-    Progress("trials", 7, 2000, 0, 0.98765, 0.80712, 0.0, math.nan),
-    Progress("trials", 1234, 2000, 17, 0.98765, 0.80712, 126_632.0, 35.4),
-    Progress("trials", 65_612, 65_612, 1_017, -0.0098765, -10.807, 126_632.0, 616_444.0),
-    Progress("fresh seeds", 2, 9, 17, 0.98765, 0.80712, 126_632.0, 61.0),
+    SearchProgress("start", 0, 2000, 0, math.nan, math.nan, 0.0, math.nan),
+    SearchProgress("trials", 7, 2000, 0, 0.98765, 0.80712, 0.0, math.nan),
+    SearchProgress("trials", 1234, 2000, 17, 0.98765, 0.80712, 126_632.0, 35.4),
+    SearchProgress("trials", 65_612, 65_612, 1_017, -0.0098765, -10.807, 126_632.0, 616_444.0),
+    SearchProgress("fresh seeds", 2, 9, 17, 0.98765, 0.80712, 126_632.0, 61.0),
 ]
 
 
 @pytest.mark.parametrize("columns", [20, 40, 60, 80, 200])
 @pytest.mark.parametrize("told", SEARCHES)
-def test_a_search_fits_the_terminal(told: Progress, columns: int) -> None:
+def test_a_search_fits_the_terminal(told: SearchProgress, columns: int) -> None:
     from optisense.cli.searching import notes, what
 
     clock = Clock()

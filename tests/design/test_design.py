@@ -83,7 +83,7 @@ def test_changes_in_place_are_checked(design: SensorDesign) -> None:
 def test_a_name_in_place_of_a_design_says_how_to_load_it(given: Any) -> None:
     for use in (
         ots.OpticalModel,
-        lambda each: ots.search(each, {"camera.fov": (40, 60)}, "aoap"),
+        lambda each: ots.search.search(each, {"camera.fov": (40, 60)}, "aoap"),
         *([lambda each: ots.evaluate(each, "aoap")] if given is not None else []),
     ):
         with pytest.raises(DesignError, match=r"a design is needed.*optisense\.load"):

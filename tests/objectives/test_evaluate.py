@@ -267,7 +267,7 @@ def test_light_cut_short_by_ctrl_c_gives_no_score(
 
 def test_progress_only_grows(model: OpticalModel) -> None:
     told: list[float] = []
-    evaluate(model, "rgb2normal", tell=lambda done, text: told.append(done), **SMALL)
+    evaluate(model, "rgb2normal", progress=lambda done, text: told.append(done), **SMALL)
     assert told[0] == 0.0
     assert told[-1] == pytest.approx(1.0)
     assert all(np.diff(told) >= -1e-9)

@@ -18,7 +18,7 @@ from optisense.report.balls import Ball
 from optisense.report.before_after import Look, RayFigures
 from optisense.report.cage_changes import cage_changes
 from optisense.report.study import render_study, write_study_report
-from optisense.search import Around, CagePoints, Result, Study, search
+from optisense.search import Around, CagePoints, SearchResult, Study, search
 
 EVIL = "</table><img src=x onerror=alert(1)>"
 SPACE: dict[str, object] = {
@@ -40,13 +40,13 @@ def opposite(design: SensorDesign) -> float:
 
 
 @pytest.fixture(scope="module")
-def result() -> Result:
+def result() -> SearchResult:
     mini = ots.load("gelsight-mini")
     return search(mini, SPACE, [steep, opposite], method="pareto", budget=60, seed=2)
 
 
 @pytest.fixture(scope="module")
-def page(result: Result) -> str:
+def page(result: SearchResult) -> str:
     picture = np.full((3, 4, 3), 90, dtype=np.uint8)
     ball = Ball(1, 20, (np.array([[0.0, 0.0], [2.0, 0.0], [1.0, 2.0]]),))
     figures = RayFigures(0.5, 0.25, 0.75, 0.5, 4.0, 1.1, 1.5, np.full((3, 4), 1.2))
@@ -57,7 +57,7 @@ def page(result: Result) -> str:
     return render_study(result.study, looks)
 
 
-def test_scores_before_and_after_are_told(result: Result, page: str) -> None:
+def test_scores_before_and_after_are_told(result: SearchResult, page: str) -> None:
     for trial in (result.start, result.best):
         for name in ("steep", "opposite"):
             assert f">{trial.scores[name]:.4g}<" in page
@@ -77,7 +77,7 @@ def test_every_figure_is_there(page: str) -> None:
     assert not re.search(r'(src|href)="(?!data:)', page)
 
 
-def test_trials_and_failures_are_listed(result: Result, page: str) -> None:
+def test_trials_and_failures_are_listed(result: SearchResult, page: str) -> None:
     failed = [trial for trial in result.trials if trial.failure is not None]
     assert failed
     for trial in result.trials:
@@ -177,14 +177,14 @@ def test_the_command_writes_the_page(tmp_path: Path) -> None:
     assert "no study here" in missing.output
 
 
-def test_a_page_is_written_whole_or_not_at_all(result: Result, tmp_path: Path) -> None:
+def test_a_page_is_written_whole_or_not_at_all(result: SearchResult, tmp_path: Path) -> None:
     path = write_study_report(tmp_path / "page.html", result.study)
     assert path.read_text(encoding="utf-8").rstrip().endswith("</html>")
     assert [each.name for each in tmp_path.iterdir()] == ["page.html"]
 
 
 class TestInfluence:
-    def test_the_parameter_that_matters_comes_first(self, result: Result) -> None:
+    def test_the_parameter_that_matters_comes_first(self, result: SearchResult) -> None:
         found = study_figures.influences(result.trials, "steep")
         names = result.study.space.names
         assert names[found[0].number] == "coating.specularity"

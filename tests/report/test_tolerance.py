@@ -14,8 +14,8 @@ import optisense as ots
 from optisense.cli import app
 from optisense.design import SensorDesign, set_value
 from optisense.report.tolerance import noise_share, render_tolerance, shown_size, spread_figure
-from optisense.search import Spread
-from optisense.search.tolerance import Tolerance, tolerance
+from optisense.search import ToleranceDistribution
+from optisense.search.tolerance.analysis import Tolerance, tolerance
 
 EVIL = "</table><img src=x onerror=alert(1)>"
 QUICK = ["--objective", "aoap", "--resolution", "40x30"]
@@ -32,8 +32,8 @@ def score(design: SensorDesign) -> float:
 def found() -> Tolerance:
     grey = set_value(ots.load("gelsight-mini"), "coating.reflectance", (0.5, 0.5, 0.5))
     errors = {
-        "coating.reflectance.r": Spread(0.1, "even"),
-        "coating.reflectance.g": Spread(0.02),
+        "coating.reflectance.r": ToleranceDistribution(0.1, "uniform"),
+        "coating.reflectance.g": ToleranceDistribution(0.02),
     }
     return tolerance(grey, score, errors, sensors=150)
 
@@ -75,7 +75,7 @@ def test_the_command(tmp_path: Path) -> None:
     assert done.exit_code == 0, done.output
     told = json.loads(done.stdout)
     assert told == json.loads((out / "tolerance.json").read_text(encoding="utf-8"))
-    assert told["errors"] == {"camera.fov": ["normal", 0.5], "camera.position.z": ["even", 0.2]}
+    assert told["errors"] == {"camera.fov": ["normal", 0.5], "camera.position.z": ["uniform", 0.2]}
     result = told["objectives"]["aoap"]
     assert told["sensors"] == len(result["scores"]) == 24
     order = [result["percentiles"][key]["value"] for key in ("p10", "p50", "p90")]

@@ -10,7 +10,7 @@ import pytest
 
 import optisense as ots
 from optisense.design import SensorDesign
-from optisense.search.space import BoundSpace, SearchSpace
+from optisense.search.space.search_space import BoundSpace, SearchSpace
 
 TWO_NUMBERS = {"coating.specularity": (0.0, 1.0, 5), "camera.position.x": (-1.0, 3.0, 3)}
 """A space in which `cheap_goals` make sense."""

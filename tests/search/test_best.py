@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 
 from optisense.design import SensorDesign
-from optisense.search import Result, search
-from optisense.search.best import best_of, distance, tie_note, tied
-from optisense.search.outcome import Outcome
-from optisense.search.space import BoundSpace, SearchSpace
-from optisense.search.trial import Trial
+from optisense.search import SearchResult, search
+from optisense.search.evaluation.outcome import Outcome
+from optisense.search.space.search_space import BoundSpace, SearchSpace
+from optisense.search.study.best import best_of, distance, tie_note, tied
+from optisense.search.study.trial import Trial
 
 
 @pytest.fixture(scope="module")
@@ -78,7 +78,7 @@ def test_a_search_tells_its_ties_the_same_way_each_time(mini: SensorDesign) -> N
     def plateau(design: SensorDesign) -> float:
         return float(design.coating.specularity >= 0.5)
 
-    def run() -> Result:
+    def run() -> SearchResult:
         return search(mini, {"coating.specularity": (0.0, 1.0, 11)}, plateau, method="grid")
 
     first, second = run(), run()

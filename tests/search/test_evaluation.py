@@ -16,8 +16,8 @@ from optisense.design import SensorDesign, set_value
 from optisense.design.difference import differences, fingerprint
 from optisense.errors import ObjectiveError, SearchError
 from optisense.search import Around, SearchSpace
-from optisense.search.constraints import PartsApart, UserRule, why_forbidden
-from optisense.search.evaluation import DesignEvaluator
+from optisense.search.evaluation.evaluator import DesignEvaluator
+from optisense.search.space.constraints import PartsApart, UserRule, why_forbidden
 
 LOW = {"photons": 200_000, "resolution": (160, 120), "together": True}
 
@@ -60,7 +60,7 @@ class TestScores:
         settings = {"photons": 20_000, "resolution": (40, 30)}
         evaluator = DesignEvaluator(space, ["normdiff"], settings)
         heard: list[str] = []
-        evaluator.listen(lambda fraction, text: heard.append(text))
+        evaluator.report_progress_to(lambda fraction, text: heard.append(text))
         evaluator(space.start, 0)
         assert "tracing photons" in heard
         assert "press 1 of 9" in heard

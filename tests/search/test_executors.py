@@ -18,11 +18,11 @@ import pytest
 
 from optisense.design import SensorDesign
 from optisense.errors import SearchError, SetupError
-from optisense.search import Progress, search
-from optisense.search.evaluation import DesignEvaluator
+from optisense.search import SearchProgress, search
+from optisense.search.evaluation.evaluator import DesignEvaluator
+from optisense.search.evaluation.outcome import Outcome
 from optisense.search.executors import ExecutorRunner, ProcessPool, remote
-from optisense.search.outcome import Outcome
-from optisense.search.space import BoundSpace, SearchSpace
+from optisense.search.space.search_space import BoundSpace, SearchSpace
 
 LINE = {"coating.specularity": (0.0, 1.0, 11)}
 
@@ -179,7 +179,7 @@ class TestDask:
                 processes.enter_context(worker(address))
             added: list[object] = []
 
-            def add_one(progress: Progress) -> None:
+            def add_one(progress: SearchProgress) -> None:
                 if not added and progress.done >= 6:
                     added.append(processes.enter_context(worker(address)))
 

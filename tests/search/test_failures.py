@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from optisense.search.failures import by_cause, cause_of
+from optisense.search.study.failures import by_cause, cause_of
 
 CROSSING = "parts '{}' and '{}' cut through each other at ({}, 11.51, 86.87) mm"
 

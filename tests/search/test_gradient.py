@@ -8,7 +8,7 @@ import pytest
 from optisense import SensorDesign, load
 from optisense.errors import NoDerivativeError, SearchError
 from optisense.search import Around, CagePoints, SearchSpace, search
-from optisense.search.evaluation import DesignEvaluator
+from optisense.search.evaluation.evaluator import DesignEvaluator
 from optisense.search.methods.base import Problem
 from optisense.search.methods.gradient import (
     DIFFERENCES,

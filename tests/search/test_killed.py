@@ -23,7 +23,7 @@ import sys
 import cheap_goals
 import optisense as ots
 
-ots.search(
+ots.search.search(
     ots.load("gelsight-mini"),
     {"coating.specularity": (0.0, 1.0), "camera.position.x": (-1.0, 3.0)},
     cheap_goals.told,

@@ -15,11 +15,11 @@ import optisense as ots
 from optisense.design import SensorDesign
 from optisense.errors import SearchError
 from optisense.objectives import Evaluation, Objective
-from optisense.search import Integer, Result, SearchSpace, search
-from optisense.search.evaluation import DesignEvaluator
+from optisense.search import Integer, SearchResult, SearchSpace, search
+from optisense.search.evaluation.evaluator import DesignEvaluator
+from optisense.search.evaluation.outcome import Outcome
 from optisense.search.methods import Problem, find, make
 from optisense.search.methods.light_colours import LightColours, RelitEvaluator
-from optisense.search.outcome import Outcome
 
 COLOURS = {"lights.*.colour": ["red", "green", "blue"]}
 QUICK = {"resolution": (200, 150), "photons": 100_000, "places": ((0.0, 0.0), (3.0, 2.0))}
@@ -35,20 +35,20 @@ GOALS = ("rgb2normal", "normdiff", Objective("redness", redness, "Redness"))
 
 
 @pytest.fixture(scope="module")
-def result() -> Result:
+def result() -> SearchResult:
     """All 27 colourings of a GelSight Mini's three groups."""
     return search(
         ots.load("gelsight-mini"), COLOURS, list(GOALS), method="light-colours", settings=QUICK
     )
 
 
-def test_every_colouring_is_tried_once(result: Result) -> None:
+def test_every_colouring_is_tried_once(result: SearchResult) -> None:
     tried = [tuple(trial.values.values()) for trial in result.trials if not trial.is_start]
     assert len(tried) == len(set(tried)) == 27
     assert result.ended == "the method has finished"
 
 
-def test_a_colouring_scores_as_its_own_rendering(result: Result) -> None:
+def test_a_colouring_scores_as_its_own_rendering(result: SearchResult) -> None:
     """With the same seed: the light is traced alike, so only rounding differs."""
     usual = DesignEvaluator(result.study.space, GOALS, QUICK)
     tried = [trial for trial in result.trials if not trial.is_start]
@@ -67,7 +67,7 @@ def test_a_colouring_scores_as_its_own_rendering(result: Result) -> None:
         )
 
 
-def test_colours_matter_and_their_names_hardly(result: Result) -> None:
+def test_colours_matter_and_their_names_hardly(result: SearchResult) -> None:
     """Swapping the three colours among themselves leaves the scores almost as they are: the
     aluminium of the coating is nearly grey.
     """
@@ -83,13 +83,13 @@ def test_colours_matter_and_their_names_hardly(result: Result) -> None:
     assert within < 0.1 * among
 
 
-def test_the_best_is_made_as_a_design(result: Result) -> None:
+def test_the_best_is_made_as_a_design(result: SearchResult) -> None:
     colours = [group.colour for group in result.best.design.lights.values()]
     assert len(set(colours)) > 1  # one colour for all would not tell normals apart
     assert math.isfinite(result.best.fresh_score())
 
 
-def test_an_evaluator_travels_without_its_images(result: Result) -> None:
+def test_an_evaluator_travels_without_its_images(result: SearchResult) -> None:
     evaluator = RelitEvaluator(DesignEvaluator(result.study.space, ["rgb2normal"], QUICK))
     evaluator._lit[0] = object()  # type: ignore[assignment]
     there = pickle.loads(pickle.dumps(evaluator))

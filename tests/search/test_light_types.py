@@ -10,10 +10,10 @@ import pytest
 from optisense.design import SensorDesign
 from optisense.errors import SearchError
 from optisense.search import SearchSpace
+from optisense.search.evaluation.outcome import Outcome
 from optisense.search.methods import Problem, find, make
 from optisense.search.methods.light_types import FOR_ALL, FOR_GROUPS, FOR_LIGHTS, LightTypes
-from optisense.search.outcome import Outcome
-from optisense.search.space import BoundSpace
+from optisense.search.space.search_space import BoundSpace
 
 TYPES = ["osram-topled-black-30", "chanzon-5730", "generic-spot"]
 

@@ -14,7 +14,7 @@ from optisense.errors import SearchError
 from optisense.search import Around, CagePoints
 from optisense.search.methods import names
 from optisense.search.methods.registry import HOMES
-from optisense.search.space import BoundSpace
+from optisense.search.space.search_space import BoundSpace
 from optisense.search.testing import Landscape, MethodContract, general_spaces
 from optisense.sensors import load
 
@@ -96,7 +96,7 @@ class TestTypes(MethodContract):
             if group.model == "chanzon-5730"
         }
         places = [
-            space.design.lights[p.handle.group].lights[p.handle.index].position  # type: ignore[union-attr]
+            space.design.lights[p.variable.group].lights[p.variable.index].position  # type: ignore[union-attr]
             for p in space.parameters
         ]
         return np.array([float(tuple(place) in of_second) for place in places])

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from optisense.errors import SearchError
-from optisense.search.dominance import hypervolume
+from optisense.search.evaluation.outcome import Outcome
 from optisense.search.methods import Method, Problem, find, make, names, register
 from optisense.search.methods.base import values_to_maximise
-from optisense.search.outcome import Outcome
-from optisense.search.space import BoundSpace, SearchSpace
+from optisense.search.methods.dominance import hypervolume
+from optisense.search.space.search_space import BoundSpace, SearchSpace
 from optisense.sensors import load
 
 FloatArray = np.ndarray

@@ -15,10 +15,10 @@ import pytest
 
 from optisense.design import SensorDesign, save_design, set_value
 from optisense.errors import FolderInUseError, OutputError, SearchError
-from optisense.search import Plan, Progress, SearchSpace, Study, search
-from optisense.search.plan import PHOTONS
-from optisense.search.run import run_study
-from optisense.search.store import START, STORE_VERSION
+from optisense.search import Plan, SearchProgress, SearchSpace, Study, search
+from optisense.search.run_search import run_study
+from optisense.search.study.plan import PHOTONS
+from optisense.search.study.store import START, STORE_VERSION
 
 SPACE = {"coating.specularity": (0.0, 1.0, 5), "camera.position.x": (-1.0, 3.0, 3)}
 
@@ -60,7 +60,7 @@ def test_no_point_is_scored_twice(mini: SensorDesign, goals: ModuleType) -> None
 
 
 def test_progress_tells_of_best_rate_and_time_left(mini: SensorDesign, goals: ModuleType) -> None:
-    seen: list[Progress] = []
+    seen: list[SearchProgress] = []
     search(mini, SPACE, goals.nearness, budget=40, progress=seen.append)
     last = [each for each in seen if each.stage == "trials"][-1]
     assert last.total == 40
@@ -129,7 +129,7 @@ def test_the_same_seed_is_the_same_study(mini: SensorDesign, goals: ModuleType) 
 
 def test_the_best_is_scored_again_before_it_is_named(mini: SensorDesign) -> None:
     """Of noisy scores the luckiest is not the best: fresh seeds tell."""
-    from optisense.search import running
+    from optisense.search import Outcome
 
     class Noisy:
         """Scores the specularity, with luck that depends on the seed and the design."""
@@ -139,7 +139,7 @@ def test_the_best_is_scored_again_before_it_is_named(mini: SensorDesign) -> None
 
         def __call__(self, vector: np.ndarray, seed: int) -> object:
             luck = np.random.default_rng([seed, int(1e6 * vector[0])]).normal(0.0, 0.05)
-            return running.Outcome({"brightness": float(vector[0]) + luck})
+            return Outcome({"brightness": float(vector[0]) + luck})
 
     def brightness(design: SensorDesign) -> float:
         raise AssertionError("the method brings an evaluator of its own")
@@ -260,7 +260,7 @@ class TestResume:
     def test_an_edited_file_of_a_user_is_refused(self, mini: SensorDesign, tmp_path: Path) -> None:
         rule = tmp_path / "rule.py"
         rule.write_text("def fine(design):\n    return True\n")
-        from optisense.search.constraints import UserRule
+        from optisense.search.space.constraints import UserRule
 
         space = SearchSpace(SPACE, constraints=[UserRule(f"{rule}:fine")])
         folder = tmp_path / "study"

@@ -9,8 +9,8 @@ from optisense.design import SensorDesign, add_cage, get_value
 from optisense.design.cage import as_array
 from optisense.errors import DesignError, OptiSenseError, SearchError
 from optisense.search import Around, CagePoints, Choice, Integer, SearchSpace
-from optisense.search.expand import expand
-from optisense.search.space import BoundSpace
+from optisense.search.space.expansion import expand
+from optisense.search.space.search_space import BoundSpace
 
 
 class TestNumbers:

@@ -18,8 +18,8 @@ import optisense as ots
 from optisense.cli import app
 from optisense.errors import OptiSenseError, SearchError
 from optisense.search import Plan, SearchSpace, Study, run_study
-from optisense.search.constraints import UserRule
-from optisense.search.trust import file_of, not_trusted, trust
+from optisense.search.space.constraints import UserRule
+from optisense.search.study.trust import file_of, not_trusted, trust
 
 CODE = """
 from pathlib import Path

@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 
 from optisense.errors import SearchError
-from optisense.search import Around, CagePoints, Choice, Continuous, Spread
-from optisense.search.text import parse_errors, parse_space, parse_vary
+from optisense.search import Around, CagePoints, Choice, Continuous, ToleranceDistribution
+from optisense.search.space.text import parse_errors, parse_space, parse_vary
 
 
 @pytest.mark.parametrize(
@@ -63,8 +63,8 @@ def test_a_path_is_varied_once() -> None:
 def test_errors_of_making() -> None:
     errors = parse_errors(["lights.position=0.1", "coating.specularity=+-0.05"])
     assert errors.spreads == {
-        "lights.position": Spread(0.1),
-        "coating.specularity": Spread(0.05, "even"),
+        "lights.position": ToleranceDistribution(0.1),
+        "coating.specularity": ToleranceDistribution(0.05, "uniform"),
     }
     for text in ("a", "a=", "a=x", "a=-1", "a=+-0"):
         with pytest.raises(SearchError):

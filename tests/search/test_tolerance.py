@@ -1,4 +1,4 @@
-"""Errors of making: percentiles and shares of a linear score are known in closed form."""
+"""Manufacturing errors: percentiles and shares of a linear score are known in closed form."""
 
 from __future__ import annotations
 
@@ -12,17 +12,17 @@ from scipy.stats import norm, truncnorm
 import optisense as ots
 from optisense.design import SensorDesign, set_value
 from optisense.errors import DesignError, ObjectiveError, SearchError
-from optisense.search import Spread, search
-from optisense.search.making import CUT, MakingErrors
-from optisense.search.robust import percentile
-from optisense.search.sensitivity import paired_errors, percentile_of, total_effect
-from optisense.search.tolerance import Tolerance, tolerance, usual_errors
+from optisense.search import ToleranceDistribution, search
+from optisense.search.evaluation.robust import percentile
+from optisense.search.space.manufacturing import TRUNCATION, ManufacturingErrors
+from optisense.search.tolerance.analysis import Tolerance, tolerance, usual_errors
+from optisense.search.tolerance.sensitivity import paired_errors, percentile_of, total_effect
 
 RED, GREEN, BLUE = (f"coating.reflectance.{letter}" for letter in "rgb")
 SIGMA = 0.05
 WEIGHTS = {RED: 3.0, GREEN: 1.0, BLUE: 0.0}
-WITHIN = truncnorm.std(-CUT, CUT)
-"""Standard deviation of a standard normal error that is cut."""
+WITHIN = truncnorm.std(-TRUNCATION, TRUNCATION)
+"""Standard deviation of a standard normal error that is truncated."""
 
 
 @pytest.fixture(scope="module")
@@ -52,7 +52,7 @@ def test_percentiles_of_a_linear_score(result: Tolerance) -> None:
     found = result.results["linear"]
     assert found.nominal == pytest.approx(2.0)
     assert found.deviation == pytest.approx(deviation, rel=0.02)
-    one = SIGMA * truncnorm.ppf((np.arange(1000) + 0.5) / 1000, -CUT, CUT)
+    one = SIGMA * truncnorm.ppf((np.arange(1000) + 0.5) / 1000, -TRUNCATION, TRUNCATION)
     sums = 2.0 + np.add.outer(3.0 * one, one)
     for name, share in (("p10", 0.1), ("p50", 0.5), ("p90", 0.9)):
         expected = float(np.quantile(sums, share))
@@ -81,7 +81,7 @@ def test_errors_that_only_act_together_each_have_the_whole_share(result: Toleran
 
 
 def test_intervals_hold_the_truth_nine_times_in_ten() -> None:
-    bound = MakingErrors({RED: 0.01, GREEN: 0.02}).bind(
+    bound = ManufacturingErrors({RED: 0.01, GREEN: 0.02}).bind(
         set_value(ots.load("gelsight-mini"), "coating.reflectance", (0.5, 0.5, 0.5))
     )
     held_share = held_percentile = 0
@@ -98,7 +98,9 @@ def test_intervals_hold_the_truth_nine_times_in_ten() -> None:
 
 def test_one_source_of_many_numbers(grey: SensorDesign) -> None:
     """A vector is one source; with nothing else its share is all."""
-    found = tolerance(grey, linear, {"coating.reflectance": Spread(SIGMA, "even")}, sensors=400)
+    found = tolerance(
+        grey, linear, {"coating.reflectance": ToleranceDistribution(SIGMA, "uniform")}, sensors=400
+    )
     spread = found.results["linear"]
     assert spread.shares["coating.reflectance"].value == 1.0  # type: ignore[union-attr]
     assert spread.deviation == pytest.approx(SIGMA * math.sqrt(10 / 3), rel=0.06)
@@ -118,7 +120,7 @@ def test_errors_stay_within_what_is_possible(mini: SensorDesign) -> None:
 
 
 def test_every_light_errs_by_itself(mini: SensorDesign) -> None:
-    bound = MakingErrors({"lights.position": 0.1, "lights.angle": 2.0}).bind(mini)
+    bound = ManufacturingErrors({"lights.position": 0.1, "lights.angle": 2.0}).bind(mini)
     lights = sum(len(group.lights) for group in mini.lights.values())
     assert bound.size == 6 * lights
     errors = paired_errors(bound, 8, 0)
@@ -129,7 +131,7 @@ def test_every_light_errs_by_itself(mini: SensorDesign) -> None:
         for one, other in zip(made.lights[name].lights, group.lights, strict=True)
     ]
     assert len({tuple(each) for each in moved}) == lights
-    assert np.abs(moved).max() <= CUT * 0.1 + 1e-9
+    assert np.abs(moved).max() <= TRUNCATION * 0.1 + 1e-9
     assert (errors[:, 1, bound.owner == 1] == errors[:, 0, bound.owner == 1]).all()
     assert (errors[:, 1, bound.owner == 0] != errors[:, 0, bound.owner == 0]).all()
 
@@ -143,7 +145,7 @@ def test_failed_sensors_count_as_worse_than_any(grey: SensorDesign) -> None:
 
     found = tolerance(grey, fragile, {RED: SIGMA}, sensors=400)
     spread = found.results["fragile"]
-    part = truncnorm.cdf(-1.0, -CUT, CUT)
+    part = truncnorm.cdf(-1.0, -TRUNCATION, TRUNCATION)
     assert sum(found.failures.values()) / found.sensors == pytest.approx(part, abs=0.01)
     assert math.isnan(spread.percentiles["p10"].value)
     assert spread.percentiles["p50"].value == pytest.approx(0.5, abs=0.003)
@@ -173,9 +175,9 @@ def test_usual_errors_fit_every_sensor() -> None:
     [
         ({"coating.specularty": 0.1}, DesignError, "specularity"),
         ({"coating.specularity": -0.1}, SearchError, "not a number above 0"),
-        ({"camera.resolution[0]": 1.0}, SearchError, "no error of making"),
+        ({"camera.resolution[0]": 1.0}, SearchError, "no manufacturing error"),
         ({"lights.nowhere.position": 0.1}, DesignError, "no light group 'nowhere'"),
-        ({}, SearchError, "no errors of making"),
+        ({}, SearchError, "no manufacturing errors"),
     ],
 )
 def test_bad_errors_are_told(
@@ -210,7 +212,12 @@ class TestRobust:
         space = {RED: (0.3, 0.9, 61)}
         plain = search(grey, space, cliff, method="grid")
         robust = search(
-            grey, space, cliff, method="grid", errors={RED: Spread(0.1, "even")}, samples=101
+            grey,
+            space,
+            cliff,
+            method="grid",
+            errors={RED: ToleranceDistribution(0.1, "uniform")},
+            samples=101,
         )
         assert plain.best.values[RED] == pytest.approx(0.7)
         assert 0.595 < float(robust.best.values[RED]) < 0.6205
@@ -225,8 +232,13 @@ class TestRobust:
                 raise ValueError("it breaks")
             return 1.0
 
-        errors = {RED: Spread(0.1, "even")}
-        result = search(grey, {RED: (0.5, 0.7, 3)}, fragile, method="grid", errors=errors)
+        result = search(
+            grey,
+            {RED: (0.5, 0.7, 3)},
+            fragile,
+            method="grid",
+            errors={RED: ToleranceDistribution(0.1, "uniform")},
+        )
         assert [trial.failure is None for trial in result.trials[1:]] == [True, True, False]
         assert "manufactured sensors fail: ValueError: it breaks" in str(result.trials[3].failure)
 

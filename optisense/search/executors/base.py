@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from optisense.errors import SearchError
-from optisense.search.evaluation import Evaluator
-from optisense.search.outcome import Outcome
+from optisense.search.evaluation.evaluator import Evaluator
+from optisense.search.evaluation.outcome import Outcome
 
 
 class Runner(ABC):

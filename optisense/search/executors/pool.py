@@ -23,10 +23,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from optisense.errors import OptiSenseError, SearchError, SetupError
-from optisense.search.evaluation import Evaluator
+from optisense.search.evaluation.evaluator import Evaluator
+from optisense.search.evaluation.outcome import Outcome
 from optisense.search.executors.base import Runner, packed
 from optisense.search.executors.wire import receive, send
-from optisense.search.outcome import Outcome
 
 MOST_DEATHS = 2
 """A trial whose workers die so often is itself the reason, and fails."""

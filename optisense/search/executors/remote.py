@@ -15,9 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from optisense.errors import SetupError
-from optisense.search.evaluation import Evaluator
+from optisense.search.evaluation.evaluator import Evaluator
+from optisense.search.evaluation.outcome import Outcome
 from optisense.search.executors.base import Runner, packed
-from optisense.search.outcome import Outcome
 
 CONNECT_SECONDS = 10.0
 WORKER_SECONDS = 60.0

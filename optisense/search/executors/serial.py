@@ -11,9 +11,9 @@ from types import FrameType, TracebackType
 import numpy as np
 from numpy.typing import NDArray
 
-from optisense.search.evaluation import Evaluator
+from optisense.search.evaluation.evaluator import Evaluator
+from optisense.search.evaluation.outcome import Outcome
 from optisense.search.executors.base import Runner
-from optisense.search.outcome import Outcome
 
 
 class SerialRunner(Runner):
@@ -55,11 +55,11 @@ class SerialRunner(Runner):
         future.set_result(outcome)
         return future
 
-    def listen(self, tell: Callable[[float, str], None]) -> None:
-        """Call ``tell`` with what a trial is at, if its evaluator can tell."""
-        listen = getattr(self._evaluator, "listen", None)
-        if listen is not None:
-            listen(tell)
+    def report_progress_to(self, callback: Callable[[float, str], None]) -> None:
+        """Call `callback` with the progress of the trial at hand, if its evaluator reports it."""
+        report_progress_to = getattr(self._evaluator, "report_progress_to", None)
+        if report_progress_to is not None:
+            report_progress_to(callback)
 
     def close(self) -> None:
         """Nothing is running."""

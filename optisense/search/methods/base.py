@@ -18,9 +18,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from optisense.errors import SearchError
-from optisense.search.evaluation import DesignEvaluator, Evaluator
-from optisense.search.outcome import Outcome
-from optisense.search.space import BoundSpace
+from optisense.search.evaluation.evaluator import DesignEvaluator, Evaluator
+from optisense.search.evaluation.outcome import Outcome
+from optisense.search.space.search_space import BoundSpace
 
 FloatArray = NDArray[np.float64]
 

@@ -16,8 +16,8 @@ import numpy as np
 from threadpoolctl import ThreadpoolController
 
 from optisense.errors import SearchError
+from optisense.search.evaluation.outcome import Outcome
 from optisense.search.methods.base import FloatArray, Method, Problem, values_to_maximise
-from optisense.search.outcome import Outcome
 
 MOST_POPULATION = 100_000
 

@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
+from optisense.search.evaluation.outcome import Outcome
 from optisense.search.methods.base import FloatArray, Method, Problem, values_to_maximise
-from optisense.search.outcome import Outcome
 
 Combination = tuple[int, ...]
 """The position of a level for each parameter."""

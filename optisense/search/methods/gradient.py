@@ -24,11 +24,11 @@ import numpy as np
 from optisense.design import SensorDesign
 from optisense.errors import NoDerivativeError, OptiSenseError, SearchError
 from optisense.objectives.smooth import SMOOTH, Slopes
-from optisense.search.evaluation import DesignEvaluator, Evaluator
-from optisense.search.jacobian import Jacobian, holds, jacobian, moving_parts
+from optisense.search.evaluation.evaluator import DesignEvaluator, Evaluator
+from optisense.search.evaluation.outcome import Outcome
 from optisense.search.methods.base import FloatArray, Method, Problem
-from optisense.search.outcome import Outcome
-from optisense.search.space import BoundSpace
+from optisense.search.methods.jacobian import Jacobian, holds, jacobian, moving_parts
+from optisense.search.space.search_space import BoundSpace
 
 if TYPE_CHECKING:
     from optisense.optics.transport.ray_gradient import DifferentiableRays

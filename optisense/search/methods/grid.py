@@ -8,9 +8,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from optisense.errors import SearchError
+from optisense.search.evaluation.outcome import Outcome
 from optisense.search.methods.base import FloatArray, Method, Problem
-from optisense.search.outcome import Outcome
-from optisense.search.space import BoundSpace
+from optisense.search.space.search_space import BoundSpace
 
 GENERATION = 512
 """Combinations that are proposed together: enough for many workers."""

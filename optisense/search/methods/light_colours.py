@@ -17,15 +17,15 @@ from typing import TYPE_CHECKING, Any
 from optisense.design import SensorDesign
 from optisense.errors import SearchError
 from optisense.objectives import Evaluation, Objective, Score, Settings
-from optisense.objectives.evaluation import Tell
+from optisense.objectives.evaluation import ProgressCallback
 from optisense.objectives.registry import pixels_read
 from optisense.objectives.relighting import Relighting
 from optisense.objectives.relit_scores import RelitScore, has_quick_form, quick_form
 from optisense.objectives.run import run_objective, split_settings
-from optisense.search.evaluation import DesignEvaluator, Evaluator
+from optisense.search.evaluation.evaluator import DesignEvaluator, Evaluator
 from optisense.search.methods.base import Problem
 from optisense.search.methods.combinations import Combinations, Stage
-from optisense.search.space import BoundSpace
+from optisense.search.space.search_space import BoundSpace
 
 if TYPE_CHECKING:
     from optisense.optics import OpticalModel
@@ -85,7 +85,7 @@ class RelitEvaluator(DesignEvaluator):
             while len(self._lit) >= KEPT_SEEDS:
                 self._lit.popitem(last=False)
             model = self.keeper.model(self.space.prepared)
-            self._lit[seed] = _Lit(model, self._ready(), self.settings, seed, self._tell)
+            self._lit[seed] = _Lit(model, self._ready(), self.settings, seed, self._progress)
         self._lit.move_to_end(seed)
         return self._lit[seed].scores(design)
 
@@ -102,12 +102,12 @@ class _Lit:
         objectives: Sequence[Objective],
         settings: Mapping[str, Any],
         seed: int,
-        tell: Tell | None,
+        progress: ProgressCallback | None,
     ) -> None:
         shared, self._own = split_settings(settings, objectives)
         reads = pixels_read(objectives, self._own)
         given = Settings(**shared, seed=seed)
-        self._relighting = Relighting(Evaluation(model, given, tell, reads))
+        self._relighting = Relighting(Evaluation(model, given, progress, reads))
         model.forget_light()  # the layers hold all that is needed of it
         self._objectives = objectives
         self._quick: dict[str, RelitScore] = {}

@@ -13,11 +13,11 @@ from itertools import islice, product
 import numpy as np
 
 from optisense.errors import SearchError
-from optisense.search.handles import LightType
 from optisense.search.methods.base import Problem
 from optisense.search.methods.combinations import GENERATION, Combination, Combinations, Stage
-from optisense.search.parameters import Choice
-from optisense.search.space import BoundSpace
+from optisense.search.space.design_variables import LightType
+from optisense.search.space.parameters import Choice
+from optisense.search.space.search_space import BoundSpace
 
 GROUPWISE_SHARE = 0.5
 """Combinations of groups are all tried where they take no more than this part of the budget."""
@@ -82,8 +82,8 @@ def _groups(space: BoundSpace) -> list[list[int]]:
     """The parameters of each light group."""
     found: dict[str, list[int]] = {}
     for number, parameter in enumerate(space.parameters):
-        if isinstance(parameter.handle, LightType):
-            found.setdefault(parameter.handle.group, []).append(number)
+        if isinstance(parameter.variable, LightType):
+            found.setdefault(parameter.variable.group, []).append(number)
     return list(found.values())
 
 
@@ -94,7 +94,7 @@ def _options(space: BoundSpace) -> int:
         SearchError: the space holds something else than types of lights.
     """
     for parameter in space.parameters:
-        if not isinstance(parameter.handle, LightType):
+        if not isinstance(parameter.variable, LightType):
             raise SearchError(
                 "this method searches types of lights and nothing else",
                 where=parameter.name,

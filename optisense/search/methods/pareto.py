@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 from scipy.stats import qmc
 
 from optisense.errors import SearchError
-from optisense.search.dominance import crowding, ranks
+from optisense.search.evaluation.outcome import Outcome
 from optisense.search.methods.base import FloatArray, Method, Problem
-from optisense.search.outcome import Outcome
+from optisense.search.methods.dominance import crowding, ranks
 
 CROSSOVER_SPREAD = 15.0
 """Distribution index of the crossover; larger keeps children nearer to their parents."""

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 
 from scipy.stats import qmc
 
+from optisense.search.evaluation.outcome import Outcome
 from optisense.search.methods.base import FloatArray, Method, Problem
-from optisense.search.outcome import Outcome
 
 GENERATION = 64
 

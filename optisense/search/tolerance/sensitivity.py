@@ -16,8 +16,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from optisense.search.making import BoundErrors, even_shares
-from optisense.search.robust import percentile
+from optisense.search.evaluation.robust import percentile
+from optisense.search.space.manufacturing import BoundManufacturingErrors, latin_hypercube
 
 FloatArray = NDArray[np.float64]
 
@@ -46,7 +46,7 @@ class Estimate:
     error: float = 0.0
 
 
-def paired_errors(bound: BoundErrors, rows: int, seed: int) -> FloatArray:
+def paired_errors(bound: BoundManufacturingErrors, rows: int, seed: int) -> FloatArray:
     """(rows, 1 + sources, d) errors: in each row a first sensor, and for each source another one
     that differs from it in the errors of this source alone.
 
@@ -54,7 +54,7 @@ def paired_errors(bound: BoundErrors, rows: int, seed: int) -> FloatArray:
     apart, and each row holds one sensor.
     """
     sources = len(bound.sources)
-    shares = even_shares(rows, 2 * bound.size, seed)
+    shares = latin_hypercube(rows, 2 * bound.size, seed)
     one = bound.errors(shares[:, : bound.size])
     if sources == 1:
         return one[:, None]

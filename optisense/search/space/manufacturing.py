@@ -1,4 +1,4 @@
-"""Errors of making: how a manufactured sensor may differ from its design."""
+"""Manufacturing errors: how a manufactured sensor may differ from its design."""
 
 from __future__ import annotations
 
@@ -12,53 +12,57 @@ from numpy.typing import NDArray
 
 from optisense.design import SensorDesign, set_value
 from optisense.errors import DesignError, SearchError
-from optisense.search.expand import Parameter, expand
-from optisense.search.parameters import Around, CagePoints, Continuous, Integer
-from optisense.search.space import BoundSpace, SearchSpace
+from optisense.search.space.expansion import Parameter, expand
+from optisense.search.space.parameters import Around, CagePoints, Continuous, Integer
+from optisense.search.space.search_space import BoundSpace, SearchSpace
 
 FloatArray = NDArray[np.float64]
 
-CUT = 3.0
-"""A normal error is cut at so many standard deviations: what is farther off is thrown away."""
+TRUNCATION = 3.0
+"""Standard deviations at which a normal distribution of errors is truncated: parts that are farther
+off do not pass the inspection of their maker."""
 
 SAMPLES = 8
-"""Manufactured sensors that are tried for each trial of a search."""
+"""Sensors with random manufacturing errors that each trial of a search scores."""
 
 ALL_LIGHTS = {"position": "shift", "angle": "turn"}
 """`lights.position` and `lights.angle`, and those of a group, speak of each light by itself."""
 
 
 @dataclass(frozen=True)
-class Spread:
-    """How far a value may be off.
+class ToleranceDistribution:
+    """The distribution of the error of one value.
 
     Attributes:
-        size: standard deviation of a normal error, or the limit of an even one, in the value's
-            unit (mm, degrees).
-        kind: "normal" (cut at three standard deviations) or "even" (all errors up to the limit).
+        size: the standard deviation of a normal distribution, or the limit of a uniform one, in
+            the value's unit (mm, degrees).
+        kind: "normal" (truncated at three standard deviations) or "uniform" (all errors up to the
+            limit are equally likely).
     """
 
     size: float
-    kind: Literal["normal", "even"] = "normal"
+    kind: Literal["normal", "uniform"] = "normal"
 
     def __post_init__(self) -> None:
         if not (np.isfinite(self.size) and self.size > 0.0):
             raise SearchError(f"an error of {self.size} is not a number above 0")
-        if self.kind not in ("normal", "even"):
-            raise SearchError(f"'{self.kind}' errors are not known", hint="normal or even")
+        if self.kind not in ("normal", "uniform"):
+            raise SearchError(
+                f"a distribution '{self.kind}' is not known", hint="Write normal or uniform"
+            )
 
     @property
     def reach(self) -> float:
         """The largest error."""
-        return self.size * (CUT if self.kind == "normal" else 1.0)
+        return self.size * (TRUNCATION if self.kind == "normal" else 1.0)
 
     def errors(self, share: FloatArray) -> FloatArray:
         """Errors whose distribution function has the value `share` (0 to 1)."""
-        if self.kind == "even":
+        if self.kind == "uniform":
             return np.asarray((2.0 * share - 1.0) * self.size)
         from scipy.stats import truncnorm  # takes a second to load
 
-        return np.asarray(truncnorm.ppf(share, -CUT, CUT) * self.size)
+        return np.asarray(truncnorm.ppf(share, -TRUNCATION, TRUNCATION) * self.size)
 
 
 UNITS = {
@@ -84,7 +88,7 @@ def unit_of(path: str) -> str:
     return UNITS.get(names[-1], "")
 
 
-class MakingErrors:
+class ManufacturingErrors:
     """Everything that may come out other than designed, by path.
 
     A path is one that may be varied (a number, a vector, the points of a cage, the shift or turn
@@ -92,47 +96,58 @@ class MakingErrors:
     itself, of all groups or as `lights.GROUP.position` of one.
     """
 
-    def __init__(self, spreads: Mapping[str, Spread | float]) -> None:
+    def __init__(self, distributions: Mapping[str, ToleranceDistribution | float]) -> None:
         """Name the errors; a plain number is a standard deviation.
 
         Raises:
             SearchError: there is none, or a size makes no sense.
         """
-        self.spreads: dict[str, Spread] = {}
-        for path, given in spreads.items():
+        self.distributions: dict[str, ToleranceDistribution] = {}
+        for path, given in distributions.items():
             try:
-                self.spreads[path] = given if isinstance(given, Spread) else Spread(float(given))
+                self.distributions[path] = (
+                    given
+                    if isinstance(given, ToleranceDistribution)
+                    else ToleranceDistribution(float(given))
+                )
             except SearchError as error:
                 raise SearchError(error.message, where=path, hint=error.hint) from None
-        if not self.spreads:
-            raise SearchError("there are no errors of making", hint="Name one: --error PATH=SIZE")
+        if not self.distributions:
+            raise SearchError(
+                "there are no manufacturing errors", hint="Name one: --error PATH=SIZE"
+            )
 
     @property
     def sources(self) -> list[str]:
         """The paths, as given."""
-        return list(self.spreads)
+        return list(self.distributions)
 
-    def bind(self, design: SensorDesign) -> BoundErrors:
+    def bind(self, design: SensorDesign) -> BoundManufacturingErrors:
         """The errors of one design.
 
         Raises:
             DesignError: a path leads nowhere; names the near match.
             SearchError: what it names takes no error.
         """
-        return BoundErrors(self, design)
+        return BoundManufacturingErrors(self, design)
 
     def to_plain(self) -> dict[str, Any]:
         """JSON-ready."""
-        return {path: [each.kind, each.size] for path, each in self.spreads.items()}
+        return {path: [each.kind, each.size] for path, each in self.distributions.items()}
 
     @staticmethod
-    def from_plain(data: Mapping[str, Any]) -> MakingErrors:
-        """The errors of `to_plain`'s values."""
-        return MakingErrors({path: Spread(size, kind) for path, (kind, size) in data.items()})
+    def from_plain(data: Mapping[str, Any]) -> ManufacturingErrors:
+        """The errors of `to_plain`'s values; release 0.1 wrote "even" for "uniform"."""
+        return ManufacturingErrors(
+            {
+                path: ToleranceDistribution(size, "uniform" if kind == "even" else kind)
+                for path, (kind, size) in data.items()
+            }
+        )
 
 
-class BoundErrors:
-    """Errors of making for one design.
+class BoundManufacturingErrors:
+    """Manufacturing errors for one design.
 
     Attributes:
         sources: the paths as given.
@@ -140,14 +155,14 @@ class BoundErrors:
         space: of these numbers, within what is possible.
     """
 
-    def __init__(self, errors: MakingErrors, design: SensorDesign) -> None:
-        """See `MakingErrors.bind`."""
+    def __init__(self, errors: ManufacturingErrors, design: SensorDesign) -> None:
+        """See `ManufacturingErrors.bind`."""
         self.sources = errors.sources
-        self._spreads = [errors.spreads[source] for source in self.sources]
+        self._distributions = [errors.distributions[source] for source in self.sources]
         ranges: dict[str, Any] = {}
         owner: list[int] = []
         prepared = design
-        for number, (source, spread) in enumerate(errors.spreads.items()):
+        for number, (source, spread) in enumerate(errors.distributions.items()):
             for path in _paths(design, source):
                 if path in ranges:
                     raise SearchError(f"'{path}' is off twice", where=source)
@@ -165,7 +180,8 @@ class BoundErrors:
     def errors(self, shares: FloatArray) -> FloatArray:
         """(k, d) errors, in the unit of each value, for shares (k, d) from 0 to 1."""
         columns = [
-            self._spreads[owner].errors(shares[:, k]) for k, owner in enumerate(self.owner.tolist())
+            self._distributions[owner].errors(shares[:, k])
+            for k, owner in enumerate(self.owner.tolist())
         ]
         return np.stack(columns, axis=1)
 
@@ -194,7 +210,7 @@ class _ErrorSpace(BoundSpace):
         self.now = self.start
 
 
-def even_shares(count: int, size: int, seed: int) -> FloatArray:
+def latin_hypercube(count: int, size: int, seed: int) -> FloatArray:
     """(count, size) shares from 0 to 1, each number spread evenly over its range (Latin
     hypercube: McKay, Beckman and Conover, "A comparison of three methods for selecting values of
     input variables", 1979).
@@ -223,7 +239,7 @@ def _paths(design: SensorDesign, source: str) -> list[str]:
     ]
 
 
-def _all_points(path: str, spread: Spread) -> Around | CagePoints:
+def _all_points(path: str, spread: ToleranceDistribution) -> Around | CagePoints:
     around = Around(spread.reach)
     return CagePoints(around) if re.fullmatch(r"cages\.[^.]+\.points", path) else around
 
@@ -232,8 +248,8 @@ def _limits(design: SensorDesign, parameter: Parameter, source: str) -> Continuo
     """The range of a number with errors, cut where the design refuses it."""
     kind = parameter.kind
     if isinstance(kind, Integer) or not isinstance(kind, Continuous):
-        raise SearchError("a whole number or a name has no error of making", where=source)
-    if parameter.handle is not None or parameter.name.startswith("cages."):
+        raise SearchError("a whole number or a name has no manufacturing error", where=source)
+    if parameter.variable is not None or parameter.name.startswith("cages."):
         return kind
     name, now = parameter.name, parameter.start
     low = _farthest(design, name, now, kind.low)

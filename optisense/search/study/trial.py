@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from optisense.design import SensorDesign
 from optisense.objectives.score import deviation_of
-from optisense.search.outcome import Outcome
-from optisense.search.space import BoundSpace
+from optisense.search.evaluation.outcome import Outcome
+from optisense.search.space.search_space import BoundSpace
 
 
 @dataclass(frozen=True)

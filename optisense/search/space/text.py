@@ -7,7 +7,7 @@ range = LOW ":" HIGH [ ":" STEPS ]      between two bounds
       | NAME "," NAME [ "," NAME ]...   one of several
 ```
 
-For the points of a cage: `/symmetry=x`, `/axes=xz`, `/points=0,2,6-8`. Errors of making are
+For the points of a cage: `/symmetry=x`, `/axes=xz`, `/points=0,2,6-8`. Manufacturing errors are
 written PATH=SIZE (see `parse_errors`).
 """
 
@@ -20,8 +20,8 @@ import yaml
 
 from optisense.design.near import suggestion
 from optisense.errors import SearchError
-from optisense.search.making import MakingErrors, Spread
-from optisense.search.parameters import Around, CagePoints, Choice, Continuous, Specification
+from optisense.search.space.manufacturing import ManufacturingErrors, ToleranceDistribution
+from optisense.search.space.parameters import Around, CagePoints, Choice, Continuous, Specification
 
 EXAMPLE = "Write PATH=LOW:HIGH, such as coating.specularity=0:1, or PATH=NAME,NAME"
 OPTIONS = ("symmetry", "axes", "points")
@@ -59,25 +59,29 @@ def parse_space(texts: list[str]) -> dict[str, Specification]:
     return found
 
 
-def parse_errors(texts: list[str]) -> MakingErrors:
-    """Errors of making: PATH=SIZE is a standard deviation, PATH=+-LIMIT any error up to a limit.
+def parse_errors(texts: list[str]) -> ManufacturingErrors:
+    """Read manufacturing errors: PATH=SIZE is a standard deviation, PATH=+-LIMIT a limit.
 
     Raises:
         SearchError: one can't be read, or a path is there twice.
     """
-    found: dict[str, Spread] = {}
+    found: dict[str, ToleranceDistribution] = {}
     for text in texts:
         path, equals, size = (part.strip() for part in text.partition("="))
         if not equals or not path or not size:
-            raise SearchError(f"'{text}' is no error of making", hint="Write PATH=SIZE")
+            raise SearchError(f"'{text}' is no manufacturing error", hint="Write PATH=SIZE")
         if path in found:
             raise SearchError(f"'{path}' is off twice")
         limit = re.fullmatch(r"(?:\+-|\+/-|±)(.+)", size)
         try:
-            found[path] = Spread(_number(limit[1]), "even") if limit else Spread(_number(size))
+            found[path] = (
+                ToleranceDistribution(_number(limit[1]), "uniform")
+                if limit
+                else ToleranceDistribution(_number(size))
+            )
         except SearchError as error:
             raise SearchError(error.message, where=path, hint=error.hint) from None
-    return MakingErrors(found)
+    return ManufacturingErrors(found)
 
 
 def _range(text: str) -> Specification:

@@ -26,15 +26,15 @@ from collections.abc import Callable, Iterable
 from optisense.design import SensorDesign
 from optisense.design.near import suggestion
 from optisense.errors import DesignError, SearchError
-from optisense.search.handles import (
+from optisense.search.space.design_variables import (
+    DesignVariable,
     GroupType,
-    Handle,
     LibraryCamera,
     LibraryCoating,
     LightType,
     PartMaterial,
 )
-from optisense.search.moves import (
+from optisense.search.space.rigid_moves import (
     CameraTurn,
     GroupShift,
     GroupTurn,
@@ -44,7 +44,7 @@ from optisense.search.moves import (
     PartTurn,
 )
 
-MOVES: dict[tuple[str, str], Callable[[str, str, int], Handle]] = {
+MOVES: dict[tuple[str, str], Callable[[str, str, int], DesignVariable]] = {
     ("lights", "shift"): GroupShift,
     ("lights", "turn"): GroupTurn,
     ("camera", "turn"): CameraTurn,
@@ -53,11 +53,11 @@ MOVES: dict[tuple[str, str], Callable[[str, str, int], Handle]] = {
 }
 
 
-def find_handles(design: SensorDesign, path: str) -> list[Handle]:
-    """The handles that a path names: none for an ordinary path, three for a whole vector.
+def find_variables(design: SensorDesign, path: str) -> list[DesignVariable]:
+    """The variables that a path names: none for an ordinary path, three for a whole vector.
 
     Raises:
-        SearchError, DesignError: it looks like a handle but names nothing in the design.
+        SearchError, DesignError: it looks like a variable but names nothing in the design.
     """
     move = re.fullmatch(
         r"(?:(lights|parts)\.([^.\[\]]+)|(camera))\.(shift|turn)(?:\.([^.]+))?", path
@@ -94,7 +94,7 @@ def find_handles(design: SensorDesign, path: str) -> list[Handle]:
 
 def _of_light(
     design: SensorDesign, path: str, group: str, index: int, what: str, letter: str | None
-) -> list[Handle]:
+) -> list[DesignVariable]:
     if group not in design.lights:
         raise DesignError(
             f"'{path}' leads nowhere: 'lights' has no '{group}'",
@@ -116,7 +116,7 @@ def _of_light(
 
 def _moves(
     design: SensorDesign, path: str, section: str, name: str, what: str, letter: str | None
-) -> list[Handle]:
+) -> list[DesignVariable]:
     if section == "camera" and what == "shift":
         raise SearchError("the camera has a position to move", where=path, hint="camera.position.x")
     known: Iterable[str] = design.parts if section == "parts" else design.lights

@@ -13,9 +13,8 @@ from pydantic import BaseModel
 from optisense.design import Cage, SensorDesign, Share, get_value, parse_path, set_value
 from optisense.design.cage import as_array
 from optisense.errors import SearchError
-from optisense.search.handle_paths import find_handles
-from optisense.search.handles import Handle
-from optisense.search.parameters import (
+from optisense.search.space.design_variables import DesignVariable
+from optisense.search.space.parameters import (
     Around,
     CagePoints,
     Choice,
@@ -24,6 +23,7 @@ from optisense.search.parameters import (
     Single,
     Specification,
 )
+from optisense.search.space.variable_paths import find_variables
 
 COLOURS = {
     "red": (1.0, 0.0, 0.0),
@@ -56,8 +56,8 @@ class Parameter:
         name: its dotted path; unique in a space.
         kind: bounds or options.
         start: what it is in the design, as a coordinate (see `BoundSpace`), within the bounds.
-        targets: the values of the design that follow it; empty where a handle acts.
-        handle: what it changes when that is more than values.
+        targets: the values of the design that follow it; empty where a variable acts.
+        variable: what it changes when that is more than values.
         asked: the path as the user gave it.
     """
 
@@ -65,7 +65,7 @@ class Parameter:
     kind: Single
     start: float
     targets: tuple[Target, ...] = ()
-    handle: Handle | None = None
+    variable: DesignVariable | None = None
     asked: str = ""
 
 
@@ -89,9 +89,9 @@ def expand(
             found += added
         return design, found
     try:
-        handles = find_handles(design, path)
-        if handles:
-            return design, [_of_handle(design, handle, spec, path) for handle in handles]
+        variables = find_variables(design, path)
+        if variables:
+            return design, [_of_variable(design, variable, spec, path) for variable in variables]
         steps = parse_path(path)
         if len(steps) > 2 and steps[0] == "cages" and steps[2] in ("points", "blend"):
             axes = steps[3:]
@@ -140,18 +140,20 @@ def starred(design: SensorDesign, path: str) -> list[str]:
     return [f"{section}.{name}.{leaf}" for name in chosen]
 
 
-def _of_handle(design: SensorDesign, handle: Handle, spec: Specification, asked: str) -> Parameter:
-    now = handle.start(design)
-    if handle.numeric:
+def _of_variable(
+    design: SensorDesign, variable: DesignVariable, spec: Specification, asked: str
+) -> Parameter:
+    now = variable.start(design)
+    if variable.numeric:
         if isinstance(spec, Around):
             spec = spec.about(0.0)
         if not isinstance(spec, Continuous):
             raise SearchError("this takes a range of numbers", hint="Give LOW:HIGH")
         assert isinstance(now, float)
-        return Parameter(handle.path, spec, _within(now, spec), handle=handle, asked=asked)
+        return Parameter(variable.path, spec, _within(now, spec), variable=variable, asked=asked)
     if not isinstance(spec, Choice):
         raise SearchError("this takes names to choose from", hint="Give them as NAME,NAME,...")
-    return Parameter(handle.path, spec, _number_of(now, spec), handle=handle, asked=asked)
+    return Parameter(variable.path, spec, _number_of(now, spec), variable=variable, asked=asked)
 
 
 def _of_value(path: str, value: Any, spec: Specification) -> list[Parameter]:

@@ -10,13 +10,13 @@ from numpy.typing import NDArray
 
 from optisense.design import SensorDesign
 from optisense.geometry import TriangleMesh
-from optisense.search.handles import Handle
+from optisense.search.space.design_variables import DesignVariable
 
 FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class _Move(Handle):
+class _Move(DesignVariable):
     """A number of mm or degrees along one axis; 0 leaves all as it is."""
 
     name: str

@@ -6,8 +6,8 @@ from typing import Any
 
 from optisense.design import Provenance, SensorDesign, Status, get_value
 from optisense.errors import DesignError
-from optisense.search.study import Study
-from optisense.search.trial import Trial
+from optisense.search.study.study import Study
+from optisense.search.study.trial import Trial
 
 
 def design_of(study: Study, trial: Trial) -> SensorDesign:

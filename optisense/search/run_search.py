@@ -10,7 +10,7 @@ from typing import Any
 from optisense.design import SensorDesign
 from optisense.design.sensor_design import refuse_no_design
 from optisense.errors import FolderInUseError, OptiSenseError, SearchError
-from optisense.search.evaluation import Evaluator, Goal
+from optisense.search.evaluation.evaluator import Evaluator, Goal
 from optisense.search.executors import (
     DaskRunner,
     ExecutorRunner,
@@ -18,11 +18,12 @@ from optisense.search.executors import (
     Runner,
     SerialRunner,
 )
-from optisense.search.making import SAMPLES, MakingErrors, Spread
-from optisense.search.plan import Plan
-from optisense.search.running import Result, Run, Tell
-from optisense.search.space import SearchSpace
-from optisense.search.study import Study
+from optisense.search.space.manufacturing import SAMPLES, ManufacturingErrors, ToleranceDistribution
+from optisense.search.space.search_space import SearchSpace
+from optisense.search.study.loop import StudyRun
+from optisense.search.study.plan import Plan
+from optisense.search.study.progress import SearchProgressCallback, SearchResult
+from optisense.search.study.study import Study
 
 
 def search(
@@ -40,12 +41,12 @@ def search(
     resume: bool = False,
     options: Mapping[str, Any] | None = None,
     settings: Mapping[str, Any] | None = None,
-    errors: MakingErrors | Mapping[str, Spread | float] | None = None,
+    errors: ManufacturingErrors | Mapping[str, ToleranceDistribution | float] | None = None,
     samples: int = SAMPLES,
     apart: bool = True,
     variant: str = "auto",
-    progress: Tell | None = None,
-) -> Result:
+    progress: SearchProgressCallback | None = None,
+) -> SearchResult:
     """Search a space for the design with the highest score.
 
     The result's `.best` is a trial, and `.best.design` the better design. Every trial is scored
@@ -84,8 +85,8 @@ def search(
     goals = as_goals(objective)
     named = space if isinstance(space, SearchSpace) else SearchSpace(space)
     making = errors
-    if making is not None and not isinstance(making, MakingErrors):
-        making = MakingErrors(making)
+    if making is not None and not isinstance(making, ManufacturingErrors):
+        making = ManufacturingErrors(making)
     plan = Plan(
         space=named,
         goals=goals,
@@ -126,9 +127,9 @@ def run_study(
     own_process: bool = False,
     limit: int | None = None,
     variant: str = "auto",
-    progress: Tell | None = None,
+    progress: SearchProgressCallback | None = None,
     told: Callable[[], None] | None = None,
-) -> Result:
+) -> SearchResult:
     """Run a study, or go on with one.
 
     Args:
@@ -156,7 +157,7 @@ def run_study(
         return ProcessPool(evaluator, workers)
 
     try:
-        return Run(study, make_runner, progress, limit, variant).go()
+        return StudyRun(study, make_runner, progress, limit, variant).go()
     except FolderInUseError:
         raise
     except OptiSenseError as error:

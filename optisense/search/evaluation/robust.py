@@ -9,10 +9,15 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from optisense.errors import OptiSenseError
-from optisense.objectives.evaluation import Tell
-from optisense.search.evaluation import DesignEvaluator
-from optisense.search.making import SAMPLES, BoundErrors, MakingErrors, even_shares
-from optisense.search.outcome import Outcome
+from optisense.objectives.evaluation import ProgressCallback
+from optisense.search.evaluation.evaluator import DesignEvaluator
+from optisense.search.evaluation.outcome import Outcome
+from optisense.search.space.manufacturing import (
+    SAMPLES,
+    BoundManufacturingErrors,
+    ManufacturingErrors,
+    latin_hypercube,
+)
 
 FloatArray = NDArray[np.float64]
 
@@ -20,13 +25,13 @@ LOW, MIDDLE, HIGH = 0.1, 0.5, 0.9
 
 
 class RobustEvaluator:
-    """Scores a point by the tenth percentile (P10) over sensors with errors of making.
+    """Scores a point by the tenth percentile (P10) over sensors with manufacturing errors.
 
     All points are tried with the same errors, so that they are compared fairly.
     """
 
     def __init__(
-        self, usual: DesignEvaluator, errors: MakingErrors, seed: int, samples: int = SAMPLES
+        self, usual: DesignEvaluator, errors: ManufacturingErrors, seed: int, samples: int = SAMPLES
     ) -> None:
         """Draw the errors.
 
@@ -41,12 +46,12 @@ class RobustEvaluator:
         self._drawn: dict[int, FloatArray] = {}
         self._errors(errors.bind(usual.space.prepared))
 
-    def listen(self, tell: Tell) -> None:
+    def report_progress_to(self, callback: ProgressCallback) -> None:
         """See `DesignEvaluator.listen`."""
-        self.usual.listen(tell)
+        self.usual.report_progress_to(callback)
 
     def __call__(self, vector: FloatArray, seed: int) -> Outcome:
-        """See `optisense.search.evaluation.Evaluator`."""
+        """See `optisense.search.evaluation.evaluator.Evaluator`."""
         began = time.perf_counter()
         try:
             design = self.usual.space.apply(vector)
@@ -76,10 +81,10 @@ class RobustEvaluator:
             failure = f"{len(reasons)} of {len(found)} manufactured sensors fail: {reasons[0]}"
         return Outcome(scores, failure, parts, time.perf_counter() - began)
 
-    def _errors(self, bound: BoundErrors) -> FloatArray:
+    def _errors(self, bound: BoundManufacturingErrors) -> FloatArray:
         """(samples, d) errors, the same for all designs with as many numbers."""
         if bound.size not in self._drawn:
-            shares = even_shares(self.samples, bound.size, self.seed)
+            shares = latin_hypercube(self.samples, bound.size, self.seed)
             self._drawn[bound.size] = bound.errors(shares)
         return self._drawn[bound.size]
 

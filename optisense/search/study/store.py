@@ -22,8 +22,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from optisense.errors import OptiSenseError, OutputError, SearchError
-from optisense.search.outcome import Outcome
-from optisense.search.reader import Reader
+from optisense.search.evaluation.outcome import Outcome
+from optisense.search.study.reader import Reader
 
 FloatArray = NDArray[np.float64]
 

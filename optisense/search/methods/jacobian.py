@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from optisense.design import Camera, SensorDesign
 from optisense.errors import SearchError
 from optisense.geometry import TriangleMesh
-from optisense.search.space import BoundSpace
+from optisense.search.space.search_space import BoundSpace
 
 FloatArray = NDArray[np.float64]
 

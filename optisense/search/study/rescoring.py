@@ -12,11 +12,11 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from optisense.search.best import ranked
+from optisense.search.evaluation.outcome import Outcome
 from optisense.search.methods import find
-from optisense.search.outcome import Outcome
-from optisense.search.study import Study
-from optisense.search.trial import Trial
+from optisense.search.study.best import ranked
+from optisense.search.study.study import Study
+from optisense.search.study.trial import Trial
 
 SEEDS = 3
 """Fresh seeds for each."""

@@ -13,8 +13,8 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
-from optisense.search.parameters import Choice
-from optisense.search.trial import Trial
+from optisense.search.space.parameters import Choice
+from optisense.search.study.trial import Trial
 
 
 def distance(trial: Trial) -> float:

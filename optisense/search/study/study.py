@@ -23,17 +23,17 @@ from optisense.design.difference import differences, fingerprint, notes, plain_d
 from optisense.errors import SearchError
 from optisense.folders import FolderLock
 from optisense.library import with_own_lights
-from optisense.search.best import best_of
-from optisense.search.constraints import Constraint
-from optisense.search.dominance import front as front_of
-from optisense.search.evaluation import DesignEvaluator, Goal
-from optisense.search.plan import ONLY_HERE, Plan, file_prints, known_goals, known_rules
-from optisense.search.settings import StudySettings
-from optisense.search.space import SearchSpace
-from optisense.search.store import Row, Store
-from optisense.search.study_folder import STORE_FILE, as_begun, begin, kept, listed
-from optisense.search.trial import Trial
-from optisense.search.trust import not_trusted, trust
+from optisense.search.evaluation.evaluator import DesignEvaluator, Goal
+from optisense.search.methods.dominance import front as front_of
+from optisense.search.space.constraints import Constraint
+from optisense.search.space.search_space import SearchSpace
+from optisense.search.study.best import best_of
+from optisense.search.study.folder import STORE_FILE, as_begun, begin, kept, listed
+from optisense.search.study.plan import ONLY_HERE, Plan, file_prints, known_goals, known_rules
+from optisense.search.study.settings import StudySettings
+from optisense.search.study.store import Row, Store
+from optisense.search.study.trial import Trial
+from optisense.search.study.trust import not_trusted, trust
 
 
 class Study:
@@ -176,9 +176,9 @@ class Study:
         return [*self.settings.objectives, *self.settings.rules]
 
     def trust(self) -> None:
-        """Let the Python files that it names be run, now and later; see `optisense.search.trust`.
+        """Allow its Python files to run, now and later, once the user has named or confirmed them.
 
-        The user has named them, or has been asked.
+        See `optisense.search.study.trust`.
         """
         self._trusted = True
         trust(self.references)
@@ -241,7 +241,7 @@ class Study:
 
     @property
     def best(self) -> Trial | None:
-        """The best trial by the first objective; see `optisense.search.best` for the rule."""
+        """The best trial by the first objective; see `optisense.search.study.best` for the rule."""
         return best_of(self.trials)
 
     @property

@@ -14,14 +14,14 @@ from numpy.typing import NDArray
 from optisense.design import SensorDesign
 from optisense.errors import OptiSenseError, SearchError, SetupError
 from optisense.objectives import Objective, Score, Settings, evaluate
-from optisense.objectives.evaluation import Tell
+from optisense.objectives.evaluation import ProgressCallback
 from optisense.objectives.files import place_of
 from optisense.objectives.registry import resolve
 from optisense.objectives.run import split_settings
-from optisense.search.constraints import Constraint, PartsApart, Unfolded, why_forbidden
-from optisense.search.models import RAYS_ONLY, ModelKeeper
-from optisense.search.outcome import Outcome
-from optisense.search.space import BoundSpace
+from optisense.search.evaluation.models import RAYS_ONLY, ModelKeeper
+from optisense.search.evaluation.outcome import Outcome
+from optisense.search.space.constraints import Constraint, PartsApart, Unfolded, why_forbidden
+from optisense.search.space.search_space import BoundSpace
 
 FloatArray = NDArray[np.float64]
 
@@ -102,7 +102,7 @@ class DesignEvaluator:
         self._resolved: list[Objective] | None = None
         self.renders = bool(self._objectives)
         self.variant = variant
-        self._tell: Tell | None = None
+        self._progress: ProgressCallback | None = None
         self._check_settings()
 
     def __call__(self, vector: FloatArray, seed: int) -> Outcome:
@@ -115,7 +115,7 @@ class DesignEvaluator:
         return self.judge(design, seed)
 
     def judge(self, design: SensorDesign, seed: int) -> Outcome:
-        """The outcome of any design: a point of the space, or one with errors of making.
+        """The outcome of any design: a point of the space, or one with manufacturing errors.
 
         Raises:
             SetupError: the renderer can't run on this machine.
@@ -135,9 +135,9 @@ class DesignEvaluator:
         failure = "; ".join(failures) or None
         return Outcome(scores, failure, parts, time.perf_counter() - began)
 
-    def listen(self, tell: Tell) -> None:
-        """Call ``tell`` while images are rendered in this process; copies elsewhere don't."""
-        self._tell = tell
+    def report_progress_to(self, callback: ProgressCallback) -> None:
+        """Call `callback` while images are rendered in this process; copies elsewhere don't."""
+        self._progress = callback
 
     def failed(self, reason: str, began: float) -> Outcome:
         """An outcome without scores; `began` by `time.perf_counter`."""
@@ -146,7 +146,7 @@ class DesignEvaluator:
     def objective_scores(self, design: SensorDesign, seed: int) -> Mapping[str, Score]:
         """Scores by the objectives, plain functions left out; a quicker way may stand in here."""
         model = self.keeper.model(design)
-        return evaluate(model, self._ready(), tell=self._tell, seed=seed, **self.settings)
+        return evaluate(model, self._ready(), progress=self._progress, seed=seed, **self.settings)
 
     def _score(
         self, design: SensorDesign, seed: int
@@ -175,7 +175,7 @@ class DesignEvaluator:
         return self._resolved
 
     def __getstate__(self) -> dict[str, object]:
-        return {**self.__dict__, "_resolved": None, "_tell": None}
+        return {**self.__dict__, "_resolved": None, "_progress": None}
 
     def _check_settings(self) -> None:
         if not self._objectives:

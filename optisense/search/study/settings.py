@@ -41,7 +41,7 @@ class StudySettings:
         apart: whether parts must not cut through one another.
         rules: constraints as FILE.py:FUNCTION, or "function:NAME".
         files: the SHA-256 of each user's file that objectives and rules come from, by path.
-        errors: of making, where P10 is searched; as of `MakingErrors.to_plain`.
+        errors: of making, where P10 is searched; as of `ManufacturingErrors.to_plain`.
         samples: manufactured sensors a trial.
         begun: when, UTC.
         versions: of the packages that it was begun with.

@@ -13,13 +13,13 @@ from optisense.design.difference import fingerprint
 from optisense.errors import SearchError
 from optisense.objectives import Objective
 from optisense.objectives.settings import size_for
-from optisense.search.constraints import Constraint, UserRule
-from optisense.search.evaluation import DesignEvaluator, Goal, goal_name, placed
-from optisense.search.making import SAMPLES, MakingErrors
+from optisense.search.evaluation.evaluator import DesignEvaluator, Goal, goal_name, placed
+from optisense.search.evaluation.models import RAYS_ONLY
 from optisense.search.methods import Problem, find, make
-from optisense.search.models import RAYS_ONLY
-from optisense.search.settings import StudySettings
-from optisense.search.space import SearchSpace
+from optisense.search.space.constraints import Constraint, UserRule
+from optisense.search.space.manufacturing import SAMPLES, ManufacturingErrors
+from optisense.search.space.search_space import SearchSpace
+from optisense.search.study.settings import StudySettings
 
 ONLY_HERE = "function:"
 """Begins the name of a goal or rule that is a function of the program and in no file."""
@@ -50,7 +50,7 @@ class Plan:
     seed: int = 0
     settings: Mapping[str, Any] | None = None
     apart: bool = True
-    errors: MakingErrors | None = None
+    errors: ManufacturingErrors | None = None
     samples: int = SAMPLES
 
     def settings_for(self, design: SensorDesign) -> StudySettings:

@@ -7,26 +7,26 @@ import queue
 import time
 from collections.abc import Callable, Sequence
 from concurrent.futures import Future
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from functools import partial
-from typing import Any
 
 import numpy as np
 
 from optisense.errors import OptiSenseError, SearchError
-from optisense.search.best import tie_note
-from optisense.search.evaluation import Evaluator
+from optisense.search.evaluation.evaluator import Evaluator
+from optisense.search.evaluation.outcome import Outcome
 from optisense.search.executors import Runner, SerialRunner
-from optisense.search.failures import cause_of
-from optisense.search.making import MakingErrors
 from optisense.search.methods import Method, Problem, make
-from optisense.search.outcome import Outcome
-from optisense.search.rescoring import SEEDS as FRESH_SEEDS
-from optisense.search.rescoring import rescore
-from optisense.search.settings import package_versions
-from optisense.search.store import START, Row
-from optisense.search.study import Study
-from optisense.search.trial import Trial
+from optisense.search.space.manufacturing import ManufacturingErrors
+from optisense.search.study.best import tie_note
+from optisense.search.study.failures import cause_of
+from optisense.search.study.progress import SearchProgress, SearchProgressCallback, SearchResult
+from optisense.search.study.rescoring import SEEDS as FRESH_SEEDS
+from optisense.search.study.rescoring import rescore
+from optisense.search.study.settings import package_versions
+from optisense.search.study.store import START, Row
+from optisense.search.study.study import Study
+from optisense.search.study.trial import Trial
 from optisense.time_left import Step, TimeLeft
 
 ALL_FAIL = 20
@@ -53,94 +53,17 @@ if that is more: where trials share the light that is traced for the first one, 
 its own. The rest of the first one's time is taken to be compiling."""
 
 
-@dataclass(frozen=True)
-class Progress:
-    """How far a study is.
-
-    Attributes:
-        stage: "start" while the design as it is is scored, "trials", or "fresh seeds" while the
-            best are scored again.
-        done: finished trials, those of earlier runs included; the start is not counted. Scores in
-            the stage "fresh seeds".
-        total: trials that there may be; scores that are wanted in the stage "fresh seeds".
-        failed: of the finished ones.
-        best: the best score so far, NaN before there is one.
-        start: score of the start.
-        trials_per_hour: at the pace of the last ones; 0 before that can be known.
-        seconds_left: until the end, scoring the best again included; NaN before that can be known.
-        facts: what the method tells of itself.
-        doing: what the trial at hand is at, where it is worked out in this process.
-    """
-
-    stage: str
-    done: int
-    total: int
-    failed: int
-    best: float
-    start: float
-    trials_per_hour: float
-    seconds_left: float
-    facts: dict[str, Any] = field(default_factory=dict)
-    doing: str = ""
-
-
-@dataclass(frozen=True)
-class Result:
-    """What came of a study.
-
-    Attributes:
-        study: with all its trials; can be run again to go on.
-        interrupted: whether it was stopped before its end.
-        ended: why it ended.
-        notes: what the user should know.
-    """
-
-    study: Study
-    interrupted: bool
-    ended: str
-    notes: tuple[str, ...] = ()
-
-    @property
-    def best(self) -> Trial:
-        """The best trial, by fresh seeds where they were scored.
-
-        Raises:
-            SearchError: none succeeded.
-        """
-        return self.study.trial("best")
-
-    @property
-    def start(self) -> Trial:
-        """The design as it is, or the nearest to it in the space.
-
-        Raises:
-            SearchError: it has not been scored.
-        """
-        return self.study.trial("start")
-
-    @property
-    def trials(self) -> list[Trial]:
-        """All finished trials, the start first."""
-        return self.study.trials
-
-    @property
-    def front(self) -> list[Trial]:
-        """The trials that no other one beats in all objectives."""
-        return self.study.front
-
-
-Tell = Callable[[Progress], None]
 MakeRunner = Callable[[Evaluator], Runner]
 
 
-class Run:
-    """One go at a study, in this process and on its workers."""
+class StudyRun:
+    """One run of a study, in this process and on its workers."""
 
     def __init__(
         self,
         study: Study,
         make_runner: MakeRunner,
-        tell: Tell | None = None,
+        progress: SearchProgressCallback | None = None,
         limit: int | None = None,
         variant: str = "auto",
     ) -> None:
@@ -149,7 +72,7 @@ class Run:
         Args:
             study: new, or one that was stopped.
             make_runner: who works out the trials.
-            tell: called now and then.
+            progress: called a few times a second.
             limit: how many trials there may be; the study's budget if None.
             variant: of the renderer.
 
@@ -166,17 +89,17 @@ class Run:
         if settings.errors is not None:
             if self._evaluator is not usual:
                 raise SearchError(
-                    f"{settings.method} can't search with errors of making: it scores in a way of "
-                    "its own",
+                    f"{settings.method} can't search with manufacturing errors: it scores in a way "
+                    "of its own",
                     hint="Use cma-es, grid or random; or search without errors and look at the "
                     "winner with `optisense tolerance`",
                 )
-            from optisense.search.robust import RobustEvaluator
+            from optisense.search.evaluation.robust import RobustEvaluator
 
-            errors = MakingErrors.from_plain(settings.errors)
+            errors = ManufacturingErrors.from_plain(settings.errors)
             self._evaluator = RobustEvaluator(usual, errors, settings.seed, settings.samples)
         self._make_runner = make_runner
-        self._tell = tell or (lambda progress: None)
+        self._progress = progress or (lambda progress: None)
         self._notes: list[str] = []
         self._finished: queue.SimpleQueue[tuple[int, Future[Outcome]]] = queue.SimpleQueue()
         self._done = self._failed = 0
@@ -192,7 +115,7 @@ class Run:
         self._doing = ""
         self._pace = math.nan
 
-    def go(self) -> Result:
+    def go(self) -> SearchResult:
         """Run to the end, or until Ctrl-C; the study stays locked, for the caller to unlock.
 
         Raises:
@@ -210,7 +133,7 @@ class Run:
                 runner.workers,
             )
             if isinstance(runner, SerialRunner):
-                runner.listen(self._listen)
+                runner.report_progress_to(self._trial_progress)
             try:
                 self._begin(START_STAGE)
                 self._score_start(runner)
@@ -227,7 +150,7 @@ class Run:
         several = self.method.several  # its result is a front, not one best trial
         tie = None if several else tie_note(study.trials)
         notes = [*self._notes, *self.method.notes(), *([] if tie is None else [tie])]
-        return Result(study, interrupted, ended, tuple(notes))
+        return SearchResult(study, interrupted, ended, tuple(notes))
 
     def _search(self, runner: Runner) -> str:
         """All generations; returns why the search is over."""
@@ -419,8 +342,8 @@ class Run:
         known = each if math.isfinite(each) else None
         self._time_left.expect(FRESH, count=count, seconds=known)
 
-    def _listen(self, fraction: float, text: str) -> None:
-        """A trial in this process tells what it is at."""
+    def _trial_progress(self, fraction: float, text: str) -> None:
+        """Note the progress of the trial that this process is scoring."""
         self._doing = text
         self._report()
 
@@ -430,8 +353,8 @@ class Run:
             return
         self._told = clock
         fresh = self._stage == FRESH
-        self._tell(
-            Progress(
+        self._progress(
+            SearchProgress(
                 stage=self._stage,
                 done=self._fresh_done if fresh else self._done,
                 total=self._fresh_count if fresh else self.limit,

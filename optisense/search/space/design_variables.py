@@ -13,12 +13,12 @@ LONGEST_NAME = 64
 
 
 @dataclass(frozen=True)
-class Handle(ABC):
+class DesignVariable(ABC):
     """Something that one parameter changes in a design.
 
     Attributes:
         path: what the user calls it.
-        stage: handles of a lower stage act first: whole parts (0), then single numbers, then
+        stage: variables of a lower stage act first: whole parts (0), then single numbers, then
             moves (2), and last what changes the list of light groups (3).
         numeric: whether it takes numbers, else names.
         shapes: whether it moves surfaces.
@@ -42,7 +42,7 @@ class Handle(ABC):
         """
 
 
-class LibraryCoating(Handle):
+class LibraryCoating(DesignVariable):
     """The whole coating, from the library."""
 
     def start(self, design: SensorDesign) -> str | None:
@@ -54,7 +54,7 @@ class LibraryCoating(Handle):
         return design.model_copy(update={"coating": library.coating(str(value))})
 
 
-class LibraryCamera(Handle):
+class LibraryCamera(DesignVariable):
     """Projection, field of view and resolution of a camera of the library; the pose stays."""
 
     def start(self, design: SensorDesign) -> str:
@@ -70,7 +70,7 @@ class LibraryCamera(Handle):
 
 
 @dataclass(frozen=True)
-class PartMaterial(Handle):
+class PartMaterial(DesignVariable):
     """What a part is made of; a material of the library joins the design's own."""
 
     name: str
@@ -88,7 +88,7 @@ class PartMaterial(Handle):
 
 
 @dataclass(frozen=True)
-class GroupType(Handle):
+class GroupType(DesignVariable):
     """The type of the lights of one group, or of all groups; their flux stays."""
 
     group: str | None
@@ -111,7 +111,7 @@ class GroupType(Handle):
 
 
 @dataclass(frozen=True)
-class LightType(Handle):
+class LightType(DesignVariable):
     """The type of one light: lights of another type than their group's form a group beside it."""
 
     group: str

@@ -9,8 +9,8 @@ from optisense.design.difference import differences_from, fingerprint, plain_dif
 from optisense.design.storage import files_of
 from optisense.errors import SearchError
 from optisense.folders import LOCK_FILE, FolderLock
-from optisense.search.settings import STUDY_FILE, StudySettings
-from optisense.search.store import Store
+from optisense.search.study.settings import STUDY_FILE, StudySettings
+from optisense.search.study.store import Store
 
 DESIGN_FOLDER = "design"
 STORE_FILE = "trials.sqlite"

@@ -12,11 +12,11 @@ from pydantic import ValidationError
 from optisense.design import SensorDesign
 from optisense.design.problems import design_error
 from optisense.errors import OptiSenseError, SearchError
-from optisense.search.constraints import Constraint
-from optisense.search.edit import Edit
-from optisense.search.expand import Parameter, expand
-from optisense.search.handles import LightType, with_light_types
-from optisense.search.parameters import (
+from optisense.search.space.constraints import Constraint
+from optisense.search.space.design_variables import LightType, with_light_types
+from optisense.search.space.edit import Edit
+from optisense.search.space.expansion import Parameter, expand
+from optisense.search.space.parameters import (
     Choice,
     Continuous,
     Integer,
@@ -37,8 +37,8 @@ class SearchSpace:
 
     A value is (low, high), (low, high, steps), `Integer`, `Choice` or a list of options,
     `Around` (so far from what it is now), or `CagePoints`. A path to a vector or to a cage's
-    points stands for all their numbers. See `optisense.search.handle_paths` for paths that move
-    whole groups and parts.
+    points stands for all their numbers. See `optisense.search.space.variable_paths` for paths that
+    move whole groups and parts.
     """
 
     def __init__(
@@ -124,8 +124,8 @@ class BoundSpace:
         self.start = np.array([parameter.start for parameter in found])
         self.whole = np.array([isinstance(kind, Integer | Choice) for kind in kinds])
         sections = {parameter.name.split(".")[0] for parameter in found}
-        self.reshapes = "cages" in sections or any(p.handle and p.handle.shapes for p in found)
-        self._sure = sections <= set(SURE_SECTIONS) and not any(p.handle for p in found)
+        self.reshapes = "cages" in sections or any(p.variable and p.variable.shapes for p in found)
+        self._sure = sections <= set(SURE_SECTIONS) and not any(p.variable for p in found)
         self._plan()
         if tried:
             self._try_bounds()
@@ -213,15 +213,15 @@ class BoundSpace:
         """
         point = np.asarray(vector, dtype=np.float64)
         design = self.prepared
-        for number, handle in self._first:
-            design = handle.apply(design, self._option(number, point))
+        for number, variable in self._first:
+            design = variable.apply(design, self._option(number, point))
         design = self._edit.apply(design, self._targets(point))
-        for number, handle in self._moves:
-            design = handle.apply(design, float(point[number]))
+        for number, variable in self._moves:
+            design = variable.apply(design, float(point[number]))
         if self._types:
             chosen = {
-                (handle.group, handle.index): str(self._option(number, point))
-                for number, handle in self._types
+                (variable.group, variable.index): str(self._option(number, point))
+                for number, variable in self._types
             }
             design = with_light_types(design, chosen)
         return design if self._sure else checked(design)
@@ -256,7 +256,7 @@ class BoundSpace:
         self._edit = Edit(self.prepared, paths)
         self._source = np.array(source, dtype=np.int64)
         self._scale, self._offset = np.array(scale), np.array(offset)
-        handled = [(n, p.handle) for n, p in enumerate(self.parameters) if p.handle is not None]
+        handled = [(n, p.variable) for n, p in enumerate(self.parameters) if p.variable is not None]
         self._first = [(n, h) for n, h in handled if h.stage == 0]
         self._moves = [(n, h) for n, h in handled if h.stage == 2]
         self._types = [(n, h) for n, h in handled if isinstance(h, LightType)]

@@ -16,14 +16,19 @@ from numpy.typing import NDArray
 from optisense.design import Dielectric, SensorDesign
 from optisense.errors import SearchError
 from optisense.objectives.score import deviation_of
-from optisense.search.evaluation import DesignEvaluator, Goal
+from optisense.search.evaluation.evaluator import DesignEvaluator, Goal
+from optisense.search.evaluation.outcome import Outcome
+from optisense.search.evaluation.robust import HIGH, LOW, MIDDLE
 from optisense.search.executors import ProcessPool, Runner, SerialRunner
-from optisense.search.failures import cause_of
-from optisense.search.making import MakingErrors, Spread
-from optisense.search.outcome import Outcome
-from optisense.search.rescoring import fresh_seeds
-from optisense.search.robust import HIGH, LOW, MIDDLE
-from optisense.search.sensitivity import Estimate, paired_errors, percentile_of, total_effect
+from optisense.search.space.manufacturing import ManufacturingErrors, ToleranceDistribution
+from optisense.search.study.failures import cause_of
+from optisense.search.study.rescoring import fresh_seeds
+from optisense.search.tolerance.sensitivity import (
+    Estimate,
+    paired_errors,
+    percentile_of,
+    total_effect,
+)
 from optisense.time_left import Step, TimeLeft
 
 FloatArray = NDArray[np.float64]
@@ -45,13 +50,14 @@ axis), of the specularity, of each coordinate of a control point (mm), of a refr
 Assumptions for a sensor that is built by hand: LEDs soldered to a board that is glued in, a printed
 mould, silicone and resin of another batch."""
 
-Tell = Callable[[int, int, float, str], None]
+ToleranceCallback = Callable[[int, int, float, str], None]
+"""Called with the scored sensors, their total, the seconds left and what is being done."""
 """Called with the number of finished scores, of all, the seconds left (NaN if unknown), and with
 what the score at hand is at, where it is worked out in this process."""
 
 
 @dataclass(frozen=True)
-class Spreading:
+class ScoreDistribution:
     """How one objective's score spreads.
 
     Attributes:
@@ -78,7 +84,7 @@ class Spreading:
 
 @dataclass(frozen=True)
 class Tolerance:
-    """What errors of making do to a design.
+    """What manufacturing errors do to a design.
 
     Attributes:
         design: the design.
@@ -95,8 +101,8 @@ class Tolerance:
     """
 
     design: SensorDesign
-    errors: MakingErrors
-    results: Mapping[str, Spreading]
+    errors: ManufacturingErrors
+    results: Mapping[str, ScoreDistribution]
     sensors: int
     failures: Mapping[str, int]
     interrupted: bool
@@ -119,9 +125,9 @@ class Tolerance:
         }
 
 
-def usual_errors(design: SensorDesign) -> MakingErrors:
+def usual_errors(design: SensorDesign) -> ManufacturingErrors:
     """Errors that a design may have, of the usual sizes."""
-    found: dict[str, Spread | float] = {}
+    found: dict[str, ToleranceDistribution | float] = {}
     if design.lights:
         found |= {"lights.position": POSITION, "lights.angle": ANGLE}
     found["coating.specularity"] = SPECULARITY
@@ -130,28 +136,28 @@ def usual_errors(design: SensorDesign) -> MakingErrors:
     for name, material in design.materials.items():
         if isinstance(material, Dielectric) and name in used and material.ior > 1.001:
             found[f"materials.{name}.ior"] = INDEX
-    return MakingErrors(found)
+    return ManufacturingErrors(found)
 
 
 def tolerance(
     design: SensorDesign,
     objective: Goal | Sequence[Goal],
-    errors: MakingErrors | Mapping[str, Spread | float] | None = None,
+    errors: ManufacturingErrors | Mapping[str, ToleranceDistribution | float] | None = None,
     *,
     sensors: int = SENSORS,
     seed: int = 0,
     workers: int = 1,
     settings: Mapping[str, Any] | None = None,
     variant: str = "auto",
-    progress: Tell | None = None,
+    progress: ToleranceCallback | None = None,
     told: Callable[[], None] | None = None,
 ) -> Tolerance:
-    """Try sensors with errors of making, all with the same seed of the light.
+    """Try sensors with manufacturing errors, all with the same seed of the light.
 
     Args:
         design: the sensor.
         objective: one or several; see `optisense.search.search`.
-        errors: by path (see `MakingErrors`); usual ones if None.
+        errors: by path (see `ManufacturingErrors`); usual ones if None.
         sensors: about how many to try; at least 8 for each source of error and 8 more.
         seed: of the errors and of the light.
         workers: processes on this machine; 1 works in this one.
@@ -175,7 +181,7 @@ def tolerance(
     if errors is None:
         making = usual_errors(design)
     else:
-        making = errors if isinstance(errors, MakingErrors) else MakingErrors(errors)
+        making = errors if isinstance(errors, ManufacturingErrors) else ManufacturingErrors(errors)
     bound = making.bind(design)
     goals: list[Goal] = list(objective) if isinstance(objective, list | tuple) else [objective]  # type: ignore[list-item]
     evaluator = DesignEvaluator(bound.space, goals, settings, variant=variant)
@@ -206,7 +212,7 @@ def tolerance(
         design=design,
         errors=making,
         results={
-            name: _spreading(name, repeats, outcomes, making.sources, shape)
+            name: _score_distribution(name, repeats, outcomes, making.sources, shape)
             for name in evaluator.names
         },
         sensors=len(outcomes),
@@ -219,13 +225,13 @@ def tolerance(
     )
 
 
-def _spreading(
+def _score_distribution(
     name: str,
     repeats: Sequence[Outcome],
     outcomes: Sequence[Outcome],
     sources: Sequence[str],
     shape: tuple[int, int],
-) -> Spreading:
+) -> ScoreDistribution:
     values = np.array([each.scores.get(name, math.nan) for each in outcomes]).reshape(shape)
     same = np.array([each.scores.get(name, math.nan) for each in repeats])
     rows_are_whole = shape[1] > 1 or len(sources) == 1
@@ -234,7 +240,7 @@ def _spreading(
         for number, source in enumerate(sources)
     }
     order = sorted(shares, key=lambda source: -_size(shares[source]))
-    return Spreading(
+    return ScoreDistribution(
         nominal=float(same[0]),
         noise=deviation_of(same[np.isfinite(same)].tolist()),
         scores=values,
@@ -248,7 +254,7 @@ def _runner(evaluator: DesignEvaluator, workers: int, told: Callable[[], None] |
 
 
 def _work(
-    runner: Runner, jobs: Sequence[tuple[FloatArray, int]], tell: Tell
+    runner: Runner, jobs: Sequence[tuple[FloatArray, int]], progress: ToleranceCallback
 ) -> tuple[list[Outcome | None], bool]:
     """The outcome of each job, None where Ctrl-C came first; and whether it came."""
     found: list[Outcome | None] = [None] * len(jobs)
@@ -265,11 +271,13 @@ def _work(
             found[running.pop(future)] = outcome
             done += 1
             time_left.advance(done, outcome.seconds, outcome.worker)
-        tell(done, len(jobs), time_left.seconds_left, "")
+        progress(done, len(jobs), time_left.seconds_left, "")
 
-    tell(0, len(jobs), math.nan, "")
+    progress(0, len(jobs), math.nan, "")
     if isinstance(runner, SerialRunner):
-        runner.listen(lambda part, doing: tell(done, len(jobs), time_left.seconds_left, doing))
+        runner.report_progress_to(
+            lambda part, doing: progress(done, len(jobs), time_left.seconds_left, doing)
+        )
     try:
         for number, (point, seed) in enumerate(jobs):
             running[runner.submit(point, seed)] = number
@@ -286,7 +294,7 @@ def _size(share: Estimate | None) -> float:
     return -1.0 if share is None else share.value
 
 
-def _plain(each: Spreading) -> dict[str, Any]:
+def _plain(each: ScoreDistribution) -> dict[str, Any]:
     def number(value: float) -> float | None:
         return value if math.isfinite(value) else None
 
