@@ -8,6 +8,8 @@ angles count, and only blocks on its border are looked at point by point. The re
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -15,6 +17,10 @@ FloatArray = NDArray[np.float64]
 
 BLOCK = 128
 """Points of a block; any number gives the same result."""
+
+ONE_BLOCK = 600
+"""So few points are one block: comparing all their pairs is then faster than sorting them out
+(2 ms instead of 3 ms for 450 points)."""
 
 SECTORS = 12
 """Extreme azimuths of a block are kept for each of so many sectors of the circle."""
@@ -27,7 +33,7 @@ def ranges_in_boxes(
     theta: ArrayLike,
     phi: ArrayLike,
     has_azimuth: ArrayLike,
-    block: int = BLOCK,
+    block: int | None = None,
 ) -> tuple[FloatArray, FloatArray]:
     """Ranges of both angles over the points in each point's colour box.
 
@@ -37,7 +43,7 @@ def ranges_in_boxes(
         theta: (n,) polar angles, degrees.
         phi: (n,) azimuths, degrees.
         has_azimuth: (n,) points whose azimuth counts; others have a range of 0.
-        block: points of a block.
+        block: points of a block; by default chosen for speed.
 
     Returns:
         (n,) and (n,) degrees: largest minus smallest polar angle, and the arc of the circle that
@@ -52,10 +58,10 @@ def ranges_in_boxes(
     polar = np.asarray(theta, dtype=np.float64)[order]
     azimuth = np.asarray(phi, dtype=np.float64)[order] % 360.0
     counts = np.asarray(has_azimuth, dtype=bool)[order]
-    blocks = _blocks(c, block)
+    blocks = _blocks(c, block or (BLOCK if len(c) > ONE_BLOCK else ONE_BLOCK))
     least = np.array([c[rows].min(axis=0) for rows in blocks])
     most = np.array([c[rows].max(axis=0) for rows in blocks])
-    extremes = [_extremes(rows, polar, azimuth, counts) for rows in blocks]
+    extremes = cache(lambda k: _extremes(blocks[k], polar, azimuth, counts))
     ranks, first, last = _ranked(c, lower, upper)
     turn = (azimuth * (2.0**63 / 360.0)).astype(np.uint64) * np.uint64(2)
 
@@ -66,7 +72,7 @@ def ranges_in_boxes(
         inside = (least >= lower[rows].max(axis=0)).all(axis=1)
         inside &= (most <= upper[rows].min(axis=0)).all(axis=1)
         others = np.sort(
-            np.concatenate([extremes[k] if inside[k] else blocks[k] for k in touched.nonzero()[0]])
+            np.concatenate([extremes(k) if inside[k] else blocks[k] for k in touched.nonzero()[0]])
         )
         within = np.ones((len(rows), len(others)), dtype=bool)
         for channel in range(3):

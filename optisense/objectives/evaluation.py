@@ -393,7 +393,7 @@ def exposure_for(untouched: NDArray[np.float32], contacts: Iterable[NDArray[np.f
     return exposure
 
 
-def _frame(contact: Contact, surface: SensingSurface) -> dict[str, NDArray[np.float64]]:
+def _frame(contact: Contact, surface: SensingSurface) -> dict[str, Any]:
     """Where a press sits: place, inward normal, compass directions, the ball's centre."""
     assert isinstance(contact.indenter, Sphere)
     spot = locate(contact, surface)
@@ -422,7 +422,7 @@ def _around(mask: NDArray[np.bool_], reach: int) -> tuple[slice, slice]:
 def _nearest(
     points: NDArray[np.float32],
     mask: NDArray[np.bool_],
-    frames: Sequence[dict[str, NDArray[np.float64]]],
+    frames: Sequence[dict[str, Any]],
 ) -> NDArray[np.int64]:
     """(h, w): the press whose centre is nearest to what a pixel of the mask sees, else -1."""
     centres = np.array([frame["centre"] for frame in frames])

@@ -136,8 +136,7 @@ def normdiff(
     places: list[dict[str, Any]] = []
     maps = []
     for press in evaluation.presses:
-        indented = indented_pixels(press, least_pixels)
-        theta, phi = azimuths(press, press.normals[indented])
+        indented, theta, phi = _indentation(press, least_pixels)
         found = confusion(
             press.colours(indented, colours), theta, phi, noise, theta_weight, phi_weight
         )
@@ -176,6 +175,18 @@ def indented_pixels(press: Press, least: int = LEAST_PIXELS) -> NDArray[np.bool_
             hint="Use a higher resolution",
         )
     return indented
+
+
+def _indentation(
+    press: Press, least_pixels: int
+) -> tuple[NDArray[np.bool_], FloatArray, FloatArray]:
+    """The indented pixels of a press, and polar angle and azimuth of their normals, degrees."""
+
+    def indentation() -> tuple[NDArray[np.bool_], FloatArray, FloatArray]:
+        indented = indented_pixels(press, least_pixels)
+        return indented, *azimuths(press, press.normals[indented])
+
+    return press.derived(("indentation", least_pixels), indentation)
 
 
 def confusion(

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable, Hashable
+from dataclasses import dataclass, field
 from functools import cached_property
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +13,7 @@ from numpy.typing import NDArray
 from optisense.errors import ObjectiveError
 
 FloatArray = NDArray[np.float64]
+Value = TypeVar("Value")
 
 MOST_CLIPPED = 0.25
 """A press with a larger part of its pixels overexposed can't be judged."""
@@ -38,6 +41,7 @@ class Press:
         normals: (h, w, 3) unit, of the surface seen.
         points: (h, w, 3) mm, what is seen.
         before: (h, w, 3) unit normals of the untouched surface.
+        geometry: what objectives have derived of all but the response (see `derived`).
     """
 
     number: int
@@ -51,6 +55,19 @@ class Press:
     normals: NDArray[np.float32]
     points: NDArray[np.float32]
     before: NDArray[np.float32]
+    geometry: dict[Hashable, Any] = field(default_factory=dict, repr=False, compare=False)
+
+    def derived(self, key: Hashable, derive: Callable[[], Value]) -> Value:
+        """What follows from all but the response: derived once for the press under any light.
+
+        Args:
+            key: names it, with the settings that it depends on.
+            derive: works it out.
+        """
+        if key not in self.geometry:
+            self.geometry[key] = derive()
+        found: Value = self.geometry[key]
+        return found
 
     def direction(self, angle: float) -> FloatArray:
         """(3,) unit: `angle` degrees from east towards north."""

@@ -85,11 +85,6 @@ class Relighting:
         self._image = replace(image, layers={}, unit_layers=views)
         self._seen = [self._keep(press, image) for press, image in evaluation.each_press()]
 
-    @property
-    def cut_presses(self) -> list[Press]:
-        """The presses cut to their boxes, not exposed: where they are and what is true there."""
-        return [seen.small for seen in self._seen]
-
     @cached_property
     def chief_rays(self) -> ChiefRays:
         """Of the untouched sensor; light does not change them."""
@@ -169,7 +164,7 @@ class Relighting:
             for name in ("mask", "response", "normals", "points", "before")
         }
         own = press.mask[around][touched]
-        return _Seen(press, replace(press, **cut), box, around, touched, own, layers)
+        return _Seen(press, replace(press, **cut, geometry={}), box, around, touched, own, layers)
 
     def _contacts(self, flux: ArrayLike) -> list[NDArray[np.float32]]:
         """(n, 3) for each press: the radiance of what contacts touch in its image."""

@@ -4,7 +4,6 @@ places (the OptiSense paper, "RGB2Normal mapping objective function").
 
 from __future__ import annotations
 
-import warnings
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -104,10 +103,10 @@ def rgb2normal(
     lines = []
     for press in evaluation.presses:
         fits = {
-            angle: fit(
-                signed_angles(press, angle, press.normals[chosen]), press.colours(chosen, colours)
-            )
-            for angle, chosen in lines_of(press, directions, half_lines, least_pixels).items()
+            angle: fit(tilts, press.colours(chosen, colours))
+            for angle, (chosen, tilts) in _tilts_on_lines(
+                press, directions, half_lines, least_pixels
+            ).items()
         }
         scores = {f"{angle:g}": fits[_line_of(angle, fits)].linearity for angle in angles}
         places.append(
@@ -154,6 +153,20 @@ def lines_of(
             )
         found[angle] = chosen
     return found
+
+
+def _tilts_on_lines(
+    press: Press, directions: int, half_lines: bool, least_pixels: int
+) -> dict[float, tuple[NDArray[np.bool_], FloatArray]]:
+    """The lines of a press, by angle, and the signed angles of the normals on each."""
+
+    def tilts() -> dict[float, tuple[NDArray[np.bool_], FloatArray]]:
+        return {
+            angle: (chosen, signed_angles(press, angle, press.normals[chosen]))
+            for angle, chosen in lines_of(press, directions, half_lines, least_pixels).items()
+        }
+
+    return press.derived(("tilts on lines", directions, half_lines, least_pixels), tilts)
 
 
 def _refuse_directions(directions: int, half_lines: bool) -> None:
@@ -207,18 +220,17 @@ def signed_angles(press: Press, angle: float, normals: ArrayLike) -> FloatArray:
 
 def fit(angles: ArrayLike, colours: ArrayLike) -> Fit:
     """Fit the first principal component of colours (m, 3) to angles (m,) in degrees."""
-    from scipy.stats import linregress
-
     x, y = np.asarray(angles, dtype=np.float64), dominant_colour(colours)
     if np.ptp(x) == 0.0 or np.ptp(y) == 0.0:  # nothing follows anything
         return Fit(x, y, 0.0, float(y.mean()), 0.0)
-    found = linregress(x, y)
-    if found.slope < 0:
+    across, up = x - x.mean(), y - y.mean()
+    shared, spread = float(across @ up), float(across @ across)
+    if shared < 0:
         y = -y
+    slope = abs(shared) / spread
     return Fit(
-        x, y, abs(float(found.slope)), float(y.mean() - abs(found.slope) * x.mean()),
-        float(found.rvalue**2),
-    )  # fmt: skip
+        x, y, slope, float(y.mean() - slope * x.mean()), shared**2 / (spread * float(up @ up))
+    )
 
 
 def dominant_colour(colours: ArrayLike) -> FloatArray:
@@ -235,13 +247,10 @@ def _line_of(angle: float, fits: dict[float, Fit]) -> float:
 
 def _step(values: FloatArray, axis: int) -> FloatArray:
     """How much values change from pixel to pixel along an axis: the mean of both neighbours."""
-    change = np.abs(np.diff(values, axis=axis))
-    pad = [(0, 0), (0, 0)]
-    pad[axis] = (1, 1)
-    around = np.pad(change, pad, constant_values=np.nan)
+    edge = np.full_like(values.take([0], axis), np.nan)
+    change = np.concatenate([edge, np.abs(np.diff(values, axis=axis)), edge], axis)
     length = values.shape[axis]
-    pair = np.stack([around.take(range(length), axis), around.take(range(1, length + 1), axis)])
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", RuntimeWarning)  # pixels without neighbours
-        step: FloatArray = np.nanmean(pair, axis=0)
-    return step
+    before, after = change.take(range(length), axis), change.take(range(1, length + 1), axis)
+    one_side = np.fmax(before, after)  # where the other neighbour is missing
+    both = 0.5 * (before + after)
+    return np.where(np.isnan(both), one_side, both)

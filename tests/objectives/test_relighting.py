@@ -14,7 +14,6 @@ from optisense.design import SensorDesign, set_value
 from optisense.errors import ObjectiveError
 from optisense.objectives import Evaluation, Press, Settings, evaluate, find
 from optisense.objectives.relighting import Relighting
-from optisense.objectives.relit_scores import has_quick_form, quick_form
 from optisense.optics import OpticalModel
 
 SMALL = Settings(
@@ -72,21 +71,18 @@ def test_cut_presses_hold_the_same_colours(
 
 
 @pytest.mark.parametrize(("name", "own"), SETTINGS)
-def test_quick_scores_are_the_objectives_own(
+def test_scores_of_cut_presses_are_those_of_whole_ones(
     relighting: Relighting, name: str, own: dict[str, Any]
 ) -> None:
-    objective = find(name)
-    quick = quick_form(objective, own, relighting.cut_presses)
+    """Also of one light after another, whose presses share what follows from their shape."""
     for seed in range(3, 7):
         design = recoloured(seed)
-        score = evaluate(relighting.lit(design), name, **own)
-        value, parts = quick(relighting.presses(relighting.flux_of(design)))
-        assert score.failure is None
-        assert value == pytest.approx(score.value, rel=1e-12)
-        for key in objective.beside:
-            assert parts[key] == pytest.approx(score.parts[key], rel=1e-12)
-        places = [place["score"] for place in score.parts["places"]]
-        assert parts["places"] == pytest.approx(places, rel=1e-12)
+        whole = evaluate(relighting.lit(design), name, **own)
+        cut = evaluate(relighting.lit(design, whole=False), name, **own)
+        assert whole.failure is None and cut.failure is None
+        assert cut.value == pytest.approx(whole.value, rel=1e-12)
+        for one, other in zip(cut.parts["places"], whole.parts["places"], strict=True):
+            assert one["score"] == pytest.approx(other["score"], rel=1e-12)
 
 
 def test_brighter_lights_of_the_same_colours_change_nothing(relighting: Relighting) -> None:
@@ -100,20 +96,11 @@ def test_brighter_lights_of_the_same_colours_change_nothing(relighting: Relighti
         assert one == pytest.approx(other, rel=SCORE_ROUNDING)
 
 
-def test_large_contacts_are_compared_in_parts(
+def test_one_colour_for_all_pixels_tells_no_normal(
     make_press: Callable[..., Press], evaluation_of: Callable[..., Any]
 ) -> None:
-    """More pixels than fit into one table of pairs."""
-    press = make_press(lambda n: np.clip(0.4 + 0.5 * n, 0.0, 1.0), pixels=61)
-    score = evaluate_presses("normdiff", evaluation_of(press))
-    assert press.mask.sum() ** 2 > 1_500_000
-    value, _ = quick_form(find("normdiff"), {}, [press])([press])
-    assert value == pytest.approx(score, rel=1e-12)
-
-
-def test_one_colour_for_all_pixels_tells_no_normal(make_press: Callable[..., Press]) -> None:
     press = make_press(lambda n: np.full((len(n), 3), 0.3))
-    value, parts = quick_form(find("rgb2normal"), {}, [press])([press])
+    value, parts, _ = find("rgb2normal")(evaluation_of(press))
     assert (value, parts["worst_line"]) == (0.0, 0.0)
 
 
@@ -131,15 +118,3 @@ def test_other_light_groups_are_refused(relighting: Relighting) -> None:
     del design.lights[next(iter(design.lights))]
     with pytest.raises(ObjectiveError, match="other light groups"):
         relighting.lit(design)
-
-
-def test_objectives_of_users_have_no_quick_form() -> None:
-    assert has_quick_form(find("normdiff"))
-    assert not has_quick_form(find("aoap"))
-
-
-def evaluate_presses(name: str, evaluation: Any) -> float:
-    """A built-in objective's value of given presses."""
-    value = find(name)(evaluation)[0]
-    assert isinstance(value, float)
-    return value

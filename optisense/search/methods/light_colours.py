@@ -11,7 +11,7 @@ import math
 import re
 from collections import OrderedDict
 from collections.abc import Iterator, Mapping, Sequence
-from functools import partial
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from optisense.design import SensorDesign
@@ -20,7 +20,6 @@ from optisense.objectives import Evaluation, Objective, Score, Settings
 from optisense.objectives.evaluation import ProgressCallback
 from optisense.objectives.registry import pixels_read
 from optisense.objectives.relighting import Relighting
-from optisense.objectives.relit_scores import RelitScore, has_quick_form, quick_form
 from optisense.objectives.run import run_objective, split_settings
 from optisense.search.evaluation.evaluator import DesignEvaluator, Evaluator
 from optisense.search.methods.base import Problem
@@ -110,28 +109,36 @@ class _Lit:
         self._relighting = Relighting(Evaluation(model, given, progress, reads))
         model.forget_light()  # the layers hold all that is needed of it
         self._objectives = objectives
-        self._quick: dict[str, RelitScore] = {}
 
     def scores(self, design: SensorDesign) -> dict[str, Score]:
         """One score for each objective."""
         cut, whole = (self._relighting.lit(design, whole=each) for each in (False, True))
         found = {}
         for each in self._objectives:
-            name, own = each.name, self._own[each.name]
-            if has_quick_form(each):
-                quick = Objective(name, partial(self._quickly, each), each.title)
-                found[name] = run_objective(quick, cut)
+            if _reads_contacts_only(each):
+                score = run_objective(each, cut, self._own[each.name])
+                found[each.name] = _without_details(score)
             else:
-                found[name] = run_objective(each, whole, own)
+                found[each.name] = run_objective(each, whole, self._own[each.name])
         return found
 
-    def _quickly(self, objective: Objective, evaluation: Evaluation) -> tuple[float, Any]:
-        """An objective's value and its single numbers by its quick form, made on first use."""
-        name = objective.name
-        if name not in self._quick:
-            presses = self._relighting.cut_presses
-            self._quick[name] = quick_form(objective, self._own[name], presses)
-        return self._quick[name](evaluation.presses)
+
+def _reads_contacts_only(objective: Objective) -> bool:
+    """Whether an objective reads no pixel outside of the contacts: built-in ones that name pixels.
+
+    A user's objective may look at what lies around a contact.
+    """
+    own = objective.function.__module__.startswith("optisense.objectives.")
+    return own and objective.reads is not None
+
+
+def _without_details(score: Score) -> Score:
+    """A score with its main numbers only, because thousands of scores are stored."""
+    if score.failure is not None:
+        return score
+    parts = {name: score.parts[name] for name in score.shown}
+    parts["places"] = [place["score"] for place in score.parts["places"]]
+    return replace(score, parts=parts, arrays={})
 
 
 def _levels(space: BoundSpace) -> list[tuple[float, ...]]:
