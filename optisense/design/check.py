@@ -16,7 +16,7 @@ from optisense.design.near import suggestion
 from optisense.design.parts import TRANSPARENT_SOLIDS, Role
 from optisense.design.problems import Problem
 from optisense.design.sensor_design import SensorDesign
-from optisense.errors import DesignError, LibraryError, MeshError
+from optisense.errors import DesignError, MeshError, OptiSenseError
 from optisense.geometry import TriangleMesh
 from optisense.geometry.containment import inside
 
@@ -109,13 +109,13 @@ def _check_lights(design: SensorDesign, light_names: Collection[str] | None) -> 
             )
         )
     for name, group in design.lights.items():
-        if group.emitter is not None and group.emitter.kind == "ies":
+        if group.emitter is not None:
             try:
-                group.emitter.intensity_table()
-            except LibraryError as error:
-                place = error.where or design.where("lights", name, "emitter", "file")
+                group.emitter.check()
+            except OptiSenseError as error:
+                place = error.where or design.where("lights", name, "emitter")
                 problems.append(Problem(error.message, place, error.hint))
-        elif group.emitter is None and light_names is not None and group.model not in light_names:
+        elif light_names is not None and group.model not in light_names:
             problems.append(
                 Problem(
                     f"light group '{name}' has an unknown model '{group.model}'",

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from optisense.design import IesEmitter, SensorDesign
+from optisense.design import SensorDesign
 from optisense.design.sensor_design import dotted
 from optisense.geometry import TriangleMesh
 
@@ -27,8 +27,9 @@ def fingerprint(design: SensorDesign) -> str:
         digest.update(name.encode())
         _digest(mesh, digest)
     for group in design.lights.values():
-        if isinstance(group.emitter, IesEmitter):
-            digest.update(group.emitter.path().read_bytes())
+        if group.emitter is not None:
+            for data in group.emitter.contents().values():
+                digest.update(data)
     return digest.hexdigest()
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Any
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 
@@ -15,6 +15,10 @@ Fraction = Annotated[Number, Field(ge=0.0, le=1.0)]
 NonNegative = Annotated[Number, Field(ge=0.0)]
 Positive = Annotated[Number, Field(gt=0.0)]
 Count = Annotated[int, Field(strict=True, ge=1)]
+
+MILLIMETRES: dict[str, Any] = {"unit": "mm"}
+DEGREES: dict[str, Any] = {"unit": "degrees"}
+"""What `json_schema_extra` of a field says of its unit: `unit_of` reads it."""
 
 Vector = tuple[Number, Number, Number]
 """x, y, z."""
@@ -48,7 +52,10 @@ def _inside_folder(path: str) -> str:
     return path
 
 
-RelativePath = Annotated[str, AfterValidator(_inside_folder)]
+IN_FOLDER = AfterValidator(_inside_folder)
+"""Marks a field that names a file: `KindModel.files` finds it by this."""
+
+RelativePath = Annotated[str, IN_FOLDER]
 """A file inside the design folder."""
 
 
@@ -56,6 +63,13 @@ class Model(BaseModel):
     """Base of everything in a design file: unknown fields are refused, changes are checked."""
 
     model_config = ConfigDict(extra="forbid", validate_assignment=True)
+
+
+def unit_of(model: type[BaseModel], name: str) -> str:
+    """The unit of a field's numbers, as the schema has it; empty where they have none."""
+    field = model.model_fields.get(name)
+    extra = None if field is None else field.json_schema_extra
+    return str(extra.get("unit", "")) if isinstance(extra, dict) else ""
 
 
 class MisfitError(ValueError):

@@ -9,6 +9,7 @@ from typing import Annotated, Any, Literal, Union, get_args, get_origin
 from pydantic import BaseModel, ValidationError
 
 from optisense.design.fields import MisfitError
+from optisense.design.kinds import KindModel
 from optisense.design.near import near_match, suggestion
 from optisense.design.sensor_design import SensorDesign, dotted
 from optisense.errors import DesignError
@@ -87,7 +88,7 @@ def _problems(
     for report in reports:
         if report["type"] == "extra_forbidden":
             path = _path_in(data, report["loc"])
-            fields = _fields_at(model, report["loc"][:-1])
+            fields = _fields_at(model, report["loc"][:-1], data)
             match = near_match(str(path[-1]), fields)
             if match is not None:
                 explained.add((*path[:-1], match))
@@ -163,15 +164,23 @@ def _place(path: Path, where: str, lines: Lines) -> str:
     return where
 
 
-def _fields_at(model: type[BaseModel], location: tuple[str | int, ...]) -> list[str]:
-    """The fields of the model at a location inside `model`."""
+def _fields_at(
+    model: type[BaseModel], location: tuple[str | int, ...], data: Any = None
+) -> list[str]:
+    """The fields of the model at a location inside `model`, where `data` were to be one."""
     kind: Any = model
     for step in location:
         kind = _step_into(kind, step)
+        if isinstance(data, dict):
+            data = data.get(step)
+        elif isinstance(data, list | tuple) and isinstance(step, int) and step < len(data):
+            data = data[step]
     kind = _bare(kind)
-    if isinstance(kind, type) and issubclass(kind, BaseModel):
-        return list(kind.model_fields)
-    return []
+    if not (isinstance(kind, type) and issubclass(kind, BaseModel)):
+        return []
+    if issubclass(kind, KindModel) and isinstance(data, dict) and data.get("kind") in kind.kinds:
+        kind = kind.kinds.find(data["kind"])
+    return list(kind.model_fields)
 
 
 def _step_into(kind: Any, step: str | int) -> Any:

@@ -222,9 +222,7 @@ class SensorDesign(Model):
         for name, group in design.lights.items():
             old = self.lights.get(name)
             if old is not None and old.emitter is not None and group.emitter is not None:
-                old_folder = getattr(old.emitter, "_folder", None)
-                if old_folder is not None and group.emitter.kind == "ies":
-                    group.emitter._folder = old_folder
+                group.emitter.located(old.emitter.folder)
         return design
 
 

@@ -8,7 +8,6 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from optisense.design.emitters import IesEmitter
 from optisense.design.limits import unit_slips
 from optisense.design.near import near_match
 from optisense.design.parts import TRANSPARENT_SOLIDS
@@ -54,10 +53,9 @@ def load_design(path: str | Path) -> SensorDesign:
         mesh_path = _inside(folder, part.mesh, design.where("parts", name, "mesh"))
         design.meshes[name] = _load_mesh(mesh_path, name, design)
     for name, group in design.lights.items():
-        if isinstance(group.emitter, IesEmitter):
-            where = design.where("lights", name, "emitter", "file")
-            _inside(folder, group.emitter.file, where)
-            group.emitter._folder = folder
+        if group.emitter is not None:
+            for field, named in group.emitter.located(folder).files().items():
+                _inside(folder, named, design.where("lights", name, "emitter", field))
     raise_problems(unit_slips(design), str(file))
     return design
 
@@ -76,7 +74,7 @@ def save_design(design: SensorDesign, folder: str | Path, *, new: bool = False) 
 
     Raises:
         DesignError: a part has no mesh, or two parts with different meshes (or two light groups
-            with different IES files) share a file.
+            with different files of their lamps) share a file.
         FolderInUseError: another process is writing to the folder.
         OutputError: the folder can't be written, or is not empty though it must be.
     """
@@ -93,7 +91,7 @@ def save_design(design: SensorDesign, folder: str | Path, *, new: bool = False) 
     with held(folder), written_together("the design") as stage:
         for file, name in {file: name for name, file in meshes.items()}.items():
             design.meshes[name].save_obj(stage(inside(folder, file)))
-        for file, data in _ies_files(design).items():
+        for file, data in _lamp_files(design).items():
             stage(inside(folder, file)).write_bytes(data)
         stage(inside(folder, DESIGN_FILE)).write_text(to_yaml(saved, HEAD), encoding="utf-8")
 
@@ -101,7 +99,7 @@ def save_design(design: SensorDesign, folder: str | Path, *, new: bool = False) 
 def files_of(design: SensorDesign) -> list[str]:
     """The files that `save_design` writes, relative to the folder."""
     meshes = dict.fromkeys(_as_obj(part.mesh) for part in design.parts.values())
-    return [*meshes, *_ies_files(design), DESIGN_FILE]
+    return [*meshes, *_lamp_files(design), DESIGN_FILE]
 
 
 def _check_version(data: dict[str, Any], lines: Lines, source: str) -> None:
@@ -176,19 +174,18 @@ def _check_saveable(design: SensorDesign, files: dict[str, str]) -> None:
             )
 
 
-def _ies_files(design: SensorDesign) -> dict[str, bytes]:
-    """What is in the IES files of the lights, by their paths inside the design folder."""
+def _lamp_files(design: SensorDesign) -> dict[str, bytes]:
+    """What is in the files of the lamps, by their paths inside the design folder."""
     files: dict[str, bytes] = {}
     owner: dict[str, str] = {}
     for name, group in design.lights.items():
-        if isinstance(group.emitter, IesEmitter):
-            file, data = group.emitter.file, group.emitter.path().read_bytes()
+        for file, data in ({} if group.emitter is None else group.emitter.contents()).items():
             first = owner.setdefault(file, name)
             if files.setdefault(file, data) != data:
                 raise DesignError(
                     f"light groups '{first}' and '{name}' have different lights but one file "
                     f"'{file}'",
-                    where=f"lights.{name}.emitter.file",
+                    where=f"lights.{name}.emitter",
                     hint="Give each its own file",
                 )
     return files

@@ -11,7 +11,7 @@ from weakref import WeakKeyDictionary
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from optisense.design import IesEmitter, SensorDesign, check_design, load_design, set_value
+from optisense.design import SensorDesign, check_design, load_design, set_value
 from optisense.design.near import near_match
 from optisense.design.parts import TRANSPARENT_SOLIDS, Role
 from optisense.design.problems import Problem, design_error
@@ -172,9 +172,9 @@ class Designs:
                 path = _inside(base, part.mesh, f"parts.{name}.mesh")
                 design.meshes[name] = self._checked(self._read(path, name), name, part.role)
         for name, group in design.lights.items():
-            if isinstance(group.emitter, IesEmitter):
-                _inside(base, group.emitter.file, f"lights.{name}.emitter.file")
-                group.emitter._folder = base
+            if group.emitter is not None:
+                for field, named in group.emitter.located(base).files().items():
+                    _inside(base, named, f"lights.{name}.emitter.{field}")
         return design
 
     def _read(self, path: Path, part: str) -> TriangleMesh:
@@ -220,8 +220,8 @@ def _same(one: SensorDesign, other: SensorDesign) -> bool:
 def _stamps(design: SensorDesign, file: Path) -> list[Stamp]:
     """What tells whether any file of a design has changed."""
     meshes = [file.parent / part.mesh for part in design.parts.values()]
-    emitters = [group.emitter for group in design.lights.values()]
-    others = [file.parent / each.file for each in emitters if isinstance(each, IesEmitter)]
+    emitters = [group.emitter for group in design.lights.values() if group.emitter is not None]
+    others = [file.parent / name for each in emitters for name in each.files().values()]
     return [_stamp(path) for path in (file, *meshes, *others)]
 
 

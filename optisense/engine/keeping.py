@@ -7,7 +7,6 @@ from typing import Any
 from pydantic import Field
 
 from optisense import library
-from optisense.design.emitters import IesEmitter
 from optisense.engine.failures import ProtocolError
 from optisense.engine.jobs import Job
 from optisense.engine.protocol import Fields
@@ -17,7 +16,7 @@ from optisense.library import AnyEntry
 from optisense.library.adding import check_new_name
 from optisense.library.loader import kind_named
 from optisense.library.own_parts import write_own
-from optisense.library.reading import make_entry
+from optisense.library.reading import files_of, make_entry
 
 BALL_PIXELS = 160
 """Width and height of a ball alone."""
@@ -120,11 +119,12 @@ def library_add(session: Session, fields: LibraryAdd, job: Job) -> dict[str, Any
         {"maker": fields.maker} if fields.maker else {},
         fields.sources,
     )
-    if isinstance(made.value, IesEmitter):
+    named = files_of(made.value)
+    if named:
         raise ProtocolError(
-            "a light with an IES file can't be added by its values",
+            f"an entry with a file ({', '.join(named)}) can't be added by its values",
             where="value",
-            hint="Use `optisense library add FILE.ies`",
+            hint="Use `optisense library add FILE`",
         )
     path = write_own(kind_named(fields.kind), fields.entry, made)
     return {"entry": fields.entry, "file": str(path)}

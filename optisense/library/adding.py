@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
 from optisense.design.emitters import IesEmitter
-from optisense.design.fields import Colour
+from optisense.design.fields import Colour, Model
 from optisense.design.ies import parse_ies
+from optisense.design.kinds import KindModel
 from optisense.design.near import suggestion
 from optisense.design.sensor_design import Status
 from optisense.design.yaml_reader import read_yaml
@@ -17,7 +19,7 @@ from optisense.folders import held
 from optisense.library.entries import AnyEntry, LightEntry, Source, TypicalLight
 from optisense.library.loader import is_own, kind_named, names
 from optisense.library.own_parts import WHERE_TO_STORE, own_folder, write_own
-from optisense.library.reading import KINDS, Kind, kind_of, read_entry
+from optisense.library.reading import KINDS, Kind, files_of, kind_of, read_entry
 
 NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,63}")
 
@@ -48,7 +50,7 @@ class Added:
 
 
 def add_file(file: str | Path, kind: str | None = None, name: str | None = None) -> Added:
-    """Add an entry from a YAML file; the IES file that it may name comes along.
+    """Add an entry from a YAML file; the files that it may name come along.
 
     Args:
         kind: material, coating, light or camera; None finds out from the file.
@@ -64,22 +66,30 @@ def add_file(file: str | Path, kind: str | None = None, name: str | None = None)
     check_new_name(name)
     data, lines = read_yaml(file, LibraryError)
     if kind is None:
-        found = kind_of(data)
-        if found is None:
+        told = kind_of(data)
+        if told is None:
             raise LibraryError(
                 "can't tell what kind of part this is",
                 where=f"{file}:{lines.get(('value',), 1)}",
                 hint="Name it: --kind material, coating, light or camera; a file holds one entry "
                 "with 'description', 'value' and 'sources'",
             )
-        kind = found
+        kind = told
     singular = kind_named(kind)
     entry = read_entry(singular, file)
-    ies = None
-    if isinstance(entry.value, IesEmitter):
-        ies = entry.value.path().read_bytes()
-        entry.value.file = f"{name}.ies"
-    return Added(singular, name, entry, _stored(singular, name, entry, ies))
+    files = _taken_along(entry.value, name)
+    return Added(singular, name, entry, _stored(singular, name, entry, files))
+
+
+def _taken_along(value: Model, name: str) -> dict[str, bytes]:
+    """What is in the files of a value, which names them after its entry from now on."""
+    found = files_of(value)
+    own = {file: f"{name}{Path(file).suffix}" for file in found}
+    if len(set(own.values())) < len(own):  # several of one suffix keep their own names too
+        own = {file: f"{name}-{Path(file).name}" for file in found}
+    if isinstance(value, KindModel):
+        value.renamed(own.__getitem__, value.folder)
+    return {own[file]: data for file, data in found.items()}
 
 
 def add_ies(
@@ -145,7 +155,7 @@ def add_ies(
         },
         sources=sources,
     )
-    return Added("light", name, entry, _stored("light", name, entry, data))
+    return Added("light", name, entry, _stored("light", name, entry, {f"{name}.ies": data}))
 
 
 def check_new_name(name: str) -> None:
@@ -169,11 +179,11 @@ def check_new_name(name: str) -> None:
             )
 
 
-def _stored(kind: Kind, name: str, entry: AnyEntry, ies: bytes | None) -> Path:
+def _stored(kind: Kind, name: str, entry: AnyEntry, files: Mapping[str, bytes]) -> Path:
     """Write an entry unless another process has taken its name meanwhile; returns its file."""
     with held(own_folder(), wait=True, hint=WHERE_TO_STORE):
         check_new_name(name)
-        return write_own(kind, name, entry, ies)
+        return write_own(kind, name, entry, files)
 
 
 def parse_colour(text: str) -> tuple[str, Colour]:

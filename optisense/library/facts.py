@@ -7,22 +7,19 @@ from typing import Any
 
 import numpy as np
 
-from optisense.design.emitters import AreaEmitter, IesEmitter, LightModel, SpotEmitter
+from optisense.design.fields import unit_of
 from optisense.design.materials import Absorber, Coating, Conductor, Dielectric, Diffuse
 from optisense.library.entries import AnyEntry, CameraModel, LightEntry, Source
 from optisense.library.previews.camera import DISTANCES, footprint_size
-from optisense.library.previews.light import colour_facts, half_angle
+from optisense.library.previews.light import colour_facts
 from optisense.library.previews.material import critical_angle
 from optisense.library.previews.reflection import fresnel_dielectric, fresnel_metal
 from optisense.library.scattering import specularity_to_roughness
 
 UNITS = {
-    "size": "mm",
     "package": "mm",
     "window": "mm",
     "fov": "degrees",
-    "cutoff": "degrees",
-    "beam": "degrees",
     "wavelength": "nm",
     "current": "mA",
     "flux": "mW",
@@ -30,6 +27,7 @@ UNITS = {
     "pixel_size": "micrometres",
     "focal_length": "mm",
 }
+"""Units of the fields around a value, and of a camera; those of a kind are in its class."""
 
 
 @dataclass(frozen=True)
@@ -65,24 +63,17 @@ def summary(entry: AnyEntry) -> str:
         wide, high, _ = value.angles()
         fisheye = " fisheye" if value.projection == "equidistant" else ""
         return f"{wide:.3g} x {high:.3g} degrees{fisheye}"
-    return light_in_words(value)
-
-
-def light_in_words(emitter: LightModel) -> str:
-    """What kind of lamp, in a few words."""
-    if isinstance(emitter, AreaEmitter):
-        width, height = emitter.size
-        size = f"{width:g}" if emitter.shape == "disc" else f"{width:g} x {height:g}"
-        return f"{emitter.shape} {size} mm"
-    if isinstance(emitter, SpotEmitter):
-        return f"spot, {emitter.beam:g} to {emitter.cutoff:g} degrees"
-    return f"IES, half at {half_angle(emitter):.3g} degrees"
+    return str(value.in_words())
 
 
 def facts(entry: AnyEntry) -> list[Fact]:
     """All fields of an entry with their sources."""
     own = entry.value.model_dump(mode="json", exclude_none=True)
-    found = [Fact(name, _text(name, value), entry.source(name)) for name, value in own.items()]
+    units = {name: unit_of(type(entry.value), name) for name in own}
+    found = [
+        Fact(name, _text(name, value, units[name]), entry.source(name))
+        for name, value in own.items()
+    ]
     if isinstance(entry, LightEntry):
         for name in ("package", "window"):
             value = getattr(entry, name)
@@ -125,19 +116,20 @@ def consequences(entry: AnyEntry) -> list[str]:
             width, height = footprint_size(value, distance)
             lines.append(f"{distance:g} mm away, in air: {width:.3g} x {height:.3g} mm")
         return lines
-    if isinstance(value, AreaEmitter | IesEmitter | SpotEmitter) and isinstance(entry, LightEntry):
-        half = f"half of the intensity at {half_angle(value):.3g} degrees from the axis"
+    if isinstance(entry, LightEntry):
+        half = f"half of the intensity at {value.half_angle():.3g} degrees from the axis"
         return [half, *colour_facts(entry)]
     return []
 
 
-def _text(name: str, value: object) -> str:
+def _text(name: str, value: object, unit: str = "") -> str:
     """A value with its unit, without Python's quotes and brackets."""
+    unit = unit or UNITS.get(name, "")
     if isinstance(value, list | tuple):
-        joint = " x " if name in ("size", "package", "window", "resolution") else ", "
+        joint = " x " if unit in ("mm", "pixels") else ", "
         text = joint.join(_text("", item) for item in value)
     elif isinstance(value, bool):
         text = "yes" if value else "no"
     else:
         text = f"{value:g}" if isinstance(value, float) else str(value)
-    return f"{text} {UNITS[name]}" if name in UNITS else text
+    return f"{text} {unit}" if unit else text

@@ -8,7 +8,9 @@ the user's configuration folder ($XDG_CONFIG_HOME, or ~/.config).
 from __future__ import annotations
 
 import os
+from collections.abc import Mapping
 from pathlib import Path
+from types import MappingProxyType
 
 from optisense.design.yaml_writer import to_yaml
 from optisense.library.entries import AnyEntry
@@ -44,12 +46,13 @@ def own_files(kind: Kind) -> dict[str, Path]:
     return {file.stem: file for file in files if not file.name.startswith(".")}
 
 
-def write_own(kind: Kind, name: str, entry: AnyEntry, ies: bytes | None = None) -> Path:
+def write_own(
+    kind: Kind, name: str, entry: AnyEntry, files: Mapping[str, bytes] = MappingProxyType({})
+) -> Path:
     """Write an entry into the user's folder, whose lock is held, whole or not at all.
 
     Args:
-        ies: the bytes of the IES file of a light; it is written beside the entry first, under
-            the name that the entry gives it.
+        files: what is in the files that the entry names; they are written beside it first.
 
     Returns:
         The file of the entry.
@@ -59,7 +62,7 @@ def write_own(kind: Kind, name: str, entry: AnyEntry, ies: bytes | None = None) 
     """
     file = own_folder() / f"{kind}s" / f"{name}.yaml"
     with written_together("your library", WHERE_TO_STORE) as stage:
-        if ies is not None:
-            stage(file.with_suffix(".ies")).write_bytes(ies)
+        for own, data in files.items():
+            stage(file.parent / own).write_bytes(data)
         stage(file).write_text(to_yaml(entry, HEADS[kind]), encoding="utf-8")
     return file

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import Any
 
-from optisense.design.emitters import IesEmitter
 from optisense.design.sensor_design import SensorDesign
 from optisense.library.loader import entry, is_own
 
@@ -14,7 +13,7 @@ def with_own_lights(design: SensorDesign) -> SensorDesign:
 
     Materials and coatings are always copied into a design, and a camera's numbers too. A light
     is only named; other machines know the built-in ones. So each group whose light is one of the
-    user's own gets it as its `emitter`, and saving the design copies the IES file.
+    user's own gets it as its `emitter`, and saving the design copies its files.
 
     Raises:
         LibraryError: one of these lights can't be read.
@@ -29,10 +28,8 @@ def with_own_lights(design: SensorDesign) -> SensorDesign:
     result = design.copy()
     for name in groups:
         emitter: Any = entry("light", result.lights[name].model).value
-        if isinstance(emitter, IesEmitter):
-            # In the design it lies as in the library: lights/NAME.ies.
-            path = emitter.path()
-            emitter.file = f"{path.parent.name}/{path.name}"
-            emitter._folder = path.parent.parent
+        folder = emitter.folder
+        if folder is not None:  # In the design its files lie as in the library: lights/NAME.ies.
+            emitter.renamed(lambda file, own=folder.name: f"{own}/{file}", folder.parent)
         result.lights[name].emitter = emitter
     return result

@@ -7,7 +7,9 @@ from typing import Any, Literal
 
 from pydantic import TypeAdapter, ValidationError
 
-from optisense.design.emitters import IesEmitter
+from optisense.design.emitters import LightModel
+from optisense.design.fields import Model
+from optisense.design.kinds import KindModel
 from optisense.design.problems import design_error
 from optisense.design.yaml_reader import Lines, Steps, read_yaml
 from optisense.errors import LibraryError
@@ -30,17 +32,26 @@ KINDS: dict[Kind, Any] = {
 
 
 def read_entry(kind: Kind, file: Path) -> AnyEntry:
-    """Read a file that holds one entry, and the IES file it may name.
+    """Read a file that holds one entry, and the files it may name.
 
     Raises:
         LibraryError: a file can't be read, or is no entry of this kind; says the line.
     """
     data, lines = read_yaml(file, LibraryError)
     entry = make_entry(kind, file.stem, data, lines, str(file))
-    if isinstance(entry.value, IesEmitter):
-        entry.value._folder = file.parent
-        entry.value.intensity_table()
+    value: Model = entry.value
+    if isinstance(value, KindModel):
+        value.located(file.parent).check()
     return entry
+
+
+def files_of(value: Model) -> dict[str, bytes]:
+    """What is in the files that a value of an entry names, by their names.
+
+    Raises:
+        LibraryError: one can't be read.
+    """
+    return value.contents() if isinstance(value, KindModel) else {}
 
 
 def make_entry(kind: Kind, name: str, data: Any, lines: Lines, source: str) -> AnyEntry:
@@ -77,7 +88,7 @@ def kind_of(data: dict[str, Any]) -> Kind | None:
     value = data.get("value")
     if not isinstance(value, dict):
         return None
-    if value.get("kind") in ("area", "ies", "spot"):
+    if value.get("kind") in LightModel.kinds:
         return "light"
     if value.get("kind") in ("dielectric", "conductor", "diffuse", "absorber"):
         return "material"

@@ -105,8 +105,8 @@ def _window_radius(group: LightGroup) -> float:
         model = library.emitter(group)
     except OptiSenseError:
         return MARKER_SIZE
-    size = getattr(model, "size", None)
-    return MARKER_SIZE if size is None else float(np.sqrt(size[0] * size[1])) / 2
+    window = model.window()
+    return MARKER_SIZE if window is None else float(np.sqrt(np.prod(window.size))) / 2
 
 
 def _camera(design: SensorDesign, meshes: dict[str, TriangleMesh]) -> dict[str, Any]:

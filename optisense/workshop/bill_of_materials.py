@@ -11,7 +11,7 @@ from optisense import library
 from optisense.design import Dielectric, Role, SensorDesign
 from optisense.errors import LibraryError
 from optisense.library import AnyEntry
-from optisense.library.facts import light_in_words, summary
+from optisense.library.facts import summary
 from optisense.text import cell, markdown
 from optisense.workshop.placement import light_entry, typical_colour
 from optisense.workshop.shapes import Shape, shapes
@@ -118,7 +118,7 @@ def _lights(design: SensorDesign) -> list[Item]:
         entry, colour = light_entry(group), typical_colour(group)
         description = entry.description if entry is not None else "described in the design"
         if entry is None and group.emitter is not None:
-            description += f": {light_in_words(group.emitter)}"
+            description += f": {group.emitter.in_words()}"
         package = entry.package if entry is not None else None
         note = f"{group.flux:g} mW each"
         if colour is not None:

@@ -30,10 +30,9 @@ def test_a_spot_is_full_in_its_beam_half_midway_and_dark_beyond() -> None:
 
 
 def test_the_spot_is_the_one_that_the_simulation_emits() -> None:
-    from optisense.optics.scene.emitters import spot_intensity
 
     angles = np.linspace(0.0, 60.0, 241)
-    emitted = spot_intensity(40.0, 20.0).at(angles, np.zeros_like(angles))
+    emitted = SpotEmitter(cutoff=40.0, beam=20.0).intensity().at(angles, np.zeros_like(angles))
     relative = SpotEmitter(cutoff=40.0, beam=20.0).relative_intensity(angles)
     np.testing.assert_allclose(relative, emitted, atol=1e-3)
 

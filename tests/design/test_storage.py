@@ -13,6 +13,7 @@ from pydantic import BaseModel
 
 from optisense.design import SensorDesign, load_design, save_design, set_value
 from optisense.design.cage import Share
+from optisense.design.kinds import KindModel
 from optisense.errors import DesignError, MeshError, OutputError
 from optisense.geometry import TriangleMesh
 
@@ -52,7 +53,12 @@ def all_fields(kind: type[BaseModel] = SensorDesign) -> set[tuple[str, str]]:
     def below(base: type[BaseModel]) -> list[type[BaseModel]]:
         return [c for sub in base.__subclasses__() for c in [sub, *below(sub)]]
 
-    classes = [c for c in below(BaseModel) if c.__module__.startswith("optisense.design.")]
+    classes = [
+        c
+        for c in below(BaseModel)
+        if c.__module__.startswith("optisense.design.")
+        and not ("kinds" in c.__dict__ or c is KindModel)  # they stand for their kinds
+    ]
     return {(c.__name__, name) for c in classes for name in c.model_fields}
 
 

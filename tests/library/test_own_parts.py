@@ -90,7 +90,7 @@ class TestAdding:
 
         original = library.entry(kind, name)
         if isinstance(original.value, IesEmitter):
-            (tmp_path / original.value.file).write_bytes(original.value.path().read_bytes())
+            (tmp_path / original.value.file).write_bytes(original.value.path("file").read_bytes())
         file = write(tmp_path, "copy.yaml", to_yaml(original, "mine"))
         added = library.add_file(file, name="copy")
         copied = library.entry(kind, "copy")

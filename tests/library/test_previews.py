@@ -15,7 +15,7 @@ from optisense.errors import OutputError
 from optisense.library import CameraModel, previews
 from optisense.library.previews.ball import picture_of_ball
 from optisense.library.previews.camera import border_directions, footprint, footprint_size
-from optisense.library.previews.light import equivalent_solid_angle, half_angle
+from optisense.library.previews.light import equivalent_solid_angle
 from optisense.library.previews.material import lobes
 from optisense.library.previews.reflection import (
     fresnel_dielectric,
@@ -142,7 +142,7 @@ class TestLights:
     def test_closed_forms(self) -> None:
         lambertian = AreaEmitter(size=(1.0, 1.0))
         assert equivalent_solid_angle(lambertian) == pytest.approx(np.pi, rel=INTEGRAL)
-        assert half_angle(lambertian) == pytest.approx(60.0, abs=0.01)
+        assert lambertian.half_angle() == pytest.approx(60.0, abs=0.01)
         cone = SpotEmitter(cutoff=30.0, beam=30.0)
         exact = 2 * np.pi * (1 - np.cos(np.radians(30.0)))
         assert equivalent_solid_angle(cone) == pytest.approx(exact, rel=INTEGRAL)
@@ -152,7 +152,7 @@ class TestLights:
         power = np.log(0.5) / np.log(np.cos(np.radians(7.5)))
         exact = 2 * np.pi / (power + 1)
         assert equivalent_solid_angle(lens) == pytest.approx(exact, rel=INTEGRAL)
-        assert half_angle(lens) == pytest.approx(7.5, abs=0.01)
+        assert lens.half_angle() == pytest.approx(7.5, abs=0.01)
 
 
 class TestCameras:

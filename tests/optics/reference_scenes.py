@@ -11,6 +11,7 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
+from optisense.design.emitters import Intensity
 from optisense.optics.camera.projection import RayCamera
 from optisense.optics.imaging.cached import render_cached
 from optisense.optics.imaging.sppm import render_sppm
@@ -21,7 +22,6 @@ from optisense.optics.scene.emitters import (
     Emitter,
     EmitterShape,
     EmitterTable,
-    Intensity,
     emitter_table,
 )
 from optisense.optics.scene.ray_scene import Piece, RayScene

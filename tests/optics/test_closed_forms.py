@@ -15,8 +15,9 @@ from reference_scenes import (
     quad,
 )
 
+from optisense.design.emitters import Intensity
 from optisense.optics.camera.projection import RayCamera
-from optisense.optics.scene.emitters import Emitter, EmitterShape, Intensity
+from optisense.optics.scene.emitters import Emitter, EmitterShape
 from optisense.optics.scene.ray_scene import Piece, RayScene
 from optisense.optics.scene.surfaces import Surface, SurfaceKind
 from optisense.optics.transport.camera_paths import find_visible_points

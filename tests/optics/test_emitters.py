@@ -12,16 +12,15 @@ import pytest
 from scipy import stats
 
 import optisense.library
+from optisense.design.emitters import Intensity, SpotEmitter
 from optisense.library.ies import read_ies
 from optisense.optics.backend.sequences import sequence_4d
 from optisense.optics.scene.emitters import (
     Emitter,
     EmitterShape,
     EmitterTable,
-    Intensity,
     emit,
     emitter_table,
-    spot_intensity,
 )
 from optisense.optics.scene.surfaces import RAY_OFFSET
 from optisense.optics.transport.emission_guide import (
@@ -122,7 +121,13 @@ def test_flat_lights_radiate_as_a_power_of_the_cosine(shape: EmitterShape, expon
 
 @pytest.mark.parametrize(
     "intensity",
-    [ies_lamp(), LOPSIDED, spot_intensity(40, 20), spot_intensity(12, 12), ISOTROPIC],
+    [
+        ies_lamp(),
+        LOPSIDED,
+        SpotEmitter(cutoff=40, beam=20).intensity(),
+        SpotEmitter(cutoff=12, beam=12).intensity(),
+        ISOTROPIC,
+    ],
     ids=["ies", "asymmetric ies", "spot", "hard spot", "isotropic"],
 )
 def test_tabulated_lights_radiate_as_their_table(intensity: Intensity) -> None:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from optisense.design.emitters import AreaEmitter, LightModel
+from optisense.design.emitters import LightModel
 from optisense.library.entries import LightEntry, TypicalLight
 
 if TYPE_CHECKING:
@@ -17,21 +17,6 @@ if TYPE_CHECKING:
 FloatArray = NDArray[np.float64]
 
 LEGEND_COLOURS = 4
-
-
-def half_angle(emitter: LightModel, azimuth: float = 0.0) -> float:
-    """Degrees from the axis at which the intensity has fallen to half its value there.
-
-    180 where it never does, or where the axis is dark.
-    """
-    angle = np.linspace(0.0, 180.0, 7201)
-    value = emitter.relative_intensity(angle, azimuth)
-    below = np.flatnonzero(value < 0.5 * value[0] * (1.0 - 1e-9))
-    if value[0] <= 0.0 or len(below) == 0:
-        return 180.0
-    last, first = below[0] - 1, below[0]
-    drop = value[last] - value[first]
-    return float(angle[last] + (value[last] - 0.5 * value[0]) / drop * (angle[1] - angle[0]))
 
 
 def equivalent_solid_angle(emitter: LightModel) -> float:
@@ -74,9 +59,9 @@ def _intensity(axes: Any, entry: LightEntry) -> str:
     axes.set_yticks([0.25, 0.5, 0.75, 1.0])
     axes.set_yticklabels([])
     axes.tick_params(labelsize=8)
-    facts = f"intensity by angle; half of it at {half_angle(emitter):.3g}°"
+    facts = f"intensity by angle; half of it at {emitter.half_angle():.3g}°"
     if not round_beam:
-        facts += f" (dashed: across, {half_angle(emitter, 90.0):.3g}°)"
+        facts += f" (dashed: across, {emitter.half_angle(90.0):.3g}°)"
     return facts
 
 
@@ -102,10 +87,10 @@ def _front(axes: Axes, entry: LightEntry) -> None:
     from matplotlib.patches import Ellipse, Rectangle
 
     emitter: LightModel = entry.value
-    package, window = entry.package, entry.window
+    package, window, face = entry.package, entry.window, emitter.window()
     disc = window is not None and window[0] == window[1]
-    if isinstance(emitter, AreaEmitter):
-        window, disc = emitter.size, emitter.shape == "disc"
+    if face is not None:
+        window, disc = face.size, face.shape == "disc"
     extent = max([*(package[:2] if package else ()), *(window or ()), 1.0])
     if package is not None:
         corner = (-package[0] / 2, -package[1] / 2)
@@ -128,6 +113,6 @@ def _front(axes: Axes, entry: LightEntry) -> None:
         lines.append("package " + " x ".join(f"{length:g}" for length in package) + " mm")
     if window is not None:
         size = f"{window[0]:g}" if disc else f"{window[0]:g} x {window[1]:g}"
-        kind = "window" if isinstance(emitter, AreaEmitter) else "simulated as a point; lens"
+        kind = "window" if face is not None else "simulated as a point; lens"
         lines.append(f"{kind} {size} mm" + (" across" if disc else ""))
     axes.set_title("\n".join(lines) or "a point", fontsize=9)

@@ -10,6 +10,7 @@ import numpy as np
 from optisense import library
 from optisense.design import LightGroup, LightModel, SensorDesign
 from optisense.design.check import inside
+from optisense.design.emitters import Intensity
 from optisense.design.materials import Absorber, Coating, Conductor, Dielectric, Diffuse, Material
 from optisense.design.parts import TRANSPARENT_SOLIDS, Role
 from optisense.errors import DesignError
@@ -18,9 +19,7 @@ from optisense.geometry.coplanar import merge_coplanar
 from optisense.optics.scene.emitters import (
     Emitter,
     EmitterShape,
-    Intensity,
     frame_of,
-    spot_intensity,
 )
 from optisense.optics.scene.media import Media, Sheet, Solid, same_faces
 from optisense.optics.scene.ray_scene import Piece
@@ -237,6 +236,7 @@ class _Lamp:
     """What all lights of a group have in common; ``area`` mm^2 is that of the window."""
 
     intensity: Intensity | None
+    exponent: float
     shape: EmitterShape
     size: tuple[float, float]
     area: float
@@ -258,6 +258,7 @@ def _emitters(design: SensorDesign) -> tuple[list[Emitter], list[float]]:
                     up=light.up,
                     shape=lamp.shape,
                     size=lamp.size,
+                    exponent=lamp.exponent,
                     intensity=lamp.intensity,
                 )
             )
@@ -273,17 +274,13 @@ def _built_in_lamp(name: str) -> _Lamp:
 
 
 def _lamp(model: LightModel) -> _Lamp:
-    if model.kind == "area":
-        shape = EmitterShape.DISC if model.shape == "disc" else EmitterShape.RECTANGLE
-        area = model.size[0] * model.size[1] * (np.pi / 4 if shape is EmitterShape.DISC else 1.0)
-        return _Lamp(None, shape, model.size, area)
-    if model.kind == "spot":
-        return _Lamp(spot_intensity(model.cutoff, model.beam), EmitterShape.POINT, (0.0, 0.0), 0.0)
-    table = model.intensity_table()
-    intensity = Intensity(table.vertical_angles, table.horizontal_angles, table.candela)
-    if np.ptp(table.candela, axis=0).max() <= 1e-9 * table.candela.max():
-        intensity = Intensity(table.vertical_angles, np.zeros(1), table.candela[:1])
-    return _Lamp(intensity, EmitterShape.POINT, (0.0, 0.0), 0.0)
+    window, power = model.window(), model.cosine_power()
+    intensity = model.intensity() if power is None else None
+    exponent = 1.0 if power is None else power
+    if window is None:
+        return _Lamp(intensity, exponent, EmitterShape.POINT, (0.0, 0.0), 0.0)
+    shape = EmitterShape[window.shape.upper()]
+    return _Lamp(intensity, exponent, shape, window.size, window.area)
 
 
 def _window(number: int, emitter: Emitter) -> Piece:

@@ -17,6 +17,7 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
+from optisense.design.emitters import Intensity
 from optisense.optics.scene.surfaces import RAY_OFFSET
 
 FloatArray = NDArray[np.floating]
@@ -35,48 +36,6 @@ class EmitterShape(IntEnum):
     POINT = 0
     RECTANGLE = 1
     DISC = 2
-
-
-@dataclass(frozen=True)
-class Intensity:
-    """Radiant intensity over the polar angle from the axis and the azimuth.
-
-    polar (n,) degrees ascending from 0; azimuth (m,) degrees, [0] alone if symmetric, else
-    covering 0..360; values (m, n) relative intensity, linear between the given angles, zero
-    beyond the last.
-    """
-
-    polar: FloatArray
-    azimuth: FloatArray
-    values: FloatArray
-
-    def at(self, polar: FloatArray, azimuth: FloatArray) -> FloatArray:
-        """Intensity at angles in degrees (arrays of one shape)."""
-        p = np.clip(np.interp(polar, self.polar, np.arange(len(self.polar))), 0, None)
-        i = np.minimum(p.astype(int), max(len(self.polar) - 2, 0))
-        f = p - i
-        i1 = np.minimum(i + 1, len(self.polar) - 1)
-        if len(self.azimuth) == 1:
-            j = j1 = np.zeros(np.shape(polar), dtype=int)
-            g = np.zeros(np.shape(polar))
-        else:
-            q = np.interp(np.mod(azimuth, 360.0), self.azimuth, np.arange(len(self.azimuth)))
-            j = np.minimum(q.astype(int), len(self.azimuth) - 2)
-            g, j1 = q - j, j + 1
-        low = self.values[j, i] * (1 - f) + self.values[j, i1] * f
-        high = self.values[j1, i] * (1 - f) + self.values[j1, i1] * f
-        inside = (polar >= self.polar[0]) & (polar <= self.polar[-1])
-        return np.where(inside, low * (1 - g) + high * g, 0.0)
-
-
-def spot_intensity(cutoff: float, beam: float) -> Intensity:
-    """A spot: full intensity within ``beam`` degrees of the axis, falling smoothly to 0 at
-    ``cutoff``.
-    """
-    polar = np.unique(np.concatenate([[0.0, beam], np.linspace(beam, cutoff, 65)]))
-    t = np.clip((cutoff - polar) / max(cutoff - beam, 1e-9), 0.0, 1.0)
-    values = (t * t * (3 - 2 * t))[None]
-    return Intensity(polar, np.zeros(1), values)
 
 
 @dataclass(frozen=True)
