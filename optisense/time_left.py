@@ -28,7 +28,7 @@ REMEMBERED = 400
 
 
 @dataclass
-class Step:
+class TimedStep:
     """A part of the work.
 
     Attributes:
@@ -53,7 +53,7 @@ class TimeLeft:
 
     def __init__(
         self,
-        steps: Sequence[Step],
+        steps: Sequence[TimedStep],
         workers: int = 1,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
@@ -210,7 +210,7 @@ class TimeLeft:
             return self._ends[0]
         return self._ends[len(self._ends) // 2]
 
-    def _usual(self, step: Step) -> float:
+    def _usual(self, step: TimedStep) -> float:
         """Seconds that a piece usually takes, at the speed that this machine has shown."""
         if step.seconds is None:
             return math.nan

@@ -13,7 +13,7 @@ from optisense.cli import stopping
 from optisense.cli.console import EXIT_INTERRUPTED, ends_well, messages, output
 from optisense.cli.leaving import run_and_leave
 from optisense.cli.progress import progress_line
-from optisense.time_left import Step, TimeLeft
+from optisense.time_left import TimedStep, TimeLeft
 
 if TYPE_CHECKING:
     from paper import Experiment
@@ -125,7 +125,7 @@ def _shown_units(name: str, workers: int) -> Iterator[Tell]:
         def show(done: int, count: int, label: str) -> None:
             nonlocal time_left, begun
             if time_left is None or count != begun[1] or done < begun[0]:
-                time_left = TimeLeft([Step("units", count, warm_up=min(workers, count - 1))])
+                time_left = TimeLeft([TimedStep("units", count, warm_up=min(workers, count - 1))])
                 time_left.begin("units", done=done)
                 begun = done, count
             time_left.advance(done)

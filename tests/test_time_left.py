@@ -6,7 +6,7 @@ import math
 
 import pytest
 
-from optisense.time_left import Step, TimeLeft
+from optisense.time_left import TimedStep, TimeLeft
 
 
 class Clock:
@@ -25,7 +25,7 @@ def clock() -> Clock:
 
 
 def test_nothing_is_promised_before_anything_is_known(clock: Clock) -> None:
-    left = TimeLeft([Step("trials", 40)], clock=clock)
+    left = TimeLeft([TimedStep("trials", 40)], clock=clock)
     assert math.isnan(left.seconds_left)
     left.begin("trials")
     clock.now = 30.0
@@ -35,7 +35,7 @@ def test_nothing_is_promised_before_anything_is_known(clock: Clock) -> None:
 
 def test_compiling_in_the_first_trial_does_not_count(clock: Clock) -> None:
     # The search by light colours: a first trial of 70 s, the others of 0.1 s.
-    left = TimeLeft([Step("start"), Step("trials", 6000)], clock=clock)
+    left = TimeLeft([TimedStep("start"), TimedStep("trials", 6000)], clock=clock)
     left.begin("start")
     clock.now = 70.0
     left.advance(1, 70.0, "here")
@@ -55,7 +55,7 @@ def test_workers_share_the_pieces_and_each_compiles_first(clock: Clock, workers:
         for number in range(1, count // workers + 1)
     )
     whole = ends[-1][0]
-    left = TimeLeft([Step("trials", count)], workers, clock)
+    left = TimeLeft([TimedStep("trials", count)], workers, clock)
     left.begin("trials")
     for done, (now, first, worker) in enumerate(ends, start=1):
         clock.now = now
@@ -65,7 +65,11 @@ def test_workers_share_the_pieces_and_each_compiles_first(clock: Clock, workers:
 
 
 def test_later_steps_take_longer_where_the_earlier_ones_did(clock: Clock) -> None:
-    steps = [Step("loading", 1, 2.0), Step("tracing", 10, 1.0), Step("shading", 1, 3.0)]
+    steps = [
+        TimedStep("loading", 1, 2.0),
+        TimedStep("tracing", 10, 1.0),
+        TimedStep("shading", 1, 3.0),
+    ]
     left = TimeLeft(steps, clock=clock)
     left.begin("loading")
     assert left.seconds_left == 15.0
@@ -80,7 +84,7 @@ def test_later_steps_take_longer_where_the_earlier_ones_did(clock: Clock) -> Non
 
 
 def test_a_step_that_is_late_makes_the_later_ones_longer(clock: Clock) -> None:
-    left = TimeLeft([Step("before", 1, 10.0), Step("after", 1, 8.0)], clock=clock)
+    left = TimeLeft([TimedStep("before", 1, 10.0), TimedStep("after", 1, 8.0)], clock=clock)
     left.begin("before")
     clock.now = 5.0
     assert left.seconds_left == pytest.approx(13.0)
@@ -89,7 +93,7 @@ def test_a_step_that_is_late_makes_the_later_ones_longer(clock: Clock) -> None:
 
 
 def test_a_later_step_counts_from_the_beginning(clock: Clock) -> None:
-    left = TimeLeft([Step("trials", 10), Step("fresh seeds", 6)], clock=clock)
+    left = TimeLeft([TimedStep("trials", 10), TimedStep("fresh seeds", 6)], clock=clock)
     left.begin("trials")
     clock.now = 2.0
     left.advance(1)
@@ -102,7 +106,7 @@ def test_a_later_step_counts_from_the_beginning(clock: Clock) -> None:
 
 
 def test_pieces_of_an_earlier_run_cost_nothing_now(clock: Clock) -> None:
-    left = TimeLeft([Step("samples", 100, warm_up=1)], clock=clock)
+    left = TimeLeft([TimedStep("samples", 100, warm_up=1)], clock=clock)
     left.begin("samples", done=60)
     clock.now = 30.0  # the first one of this run traces the light
     left.advance(61)
@@ -116,7 +120,7 @@ def test_pieces_of_an_earlier_run_cost_nothing_now(clock: Clock) -> None:
 def test_time_goes_by_between_pieces_and_a_late_one_does_not_count_below_zero(
     clock: Clock,
 ) -> None:
-    left = TimeLeft([Step("sensors", 3)], clock=clock)
+    left = TimeLeft([TimedStep("sensors", 3)], clock=clock)
     left.begin("sensors")
     clock.now = 10.0
     left.advance(1)
@@ -128,7 +132,7 @@ def test_time_goes_by_between_pieces_and_a_late_one_does_not_count_below_zero(
 
 
 def test_a_pace_that_changes_is_followed(clock: Clock) -> None:
-    left = TimeLeft([Step("trials", 1000)], clock=clock)
+    left = TimeLeft([TimedStep("trials", 1000)], clock=clock)
     left.begin("trials")
     for done in range(1, 101):
         clock.now += 5.0 if done <= 20 else 1.0
@@ -137,7 +141,7 @@ def test_a_pace_that_changes_is_followed(clock: Clock) -> None:
 
 
 def test_the_fraction_never_falls(clock: Clock) -> None:
-    left = TimeLeft([Step("seeds", 10, 1.0)], clock=clock)
+    left = TimeLeft([TimedStep("seeds", 10, 1.0)], clock=clock)
     left.begin("seeds")
     before = 0.0
     for done in range(1, 11):
@@ -149,7 +153,7 @@ def test_the_fraction_never_falls(clock: Clock) -> None:
 
 
 def test_many_pieces_are_not_all_remembered(clock: Clock) -> None:
-    left = TimeLeft([Step("trials", 100_000)], clock=clock)
+    left = TimeLeft([TimedStep("trials", 100_000)], clock=clock)
     left.begin("trials")
     for done in range(1, 50_001):
         clock.now += 0.01
@@ -158,7 +162,7 @@ def test_many_pieces_are_not_all_remembered(clock: Clock) -> None:
 
 
 def test_an_unknown_step_is_refused(clock: Clock) -> None:
-    left = TimeLeft([Step("a"), Step("b")], clock=clock)
+    left = TimeLeft([TimedStep("a"), TimedStep("b")], clock=clock)
     left.begin("b")
     with pytest.raises(ValueError, match="no step 'a' follows"):
         left.begin("a")

@@ -26,8 +26,8 @@ from optisense.cli.options import (
     seed_option,
 )
 from optisense.cli.output_folder import take_folder
-from optisense.cli.progress import Line, progress_line
-from optisense.time_left import Step
+from optisense.cli.progress import ProgressLine, progress_line
+from optisense.time_left import TimedStep
 from optisense.writing import remove_own_page, write_text
 
 if TYPE_CHECKING:
@@ -190,10 +190,14 @@ def _print_table(scored: Scored) -> None:
 LOADING, BUILDING, SCORING = "loading", "building the scene", "scoring"
 
 
-def _steps(seeds: int) -> list[Step]:
+def _steps(seeds: int) -> list[TimedStep]:
     """The steps, with their usual times (seconds on two cores of a desktop processor, GelSight
     Mini, all four objectives, some kernels compiled and others found in the cache)."""
-    return [Step(LOADING, 1, 2.4), Step(BUILDING, 1, 0.8), Step(SCORING, seeds, 11.0)]
+    return [
+        TimedStep(LOADING, 1, 2.4),
+        TimedStep(BUILDING, 1, 0.8),
+        TimedStep(SCORING, seeds, 11.0),
+    ]
 
 
 class _Told:
@@ -204,7 +208,7 @@ class _Told:
 
     IMAGES = 0.85
 
-    def __init__(self, line: Line, number: int, seeds: int, objectives: int) -> None:
+    def __init__(self, line: ProgressLine, number: int, seeds: int, objectives: int) -> None:
         """Seed ``number`` (from 0) of ``seeds``, for so many objectives."""
         self._line = line
         self._number, self._seeds, self._objectives = number, seeds, objectives

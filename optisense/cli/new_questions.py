@@ -31,8 +31,8 @@ from optisense.sensors.from_meshes import guessing
 from optisense.sensors.from_meshes.building import USUAL_MATERIAL
 from optisense.sensors.from_meshes.directions import SIDES
 from optisense.sensors.from_meshes.files import largest_dimension, likely_units
-from optisense.sensors.from_meshes.guessing import Found, Use
-from optisense.sensors.from_meshes.recipe import MM_PER, PartChoice, Recipe, Shape, Units
+from optisense.sensors.from_meshes.guessing import CadBody, Use
+from optisense.sensors.from_meshes.recipe import MM_PER, PartChoice, Recipe, ShapeReference, Units
 from optisense.sensors.from_meshes.surfaces import chosen as chosen_faces
 
 Parts = dict[str, PartChoice]
@@ -97,7 +97,7 @@ def say(text: str) -> None:
     messages.print(text, markup=False)
 
 
-def _ask_units(found: list[Found]) -> Units | None:
+def _ask_units(found: list[CadBody]) -> Units | None:
     without = [each.body.mesh for each in found if not each.body.own_units]
     if not without:
         return None
@@ -108,7 +108,7 @@ def _ask_units(found: list[Found]) -> Units | None:
     return cast("Units", ask_word("Unit of the files", MM_PER, likely[0] if likely else "mm"))
 
 
-def _ask_uses(found: list[Found], meshes: Meshes) -> dict[str, Use]:
+def _ask_uses(found: list[CadBody], meshes: Meshes) -> dict[str, Use]:
 
     say("\nWhat is each? The beginning of a word is enough:")
     for word, meaning in USES.items():
@@ -122,7 +122,7 @@ def _ask_uses(found: list[Found], meshes: Meshes) -> dict[str, Use]:
     return uses
 
 
-def _ask_materials(found: list[Found], uses: dict[str, Use]) -> Parts:
+def _ask_materials(found: list[CadBody], uses: dict[str, Use]) -> Parts:
     say("\nMaterials (`optisense library list material` shows them):")
     parts: Parts = {}
     for each in found:
@@ -180,7 +180,7 @@ def _ask_skin(parts: Parts, meshes: Meshes, gel: str, outward: str) -> tuple[Par
 
 
 def _ask_lights(
-    found: list[Found],
+    found: list[CadBody],
     uses: dict[str, Use],
     parts: Parts,
     meshes: Meshes,
@@ -253,13 +253,13 @@ def _ask_group(name: str, colour: str) -> dict[str, Any]:
     }
 
 
-def _ask_camera(found: list[Found], uses: dict[str, Use], parts: Parts) -> dict[str, Any]:
+def _ask_camera(found: list[CadBody], uses: dict[str, Use], parts: Parts) -> dict[str, Any]:
     say("\nCamera (`optisense library list camera` shows models):")
     camera: dict[str, Any] = {"model": _ask_known("camera", "Model", guessing.CAMERA)}
     references = {each.name: each.shape for each in found if uses[each.name] == "camera"}
     words = ["behind", *references]
 
-    def place(answer: str) -> Shape | str | tuple[float, float, float]:
+    def place(answer: str) -> ShapeReference | str | tuple[float, float, float]:
         if answer in references:
             return references[answer]
         if answer == "behind":

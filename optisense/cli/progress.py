@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 from optisense.cli import stopping
 from optisense.cli.console import messages
-from optisense.time_left import Step, TimeLeft
+from optisense.time_left import TimedStep, TimeLeft
 
 if TYPE_CHECKING:
     from rich.text import Text
@@ -26,14 +26,14 @@ MOST_BAR, LEAST_BAR = 30, 8
 """Columns of the bar; it is left out where less than the least would remain."""
 
 
-class Line:
+class ProgressLine:
     """The progress of a command: the step at hand, the time left, and what is known so far.
 
     ``scoring trial 12/40 ━━━━━━━━━━━━╸━━━━━━━━━━━  0:42, 3:10 left  best 0.6123``
     """
 
     def __init__(
-        self, steps: Sequence[Step] = (), clock: Callable[[], float] = time.monotonic
+        self, steps: Sequence[TimedStep] = (), clock: Callable[[], float] = time.monotonic
     ) -> None:
         """Start the clock.
 
@@ -155,14 +155,16 @@ class Line:
 
 
 @contextmanager
-def progress_line(*steps: Step, waits: Callable[[Line], str] | None = None) -> Iterator[Line]:
+def progress_line(
+    *steps: TimedStep, waits: Callable[[ProgressLine], str] | None = None
+) -> Iterator[ProgressLine]:
     """A line of progress that vanishes at its end; lines now and then where there is no terminal.
 
     Args:
         steps: what will be done.
         waits: what Ctrl-C waits for, if it does not act at once; see `stopping.waiting`.
     """
-    line = Line(steps, time.monotonic)
+    line = ProgressLine(steps, time.monotonic)
     with stopping.waiting(None if waits is None else lambda: waits(line)):
         if not messages.is_terminal:
             line._log_lines = True

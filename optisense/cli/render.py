@@ -18,8 +18,8 @@ from optisense.cli.options import (
     parse_resolution,
 )
 from optisense.cli.output_folder import take_folder
-from optisense.cli.progress import Line, about, progress_line
-from optisense.time_left import Step
+from optisense.cli.progress import ProgressLine, about, progress_line
+from optisense.time_left import TimedStep
 
 if TYPE_CHECKING:
     from optisense.optics import OpticalModel, RenderProgress, TactileImage
@@ -167,23 +167,23 @@ USUAL_PIXELS = 320 * 240
 """Pixels of a picture for which the usual time of shading is stated."""
 
 
-def _steps(photons: int | None, noise: float | None, seconds: float | None) -> list[Step]:
+def _steps(photons: int | None, noise: float | None, seconds: float | None) -> list[TimedStep]:
     """The steps of a render and their usual times (seconds on two cores of a desktop processor,
     GelSight Mini, some kernels compiled and others found in the cache)."""
-    tracing = Step(TRACING, (photons or ONE_PICTURE) / 1e6, 2.2)
+    tracing = TimedStep(TRACING, (photons or ONE_PICTURE) / 1e6, 2.2)
     if photons is None and noise is not None:
-        tracing = Step(TRACING, NOISE_PHOTONS, 2.2)
+        tracing = TimedStep(TRACING, NOISE_PHOTONS, 2.2)
     if photons is None and seconds is not None:
-        tracing = Step(TRACING, 1.0, max(1.0, seconds - 5.0))
+        tracing = TimedStep(TRACING, 1.0, max(1.0, seconds - 5.0))
     return [
-        Step(LOADING, 1, 2.4),
-        Step(BUILDING, 1, 0.8),
-        Step("preparing the scene", 1, 0.4),
-        Step("tracing pilot photons", 1, 1.4),
+        TimedStep(LOADING, 1, 2.4),
+        TimedStep(BUILDING, 1, 0.8),
+        TimedStep("preparing the scene", 1, 0.4),
+        TimedStep("tracing pilot photons", 1, 1.4),
         tracing,
-        Step("smoothing the light", 1, 0.9),
-        Step(SHADING, 1, 2.0),
-        Step(WRITING, 1, 0.8),
+        TimedStep("smoothing the light", 1, 0.9),
+        TimedStep(SHADING, 1, 2.0),
+        TimedStep(WRITING, 1, 0.8),
     ]
 
 
@@ -192,7 +192,7 @@ def _pictures(resolution: tuple[int, int]) -> float:
     return 0.5 + 0.5 * resolution[0] * resolution[1] / USUAL_PIXELS
 
 
-def _waits(line: Line) -> str:
+def _waits(line: ProgressLine) -> str:
     """What a first Ctrl-C waits for: the light so far is made into a picture."""
     left = line.time_left
     rest = left.seconds_left - left.seconds_left_of(TRACING)
@@ -223,7 +223,7 @@ class RenderStages:
         stage: the one at hand.
     """
 
-    def __init__(self, line: Line) -> None:
+    def __init__(self, line: ProgressLine) -> None:
         """``line`` has a step for each stage."""
         self._line = line
         self.stage = ""

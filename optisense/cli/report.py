@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from optisense.cli.console import ends_well, output
-from optisense.cli.progress import Line, progress_line
-from optisense.time_left import Step
+from optisense.cli.progress import ProgressLine, progress_line
+from optisense.time_left import TimedStep
 
 if TYPE_CHECKING:
     from optisense.report.before_after import Look
@@ -69,18 +69,18 @@ def report(
 WRITING = "writing the page"
 
 
-def _steps(photons: int, pictures: bool) -> list[Step]:
+def _steps(photons: int, pictures: bool) -> list[TimedStep]:
     """The steps, with their usual times (seconds on two cores of a desktop processor, GelSight
     Mini)."""
     look = 5.0 + 2.2 * photons / 1e6 if pictures else 1.0
     return [
-        Step("the sensor before the search", 1, 3.0 + look),
-        Step("the sensor after the search", 1, look),
-        Step(WRITING, 1, 3.0),
+        TimedStep("the sensor before the search", 1, 3.0 + look),
+        TimedStep("the sensor after the search", 1, look),
+        TimedStep(WRITING, 1, 3.0),
     ]
 
 
-def _looks(study: Study, photons: int, pictures: bool, line: Line) -> dict[str, Look]:
+def _looks(study: Study, photons: int, pictures: bool, line: ProgressLine) -> dict[str, Look]:
     """Chief rays of the start and of the best trial, and pictures where they are asked for.
 
     Raises:

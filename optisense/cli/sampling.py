@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
-from optisense.cli.progress import Line
-from optisense.time_left import Step
+from optisense.cli.progress import ProgressLine
+from optisense.time_left import TimedStep
 
 if TYPE_CHECKING:
     from optisense.optics import OpticalModel, RenderProgress
@@ -17,12 +17,14 @@ MILLION_PHOTONS = 1.6
 """Seconds to trace so many, on two cores of a desktop processor, GelSight Mini."""
 
 
-def loading_steps() -> list[Step]:
+def loading_steps() -> list[TimedStep]:
     """Steps before any picture, with their usual times on such a machine."""
-    return [Step(LOADING, 1, 2.4), Step(BUILDING, 1, 0.8)]
+    return [TimedStep(LOADING, 1, 2.4), TimedStep(BUILDING, 1, 0.8)]
 
 
-def sample_steps(name: str, photons: int, count: int, seconds: float, after: float) -> list[Step]:
+def sample_steps(
+    name: str, photons: int, count: int, seconds: float, after: float
+) -> list[TimedStep]:
     """Steps of samples: their light and the first one, the others, and what follows.
 
     Args:
@@ -33,14 +35,14 @@ def sample_steps(name: str, photons: int, count: int, seconds: float, after: flo
         after: seconds that usually follow the last one.
     """
     return [
-        Step(_light(name), 1, photons / 1e6 * MILLION_PHOTONS + 4.0),
-        Step(name, count, seconds),
-        Step(_after(name), 1, after),
+        TimedStep(_light(name), 1, photons / 1e6 * MILLION_PHOTONS + 4.0),
+        TimedStep(name, count, seconds),
+        TimedStep(_after(name), 1, after),
     ]
 
 
 def shown_samples(
-    line: Line, model: OpticalModel, name: str, after: str
+    line: ProgressLine, model: OpticalModel, name: str, after: str
 ) -> Callable[[int, int], None]:
     """What is to be called with the number of samples that are done, and of all.
 

@@ -27,7 +27,7 @@ from optisense.design.materials import (
     Material,
 )
 from optisense.design.parts import Part, Role
-from optisense.design.problems import Problem
+from optisense.design.problems import Diagnostic
 from optisense.design.sensor_design import Provenance, SensorDesign, Status
 from optisense.design.storage import load_design, save_design
 
@@ -38,6 +38,7 @@ __all__ = [
     "Camera",
     "Coating",
     "Conductor",
+    "Diagnostic",
     "Dielectric",
     "Diffuse",
     "IesEmitter",
@@ -47,7 +48,6 @@ __all__ = [
     "Material",
     "Part",
     "Point",
-    "Problem",
     "Provenance",
     "Role",
     "SensorDesign",

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from optisense.design.camera import Camera
 from optisense.design.parts import TRANSPARENT_SOLIDS
-from optisense.design.problems import Problem
+from optisense.design.problems import Diagnostic
 from optisense.design.sensor_design import SensorDesign
 from optisense.geometry import TriangleMesh
 from optisense.geometry.common_space import common_space
@@ -22,13 +22,13 @@ SAMPLES = (8, 6)
 """So many places across and down the picture are tried for the sensing surface."""
 
 
-def overlaps(design: SensorDesign, meshes: dict[str, TriangleMesh]) -> list[Problem]:
+def overlaps(design: SensorDesign, meshes: dict[str, TriangleMesh]) -> list[Diagnostic]:
     """Solids of different index that share space without a priority that says which one counts.
 
     Args:
         meshes: the deformed meshes, mm.
     """
-    problems: list[Problem] = []
+    problems: list[Diagnostic] = []
     solids = [n for n in meshes if design.parts[n].role in TRANSPARENT_SOLIDS]
     for name, other in combinations(solids, 2):
         parts = design.parts[name], design.parts[other]
@@ -40,7 +40,7 @@ def overlaps(design: SensorDesign, meshes: dict[str, TriangleMesh]) -> list[Prob
         place = common_space(meshes[name], meshes[other], CONTACT)
         if place is not None:
             problems.append(
-                Problem(
+                Diagnostic(
                     f"parts '{name}' and '{other}' overlap near "
                     "({:.2f}, {:.2f}, {:.2f}) mm".format(*place)
                     + f" and have the same priority {parts[0].priority}",

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from optisense.design.cage import Cage
 from optisense.design.parts import TRANSPARENT_SOLIDS, Role
-from optisense.design.problems import Problem
+from optisense.design.problems import Diagnostic
 from optisense.design.sensor_design import SensorDesign
 from optisense.geometry import TriangleMesh
 from optisense.geometry.cage import cage_points, cage_weights
@@ -34,7 +34,7 @@ Meshes = dict[str, TriangleMesh]
 Overlap = Literal["no", "odd", "yes"]
 
 
-def cage_problems(design: SensorDesign, meshes: Meshes | None = None) -> list[Problem]:
+def cage_problems(design: SensorDesign, meshes: Meshes | None = None) -> list[Diagnostic]:
     """What is wrong with the shapes that the cages give the parts.
 
     Found are parts that are folded, collapsed, turned inside out or bent through themselves;
@@ -55,7 +55,7 @@ def cage_problems(design: SensorDesign, meshes: Meshes | None = None) -> list[Pr
     if not moved:
         return []
     bent = design.deformed_meshes() if meshes is None else meshes
-    problems: list[Problem] = []
+    problems: list[Diagnostic] = []
     done: set[frozenset[str]] = set()
     for cage_name, cage in moved.items():
         parts = [name for name in cage.parts if name in bent and name in design.meshes]
@@ -72,7 +72,7 @@ def cage_problems(design: SensorDesign, meshes: Meshes | None = None) -> list[Pr
     return problems
 
 
-def fold_problems(design: SensorDesign) -> list[Problem]:
+def fold_problems(design: SensorDesign) -> list[Diagnostic]:
     """Parts that cages have folded, collapsed, turned inside out or bent through themselves.
 
     Raises:
@@ -80,7 +80,7 @@ def fold_problems(design: SensorDesign) -> list[Problem]:
     """
     moved = {name: cage for name, cage in design.cages.items() if _has_moved(cage)}
     bent = design.deformed_meshes() if moved else {}
-    problems: list[Problem] = []
+    problems: list[Diagnostic] = []
     for cage_name, cage in moved.items():
         for name in cage.parts:
             if name in bent and name in design.meshes:
@@ -88,13 +88,13 @@ def fold_problems(design: SensorDesign) -> list[Problem]:
     return problems
 
 
-def half_caged(design: SensorDesign, meshes: Meshes) -> list[Problem]:
+def half_caged(design: SensorDesign, meshes: Meshes) -> list[Diagnostic]:
     """Warnings of cages around a sensing surface without the solid that it coats, or around that
     solid alone: to bend one is to tear the two apart. A cage that has moved is left to
     `cage_problems`.
     """
     solids = [name for name in meshes if design.parts[name].role in TRANSPARENT_SOLIDS]
-    problems: list[Problem] = []
+    problems: list[Diagnostic] = []
     for cage_name, cage in design.cages.items():
         for surface in design.parts_of(Role.SENSING_SURFACE):
             for solid in solids:
@@ -106,7 +106,7 @@ def half_caged(design: SensorDesign, meshes: Meshes) -> list[Problem]:
                     continue
                 (outer,) = {surface, solid} - {*inner}
                 problems.append(
-                    Problem(
+                    Diagnostic(
                         f"cage '{cage_name}' is around part '{inner[0]}' without part '{outer}', "
                         "which it touches: to bend one of them tears the two apart",
                         design.where("cages", cage_name, "parts"),
@@ -133,7 +133,7 @@ def _overlap(design: SensorDesign, name: str, other: str) -> Overlap:
     return "no" if parts[0].priority == parts[1].priority else "odd"
 
 
-def _folds(design: SensorDesign, cage_name: str, name: str, bent: TriangleMesh) -> list[Problem]:
+def _folds(design: SensorDesign, cage_name: str, name: str, bent: TriangleMesh) -> list[Diagnostic]:
     cage = design.cages[cage_name]
     points = cage.current_points()
     fold = find_fold(design.meshes[name], bent, cage.box, cage.resolution, points)
@@ -141,7 +141,7 @@ def _folds(design: SensorDesign, cage_name: str, name: str, bent: TriangleMesh) 
         return []
     text = FOLDS[fold.kind].format(cage=cage_name, place=_text(fold.place), count=fold.affected)
     return [
-        Problem(
+        Diagnostic(
             f"part '{name}' {text}",
             _where(design, cage_name),
             f"Move {_mover(design, cage_name, name, fold.vertex)} back: control points must not "
@@ -150,13 +150,15 @@ def _folds(design: SensorDesign, cage_name: str, name: str, bent: TriangleMesh) 
     ]
 
 
-def _coarse(design: SensorDesign, cage_name: str, name: str, bent: TriangleMesh) -> list[Problem]:
+def _coarse(
+    design: SensorDesign, cage_name: str, name: str, bent: TriangleMesh
+) -> list[Diagnostic]:
     cage = design.cages[cage_name]
     off = chord_error(design.meshes[name], bent, cage.box, cage.resolution, cage.current_points())
     if off.distance <= COARSE:
         return []
     return [
-        Problem(
+        Diagnostic(
             f"part '{name}' has too large triangles to follow cage '{cage_name}': near "
             f"{_text(off.place)} it is {off.distance:.2g} mm off the shape that the cage gives",
             design.where("parts", name, "mesh"),
@@ -169,7 +171,7 @@ def _coarse(design: SensorDesign, cage_name: str, name: str, bent: TriangleMesh)
 
 def _meetings(
     design: SensorDesign, cage_name: str, name: str, other: str, bent: Meshes
-) -> list[Problem]:
+) -> list[Diagnostic]:
     """What is wrong between a bent part and one that is not in the same cage."""
     if Role.INDENTER in (design.parts[name].role, design.parts[other].role):
         return []
@@ -182,7 +184,7 @@ def _meetings(
     distance = np.linalg.norm(bent[name].vertices - meeting.place, axis=1)
     mover = _mover(design, cage_name, name, int(np.argmin(distance)))
     return [
-        Problem(
+        Diagnostic(
             f"part '{name}', bent by cage '{cage_name}', {meeting.kind} part '{other}' "
             f"near {_text(meeting.place)}",
             _where(design, cage_name),
@@ -194,7 +196,7 @@ def _meetings(
 
 def _partings(
     design: SensorDesign, cage_name: str, name: str, other: str, bent: Meshes, overlap: Overlap
-) -> list[Problem]:
+) -> list[Diagnostic]:
     """Where a bent part no longer lies on one that it touched at rest."""
     mesh, rest = design.meshes[name], design.meshes[other]
     change = np.linalg.norm(bent[name].vertices - mesh.vertices, axis=1)
@@ -212,7 +214,7 @@ def _partings(
         return []
     what = "is pushed into" if pushed else "has come off"
     return [
-        Problem(
+        Diagnostic(
             f"part '{name}', bent by cage '{cage_name}', {what} part '{other}', on which it lies "
             f"at rest, near {_text(place)}",
             _where(design, cage_name),

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from optisense.design.arrangement import in_picture, straight_rays
 from optisense.design.camera import Camera
 from optisense.design.parts import TRANSPARENT_SOLIDS, Role
-from optisense.design.problems import Problem
+from optisense.design.problems import Diagnostic
 from optisense.design.sensor_design import SensorDesign
 from optisense.geometry import TriangleMesh
 from optisense.geometry.containment import inside
@@ -49,7 +49,7 @@ sensors have 0.31 (GelSight Svelte) to 1. 2to3PW does not count the other pixels
 the best camera is far away and shows the sensor as a few pixels."""
 
 
-def lens_problems(camera: Camera, where: str) -> list[Problem]:
+def lens_problems(camera: Camera, where: str) -> list[Diagnostic]:
     """A field of view that no lens has.
 
     Args:
@@ -58,7 +58,7 @@ def lens_problems(camera: Camera, where: str) -> list[Problem]:
     """
     if camera.fov < NARROWEST:
         return [
-            Problem(
+            Diagnostic(
                 f"no lens of a sensor sees as little as {camera.fov:g} degrees",
                 where,
                 f"Give {NARROWEST:g} degrees or more",
@@ -68,7 +68,7 @@ def lens_problems(camera: Camera, where: str) -> list[Problem]:
         if camera.fov <= WIDEST_FISHEYE:
             return []
         return [
-            Problem(
+            Diagnostic(
                 f"no fisheye lens sees {camera.fov:g} degrees",
                 where,
                 f"Give {WIDEST_FISHEYE:g} degrees or less",
@@ -82,7 +82,7 @@ def lens_problems(camera: Camera, where: str) -> list[Problem]:
     half = np.tan(np.radians(WIDEST_PERSPECTIVE / 2.0)) / diagonal
     most = np.floor(10.0 * np.degrees(2.0 * np.arctan(half))) / 10.0
     return [
-        Problem(
+        Diagnostic(
             f"no perspective lens sees {camera.fov:g} degrees across the image "
             f"({corner:.0f} from corner to corner)",
             where,
@@ -91,7 +91,7 @@ def lens_problems(camera: Camera, where: str) -> list[Problem]:
     ]
 
 
-def place_problems(design: SensorDesign, meshes: dict[str, TriangleMesh]) -> list[Problem]:
+def place_problems(design: SensorDesign, meshes: dict[str, TriangleMesh]) -> list[Diagnostic]:
     """A camera inside a transparent solid, or so near to a part that its lens is in it.
 
     Inside opaque solids it is found with the lights. A camera that is cast into a solid stands in
@@ -107,7 +107,7 @@ def place_problems(design: SensorDesign, meshes: dict[str, TriangleMesh]) -> lis
         role = design.parts[name].role
         if role in TRANSPARENT_SOLIDS and mesh.is_closed and inside(position[None], mesh)[0]:
             return [
-                Problem(
+                Diagnostic(
                     f"the camera is inside the solid part '{name}' ({role.value}) at {at}",
                     where,
                     "Move it out, or make a cavity for it in the part's mesh, such as a sphere "
@@ -118,7 +118,7 @@ def place_problems(design: SensorDesign, meshes: dict[str, TriangleMesh]) -> lis
         distance = _distance(position, mesh)
         if distance < 0.5 * SMALLEST_CAMERA:
             return [
-                Problem(
+                Diagnostic(
                     f"the camera is {distance:.2g} mm from part '{name}' at {at}: even the "
                     f"smallest camera is {SMALLEST_CAMERA:g} mm wide, so its lens is in the part",
                     where,
@@ -128,7 +128,7 @@ def place_problems(design: SensorDesign, meshes: dict[str, TriangleMesh]) -> lis
     return []
 
 
-def camera_fault(design: SensorDesign, meshes: dict[str, TriangleMesh]) -> Problem | None:
+def camera_fault(design: SensorDesign, meshes: dict[str, TriangleMesh]) -> Diagnostic | None:
     """The first reason why there can be no such camera; None when there can.
 
     Args:
@@ -139,7 +139,7 @@ def camera_fault(design: SensorDesign, meshes: dict[str, TriangleMesh]) -> Probl
     return found[0] if found else None
 
 
-def view_problems(design: SensorDesign, meshes: dict[str, TriangleMesh]) -> list[Problem]:
+def view_problems(design: SensorDesign, meshes: dict[str, TriangleMesh]) -> list[Diagnostic]:
     """A camera in whose straight view there is too little of the sensing surface.
 
     Rays bend on their way, so this is a warning; scores look at the bent ones. With mirrors it
@@ -164,7 +164,7 @@ def view_problems(design: SensorDesign, meshes: dict[str, TriangleMesh]) -> list
     where = design.where("camera", "direction")
     if picture == 0.0 and not any(in_picture(camera, skin.vertices).any() for skin in skins):
         return [
-            Problem(
+            Diagnostic(
                 "the sensing surface is not where the camera looks",
                 where,
                 "Point the camera's direction at it, or move the camera, unless the parts bend the "
@@ -181,8 +181,8 @@ def view_problems(design: SensorDesign, meshes: dict[str, TriangleMesh]) -> list
     return []
 
 
-def _small(message: str, where: str) -> Problem:
-    return Problem(
+def _small(message: str, where: str) -> Diagnostic:
+    return Diagnostic(
         f"{message}, seen straight",
         where,
         "Move the camera or change its field of view, unless the parts bend the light that far; "

@@ -14,7 +14,7 @@ from optisense.design.camera_checks import lens_problems, place_problems, view_p
 from optisense.design.limits import unit_slips
 from optisense.design.near import suggestion
 from optisense.design.parts import TRANSPARENT_SOLIDS, Role
-from optisense.design.problems import Problem
+from optisense.design.problems import Diagnostic
 from optisense.design.sensor_design import SensorDesign
 from optisense.errors import DesignError, MeshError, OptiSenseError
 from optisense.geometry import TriangleMesh
@@ -30,7 +30,9 @@ PROBE = 0.05
 PROBES = 64
 
 
-def check_design(design: SensorDesign, light_names: Collection[str] | None = None) -> list[Problem]:
+def check_design(
+    design: SensorDesign, light_names: Collection[str] | None = None
+) -> list[Diagnostic]:
     """All that can be found wrong with a design without tracing light through it.
 
     Meshes that are empty, not closed or not finite, unit slips, missing meshes, unknown lights,
@@ -47,7 +49,7 @@ def check_design(design: SensorDesign, light_names: Collection[str] | None = Non
     Returns:
         Problems in the order of the design file, an empty list when all is well.
     """
-    problems: list[Problem] = []
+    problems: list[Diagnostic] = []
     meshes: dict[str, TriangleMesh] = {}
     for name in design.parts:
         problems += _check_mesh(design, name, meshes)
@@ -59,7 +61,7 @@ def check_design(design: SensorDesign, light_names: Collection[str] | None = Non
             meshes = {n: m for n, m in design.deformed_meshes().items() if n in meshes}
         except DesignError as error:
             place = error.where or design.where("cages")
-            problems.append(Problem(error.message, place, error.hint))
+            problems.append(Diagnostic(error.message, place, error.hint))
         else:
             problems += _check_poses(design, meshes)
             problems += _check_sensing_surfaces(design, meshes)
@@ -74,20 +76,22 @@ def check_design(design: SensorDesign, light_names: Collection[str] | None = Non
     return problems
 
 
-def _check_mesh(design: SensorDesign, name: str, meshes: dict[str, TriangleMesh]) -> list[Problem]:
+def _check_mesh(
+    design: SensorDesign, name: str, meshes: dict[str, TriangleMesh]
+) -> list[Diagnostic]:
     """Put the part's mesh into `meshes` unless something is wrong with it."""
     part = design.parts[name]
     place = design.where("parts", name, "mesh")
     if name not in design.meshes:
-        return [Problem(f"part '{name}' has no mesh", place, "Set design.meshes[name]")]
+        return [Diagnostic(f"part '{name}' has no mesh", place, "Set design.meshes[name]")]
     try:
         mesh = design.meshes[name].validate(name, closed=part.role in TRANSPARENT_SOLIDS)
     except MeshError as error:
-        return [Problem(f"part '{name}': {error.message}", place, error.hint)]
+        return [Diagnostic(f"part '{name}': {error.message}", place, error.hint)]
     meshes[name] = mesh
     if part.role is Role.SENSING_SURFACE and mesh.is_closed:
         return [
-            Problem(
+            Diagnostic(
                 f"part '{name}' is a sensing_surface, but its mesh is closed",
                 place,
                 "A sensing surface is open: only the coated faces of the elastomer",
@@ -97,11 +101,11 @@ def _check_mesh(design: SensorDesign, name: str, meshes: dict[str, TriangleMesh]
     return []
 
 
-def _check_lights(design: SensorDesign, light_names: Collection[str] | None) -> list[Problem]:
-    problems: list[Problem] = []
+def _check_lights(design: SensorDesign, light_names: Collection[str] | None) -> list[Diagnostic]:
+    problems: list[Diagnostic] = []
     if sum(group.flux * len(group.lights) for group in design.lights.values()) <= 0.0:
         problems.append(
-            Problem(
+            Diagnostic(
                 "no light is on: every picture will be black",
                 design.where("lights"),
                 "Add a light group, or set a flux above 0",
@@ -114,10 +118,10 @@ def _check_lights(design: SensorDesign, light_names: Collection[str] | None) -> 
                 group.emitter.check()
             except OptiSenseError as error:
                 place = error.where or design.where("lights", name, "emitter")
-                problems.append(Problem(error.message, place, error.hint))
+                problems.append(Diagnostic(error.message, place, error.hint))
         elif light_names is not None and group.model not in light_names:
             problems.append(
-                Problem(
+                Diagnostic(
                     f"light group '{name}' has an unknown model '{group.model}'",
                     design.where("lights", name, "model"),
                     unknown_light_hint(group.model, light_names),
@@ -135,7 +139,7 @@ def unknown_light_hint(model: str, light_names: Collection[str]) -> str:
     )
 
 
-def _check_poses(design: SensorDesign, meshes: dict[str, TriangleMesh]) -> list[Problem]:
+def _check_poses(design: SensorDesign, meshes: dict[str, TriangleMesh]) -> list[Diagnostic]:
     """No light and no camera may be shut up inside an opaque solid."""
     opaque = {
         name: mesh
@@ -159,7 +163,7 @@ def _check_poses(design: SensorDesign, meshes: dict[str, TriangleMesh]) -> list[
             if within:
                 at = ", ".join(f"{value:g}" for value in position)
                 problems.append(
-                    Problem(
+                    Diagnostic(
                         f"{label} is inside the opaque part '{part}' ({role}) at ({at})",
                         design.where(*path),
                         "Move it out, or make a hole in the part",
@@ -168,10 +172,12 @@ def _check_poses(design: SensorDesign, meshes: dict[str, TriangleMesh]) -> list[
     return problems
 
 
-def _check_sensing_surfaces(design: SensorDesign, meshes: dict[str, TriangleMesh]) -> list[Problem]:
+def _check_sensing_surfaces(
+    design: SensorDesign, meshes: dict[str, TriangleMesh]
+) -> list[Diagnostic]:
     """Normals of a sensing surface must look into the medium behind it."""
     solids = [mesh for n, mesh in meshes.items() if design.parts[n].role in TRANSPARENT_SOLIDS]
-    problems: list[Problem] = []
+    problems: list[Diagnostic] = []
     if not solids:
         return problems
     for name in design.parts_of(Role.SENSING_SURFACE):
@@ -183,7 +189,7 @@ def _check_sensing_surfaces(design: SensorDesign, meshes: dict[str, TriangleMesh
         place = design.where("parts", name, "mesh")
         if np.count_nonzero(back & ~front) > len(chosen) / 2:
             problems.append(
-                Problem(
+                Diagnostic(
                     f"the sensing surface '{name}' faces outward: its normals must look into the "
                     "elastomer, to where the light comes from",
                     place,
@@ -192,7 +198,7 @@ def _check_sensing_surfaces(design: SensorDesign, meshes: dict[str, TriangleMesh
             )
         elif np.count_nonzero(front) < len(chosen) / 2:
             problems.append(
-                Problem(
+                Diagnostic(
                     f"most of the sensing surface '{name}' does not lie on a transparent solid",
                     place,
                     "Let it share its faces with the elastomer, unless light reaches it in air",
@@ -202,14 +208,14 @@ def _check_sensing_surfaces(design: SensorDesign, meshes: dict[str, TriangleMesh
     return problems
 
 
-def _check_provenance(design: SensorDesign) -> list[Problem]:
+def _check_provenance(design: SensorDesign) -> list[Diagnostic]:
     problems = []
     for path in design.provenance:
         try:
             get_value(design, path)
         except DesignError as error:
             problems.append(
-                Problem(
+                Diagnostic(
                     f"provenance is given for '{path}', which does not exist",
                     design.where("provenance", path),
                     error.hint,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from optisense.design.problems import Problem
+from optisense.design.problems import Diagnostic
 from optisense.design.sensor_design import SensorDesign
 
 LARGEST = 1000.0
@@ -14,9 +14,9 @@ SMALLEST = 0.5
 """mm: no part of a sensor is smaller in its largest dimension."""
 
 
-def unit_slips(design: SensorDesign) -> list[Problem]:
+def unit_slips(design: SensorDesign) -> list[Diagnostic]:
     """Parts, lights and a camera whose sizes or distances suggest another unit than mm."""
-    problems: list[Problem] = []
+    problems: list[Diagnostic] = []
     for name, mesh in design.meshes.items():
         place = design.where("parts", name, "mesh")
         extent = float(np.ptp(mesh.bounds, axis=0).max())
@@ -24,7 +24,7 @@ def unit_slips(design: SensorDesign) -> list[Problem]:
         if extent > LARGEST or far > 2.0 * LARGEST:
             size = f"{extent:.6g} mm large" if extent > LARGEST else f"{far:.6g} mm from the origin"
             problems.append(
-                Problem(
+                Diagnostic(
                     f"part '{name}' is {size}: looks like micrometres or another smaller unit",
                     place,
                     f"Scale the mesh to millimetres; a sensor is smaller than {LARGEST:g} mm",
@@ -32,7 +32,7 @@ def unit_slips(design: SensorDesign) -> list[Problem]:
             )
         elif extent < SMALLEST:
             problems.append(
-                Problem(
+                Diagnostic(
                     f"part '{name}' is only {extent:.3g} mm large: looks like metres or inches",
                     place,
                     "Scale the mesh to millimetres (metres times 1000)",
@@ -42,7 +42,7 @@ def unit_slips(design: SensorDesign) -> list[Problem]:
         far = float(np.abs(cage.current_points()).max())
         if far > 2.0 * LARGEST:
             problems.append(
-                Problem(
+                Diagnostic(
                     f"cage '{cage_name}' has a control point {far:.6g} mm from the origin",
                     design.where("cages", cage_name, "points"),
                     "Give control points in millimetres",
@@ -59,7 +59,7 @@ def unit_slips(design: SensorDesign) -> list[Problem]:
         distance = float(np.linalg.norm(position))
         if distance > LARGEST:
             problems.append(
-                Problem(
+                Diagnostic(
                     f"{label} is {distance:.6g} mm from the origin: not in millimetres?",
                     design.where(*path),
                     "Give positions in millimetres",

@@ -21,7 +21,7 @@ Lines = dict[Path, int]
 
 
 @dataclass(frozen=True)
-class Problem:
+class Diagnostic:
     """Something that is wrong with a design.
 
     Attributes:
@@ -41,7 +41,7 @@ class Problem:
         return f"{text}. {self.hint}" if self.hint else text
 
 
-def raise_problems(problems: list[Problem], source: str) -> None:
+def raise_problems(problems: list[Diagnostic], source: str) -> None:
     """Raise one DesignError for all problems of severity "error"; none, and it returns."""
     errors = [problem for problem in problems if problem.severity == "error"]
     if not errors:
@@ -81,9 +81,9 @@ def design_error(
 
 def _problems(
     error: ValidationError, data: Any, where: str, lines: Lines, model: type[BaseModel]
-) -> list[Problem]:
+) -> list[Diagnostic]:
     reports = error.errors(include_url=False)
-    found: list[Problem] = []
+    found: list[Diagnostic] = []
     explained: set[Path] = set()  # missing fields that a misspelt one stands for
     for report in reports:
         if report["type"] == "extra_forbidden":
@@ -94,7 +94,7 @@ def _problems(
                 explained.add((*path[:-1], match))
             hint = suggestion(str(path[-1]), fields, limit=20)
             found.append(
-                Problem(f"unknown field '{dotted(path)}'", _place(path, where, lines), hint)
+                Diagnostic(f"unknown field '{dotted(path)}'", _place(path, where, lines), hint)
             )
     for report in reports:
         kind, location = report["type"], report["loc"]
@@ -106,7 +106,7 @@ def _problems(
             path = (*path, location[-1])
             if path not in explained:
                 found.append(
-                    Problem(f"'{dotted(path)}' is missing", _place(path, where, lines), "Add it")
+                    Diagnostic(f"'{dotted(path)}' is missing", _place(path, where, lines), "Add it")
                 )
             continue
         if kind in ("union_tag_invalid", "union_tag_not_found"):
@@ -117,12 +117,12 @@ def _problems(
                 f"'{dotted(path)}' is missing"
             )  # fmt: skip
             hint = suggestion(tag, known) if known[0] else None
-            found.append(Problem(message, _place(path, where, lines), hint))
+            found.append(Diagnostic(message, _place(path, where, lines), hint))
             continue
         cause = context.get("error")
         if isinstance(cause, MisfitError):
             path = (*path, *cause.path)
-            found.append(Problem(str(cause), _place(path, where, lines), cause.hint))
+            found.append(Diagnostic(str(cause), _place(path, where, lines), cause.hint))
             continue
         text = str(cause) if cause is not None else _sentence(report["msg"])
         given = report.get("input")
@@ -131,7 +131,9 @@ def _problems(
         if kind in ("enum", "literal_error") and isinstance(given, str):
             words = str(context.get("expected", "")).replace(" or ", ", ").replace("'", "")
             hint = suggestion(given, words.split(", "))
-        found.append(Problem(f"'{dotted(path)}'{shown}: {text}", _place(path, where, lines), hint))
+        found.append(
+            Diagnostic(f"'{dotted(path)}'{shown}: {text}", _place(path, where, lines), hint)
+        )
     return found
 
 

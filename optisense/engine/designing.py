@@ -40,10 +40,6 @@ Resolution = tuple[int, int, int]
 Place = tuple[float, float, float]
 
 
-class Nothing(Fields):
-    """A request without fields of its own."""
-
-
 class Save(OfDesign):
     """See docs/engine.md."""
 
@@ -59,7 +55,7 @@ class Mesh(Fields):
     scale: float = Field(default=1.0, gt=0.0)
 
 
-class Cage(OfDesign):
+class ChangeCage(OfDesign):
     """See docs/engine.md."""
 
     action: Literal["add", "remove", "refine", "range", "settle"]
@@ -85,8 +81,8 @@ class Export(OfDesign):
     formats: list[Literal["stl", "obj", "3mf", "step"]] = Field(default=["stl"])
 
 
-@handles("sensors", Nothing, Lane.QUICK)
-def sensors(session: Session, fields: Nothing, job: Job) -> dict[str, Any]:
+@handles("sensors", Fields, Lane.QUICK)
+def sensors(session: Session, fields: Fields, job: Job) -> dict[str, Any]:
     """The built-in sensors."""
     rows = []
     for name in BUILDERS:
@@ -144,8 +140,8 @@ def check(session: Session, fields: OfDesign, job: Job) -> dict[str, Any]:
     return {"problems": [problem_row(each, design) for each in found]}
 
 
-@handles("cage", Cage, Lane.QUICK)
-def cage(session: Session, fields: Cage, job: Job) -> dict[str, Any]:
+@handles("cage", ChangeCage, Lane.QUICK)
+def cage(session: Session, fields: ChangeCage, job: Job) -> dict[str, Any]:
     """Another cage, or a changed one."""
     design = design_of(session, fields, job)
     if fields.action == "add":
@@ -209,7 +205,7 @@ def _alike(one: TriangleMesh, other: TriangleMesh | None) -> bool:
     )
 
 
-def _check_count(design: SensorDesign, fields: Cage, name: str) -> None:
+def _check_count(design: SensorDesign, fields: ChangeCage, name: str) -> None:
     given = getattr(fields, name)
     known = design.cages.get(fields.cage)
     if given is not None and known is not None and len(given) != np.prod(known.resolution):

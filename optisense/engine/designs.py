@@ -14,7 +14,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from optisense.design import SensorDesign, check_design, load_design, set_value
 from optisense.design.near import near_match
 from optisense.design.parts import TRANSPARENT_SOLIDS, Role
-from optisense.design.problems import Problem, design_error
+from optisense.design.problems import Diagnostic, design_error
 from optisense.design.storage import DESIGN_FILE
 from optisense.engine.failures import ProtocolError, UnsoundDesignError, place_in
 from optisense.errors import DesignError, MeshError
@@ -68,7 +68,7 @@ class Designs:
         self._folders: dict[str, tuple[list[Stamp], SensorDesign]] = {}
         self._meshes: dict[tuple[Stamp, ...], TriangleMesh] = {}
         self._valid: WeakKeyDictionary[TriangleMesh, dict[bool, TriangleMesh]] = WeakKeyDictionary()
-        self._sound: tuple[SensorDesign, list[Problem]] | None = None
+        self._sound: tuple[SensorDesign, list[Diagnostic]] | None = None
 
     def read(self, given: AnyDesign, meshes: Mapping[str, AnyMesh] | None = None) -> SensorDesign:
         """The design that a request names.
@@ -101,7 +101,7 @@ class Designs:
                 design = set_value(design, path, value)
         return design
 
-    def problems(self, design: SensorDesign) -> list[Problem]:
+    def problems(self, design: SensorDesign) -> list[Diagnostic]:
         """All that `check` finds; the answer for the last design is kept."""
         if self._sound is not None and _same(self._sound[0], design):
             return self._sound[1]
@@ -109,7 +109,7 @@ class Designs:
         self._sound = design, found
         return found
 
-    def must_be_sound(self, design: SensorDesign) -> list[Problem]:
+    def must_be_sound(self, design: SensorDesign) -> list[Diagnostic]:
         """The warnings about a design.
 
         Raises:

@@ -6,7 +6,7 @@ import re
 from collections.abc import Iterable, Sequence
 from typing import Any
 
-from optisense.design import Problem, SensorDesign
+from optisense.design import Diagnostic, SensorDesign
 from optisense.errors import OptiSenseError
 
 
@@ -51,7 +51,7 @@ class WrongContactError(OptiSenseError):
 class UnsoundDesignError(OptiSenseError):
     """A design that `check` refuses, with all that it found."""
 
-    def __init__(self, problems: Sequence[Problem], source: str) -> None:
+    def __init__(self, problems: Sequence[Diagnostic], source: str) -> None:
         errors = [problem for problem in problems if problem.severity == "error"]
         first = errors[0]
         more = f" (and {len(errors) - 1} more)" if len(errors) > 1 else ""
@@ -99,7 +99,7 @@ def as_data(
     )
 
 
-def problem_row(problem: Problem, design: SensorDesign | None) -> dict[str, Any]:
+def problem_row(problem: Diagnostic, design: SensorDesign | None) -> dict[str, Any]:
     """What `check` has found, with the part that it is about."""
     known = list(design.parts) if design is not None else []
     path = path_in(problem.where)

@@ -12,7 +12,7 @@ from optisense.engine.failures import Cancelled
 from optisense.engine.files import Files
 from optisense.engine.jobs import Job
 from optisense.engine.search_process import SearchProcess, is_running
-from optisense.time_left import Step, TimeLeft
+from optisense.time_left import TimedStep, TimeLeft
 
 if TYPE_CHECKING:
     from optisense.search import Study
@@ -119,7 +119,7 @@ class Following:
         self._failed = sum(row.generation >= 0 and _failed(row) for row in rows)
         if self._time_left is None:
             # The first trial that is waited for also compiles.
-            self._time_left = TimeLeft([Step("trials", self._total(study), warm_up=1)])
+            self._time_left = TimeLeft([TimedStep("trials", self._total(study), warm_up=1)])
             self._time_left.begin("trials", done=self._done)
         if not new:
             return

@@ -151,7 +151,7 @@ class Task(Protocol):
         """Answer without having done it: "Cancelled" or "Replaced"."""
 
 
-class Line:
+class JobQueue:
     """Requests that are done one after another, in a thread of their own.
 
     Drafts wait in a place of their own, which only the newest one has, and give way to whatever

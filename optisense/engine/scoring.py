@@ -23,10 +23,6 @@ if TYPE_CHECKING:
 _registering = threading.Lock()
 
 
-class Nothing(Fields):
-    """A request without fields of its own."""
-
-
 class Evaluate(OfDesign):
     """See docs/engine.md."""
 
@@ -37,8 +33,8 @@ class Evaluate(OfDesign):
     figures: bool = False
 
 
-@handles("objectives", Nothing, Lane.QUICK)
-def objectives(session: Session, fields: Nothing, job: Job) -> dict[str, Any]:
+@handles("objectives", Fields, Lane.QUICK)
+def objectives(session: Session, fields: Fields, job: Job) -> dict[str, Any]:
     """What can be scored."""
     from optisense.objectives.registry import find, names
 

@@ -27,10 +27,6 @@ if TYPE_CHECKING:
     from optisense.search.space.search_space import BoundSpace
 
 
-class Nothing(Fields):
-    """A request without fields of its own."""
-
-
 class Space(OfDesign):
     """See docs/engine.md."""
 
@@ -78,8 +74,8 @@ class Apply(OneTrial):
     to: str
 
 
-@handles("methods", Nothing, Lane.QUICK)
-def methods(session: Session, fields: Nothing, job: Job) -> dict[str, Any]:
+@handles("methods", Fields, Lane.QUICK)
+def methods(session: Session, fields: Fields, job: Job) -> dict[str, Any]:
     """Ways to search."""
     from optisense.search.methods import find, names
 

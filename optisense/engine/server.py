@@ -16,7 +16,7 @@ from optisense import __version__
 from optisense.engine import requests
 from optisense.engine.channel import Channel
 from optisense.engine.failures import Cancelled, ProtocolError, as_data
-from optisense.engine.jobs import Job, Line
+from optisense.engine.jobs import Job, JobQueue
 from optisense.engine.protocol import (
     MOST_OF_A_LINE,
     PROTOCOL,
@@ -65,7 +65,7 @@ class Engine:
         """
         self.session = Session()
         self._channel = channel
-        self._lines = {lane: Line(lane.value) for lane in (Lane.QUICK, Lane.RENDER)}
+        self._lines = {lane: JobQueue(lane.value) for lane in (Lane.QUICK, Lane.RENDER)}
         self._open: dict[RequestId, Job] = {}
         self._changed = threading.Condition()
         self._ending = False

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from optisense import library
-from optisense.design import Problem, SensorDesign, check_design, load_design, storage
+from optisense.design import Diagnostic, SensorDesign, check_design, load_design, storage
 from optisense.design.near import suggestion
 from optisense.design.problems import raise_problems
 from optisense.errors import DesignError
@@ -83,7 +83,7 @@ def save_design(design: SensorDesign, folder: str | Path, *, new: bool = False) 
     storage.save_design(library.with_own_lights(design), folder, new=new)
 
 
-def check(design: SensorDesign) -> list[Problem]:
+def check(design: SensorDesign) -> list[Diagnostic]:
     """Check a design without rendering it, and that the library knows its lights.
 
     Returns:

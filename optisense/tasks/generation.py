@@ -33,7 +33,7 @@ from optisense.tasks.dataset import (
     write_picture,
 )
 from optisense.tasks.draws import ContactDraw, DrawnContact, Places, keeps_margin
-from optisense.tasks.records import Table, read_json, refuse_differences, write_whole
+from optisense.tasks.records import CsvTable, read_json, refuse_differences, write_whole
 from optisense.tasks.untouched import UntouchedSurface
 from optisense.writing import inside, write_json, written_whole
 
@@ -144,8 +144,8 @@ class _Maker:
         self._larger_than_view = {
             text for text, each in self._indenters.items() if not self._fits(each)
         }
-        self._labels = Table(folder / LABELS, COLUMNS)
-        self._failures = Table(folder / FAILURES, ("index", "reason"))
+        self._labels = CsvTable(folder / LABELS, COLUMNS)
+        self._failures = CsvTable(folder / FAILURES, ("index", "reason"))
 
     def done(self) -> set[int]:
         """The indices that need no more work."""

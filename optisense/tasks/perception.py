@@ -22,7 +22,7 @@ from optisense.geometry import Contact
 from optisense.objectives.score import json_ready
 from optisense.tasks.camera_noise import MEASURED_NOISE, add_camera_noise
 from optisense.tasks.generation import design_values, mesh_digests
-from optisense.tasks.records import KEPT, Table, read_json, refuse_differences
+from optisense.tasks.records import KEPT, CsvTable, read_json, refuse_differences
 from optisense.tasks.regression import FOLDS, ForestReading, read_by_forest
 from optisense.tasks.snr import NEIGHBOURS, signal_to_noise
 from optisense.writing import write_json
@@ -297,7 +297,7 @@ def _open_table(
     model: OpticalModel,
     settings: SampleSettings,
     names: Sequence[str],
-) -> Table:
+) -> CsvTable:
     now = _described(task, model, settings) | {
         "design": design_values(model.design),
         "meshes": mesh_digests(model.design),
@@ -306,7 +306,7 @@ def _open_table(
         refuse_differences("samples", folder, read_json(folder / SETTINGS), now)
     else:
         write_json(folder / SETTINGS, now, "the results", KEPT)
-    return Table(folder / SAMPLES, names)
+    return CsvTable(folder / SAMPLES, names)
 
 
 def _numbers(row: Mapping[str, str], names: Sequence[str]) -> list[float]:

@@ -51,7 +51,7 @@ def read_json(path: Path) -> dict[str, Any]:
     return values
 
 
-class Table:
+class CsvTable:
     """A CSV file with named columns that grows row by row; its folder's lock must be held."""
 
     def __init__(self, path: Path, columns: Sequence[str]) -> None:

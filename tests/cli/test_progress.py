@@ -10,9 +10,9 @@ import pytest
 from rich.console import Console
 
 from optisense.cli import progress
-from optisense.cli.progress import Line, about, duration, progress_line
+from optisense.cli.progress import ProgressLine, about, duration, progress_line
 from optisense.search import SearchProgress
-from optisense.time_left import Step
+from optisense.time_left import TimedStep
 
 
 class Clock:
@@ -41,7 +41,7 @@ def test_a_search_fits_the_terminal(told: SearchProgress, columns: int) -> None:
     from optisense.cli.searching import notes, what
 
     clock = Clock()
-    line = Line(clock=clock)
+    line = ProgressLine(clock=clock)
     clock.now = 4321.0
     line.show(*what(told), told.seconds_left, notes(told))
     text = line.text(columns - 1).plain
@@ -62,7 +62,9 @@ def test_a_search_fits_the_terminal(told: SearchProgress, columns: int) -> None:
 
 def test_a_line_names_the_step_and_counts_the_whole_time() -> None:
     clock = Clock()
-    line = Line([Step("loading", 1, 2.0), Step("tracing photons", 10, 1.0)], clock=clock)
+    line = ProgressLine(
+        [TimedStep("loading", 1, 2.0), TimedStep("tracing photons", 10, 1.0)], clock=clock
+    )
     line.begin("loading")
     assert line.text(79).plain.startswith("loading ─")
     clock.now = 2.0
@@ -77,7 +79,7 @@ def test_a_line_names_the_step_and_counts_the_whole_time() -> None:
 
 def test_the_bar_never_goes_back_and_the_clock_never_stops() -> None:
     clock = Clock()
-    line = Line([Step("seeds", 6, 10.0)], clock=clock)
+    line = ProgressLine([TimedStep("seeds", 6, 10.0)], clock=clock)
     line.begin("seeds")
     full, clocks = 0, []
     for number in range(6):
@@ -93,7 +95,7 @@ def test_the_bar_never_goes_back_and_the_clock_never_stops() -> None:
 
 def test_what_somebody_else_estimated_runs_down() -> None:
     clock = Clock()
-    line = Line(clock=clock)
+    line = ProgressLine(clock=clock)
     clock.now = 8.0
     line.say("loading")
     assert line.text(79).plain == f"loading {'─' * 30}  0:08"
@@ -110,7 +112,7 @@ def test_in_a_log_a_line_comes_now_and_then(monkeypatch: pytest.MonkeyPatch) -> 
     monkeypatch.setattr(progress, "messages", Console(file=log, width=120))
     clock = Clock()
     monkeypatch.setattr(progress.time, "monotonic", clock)
-    with progress_line(Step("samples", 9)) as line:
+    with progress_line(TimedStep("samples", 9)) as line:
         line.begin("samples")
         for done, now in enumerate([10.0, 45.0, 50.0, 80.0], start=1):
             clock.now = now
@@ -125,7 +127,7 @@ def test_on_a_terminal_one_line_is_drawn_and_goes(monkeypatch: pytest.MonkeyPatc
     screen = io.StringIO()
     console = Console(file=screen, force_terminal=True, width=80)
     monkeypatch.setattr(progress, "messages", console)
-    with progress_line(Step("samples", 9)) as line:
+    with progress_line(TimedStep("samples", 9)) as line:
         line.begin("samples")
         line.advance(3, 9, "contact 3")
     assert screen.getvalue().endswith("\x1b[2K")

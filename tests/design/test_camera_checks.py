@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from optisense import sensors
-from optisense.design import Problem, SensorDesign, check_design, set_value
+from optisense.design import Diagnostic, SensorDesign, check_design, set_value
 from optisense.design.camera_checks import camera_fault
 from optisense.geometry import TriangleMesh
 
@@ -16,7 +16,7 @@ def mini() -> SensorDesign:
     return sensors.gelsight_mini()
 
 
-def errors(design: SensorDesign) -> list[Problem]:
+def errors(design: SensorDesign) -> list[Diagnostic]:
     return [problem for problem in check_design(design) if problem.severity == "error"]
 
 

@@ -5,14 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from optisense.design import Problem, SensorDesign, check_design, set_value
+from optisense.design import Diagnostic, SensorDesign, check_design, set_value
 from optisense.design.check import inside
 from optisense.geometry import TriangleMesh
 
 LIGHTS = ["smd-3528", "generic-spot"]
 
 
-def only(problems: list[Problem], severity: str = "error") -> Problem:
+def only(problems: list[Diagnostic], severity: str = "error") -> Diagnostic:
     found = [problem for problem in problems if problem.severity == severity]
     assert len(found) == 1, found
     return found[0]

@@ -7,14 +7,14 @@ from pathlib import Path
 import pytest
 
 from optisense.errors import TaskError
-from optisense.tasks.records import Table, differences, read_json, refuse_differences
+from optisense.tasks.records import CsvTable, differences, read_json, refuse_differences
 
 COLUMNS = ("name", "value")
 ROWS = [{"name": 'a, "quoted" word', "value": 0.1}, {"name": "b", "value": 1 / 3}]
 
 
-def filled(path: Path) -> Table:
-    table = Table(path, COLUMNS)
+def filled(path: Path) -> CsvTable:
+    table = CsvTable(path, COLUMNS)
     for row in ROWS:
         table.add(row)
     table.close()
@@ -23,7 +23,7 @@ def filled(path: Path) -> Table:
 
 def test_numbers_and_words_come_back(tmp_path: Path) -> None:
     filled(tmp_path / "t.csv")
-    rows = Table(tmp_path / "t.csv", COLUMNS).rows
+    rows = CsvTable(tmp_path / "t.csv", COLUMNS).rows
     assert [(row["name"], float(row["value"])) for row in rows] == [
         (row["name"], row["value"]) for row in ROWS
     ]
@@ -35,7 +35,7 @@ def test_cut_off_anywhere_it_continues_to_the_same_file(tmp_path: Path) -> None:
     for length in range(len("name,value\n"), len(content)):
         path = tmp_path / "cut.csv"
         path.write_bytes(content[:length])
-        table = Table(path, COLUMNS)
+        table = CsvTable(path, COLUMNS)
         for row in ROWS[len(table.rows) :]:
             table.add(row)
         table.close()
@@ -45,7 +45,7 @@ def test_cut_off_anywhere_it_continues_to_the_same_file(tmp_path: Path) -> None:
 def test_other_columns_are_refused(tmp_path: Path) -> None:
     filled(tmp_path / "t.csv")
     with pytest.raises(TaskError, match="other columns"):
-        Table(tmp_path / "t.csv", ("name",))
+        CsvTable(tmp_path / "t.csv", ("name",))
 
 
 def test_differences_within_lists_name_the_place() -> None:

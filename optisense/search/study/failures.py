@@ -14,7 +14,7 @@ _NUMBER = re.compile(r"(?<![\w.'])[-+]?\d+(?:[.,]\d+)*(?:e[-+]?\d+)?(?![\w'])")
 
 
 @dataclass
-class Cause:
+class FailureCause:
     """Why trials failed.
 
     Attributes:
@@ -33,14 +33,14 @@ def cause_of(reason: str) -> str:
     return _NUMBER.sub("…", _PLACE.sub("", reason))
 
 
-def by_cause(failures: Iterable[tuple[int, str]]) -> list[Cause]:
+def by_cause(failures: Iterable[tuple[int, str]]) -> list[FailureCause]:
     """Group failures by cause, the commonest cause first.
 
     Args:
         failures: the number of each failed trial, and its reason.
     """
-    found: dict[str, Cause] = {}
+    found: dict[str, FailureCause] = {}
     for number, reason in failures:
         text = cause_of(reason)
-        found.setdefault(text, Cause(text, reason)).numbers.append(number)
+        found.setdefault(text, FailureCause(text, reason)).numbers.append(number)
     return sorted(found.values(), key=lambda cause: -len(cause.numbers))

@@ -27,7 +27,7 @@ from optisense.search.study.settings import package_versions
 from optisense.search.study.store import START, Row
 from optisense.search.study.study import Study
 from optisense.search.study.trial import Trial
-from optisense.time_left import Step, TimeLeft
+from optisense.time_left import TimedStep, TimeLeft
 
 ALL_FAIL = 20
 """A study whose first trials all fail stops after so many, ..."""
@@ -129,7 +129,11 @@ class StudyRun:
         self._count_known()
         with self._make_runner(self._evaluator) as runner:
             self._time_left = TimeLeft(
-                [Step(START_STAGE), Step(TRIALS, self.limit), Step(FRESH, USUAL_FRESH)],
+                [
+                    TimedStep(START_STAGE),
+                    TimedStep(TRIALS, self.limit),
+                    TimedStep(FRESH, USUAL_FRESH),
+                ],
                 runner.workers,
             )
             if isinstance(runner, SerialRunner):

@@ -29,7 +29,7 @@ from optisense.search.tolerance.sensitivity import (
     percentile_of,
     total_effect,
 )
-from optisense.time_left import Step, TimeLeft
+from optisense.time_left import TimedStep, TimeLeft
 
 FloatArray = NDArray[np.float64]
 
@@ -259,7 +259,7 @@ def _work(
     """The outcome of each job, None where Ctrl-C came first; and whether it came."""
     found: list[Outcome | None] = [None] * len(jobs)
     running: dict[Future[Outcome], int] = {}
-    time_left = TimeLeft([Step("sensors", len(jobs))], runner.workers)
+    time_left = TimeLeft([TimedStep("sensors", len(jobs))], runner.workers)
     time_left.begin("sensors")
     done = 0
 

@@ -26,10 +26,10 @@ from optisense.errors import DesignError, MeshError
 from optisense.geometry import TriangleMesh
 from optisense.geometry.repair import refuse_bad_sheet, repaired
 from optisense.geometry.step import SUFFIXES
-from optisense.sensors.from_meshes.bench import Bench
 from optisense.sensors.from_meshes.files import refuse_odd_units
 from optisense.sensors.from_meshes.posing import check_places, place_camera, place_lights
 from optisense.sensors.from_meshes.recipe import Recipe, read_recipe
+from optisense.sensors.from_meshes.recipe_state import RecipeState
 from optisense.sensors.from_meshes.surfaces import chosen
 from optisense.sensors.from_meshes.touching import (
     lay_on_elastomer,
@@ -77,7 +77,7 @@ def design_from_meshes(recipe: Recipe | str | Path) -> FromMeshes:
     return FromMeshes(builder.build(), builder.notes)
 
 
-class _Builder(Bench):
+class _Builder(RecipeState):
     """The steps, in their order."""
 
     def build(self) -> SensorDesign:

@@ -14,7 +14,7 @@ from optisense.geometry import TriangleMesh
 from optisense.geometry.mesh_files import FORMATS, load_mesh
 from optisense.geometry.step import SUFFIXES as STEP_FORMATS
 from optisense.geometry.step import read_step
-from optisense.sensors.from_meshes.recipe import MM_PER, Shape
+from optisense.sensors.from_meshes.recipe import MM_PER, ShapeReference
 
 ALL_FORMATS = (*FORMATS, *STEP_FORMATS)
 
@@ -69,7 +69,7 @@ class CadFiles:
                 self._read[path] = [Body(file, None, _mesh(path), False)]
         return self._read[path]
 
-    def load(self, shape: Shape, units: str, where: str) -> TriangleMesh:
+    def load(self, shape: ShapeReference, units: str, where: str) -> TriangleMesh:
         """The mesh of a shape that comes from a file, mm.
 
         Args:

@@ -30,11 +30,11 @@ from optisense.sensors.from_meshes.recipe import (
     MM_PER,
     CameraChoice,
     LightChoice,
+    LightRow,
     Over,
     PartChoice,
     Recipe,
-    Row,
-    Shape,
+    ShapeReference,
     Units,
 )
 from optisense.sensors.from_meshes.surfaces import WITHIN
@@ -73,7 +73,7 @@ Bounds = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class Found:
+class CadBody:
     """A body in the user's CAD files.
 
     Attributes:
@@ -89,9 +89,9 @@ class Found:
     use: Use
 
     @property
-    def shape(self) -> Shape:
+    def shape(self) -> ShapeReference:
         """How a recipe refers to it."""
-        return Shape(file=self.file, solid=self.body.name)
+        return ShapeReference(file=self.file, solid=self.body.name)
 
     def mesh(self, units: Units | None) -> TriangleMesh:
         """It in mm, where files that don't know their units are in `units` (mm if None)."""
@@ -101,7 +101,7 @@ class Found:
         return self.body.mesh.with_vertices(scale * self.body.mesh.vertices)
 
 
-def find_bodies(source: Path) -> list[Found]:
+def find_bodies(source: Path) -> list[CadBody]:
     """All bodies of a CAD file, or of the CAD files in a folder.
 
     Raises:
@@ -122,7 +122,7 @@ def find_bodies(source: Path) -> list[Found]:
         for body in reader.bodies(file.name):
             name = _fresh(_as_name(body.name or file.stem), taken)
             taken.add(name)
-            found.append(Found(name, file.name, body, guess_use(name)))
+            found.append(CadBody(name, file.name, body, guess_use(name)))
     return found
 
 
@@ -135,7 +135,7 @@ def guess_use(name: str) -> Use:
     return Role.BLOCKER
 
 
-def guess_units(found: Iterable[Found]) -> Units | None:
+def guess_units(found: Iterable[CadBody]) -> Units | None:
     """The only unit in which the files have a fair size, where mm is plainly not it; else None."""
     meshes = [each.body.mesh for each in found if not each.body.own_units]
     if not meshes:
@@ -220,7 +220,7 @@ def usual_name(source: Path) -> str:
     return (path.name if source.is_dir() else path.stem)[:200] or "sensor"
 
 
-def part_of(found: Found, role: Role, material: str | None = None) -> PartChoice:
+def part_of(found: CadBody, role: Role, material: str | None = None) -> PartChoice:
     """A body as a part of the recipe."""
     return PartChoice(file=found.file, solid=found.body.name, role=role, material=material)
 
@@ -243,7 +243,7 @@ def insert_skin(
     return result
 
 
-def lights_over(found: Found, mesh: TriangleMesh, gel: TriangleMesh) -> LightChoice:
+def lights_over(found: CadBody, mesh: TriangleMesh, gel: TriangleMesh) -> LightChoice:
     """A light on each face of a reference that looks to the gel; its colour by its name."""
     side = nearest_side(gel.bounds.mean(axis=0) - mesh.bounds.mean(axis=0))
     colour = next(
@@ -267,7 +267,7 @@ def lights_around(part: str, mesh: TriangleMesh, outward: str) -> dict[str, Ligh
         along = across[0] if side[-1] == across[1] else across[1]
         count = max(1, int(size[along] / LED_PITCH))
         row = {"part": part, "side": side, "along": along, "count": count}
-        lights[colour] = LightChoice(model=LIGHT, colour=colour, row=Row.model_validate(row))
+        lights[colour] = LightChoice(model=LIGHT, colour=colour, row=LightRow.model_validate(row))
     return lights
 
 

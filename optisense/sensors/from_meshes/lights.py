@@ -11,7 +11,7 @@ from optisense.errors import ContactError, DesignError
 from optisense.geometry import SensingSurface, TriangleMesh
 from optisense.geometry.patches import Faces, mean_normal, middle
 from optisense.sensors.from_meshes.directions import Direction, axis_of, vector
-from optisense.sensors.from_meshes.recipe import Over, Ring, Row
+from optisense.sensors.from_meshes.recipe import LightRow, Over, Ring
 
 FloatArray = NDArray[np.float64]
 
@@ -22,7 +22,7 @@ SPREAD = 0.2
 """Shorter than this, the mean of a surface's normals says nothing about where it looks."""
 
 
-def row(choice: Row, bounds: FloatArray) -> list[Light]:
+def row(choice: LightRow, bounds: FloatArray) -> list[Light]:
     """Lights along one side of a box, their middle over the middle of the side.
 
     Args:

@@ -15,9 +15,9 @@ from optisense.geometry.containment import inside
 from optisense.geometry.patches import middle
 from optisense.library.adding import COLOURS
 from optisense.sensors.from_meshes import lights as placing
-from optisense.sensors.from_meshes.bench import Bench
 from optisense.sensors.from_meshes.camera import make_camera, share_seen
-from optisense.sensors.from_meshes.recipe import LightChoice, Shape
+from optisense.sensors.from_meshes.recipe import LightChoice, ShapeReference
+from optisense.sensors.from_meshes.recipe_state import RecipeState
 from optisense.sensors.from_meshes.surfaces import chosen, pick
 from optisense.sensors.from_meshes.touching import refuse_contact_with_lamps
 
@@ -25,7 +25,7 @@ LITTLE_SEEN = 0.5
 """A camera that sees less of the sensing surface is told."""
 
 
-def place_lights(bench: Bench, name: str, choice: LightChoice) -> LightGroup:
+def place_lights(bench: RecipeState, name: str, choice: LightChoice) -> LightGroup:
     """A light group, each of its lights in place.
 
     Raises:
@@ -68,7 +68,7 @@ def place_lights(bench: Bench, name: str, choice: LightChoice) -> LightGroup:
     return group
 
 
-def _note_beyond(bench: Bench, name: str, group: LightGroup, part: str) -> None:
+def _note_beyond(bench: RecipeState, name: str, group: LightGroup, part: str) -> None:
     """Tell a row that is longer than the side it stands at."""
     low, high = bench.meshes[part].bounds
     places = np.array([light.position for light in group.lights])
@@ -81,7 +81,7 @@ def _note_beyond(bench: Bench, name: str, group: LightGroup, part: str) -> None:
         )
 
 
-def _note_crowded(bench: Bench, name: str, group: LightGroup) -> None:
+def _note_crowded(bench: RecipeState, name: str, group: LightGroup) -> None:
     """Tell lights that stand closer than their bodies are wide."""
     package = getattr(library.entry("light", group.model), "package", None)
     if package is None or len(group.lights) < 2:
@@ -95,7 +95,7 @@ def _note_crowded(bench: Bench, name: str, group: LightGroup) -> None:
         )
 
 
-def place_camera(bench: Bench) -> Camera:
+def place_camera(bench: RecipeState) -> Camera:
     """The camera; tells when it sees little of the sensing surface.
 
     Raises:
@@ -113,7 +113,7 @@ def place_camera(bench: Bench) -> Camera:
     elif choice.look_at is not None:
         target = np.array(choice.look_at)
     place = None
-    if isinstance(choice.at, Shape):
+    if isinstance(choice.at, ShapeReference):
         shape = choice.at
         mesh, _ = chosen(bench.reference(shape, "camera"), shape, "camera")
         place = middle(mesh)
@@ -147,7 +147,7 @@ def place_camera(bench: Bench) -> Camera:
     return camera
 
 
-def check_places(bench: Bench, camera: Camera, groups: dict[str, LightGroup]) -> None:
+def check_places(bench: RecipeState, camera: Camera, groups: dict[str, LightGroup]) -> None:
     """No camera and no light may lie in a face; those inside a transparent solid are told.
 
     Raises:

@@ -95,7 +95,7 @@ PitchOrTwo = Annotated[
 ]
 
 
-class Shape(Model):
+class ShapeReference(Model):
     """A shape: a file, or faces of another part."""
 
     file: str | None = Field(default=None, description="OBJ, STL, PLY or STEP")
@@ -112,7 +112,7 @@ class Shape(Model):
     )
 
     @model_validator(mode="after")
-    def _one_source(self) -> Shape:
+    def _one_source(self) -> ShapeReference:
         if (self.file is None) == (self.faces_of is None):
             raise ValueError("give either a file, or faces_of another part")
         if self.faces_of is not None and (self.solid is not None or self.units is not None):
@@ -125,7 +125,7 @@ class Shape(Model):
         return self
 
 
-class PartChoice(Shape):
+class PartChoice(ShapeReference):
     """A part of the sensor."""
 
     role: Role = Field(description="; ".join(role.value for role in Role))
@@ -135,7 +135,7 @@ class PartChoice(Shape):
     )
 
 
-class Row(Model):
+class LightRow(Model):
     """Lights in a row along one side of a part's box."""
 
     part: Name = Field(description="beside this part")
@@ -179,7 +179,7 @@ class Ring(Model):
     )
 
 
-class Over(Shape):
+class Over(ShapeReference):
     """Lights over a reference surface, such as the front of a circuit board."""
 
     count: CountOrTwo | None = Field(
@@ -206,7 +206,7 @@ class LightChoice(Model):
     model: Name = Field(description="light of the library")
     colour: ColourWord = Field(description=", ".join(COLOURS) + " or [r, g, b]")
     flux: NonNegative = Field(default=10.0, description="mW of each light")
-    row: Row | None = Field(default=None, description="lights along one side of a part's box")
+    row: LightRow | None = Field(default=None, description="lights along one side of a part's box")
     ring: Ring | None = Field(default=None, description="lights in a circle around a part")
     over: Over | None = Field(default=None, description="lights over a surface")
     at: list[Light] | None = Field(default=None, description="each light by its place")
@@ -224,7 +224,7 @@ class CameraChoice(Model):
     """The camera and where it is."""
 
     model: Name = Field(description="camera of the library")
-    at: Vector | Shape | None = Field(
+    at: Vector | ShapeReference | None = Field(
         default=None,
         description="mm, its pupil, or a shape in whose middle it is; behind the sensing surface "
         "if left out",
@@ -310,7 +310,7 @@ class Recipe(Model):
                     named.append((("lights", name, key, "part"), way.part))
             if group.over is not None and group.over.faces_of is not None:
                 named.append((("lights", name, "over", "faces_of"), group.over.faces_of))
-        if isinstance(self.camera.at, Shape) and self.camera.at.faces_of is not None:
+        if isinstance(self.camera.at, ShapeReference) and self.camera.at.faces_of is not None:
             named.append((("camera", "at", "faces_of"), self.camera.at.faces_of))
         if isinstance(self.camera.look_at, str):
             named.append((("camera", "look_at"), self.camera.look_at))

@@ -6,7 +6,7 @@ import os
 from pathlib import Path
 
 from optisense.design.yaml_writer import to_yaml
-from optisense.sensors.from_meshes.recipe import Recipe, Shape
+from optisense.sensors.from_meshes.recipe import Recipe, ShapeReference
 from optisense.writing import write_text
 
 RECIPE_FILE = "recipe.yaml"
@@ -31,11 +31,11 @@ def save_recipe(recipe: Recipe, path: str | Path) -> None:
     write_text(path, to_yaml(moved, HEAD), "the recipe")
 
 
-def _shapes(recipe: Recipe) -> list[Shape]:
+def _shapes(recipe: Recipe) -> list[ShapeReference]:
     """All shapes of a recipe, which may come from files."""
-    shapes: list[Shape] = list(recipe.parts.values())
+    shapes: list[ShapeReference] = list(recipe.parts.values())
     shapes += [group.over for group in recipe.lights.values() if group.over is not None]
-    if isinstance(recipe.camera.at, Shape):
+    if isinstance(recipe.camera.at, ShapeReference):
         shapes.append(recipe.camera.at)
     return shapes
 

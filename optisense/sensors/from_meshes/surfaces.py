@@ -14,13 +14,13 @@ from optisense.geometry.patches import (
     smoothly_joined,
 )
 from optisense.sensors.from_meshes.directions import said, vector
-from optisense.sensors.from_meshes.recipe import Shape
+from optisense.sensors.from_meshes.recipe import ShapeReference
 
 WITHIN = 30.0
 """Degrees that faces may look aside where the recipe gives none."""
 
 
-def pick(mesh: TriangleMesh, shape: Shape, where: str) -> list[Faces]:
+def pick(mesh: TriangleMesh, shape: ShapeReference, where: str) -> list[Faces]:
     """The faces that a shape chooses, as patches, the largest first.
 
     Args:
@@ -53,7 +53,7 @@ def pick(mesh: TriangleMesh, shape: Shape, where: str) -> list[Faces]:
     return sorted(grown, key=lambda group: -float(mesh.face_areas[group].sum()))
 
 
-def chosen(mesh: TriangleMesh, shape: Shape, where: str) -> tuple[TriangleMesh, list[str]]:
+def chosen(mesh: TriangleMesh, shape: ShapeReference, where: str) -> tuple[TriangleMesh, list[str]]:
     """The faces that a shape chooses as a mesh of their own, and what was left out, if anything.
 
     Without `towards` it is the whole mesh; else the largest patch, unless all are wanted.

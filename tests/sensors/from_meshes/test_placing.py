@@ -13,7 +13,7 @@ from optisense.errors import DesignError
 from optisense.geometry import TriangleMesh
 from optisense.sensors.from_meshes.camera import make_camera
 from optisense.sensors.from_meshes.lights import over, ring, row
-from optisense.sensors.from_meshes.recipe import CameraChoice, Over, Ring, Row
+from optisense.sensors.from_meshes.recipe import CameraChoice, LightRow, Over, Ring
 from optisense.sensors.from_meshes.surfaces import pick
 
 BOUNDS = np.array([[-12.0, -10.0, -3.0], [12.0, 10.0, 1.0]])
@@ -29,21 +29,21 @@ def ways(lights: list[Any]) -> np.ndarray:
 
 class TestRow:
     def test_pitch_gap_and_middle(self) -> None:
-        lights = row(Row(part="plate", side="+y", count=4, pitch=5.0, gap=0.3), BOUNDS)
+        lights = row(LightRow(part="plate", side="+y", count=4, pitch=5.0, gap=0.3), BOUNDS)
         np.testing.assert_allclose(
             places(lights), [[x, 10.3, -1.0] for x in (-7.5, -2.5, 2.5, 7.5)]
         )
         np.testing.assert_allclose(ways(lights), [[0, -1, 0]] * 4)
 
     def test_without_a_pitch_each_is_in_the_middle_of_its_share(self) -> None:
-        lights = row(Row(part="plate", side="-x", count=4, height=-2.5), BOUNDS)
+        lights = row(LightRow(part="plate", side="-x", count=4, height=-2.5), BOUNDS)
         np.testing.assert_allclose(
             places(lights), [[-12.2, y, -2.5] for y in (-7.5, -2.5, 2.5, 7.5)]
         )
 
     def test_it_cannot_run_into_its_own_side(self) -> None:
         with pytest.raises(DesignError, match="can't run along x"):
-            row(Row(part="plate", side="+x", along="x", count=2), BOUNDS)
+            row(LightRow(part="plate", side="+x", along="x", count=2), BOUNDS)
 
 
 class TestRing:

@@ -8,10 +8,10 @@ from optisense.errors import LibraryError, MeshError
 from optisense.geometry import TriangleMesh
 from optisense.geometry.repair import repaired
 from optisense.sensors.from_meshes.files import CadFiles
-from optisense.sensors.from_meshes.recipe import Recipe, Shape
+from optisense.sensors.from_meshes.recipe import Recipe, ShapeReference
 
 
-class Bench:
+class RecipeState:
     """A recipe, and what has come of it so far.
 
     Attributes:
@@ -29,7 +29,7 @@ class Bench:
         self.provenance: dict[str, Provenance] = {}
         self.notes: list[str] = []
 
-    def load(self, shape: Shape, where: str) -> TriangleMesh:
+    def load(self, shape: ShapeReference, where: str) -> TriangleMesh:
         """The mesh of a file, mm; an error also says which shape it is for."""
         try:
             return self.files.load(shape, self.recipe.units or "mm", where)
@@ -63,7 +63,7 @@ class Bench:
             if name in self.meshes and self.recipe.parts[name].towards is None
         }
 
-    def reference(self, shape: Shape, where: str) -> TriangleMesh:
+    def reference(self, shape: ShapeReference, where: str) -> TriangleMesh:
         """The mesh that lights or the camera refer to, welded."""
         if shape.faces_of is not None:
             return self.meshes[shape.faces_of]
