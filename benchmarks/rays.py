@@ -13,8 +13,8 @@ import numpy as np
 
 from benchmarks.case import Case
 from benchmarks.timing import timed
-from optisense.optics.transport import photons as photon_pass
-from optisense.optics.transport.photons import trace_photons
+from optisense.optics.scene.ray_scene import Ray, RayScene, SurfaceHit
+from optisense.optics.transport.photons import Emission, trace_photons
 
 PHOTONS = 1_000_000
 PURE_RAYS = 4_000_000
@@ -29,7 +29,7 @@ def photon_rates(case: Case) -> dict[str, Any]:
     guide = model.guide()
 
     def trace(seed: int) -> None:
-        trace_photons(model.scene, table, guide, per_light, seed, coloured=False)
+        trace_photons(model.scene, Emission(table, guide, per_light, seed), coloured=False)
         dr.sync_thread()
 
     trace(0)
@@ -73,16 +73,14 @@ def _counted() -> Iterator[mi.UInt32]:
     """Count the photon pass's rays while the context lasts."""
     counter = dr.zeros(mi.UInt32, 1)
     dr.make_opaque(counter)
-    module: Any = photon_pass
-    original = module.intersect
+    original = RayScene.intersect
 
-    def counting(*arguments: Any) -> Any:
-        active = arguments[5]
-        dr.scatter_inc(counter, mi.UInt32(0), active)
-        return original(*arguments)
+    def counting(scene: RayScene, ray: Ray, coherent: bool = False) -> SurfaceHit:
+        dr.scatter_inc(counter, mi.UInt32(0), ray.active)
+        return original(scene, ray, coherent)
 
-    module.intersect = counting
+    RayScene.intersect = counting  # type: ignore[method-assign]
     try:
         yield counter
     finally:
-        module.intersect = original
+        RayScene.intersect = original  # type: ignore[method-assign]

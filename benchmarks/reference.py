@@ -24,6 +24,7 @@ from benchmarks.case import CONTACT_TEXT, DESIGN, RESOLUTION, Case, FloatArray, 
 from optisense.design import SensorDesign
 from optisense.optics.camera.projection import RayCamera
 from optisense.optics.imaging.sppm import render_sppm
+from optisense.optics.transport.photons import Emission
 
 CACHE = Path(__file__).parent / ".cache"
 SEEDS = 6
@@ -145,12 +146,9 @@ def _one_seed(
     passes = max(1, round(photons / (per_light * table.count)))
     result = render_sppm(
         model._scenes([ball()]).full,
-        table,
-        model.guide(),
+        Emission(table, model.guide(), per_light, seed),
         camera,
         passes,
-        per_light,
-        seed,
         coloured=model._coloured,
         radius=radius,
     )

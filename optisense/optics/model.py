@@ -27,6 +27,7 @@ from optisense.optics.scene.contact_scenes import ContactScenes
 from optisense.optics.scene.surfaces import SurfaceKind
 from optisense.optics.transport.chief_rays import ChiefRays, sees_nothing, trace_chief_rays
 from optisense.optics.transport.emission_guide import EmissionGuide
+from optisense.optics.transport.photons import Emission
 
 DEFAULT_PHOTONS = 5_000_000
 """Photons of a radiance cache where no other limit is given; the cache serves the next images,
@@ -261,12 +262,9 @@ class OpticalModel(RayModel):
 
         result = render_sppm(
             scenes.full,
-            self._emitter_table,
-            self.guide(),
+            Emission(self._emitter_table, self.guide(), per_light, seed),
             camera,
             passes,
-            per_light,
-            seed,
             coloured=self._coloured,
             stop=stop,
         )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import drjit as dr
 import mitsuba as mi
@@ -12,8 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from optisense.geometry import Contact
-from optisense.optics.scene.ray_scene import RayScene
-from optisense.optics.transport.chief_rays import MAX_DEPTH, RayOutcome, next_step
+from optisense.optics.scene.ray_scene import Ray
+from optisense.optics.transport.chief_rays import RayOutcome
+from optisense.optics.transport.interact import Path, interact
 
 if TYPE_CHECKING:
     from optisense.optics.model import OpticalModel
@@ -65,37 +66,25 @@ def trace_paths(
     lengths = np.ones(count, dtype=np.int32)
     outcomes = np.full(count, int(RayOutcome.DEPTH_LIMIT), dtype=np.uint8)
     total = np.zeros(count, dtype=bool)
-    active = mi.Bool(True) & (index < count)
-    for _ in range(MAX_DEPTH):
-        step = _step(scene, origin, direction, active)
-        dr.eval(step)
-        going = np.asarray(active).astype(bool)
-        if not going.any():
-            break
-        end, ended, reflected, origin, direction, active = step
+    ray = Ray(origin, direction, dr.full(mi.Bool, True, count))
+    while (going := np.asarray(ray.active).astype(bool)).any():
+        step = interact(scene, ray, Path.CHIEF)
+        end = dr.select(step.hit.valid, step.hit.point, ray.origin + ESCAPE_LENGTH * ray.direction)
+        dr.eval(step, end)
         points.append(_rows(end))
         lengths[going] += 1
-        told = np.asarray(ended).astype(np.int32)
-        closed = going & (told >= 0)
-        outcomes[closed] = told[closed]
-        total |= going & np.asarray(reflected).astype(bool)
+        for outcome, there in (
+            (RayOutcome.ESCAPED, ~step.hit.valid),
+            (RayOutcome.ABSORBED, step.ended),
+            (RayOutcome.HIT, step.sensed),
+        ):
+            outcomes[going & np.asarray(there).astype(bool)] = int(outcome)
+        total |= np.asarray(step.totally).astype(bool)
+        ray = step.ray
     outcomes[total & (outcomes != int(RayOutcome.HIT))] = int(RayOutcome.TOTAL_REFLECTION)
     every = np.stack(points, axis=1)
     chosen = np.arange(every.shape[1])[None, :] < lengths[:, None]
     return RayPaths(every[chosen].astype(np.float32), lengths, outcomes)
-
-
-def _step(scene: RayScene, origin: Any, direction: Any, active: Any) -> tuple[Any, ...]:
-    """One surface further: where it is met, the outcome or -1, whether all light was reflected,
-    and the ray that goes on.
-    """
-    step = next_step(scene.scene, scene.rows, scene.corners, scene.table, origin, direction, active)
-    valid = step.hit.valid
-    outcome = dr.select(step.ended, int(RayOutcome.ABSORBED), mi.Int32(-1))
-    outcome = dr.select(step.arrived, int(RayOutcome.HIT), outcome)
-    outcome = dr.select(valid, outcome, int(RayOutcome.ESCAPED))
-    end = dr.select(valid, step.hit.point, origin + ESCAPE_LENGTH * direction)
-    return end, outcome, step.totally, step.origin, step.direction, step.goes_on
 
 
 def _rows(values: object) -> NDArray[np.float32]:

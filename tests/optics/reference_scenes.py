@@ -28,6 +28,7 @@ from optisense.optics.scene.ray_scene import Piece, RayScene
 from optisense.optics.scene.surfaces import Region, Surface, SurfaceKind
 from optisense.optics.transport.chief_rays import ChiefRays, trace_chief_rays
 from optisense.optics.transport.emission_guide import uniform_guide
+from optisense.optics.transport.photons import Emission
 
 FloatArray = NDArray[np.floating]
 
@@ -78,12 +79,9 @@ class ReferenceScene:
         """
         result = render_sppm(
             self.ray_scene(),
-            self.table(),
-            uniform_guide(len(self.emitters)),
+            Emission(self.table(), uniform_guide(len(self.emitters)), per_light, seed),
             self.camera,
             passes,
-            per_light,
-            seed,
             coloured=self._coloured(),
             radius=radius,
         )

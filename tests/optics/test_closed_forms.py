@@ -22,7 +22,8 @@ from optisense.optics.scene.ray_scene import Piece, RayScene
 from optisense.optics.scene.surfaces import Surface, SurfaceKind
 from optisense.optics.transport.camera_paths import find_visible_points
 from optisense.optics.transport.emission_guide import uniform_guide
-from optisense.optics.transport.photons import SURFACE_SHIFT, trace_photons
+from optisense.optics.transport.photon_map import SURFACE_SHIFT
+from optisense.optics.transport.photons import Emission, trace_photons
 
 PHOTONS = 400_000
 POWER = 1000.0
@@ -50,10 +51,7 @@ class Landings:
         count = len(emitters)
         found = trace_photons(
             RayScene(pieces),
-            table.table(),
-            uniform_guide(count),
-            photons // count,
-            1,
+            Emission(table.table(), uniform_guide(count), photons // count, 1),
             coloured=False,
         )
         n = found.count

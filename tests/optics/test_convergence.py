@@ -10,6 +10,7 @@ from optisense.optics.camera.projection import RayCamera
 from optisense.optics.imaging.sppm import render_sppm
 from optisense.optics.scene.emitters import Emitter, EmitterShape
 from optisense.optics.transport.emission_guide import uniform_guide
+from optisense.optics.transport.photons import Emission
 
 SLOPE = (-0.85, -0.42)
 """Of log error over log photons at a fixed radius: -1/2 for random points, steeper for evenly
@@ -45,9 +46,13 @@ def closed_form(where: ReferenceScene) -> np.ndarray:
 
 def single_pass(where: ReferenceScene, photons: int, radius: float, seed: int) -> np.ndarray:
     result = render_sppm(
-        where.ray_scene(), where.table(), uniform_guide(1), where.camera, 1, photons, seed,
-        coloured=False, radius=radius,
-    )  # fmt: skip
+        where.ray_scene(),
+        Emission(where.table(), uniform_guide(1), photons, seed),
+        where.camera,
+        1,
+        coloured=False,
+        radius=radius,
+    )
     return result.layers[0, ..., 0].astype(float)
 
 

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from optisense.optics.scene.bsdf import CoatingBsdf, coating_of, evaluate_coating
 from optisense.optics.transport.camera_paths import VisiblePoints
-from optisense.optics.transport.photons import GROUP_MASK, PhotonMap
+from optisense.optics.transport.photon_map import GROUP_MASK, PhotonMap
 
 MIN_COSINE = 0.03
 """Lower bound on the cosine of incidence that a photon's power is divided by, so that an isolated

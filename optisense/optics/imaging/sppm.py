@@ -9,7 +9,7 @@ slower than the radiance cache and is what that is checked against.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import drjit as dr
 import mitsuba as mi
@@ -19,11 +19,9 @@ from numpy.typing import NDArray
 from optisense.optics.camera.projection import RayCamera
 from optisense.optics.imaging.density_estimation import build_grid, gather_pairwise
 from optisense.optics.imaging.film import Film
-from optisense.optics.scene.emitters import EmitterTable
 from optisense.optics.scene.ray_scene import RayScene
 from optisense.optics.transport.camera_paths import film_samples, find_visible_points
-from optisense.optics.transport.emission_guide import EmissionGuide
-from optisense.optics.transport.photons import trace_photons
+from optisense.optics.transport.photons import Emission, trace_photons
 
 FIRST_RADIUS = 0.3
 """Gather radius (mm) of the first pass."""
@@ -43,20 +41,26 @@ class SppmResult:
 
 def render_sppm(
     scene: RayScene,
-    table: EmitterTable,
-    guide: EmissionGuide,
+    emission: Emission,
     camera: RayCamera,
     passes: int,
-    per_light: int,
-    seed: int,
     *,
     coloured: bool,
     radius: float = FIRST_RADIUS,
     stop: Callable[[int], bool] | None = None,
 ) -> SppmResult:
-    """Average ``passes`` passes of ``per_light`` photons from each light; ``stop(done)`` may
-    end earlier.
+    """Average several passes.
+
+    Args:
+        scene: the surfaces, contacts included.
+        emission: the photons of the first pass; the others go on with its sequence.
+        camera: its pixels.
+        passes: number of passes.
+        coloured: whether surfaces are coloured.
+        radius: gather radius (mm) of the first pass.
+        stop: called with the number of passes done; tracing ends early if it returns True.
     """
+    table, seed = emission.table, emission.seed
     width, height = camera.width, camera.height
     pixel = dr.arange(mi.UInt32, width * height)
     halves = np.zeros((2, table.groups, height, width, 3), dtype=np.float64)
@@ -66,9 +70,8 @@ def render_sppm(
         sample = dr.opaque(mi.UInt32, number + 1)
         film = film_samples(pixel, width, sample, seed)
         main, reflected = find_visible_points(scene, camera, pixel, sample, film, seed)
-        photons = trace_photons(
-            scene, table, guide, per_light, seed, first=number * per_light, coloured=coloured
-        )
+        sent = replace(emission, first=number * emission.per_light)
+        photons = trace_photons(scene, sent, coloured=coloured)
         reach = radius * (number + 1) ** (-1 / 6)
         grid = build_grid(photons, *scene.bounds, reach)
         image = Film(width * height, table.groups)

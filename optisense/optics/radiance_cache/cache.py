@@ -24,7 +24,7 @@ from optisense.optics.radiance_cache.beams import Beams, collect_beams
 from optisense.optics.radiance_cache.irradiance import irradiance_table
 from optisense.optics.radiance_cache.smoothing import Kernels, smooth
 from optisense.optics.scene.surface_cells import SurfaceCells, bin_axis, cell_at
-from optisense.optics.transport.photons import GROUP_MASK, HALF_SHIFT, PhotonMap
+from optisense.optics.transport.photon_map import GROUP_MASK, HALF_SHIFT, PhotonMap
 from optisense.optics.transport.volume_flux import FluxLayer, layer_cell_at
 
 FloatArray = NDArray[np.floating]

@@ -17,7 +17,7 @@ from optisense.optics.radiance_cache.cache import RadianceCache
 from optisense.optics.radiance_cache.irradiance import irradiance
 from optisense.optics.scene.bsdf import CoatingBsdf, albedo_of, sample_coating
 from optisense.optics.scene.contact_scenes import ContactScenes
-from optisense.optics.scene.ray_scene import RayScene, intersect, leave
+from optisense.optics.scene.ray_scene import Ray, RayScene, leave
 from optisense.optics.scene.surface_cells import SurfaceCells, cell_at
 from optisense.optics.transport.camera_paths import VisiblePoints
 
@@ -66,10 +66,8 @@ def _sample(
         walking = (dr.dot(way, face_normal) > 0) & (dr.max(weight) > 0)
         places = mi.UInt32(0)
         while walking:
-            pressed = intersect(
-                indenters.scene, indenters.rows, indenters.corners, start, way, mi.Bool(True)
-            )
-            skin = intersect(fixed.scene, fixed.rows, fixed.corners, start, way, above)
+            pressed = indenters.intersect(Ray(start, way, mi.Bool(True)))
+            skin = fixed.intersect(Ray(start, way, above))
             on_indenter = pressed.valid & (~skin.valid | (pressed.distance < skin.distance))
             # Light along a line that comes from the skin behind is in the field already.
             behind = fixed.scene.ray_test(mi.Ray3f(start, -way), coherent=False, active=above)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from optisense.optics.backend.arrays import floats
 from optisense.optics.scene.surface_cells import SurfaceCells, cell_at
-from optisense.optics.transport.photons import GROUP_MASK, HALF_SHIFT, PhotonMap
+from optisense.optics.transport.photon_map import GROUP_MASK, HALF_SHIFT, PhotonMap
 
 FloatArray = NDArray[np.floating]
 

@@ -37,7 +37,7 @@ from optisense.optics.scene.bsdf import (
     surface_region,
 )
 from optisense.optics.scene.contact_scenes import ContactScenes
-from optisense.optics.scene.ray_scene import leave
+from optisense.optics.scene.ray_scene import Ray, leave
 from optisense.optics.scene.surface_cells import SurfaceCells, bin_axis, cell_at, plane_of
 from optisense.optics.scene.surfaces import Region
 from optisense.optics.transport.camera_paths import VisiblePoints
@@ -250,7 +250,7 @@ def shade(
         raised = points.valid & (region == int(Region.INDENTER))
         # Behind an indenter, along the line of sight, lies the undeformed surface that the eye
         # would have met.
-        onward = scenes.fixed.intersect(points.point, -points.towards_eye, raised)
+        onward = scenes.fixed.intersect(Ray(points.point, -points.towards_eye, raised))
         base = dr.select(raised & onward.valid, onward.point, points.point)
     seen = active
     cell, shift, active = _interpolating_cell(field.cells, base, seen, points, points.number)

@@ -21,7 +21,12 @@ from optisense.optics.scene.emitters import EmitterTable
 from optisense.optics.scene.ray_scene import Piece, RayScene
 from optisense.optics.scene.surface_cells import SurfaceCells, build_cells, cells_near
 from optisense.optics.transport.emission_guide import EmissionGuide, learn_guide, uniform_guide
-from optisense.optics.transport.photons import TargetCells, trace_photons, trace_pilot
+from optisense.optics.transport.photons import (
+    Emission,
+    TargetCells,
+    trace_photons,
+    trace_pilot,
+)
 from optisense.optics.transport.volume_flux import FluxLayer, flux_layer_above
 
 PASS_PHOTONS = 500_000
@@ -141,10 +146,7 @@ class CacheStore:
             per_light = max(1, PILOT_PHOTONS // lights)
             arrived, landed = trace_pilot(
                 self._scene,
-                self._table,
-                uniform_guide(lights),
-                per_light,
-                seed_of(0, 1),
+                Emission(self._table, uniform_guide(lights), per_light, seed_of(0, 1)),
                 TargetCells(cells, mi.UInt32(near.astype(np.uint32))),
                 self._coloured,
             )
@@ -282,13 +284,15 @@ class CacheStore:
                 tally.add(
                     trace_photons(
                         self._scene,
-                        self._table,
-                        self.guide,
-                        per_light,
-                        seed_of(seed, 2),
-                        first=tally.passes * per_light,
+                        Emission(
+                            self._table,
+                            self.guide,
+                            per_light,
+                            seed_of(seed, 2),
+                            first=tally.passes * per_light,
+                            groups=self.lit,
+                        ),
                         coloured=self._coloured,
-                        groups=self.lit,
                         flux_layer=self._flux_layer,
                     )
                 )

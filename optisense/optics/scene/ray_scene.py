@@ -8,7 +8,7 @@ indenter never changes a compiled kernel.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import drjit as dr
@@ -84,7 +84,24 @@ class Piece:
 
 
 @dataclass
-class Hit:
+class Ray:
+    """Rays on their way.
+
+    Attributes:
+        origin: mm.
+        direction: unit vector.
+        active: which of them are followed.
+        depth: number of surfaces that they have met.
+    """
+
+    origin: mi.Point3f
+    direction: mi.Vector3f
+    active: mi.Bool
+    depth: mi.UInt32 = field(default_factory=lambda: mi.UInt32(0))
+
+
+@dataclass
+class SurfaceHit:
     """Where rays met a surface. ``normal`` is the face normal, ``shading_normal`` the smooth
     one.
     """
@@ -151,47 +168,36 @@ class RayScene:
             start += int(piece.patches.max(initial=-1)) + 1
         return indices(np.concatenate(numbers))
 
-    def intersect(
-        self, origin: mi.Point3f, direction: mi.Vector3f, active: mi.Bool, coherent: bool = False
-    ) -> Hit:
-        """First hit along rays (unit directions), with normals."""
-        return intersect(self.scene, self.rows, self.corners, origin, direction, active, coherent)
+    def intersect(self, ray: Ray, coherent: bool = False) -> SurfaceHit:
+        """First hit along rays, with normals; symbolic loops may call it.
 
-
-def intersect(
-    scene: mi.Scene,
-    rows: mi.Float,
-    corners: mi.Float,
-    origin: mi.Point3f,
-    direction: mi.Vector3f,
-    active: mi.Bool,
-    coherent: bool = False,
-) -> Hit:
-    """First hit of rays with a scene; free function, so that symbolic loops may call it."""
-    found = scene.ray_intersect_preliminary(
-        mi.Ray3f(origin, direction), coherent=coherent, active=active
-    )
-    valid = active & found.is_valid()
-    face = found.prim_index
-    row = dr.gather(mi.Vector4f, rows, face, valid)
-    normal = mi.Vector3f(row.x, row.y, row.z)
-    bits = dr.reinterpret_array(mi.UInt32, row.w)
-    smooth = valid & ((bits & SMOOTH_FACE) != 0)
-    u, v = found.prim_uv.x, found.prim_uv.y
-    n0 = dr.gather(mi.Vector4f, corners, face * 3, smooth)
-    n1 = dr.gather(mi.Vector4f, corners, face * 3 + 1, smooth)
-    n2 = dr.gather(mi.Vector4f, corners, face * 3 + 2, smooth)
-    blended = n0 * (1 - u - v) + n1 * u + n2 * v
-    shading = dr.select(smooth, dr.normalize(mi.Vector3f(blended.x, blended.y, blended.z)), normal)
-    return Hit(
-        valid=valid,
-        distance=found.t,
-        point=mi.Point3f(origin + direction * found.t),
-        normal=normal,
-        shading_normal=shading,
-        surface=bits & (SMOOTH_FACE - 1),
-        face=face,
-    )
+        Args:
+            ray: the rays.
+            coherent: whether those of neighbouring lanes are alike, which saves time.
+        """
+        origin, direction = ray.origin, ray.direction
+        found = self.scene.ray_intersect_preliminary(
+            mi.Ray3f(origin, direction), coherent=coherent, active=ray.active
+        )
+        valid = ray.active & found.is_valid()
+        face = found.prim_index
+        row = dr.gather(mi.Vector4f, self.rows, face, valid)
+        normal = mi.Vector3f(row.x, row.y, row.z)
+        bits = dr.reinterpret_array(mi.UInt32, row.w)
+        smooth = valid & ((bits & SMOOTH_FACE) != 0)
+        u, v = found.prim_uv.x, found.prim_uv.y
+        corners = [dr.gather(mi.Vector4f, self.corners, face * 3 + k, smooth) for k in range(3)]
+        blended = corners[0] * (1 - u - v) + corners[1] * u + corners[2] * v
+        blended = dr.normalize(mi.Vector3f(blended.x, blended.y, blended.z))
+        return SurfaceHit(
+            valid=valid,
+            distance=found.t,
+            point=mi.Point3f(origin + direction * found.t),
+            normal=normal,
+            shading_normal=dr.select(smooth, blended, normal),
+            surface=bits & (SMOOTH_FACE - 1),
+            face=face,
+        )
 
 
 def leave(point: mi.Point3f, normal: mi.Vector3f, direction: mi.Vector3f) -> mi.Point3f:

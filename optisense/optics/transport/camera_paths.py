@@ -9,41 +9,33 @@ weight.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import drjit as dr
 import mitsuba as mi
 
 from optisense.optics.backend.sequences import sequence_2d
 from optisense.optics.camera.projection import RayCamera
-from optisense.optics.scene.bsdf import (
-    SMOOTH_ALPHA,
-    coating_of,
-    fresnel_metal,
-    grey,
-    refract,
-    sample_rough_interface,
-    surface_kind,
-    surface_light,
-)
-from optisense.optics.scene.ray_scene import RayScene, intersect, leave
-from optisense.optics.scene.surfaces import SurfaceKind
-
-MAX_DEPTH = 24
-"""Largest number of surfaces that a path from the camera meets."""
+from optisense.optics.scene.bsdf import grey, surface_light
+from optisense.optics.scene.ray_scene import Ray, RayScene, leave
+from optisense.optics.transport.interact import LobeSample, Path, interact
 
 
 @dataclass
-class VisiblePoints:
-    """Points of opaque surfaces that the camera sees; one entry a path.
+class PathEnd:
+    """Where paths from the camera end.
 
-    ``weight`` multiplies the radiance that leaves the point along ``towards_eye``; ``light`` is
-    the number + 1 of a light that the path ends on instead (its emission is seen), else 0.
-    ``random`` are random bits of the path's own, ``series`` those of its pixel, and ``number`` that
-    of the sample there: what the samples of a pixel draw from one series is spread evenly.
+    Attributes:
+        valid: whether on an opaque surface.
+        weight: multiplies the radiance that leaves the point along ``towards_eye``.
+        point: mm.
+        normal: the shading normal, on the path's side.
+        face_normal: that of the triangle, on the path's side.
+        towards_eye: unit vector.
+        surface: the surface's number.
+        light: the number + 1 of a light that the path ends on instead (its emission is seen), else
+            0.
     """
 
-    pixel: mi.UInt32
     valid: mi.Bool
     weight: mi.Color3f
     point: mi.Point3f
@@ -52,6 +44,21 @@ class VisiblePoints:
     towards_eye: mi.Vector3f
     surface: mi.UInt32
     light: mi.UInt32
+
+
+@dataclass
+class VisiblePoints(PathEnd):
+    """Points of opaque surfaces that the camera sees; one entry a path.
+
+    Attributes:
+        pixel: the path's pixel.
+        random: random bits of the path's own.
+        series: random bits of its pixel. What the samples of a pixel draw from one series is
+            spread evenly.
+        number: of the sample in its pixel.
+    """
+
+    pixel: mi.UInt32
     random: mi.UInt32
     series: mi.UInt32
     number: mi.UInt32
@@ -59,22 +66,14 @@ class VisiblePoints:
 
 @dr.syntax
 def _follow(
-    scene: mi.Scene,
-    rows: mi.Float,
-    corners: mi.Float,
-    surfaces: mi.Float,
-    origin: mi.Point3f,
-    direction: mi.Vector3f,
-    weight: mi.Color3f,
-    start: mi.Bool,
-    rng: mi.PCG32,
-    split: bool,
-    coherent: bool,
-    rough: bool,
-    max_depth: mi.UInt32,
-) -> tuple[Any, ...]:
-    active = mi.Bool(start)
-    depth = mi.UInt32(0)
+    scene: RayScene, ray: Ray, weight: mi.Color3f, rng: mi.PCG32, path: Path
+) -> tuple[PathEnd, Ray, mi.Color3f]:
+    """Follow paths to their ends.
+
+    Returns:
+        The ends; and, of a path from the camera, one of its reflections at interfaces, drawn in
+        proportion to its weight, and the weight of them all.
+    """
     found = mi.Bool(False)
     light = mi.UInt32(0)
     point = mi.Point3f(0)
@@ -82,80 +81,39 @@ def _follow(
     face_normal = mi.Vector3f(0, 0, 1)
     towards_eye = mi.Vector3f(0, 0, 1)
     surface = mi.UInt32(0)
-    branch_total = mi.Color3f(0)
+    total = mi.Color3f(0)
     branch_origin = mi.Point3f(0)
     branch_direction = mi.Vector3f(0, 0, 1)
-    while active:
-        hit = intersect(scene, rows, corners, origin, direction, active, coherent)
-        kind, eta, alpha = surface_kind(surfaces, hit.surface, hit.valid)
-        active &= hit.valid & (kind != int(SurfaceKind.ABSORBER))
-        is_light = active & (kind == int(SurfaceKind.LIGHT))
-        seen = active & (kind == int(SurfaceKind.OPAQUE))
-        lit = is_light & (dr.dot(direction, hit.normal) < 0)
-        light = dr.select(lit, surface_light(surfaces, hit.surface, lit) + 1, light)
-        side = -dr.sign(dr.dot(direction, hit.normal))
+    while ray.active:
+        sample = None
+        if dr.hint(path.draws or scene.rough, mode="scalar"):
+            sample = LobeSample(rng.next_float32())
+            if dr.hint(scene.rough, mode="scalar"):
+                sample.place = mi.Point2f(rng.next_float32(), rng.next_float32())
+        step = interact(scene, ray, path, sample)
+        hit = step.hit
+        seen = step.opaque
+        ends = seen | step.light
+        lit = step.light & (step.side > 0)
+        light = dr.select(lit, surface_light(scene.table, hit.surface, lit) + 1, light)
         point = dr.select(seen, hit.point, point)
-        normal = dr.select(seen, hit.shading_normal * side, normal)
-        face_normal = dr.select(seen | is_light, hit.normal * side, face_normal)
-        towards_eye = dr.select(seen | is_light, -direction, towards_eye)
+        normal = dr.select(seen, hit.shading_normal * step.side, normal)
+        face_normal = dr.select(ends, hit.normal * step.side, face_normal)
+        towards_eye = dr.select(ends, -ray.direction, towards_eye)
         surface = dr.select(seen, hit.surface, surface)
         found |= seen
-        active &= ~seen & ~is_light
-
-        reflectance, reflected, transmitted, relative = refract(direction, hit.shading_normal, eta)
-        interface = active & (kind == int(SurfaceKind.DIELECTRIC))
-        if dr.hint(split, mode="scalar"):
-            through = reflectance < 1
-            branch = (
-                dr.select(interface & through & (alpha <= SMOOTH_ALPHA), 1.0, 0.0) * reflectance
-            )
-            branch_weight = weight * branch
-            branch_total += branch_weight
-            chosen = (branch > 0) & (rng.next_float32() * grey(branch_total) < grey(branch_weight))
-            branch_origin = dr.select(
-                chosen, leave(hit.point, hit.normal, reflected), branch_origin
-            )
-            branch_direction = dr.select(chosen, reflected, branch_direction)
-            passed = dr.select(through, 1 - reflectance, 1.0)
-        else:
-            through = rng.next_float32() >= reflectance
-            passed = mi.Float(1.0)
-        outgoing = dr.select(through, transmitted, reflected)
-        factor = mi.Color3f(dr.select(through, passed / (relative * relative), passed))
-        if dr.hint(rough, mode="scalar"):
-            pick = rng.next_float32()
-            sample = mi.Point2f(rng.next_float32(), rng.next_float32())
-            if interface & (alpha > SMOOTH_ALPHA):
-                scattered, rough_weight, _through, rough_relative = sample_rough_interface(
-                    direction, hit.shading_normal, eta, alpha, pick, sample
-                )
-                outgoing = scattered
-                factor = mi.Color3f(rough_weight / (rough_relative * rough_relative))
-        mirror = active & (kind == int(SurfaceKind.MIRROR))
-        if mirror:
-            coating = coating_of(surfaces, hit.surface, mirror)
-            facing = hit.shading_normal * side
-            cosine = -dr.dot(direction, facing)
-            outgoing = direction + facing * (2 * cosine)
-            factor = fresnel_metal(dr.abs(cosine), coating.metal_eta, coating.metal_k)
-        weight = dr.select(active, weight * factor, weight)
-        direction = dr.select(active, dr.normalize(outgoing), direction)
-        origin = dr.select(active, leave(hit.point, hit.normal, direction), origin)
-        depth += 1
-        active &= depth < max_depth
-    return (
-        found,
-        weight,
-        point,
-        normal,
-        face_normal,
-        towards_eye,
-        surface,
-        light,
-        branch_total,
-        branch_origin,
-        branch_direction,
-    )
+        if dr.hint(path is Path.CAMERA, mode="scalar"):
+            branch = weight * step.reflection.weight
+            total += branch
+            chosen = dr.max(branch) > 0
+            chosen &= rng.next_float32() * grey(total) < grey(branch)
+            away = step.reflection.direction
+            branch_origin = dr.select(chosen, leave(hit.point, hit.normal, away), branch_origin)
+            branch_direction = dr.select(chosen, away, branch_direction)
+        weight = dr.select(step.goes_on, weight * step.lobe.weight, weight)
+        ray = step.ray
+    end = PathEnd(found, weight, point, normal, face_normal, towards_eye, surface, light)
+    return end, Ray(branch_origin, branch_direction, dr.max(total) > 1e-5), total
 
 
 def film_samples(pixel: mi.UInt32, width: int, sample: mi.UInt32, seed: int) -> mi.Point2f:
@@ -185,48 +143,28 @@ def find_visible_points(
     each path is the same whichever others are traced with it.
     """
     dr.make_opaque(number)  # one kernel for all numbers
-    origin, direction = camera.rays(film.x, film.y)
     stream = mi.sample_tea_32(number, dr.opaque(mi.UInt32, seed))[0]
     own, other = mi.sample_tea_32(pixel, stream)
     series = mi.sample_tea_32(pixel, dr.opaque(mi.UInt32, seed))[1]
-    depth = dr.opaque(mi.UInt32, MAX_DEPTH)
-    tables = (scene.scene, scene.rows, scene.corners, scene.table)
-    start = dr.full(mi.Bool, True, dr.width(film))
-    out = _follow(
-        *tables,
-        origin,
-        direction,
-        mi.Color3f(1),
-        start,
-        _generator(own),
-        True,
-        True,
-        scene.rough,
-        depth,
-    )
-    dr.eval(out, own, other, series)
-    main = VisiblePoints(*(pixel, *out[:8], own, series, number))
-    total, branch_origin, branch_direction = out[8:]
+    start = Ray(*camera.rays(film.x, film.y), dr.full(mi.Bool, True, dr.width(film)))
+    end, branch, total = _follow(scene, start, mi.Color3f(1), _generator(own), Path.CAMERA)
+    dr.eval(end, branch, total, own, other, series)
+    main = VisiblePoints(**vars(end), pixel=pixel, random=own, series=series, number=number)
     if only_main:
         return main, None
-    lanes = dr.compress(dr.max(total) > 1e-5)
+    lanes = dr.compress(branch.active)
     if dr.width(lanes) == 0:
         return main, None
     other, series, number = (dr.gather(mi.UInt32, each, lanes) for each in (other, series, number))
-    branch = _follow(
-        *tables,
-        dr.gather(mi.Point3f, branch_origin, lanes),
-        dr.gather(mi.Vector3f, branch_direction, lanes),
+    end, _, _ = _follow(
+        scene,
+        dr.gather(Ray, branch, lanes),
         dr.gather(mi.Color3f, total, lanes),
-        dr.full(mi.Bool, True, dr.width(lanes)),
         _generator(other),
-        False,
-        False,
-        scene.rough,
-        depth,
+        Path.REFLECTION,
     )
-    dr.eval(branch, other, series, number)
-    kept = dr.compress(branch[0] | (branch[7] > 0))
+    dr.eval(end, other, series, number)
+    kept = dr.compress(end.valid | (end.light > 0))
     if dr.width(kept) == 0:
         return main, None
     alone = dr.width(kept) == 1
@@ -234,11 +172,9 @@ def find_visible_points(
         alone
     ):  # Dr.Jit compiles other kernels for arrays of one entry: add one that counts for nothing
         kept = dr.repeat(kept, 2)
-    picked: list[Any] = [
-        dr.gather(type(value), value, kept) for value in (*branch[:8], other, series, number)
-    ]
-    pixels = dr.gather(mi.UInt32, pixel, dr.gather(mi.UInt32, lanes, kept))
-    reflected = VisiblePoints(pixels, *picked)
+    pixel = dr.gather(mi.UInt32, pixel, lanes)
+    found = VisiblePoints(**vars(end), pixel=pixel, random=other, series=series, number=number)
+    reflected = dr.gather(VisiblePoints, found, kept)
     if alone:
         first = dr.arange(mi.UInt32, 2) == 0
         reflected.valid &= first

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import IntEnum
-from typing import Any, NamedTuple
+from typing import Any
 
 import drjit as dr
 import mitsuba as mi
@@ -14,12 +14,9 @@ from numpy.typing import NDArray
 from optisense.errors import RenderError
 from optisense.optics.backend.arrays import floats
 from optisense.optics.camera.projection import RayCamera
-from optisense.optics.scene.bsdf import refract, surface_kind, surface_region
-from optisense.optics.scene.ray_scene import Hit, RayScene, intersect, leave
-from optisense.optics.scene.surfaces import Region, SurfaceKind
-
-MAX_DEPTH = 32
-"""Largest number of surfaces that a chief ray meets."""
+from optisense.optics.scene.ray_scene import Ray, RayScene
+from optisense.optics.scene.surfaces import Region
+from optisense.optics.transport.interact import Path, interact
 
 HASH_FACTOR = 0x9E3779B1
 """Multiplier that mixes the patches of a ray's path into one number: 2^32 over the golden ratio,
@@ -33,7 +30,7 @@ class RayOutcome(IntEnum):
     ESCAPED = 1  # left the sensor
     ABSORBED = 2  # ended on a blocker, a light, or another opaque surface
     TOTAL_REFLECTION = 3  # was totally reflected on its way and did not reach the surface
-    DEPTH_LIMIT = 4  # still on its way after MAX_DEPTH surfaces
+    DEPTH_LIMIT = 4  # still on its way after `interact.MAX_DEPTH` surfaces
 
 
 @dataclass(frozen=True)
@@ -66,73 +63,8 @@ class ChiefRays:
         return self.hit & (self.region == Region.INDENTER)
 
 
-class Step(NamedTuple):
-    """What chief rays do at the next surface that they meet.
-
-    Attributes:
-        hit: where that is.
-        eta: the surface's relative refractive index.
-        region: of `Region`.
-        arrived: the ray ends on the sensing surface or an indenter.
-        ended: it ends on another opaque surface, a blocker or a light.
-        totally: it is totally reflected.
-        turned: it is reflected, by a mirror or totally; else it is refracted.
-        goes_on: it neither ends nor escapes.
-        origin, direction: of the ray that goes on; unchanged where none does.
-    """
-
-    hit: Hit
-    eta: mi.Float
-    region: mi.UInt32
-    arrived: mi.Bool
-    ended: mi.Bool
-    totally: mi.Bool
-    turned: mi.Bool
-    goes_on: mi.Bool
-    origin: mi.Point3f
-    direction: mi.Vector3f
-
-
-def next_step(
-    scene: mi.Scene,
-    rows: mi.Float,
-    corners: mi.Float,
-    surfaces: mi.Float,
-    origin: mi.Point3f,
-    direction: mi.Vector3f,
-    active: mi.Bool,
-) -> Step:
-    """One surface further, by ideal refraction and reflection; symbolic loops may call it."""
-    hit = intersect(scene, rows, corners, origin, direction, active, True)
-    kind, eta, _alpha = surface_kind(surfaces, hit.surface, hit.valid)
-    region = surface_region(surfaces, hit.surface, hit.valid)
-    opaque = hit.valid & (kind == int(SurfaceKind.OPAQUE))
-    arrived = opaque & (region != int(Region.OTHER))
-    absorbing = (kind == int(SurfaceKind.ABSORBER)) | (kind == int(SurfaceKind.LIGHT))
-    ended = hit.valid & ~arrived & (opaque | absorbing)
-    goes_on = active & hit.valid & ~arrived & ~ended
-    reflectance, reflected, transmitted, _relative = refract(direction, hit.shading_normal, eta)
-    mirror = kind == int(SurfaceKind.MIRROR)
-    totally = goes_on & ~mirror & (reflectance >= 1)
-    turned = goes_on & (mirror | totally)
-    onward = dr.select(goes_on, dr.select(turned, reflected, transmitted), direction)
-    start = dr.select(goes_on, leave(hit.point, hit.normal, onward), origin)
-    return Step(hit, eta, region, arrived, ended, totally, turned, goes_on, start, onward)
-
-
 @dr.syntax
-def _trace(
-    scene: mi.Scene,
-    rows: mi.Float,
-    corners: mi.Float,
-    surfaces: mi.Float,
-    patches: mi.UInt32 | None,
-    origin: mi.Point3f,
-    direction: mi.Vector3f,
-    limit: mi.UInt32,
-) -> tuple[Any, ...]:
-    active = mi.Bool(True)
-    depth = mi.UInt32(0)
+def _trace(scene: RayScene, patches: mi.UInt32 | None, ray: Ray) -> tuple[Any, ...]:
     outcome = mi.UInt32(int(RayOutcome.DEPTH_LIMIT))
     total = mi.Bool(False)
     point = mi.Point3f(0)
@@ -140,29 +72,25 @@ def _trace(
     region = mi.UInt32(0)
     face = mi.UInt32(0)
     path = mi.UInt32(0)
-    while active:
-        step = next_step(scene, rows, corners, surfaces, origin, direction, active)
+    while ray.active:
+        step = interact(scene, ray, Path.CHIEF)
         hit = step.hit
-        outcome = dr.select(active & ~hit.valid, int(RayOutcome.ESCAPED), outcome)
+        outcome = dr.select(ray.active & ~hit.valid, int(RayOutcome.ESCAPED), outcome)
         outcome = dr.select(step.ended, int(RayOutcome.ABSORBED), outcome)
-        outcome = dr.select(step.arrived, int(RayOutcome.HIT), outcome)
-        side = -dr.sign(dr.dot(direction, hit.normal))
-        point = dr.select(step.arrived, hit.point, point)
-        normal = dr.select(step.arrived, hit.shading_normal * side, normal)
-        region = dr.select(step.arrived, step.region, region)
-        face = dr.select(step.arrived, hit.face, face)
+        outcome = dr.select(step.sensed, int(RayOutcome.HIT), outcome)
+        point = dr.select(step.sensed, hit.point, point)
+        normal = dr.select(step.sensed, hit.shading_normal * step.side, normal)
+        region = dr.select(step.sensed, step.region, region)
+        face = dr.select(step.sensed, hit.face, face)
         if patches is not None:
             patch = dr.gather(mi.UInt32, patches, hit.face, hit.valid)
             code = patch * 2 + dr.select(step.totally, mi.UInt32(1), mi.UInt32(0))
             path = dr.select(hit.valid, (path ^ code) * HASH_FACTOR + 1, path)
         total |= step.totally
-        origin = step.origin
-        direction = step.direction
-        depth += 1
-        active = step.goes_on & (depth < limit)
+        ray = step.ray
     failed = total & (outcome != int(RayOutcome.HIT))
     outcome = dr.select(failed, int(RayOutcome.TOTAL_REFLECTION), outcome)
-    return outcome, point, normal, direction, region, face, path
+    return outcome, point, normal, ray.direction, region, face, path
 
 
 def trace_path_codes(
@@ -179,17 +107,7 @@ def trace_path_codes(
     Returns:
         (k,): 0 for rays that do not arrive at the sensing surface, and never 0 for the others.
     """
-    origin, direction = camera.rays(floats(x), floats(y))
-    traced = _trace(
-        scene.scene,
-        scene.rows,
-        scene.corners,
-        scene.table,
-        scene.patches,
-        origin,
-        direction,
-        dr.opaque(mi.UInt32, MAX_DEPTH),
-    )
+    traced = _trace(scene, scene.patches, Ray(*camera.rays(floats(x), floats(y)), mi.Bool(True)))
     outcome, path = traced[0], traced[-1]
     codes = dr.select(outcome == int(RayOutcome.HIT), path | 1, 0)
     return np.asarray(codes).astype(np.uint32)
@@ -207,16 +125,8 @@ def trace_chief_rays(
     index = dr.arange(mi.UInt32, camera.width * camera.height)
     x = mi.Float(index % camera.width) + 0.5
     y = mi.Float(index // camera.width) + 0.5
-    origin, direction = camera.rays(x, y)
     outcome, point, normal, arriving, region, face, _path = _trace(
-        scene.scene,
-        scene.rows,
-        scene.corners,
-        scene.table,
-        None,
-        origin,
-        direction,
-        dr.opaque(mi.UInt32, MAX_DEPTH),
+        scene, None, Ray(*camera.rays(x, y), mi.Bool(True))
     )
     incidence = -dr.dot(arriving, normal)
     if sensing_faces is None:

@@ -22,8 +22,9 @@ from numpy.typing import NDArray
 
 from optisense.optics.backend.arrays import floats
 from optisense.optics.camera.projection import RayCamera
-from optisense.optics.scene.ray_scene import RayScene
-from optisense.optics.transport.chief_rays import MAX_DEPTH, next_step, trace_path_codes
+from optisense.optics.scene.ray_scene import Ray, RayScene
+from optisense.optics.transport.chief_rays import trace_path_codes
+from optisense.optics.transport.interact import Path, interact
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -106,17 +107,15 @@ class Stop:
 def walk(scene: RayScene, origin: mi.Point3f, direction: mi.Vector3f) -> list[Stop]:
     """All surfaces that rays meet one after the other, without derivatives."""
     stops = []
-    origin, direction = dr.detach(origin), dr.detach(direction)
     active = dr.full(mi.Bool, True, dr.width(direction))
-    for _ in range(MAX_DEPTH):
-        step = next_step(
-            scene.scene, scene.rows, scene.corners, scene.table, origin, direction, active
-        )
+    ray = Ray(dr.detach(origin), dr.detach(direction), active)
+    while dr.any(ray.active):
+        step = interact(scene, ray, Path.CHIEF)
         hit = step.hit
         bent = hit.shading_normal != hit.normal
         stop = Stop(
-            origin,
-            direction,
+            ray.origin,
+            ray.direction,
             hit.distance,
             hit.face,
             hit.valid & (bent.x | bent.y | bent.z),
@@ -124,14 +123,12 @@ def walk(scene: RayScene, origin: mi.Point3f, direction: mi.Vector3f) -> list[St
             step.turned,
             step.totally,
             hit.valid,
-            step.arrived,
-            step.goes_on,
+            step.sensed,
+            step.ray.active,
         )
-        dr.eval(stop.__dict__, step.origin, step.direction)
+        dr.eval(stop.__dict__, step.ray)
         stops.append(stop)
-        origin, direction, active = step.origin, step.direction, step.goes_on
-        if not dr.any(active):
-            break
+        ray = step.ray
     return stops
 
 

@@ -148,9 +148,8 @@ class DifferentiableRays:
         )
         # A ray that is turned back takes no part in refraction, whose root has no slope there.
         relative = dr.select(stop.turned | ~stop.goes_on, 1.0, stop.eta)
-        _, _, transmitted, _ = refract(direction, shading, relative)
-        reflected = direction - shading * (2 * dr.dot(direction, shading))
-        onward = dr.select(stop.turned, dr.normalize(reflected), transmitted)
+        _, reflected, transmitted, _ = refract(direction, shading, relative)
+        onward = dr.select(stop.turned, reflected, transmitted)
         start = leave(point, dr.detach(normal), dr.detach(onward))
         return (
             point,

@@ -15,7 +15,7 @@ import mitsuba as mi
 import numpy as np
 
 from optisense.optics.backend.arrays import floats
-from optisense.optics.scene.ray_scene import Hit
+from optisense.optics.scene.ray_scene import Ray, SurfaceHit
 from optisense.optics.scene.surface_cells import SurfaceCells, cell_at, plane_of
 
 LAYER_HEIGHT = 1.0
@@ -70,9 +70,8 @@ def layer_cell_at(
 
 def sample_segment(
     flux_layer: FluxLayer,
-    hit: Hit,
-    origin: mi.Point3f,
-    direction: mi.Vector3f,
+    ray: Ray,
+    hit: SurfaceHit,
     chance: mi.Float,
     piece: mi.UInt32,
     landing: mi.Bool,
@@ -85,9 +84,8 @@ def sample_segment(
 
     Args:
         flux_layer: the layer.
-        hit: where the segment ends.
-        origin: its start.
-        direction: its unit direction.
+        ray: the segment's start and direction.
+        hit: where it ends.
         chance: even over 0..1, one for all pieces of a segment.
         piece: the number of the piece.
         landing: whether the segment ends on an opaque surface.
@@ -98,7 +96,7 @@ def sample_segment(
         of incidence; and whether the place is in the layer.
     """
     end = dr.select(hit.valid, hit.distance, MAX_SEGMENT_LENGTH)
-    cosine = dr.maximum(dr.abs(dr.dot(direction, hit.normal)), MIN_COSINE)
+    cosine = dr.maximum(dr.abs(dr.dot(ray.direction, hit.normal)), MIN_COSINE)
     tail = dr.select(
         landing, dr.minimum(TAIL_HEIGHTS * LAYER_HEIGHT / cosine, end * 0.5), end * 0.5
     )
@@ -106,6 +104,6 @@ def sample_segment(
     length = dr.select(last, tail, end - tail) * (2 / SAMPLES_PER_SEGMENT)
     first = dr.select(last, end - tail, 0) + length * mi.Float(piece % (SAMPLES_PER_SEGMENT // 2))
     place = chance + mi.Float(piece) * GOLDEN_RATIO_FRACTION
-    spot = origin + direction * (first + length * (place - dr.floor(place)))
+    spot = ray.origin + ray.direction * (first + length * (place - dr.floor(place)))
     _, _, inside = layer_cell_at(flux_layer, mi.Point3f(spot), mi.Bool(True))
     return mi.Point3f(spot), LAYER_HEIGHT / length, inside

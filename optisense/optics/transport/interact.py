@@ -1,0 +1,210 @@
+"""A ray meets a surface: the one place where light goes on from one surface to the next.
+
+Photons, paths from the camera, chief rays, drawn rays and their derivatives differ in what they
+carry and in which lobe they follow; where they are refracted, reflected or scattered to, with what
+weight, and when they are given up, is said here.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from enum import Enum
+
+import drjit as dr
+import mitsuba as mi
+
+from optisense.optics.scene.bsdf import (
+    SMOOTH_ALPHA,
+    coating_of,
+    fresnel_metal,
+    refract,
+    sample_coating,
+    sample_rough_interface,
+    surface_kind,
+    surface_region,
+)
+from optisense.optics.scene.ray_scene import Ray, RayScene, SurfaceHit, leave
+from optisense.optics.scene.surfaces import Region, SurfaceKind
+
+MAX_DEPTH = 64
+"""Largest number of surfaces that any ray meets. In GelSight-like sensors less than 0.1 % of the
+photons' light gets so far."""
+
+
+class Path(Enum):
+    """What a ray is, and so what it carries and which lobe it follows."""
+
+    PHOTON = 0  # carries power; a lobe is drawn, and opaque surfaces scatter
+    CAMERA = 1  # carries radiance; goes through every interface that is not totally reflecting
+    REFLECTION = 2  # carries radiance; at interfaces a lobe is drawn
+    CHIEF = 3  # carries nothing; as from the camera, and every interface is smooth to it
+
+    @property
+    def draws(self) -> bool:
+        """Whether the lobe of a smooth interface is drawn in proportion to its reflectance."""
+        return self in (Path.PHOTON, Path.REFLECTION)
+
+    @property
+    def scatters(self) -> bool:
+        """Whether rays go on from opaque surfaces; others end there."""
+        return self is Path.PHOTON
+
+    @property
+    def carries_radiance(self) -> bool:
+        """Whether weights count radiance, which changes with the square of the index."""
+        return self in (Path.CAMERA, Path.REFLECTION)
+
+    @property
+    def is_coherent(self) -> bool:
+        """Whether rays of neighbouring lanes are alike, which the ray tracer makes use of."""
+        return self in (Path.CAMERA, Path.CHIEF)
+
+
+@dataclass
+class LobeSample:
+    """Random numbers, 0 to 1: which lobe, and where in it."""
+
+    pick: mi.Float = field(default_factory=lambda: mi.Float(0))
+    place: mi.Point2f = field(default_factory=lambda: mi.Point2f(0))
+
+
+@dataclass
+class Lobe:
+    """A unit direction in which light leaves a surface, and its weight there."""
+
+    direction: mi.Vector3f
+    weight: mi.Color3f
+
+
+@dataclass
+class Interaction:
+    """What a ray does at the next surface that it meets.
+
+    Attributes:
+        hit: where that is.
+        side: 1 where the ray comes from the side that the face normal points to, else -1.
+        eta: the index behind the face normal over the index before it.
+        region: of `Region`.
+        opaque: the surface is opaque.
+        light: it is the emitting face of a light.
+        scattered: the ray goes on from an opaque surface or a mirror.
+        sensed: it is the sensing surface or an indenter.
+        ended: the ray ends on anything else: a blocker, a light, another opaque surface.
+        goes_on: the ray neither ends nor escapes.
+        totally: it is totally reflected.
+        turned: it is reflected, by a mirror or at an interface.
+        lobe: the lobe that it follows.
+        reflection: what a smooth interface reflects beside the light that the ray goes on with;
+            of weight 0 where there is none.
+        ray: the ray that goes on; inactive where none does, or where it has met `MAX_DEPTH`
+            surfaces, and otherwise unchanged where none does.
+    """
+
+    hit: SurfaceHit
+    side: mi.Float
+    eta: mi.Float
+    region: mi.UInt32
+    opaque: mi.Bool
+    light: mi.Bool
+    scattered: mi.Bool
+    sensed: mi.Bool
+    ended: mi.Bool
+    goes_on: mi.Bool
+    totally: mi.Bool
+    turned: mi.Bool
+    lobe: Lobe
+    reflection: Lobe
+    ray: Ray
+
+
+@dr.syntax
+def interact(
+    scene: RayScene, ray: Ray, path: Path, sample: LobeSample | None = None
+) -> Interaction:
+    """Follow rays to the next surface, and on from there; symbolic loops may call it.
+
+    Args:
+        scene: the surfaces.
+        ray: the rays.
+        path: what they are.
+        sample: random numbers; not needed by chief rays, nor from the camera in smooth scenes.
+    """
+    drawn = LobeSample() if sample is None else sample
+    hit = scene.intersect(ray, path.is_coherent)
+    side = -dr.sign(dr.dot(ray.direction, hit.normal))
+    kind, eta, alpha = surface_kind(scene.table, hit.surface, hit.valid)
+    region = surface_region(scene.table, hit.surface, hit.valid)
+    interface = hit.valid & (kind == int(SurfaceKind.DIELECTRIC))
+    mirror = hit.valid & (kind == int(SurfaceKind.MIRROR))
+    opaque = hit.valid & (kind == int(SurfaceKind.OPAQUE))
+    sensed = opaque & (region != int(Region.OTHER))
+    scattered = mirror
+    goes_on = interface | mirror
+    if dr.hint(path.scatters, mode="scalar"):
+        scattered = mirror | opaque
+        goes_on = goes_on | opaque
+
+    reflectance, reflected, transmitted, relative = refract(ray.direction, hit.shading_normal, eta)
+    totally = interface & (reflectance >= 1)
+    if dr.hint(path.draws, mode="scalar"):
+        through = drawn.pick >= reflectance
+        passed = mi.Float(1)
+        beside = mi.Float(0)
+    else:
+        through = reflectance < 1
+        passed = dr.select(through, 1 - reflectance, 1)
+        beside = dr.select(interface & through & (alpha <= SMOOTH_ALPHA), reflectance, 0)
+    turned = goes_on & (mirror | ~through)
+    outgoing = dr.select(turned, reflected, transmitted)
+    weight = mi.Color3f(1)
+    if dr.hint(path.carries_radiance, mode="scalar"):
+        weight = mi.Color3f(dr.select(through, passed / (relative * relative), passed))
+    if dr.hint(scene.rough and path is not Path.CHIEF, mode="scalar"):  # noqa: SIM102
+        if interface & (alpha > SMOOTH_ALPHA):
+            outgoing, kept, _through, ratio = sample_rough_interface(
+                ray.direction, hit.shading_normal, eta, alpha, drawn.pick, drawn.place
+            )
+            if dr.hint(path.carries_radiance, mode="scalar"):
+                kept = kept / (ratio * ratio)
+            weight = mi.Color3f(kept)
+    if dr.hint(path is not Path.CHIEF, mode="scalar"):  # noqa: SIM102
+        if scattered:
+            coating = coating_of(scene.table, hit.surface, scattered)
+            cosine = dr.abs(dr.dot(ray.direction, hit.shading_normal))
+            weight = fresnel_metal(cosine, coating.metal_eta, coating.metal_k)
+            if dr.hint(path.scatters, mode="scalar"):
+                spread, albedo = sample_coating(
+                    coating,
+                    hit.shading_normal * side,
+                    ray.direction,
+                    drawn.pick * 0.999999,
+                    drawn.place,
+                )
+                weight = dr.select(mirror, weight, albedo)
+                outgoing = dr.select(mirror, outgoing, spread)
+
+    direction = dr.normalize(outgoing)
+    depth = ray.depth + 1
+    onward = Ray(
+        origin=dr.select(goes_on, leave(hit.point, hit.normal, direction), ray.origin),
+        direction=dr.select(goes_on, direction, ray.direction),
+        active=goes_on & (depth < MAX_DEPTH),
+        depth=depth,
+    )
+    return Interaction(
+        hit=hit,
+        side=side,
+        eta=eta,
+        region=region,
+        opaque=opaque,
+        light=hit.valid & (kind == int(SurfaceKind.LIGHT)),
+        scattered=scattered,
+        sensed=sensed,
+        ended=hit.valid & ~sensed & ~goes_on,
+        goes_on=goes_on,
+        totally=totally,
+        turned=turned,
+        lobe=Lobe(direction, weight),
+        reflection=Lobe(reflected, mi.Color3f(beside)),
+        ray=onward,
+    )

@@ -1,0 +1,90 @@
+"""Rays of every kind obey the same laws at a surface, and are given up after the same number."""
+
+from __future__ import annotations
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+import pytest
+from reference_scenes import diffuse_coating, quad
+
+from optisense.optics.scene.ray_scene import Ray, RayScene
+from optisense.optics.scene.surfaces import Surface, SurfaceKind
+from optisense.optics.transport.interact import MAX_DEPTH, Interaction, LobeSample, Path, interact
+
+SINE = 0.6
+INDEX = 1.5
+RAYS = 4096
+SILVER = Surface(SurfaceKind.MIRROR, metal_eta=(0.1,) * 3, metal_k=(4.0,) * 3)
+
+
+def wide(surface: Surface, z: float = 0.0) -> RayScene:
+    """A square of 100 mm whose normal points to +z."""
+    corners = [(-50, -50, z), (50, -50, z), (50, 50, z), (-50, 50, z)]
+    return RayScene([quad("wide", corners, surface)])
+
+
+def slanting(depth: int = 0) -> Ray:
+    """Rays from above that meet the origin."""
+    cosine = float(np.sqrt(1 - SINE**2))
+    origin = mi.Point3f(-SINE, 0, cosine) + dr.zeros(mi.Point3f, RAYS)
+    direction = mi.Vector3f(SINE, 0, -cosine) + dr.zeros(mi.Vector3f, RAYS)
+    return Ray(origin, direction, dr.full(mi.Bool, True, RAYS), dr.full(mi.UInt32, depth, RAYS))
+
+
+def met(surface: Surface, path: Path, depth: int = 0) -> Interaction:
+    even = (dr.arange(mi.Float, RAYS) + 0.5) / RAYS
+    place = mi.Point2f(0.5, 0.5) + dr.zeros(mi.Point2f, RAYS)
+    step = interact(wide(surface), slanting(depth), path, LobeSample(even, place))
+    dr.eval(step)
+    return step
+
+
+@pytest.mark.parametrize("path", Path)
+def test_refraction_follows_snell_and_fresnel(path: Path) -> None:
+    step = met(Surface(SurfaceKind.DIELECTRIC, eta=INDEX), path)
+    turned = np.asarray(step.turned).astype(bool)
+    way = np.asarray(step.ray.direction).T
+    cos_i, cos_t = np.sqrt(1 - SINE**2), np.sqrt(1 - (SINE / INDEX) ** 2)
+    assert np.allclose(way[~turned], (SINE / INDEX, 0, -cos_t), atol=1e-6)
+    assert np.allclose(way[turned], (SINE, 0, cos_i), atol=1e-6)
+    across = (cos_i - INDEX * cos_t) / (cos_i + INDEX * cos_t)
+    along = (INDEX * cos_i - cos_t) / (INDEX * cos_i + cos_t)
+    reflectance = (across**2 + along**2) / 2
+    weight = np.asarray(step.lobe.weight)[0]
+    if path.draws:
+        assert turned.mean() == pytest.approx(reflectance, abs=1 / RAYS)
+    else:
+        assert not turned.any()
+    if path is Path.PHOTON:  # power is shared out by the draw
+        assert np.allclose(weight, 1)
+    if path is Path.CAMERA:  # radiance in the denser medium is larger by the square of the index
+        assert np.allclose(weight, (1 - reflectance) / INDEX**2, rtol=1e-5)
+        assert np.allclose(np.asarray(step.reflection.weight), reflectance, rtol=1e-5)
+
+
+@pytest.mark.parametrize("path", Path)
+def test_mirrors_reflect_to_the_same_place_with_the_same_weight(path: Path) -> None:
+    step = met(SILVER, path)
+    cosine = np.sqrt(1 - SINE**2)
+    assert np.allclose(np.asarray(step.ray.direction).T, (SINE, 0, cosine), atol=1e-6)
+    assert (np.asarray(step.ray.origin)[2] > 0).all()
+    if path is not Path.CHIEF:
+        expected = met(SILVER, Path.PHOTON).lobe.weight
+        assert np.array_equal(np.asarray(step.lobe.weight), np.asarray(expected))
+        assert 0.9 < float(step.lobe.weight[0][0]) < 1
+
+
+@pytest.mark.parametrize("path", Path)
+def test_only_photons_go_on_from_opaque_surfaces(path: Path) -> None:
+    step = met(diffuse_coating(0.5), path)
+    assert dr.all(step.sensed)
+    assert dr.all(step.ray.active == (path is Path.PHOTON))
+    if path is Path.PHOTON:
+        assert np.allclose(np.asarray(step.lobe.weight), 0.5)
+
+
+@pytest.mark.parametrize("path", Path)
+def test_every_ray_is_given_up_after_the_same_number_of_surfaces(path: Path) -> None:
+    assert dr.all(met(SILVER, path, MAX_DEPTH - 2).ray.active)
+    assert not dr.any(met(SILVER, path, MAX_DEPTH - 1).ray.active)
