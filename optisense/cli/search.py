@@ -125,7 +125,11 @@ def search(
         ),
     ] = None,
     may_cross: Annotated[
-        bool, typer.Option("--may-cross", help="Let parts cut through one another.")
+        bool,
+        typer.Option(
+            "--may-cross",
+            help="Let parts cut through one another, and leave those on which they rest.",
+        ),
     ] = False,
     error: Annotated[
         list[str] | None,

@@ -88,6 +88,27 @@ def fold_problems(design: SensorDesign) -> list[Diagnostic]:
     return problems
 
 
+def contact_problems(design: SensorDesign) -> list[Diagnostic]:
+    """Bent parts that have come off a part they lay on, or cut into a transparent part that they
+    kept clear of; of `cage_problems` those that a search asks for at every point.
+
+    Raises:
+        DesignError: a vertex of a caged part lies outside the cage's box.
+    """
+    moved = {name: cage for name, cage in design.cages.items() if _has_moved(cage)}
+    bent = design.deformed_meshes() if moved else {}
+    problems: list[Diagnostic] = []
+    for cage_name, cage in moved.items():
+        for name in cage.parts:
+            for other in set(bent) - set(cage.parts) if name in bent else ():
+                solids = all(
+                    design.parts[each].role in TRANSPARENT_SOLIDS for each in (name, other)
+                )
+                if solids or len(resting_on(design.meshes[name], design.meshes[other])):
+                    problems += _meetings(design, cage_name, name, other, bent)
+    return problems
+
+
 def half_caged(design: SensorDesign, meshes: Meshes) -> list[Diagnostic]:
     """Warnings of cages around a sensing surface without the solid that it coats, or around that
     solid alone: to bend one is to tear the two apart. A cage that has moved is left to

@@ -20,13 +20,17 @@ from optisense.geometry.rays import ray_hits
 from optisense.geometry.surface import closest_points
 
 WIDEST_PERSPECTIVE = 135.0
-"""Degrees from corner to corner: the widest lens on sale that keeps straight lines straight is
-Venus Optics' Laowa 9 mm f/5.6, with 135 degrees. At 179 degrees a pixel at the edge of the picture
-would get less than a hundred-millionth of the light of one in the middle (the fourth power of the
+"""Degrees from corner to corner of the widest lens that keeps straight lines straight. Goerz's
+Hypergon of 1900 has 130 (H. H. Nasse, "Distagon, Biogon and Hologon", Carl Zeiss 2011). A 9 mm lens
+for 24 x 36 mm, the shortest on sale (Venus Optics' Laowa 9 mm f/5.6; assumed, as its data sheet was
+not at hand), has 2 atan(21.6 / 9) = 135. At 179 degrees a pixel at the edge of the picture would
+get less than a hundred-millionth of the light of one in the middle (the fourth power of the
 cosine)."""
 
 WIDEST_FISHEYE = 280.0
-"""Degrees across the image: the widest fisheye for small cameras is Entaniya's M12 280."""
+"""Degrees across the image of the widest fisheye. C-4 Optics' 4.9 mm f/3.5 has 270 (Lensrentals,
+"Assembling the C-4 Optics 4.9mm f3.5 Hyperfisheye Prototype", 2019). Entaniya's M12 280, a lens for
+small cameras, has 280 by its name (assumed, as its data sheet was not at hand)."""
 
 NARROWEST = 1.0
 """Degrees across the image. A sensing surface as wide as a fingertip, 17 mm, fills one degree from
@@ -34,8 +38,9 @@ NARROWEST = 1.0
 which has no angle, is a pinhole so far away."""
 
 SMALLEST_CAMERA = 0.65
-"""mm: width of the smallest camera module on sale, OmniVision's OVM6948 (0.65 x 0.65 x 1.158
-mm)."""
+"""mm: width of the smallest camera module on sale, OmniVision's OVM6948 of 0.65 x 0.65 x 1.158 mm
+("OmniVision has created the world's smallest commercially available image sensor", DPReview
+2019)."""
 
 LEAST_SKIN = 0.25
 """Share of the sensing surface's area that the camera should see; no objective scores less. The

@@ -92,7 +92,11 @@ def touching(mesh: TriangleMesh, vertices: NDArray[np.int64], other: TriangleMes
     Returns:
         (k,) mm; infinite where it is more than `CONTACT`.
     """
-    points = mesh.vertices[vertices]
+    return near_surface(mesh.vertices[vertices], other)
+
+
+def near_surface(points: FloatArray, other: TriangleMesh) -> FloatArray:
+    """(k,) mm, how far points (k, 3) are from a mesh; infinite where it is more than `CONTACT`."""
     result = np.full(len(points), np.inf)
     if len(points) == 0:
         return result

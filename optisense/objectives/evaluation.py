@@ -13,6 +13,8 @@ from numpy.typing import NDArray
 
 from optisense.design import SensorDesign
 from optisense.design.camera_checks import camera_fault
+from optisense.design.material_checks import index_problems
+from optisense.design.problems import Diagnostic
 from optisense.errors import ObjectiveError, OptiSenseError
 from optisense.geometry import Contact, SensingSurface, Sphere, locate
 from optisense.objectives.press import Press
@@ -104,17 +106,22 @@ class Evaluation:
         """One chief ray a pixel of `ray_resolution`, of the untouched sensor."""
         return self._once("chief rays", lambda: self.model.chief_rays(self.ray_resolution))
 
-    def check_camera(self) -> None:
-        """Make sure that there can be such a camera.
+    def check_possible(self) -> None:
+        """Make sure that there can be such a camera and such materials.
 
         Raises:
-            ObjectiveError: it is inside a part, or no lens has its field of view.
+            ObjectiveError: the camera is inside a part, no lens has its field of view, or no
+                material has the refractive index of a part.
         """
-        fault = self._once(
-            "camera", lambda: camera_fault(self.design, self.design.deformed_meshes())
-        )
+        fault = self._once("faults", self._fault)
         if fault is not None:
             raise ObjectiveError(fault.message, hint=fault.hint)
+
+    def _fault(self) -> Diagnostic | None:
+        materials = index_problems(self.design)
+        if materials:
+            return materials[0]
+        return camera_fault(self.design, self.design.deformed_meshes())
 
     @property
     def view(self) -> View:

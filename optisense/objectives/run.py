@@ -107,7 +107,7 @@ def run_objective(
 
     try:
         if isinstance(evaluation, Evaluation):  # others are made from one with the same camera
-            evaluation.check_camera()
+            evaluation.check_possible()
         result = objective(evaluation, **(settings or {}))
         value, parts, arrays, draw = _read(result)
         low, high = objective.bounds(settings)

@@ -71,7 +71,7 @@ def search(
         settings: of the objectives, as of `optisense.evaluate`.
         errors: of making: P10 over manufactured sensors is maximised instead of the plain score.
         samples: manufactured sensors a trial.
-        apart: whether parts must not cut through one another.
+        apart: whether parts must not cut through one another, nor leave those on which they rest.
         variant: of the renderer: "auto", "llvm" or "cuda".
         progress: called now and then.
 

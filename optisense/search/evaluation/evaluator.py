@@ -20,7 +20,9 @@ from optisense.objectives.registry import resolve
 from optisense.objectives.run import split_settings
 from optisense.search.evaluation.models import RAYS_ONLY, ModelKeeper
 from optisense.search.evaluation.outcome import Outcome
+from optisense.search.space.buildable import BentPartsRest, LightsRest, PartsRest, SolidsStay
 from optisense.search.space.constraints import Constraint, PartsApart, Unfolded, why_forbidden
+from optisense.search.space.rigid_moves import PartShift, PartTurn
 from optisense.search.space.search_space import BoundSpace
 
 FloatArray = NDArray[np.float64]
@@ -50,6 +52,7 @@ class DesignEvaluator:
         goals: objectives by name, `Objective`s, or functions of the design.
         settings: of the objectives (see `optisense.evaluate`).
         constraints: designs that they forbid are not scored.
+        kept: what a point of the space must keep of the design; manufacturing errors may not.
         renders: whether the renderer is needed at all.
         variant: of the renderer.
     """
@@ -61,6 +64,7 @@ class DesignEvaluator:
         settings: Mapping[str, Any] | None = None,
         *,
         apart: bool | None = None,
+        keeps: bool = True,
         variant: str = "auto",
     ) -> None:
         """Check the goals.
@@ -69,8 +73,10 @@ class DesignEvaluator:
             space: a bound space.
             goals: one or more; the first is what single-goal methods search for.
             settings: of the objectives.
-            apart: whether parts must not cut through one another; only looked at where surfaces
-                move, which is also the default.
+            apart: whether parts must not cut through one another, nor leave those that they rest
+                on; only looked at where surfaces move, which is also the default.
+            keeps: whether points must keep what the design begins with, see `kept`; not where the
+                space is one of manufacturing errors.
             variant: of the renderer.
 
         Raises:
@@ -97,6 +103,9 @@ class DesignEvaluator:
             self.constraints.append(PartsApart(space.design))
         if any(name.startswith("cages.") for name in space.names):
             self.constraints.append(Unfolded(space.design))
+        self.kept: list[Constraint] = []
+        if keeps:
+            self._keep(apart is None or apart)
         rays_only = set(self.names) <= RAYS_ONLY | set(self._functions)
         self.keeper = ModelKeeper(space.prepared, lit=not rays_only, variant=variant)
         self._resolved: list[Objective] | None = None
@@ -112,17 +121,26 @@ class DesignEvaluator:
             design = self.space.apply(vector)
         except OptiSenseError as error:
             return self.failed(str(error), began)
-        return self.judge(design, seed)
+        return self.judge(design, seed, self.kept)
 
-    def judge(self, design: SensorDesign, seed: int) -> Outcome:
+    def lost(self, design: SensorDesign) -> str | None:
+        """What a point's design has not kept of the design that the search starts from, or None."""
+        return why_forbidden(design, self.kept)
+
+    def judge(self, design: SensorDesign, seed: int, further: Sequence[Constraint] = ()) -> Outcome:
         """The outcome of any design: a point of the space, or one with manufacturing errors.
+
+        Args:
+            design: the design.
+            seed: of the objectives.
+            further: constraints beside those for any design.
 
         Raises:
             SetupError: the renderer can't run on this machine.
         """
         began = time.perf_counter()
         try:
-            reason = why_forbidden(design, self.constraints)
+            reason = why_forbidden(design, [*self.constraints, *further])
             if reason is not None:
                 return self.failed(reason, began)
             scores, parts, failures = self._score(design, seed)
@@ -168,6 +186,16 @@ class DesignEvaluator:
                     failures.append(f"{name}: {score.failure}" if len(found) > 1 else score.failure)
         return scores, parts, failures
 
+    def _keep(self, apart: bool) -> None:
+        """Look at what the design begins with, as far as the space may change it."""
+        design, names, moved = self.space.design, self.space.names, moved_parts(self.space)
+        if apart and moved:
+            self.kept += [PartsRest(design, moved), LightsRest(design, moved)]
+        if apart and any(name.startswith("cages.") for name in names):
+            self.kept.append(BentPartsRest(design))
+        if any(name.startswith("materials.") for name in names):
+            self.kept.append(SolidsStay(design))
+
     def _ready(self) -> list[Objective]:
         """The objectives; a user's file is run once a process and not once a trial."""
         if self._resolved is None:
@@ -186,6 +214,12 @@ class DesignEvaluator:
             raise SearchError("the seed belongs to the study", hint="Give it as --seed")
         shared, _ = split_settings(self.settings, self._ready())
         Settings(**shared)
+
+
+def moved_parts(space: BoundSpace) -> set[str]:
+    """The parts that the parameters of a space shift or turn."""
+    variables = (parameter.variable for parameter in space.parameters)
+    return {each.name for each in variables if isinstance(each, PartShift | PartTurn)}
 
 
 def goal_name(goal: Goal) -> str:

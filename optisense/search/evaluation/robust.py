@@ -55,9 +55,12 @@ class RobustEvaluator:
         began = time.perf_counter()
         try:
             design = self.usual.space.apply(vector)
+            reason = self.usual.lost(design)
             bound = self.errors.bind(design)
         except OptiSenseError as error:
             return self.usual.failed(str(error), began)
+        if reason is not None:
+            return self.usual.failed(reason, began)
         found = []
         for errors in self._errors(bound):
             try:

@@ -41,7 +41,9 @@ class PartsApart:
     def __call__(self, design: SensorDesign) -> str | None:
         """Which two parts cut through each other, or None."""
         meshes = design.deformed_meshes()
-        moved = {name for name, mesh in meshes.items() if not _same(mesh, self._meshes.get(name))}
+        moved = {
+            name for name, mesh in meshes.items() if not same_shape(mesh, self._meshes.get(name))
+        }
         for one, other in self._pairs:
             if one not in meshes or other not in meshes or not moved & {one, other}:
                 continue
@@ -163,7 +165,8 @@ def _crossing(one: TriangleMesh, other: TriangleMesh) -> NDArray[np.float64] | N
     return found.places[0] if len(found.places) else None
 
 
-def _same(mesh: TriangleMesh, before: TriangleMesh | None) -> bool:
+def same_shape(mesh: TriangleMesh, before: TriangleMesh | None) -> bool:
+    """Whether a mesh has the vertices that it had before, where it was there."""
     if before is None or mesh.vertices.shape != before.vertices.shape:
         return False
     return mesh is before or bool(np.array_equal(mesh.vertices, before.vertices))

@@ -38,7 +38,7 @@ class StudySettings:
         budget: trials that the method plans for.
         seed: of the method and of all trials.
         settings: of the objectives.
-        apart: whether parts must not cut through one another.
+        apart: whether parts must not cut through one another, nor leave those on which they rest.
         rules: constraints as FILE.py:FUNCTION, or "function:NAME".
         files: the SHA-256 of each user's file that objectives and rules come from, by path.
         errors: of making, where P10 is searched; as of `ManufacturingErrors.to_plain`.

@@ -184,7 +184,7 @@ def tolerance(
         making = errors if isinstance(errors, ManufacturingErrors) else ManufacturingErrors(errors)
     bound = making.bind(design)
     goals: list[Goal] = list(objective) if isinstance(objective, list | tuple) else [objective]  # type: ignore[list-item]
-    evaluator = DesignEvaluator(bound.space, goals, settings, variant=variant)
+    evaluator = DesignEvaluator(bound.space, goals, settings, keeps=False, variant=variant)
     count = 1 if len(making.sources) == 1 else 1 + len(making.sources)
     rows = max(LEAST_ROWS, round(sensors / count))
     points = bound.points(paired_errors(bound, rows, seed))

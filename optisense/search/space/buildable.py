@@ -1,0 +1,234 @@
+"""What a point of a search must keep of the design that the search starts from, so that somebody
+could build it: parts that rest on one another, lights on their boards, and what is solid.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from itertools import combinations
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from optisense.design import Role, SensorDesign
+from optisense.design.cage_checks import contact_problems
+from optisense.design.material_checks import is_gas
+from optisense.design.materials import Dielectric
+from optisense.geometry import TriangleMesh
+from optisense.geometry.coincidence import find_coincident
+from optisense.geometry.meeting import CONTACT, near_surface
+from optisense.geometry.surface import closest_points
+from optisense.search.space.constraints import same_shape
+
+STILL_RESTS = 0.99
+"""Share of the area on which two parts lay on one another that they must keep. A hundredth is left
+for what is lost by rounding at curved faces, and by errors as small as those of manufacturing."""
+
+SEAT_POINTS = 400
+"""So many points of each of two parts tell whether they still lie on one another: four are a
+hundredth."""
+
+FEW = 16
+"""Fewer points that touch are an edge or a corner, on which no part rests."""
+
+PLASTIC = (0.7548776662466927, 0.5698402909980532)
+"""The inverse of the plastic number and its square: steps of the R2 sequence, which spreads points
+evenly over a square (Roberts, "The unreasonable effectiveness of quasirandom sequences", 2018)."""
+
+LIGHT_SEAT = 0.1
+"""mm: a light that is no farther from an opaque part sits on it. Lights of the built-in sensors are
+0.01 mm off their boards, and 0.2 mm or more off the transparent parts into which they shine."""
+
+
+class PartsRest:
+    """Parts that rest on one another must go on doing so where a search shifts or turns them.
+
+    A gel that has slipped off its tray, or a coating that has left its gel, can't be built as it
+    is drawn. Parts that are moved together keep their contact, and a plate may slide on a larger
+    one.
+    """
+
+    def __init__(self, design: SensorDesign, moved: Collection[str]) -> None:
+        """Look at the design that the search starts from.
+
+        Args:
+            design: the design.
+            moved: names of the parts that are shifted or turned.
+        """
+        self._meshes = design.deformed_meshes()
+        self._pairs = [
+            pair
+            for pair in combinations(self._meshes, 2)
+            if set(pair) & set(moved)
+            and not any(design.parts[name].role is Role.INDENTER for name in pair)
+        ]
+        self._seats: dict[tuple[str, str], tuple[Seat, Seat]] = {}
+
+    def __call__(self, design: SensorDesign) -> str | None:
+        """Which two parts have come apart, or None."""
+        meshes = design.deformed_meshes()
+        for one, other in self._pairs:
+            if one not in meshes or other not in meshes:
+                continue
+            if all(same_shape(meshes[name], self._meshes[name]) for name in (one, other)):
+                continue
+            first, second = self._seat(one, other)
+            if len(first.faces) < FEW and len(second.faces) < FEW:
+                continue
+            kept = first.kept(meshes[one], meshes[other])
+            if kept < STILL_RESTS:
+                kept = max(kept, second.kept(meshes[other], meshes[one]))
+            if kept < STILL_RESTS:
+                return (
+                    f"parts '{one}' and '{other}' lie on one another in the design that the search "
+                    f"starts from, and here over {100 * kept:.0f} % of that area"
+                )
+        return None
+
+    def _seat(self, one: str, other: str) -> tuple[Seat, Seat]:
+        if (one, other) not in self._seats:
+            first, second = self._meshes[one], self._meshes[other]
+            pairs = find_coincident(first, second, CONTACT, facing=False).pairs
+            self._seats[one, other] = (
+                Seat.of(first, np.unique(pairs[:, 0]), second),
+                Seat.of(second, np.unique(pairs[:, 1]), first),
+            )
+        return self._seats[one, other]
+
+
+class Seat(NamedTuple):
+    """Points of one part that touch another one.
+
+    Attributes:
+        faces: (k,) the faces of the part that they lie on.
+        shares: (k, 3) barycentric coordinates on these.
+    """
+
+    faces: NDArray[np.int64]
+    shares: NDArray[np.float64]
+
+    @staticmethod
+    def of(mesh: TriangleMesh, faces: NDArray[np.int64], other: TriangleMesh) -> Seat:
+        """Points spread evenly over some faces of a mesh, as far as they touch another one."""
+        reached = np.cumsum(mesh.face_areas[faces])
+        if len(faces) == 0 or reached[-1] <= 0.0:
+            return Seat(np.zeros(0, dtype=np.int64), np.zeros((0, 3)))
+        number = np.arange(SEAT_POINTS) + 0.5
+        chosen = faces[np.searchsorted(reached, reached[-1] * number / SEAT_POINTS)]
+        u, v = np.outer(PLASTIC, number) % 1.0
+        u, v = np.where(u + v > 1.0, 1.0 - u, u), np.where(u + v > 1.0, 1.0 - v, v)
+        seat = Seat(chosen, np.stack([1.0 - u - v, u, v], axis=1))
+        touch = np.isfinite(near_surface(seat.points(mesh), other))
+        return Seat(seat.faces[touch], seat.shares[touch])
+
+    def points(self, mesh: TriangleMesh) -> NDArray[np.float64]:
+        """(k, 3) mm, where the points are on the part in its present shape."""
+        found: NDArray[np.float64] = np.einsum(
+            "kc,kci->ki", self.shares, mesh.triangles[self.faces]
+        )
+        return found
+
+    def kept(self, mesh: TriangleMesh, other: TriangleMesh) -> float:
+        """Share of the points that still touch the other part; 0 where there are too few."""
+        if len(self.faces) < FEW:
+            return 0.0
+        return float(np.isfinite(near_surface(self.points(mesh), other)).mean())
+
+
+class LightsRest:
+    """Lights that sit on an opaque part must stay on it where a search shifts or turns the part.
+
+    A board that has left its lights would leave them hanging in the air.
+    """
+
+    def __init__(self, design: SensorDesign, moved: Collection[str]) -> None:
+        """Look at the design that the search starts from.
+
+        Args:
+            design: the design.
+            moved: names of the parts that are shifted or turned.
+        """
+        meshes = design.deformed_meshes()
+        opaque = (Role.BLOCKER, Role.MIRROR)
+        self._carried = {
+            part: [
+                (group, index)
+                for group, lights in design.lights.items()
+                for index in range(len(lights.lights))
+                if _off(design, group, index, meshes[part]) <= LIGHT_SEAT
+            ]
+            for part in moved
+            if part in meshes and design.parts[part].role in opaque
+        }
+
+    def __call__(self, design: SensorDesign) -> str | None:
+        """Which light has lost its part, or None."""
+        meshes = design.deformed_meshes()
+        for part, lights in self._carried.items():
+            for group, index in lights:
+                if part not in meshes or group not in design.lights:
+                    continue
+                off = _off(design, group, index, meshes[part])
+                if off > 2.0 * LIGHT_SEAT:
+                    return (
+                        f"light {index} of group '{group}' sits on part '{part}' in the design "
+                        f"that the search starts from, and here it is {off:.2g} mm off"
+                    )
+        return None
+
+
+class BentPartsRest:
+    """What a cage bends must stay on the parts outside of the cage on which it lies, and must not
+    grow into transparent ones.
+
+    A design whose cage has done so from the beginning is left alone.
+    """
+
+    def __init__(self, design: SensorDesign) -> None:
+        """Look at the design that the search starts from."""
+        self._always = {problem.where for problem in contact_problems(design)}
+
+    def __call__(self, design: SensorDesign) -> str | None:
+        """Which part has come off another, or grown into it, or None."""
+        for problem in contact_problems(design):
+            if problem.where not in self._always:
+                return problem.message
+        return None
+
+
+class SolidsStay:
+    """A solid or liquid may not become a gas by its refractive index, nor a film of air a solid.
+
+    To a search that varies an index, air is a plate that has vanished. Another material that the
+    search may choose is left alone.
+    """
+
+    def __init__(self, design: SensorDesign) -> None:
+        """Look at the design that the search starts from."""
+        self._gases = {
+            name: is_gas(material)
+            for name, material in design.materials.items()
+            if isinstance(material, Dielectric)
+        }
+
+    def __call__(self, design: SensorDesign) -> str | None:
+        """Which material has changed its state, or None."""
+        for name, was_gas in self._gases.items():
+            material = design.materials.get(name)
+            if isinstance(material, Dielectric) and is_gas(material) != was_gas:
+                now, before = ("a solid", "air") if was_gas else ("air", "a solid")
+                return (
+                    f"with a refractive index of {material.ior:g} material '{name}' is {now}, and "
+                    f"in the design that the search starts from it is {before}"
+                )
+        return None
+
+
+def _off(design: SensorDesign, group: str, index: int, mesh: TriangleMesh) -> float:
+    """mm from a light to a mesh; 0 for a light that is no longer there."""
+    lights = design.lights[group].lights
+    if index >= len(lights):
+        return 0.0
+    place = np.array(lights[index].position)
+    return float(np.linalg.norm(closest_points(mesh, place) - place, axis=1).min())

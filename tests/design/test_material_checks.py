@@ -1,0 +1,59 @@
+"""Refractive indices that no transparent material has."""
+
+from __future__ import annotations
+
+import pytest
+
+import optisense as ots
+from optisense import library, sensors
+from optisense.design import SensorDesign, check_design, set_value
+from optisense.design.material_checks import index_problems
+from optisense.design.materials import Dielectric
+
+
+@pytest.fixture(scope="module")
+def mini() -> SensorDesign:
+    return sensors.gelsight_mini()
+
+
+@pytest.mark.parametrize("name", sensors.registry.BUILDERS)
+def test_materials_of_the_built_in_sensors_are_fine(name: str) -> None:
+    assert index_problems(sensors.load(name)) == []
+
+
+@pytest.mark.parametrize("name", library.names("material"))
+def test_materials_of_the_library_are_fine(mini: SensorDesign, name: str) -> None:
+    """Every transparent one serves as a plate."""
+    material = library.material(name)
+    if isinstance(material, Dielectric):
+        assert index_problems(set_value(mini, "materials.acrylic.ior", material.ior)) == []
+
+
+@pytest.mark.parametrize(
+    ("material", "ior", "said"),
+    [
+        ("silicone-xp565", 4.0, "no clear elastomer has a refractive index of 4"),
+        ("silicone-xp565", 1.7, "no clear elastomer has a refractive index of 1.7"),
+        ("silicone-xp565", 1.62, None),
+        ("silicone-xp565", 1.2, "no clear elastomer has a refractive index of 1.2"),
+        ("silicone-xp565", 1.0, None),  # a membrane filled with air
+        ("acrylic", 4.0, "no transparent solid has a refractive index of 4"),
+        ("acrylic", 2.0, None),
+        ("acrylic", 1.1, "no transparent solid has a refractive index of 1.1"),
+        ("acrylic", 1.0, None),  # a film of air
+    ],
+)
+def test_indices(mini: SensorDesign, material: str, ior: float, said: str | None) -> None:
+    design = set_value(mini, f"materials.{material}.ior", ior)
+    errors = [problem for problem in check_design(design) if problem.severity == "error"]
+    if said is None:
+        assert errors == []
+    else:
+        (problem,) = errors
+        assert said in problem.message and problem.where == f"materials.{material}.ior"
+
+
+def test_a_sensor_of_an_impossible_material_has_no_score(mini: SensorDesign) -> None:
+    design = set_value(mini, "materials.silicone-xp565.ior", 4.0)
+    score = ots.evaluate(ots.OpticalModel(design), "aoap", ray_resolution=(40, 30))
+    assert "refractive index of 4" in str(score.failure)
