@@ -100,7 +100,7 @@ def tolerance(
 
         def show(done: int, count: int, left: float, doing: str) -> None:
             last[:] = [(done, left / max(1, count - done))]
-            line.show(_what(done), done, count, left, [doing] if doing else [])
+            line.show(*what(done, count), left, [doing] if doing else [])
 
         found = find_tolerance(
             sensor,
@@ -133,11 +133,16 @@ def tolerance(
         raise typer.Exit(EXIT_INTERRUPTED)
 
 
-def _what(done: int) -> str:
-    """What is being scored: first the design itself, with several seeds, then sensors."""
-    from optisense.search.tolerance.analysis import NOISE_SEEDS
+def what(done: int, count: int) -> tuple[str, int, int]:
+    """What is being scored, how many of it are done and of how many.
 
-    return "scoring the design itself" if done <= NOISE_SEEDS else "scoring sensors"
+    The scores of the design itself come first, and are not counted as sensors.
+    """
+    from optisense.search.tolerance.analysis import OWN_SCORES
+
+    if done < OWN_SCORES:
+        return "scoring the design itself", done, OWN_SCORES
+    return "scoring sensors", done - OWN_SCORES, count - OWN_SCORES
 
 
 def _waits(last: list[tuple[int, float]]) -> str:

@@ -11,6 +11,7 @@ from rich.console import Console
 
 from optisense.cli import progress
 from optisense.cli.progress import ProgressLine, about, duration, progress_line
+from optisense.design import SensorDesign
 from optisense.search import SearchProgress
 from optisense.time_left import TimedStep
 
@@ -143,3 +144,23 @@ def test_on_a_terminal_one_line_is_drawn_and_goes(monkeypatch: pytest.MonkeyPatc
 def test_times_in_words(seconds: float, words: str) -> None:
     assert about(seconds) == words
     assert duration(3725.0) == "1:02:05"
+
+
+def test_the_bar_of_a_tolerance_counts_the_sensors_that_its_page_tells_of() -> None:
+    from optisense.cli.tolerance import what
+    from optisense.search.tolerance.analysis import tolerance
+    from optisense.sensors import load
+
+    def flux(design: SensorDesign) -> float:
+        return design.lights["red"].flux
+
+    told: list[tuple[str, int, int]] = []
+    found = tolerance(
+        load("gelsight-mini"),
+        flux,
+        {"lights.red.flux": 0.1, "lights.blue.flux": 0.1},
+        sensors=30,
+        progress=lambda done, count, left, doing: told.append(what(done, count)),
+    )
+    assert told[0] == ("scoring the design itself", 0, 4)
+    assert told[-1] == ("scoring sensors", found.sensors, found.sensors)

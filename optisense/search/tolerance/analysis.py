@@ -42,6 +42,9 @@ LEAST_ROWS = 8
 NOISE_SEEDS = 3
 """Seeds with which the design as it is is scored again, to tell noise from tolerance."""
 
+OWN_SCORES = 1 + NOISE_SEEDS
+"""Scores of the design as it is, which come before those of manufactured sensors."""
+
 PERCENTILES = {"p10": LOW, "p50": MIDDLE, "p90": HIGH}
 
 POSITION, ANGLE, SPECULARITY, CAGE_POINT, INDEX = 0.1, 2.0, 0.05, 0.05, 0.005
@@ -51,7 +54,6 @@ Assumptions for a sensor that is built by hand: LEDs soldered to a board that is
 mould, silicone and resin of another batch."""
 
 ToleranceCallback = Callable[[int, int, float, str], None]
-"""Called with the scored sensors, their total, the seconds left and what is being done."""
 """Called with the number of finished scores, of all, the seconds left (NaN if unknown), and with
 what the score at hand is at, where it is worked out in this process."""
 
@@ -193,7 +195,7 @@ def tolerance(
     jobs += [(point, seed) for point in points.reshape(-1, bound.size)]
     with _runner(evaluator, workers, told) as runner:
         found, interrupted = _work(runner, jobs, progress or (lambda done, of, left, doing: None))
-    itself, again, tried = found[:1], found[1 : 1 + NOISE_SEEDS], found[1 + NOISE_SEEDS :]
+    itself, again, tried = found[:1], found[1:OWN_SCORES], found[OWN_SCORES:]
     whole = len([each for each in tried if each is not None]) // count
     if itself[0] is None:
         raise KeyboardInterrupt
