@@ -132,6 +132,8 @@ def warm(session: Session, fields: Warm, job: Job) -> dict[str, Any]:
 @handles("simulate", Simulate, Lane.RENDER)
 def simulate(session: Session, fields: Simulate, job: Job) -> dict[str, Any]:
     """A tactile image, or a draft of one."""
+    from optisense.report.camera_rays import CameraRays
+
     files = session.files(fields, job.id)
     design = design_of(session, fields, job)
     contacts = contacts_of(fields.contacts)
@@ -161,7 +163,15 @@ def simulate(session: Session, fields: Simulate, job: Job) -> dict[str, Any]:
     name = name_of(fields, job.id)
     indenters = {} if fields.draft else _indenters(model, contacts)
     hidden = unseen(indenters.values(), image.points, image.contact_mask) if indenters else []
-    kept = KeptImage(image, design, contacts, indenters, exposure, fields.draft)
+    kept = KeptImage(
+        image=image,
+        design=design,
+        contacts=contacts,
+        indenters=indenters,
+        exposure=exposure,
+        draft=fields.draft,
+        rays=None if fields.draft else CameraRays.of(model),
+    )
     written = write_image(image, exposure, fields.files, files)
     session.images.keep(name, kept)
     return {
@@ -212,6 +222,7 @@ def report(session: Session, fields: Report, job: Job) -> dict[str, Any]:
         kept.contacts,
         exposure=kept.exposure,
         indenters=kept.indenters,
+        rays=kept.rays,
     )
     return {"file": str(path)}
 

@@ -20,6 +20,7 @@ from optisense.geometry import Contact, TriangleMesh
 if TYPE_CHECKING:
     from optisense.optics import OpticalModel, TactileImage
     from optisense.optics.drafts import DraftModel
+    from optisense.report.camera_rays import CameraRays
 
 MOST_IMAGES = 6
 DRAFTS = 1
@@ -27,7 +28,17 @@ DRAFTS = 1
 
 @dataclass(frozen=True)
 class KeptImage:
-    """An image with what it was made of."""
+    """An image with what it was made of.
+
+    Attributes:
+        image: the layers of the image.
+        design: the sensor.
+        contacts: what presses into it.
+        indenters: the placed meshes of the contacts, by name.
+        exposure: of the picture, a factor on the radiance.
+        draft: whether it is a draft.
+        rays: chief rays to draw in the report; None for a draft.
+    """
 
     image: TactileImage
     design: SensorDesign
@@ -35,6 +46,7 @@ class KeptImage:
     indenters: Mapping[str, TriangleMesh]
     exposure: float
     draft: bool
+    rays: CameraRays | None = None
 
 
 class Images:

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import base64
+import json
+import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -9,6 +12,10 @@ from typing import Any
 import numpy as np
 import pytest
 from comparing import same_light
+
+from optisense import sensors
+from optisense.optics import OpticalModel
+from optisense.report.camera_rays import CameraRays
 
 PHOTONS = 200_000
 PRESS = ["sphere:1.5@0,0:0.6"]
@@ -66,7 +73,17 @@ def test_relighting_equals_rendering_anew(engine: Any, first: dict[str, Any]) ->
 
 def test_a_page_of_an_image(engine: Any, first: dict[str, Any], tmp_path: Path) -> None:
     page = engine.ask("report", image=first["image"], file=str(tmp_path / "page.html"))["file"]
-    assert "gelsight-mini" in Path(page).read_text(encoding="utf-8")
+    text = Path(page).read_text(encoding="utf-8")
+    assert "gelsight-mini" in text
+    # Its 3-D view shows the same chief rays as a page that `optisense render` writes.
+    scene = re.search(r'id="scene-data">(.*?)</script>', text, re.DOTALL)
+    assert scene is not None
+    drawn = json.loads(scene[1])["rays"]
+    rays = CameraRays.of(OpticalModel(sensors.load("gelsight-mini"))).segments()
+    assert len(rays["seen"])
+    for name, ends in rays.items():
+        shown = np.frombuffer(base64.b64decode(drawn[name]), dtype="<f4").reshape(-1, 3)
+        np.testing.assert_allclose(shown, ends, atol=1e-4)
 
 
 def test_a_moved_light_changes_the_picture(engine: Any, first: dict[str, Any]) -> None:
