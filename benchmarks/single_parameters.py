@@ -38,8 +38,7 @@ from optisense.search.evaluation.evaluator import DesignEvaluator
 from optisense.search.space.search_space import SearchSpace
 from optisense.search.study.best import best_of, tied
 from optisense.search.study.trial import Trial
-from optisense.sensors import load
-from optisense.sensors.registry import BUILDERS
+from optisense.sensors import SENSORS, load
 from optisense.writing import write_text
 
 OBJECTIVES = ("aoap", "2to3pw")
@@ -249,13 +248,13 @@ def main() -> None:
     """Search, keep what was found, and draw."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.single_parameters")
     parser.add_argument("folder", type=Path)
-    parser.add_argument("--sensor", choices=tuple(BUILDERS), action="append")
+    parser.add_argument("--sensor", choices=SENSORS.names(), action="append")
     options = parser.parse_args()
     options.folder.mkdir(parents=True, exist_ok=True)
     file = options.folder / "searches.json"
     kept: dict[str, Any] = json.loads(file.read_text(encoding="utf-8")) if file.is_file() else {}
     console = Console()
-    for name in options.sensor or BUILDERS:
+    for name in options.sensor or SENSORS.names():
         search_each(name, kept, options.folder, console)
         draw_sheets(name, kept, options.folder)
 

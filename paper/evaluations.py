@@ -19,7 +19,7 @@ from optisense.design import SensorDesign, set_value
 from optisense.geometry import Contact, parse_contact
 from optisense.objectives import Evaluation, Score, Settings, evaluate
 from optisense.search.evaluation.models import RAYS_ONLY, ModelKeeper
-from optisense.sensors import BUILDERS
+from optisense.sensors import SENSORS
 from paper.unit import Found
 
 if TYPE_CHECKING:
@@ -248,7 +248,7 @@ def coloured(design: SensorDesign, groups: Sequence[str], letters: str) -> Senso
 
 
 def _base(plain: Plain) -> SensorDesign:
-    builder: Callable[..., SensorDesign] = BUILDERS[plain["sensor"]]
+    builder: Callable[..., SensorDesign] = SENSORS.find(plain["sensor"])
     return builder(**tuples(plain["dimensions"]))
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from optisense.design.near import suggestion
+from optisense.near import suggestion
 from paper import (
     gelbelt_lights,
     gelsight360,

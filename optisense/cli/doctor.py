@@ -128,7 +128,7 @@ def _library() -> Finding:
     except (OptiSenseError, OSError) as error:
         return Finding("library", "bad", str(error), "Install the package again")
     text = ", ".join(f"{count} {kind}s" for kind, count in counts.items())
-    return Finding("library", "good", f"{text}, {len(sensors.BUILDERS)} sensors")
+    return Finding("library", "good", f"{text}, {len(sensors.SENSORS.names())} sensors")
 
 
 def _kernel_cache() -> Finding:

@@ -84,7 +84,7 @@ def show_entry(
         raise typer.BadParameter(f"'{out}' must end in .png", param_hint="--out")
     kinds = [kind for kind in KINDS if name in library.names(kind)]
     if not kinds:
-        from optisense.design.near import suggestion
+        from optisense.near import suggestion
 
         known = [known for kind in KINDS for known in library.names(kind)]
         hint = suggestion(name, known, limit=0) or "See: optisense library list"

@@ -13,10 +13,10 @@ from typing import Any
 
 from pydantic import BaseModel, ValidationError
 
-from optisense.design.near import suggestion
 from optisense.design.problems import design_error
 from optisense.design.sensor_design import SensorDesign, dotted
 from optisense.errors import DesignError
+from optisense.near import suggestion
 
 _STEP = re.compile(r"(?:^|\.)(?P<name>[A-Za-z0-9_][A-Za-z0-9_-]*)|\[(?P<index>\d{1,9})\]")
 _LETTERS = {"x": 0, "y": 1, "z": 2, "r": 0, "g": 1, "b": 2}

@@ -11,12 +11,12 @@ from numpy.typing import ArrayLike, NDArray
 from pydantic import ValidationError
 
 from optisense.design.cage import MAX_POINTS, MOST_ALONG, Cage, Share, as_array, as_points
-from optisense.design.near import suggestion
 from optisense.design.problems import design_error
 from optisense.design.sensor_design import SensorDesign
 from optisense.errors import DesignError
 from optisense.geometry.cage import cage_points
 from optisense.geometry.cage_map import refined_points
+from optisense.near import suggestion
 
 Resolution = tuple[int, int, int]
 Shape = Literal["points", "c_min", "c_max"]

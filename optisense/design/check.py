@@ -13,13 +13,13 @@ from optisense.design.cage_checks import cage_problems, half_caged
 from optisense.design.camera_checks import lens_problems, place_problems, view_problems
 from optisense.design.limits import unit_slips
 from optisense.design.material_checks import index_problems
-from optisense.design.near import suggestion
 from optisense.design.parts import TRANSPARENT_SOLIDS, Role
 from optisense.design.problems import Diagnostic
 from optisense.design.sensor_design import SensorDesign
 from optisense.errors import DesignError, MeshError, OptiSenseError
 from optisense.geometry import TriangleMesh
 from optisense.geometry.containment import inside
+from optisense.near import suggestion
 
 __all__ = ["check_design", "inside"]
 

@@ -13,8 +13,8 @@ from pydantic import GetCoreSchemaHandler, GetJsonSchemaHandler, PrivateAttr
 from pydantic_core import CoreSchema, PydanticKnownError, core_schema
 
 from optisense.design.fields import IN_FOLDER, Model
-from optisense.design.near import suggestion
 from optisense.errors import LibraryError, SetupError
+from optisense.near import suggestion
 
 
 class Kinds:

@@ -10,9 +10,9 @@ from pydantic import BaseModel, ValidationError
 
 from optisense.design.fields import MisfitError
 from optisense.design.kinds import KindModel
-from optisense.design.near import near_match, suggestion
 from optisense.design.sensor_design import SensorDesign, dotted
 from optisense.errors import DesignError
+from optisense.near import near_match, suggestion
 
 MAX_SHOWN = 8
 

@@ -15,10 +15,10 @@ from optisense.design.camera import Camera
 from optisense.design.fields import MisfitError, Model, Name
 from optisense.design.lights import LightGroup
 from optisense.design.materials import Coating, Material
-from optisense.design.near import suggestion
 from optisense.design.parts import Part, Role
 from optisense.errors import DesignError
 from optisense.geometry import TriangleMesh
+from optisense.near import suggestion
 from optisense.text import to_html
 
 SCHEMA_VERSION = 1

@@ -9,7 +9,6 @@ from typing import Any
 from pydantic import ValidationError
 
 from optisense.design.limits import unit_slips
-from optisense.design.near import near_match
 from optisense.design.parts import TRANSPARENT_SOLIDS
 from optisense.design.problems import design_error, raise_problems
 from optisense.design.sensor_design import SCHEMA_VERSION, SensorDesign
@@ -18,6 +17,7 @@ from optisense.design.yaml_writer import to_yaml
 from optisense.errors import DesignError, MeshError
 from optisense.folders import begun, held
 from optisense.geometry import TriangleMesh
+from optisense.near import near_match
 from optisense.writing import inside, written_together
 
 DESIGN_FILE = "design.yaml"

@@ -4,24 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
-from typing import Annotated, Any, Literal
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict
 
 from optisense.engine.failures import WrongContactError
 from optisense.errors import ContactError, MeshError, OptiSenseError
-from optisense.geometry import (
-    Contact,
-    Cylinder,
-    Indenter,
-    MeshIndenter,
-    Plane,
-    Sphere,
-    TriangleMesh,
-)
+from optisense.geometry import Contact, TriangleMesh
 from optisense.geometry.contact_text import parse_contact
+from optisense.geometry.indenter_kinds import indenter_from_plain
 
 ROUNDED = 1e-3
 """mm by which a point that a pixel sees may lie beside the mesh that it sees."""
@@ -32,50 +25,14 @@ Place = Callable[[Contact], TriangleMesh]
 """Presses a contact in: `OpticalModel.place`."""
 
 
-class _Given(BaseModel):
-    model_config = ConfigDict(extra="forbid")
+GivenIndenter = dict[str, Any]
+"""An indenter as an object: its kind, and the numbers of the kind by name."""
 
 
-class GivenSphere(_Given):
-    """A ball."""
-
-    kind: Literal["sphere"]
-    radius: float
-
-
-class GivenCylinder(_Given):
-    """A cylinder on its side."""
-
-    kind: Literal["cylinder"]
-    radius: float
-    length: float = 40.0
-    angle: float = 0.0
-
-
-class GivenPlane(_Given):
-    """A plate."""
-
-    kind: Literal["plane"]
-    tilt_x: float = 0.0
-    tilt_y: float = 0.0
-    size: float = 8.0
-
-
-class GivenMesh(_Given):
-    """A mesh file."""
-
-    kind: Literal["mesh"]
-    file: str
-    scale: float = 1.0
-
-
-GivenIndenter = Annotated[
-    GivenSphere | GivenCylinder | GivenPlane | GivenMesh, Field(discriminator="kind")
-]
-
-
-class GivenContact(_Given):
+class GivenContact(BaseModel):
     """A contact as an object."""
+
+    model_config = ConfigDict(extra="forbid")
 
     indenter: GivenIndenter
     at: tuple[float, float] | None = None
@@ -89,21 +46,6 @@ AnyContact = str | GivenContact
 """What stands under `contacts` in a request."""
 
 
-def indenter_of(given: GivenIndenter) -> Indenter:
-    """The indenter.
-
-    Raises:
-        ContactError: a size makes no sense.
-    """
-    if isinstance(given, GivenSphere):
-        return Sphere(given.radius)
-    if isinstance(given, GivenCylinder):
-        return Cylinder(given.radius, given.length, given.angle)
-    if isinstance(given, GivenPlane):
-        return Plane(given.tilt_x, given.tilt_y, given.size)
-    return MeshIndenter(given.file, given.scale)
-
-
 def contact_of(given: AnyContact) -> Contact:
     """The contact.
 
@@ -113,7 +55,7 @@ def contact_of(given: AnyContact) -> Contact:
     if isinstance(given, str):
         return parse_contact(given)
     return Contact(
-        indenter_of(given.indenter),
+        indenter_from_plain(given.indenter),
         at=given.at,
         point=given.point,
         depth=given.depth,

@@ -18,7 +18,6 @@ from optisense.design import (
     set_range,
     settle_cage,
 )
-from optisense.design.near import suggestion
 from optisense.design.parts import TRANSPARENT_SOLIDS
 from optisense.engine.designs import AnyMesh
 from optisense.engine.failures import ProtocolError, problem_row
@@ -31,7 +30,8 @@ from optisense.engine.session import Session
 from optisense.errors import DesignError, MeshError
 from optisense.geometry import TriangleMesh, cage_weights
 from optisense.library import with_own_lights
-from optisense.sensors.registry import BUILDERS
+from optisense.near import suggestion
+from optisense.sensors.registry import SENSORS
 
 SAME_PLACE = 1e-6
 """mm: rounding in a cage at rest."""
@@ -85,7 +85,7 @@ class Export(OfDesign):
 def sensors(session: Session, fields: Fields, job: Job) -> dict[str, Any]:
     """The built-in sensors."""
     rows = []
-    for name in BUILDERS:
+    for name in SENSORS.names():
         job.check()
         rows.append({"name": name, "description": session.designs.read(name).description})
     return {"sensors": rows}

@@ -12,7 +12,6 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from optisense.design import SensorDesign, check_design, load_design, set_value
-from optisense.design.near import near_match
 from optisense.design.parts import TRANSPARENT_SOLIDS, Role
 from optisense.design.problems import Diagnostic, design_error
 from optisense.design.storage import DESIGN_FILE
@@ -20,6 +19,7 @@ from optisense.engine.failures import ProtocolError, UnsoundDesignError, place_i
 from optisense.errors import DesignError, MeshError
 from optisense.geometry import TriangleMesh
 from optisense.library import names
+from optisense.near import near_match
 from optisense.sensors import load
 
 MOST_MESHES = 200

@@ -9,7 +9,6 @@ from optisense.engine.contacts import (
     AnyContact,
     GivenIndenter,
     contacts_of,
-    indenter_of,
     plain_contact,
     telling_which,
 )
@@ -18,6 +17,7 @@ from optisense.engine.rendering import OfDesign, design_of
 from optisense.engine.requests import Lane, handles
 from optisense.engine.session import Session
 from optisense.geometry import locate
+from optisense.geometry.indenter_kinds import indenter_from_plain
 
 
 class Place(OfDesign):
@@ -58,6 +58,6 @@ def place(session: Session, fields: Place, job: Job) -> dict[str, Any]:
 def nine_places(session: Session, fields: NinePlaces, job: Job) -> dict[str, Any]:
     """Nine contacts that cover what the camera sees."""
     model = session.renderer.model(design_of(session, fields, job))
-    found = model.nine_contacts(indenter_of(fields.indenter), fields.depth)
+    found = model.nine_contacts(indenter_from_plain(fields.indenter), fields.depth)
     turned = [replace(contact, rotation=fields.rotation) for contact in found]
     return {"contacts": [plain_contact(contact, fields.indenter) for contact in turned]}

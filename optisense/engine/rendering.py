@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from optisense.design import LightGroup, SensorDesign
-from optisense.design.near import suggestion
 from optisense.engine.contacts import (
     AnyContact,
     contacts_of,
@@ -27,6 +26,7 @@ from optisense.engine.protocol import Fields
 from optisense.engine.requests import Lane, handles
 from optisense.engine.session import KeptImage, Session, name_of
 from optisense.errors import RenderError
+from optisense.near import suggestion
 
 if TYPE_CHECKING:
     from optisense.optics import RenderProgress, TactileImage

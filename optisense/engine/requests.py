@@ -8,11 +8,11 @@ from enum import Enum
 from importlib import import_module
 from typing import Any, TypeVar
 
-from optisense.design.near import suggestion
 from optisense.engine.failures import ProtocolError
 from optisense.engine.jobs import Job
 from optisense.engine.protocol import Fields
 from optisense.engine.session import Session
+from optisense.near import suggestion
 
 Handler = Callable[[Session, Any, Job], dict[str, Any]]
 

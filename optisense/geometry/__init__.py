@@ -3,16 +3,25 @@
 from optisense.geometry.cage import cage_points, cage_weights, deform
 from optisense.geometry.contact import Contact, available_depth, locate, place
 from optisense.geometry.contact_text import parse_contact
-from optisense.geometry.indenters import Cylinder, Indenter, MeshIndenter, Plane, Sphere
+from optisense.geometry.indenter_kinds import (
+    INDENTERS,
+    Indenter,
+    IndenterKind,
+    quantity,
+    register_indenter,
+)
+from optisense.geometry.indenters import Cylinder, MeshIndenter, Plane, Sphere
 from optisense.geometry.mesh import TriangleMesh
 from optisense.geometry.places import nine_places
 from optisense.geometry.rays import RayHits, ray_hits
 from optisense.geometry.surface import SensingSurface, SurfacePoint
 
 __all__ = [
+    "INDENTERS",
     "Contact",
     "Cylinder",
     "Indenter",
+    "IndenterKind",
     "MeshIndenter",
     "Plane",
     "RayHits",
@@ -28,5 +37,7 @@ __all__ = [
     "nine_places",
     "parse_contact",
     "place",
+    "quantity",
     "ray_hits",
+    "register_indenter",
 ]

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from optisense.errors import ContactError
-from optisense.geometry.indenters import FACET_ERROR, Indenter
+from optisense.geometry.indenter_kinds import FACET_ERROR, Indenter
 from optisense.geometry.mesh import TriangleMesh
 from optisense.geometry.rays import ray_hits
 from optisense.geometry.surface import SensingSurface, SurfacePoint

@@ -2,9 +2,10 @@
 
     contact  = indenter "@" place ":" depth [ ":" rotation ]
     indenter = "sphere:" radius
-             | "cylinder:" radius [ "," length ]
+             | "cylinder:" radius [ "," length [ "," angle ] ]
              | "plane" [ ":" tilt_x "," tilt_y [ "," size ] ]
              | "mesh:" path [ "," scale ]
+             | any other kind in `INDENTERS` and its numbers
     place    = u "," v  |  x "," y "," z
 
 Lengths are in mm, angles in degrees; two numbers are surface coordinates, three are a point in
@@ -14,14 +15,12 @@ the frame of the design. Examples: `sphere:1.5@0,0:0.8`, `cylinder:2@1,-3:0.5:90
 
 from __future__ import annotations
 
-import difflib
-
 from optisense.errors import ContactError
 from optisense.geometry.contact import Contact
-from optisense.geometry.indenters import Cylinder, Indenter, MeshIndenter, Plane, Sphere
+from optisense.geometry.indenter_kinds import INDENTERS, Indenter
 
-_KINDS = ("sphere", "cylinder", "plane", "mesh")
-_FORM = "write it as KIND:SIZE@U,V:DEPTH, for example sphere:1.5@0,0:0.8, in mm without the unit"
+INDENTER_FORM = "Write sphere:RADIUS, cylinder:RADIUS[,LENGTH], plane or mesh:FILE[,SCALE]"
+_FORM = "Write it as KIND:SIZE@U,V:DEPTH, for example sphere:1.5@0,0:0.8, in mm without the unit"
 
 
 def parse_contact(text: str) -> Contact:
@@ -41,7 +40,7 @@ def parse_contact(text: str) -> Contact:
         coordinates = _numbers(fields[0], "the place", (2, 3))
         depth = _numbers(fields[1], "the depth", (1,))[0]
         rotation = _numbers(fields[2], "the rotation", (1,))[0] if len(fields) == 3 else 0.0
-        indenter = _indenter(shape)
+        indenter = parse_indenter(shape)
         if len(coordinates) == 3:
             x, y, z = coordinates
             return Contact(indenter, point=(x, y, z), depth=depth, rotation=rotation)
@@ -53,33 +52,18 @@ def parse_contact(text: str) -> Contact:
         ) from error
 
 
-def _indenter(text: str) -> Indenter:
+def parse_indenter(text: str) -> Indenter:
+    """Read an indenter, such as `sphere:1.5`.
+
+    Raises:
+        ContactError: there is no such kind of indenter, or its numbers make no sense.
+    """
     kind, _, sizes = text.strip().partition(":")
-    if kind == "sphere":
-        return Sphere(*_numbers(sizes, "the radius of the sphere", (1,)))
-    if kind == "cylinder":
-        return Cylinder(*_numbers(sizes, "the radius of the cylinder", (1, 2)))
-    if kind == "plane":
-        return Plane(*_numbers(sizes, "the tilt of the plane", (2, 3))) if sizes else Plane()
-    if kind == "mesh":
-        return _mesh_indenter(sizes)
-    near = difflib.get_close_matches(kind, _KINDS, 1)
-    raise ContactError(
-        f"'{kind}' is not a kind of indenter",
-        hint=f"did you mean '{near[0]}'?" if near else "use one of " + ", ".join(_KINDS),
-    )
-
-
-def _mesh_indenter(text: str) -> MeshIndenter:
-    path, separator, scale = text.rpartition(",")
-    if separator and path:
-        try:
-            return MeshIndenter(path, float(scale))
-        except ValueError:  # the comma belongs to the file name
-            pass
-    if not text:
-        raise ContactError("no mesh file is named", hint="write mesh:PATH@U,V:DEPTH")
-    return MeshIndenter(text)
+    try:
+        return INDENTERS.find(kind).from_text(sizes)
+    except ContactError as error:
+        hint = error.hint or INDENTER_FORM
+        raise ContactError(error.message, where=f"indenter '{text}'", hint=hint) from error
 
 
 def _numbers(text: str, name: str, counts: tuple[int, ...]) -> list[float]:

@@ -7,62 +7,44 @@ at z = 0. Shading normals are those of the exact shape and point out of the inde
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import ClassVar, Protocol
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from optisense.errors import ContactError
-from optisense.geometry.mesh import TriangleMesh, grid_faces
-
-FACET_ERROR = 4e-4
-"""Facets stay this close (mm) to the exact shape: well below what a camera resolves."""
-
-
-class Indenter(Protocol):
-    """Anything that can be pressed into a sensor.
-
-    One that can't shade itself, being convex, may say so by an attribute ``convex = True``: its
-    images then take fewer shadow rays.
-    """
-
-    def mesh(self, reach: float, facet_error: float = FACET_ERROR) -> TriangleMesh:
-        """The surface from its lowest point up to height `reach` (mm), or more of it.
-
-        Args:
-            reach: mm; what lies higher can't touch the sensor and may be left out.
-            facet_error: mm, largest distance of the facets from the exact shape.
-
-        Returns:
-            A mesh with outward shading normals in the indenter's frame.
-        """
-        ...
-
-
-def _positive(name: str, value: float) -> None:
-    if not (math.isfinite(value) and value > 0.0):
-        raise ContactError(
-            f"the {name} of an indenter is {value:g}", hint="give a length above 0, in mm"
-        )
+from optisense.geometry.indenter_kinds import (
+    ABOVE_ZERO,
+    FACET_ERROR,
+    IndenterKind,
+    Quantity,
+    quantity,
+)
+from optisense.geometry.mesh import TriangleMesh, grid_faces, turn_about_x_and_y
 
 
 @dataclass(frozen=True)
-class Sphere:
+class Sphere(IndenterKind):
     """A ball.
 
     Attributes:
         radius: mm.
     """
 
-    radius: float
-
+    kind: ClassVar[str] = "sphere"
+    title: ClassVar[str] = "Sphere"
+    help: ClassVar[str] = "A ball."
     convex: ClassVar[bool] = True
 
-    def __post_init__(self) -> None:
-        _positive("radius", self.radius)
+    radius: float = quantity("mm", "The radius of the ball.", low=ABOVE_ZERO)
+
+    def tilted(self, tilt_x: float, tilt_y: float) -> Sphere:
+        """The same ball."""
+        return self
 
     def mesh(self, reach: float, facet_error: float = FACET_ERROR) -> TriangleMesh:
         """See `Indenter.mesh`: a cap of parallels, each cut into as many parts as it needs."""
@@ -101,7 +83,7 @@ class Sphere:
 
 
 @dataclass(frozen=True)
-class Cylinder:
+class Cylinder(IndenterKind):
     """A cylinder that lies on its side, with flat ends.
 
     Attributes:
@@ -110,15 +92,14 @@ class Cylinder:
         angle: degrees from the u axis of the sensing surface to the cylinder's axis.
     """
 
-    radius: float
-    length: float = 40.0
-    angle: float = 0.0
-
+    kind: ClassVar[str] = "cylinder"
+    title: ClassVar[str] = "Cylinder"
+    help: ClassVar[str] = "A cylinder that lies on its side."
     convex: ClassVar[bool] = True
 
-    def __post_init__(self) -> None:
-        _positive("radius", self.radius)
-        _positive("length", self.length)
+    radius: float = quantity("mm", "The radius of the cylinder.", low=ABOVE_ZERO)
+    length: float = quantity("mm", "The length along its axis.", 40.0, low=ABOVE_ZERO)
+    angle: float = quantity("degrees", "From the surface's u axis to the cylinder's axis.", 0.0)
 
     def mesh(self, reach: float, facet_error: float = FACET_ERROR) -> TriangleMesh:
         """See `Indenter.mesh`: the lower part of the side and of both ends."""
@@ -148,7 +129,7 @@ class Cylinder:
 
 
 @dataclass(frozen=True)
-class Plane:
+class Plane(IndenterKind):
     """A square plate, pressed flat or tilted.
 
     Its middle lies above the contact place; the depth counts to its lowest corner.
@@ -158,32 +139,28 @@ class Plane:
         size: mm, its side.
     """
 
-    tilt_x: float = 0.0
-    tilt_y: float = 0.0
-    size: float = 8.0
-
+    kind: ClassVar[str] = "plane"
+    title: ClassVar[str] = "Plane"
+    help: ClassVar[str] = "A square plate, flat or tilted."
     convex: ClassVar[bool] = True
 
-    def __post_init__(self) -> None:
-        _positive("size", self.size)
-        if not (abs(self.tilt_x) < 90.0 and abs(self.tilt_y) < 90.0):
-            raise ContactError(
-                f"a plate is tilted by {self.tilt_x:g} and {self.tilt_y:g} degrees",
-                hint="keep both tilts between -90 and 90 degrees",
-            )
+    tilt_x: float = quantity("degrees", "The turn about the u axis.", 0.0, low=-89.9, high=89.9)
+    tilt_y: float = quantity("degrees", "The turn about the v axis.", 0.0, low=-89.9, high=89.9)
+    size: float = quantity("mm", "The side of the plate.", 8.0, low=ABOVE_ZERO)
+
+    def tilted(self, tilt_x: float, tilt_y: float) -> Plane:
+        """The plate tilted more; its middle stays above the contact place."""
+        return replace(self, tilt_x=self.tilt_x + tilt_x, tilt_y=self.tilt_y + tilt_y)
 
     def mesh(self, reach: float, facet_error: float = FACET_ERROR) -> TriangleMesh:
         """See `Indenter.mesh`: the whole plate, as thick as it is wide."""
         half = 0.5 * self.size
         block = TriangleMesh.box((-half, -half, 0.0), (half, half, self.size)).vertex_normals()
-        x, y = math.radians(self.tilt_x), math.radians(self.tilt_y)
-        about_x = [[1, 0, 0], [0, math.cos(x), -math.sin(x)], [0, math.sin(x), math.cos(x)]]
-        about_y = [[math.cos(y), 0, math.sin(y)], [0, 1, 0], [-math.sin(y), 0, math.cos(y)]]
-        return _lowest_at_zero(block.transformed(np.array(about_y) @ np.array(about_x)))
+        return _lowest_at_zero(block.transformed(turn_about_x_and_y(self.tilt_x, self.tilt_y)))
 
 
 @dataclass(frozen=True)
-class MeshIndenter:
+class MeshIndenter(IndenterKind):
     """Any shape: +z of its mesh points away from the sensor.
 
     Its lowest point (the middle of them, where there are several) is put on the contact place.
@@ -193,11 +170,52 @@ class MeshIndenter:
         scale: factor from the mesh's unit to mm.
     """
 
-    source: TriangleMesh | str | Path
-    scale: float = 1.0
+    kind: ClassVar[str] = "mesh"
+    title: ClassVar[str] = "Mesh"
+    help: ClassVar[str] = "A mesh file (OBJ, STL, PLY); its lowest point touches first."
 
-    def __post_init__(self) -> None:
-        _positive("scale", self.scale)
+    source: TriangleMesh | str | Path
+    scale: float = quantity("", "The factor from the file's unit to mm.", 1.0, low=ABOVE_ZERO)
+
+    @classmethod
+    def quantities(cls) -> dict[str, Quantity]:
+        """See `IndenterKind.quantities`: the scale."""
+        return {"scale": cls.__dataclass_fields__["scale"].metadata["quantity"]}
+
+    @classmethod
+    def from_text(cls, text: str) -> MeshIndenter:
+        """See `IndenterKind.from_text`: PATH or PATH,SCALE; the path may have commas itself."""
+        if not text:
+            raise ContactError("no mesh file is named", hint="write mesh:PATH@U,V:DEPTH")
+        path, separator, scale = text.rpartition(",")
+        if separator and path:
+            try:
+                return cls(path, float(scale))
+            except ValueError:  # the comma belongs to the file name
+                pass
+        return cls(text)
+
+    @classmethod
+    def from_plain(cls, values: Mapping[str, Any]) -> MeshIndenter:
+        """See `IndenterKind.from_plain`: `file`, and maybe `scale`."""
+        rest = dict(values)
+        file = rest.pop("file", None)
+        if not isinstance(file, str):
+            raise ContactError(
+                "a mesh needs 'file'", hint="Give the path of an OBJ, STL or PLY file"
+            )
+        for name, value in rest.items():
+            if name != "scale" or isinstance(value, bool) or not isinstance(value, int | float):
+                raise ContactError(
+                    f"a mesh can't take '{name}': {value!r}", hint="Known: file, scale"
+                )
+        return cls(file, **rest)
+
+    def to_plain(self) -> dict[str, Any]:
+        """See `IndenterKind.to_plain`; the mesh must come from a file."""
+        if isinstance(self.source, TriangleMesh):
+            raise ContactError("an indenter that is a mesh in memory has no file to name")
+        return {"kind": self.kind, "file": str(self.source), "scale": self.scale}
 
     @cached_property
     def _whole(self) -> TriangleMesh:

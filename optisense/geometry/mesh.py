@@ -266,6 +266,14 @@ class TriangleMesh:
         return TriangleMesh(self.vertices[vertex], faces, normals)
 
 
+def turn_about_x_and_y(angle_x: float, angle_y: float) -> NDArray[np.float64]:
+    """(3, 3): the rotation by degrees about x and then about y."""
+    x, y = np.radians([angle_x, angle_y])
+    about_x = [[1, 0, 0], [0, np.cos(x), -np.sin(x)], [0, np.sin(x), np.cos(x)]]
+    about_y = [[np.cos(y), 0, np.sin(y)], [0, 1, 0], [-np.sin(y), 0, np.cos(y)]]
+    return np.array(about_y) @ np.array(about_x)
+
+
 def grid_faces(rows: int, columns: int) -> IntArray:
     """Two triangles a cell for vertices numbered row by row; (2 (rows-1) (columns-1), 3) int32.
 

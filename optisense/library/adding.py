@@ -11,7 +11,6 @@ from optisense.design.emitters import IesEmitter
 from optisense.design.fields import Colour, Model
 from optisense.design.ies import parse_ies
 from optisense.design.kinds import KindModel
-from optisense.design.near import suggestion
 from optisense.design.sensor_design import Status
 from optisense.design.yaml_reader import read_yaml
 from optisense.errors import LibraryError
@@ -20,6 +19,7 @@ from optisense.library.entries import AnyEntry, LightEntry, Source, TypicalLight
 from optisense.library.loader import is_own, kind_named, names
 from optisense.library.own_parts import WHERE_TO_STORE, own_folder, write_own
 from optisense.library.reading import KINDS, Kind, files_of, kind_of, read_entry
+from optisense.near import suggestion
 
 NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,63}")
 

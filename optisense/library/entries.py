@@ -11,9 +11,9 @@ from optisense.design.camera import Pixels
 from optisense.design.emitters import LightModel
 from optisense.design.fields import Colour, MisfitError, Model, Name, Number, Positive
 from optisense.design.materials import Coating, Material
-from optisense.design.near import suggestion
 from optisense.design.sensor_design import Status
 from optisense.library.lens import lens_misfit
+from optisense.near import suggestion
 
 Value = TypeVar("Value", bound=Model)
 

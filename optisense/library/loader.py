@@ -10,12 +10,12 @@ from optisense.design.check import unknown_light_hint
 from optisense.design.emitters import LightModel
 from optisense.design.lights import LightGroup
 from optisense.design.materials import Coating, Material
-from optisense.design.near import suggestion
 from optisense.design.yaml_reader import read_yaml
 from optisense.errors import LibraryError
 from optisense.library.entries import AnyEntry, CameraModel
 from optisense.library.own_parts import own_files
 from optisense.library.reading import KINDS, Kind, inside, make_entry, read_entry
+from optisense.near import suggestion
 
 FOLDER = Path(__file__).parent
 

@@ -16,8 +16,8 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from optisense.design.near import suggestion
 from optisense.errors import ObjectiveError
+from optisense.near import suggestion
 from optisense.objectives.score import Drawing
 
 if TYPE_CHECKING:

@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING, Any, overload
 import numpy as np
 
 from optisense.design import SensorDesign
-from optisense.design.near import suggestion
 from optisense.design.sensor_design import refuse_no_design
 from optisense.errors import ObjectiveError, OptiSenseError, SetupError
+from optisense.near import suggestion
 from optisense.objectives.evaluation import Evaluation, ProgressCallback
 from optisense.objectives.files import place_of
 from optisense.objectives.registry import Objective, pixels_read, resolve

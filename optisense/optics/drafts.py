@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from optisense.design import SensorDesign
 from optisense.geometry import Contact, SensingSurface, TriangleMesh
-from optisense.geometry.indenters import FACET_ERROR
+from optisense.geometry.indenter_kinds import FACET_ERROR
 from optisense.optics.imaging.tactile_image import TactileImage
 from optisense.optics.model import OpticalModel
 from optisense.optics.radiance_cache.store import CELL_SIZE, VIEW_MARGIN, CacheStore

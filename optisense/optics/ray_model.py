@@ -21,7 +21,7 @@ from optisense.geometry import (
     TriangleMesh,
     nine_places,
 )
-from optisense.geometry.indenters import FACET_ERROR
+from optisense.geometry.indenter_kinds import FACET_ERROR
 from optisense.optics.backend.interrupts import lets_ctrl_c_through
 from optisense.optics.camera.projection import RayCamera
 from optisense.optics.scene.assembly import Assembly, assemble, coating_surface, indenter_piece

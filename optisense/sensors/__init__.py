@@ -8,10 +8,10 @@ from optisense.sensors.gelsight_mini import (
     gelsight_mini_spherical,
 )
 from optisense.sensors.gelsight_svelte import gelsight_svelte
-from optisense.sensors.registry import BUILDERS, build, check, load, save_design
+from optisense.sensors.registry import SENSORS, build, check, load, save_design
 
 __all__ = [
-    "BUILDERS",
+    "SENSORS",
     "build",
     "check",
     "gelbelt",

@@ -7,27 +7,26 @@ from pathlib import Path
 
 from optisense import library
 from optisense.design import Diagnostic, SensorDesign, check_design, load_design, storage
-from optisense.design.near import suggestion
 from optisense.design.problems import raise_problems
 from optisense.errors import DesignError
-from optisense.sensors.gelbelt import gelbelt
-from optisense.sensors.gelsight360 import gelsight360
-from optisense.sensors.gelsight_mini import (
-    gelsight_mini,
-    gelsight_mini_cylindrical,
-    gelsight_mini_spherical,
-)
-from optisense.sensors.gelsight_svelte import gelsight_svelte
+from optisense.near import suggestion
+from optisense.registry import Registry
 
-BUILDERS: dict[str, Callable[[], SensorDesign]] = {
-    "gelbelt": gelbelt,
-    "gelsight360": gelsight360,
-    "gelsight-mini": gelsight_mini,
-    "gelsight-mini-cylindrical": gelsight_mini_cylindrical,
-    "gelsight-mini-spherical": gelsight_mini_spherical,
-    "gelsight-svelte": gelsight_svelte,
-}
-"""Built-in sensors: a function that makes each with its default dimensions."""
+SENSORS: Registry[Callable[[], SensorDesign]] = Registry(
+    "built-in sensor",
+    "optisense.sensors",
+    DesignError,
+    {
+        "gelbelt": "optisense.sensors.gelbelt:gelbelt",
+        "gelsight360": "optisense.sensors.gelsight360:gelsight360",
+        "gelsight-mini": "optisense.sensors.gelsight_mini:gelsight_mini",
+        "gelsight-mini-cylindrical": "optisense.sensors.gelsight_mini:gelsight_mini_cylindrical",
+        "gelsight-mini-spherical": "optisense.sensors.gelsight_mini:gelsight_mini_spherical",
+        "gelsight-svelte": "optisense.sensors.gelsight_svelte:gelsight_svelte",
+    },
+)
+"""Functions that build a sensor with its default dimensions; other packages add theirs under the
+entry-point group `optisense.sensors`."""
 
 BUILT_IN = "builtin:"
 
@@ -38,11 +37,7 @@ def build(name: str) -> SensorDesign:
     Raises:
         DesignError: there is no such sensor; names the near match.
     """
-    if name not in BUILDERS:
-        raise DesignError(
-            f"there is no built-in sensor '{name}'", hint=suggestion(name, BUILDERS, limit=20)
-        )
-    return BUILDERS[name]()
+    return SENSORS.find(name)()
 
 
 def load(name_or_folder: str | Path) -> SensorDesign:
@@ -58,7 +53,7 @@ def load(name_or_folder: str | Path) -> SensorDesign:
     if text.startswith(BUILT_IN):
         return build(text.removeprefix(BUILT_IN))
     path = Path(name_or_folder)
-    if isinstance(name_or_folder, str) and text in BUILDERS:
+    if isinstance(name_or_folder, str) and text in SENSORS.names():
         if path.is_dir():
             raise DesignError(
                 f"'{text}' is a built-in sensor and also a folder here",
@@ -66,7 +61,7 @@ def load(name_or_folder: str | Path) -> SensorDesign:
             )
         return build(text)
     if not path.exists():
-        hint = suggestion(text, BUILDERS, limit=20)
+        hint = suggestion(text, SENSORS.names(), limit=20)
         raise DesignError(f"there is no built-in sensor and no folder '{text}'", hint=hint)
     return load_design(path)
 

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-import dataclasses
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from optisense.errors import ContactError, TaskError
-from optisense.geometry import Contact, Indenter, Plane, Sphere, TriangleMesh, parse_contact
-from optisense.geometry.indenters import FACET_ERROR
+from optisense.errors import TaskError
+from optisense.geometry import Contact, Indenter
+from optisense.geometry.contact_text import INDENTER_FORM, parse_indenter
+from optisense.geometry.indenter_kinds import tilted
 
 if TYPE_CHECKING:
     from optisense.optics import ChiefRays, OpticalModel
@@ -23,64 +23,7 @@ MARGIN = 0.02
 """Part of the picture's width that stays free around a contact: 6 of 320 pixels, 0.4 mm on a
 GelSight Mini, so that the shading just outside the contact is in the picture too."""
 
-INDENTER_FORM = "Write sphere:RADIUS, cylinder:RADIUS[,LENGTH], plane or mesh:FILE[,SCALE]"
-
 FloatArray = NDArray[np.float64]
-
-
-@dataclass(frozen=True)
-class Tilted:
-    """An indenter turned about two axes; its lowest point then lies on the contact place.
-
-    Attributes:
-        indenter: what is turned; it must end somewhere, as all of `optisense.geometry` do.
-        tilt_x, tilt_y: degrees, about its x axis and then about its y axis.
-    """
-
-    indenter: Indenter
-    tilt_x: float
-    tilt_y: float
-
-    def mesh(self, reach: float, facet_error: float = FACET_ERROR) -> TriangleMesh:
-        """See `optisense.geometry.Indenter`: the whole indenter, turned."""
-        whole = self.indenter.mesh(np.inf, facet_error)
-        turned = whole.transformed(turn_about_x_and_y(self.tilt_x, self.tilt_y))
-        size = np.ptp(turned.bounds, axis=0).max()
-        lowest = turned.vertices[turned.vertices[:, 2] <= turned.bounds[0, 2] + 1e-6 * size]
-        place = 0.5 * (lowest.min(axis=0) + lowest.max(axis=0))
-        return TriangleMesh(turned.vertices - place, turned.faces, turned.normals)
-
-
-def tilted(indenter: Indenter, tilt_x: float, tilt_y: float) -> Indenter:
-    """An indenter turned by degrees about its x and then its y axis."""
-    if isinstance(indenter, Sphere):
-        return indenter
-    if isinstance(indenter, Plane):  # knows how to tilt: its middle stays above the place
-        return dataclasses.replace(
-            indenter, tilt_x=indenter.tilt_x + tilt_x, tilt_y=indenter.tilt_y + tilt_y
-        )
-    return Tilted(indenter, tilt_x, tilt_y)
-
-
-def turn_about_x_and_y(angle_x: float, angle_y: float) -> FloatArray:
-    """(3, 3): turns by degrees, about x and then about y."""
-    x, y = np.radians([angle_x, angle_y])
-    about_x = [[1, 0, 0], [0, np.cos(x), -np.sin(x)], [0, np.sin(x), np.cos(x)]]
-    about_y = [[np.cos(y), 0, np.sin(y)], [0, 1, 0], [-np.sin(y), 0, np.cos(y)]]
-    return np.array(about_y) @ np.array(about_x)
-
-
-def parse_indenter(text: str) -> Indenter:
-    """Read an indenter as in a contact's text, such as `sphere:1.5` or `mesh:screw.stl`.
-
-    Raises:
-        ContactError: it is none, or its numbers make no sense.
-    """
-    try:
-        return parse_contact(f"{text}@0,0:1").indenter
-    except ContactError as error:
-        hint = error.hint if error.hint and "@" not in error.hint else INDENTER_FORM
-        raise ContactError(error.message, where=f"indenter '{text}'", hint=hint) from error
 
 
 def keeps_margin(mask: NDArray[np.bool_], margin: float) -> bool:

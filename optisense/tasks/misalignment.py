@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from optisense.errors import ContactError, TaskError
 from optisense.geometry import Contact, TriangleMesh
-from optisense.tasks.draws import turn_about_x_and_y
+from optisense.geometry.mesh import turn_about_x_and_y
 
 if TYPE_CHECKING:
     from optisense.optics import OpticalModel, TactileImage

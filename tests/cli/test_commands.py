@@ -11,7 +11,7 @@ from typer.testing import CliRunner
 
 import optisense
 from optisense.cli import app
-from optisense.sensors import BUILDERS
+from optisense.sensors import SENSORS
 
 runner = CliRunner()
 
@@ -94,7 +94,7 @@ def test_a_misspelt_command_gets_the_near_match() -> None:
     assert "'render'" in text
 
 
-@pytest.mark.parametrize("name", sorted(BUILDERS))
+@pytest.mark.parametrize("name", SENSORS.names())
 def test_a_new_design_passes_the_check(name: str, tmp_path: Path) -> None:
     folder = tmp_path / "mine"
     assert run("new", name, str(folder))[0] == 0

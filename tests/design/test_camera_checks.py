@@ -25,7 +25,7 @@ def fault(design: SensorDesign) -> str | None:
     return None if found is None else found.message
 
 
-@pytest.mark.parametrize("name", sensors.registry.BUILDERS)
+@pytest.mark.parametrize("name", sensors.SENSORS.names())
 def test_the_cameras_of_the_built_in_sensors_are_fine(name: str) -> None:
     design = sensors.load(name)
     assert fault(design) is None

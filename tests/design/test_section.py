@@ -12,7 +12,7 @@ from optisense.design import SensorDesign
 from optisense.design.section import cut, section
 from optisense.design.section_drawing import section_svg
 from optisense.geometry import Sphere, TriangleMesh
-from optisense.sensors import BUILDERS, load
+from optisense.sensors import SENSORS, load
 
 
 def area(loop: np.ndarray) -> float:
@@ -67,7 +67,7 @@ def test_gelsight_mini_is_cut_along_its_longer_side() -> None:
     assert skin.lines[0][:, 1].min() > found.camera[1]
 
 
-@pytest.mark.parametrize("name", sorted(BUILDERS))
+@pytest.mark.parametrize("name", SENSORS.names())
 def test_designs_show_themselves_with_all_labels(name: str) -> None:
     design = load(name)
     text = design._repr_html_()

@@ -13,7 +13,7 @@ from PIL import Image
 import optisense as ots
 from optisense.design import load_design
 from optisense.geometry import TriangleMesh
-from optisense.sensors.registry import BUILDERS
+from optisense.sensors import SENSORS
 
 
 def arrays(mesh: dict[str, str]) -> tuple[Any, Any]:
@@ -21,10 +21,10 @@ def arrays(mesh: dict[str, str]) -> tuple[Any, Any]:
 
 
 def test_sensors_are_those_of_the_package(engine: Any) -> None:
-    assert {row["name"] for row in engine.ask("sensors")["sensors"]} == set(BUILDERS)
+    assert {row["name"] for row in engine.ask("sensors")["sensors"]} == set(SENSORS.names())
 
 
-@pytest.mark.parametrize("name", sorted(BUILDERS))
+@pytest.mark.parametrize("name", SENSORS.names())
 def test_a_design_goes_out_and_comes_back_with_every_field(
     engine: Any, name: str, tmp_path: Path
 ) -> None:

@@ -52,11 +52,11 @@ def test_contact_text(text: str, contact: Contact) -> None:
 @pytest.mark.parametrize(
     ("text", "expected"),
     [
-        ("spher:1.5@0,0:0.8", "did you mean 'sphere'"),
-        ("donut:1@0,0:0.8", "sphere, cylinder, plane, mesh"),
+        ("spher:1.5@0,0:0.8", "Did you mean 'sphere'"),
+        ("donut:1@0,0:0.8", "cylinder, mesh, plane, sphere"),
         ("sphere:1.5", "no '@'"),
         ("sphere:1.5@0,0", "no depth"),
-        ("sphere@0,0:1", "radius of the sphere"),
+        ("sphere@0,0:1", "sphere:radius"),
         ("sphere:1.5@0:0.8", "the place needs 2 or 3 numbers"),
         ("sphere:1.5@0,0:deep", "the depth"),
         ("sphere:1.5@0,0:-1", "depth above 0"),

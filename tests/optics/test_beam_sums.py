@@ -11,7 +11,7 @@ from optisense import OpticalModel
 from optisense.geometry import Contact, Sphere
 from optisense.optics.radiance_cache import beams, shading
 from optisense.optics.radiance_cache.angular_variance import occluder_horizon
-from optisense.sensors import BUILDERS
+from optisense.sensors import build
 
 BALL = Contact(Sphere(radius=1.5), at=(0.0, 0.0), depth=0.8)
 SIZE = {"resolution": (160, 120), "photons": 200_000}
@@ -19,7 +19,7 @@ SIZE = {"resolution": (160, 120), "photons": 200_000}
 
 @pytest.fixture(scope="module")
 def mini() -> OpticalModel:
-    return OpticalModel(BUILDERS["gelsight-mini"](), "llvm")
+    return OpticalModel(build("gelsight-mini"), "llvm")
 
 
 def horizon(balls: list[tuple[float, ...]], own: bool = False) -> float:
@@ -82,7 +82,7 @@ def test_an_untouched_picture_has_no_grain(mini: OpticalModel) -> None:
 @pytest.mark.parametrize("fov", [50.0, 61.3])
 def test_no_camera_ray_slips_through_between_triangles(fov: float) -> None:
     """At these angles rays through the middle of a pixel meet the edges of triangles."""
-    design = BUILDERS["gelsight-mini"]()
+    design = build("gelsight-mini")
     design.camera.fov = fov
     model = OpticalModel(design, "llvm")
     for contacts in ([], [BALL]):

@@ -7,7 +7,7 @@ import pytest
 
 from optisense import OpticalModel
 from optisense.optics.radiance_cache import beams
-from optisense.sensors import BUILDERS
+from optisense.sensors import build
 
 MEAN = 0.001
 """Relative, of each light group's mean over the picture."""
@@ -20,7 +20,7 @@ def test_merged_beams_give_the_picture_of_all_bins(
     name: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """GelBelt's coating is part metal, which tells directions apart; the Mini's is diffuse."""
-    model = OpticalModel(BUILDERS[name](), "llvm")
+    model = OpticalModel(build(name), "llvm")
     size = {"resolution": (120, 90), "photons": 200_000}
     merged = model.render(**size)
     count = len(field_of(model).beams.ways)
@@ -37,7 +37,7 @@ def test_merged_beams_give_the_picture_of_all_bins(
 
 
 def test_no_light_is_lost_in_merging() -> None:
-    model = OpticalModel(BUILDERS["gelsight-mini"](), "llvm")
+    model = OpticalModel(build("gelsight-mini"), "llvm")
     model.render(resolution=(16, 12), photons=100_000)
     field = field_of(model)
     moments = np.asarray(field.moments).reshape(field.cells.cells, -1, field.groups, 4)

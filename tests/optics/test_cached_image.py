@@ -6,7 +6,7 @@ import numpy as np
 
 from optisense import Contact, OpticalModel, Plane
 from optisense.optics.imaging import cached
-from optisense.sensors import BUILDERS
+from optisense.sensors import build
 
 
 def test_noise_is_grainy_and_slopes_edges_of_the_mask_and_darkness_are_not() -> None:
@@ -24,7 +24,7 @@ def test_noise_is_grainy_and_slopes_edges_of_the_mask_and_darkness_are_not() -> 
 
 
 def test_a_contact_may_fill_the_picture() -> None:
-    model = OpticalModel(BUILDERS["gelsight-mini"](), "llvm")
+    model = OpticalModel(build("gelsight-mini"), "llvm")
     plate = Contact(Plane(size=60.0), at=(0.0, 0.0), depth=0.5)
     image = model.render([plate], resolution=(32, 24), photons=100_000)
     assert image.contact_mask.all()
@@ -33,7 +33,7 @@ def test_a_contact_may_fill_the_picture() -> None:
 
 def test_an_untouched_gel_has_less_grain_than_one_camera_sample_a_pixel_would_show() -> None:
     """With metal in the coating: diffuse light has no grain (see test_beam_sums.py)."""
-    design = BUILDERS["gelsight-mini"]()
+    design = build("gelsight-mini")
     design.coating.specularity = 0.5
     model = OpticalModel(design, "llvm")
 

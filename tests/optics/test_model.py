@@ -14,7 +14,7 @@ from optisense.errors import LibraryError, RenderError
 from optisense.optics import RenderProgress, TactileImage
 from optisense.optics.backend.stages import Stage
 from optisense.optics.radiance_cache.cache import SECTORS
-from optisense.sensors import BUILDERS
+from optisense.sensors import build
 
 PIXELS = (80, 60)
 PHOTONS = 400_000
@@ -46,7 +46,7 @@ def model(name: str = "gelsight-mini", specularity: float = 0.0) -> OpticalModel
 
 
 def design(name: str = "gelsight-mini", specularity: float = 0.0) -> SensorDesign:
-    return set_value(BUILDERS[name](), "coating.specularity", specularity)
+    return set_value(build(name), "coating.specularity", specularity)
 
 
 def render(of: OpticalModel, *contacts: Contact, seed: int = 0) -> TactileImage:
@@ -68,7 +68,7 @@ def test_layers_add_up_to_the_image() -> None:
 
 
 def test_groups_rendered_together_add_up_to_the_same_lights_in_one_group() -> None:
-    parted = BUILDERS["gelsight-mini"]()
+    parted = build("gelsight-mini")
     for name in parted.lights:
         parted = set_value(parted, f"lights.{name}.colour", [1, 1, 1])
     joined = parted.copy()
@@ -127,7 +127,7 @@ def test_an_updated_coating_renders_as_a_new_model_of_the_changed_design() -> No
 
 
 def test_a_model_that_became_another_design_sees_what_a_new_model_of_it_sees() -> None:
-    start = BUILDERS["gelsight-svelte"]()
+    start = build("gelsight-svelte")
     used = OpticalModel(start, "llvm")
     used.chief_rays(PIXELS)
     for path, value, resolved_anew in (

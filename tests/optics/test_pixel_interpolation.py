@@ -10,7 +10,7 @@ from optisense import Contact, OpticalModel, Sphere
 from optisense.optics.imaging import cached
 from optisense.optics.imaging.pixel_interpolation import agreed, between_rays, fill
 from optisense.optics.transport.chief_rays import ChiefRays
-from optisense.sensors import BUILDERS
+from optisense.sensors import build
 
 
 def rays_onto(points: np.ndarray) -> ChiefRays:
@@ -59,7 +59,7 @@ def test_edges_of_what_is_seen_and_of_shadows_are_not_filled() -> None:
 
 
 def test_a_sensor_of_many_lights_looks_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
-    model = OpticalModel(BUILDERS["gelsight360"](), "llvm")
+    model = OpticalModel(build("gelsight360"), "llvm")
     ball = [Contact(Sphere(radius=2.0), at=(0.0, 0.0), depth=1.0)]
     size = {"resolution": (160, 120), "photons": 300_000}
     monkeypatch.setattr(cached, "SPARSE_SHADING_BEAMS", np.inf)

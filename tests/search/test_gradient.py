@@ -17,7 +17,7 @@ from optisense.search.methods.gradient import (
     Gradient,
     SlopeEvaluator,
 )
-from optisense.sensors import BUILDERS
+from optisense.sensors import gelsight_svelte
 
 SETTINGS = {"ray_resolution": (160, 120)}
 
@@ -30,7 +30,7 @@ RESOLUTION = 160
 
 @pytest.fixture(scope="module")
 def svelte() -> SensorDesign:
-    return BUILDERS["gelsight-svelte"](tessellation=1.0, m1_grid=(60, 15))
+    return gelsight_svelte(tessellation=1.0, m1_grid=(60, 15))
 
 
 def method(design: SensorDesign, objective: str = "aoap", **space: object) -> Gradient:

@@ -12,8 +12,7 @@ import pytest
 from optisense.design import SensorDesign
 from optisense.errors import SearchError
 from optisense.search import Around, CagePoints
-from optisense.search.methods import names
-from optisense.search.methods.registry import HOMES
+from optisense.search.methods.registry import METHODS
 from optisense.search.space.search_space import BoundSpace
 from optisense.search.testing import Landscape, MethodContract, general_spaces
 from optisense.sensors import load
@@ -137,4 +136,4 @@ def svelte() -> SensorDesign:
 
 def test_no_method_of_the_package_goes_without_the_contract() -> None:
     tested = {each.method for each in MethodContract.__subclasses__()}
-    assert set(HOMES) & set(names()) <= tested
+    assert set(METHODS.built_in) <= tested

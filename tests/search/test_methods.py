@@ -253,7 +253,7 @@ def test_other_packages_bring_methods(two_numbers: BoundSpace) -> None:
     class Grid(Middle):
         name = "grid"
 
-    with pytest.raises(SearchError, match="already a method"):
+    with pytest.raises(SearchError, match="already a search method"):
         register(Grid)
 
 

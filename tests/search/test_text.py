@@ -62,7 +62,7 @@ def test_a_path_is_varied_once() -> None:
 
 def test_errors_of_making() -> None:
     errors = parse_errors(["lights.position=0.1", "coating.specularity=+-0.05"])
-    assert errors.spreads == {
+    assert errors.distributions == {
         "lights.position": ToleranceDistribution(0.1),
         "coating.specularity": ToleranceDistribution(0.05, "uniform"),
     }

@@ -19,7 +19,7 @@ from optisense.optics.transport.chief_rays import RayOutcome
 SMALL: dict[str, Any] = {"resolution": (160, 120), "photons": 200_000}
 
 
-@pytest.fixture(scope="module", params=list(sensors.BUILDERS))
+@pytest.fixture(scope="module", params=list(sensors.SENSORS.names()))
 def sensor(request: pytest.FixtureRequest) -> SensorDesign:
     return sensors.build(request.param)
 

@@ -19,7 +19,7 @@ FIELD_OF_VIEW = (18.6, 14.3)
 """mm on the gel, by the maker's datasheet."""
 
 
-@pytest.fixture(scope="module", params=[n for n in sensors.BUILDERS if "mini" in n])
+@pytest.fixture(scope="module", params=[n for n in sensors.SENSORS.names() if "mini" in n])
 def sensor(request: pytest.FixtureRequest) -> SensorDesign:
     return sensors.build(request.param)
 

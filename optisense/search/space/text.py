@@ -18,8 +18,8 @@ from typing import Any
 
 import yaml
 
-from optisense.design.near import suggestion
 from optisense.errors import SearchError
+from optisense.near import suggestion
 from optisense.search.space.manufacturing import ManufacturingErrors, ToleranceDistribution
 from optisense.search.space.parameters import Around, CagePoints, Choice, Continuous, Specification
 

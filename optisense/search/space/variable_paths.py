@@ -24,8 +24,8 @@ import re
 from collections.abc import Callable, Iterable
 
 from optisense.design import SensorDesign
-from optisense.design.near import suggestion
 from optisense.errors import DesignError, SearchError
+from optisense.near import suggestion
 from optisense.search.space.design_variables import (
     DesignVariable,
     GroupType,

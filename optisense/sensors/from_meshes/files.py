@@ -8,12 +8,12 @@ from pathlib import Path
 
 import numpy as np
 
-from optisense.design.near import near_match
 from optisense.errors import DesignError, MeshError
 from optisense.geometry import TriangleMesh
 from optisense.geometry.mesh_files import FORMATS, load_mesh
 from optisense.geometry.step import SUFFIXES as STEP_FORMATS
 from optisense.geometry.step import read_step
+from optisense.near import near_match
 from optisense.sensors.from_meshes.recipe import MM_PER, ShapeReference
 
 ALL_FORMATS = (*FORMATS, *STEP_FORMATS)

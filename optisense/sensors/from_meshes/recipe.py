@@ -23,11 +23,11 @@ from optisense.design.fields import (
     Positive,
     Vector,
 )
-from optisense.design.near import suggestion
 from optisense.design.problems import design_error
 from optisense.design.yaml_reader import Lines, read_yaml
 from optisense.errors import DesignError
 from optisense.library.adding import COLOURS
+from optisense.near import suggestion
 from optisense.sensors.from_meshes.directions import Direction, Side, Way, or_words
 
 Units = Literal["mm", "cm", "m", "inch", "um"]

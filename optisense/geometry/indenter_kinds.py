@@ -1,0 +1,261 @@
+"""Kinds of indenters: what contacts in text, requests of front ends and the studio can name.
+
+A kind is one class. Its numbers are the fields of a dataclass, each made by `quantity`, which holds
+their units, limits and help; from them follow the text form (`cylinder:2,10`), the form of requests
+(`{"kind": "cylinder", "radius": 2}`) and what front ends show. The kinds of this package
+are in `optisense/geometry/indenters.py`; docs/extending.md adds one.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from dataclasses import MISSING, dataclass
+from typing import Any, ClassVar, Protocol
+
+import numpy as np
+
+from optisense.errors import ContactError
+from optisense.geometry.mesh import TriangleMesh, turn_about_x_and_y
+from optisense.near import suggestion
+from optisense.registry import Registry
+
+FACET_ERROR = 4e-4
+"""Facets stay this close (mm) to the exact shape: well below what a camera resolves."""
+
+ABOVE_ZERO = 5e-324
+"""The smallest number above 0, as a lower limit of lengths."""
+
+
+class Indenter(Protocol):
+    """Anything that can be pressed into a sensor.
+
+    One that can't shade itself, being convex, may say so by an attribute ``convex = True``: its
+    images then take fewer shadow rays.
+    """
+
+    def mesh(self, reach: float, facet_error: float = FACET_ERROR) -> TriangleMesh:
+        """The surface from its lowest point up to height `reach` (mm), or more of it.
+
+        Args:
+            reach: mm; what lies higher can't touch the sensor and may be left out.
+            facet_error: mm, largest distance of the facets from the exact shape.
+
+        Returns:
+            A mesh with outward shading normals in the indenter's frame.
+        """
+        ...
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """One number of an indenter.
+
+    Attributes:
+        unit: such as "mm"; empty for a plain number.
+        help: one sentence.
+        low, high: the limits, which are allowed values.
+    """
+
+    unit: str
+    help: str
+    low: float = -math.inf
+    high: float = math.inf
+
+    def check(self, owner: str, name: str, value: float) -> None:
+        """Check a value.
+
+        Raises:
+            ContactError: it is no finite number or lies outside of the limits.
+        """
+        if math.isfinite(value) and self.low <= value <= self.high:
+            return
+        if self.low == ABOVE_ZERO:
+            hint = f"Give a length above 0, in {self.unit}" if self.unit else "Give one above 0"
+        elif math.isfinite(self.low) and math.isfinite(self.high):
+            hint = f"Keep it from {self.low:g} to {self.high:g} {self.unit}".rstrip()
+        else:
+            hint = "Give a finite number"
+        title = name.replace("_", " ")
+        raise ContactError(f"the {title} of an indenter ({owner}) is {value:g}", hint=hint)
+
+
+def quantity(
+    unit: str,
+    help: str,
+    default: float | None = None,
+    *,
+    low: float = -math.inf,
+    high: float = math.inf,
+) -> Any:
+    """A field of an indenter's dataclass; required where it has no default."""
+    metadata = {"quantity": Quantity(unit, help, low, high)}
+    if default is None:
+        return dataclasses.field(metadata=metadata)
+    return dataclasses.field(default=default, metadata=metadata)
+
+
+@dataclass(frozen=True)
+class IndenterKind(ABC):
+    """Base of indenters that have a name; a subclass is a frozen dataclass of quantities.
+
+    Attributes:
+        kind: the name in text and requests, lower case.
+        title: how people write the name.
+        help: one sentence.
+        convex: whether no part of its surface can shade another part.
+    """
+
+    kind: ClassVar[str]
+    title: ClassVar[str]
+    help: ClassVar[str]
+    convex: ClassVar[bool] = False
+
+    def __post_init__(self) -> None:
+        """Check the numbers.
+
+        Raises:
+            ContactError: one lies outside of its limits.
+        """
+        for name, each in self.quantities().items():
+            each.check(self.kind, name, getattr(self, name))
+
+    @abstractmethod
+    def mesh(self, reach: float, facet_error: float = FACET_ERROR) -> TriangleMesh:
+        """See `Indenter.mesh`."""
+
+    def tilted(self, tilt_x: float, tilt_y: float) -> Indenter:
+        """The indenter turned by degrees about its x and then its y axis."""
+        return Tilted(self, tilt_x, tilt_y)
+
+    @classmethod
+    def quantities(cls) -> dict[str, Quantity]:
+        """The numbers of this kind by name, in the order in which text gives them."""
+        return {each.name: each.metadata["quantity"] for each in dataclasses.fields(cls)}
+
+    @classmethod
+    def from_text(cls, text: str) -> IndenterKind:
+        """Read what stands behind the colon in text: the numbers in their order.
+
+        Raises:
+            ContactError: they are too few or too many, no numbers, or outside of their limits.
+        """
+        fields = dataclasses.fields(cls)
+        needed = sum(each.default is MISSING for each in fields)
+        words = text.split(",") if text else []
+        try:
+            values = [float(word) for word in words]
+        except ValueError:
+            values = [math.nan] * (len(fields) + 1)
+        if not needed <= len(values) <= len(fields):
+            form = ",".join(
+                each.name if each.default is MISSING else f"[{each.name}]" for each in fields
+            )
+            raise ContactError(
+                f"a {cls.kind} can't be read from '{text}'", hint=f"Write {cls.kind}:{form}"
+            )
+        return cls(*values)
+
+    @classmethod
+    def from_plain(cls, values: Mapping[str, Any]) -> IndenterKind:
+        """Read the numbers of a request, by name.
+
+        Raises:
+            ContactError: one is missing, unknown, no number, or outside of its limits.
+        """
+        known = {each.name: each for each in dataclasses.fields(cls)}
+        for name in values:
+            if name not in known:
+                raise ContactError(f"a {cls.kind} has no '{name}'", hint=suggestion(name, known))
+        for name, each in known.items():
+            if each.default is MISSING and name not in values:
+                raise ContactError(
+                    f"a {cls.kind} needs '{name}'", hint=each.metadata["quantity"].help
+                )
+        numbers = {}
+        for name, value in values.items():
+            if isinstance(value, bool) or not isinstance(value, int | float):
+                raise ContactError(f"the {name} of a {cls.kind} is {value!r}, which is no number")
+            numbers[name] = float(value)
+        return cls(**numbers)
+
+    def to_plain(self) -> dict[str, Any]:
+        """The indenter as `from_plain` reads it, with its kind."""
+        return {"kind": self.kind, **dataclasses.asdict(self)}
+
+
+@dataclass(frozen=True)
+class Tilted:
+    """An indenter turned about its x and then its y axis; its lowest point is at its origin again.
+
+    Attributes:
+        indenter: what is turned.
+        tilt_x, tilt_y: degrees.
+    """
+
+    indenter: Indenter
+    tilt_x: float
+    tilt_y: float
+
+    def mesh(self, reach: float, facet_error: float = FACET_ERROR) -> TriangleMesh:
+        """See `Indenter.mesh`: the whole indenter, turned."""
+        whole = self.indenter.mesh(np.inf, facet_error)
+        turned = whole.transformed(turn_about_x_and_y(self.tilt_x, self.tilt_y))
+        size = np.ptp(turned.bounds, axis=0).max()
+        lowest = turned.vertices[turned.vertices[:, 2] <= turned.bounds[0, 2] + 1e-6 * size]
+        place = 0.5 * (lowest.min(axis=0) + lowest.max(axis=0))
+        return TriangleMesh(turned.vertices - place, turned.faces, turned.normals)
+
+
+def tilted(indenter: Indenter, tilt_x: float, tilt_y: float) -> Indenter:
+    """An indenter of any kind, or of none, turned by degrees about its x and then its y axis."""
+    if isinstance(indenter, IndenterKind):
+        return indenter.tilted(tilt_x, tilt_y)
+    return Tilted(indenter, tilt_x, tilt_y)
+
+
+def _check(name: str, kind: Any) -> None:
+    if not (isinstance(kind, type) and issubclass(kind, IndenterKind)):
+        raise ContactError(f"the indenter '{name}' is no subclass of IndenterKind")
+
+
+INDENTERS: Registry[type[IndenterKind]] = Registry(
+    "kind of indenter",
+    "optisense.indenters",
+    ContactError,
+    {
+        "sphere": "optisense.geometry.indenters:Sphere",
+        "cylinder": "optisense.geometry.indenters:Cylinder",
+        "plane": "optisense.geometry.indenters:Plane",
+        "mesh": "optisense.geometry.indenters:MeshIndenter",
+    },
+    _check,
+)
+"""All kinds of indenters; other packages add theirs under the entry-point group
+`optisense.indenters`."""
+
+
+def register_indenter(kind: type[IndenterKind]) -> type[IndenterKind]:
+    """Add a kind of indenter by its `kind`; usable as a class decorator.
+
+    Raises:
+        ContactError: the name is taken or malformed.
+    """
+    return INDENTERS.register(kind.kind, kind)
+
+
+def indenter_from_plain(values: Mapping[str, Any]) -> IndenterKind:
+    """An indenter as a request gives it: its kind, and its numbers by name.
+
+    Raises:
+        ContactError: there is no such kind, or its numbers make no sense.
+    """
+    rest = dict(values)
+    kind = rest.pop("kind", None)
+    if not isinstance(kind, str):
+        raise ContactError(
+            "the indenter has no kind", hint="Known: " + ", ".join(INDENTERS.names())
+        )
+    return INDENTERS.find(kind).from_plain(rest)
