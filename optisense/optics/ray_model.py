@@ -31,6 +31,7 @@ from optisense.optics.scene.emitters import EmitterTable, emitter_table
 from optisense.optics.scene.ray_scene import Piece, RayScene
 from optisense.optics.scene.surfaces import Region, Surface, SurfaceKind
 from optisense.optics.transport.chief_rays import (
+    MIRROR_BITS,
     ChiefRays,
     pixel_areas,
     sees_nothing,
@@ -232,6 +233,29 @@ class RayModel:
         else:
             scene = self._fine.scene
         return trace_chief_rays(scene, self.camera(resolution), self._fine.sensing_faces)
+
+    def views_by_mirrors(self, resolution: tuple[int, int]) -> dict[frozenset[str], float]:
+        """By which mirrors the camera sees the sensing surface.
+
+        Args:
+            resolution: (width, height) of the chief rays.
+
+        Returns:
+            For each set of parts that reflect a ray on its way to the sensing surface, its share
+            of the rays that arrive there; the empty set stands for those that no mirror reflects.
+        """
+        rays = self.chief_rays(resolution)
+        met, counts = np.unique(rays.mirrors[rays.hit], return_counts=True)
+        mirrors = [
+            (piece.name, 1 << number % MIRROR_BITS)
+            for number, piece in enumerate(self._pieces)
+            if piece.surface.kind is SurfaceKind.MIRROR
+        ]
+        shares: dict[frozenset[str], float] = {}
+        for bits, count in zip(met.tolist(), counts.tolist(), strict=True):
+            names = frozenset(name for name, bit in mirrors if bits & bit)
+            shares[names] = shares.get(names, 0.0) + count / int(counts.sum())
+        return shares
 
     def differentiable_rays(
         self,

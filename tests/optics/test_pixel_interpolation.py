@@ -24,6 +24,7 @@ def rays_onto(points: np.ndarray) -> ChiefRays:
         outcome=np.zeros(shape, np.uint8),
         face=np.zeros(shape, np.int64),
         region=np.ones(shape, np.uint8),
+        mirrors=np.zeros(shape, np.uint32),
     )
 
 

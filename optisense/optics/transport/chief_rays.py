@@ -23,6 +23,11 @@ HASH_FACTOR = 0x9E3779B1
 as in Knuth's multiplicative hashing."""
 
 
+MIRROR_BITS = 32
+"""Bits that tell which mirrors a ray has met: as many as a number of the kernel has. Mirrors whose
+surfaces' numbers differ by a multiple of it are told as one."""
+
+
 class RayOutcome(IntEnum):
     """What became of a chief ray."""
 
@@ -41,7 +46,8 @@ class ChiefRays:
     points: mm; normals: unit, towards the ray; incidence: cosine of the angle between ray and
     normal (1 is perpendicular); directions: unit, the way the ray travels when it arrives;
     face: triangle of the sensing surface hit, in the order of its mesh; region: 1 sensing
-    surface, 2 indenter.
+    surface, 2 indenter; mirrors: bit n % 32 is set where surface n of the scene, a mirror, has
+    reflected the ray.
     """
 
     points: NDArray[np.float32]
@@ -51,6 +57,7 @@ class ChiefRays:
     outcome: NDArray[np.uint8]
     face: NDArray[np.int64]
     region: NDArray[np.uint8]
+    mirrors: NDArray[np.uint32]
 
     @property
     def hit(self) -> NDArray[np.bool_]:
@@ -71,6 +78,7 @@ def _trace(scene: RayScene, patches: mi.UInt32 | None, ray: Ray) -> tuple[Any, .
     normal = mi.Vector3f(0)
     region = mi.UInt32(0)
     face = mi.UInt32(0)
+    mirrors = mi.UInt32(0)
     path = mi.UInt32(0)
     while ray.active:
         step = interact(scene, ray, Path.CHIEF)
@@ -87,10 +95,11 @@ def _trace(scene: RayScene, patches: mi.UInt32 | None, ray: Ray) -> tuple[Any, .
             code = patch * 2 + dr.select(step.totally, mi.UInt32(1), mi.UInt32(0))
             path = dr.select(hit.valid, (path ^ code) * HASH_FACTOR + 1, path)
         total |= step.totally
+        mirrors |= dr.select(step.scattered, mi.UInt32(1) << (hit.surface % MIRROR_BITS), 0)
         ray = step.ray
     failed = total & (outcome != int(RayOutcome.HIT))
     outcome = dr.select(failed, int(RayOutcome.TOTAL_REFLECTION), outcome)
-    return outcome, point, normal, ray.direction, region, face, path
+    return outcome, point, normal, ray.direction, region, face, mirrors, path
 
 
 def trace_path_codes(
@@ -125,13 +134,13 @@ def trace_chief_rays(
     index = dr.arange(mi.UInt32, camera.width * camera.height)
     x = mi.Float(index % camera.width) + 0.5
     y = mi.Float(index // camera.width) + 0.5
-    outcome, point, normal, arriving, region, face, _path = _trace(
+    outcome, point, normal, arriving, region, face, mirrors, _path = _trace(
         scene, None, Ray(*camera.rays(x, y), mi.Bool(True))
     )
     incidence = -dr.dot(arriving, normal)
     if sensing_faces is None:
         sensing_faces = np.zeros(0, dtype=np.int64)
-    dr.eval(outcome, point, normal, arriving, region, face, incidence)
+    dr.eval(outcome, point, normal, arriving, region, face, mirrors, incidence)
 
     def image(values: object) -> NDArray[np.float32]:
         return np.asarray(values, dtype=np.float32).T.reshape(*shape, 3)
@@ -146,6 +155,7 @@ def trace_chief_rays(
             shape
         ),
         region=np.asarray(region).astype(np.uint8).reshape(shape),
+        mirrors=np.asarray(mirrors).astype(np.uint32).reshape(shape),
     )
 
 

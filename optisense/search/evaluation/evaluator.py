@@ -11,13 +11,14 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from optisense.design import SensorDesign
+from optisense.design import Role, SensorDesign
 from optisense.errors import OptiSenseError, SearchError, SetupError
 from optisense.objectives import Objective, Score, Settings, evaluate
 from optisense.objectives.evaluation import ProgressCallback
 from optisense.objectives.files import place_of
 from optisense.objectives.registry import resolve
 from optisense.objectives.run import split_settings
+from optisense.search.evaluation.mirror_views import SameMirrors, may_change_view
 from optisense.search.evaluation.models import RAYS_ONLY, ModelKeeper
 from optisense.search.evaluation.outcome import Outcome
 from optisense.search.space.buildable import BentPartsRest, LightsRest, PartsRest, SolidsStay
@@ -103,13 +104,13 @@ class DesignEvaluator:
             self.constraints.append(PartsApart(space.design))
         if any(name.startswith("cages.") for name in space.names):
             self.constraints.append(Unfolded(space.design))
-        self.kept: list[Constraint] = []
-        if keeps:
-            self._keep(apart is None or apart)
         rays_only = set(self.names) <= RAYS_ONLY | set(self._functions)
         self.keeper = ModelKeeper(space.prepared, lit=not rays_only, variant=variant)
         self._resolved: list[Objective] | None = None
         self.renders = bool(self._objectives)
+        self.kept: list[Constraint] = []
+        if keeps:
+            self._keep(apart is None or apart)
         self.variant = variant
         self._progress: ProgressCallback | None = None
         self._check_settings()
@@ -195,6 +196,8 @@ class DesignEvaluator:
             self.kept.append(BentPartsRest(design))
         if any(name.startswith("materials.") for name in names):
             self.kept.append(SolidsStay(design))
+        if self.renders and design.parts_of(Role.MIRROR) and may_change_view(names):
+            self.kept.append(SameMirrors(design, self.keeper))
 
     def _ready(self) -> list[Objective]:
         """The objectives; a user's file is run once a process and not once a trial."""

@@ -47,6 +47,14 @@ class ModelKeeper:
         model.set_design(design)
         return model
 
+    def ray_model(self, design: SensorDesign) -> OpticalModel:
+        """The model of a design, but for its coating, which chief rays don't depend on.
+
+        Raises:
+            OptiSenseError: the design can't be built.
+        """
+        return self._becoming(design.model_copy(update={"coating": self.first.coating}))
+
     def _becoming(self, design: SensorDesign) -> OpticalModel:
         if self._model is None:
             from optisense.optics import OpticalModel

@@ -1,0 +1,68 @@
+"""A sensor whose camera looks by mirrors must go on doing so: past them it is another sensor."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from optisense.design import SensorDesign
+from optisense.search.evaluation.models import ModelKeeper
+
+VIEW_RAYS = (96, 72)
+"""Width and height of the chief rays that tell by which mirrors the camera looks: a share of 0.1 is
+then off by less than 0.01."""
+
+MOST_BY_OTHER_WAYS = 0.1
+"""Share of the chief rays that may reach the sensing surface by other mirrors than in the design
+that the search starts from, or by none. All rays of GelSight Svelte go by both of its mirrors; by
+AOAP, designs of which 31 to 99 % go past them were the best of a camera that may turn, and a
+strip of 6 % beside the edge of a mirror turned by a degree does no harm."""
+
+SIGHTLESS = ("lights.", "coating.")
+"""Sections of a design that no chief ray depends on."""
+
+
+class SameMirrors:
+    """The camera must see the sensing surface by the same mirrors as in the first design.
+
+    A mirror that the camera looks past is a part that nobody would build.
+    """
+
+    def __init__(self, design: SensorDesign, keeper: ModelKeeper) -> None:
+        """Nothing is traced yet.
+
+        Args:
+            design: that the search starts from.
+            keeper: of the optical model.
+        """
+        self._design = design
+        self._keeper = keeper
+        self._ways: frozenset[frozenset[str]] | None = None
+
+    def __call__(self, design: SensorDesign) -> str | None:
+        """How much the camera sees past the mirrors, where that is too much; else None."""
+        if self._ways is None:
+            self._ways = frozenset(self._seen(self._design))
+        seen = self._seen(design)
+        other = {way: share for way, share in seen.items() if way not in self._ways}
+        if not self._ways or sum(other.values()) <= MOST_BY_OTHER_WAYS:
+            return None
+        now = _told(max(other, key=lambda way: other[way]))
+        before = " or ".join(sorted(_told(way) for way in self._ways))
+        return (
+            f"{100 * sum(other.values()):.0f} % of the rays that reach the sensing surface do not "
+            "go by the mirrors that they go by in the design that the search starts from: "
+            f"{now} instead of {before}"
+        )
+
+    def _seen(self, design: SensorDesign) -> dict[frozenset[str], float]:
+        return self._keeper.ray_model(design).views_by_mirrors(VIEW_RAYS)
+
+
+def may_change_view(names: Iterable[str]) -> bool:
+    """Whether what parameters of these names change can change what the camera sees."""
+    return any(not name.startswith(SIGHTLESS) for name in names)
+
+
+def _told(way: frozenset[str]) -> str:
+    names = [f"'{name}'" for name in sorted(way)]
+    return "by " + " and ".join(names) if names else "straight"

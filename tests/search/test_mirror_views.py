@@ -1,0 +1,69 @@
+"""Cameras that look past the mirrors of their sensor.
+
+The points are winners of `benchmarks/single_parameters.py` that a person would not accept.
+"""
+
+from __future__ import annotations
+
+import pickle
+
+import numpy as np
+import pytest
+
+import optisense as ots
+from optisense import sensors
+from optisense.design import SensorDesign
+from optisense.search.evaluation.evaluator import DesignEvaluator
+from optisense.search.evaluation.mirror_views import SameMirrors
+from optisense.search.space.search_space import SearchSpace
+
+RAYS = {"ray_resolution": (40, 30)}
+
+
+@pytest.fixture(scope="module")
+def svelte() -> SensorDesign:
+    return sensors.load("gelsight-svelte")
+
+
+def evaluator(design: SensorDesign, path: str) -> DesignEvaluator:
+    bound = SearchSpace({path: (-100.0, 100.0)}).bind(design, tried=False)
+    return DesignEvaluator(bound, ["aoap"], RAYS)
+
+
+def test_which_mirrors_a_camera_looks_by(svelte: SensorDesign) -> None:
+    """All rays of Svelte go by both of its mirrors, and those of Mini, which has none, straight."""
+    both = frozenset({"M1", "M2"})
+    assert ots.OpticalModel(svelte).views_by_mirrors((48, 36)) == {both: 1.0}
+    mini = ots.OpticalModel(sensors.load("gelsight-mini"))
+    assert mini.views_by_mirrors((48, 36)) == {frozenset(): 1.0}
+
+
+@pytest.mark.parametrize(
+    ("path", "value"),
+    [
+        ("camera.turn.y", -30.0),
+        ("camera.direction.z", 1.1832),
+        ("camera.position.z", 10.0),
+    ],
+)
+def test_a_camera_that_looks_past_its_mirrors(
+    svelte: SensorDesign, path: str, value: float
+) -> None:
+    said = evaluator(svelte, path)(np.array([value]), 0).failure
+    assert "straight instead of by 'M1' and 'M2'" in str(said)
+
+
+@pytest.mark.parametrize(
+    ("path", "value"),
+    [("camera.turn.y", 10.0), ("camera.position.x", 10.0), ("parts.M2.turn.y", 1.0)],
+)
+def test_a_camera_that_looks_by_them(svelte: SensorDesign, path: str, value: float) -> None:
+    one = evaluator(svelte, path)
+    assert any(isinstance(rule, SameMirrors) for rule in one.kept)
+    outcome = pickle.loads(pickle.dumps(one))(np.array([value]), 0)
+    assert outcome.failure is None
+
+
+def test_light_does_not_ask_for_the_view(svelte: SensorDesign) -> None:
+    bound = SearchSpace({"lights.red.flux": (0.0, 1.0)}).bind(svelte)
+    assert DesignEvaluator(bound, ["aoap"], RAYS).kept == []
