@@ -23,7 +23,8 @@ from optisense.cli.asking import (
 )
 from optisense.cli.console import messages
 from optisense.design import Role
-from optisense.design.sensor_design import KINDS_OF_ROLE, MATERIAL_REQUIRED
+from optisense.design.materials import kinds_for
+from optisense.design.sensor_design import MATERIAL_REQUIRED
 from optisense.errors import DesignError
 from optisense.geometry import TriangleMesh
 from optisense.library.adding import COLOURS
@@ -134,10 +135,10 @@ def _ask_materials(found: list[CadBody], uses: dict[str, Use]) -> Parts:
             usual = USUAL_MATERIAL.get(use, "black-absorber")
 
             def fits(answer: str, role: Role = use) -> str:
-                kind = library.material(answer).kind
-                if kind not in KINDS_OF_ROLE[role]:
-                    wanted = " or ".join(KINDS_OF_ROLE[role])
-                    raise ValueError(f"that is a {kind}; a {role.value} is a {wanted}")
+                material = library.material(answer)
+                if role not in material.roles:
+                    wanted = " or ".join(kinds_for(role))
+                    raise ValueError(f"that is a {material.kind}; a {role.value} is a {wanted}")
                 return answer
 
             material = ask(f"{each.name} ({use.value}) is made of", fits, usual)

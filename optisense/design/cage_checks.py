@@ -148,8 +148,8 @@ def _overlap(design: SensorDesign, name: str, other: str) -> Overlap:
     parts = design.parts[name], design.parts[other]
     if not all(part.role in TRANSPARENT_SOLIDS for part in parts):
         return "no"
-    one, two = (design.materials[part.material or ""] for part in parts)
-    if one.kind == two.kind == "dielectric" and one.ior == two.ior:
+    one, two = (design.materials[part.material or ""].medium() for part in parts)
+    if one is not None and two is not None and one.ior == two.ior:
         return "yes"
     return "no" if parts[0].priority == parts[1].priority else "odd"
 

@@ -55,7 +55,7 @@ def _inside_folder(path: str) -> str:
 IN_FOLDER = AfterValidator(_inside_folder)
 """Marks a field that names a file: `KindModel.files` finds it by this."""
 
-RelativePath = Annotated[str, IN_FOLDER]
+RelativePath = Annotated[str, IN_FOLDER, Field(json_schema_extra={"format": "path"})]
 """A file inside the design folder."""
 
 

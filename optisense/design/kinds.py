@@ -5,7 +5,6 @@ from __future__ import annotations
 import inspect
 import os
 from collections.abc import Callable, Mapping
-from importlib.metadata import entry_points
 from pathlib import Path
 from typing import Any, ClassVar, Self
 
@@ -13,89 +12,8 @@ from pydantic import GetCoreSchemaHandler, GetJsonSchemaHandler, PrivateAttr
 from pydantic_core import CoreSchema, PydanticKnownError, core_schema
 
 from optisense.design.fields import IN_FOLDER, Model
-from optisense.errors import LibraryError, SetupError
-from optisense.near import suggestion
-
-
-class Kinds:
-    """The kinds of one noun, by their names in files.
-
-    A kind is registered when its class is made. Installed packages name theirs under an entry
-    point group: `name = "module:Class"`; they are imported when the kinds are first asked for.
-    """
-
-    def __init__(self, noun: str, group: str) -> None:
-        """A registry without kinds.
-
-        Args:
-            noun: what a kind is one of, for messages: 'emitter'.
-            group: the entry point group of other packages' kinds.
-        """
-        self.noun = noun
-        self.group = group
-        self._classes: dict[str, Any] = {}
-        self._loaded = False
-
-    def add(self, kind: type[KindModel]) -> None:
-        """Register a class under the default of its field `kind`.
-
-        A class may be registered again by the same module, so that it can be reloaded.
-
-        Raises:
-            SetupError: another class has this name.
-        """
-        name = kind.model_fields["kind"].default
-        known = self._classes.get(name)
-        if known is not None and _identity(known) != _identity(kind):
-            raise SetupError(
-                f"there are two kinds of {self.noun} called '{name}': "
-                f"{'.'.join(_identity(known))} and {'.'.join(_identity(kind))}",
-                hint="Give one of them another name",
-            )
-        self._classes[name] = kind
-
-    def names(self) -> list[str]:
-        """The names of all kinds, the package's own first.
-
-        Raises:
-            SetupError: an installed package's kind can't be imported.
-        """
-        if not self._loaded:
-            self._loaded = True
-            for point in entry_points(group=self.group):
-                try:
-                    point.load()
-                except Exception as error:
-                    self._loaded = False
-                    raise SetupError(
-                        f"the {self.noun} '{point.name}' of an installed package can't be "
-                        f"imported: {type(error).__name__}: {error}",
-                        where=point.value,
-                        hint="Repair or uninstall that package",
-                    ) from error
-        return list(self._classes)
-
-    def find(self, name: str) -> Any:
-        """The class of a kind.
-
-        Raises:
-            LibraryError: there is no such kind; names the near match.
-            SetupError: an installed package's kind can't be imported.
-        """
-        if name not in self:
-            raise LibraryError(
-                f"there is no {self.noun} of kind '{name}'",
-                hint=suggestion(name, self.names(), limit=20),
-            )
-        return self._classes[name]
-
-    def __contains__(self, name: object) -> bool:
-        """Whether there is a kind of this name."""
-        return name in self.names()
-
-
-def _identity(kind: type) -> tuple[str, str]:
-    return kind.__module__, kind.__qualname__
+from optisense.errors import DesignError, LibraryError
+from optisense.registry import Registry
 
 
 class KindModel(Model):
@@ -107,10 +25,12 @@ class KindModel(Model):
 
     Attributes:
         kinds: all kinds of the noun.
+        usual_kind: of a noun, the kind of values that name none; they must name one if left out.
         title: what a menu calls the kind; its name if left out.
     """
 
-    kinds: ClassVar[Kinds]
+    kinds: ClassVar[Registry[Any]]
+    usual_kind: ClassVar[str | None] = None
     title: ClassVar[str] = ""
 
     kind: str
@@ -121,7 +41,7 @@ class KindModel(Model):
         """Register a kind when its class is made."""
         super().__pydantic_init_subclass__(**kwargs)
         if "kinds" not in cls.__dict__ and not cls.model_fields["kind"].is_required():
-            cls.kinds.add(cls)
+            cls.kinds.register(cls.model_fields["kind"].default, cls)
 
     @classmethod
     def __get_pydantic_core_schema__(
@@ -150,16 +70,24 @@ class KindModel(Model):
             return value
         if not isinstance(value, Mapping):
             raise PydanticKnownError("model_attributes_type")
-        name = value.get("kind")
+        name = value.get("kind", cls.usual_kind)
         if name is None:
             raise PydanticKnownError("union_tag_not_found", {"discriminator": "'kind'"})
-        if name not in cls.kinds:
-            known = ", ".join(repr(each) for each in cls.kinds.names())
+        try:
+            kind = cls.kinds.find(str(name))
+        except DesignError as error:
+            known = cls.kinds.names()
+            if name in known:  # a package names it, and can't be loaded
+                raise ValueError(str(error)) from error
             raise PydanticKnownError(
                 "union_tag_invalid",
-                {"discriminator": "'kind'", "tag": str(name), "expected_tags": known},
-            )
-        return cls.kinds.find(name).model_validate(value)
+                {
+                    "discriminator": "'kind'",
+                    "tag": str(name),
+                    "expected_tags": ", ".join(repr(each) for each in known),
+                },
+            ) from error
+        return kind.model_validate(value)
 
     @classmethod
     def summary(cls) -> str:
@@ -190,7 +118,7 @@ class KindModel(Model):
         file = self.files()[field]
         if self._folder is None:
             raise LibraryError(
-                f"the file '{file}' of {self.kinds.noun} '{self.kind}' has no folder",
+                f"the file '{file}' of the {self.kinds.noun} '{self.kind}' has no folder",
                 hint="Load the design or the library entry that names it from its folder",
             )
         folder = Path(os.path.realpath(self._folder))
@@ -224,8 +152,8 @@ class KindModel(Model):
         return self._folder
 
     def located(self, folder: Path | None) -> Self:
-        """The same object, now that it is known which folder its files are in."""
-        self._folder = folder
+        """The same object, now that it is known which folder its files are in, if it names any."""
+        self._folder = folder if self.files() else None
         return self
 
     def renamed(self, name: Callable[[str], str], folder: Path | None = None) -> Self:

@@ -180,8 +180,9 @@ def _fields_at(
     kind = _bare(kind)
     if not (isinstance(kind, type) and issubclass(kind, BaseModel)):
         return []
-    if issubclass(kind, KindModel) and isinstance(data, dict) and data.get("kind") in kind.kinds:
-        kind = kind.kinds.find(data["kind"])
+    if issubclass(kind, KindModel) and isinstance(data, dict):
+        name = str(data.get("kind", kind.usual_kind))
+        kind = kind.kinds.find(name) if name in kind.kinds.names() else kind
     return list(kind.model_fields)
 
 

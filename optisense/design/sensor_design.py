@@ -14,7 +14,7 @@ from optisense.design.cage import Cage
 from optisense.design.camera import Camera
 from optisense.design.fields import MisfitError, Model, Name
 from optisense.design.lights import LightGroup
-from optisense.design.materials import Coating, Material
+from optisense.design.materials import CoatingModel, Material, kinds_for
 from optisense.design.parts import Part, Role
 from optisense.errors import DesignError
 from optisense.geometry import TriangleMesh
@@ -22,16 +22,6 @@ from optisense.near import suggestion
 from optisense.text import to_html
 
 SCHEMA_VERSION = 1
-
-KINDS_OF_ROLE: dict[Role, tuple[str, ...]] = {
-    Role.ELASTOMER: ("dielectric",),
-    Role.SUPPORT: ("dielectric",),
-    Role.INTERFACE: ("dielectric",),
-    Role.MIRROR: ("conductor", "diffuse"),
-    Role.BLOCKER: ("absorber", "diffuse", "conductor"),
-    Role.INDENTER: ("diffuse", "conductor", "absorber"),
-}
-"""The kinds of material a role can be made of. A sensing surface has none: it is coated."""
 
 MATERIAL_REQUIRED = frozenset({Role.ELASTOMER, Role.SUPPORT, Role.INTERFACE, Role.MIRROR})
 
@@ -63,7 +53,7 @@ class SensorDesign(Model):
     schema_version: Literal[1] = Field(default=1, description="version of this file format")
     name: Annotated[str, StringConstraints(min_length=1, max_length=200)]
     description: str = ""
-    coating: Coating = Field(description="of the sensing surface")
+    coating: CoatingModel = Field(description="of the sensing surface")
     materials: dict[Name, Material] = Field(description="optical materials, by name")
     parts: Annotated[dict[Name, Part], Field(min_length=1)] = Field(
         description="solids and surfaces; lengths in mm"
@@ -111,7 +101,7 @@ class SensorDesign(Model):
         path: tuple[str | int, ...] = ("parts", name, "material")
         if part.material is None:
             if part.role in MATERIAL_REQUIRED:
-                kinds = KINDS_OF_ROLE[part.role]
+                kinds = kinds_for(part.role)
                 fit = [name for name, material in self.materials.items() if material.kind in kinds]
                 raise MisfitError(
                     f"part '{name}' ({part.role.value}) has no material",
@@ -133,13 +123,13 @@ class SensorDesign(Model):
                 path,
                 suggestion(part.material, self.materials),
             )
-        kind, fitting = self.materials[part.material].kind, KINDS_OF_ROLE[part.role]
-        if kind not in fitting:
+        material = self.materials[part.material]
+        if part.role not in material.roles:
             raise MisfitError(
                 f"part '{name}' ({part.role.value}) can't be made of '{part.material}', "
-                f"which is a {kind}",
+                f"which is a {material.kind}",
                 path,
-                "Use a material of kind " + " or ".join(fitting),
+                "Use a material of kind " + " or ".join(kinds_for(part.role)),
             )
 
     @property

@@ -34,7 +34,7 @@ def to_yaml(model: BaseModel, head: str) -> str:
 def _model(model: BaseModel, indent: str) -> Iterator[str]:
     for name, field in type(model).model_fields.items():
         value = getattr(model, name)
-        if value is not None:
+        if value is not None and not field.exclude:
             yield from _entry(name, value, indent, field.description)
 
 

@@ -1,5 +1,6 @@
 """Materials, coatings, lights and cameras that designs can name, each number with its source."""
 
+from optisense.design.materials import specularity_to_roughness
 from optisense.library import ies
 from optisense.library.adding import Added, add_file, add_ies, parse_colour
 from optisense.library.entries import AnyEntry, CameraModel, Entry, LightEntry, Source, TypicalLight
@@ -15,7 +16,6 @@ from optisense.library.loader import (
 )
 from optisense.library.own_parts import own_folder
 from optisense.library.portable import with_own_lights
-from optisense.library.scattering import specularity_to_roughness
 
 __all__ = [
     "Added",

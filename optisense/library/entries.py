@@ -10,7 +10,7 @@ from pydantic import Field, model_validator
 from optisense.design.camera import Pixels
 from optisense.design.emitters import LightModel
 from optisense.design.fields import Colour, MisfitError, Model, Name, Number, Positive
-from optisense.design.materials import Coating, Material
+from optisense.design.materials import CoatingModel, Material
 from optisense.design.sensor_design import Status
 from optisense.library.lens import lens_misfit
 from optisense.near import suggestion
@@ -175,7 +175,7 @@ class CameraModel(Model):
 
 
 MaterialEntry = Entry[Material]
-CoatingEntry = Entry[Coating]
+CoatingEntry = Entry[CoatingModel]
 CameraEntry = Entry[CameraModel]
 
 AnyEntry = MaterialEntry | CoatingEntry | LightEntry | CameraEntry

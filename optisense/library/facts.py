@@ -5,16 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
-
 from optisense.design.fields import unit_of
-from optisense.design.materials import Absorber, Coating, Conductor, Dielectric, Diffuse
 from optisense.library.entries import AnyEntry, CameraModel, LightEntry, Source
 from optisense.library.previews.camera import DISTANCES, footprint_size
 from optisense.library.previews.light import colour_facts
-from optisense.library.previews.material import critical_angle
-from optisense.library.previews.reflection import fresnel_dielectric, fresnel_metal
-from optisense.library.scattering import specularity_to_roughness
 
 UNITS = {
     "package": "mm",
@@ -48,17 +42,6 @@ class Fact:
 def summary(entry: AnyEntry) -> str:
     """The most telling numbers, in a few words."""
     value: Any = entry.value
-    if isinstance(value, Dielectric):
-        rough = f", rough {value.roughness:g}" if value.roughness > 0.0 else ""
-        return f"index {value.ior:g}{rough}"
-    if isinstance(value, Conductor):
-        return f"reflects {100 * float(fresnel_metal(1.0, value.eta, value.k).mean()):.0f} %"
-    if isinstance(value, Diffuse):
-        return f"reflects {100 * float(np.mean(value.reflectance)):.3g} %"
-    if isinstance(value, Absorber):
-        return "reflects nothing"
-    if isinstance(value, Coating):
-        return f"specularity {value.specularity:g}"
     if isinstance(value, CameraModel):
         wide, high, _ = value.angles()
         fisheye = " fisheye" if value.projection == "equidistant" else ""
@@ -93,22 +76,6 @@ def consequences(entry: AnyEntry) -> list[str]:
         LibraryError: the IES file of a light is missing or malformed.
     """
     value: Any = entry.value
-    if isinstance(value, Dielectric):
-        lines = [f"a smooth face reflects {100 * float(fresnel_dielectric(1.0, value.ior)):.1f} % "
-                 "of light that comes straight from air"]  # fmt: skip
-        limit = critical_angle(value.ior)
-        if limit is not None:
-            lines.append(f"light inside is wholly reflected beyond {limit:.1f} degrees")
-        return lines
-    if isinstance(value, Conductor):
-        share = 100 * fresnel_metal(1.0, value.eta, value.k)
-        return ["reflects {:.1f}, {:.1f}, {:.1f} % of R, G, B in air".format(*share)]
-    if isinstance(value, Coating):
-        alpha = specularity_to_roughness(value.specularity)
-        return [
-            f"{100 * (1 - value.specularity):.0f} % diffuse paint and "
-            f"{100 * value.specularity:.0f} % metal flake of roughness {alpha:.2g}"
-        ]
     if isinstance(value, CameraModel):
         angles = "sees {:.1f} degrees across, {:.1f} high, {:.1f} over the diagonal"
         lines = [angles.format(*value.angles())]
@@ -119,7 +86,7 @@ def consequences(entry: AnyEntry) -> list[str]:
     if isinstance(entry, LightEntry):
         half = f"half of the intensity at {value.half_angle():.3g} degrees from the axis"
         return [half, *colour_facts(entry)]
-    return []
+    return list(value.consequences())
 
 
 def _text(name: str, value: object, unit: str = "") -> str:

@@ -9,7 +9,7 @@ from typing import Any
 from optisense.design.check import unknown_light_hint
 from optisense.design.emitters import LightModel
 from optisense.design.lights import LightGroup
-from optisense.design.materials import Coating, Material
+from optisense.design.materials import CoatingModel, Material
 from optisense.design.yaml_reader import read_yaml
 from optisense.errors import LibraryError
 from optisense.library.entries import AnyEntry, CameraModel
@@ -74,7 +74,7 @@ def material(name: str) -> Material:
     return value
 
 
-def coating(name: str) -> Coating:
+def coating(name: str) -> CoatingModel:
     """The coating of this name; its `library` field says so.
 
     Raises:

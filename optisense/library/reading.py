@@ -10,6 +10,7 @@ from pydantic import TypeAdapter, ValidationError
 from optisense.design.emitters import LightModel
 from optisense.design.fields import Model
 from optisense.design.kinds import KindModel
+from optisense.design.materials import CoatingModel, Material
 from optisense.design.problems import design_error
 from optisense.design.yaml_reader import Lines, Steps, read_yaml
 from optisense.errors import LibraryError
@@ -88,10 +89,10 @@ def kind_of(data: dict[str, Any]) -> Kind | None:
     value = data.get("value")
     if not isinstance(value, dict):
         return None
-    if value.get("kind") in LightModel.kinds:
+    if value.get("kind") in LightModel.kinds.names():
         return "light"
-    if value.get("kind") in ("dielectric", "conductor", "diffuse", "absorber"):
+    if value.get("kind") in Material.kinds.names():
         return "material"
-    if "specularity" in value:
+    if value.get("kind") in CoatingModel.kinds.names() or "specularity" in value:
         return "coating"
     return "camera" if "fov" in value or "projection" in value else None

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from optisense import library
-from optisense.design import Dielectric, Role, SensorDesign
+from optisense.design import Role, SensorDesign
 from optisense.errors import LibraryError
 from optisense.library import AnyEntry
 from optisense.library.facts import summary
@@ -174,8 +174,9 @@ def _material(design: SensorDesign, shape: Shape) -> Item:
             description, maker = entry.description, entry.maker or ""
             if entry.value != value:
                 note = f"as changed in the design; the library has {summary(entry)}"
-        if isinstance(value, Dielectric):
-            note = "; ".join(filter(None, [f"index {value.ior:g}", note]))
+        medium = value.medium()
+        if medium is not None:
+            note = "; ".join(filter(None, [f"index {medium.ior:g}", note]))
     volume = shape.volume
     return Item(
         kind="material",
@@ -201,7 +202,7 @@ def _coating(design: SensorDesign, coated: Sequence[Shape]) -> list[Item]:
             used_for=f"{shape.name} ({shape.role.value})",
             description=entry.description if entry is not None else "described in the design",
             maker=(entry.maker or "") if entry is not None else "",
-            note=f"specularity {coating.specularity:g}",
+            note=coating.in_words(),
         )
         for shape in coated
     ]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from optisense.design import Dielectric, Role, SensorDesign
+from optisense.design import Role, SensorDesign
 from optisense.errors import DesignError
 from optisense.geometry import TriangleMesh
 
@@ -42,7 +42,8 @@ class Shape:
 def is_air(design: SensorDesign, name: str) -> bool:
     """Whether a part is a gap that the design draws, such as the film under a belt."""
     material = design.materials.get(design.parts[name].material or "")
-    return isinstance(material, Dielectric) and material.ior == AIR
+    medium = None if material is None else material.medium()
+    return medium is not None and medium.ior == AIR
 
 
 def shapes(design: SensorDesign) -> list[Shape]:

@@ -11,19 +11,20 @@ from PIL import Image
 
 from optisense import library
 from optisense.design import Absorber, AreaEmitter, Conductor, Dielectric, Diffuse, SpotEmitter
-from optisense.errors import OutputError
-from optisense.library import CameraModel, previews
-from optisense.library.previews.ball import picture_of_ball
-from optisense.library.previews.camera import border_directions, footprint, footprint_size
-from optisense.library.previews.light import equivalent_solid_angle
-from optisense.library.previews.material import lobes
-from optisense.library.previews.reflection import (
+from optisense.design.materials.base import GEL_INDEX
+from optisense.design.reflectance import (
     fresnel_dielectric,
     fresnel_metal,
     ggx_density,
     sample_facets,
     smith_shadowing,
 )
+from optisense.errors import OutputError
+from optisense.library import CameraModel, previews
+from optisense.library.previews.ball import picture_of_ball
+from optisense.library.previews.camera import border_directions, footprint, footprint_size
+from optisense.library.previews.light import equivalent_solid_angle
+from optisense.library.previews.material import lobes
 
 FloatArray = NDArray[np.float64]
 
@@ -101,7 +102,7 @@ class TestMaterials:
     def test_lobes_send_back_the_reflectance(self) -> None:
         """A diffuse lobe, turned about the normal, holds its reflectance of the light."""
         angle = np.linspace(0.0, 90.0, 2001)
-        diffuse, metal = lobes(Diffuse(reflectance=(0.5, 0.2, 0.1)), angle)
+        diffuse, metal = lobes(Diffuse(reflectance=(0.5, 0.2, 0.1)).reflection(), angle)
         sine = np.sin(np.radians(angle))[:, None]
         total = (2 * np.pi * diffuse * sine).sum(axis=0) * np.radians(angle[1])
         np.testing.assert_allclose(total, [0.5, 0.2, 0.1], rtol=INTEGRAL)
@@ -109,7 +110,9 @@ class TestMaterials:
 
     def test_the_metal_lobe_points_away_from_the_light(self) -> None:
         angle = np.linspace(-90.0, 90.0, 721)
-        diffuse, metal = lobes(library.coating("mirror-like"), angle)
+        diffuse, metal = lobes(
+            library.coating("mirror-like").reflection().seen_in(GEL_INDEX), angle
+        )
         assert diffuse.max() == 0.0
         assert angle[metal[:, 0].argmax()] == pytest.approx(45.0, abs=1.0)
 

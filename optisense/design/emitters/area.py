@@ -18,9 +18,12 @@ class AreaEmitter(LightModel):
     title: ClassVar[str] = "Flat window"
 
     kind: Literal["area"] = "area"
-    shape: Literal["rectangle", "disc"] = Field(default="disc", description="rectangle; disc")
+    shape: Literal["rectangle", "disc"] = Field(
+        default="disc", title="Window", description="rectangle; disc"
+    )
     size: tuple[Positive, Positive] = Field(
         description="mm, width and height of the window; a disc's diameter twice",
+        examples=[(2.0, 2.0)],
         json_schema_extra=MILLIMETRES,
     )
     lambertian: Literal[True] = Field(default=True, description="as bright from all sides")

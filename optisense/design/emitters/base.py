@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from dataclasses import dataclass
-from typing import Annotated, ClassVar, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -12,8 +12,9 @@ from pydantic import Field
 
 from optisense.design.emitters.intensity import Intensity
 from optisense.design.fields import DEGREES, Number
-from optisense.design.kinds import KindModel, Kinds
-from optisense.errors import LibraryError
+from optisense.design.kinds import KindModel
+from optisense.errors import DesignError, LibraryError
+from optisense.registry import Registry
 
 FloatArray = NDArray[np.float64]
 
@@ -58,7 +59,16 @@ class LightModel(KindModel):
     direction, 0 to 180; azimuth about it, 0 at the light's `up`.
     """
 
-    kinds: ClassVar[Kinds] = Kinds("emitter", "optisense.emitters")
+    kinds: ClassVar[Registry[Any]] = Registry(
+        "kind of emitter",
+        "optisense.emitters",
+        DesignError,
+        {
+            "area": "optisense.design.emitters.area:AreaEmitter",
+            "ies": "optisense.design.emitters.ies:IesEmitter",
+            "spot": "optisense.design.emitters.spot:SpotEmitter",
+        },
+    )
 
     @abstractmethod
     def relative_intensity(self, polar: ArrayLike, azimuth: ArrayLike = 0.0) -> FloatArray:

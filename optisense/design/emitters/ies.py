@@ -21,7 +21,7 @@ class IesEmitter(LightModel):
     title: ClassVar[str] = "IES profile"
 
     kind: Literal["ies"] = "ies"
-    file: RelativePath = Field(description="LM-63 file, inside this folder")
+    file: RelativePath = Field(title="IES file", description="LM-63 file, inside this folder")
 
     def intensity_table(self) -> IesProfile:
         """Read the file: luminous intensity (candela) over vertical and horizontal angles.

@@ -21,8 +21,12 @@ class SpotEmitter(LightModel):
     title: ClassVar[str] = "Spot"
 
     kind: Literal["spot"] = "spot"
-    cutoff: HalfAngle = Field(description="degrees from the axis where the light ends")
-    beam: HalfAngle = Field(description="degrees from the axis up to which it is full")
+    cutoff: HalfAngle = Field(
+        title="Cut-off", description="degrees from the axis where the light ends", examples=[45.0]
+    )
+    beam: HalfAngle = Field(
+        description="degrees from the axis up to which it is full", examples=[30.0]
+    )
 
     @model_validator(mode="after")
     def _beam_inside_cutoff(self) -> SpotEmitter:

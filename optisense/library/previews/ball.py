@@ -9,8 +9,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from optisense.design.materials import Absorber, Coating, Conductor, Dielectric, Material
-from optisense.library.previews.reflection import (
+from optisense.design.materials import CoatingModel, Material, Medium, Reflection
+from optisense.design.materials.base import GEL_INDEX
+from optisense.design.reflectance import (
     fresnel_dielectric,
     fresnel_metal,
     ggx_density,
@@ -18,12 +19,8 @@ from optisense.library.previews.reflection import (
     smith_shadowing,
 )
 from optisense.library.previews.studio import Studio, coloured_studio, white_studio
-from optisense.library.scattering import specularity_to_roughness
 
 FloatArray = NDArray[np.float64]
-
-GEL_INDEX = 1.41
-"""A coating is seen from inside the gel, as in a sensor."""
 
 SMOOTH = 1e-3
 """Below this roughness a face is a plain mirror."""
@@ -38,13 +35,14 @@ STEPS = np.array([0.7548776662466927, 0.5698402909980532])
 
 
 def picture_of_ball(
-    material: Material | Coating, size: int = 280, seed: int = 0
+    material: Material | CoatingModel, size: int = 280, seed: int = 0
 ) -> NDArray[np.uint8]:
     """(size, size, 3) sRGB picture of a ball of the material."""
     offsets = np.random.default_rng(seed).random((size * size, 4))
-    studio = white_studio(0.3 if isinstance(material, Dielectric) else 1.0)
-    if isinstance(material, Coating):
-        studio = coloured_studio()
+    medium, surface = medium_of(material), material.reflection()
+    studio = white_studio(1.0 if medium is None else 0.3)
+    if isinstance(material, CoatingModel):
+        studio, surface = coloured_studio(), surface.seen_in(GEL_INDEX)
     pixels = np.arange(size * size)
     light = np.zeros((size * size, 3))
     start, towards = _camera_rays(pixels, size, offsets)
@@ -53,7 +51,7 @@ def picture_of_ball(
     for number in range(4):
         place = _even(offsets[beside, :2], number)
         light[beside] += studio.radiance(*_camera_rays(beside, size, place)) / 4
-    samples = _samples(material)
+    samples = _samples(medium, surface)
     for number in range(samples):
         start, towards = _camera_rays(ball, size, _even(offsets[ball, :2], number))
         passing = _passing(start, towards)
@@ -63,7 +61,7 @@ def picture_of_ball(
         distance = -np.einsum("ij,ij->i", start[hit], towards[hit]) - np.sqrt(1 - passing[hit])
         place = start[hit] + distance[:, None] * towards[hit]
         u = _even(offsets[ball, 2:], number)[hit]
-        shone[hit] = _from_ball(place, towards[hit], material, studio, u)
+        shone[hit] = _from_ball(place, towards[hit], medium, surface, studio, u)
         light[ball] += np.minimum(shone, 4.0) / samples
     return _coded(light).reshape(size, size, 3)
 
@@ -102,37 +100,39 @@ def _passing(start: FloatArray, towards: FloatArray) -> FloatArray:
     return np.asarray(np.einsum("ij,ij->i", start, start) - along**2)
 
 
-def _samples(material: Material | Coating) -> int:
+def medium_of(material: Material | CoatingModel) -> Medium | None:
+    """What light meets that enters a ball of the material; None where it is opaque."""
+    return material.medium() if isinstance(material, Material) else None
+
+
+def _samples(medium: Medium | None, surface: Reflection) -> int:
     """How many rays a pixel needs: more where rays are scattered and lamps found by chance."""
-    if isinstance(material, Coating):
-        alpha = specularity_to_roughness(material.specularity)
-    else:
-        alpha = material.roughness if isinstance(material, Dielectric | Conductor) else 0.0
-    by_chance = alpha < SHARP or isinstance(material, Dielectric)
+    alpha = surface.roughness if medium is None else medium.roughness
+    by_chance = alpha < SHARP or medium is not None
     return SAMPLES_ROUGH if alpha >= SMOOTH and by_chance else SAMPLES_SMOOTH
 
 
 def _from_ball(
     place: FloatArray,
     towards: FloatArray,
-    material: Material | Coating,
+    medium: Medium | None,
+    surface: Reflection,
     studio: Studio,
     u: FloatArray,
 ) -> FloatArray:
     """(n, 3) radiance that leaves the ball's surface towards the camera."""
-    if isinstance(material, Absorber):
+    if medium is not None:
+        return _through(place, towards, medium, studio, u)
+    if surface.is_black:
         return np.zeros((len(place), 3))
-    if isinstance(material, Dielectric):
-        return _through(place, towards, material, studio, u)
-    if isinstance(material, Conductor):
-        eta, k = np.array(material.eta), np.array(material.k)
-        return _metal(place, towards, eta, k, material.roughness, studio, u)
-    share = material.specularity if isinstance(material, Coating) else 0.0
-    light = studio.irradiance(place) * np.array(material.reflectance) * (1.0 - share) / np.pi
-    if isinstance(material, Coating) and share > 0.0:
-        eta, k = np.array(material.eta) / GEL_INDEX, np.array(material.k) / GEL_INDEX
-        alpha = specularity_to_roughness(share)
-        light += share * _metal(place, towards, eta, k, alpha, studio, u)
+    share = surface.specularity
+    light = np.zeros((len(place), 3))
+    if share < 1.0:
+        diffuse = np.array(surface.reflectance) * (1.0 - share) / np.pi
+        light += studio.irradiance(place) * diffuse
+    if share > 0.0:
+        eta, k = np.array(surface.eta), np.array(surface.k)
+        light += share * _metal(place, towards, eta, k, surface.roughness, studio, u)
     return light
 
 
@@ -167,7 +167,7 @@ def _metal(
 
 
 def _through(
-    place: FloatArray, towards: FloatArray, glass: Dielectric, studio: Studio, u: FloatArray
+    place: FloatArray, towards: FloatArray, glass: Medium, studio: Studio, u: FloatArray
 ) -> FloatArray:
     """Mirrored by the front of a clear ball, and refracted through it."""
     alpha = glass.roughness

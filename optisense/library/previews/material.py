@@ -7,15 +7,16 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from optisense.design.materials import Absorber, Coating, Conductor, Dielectric, Diffuse, Material
-from optisense.library.previews.ball import GEL_INDEX, picture_of_ball
-from optisense.library.previews.reflection import (
+from optisense.design.materials import CoatingModel, Material, Medium, Reflection
+from optisense.design.materials.base import GEL_INDEX
+from optisense.design.materials.dielectric import critical_angle
+from optisense.design.reflectance import (
     fresnel_dielectric,
     fresnel_metal,
     ggx_density,
     smith_shadowing,
 )
-from optisense.library.scattering import specularity_to_roughness
+from optisense.library.previews.ball import medium_of, picture_of_ball
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -28,27 +29,23 @@ INCIDENCE = 45.0
 """Degrees from the normal at which the light comes in the picture of a lobe."""
 
 
-def draw_material(figure: Figure, material: Material | Coating) -> None:
+def draw_material(figure: Figure, material: Material | CoatingModel) -> None:
     """Draw both pictures into a figure."""
     left = figure.add_axes((0.03, 0.06, 0.36, 0.77))
     left.imshow(picture_of_ball(material), interpolation="none")
     left.set_axis_off()
     place = (0.49, 0.15, 0.47, 0.62)
-    if isinstance(material, Dielectric):
-        _reflectance_of_glass(figure.add_axes(place), material)
-    elif isinstance(material, Conductor):
-        _reflectance_of_metal(figure.add_axes(place), material)
+    medium = medium_of(material)
+    if medium is not None:
+        _reflectance_of_glass(figure.add_axes(place), material, medium)
+    elif material.reflection().is_metal and isinstance(material, Material):
+        _reflectance_of_metal(figure.add_axes(place), material.reflection())
     else:
         axes: Any = figure.add_axes((0.43, -0.17, 0.54, 1.08), projection="polar")
         figure.text(0.70, 0.85, _lobes(axes, material), fontsize=9, ha="center", va="top")
 
 
-def critical_angle(ior: float) -> float | None:
-    """Degrees from the normal beyond which light inside is reflected wholly; None for air."""
-    return float(np.degrees(np.arcsin(1.0 / ior))) if ior > 1.0 else None
-
-
-def _reflectance_of_glass(axes: Axes, glass: Dielectric) -> None:
+def _reflectance_of_glass(axes: Axes, material: Any, glass: Medium) -> None:
     angle = np.linspace(0.0, 90.0, 361)
     cosine = np.cos(np.radians(angle))
     axes.plot(angle, 100 * fresnel_dielectric(cosine, glass.ior), color="0.15", label="from air")
@@ -64,8 +61,9 @@ def _reflectance_of_glass(axes: Axes, glass: Dielectric) -> None:
             arrowprops={"arrowstyle": "-", "color": "0.5"},
         )
     facts = f"index {glass.ior:g}"
-    if glass.dispersion is not None:
-        facts += "  (R, G, B: " + ", ".join(f"{n:.3f}" for n in glass.dispersion) + ")"
+    dispersion = getattr(material, "dispersion", None)
+    if dispersion is not None:
+        facts += "  (R, G, B: " + ", ".join(f"{n:.3f}" for n in dispersion) + ")"
     facts += f"\nroughness {glass.roughness:g}" + (" (smooth)" if glass.roughness == 0 else "")
     axes.set_title(facts, fontsize=9, loc="left")
     axes.set(xlim=(0, 90), ylim=(0, 103), ylabel="reflected by a smooth face (%)")
@@ -74,7 +72,7 @@ def _reflectance_of_glass(axes: Axes, glass: Dielectric) -> None:
     _tidy(axes)
 
 
-def _reflectance_of_metal(axes: Axes, metal: Conductor) -> None:
+def _reflectance_of_metal(axes: Axes, metal: Reflection) -> None:
     angle = np.linspace(0.0, 90.0, 361)
     share = 100 * fresnel_metal(np.cos(np.radians(angle)), metal.eta, metal.k)
     for channel, (colour, shade) in enumerate(RGB):
@@ -87,41 +85,42 @@ def _reflectance_of_metal(axes: Axes, metal: Conductor) -> None:
     _tidy(axes)
 
 
-def lobes(material: Coating | Diffuse, angle: FloatArray) -> tuple[FloatArray, FloatArray]:
+def lobes(surface: Reflection, angle: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Light scattered in the plane of incidence, per steradian: reflectance times cosine.
 
     Args:
+        surface: as seen in the medium before it.
         angle: (n,) degrees from the normal, positive beyond it from where the light comes.
 
     Returns:
         The diffuse part and the metallic part, (n, 3) each, for R, G, B.
     """
     cosine = np.cos(np.radians(angle))
-    diffuse = cosine[:, None] / np.pi * np.array(material.reflectance)
-    if isinstance(material, Diffuse):
+    diffuse = cosine[:, None] / np.pi * np.array(surface.reflectance)
+    if surface.specularity == 0.0:
         return diffuse, np.zeros_like(diffuse)
-    share, alpha = material.specularity, specularity_to_roughness(material.specularity)
+    share, alpha = surface.specularity, surface.roughness
     half = np.radians(0.5 * (angle - INCIDENCE))
     at_facet = np.cos(np.radians(0.5 * (angle + INCIDENCE)))
-    eta, k = np.array(material.eta) / GEL_INDEX, np.array(material.k) / GEL_INDEX
     incoming = np.cos(np.radians(INCIDENCE))
     strength = ggx_density(np.cos(half), alpha) / (4.0 * incoming)
     strength *= smith_shadowing(incoming, alpha) * smith_shadowing(cosine, alpha)
-    metal = fresnel_metal(at_facet, eta, k) * strength[:, None]
+    metal = fresnel_metal(at_facet, surface.eta, surface.k) * strength[:, None]
     return (1.0 - share) * diffuse, share * metal
 
 
-def _lobes(axes: Any, material: Coating | Diffuse | Absorber) -> str:
+def _lobes(axes: Any, material: Material | CoatingModel) -> str:
     """Draw where light goes, and return the text above it."""
     axes.set_theta_zero_location("N")
     axes.set_theta_direction(-1)
     axes.set(thetamin=-90, thetamax=90)
     axes.tick_params(labelsize=8)
     axes.set_yticklabels([])
-    if isinstance(material, Absorber):
+    surface, coated = material.reflection(), isinstance(material, CoatingModel)
+    if surface.is_black:
         return "absorbs all light"
     angle = np.linspace(-90.0, 90.0, 721)
-    parts = lobes(material, angle)
+    parts = lobes(surface.seen_in(GEL_INDEX) if coated else surface, angle)
     names = ("diffuse paint", "metal flake")
     total = np.zeros(len(angle))
     for part, name, shade in zip(parts, names, ("0.75", "#e0a030"), strict=True):
@@ -139,12 +138,10 @@ def _lobes(axes: Any, material: Coating | Diffuse | Absorber) -> str:
     )
     axes.legend(frameon=False, fontsize=9, loc="lower center", bbox_to_anchor=(0.5, 0.155), ncols=2)
     facts = "scattered light for one ray at 45°"
-    if isinstance(material, Coating):
-        facts += f", seen in silicone\nspecularity {material.specularity:g}"
-        if material.specularity > 0.0:
-            facts += (
-                f", roughness of the flake {specularity_to_roughness(material.specularity):.2g}"
-            )
+    if coated:
+        facts += f", seen in silicone\nspecularity {surface.specularity:g}"
+        if surface.specularity > 0.0:
+            facts += f", roughness of the flake {surface.roughness:.2g}"
     return facts
 
 

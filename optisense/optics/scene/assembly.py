@@ -11,7 +11,7 @@ from optisense import library
 from optisense.design import LightGroup, LightModel, SensorDesign
 from optisense.design.check import inside
 from optisense.design.emitters import Intensity
-from optisense.design.materials import Absorber, Coating, Conductor, Dielectric, Diffuse, Material
+from optisense.design.materials import CoatingModel, Material, Medium, Reflection
 from optisense.design.parts import TRANSPARENT_SOLIDS, Role
 from optisense.errors import DesignError
 from optisense.geometry import TriangleMesh
@@ -113,13 +113,13 @@ def assemble(design: SensorDesign, before: Assembly | None = None, bend: bool = 
         mesh = kept.merge(meshes[name], old, bend)
         material = design.materials.get(part.material) if part.material else None
         if part.role in TRANSPARENT_SOLIDS:
-            assert isinstance(material, Dielectric) and part.material is not None
+            medium = _medium(design, name, material)
             solids.append(
-                Solid(name, mesh, part.material, material.ior, material.roughness, part.priority)
+                Solid(name, mesh, part.material or "", medium.ior, medium.roughness, part.priority)
             )
         elif part.role is Role.INTERFACE:
-            assert isinstance(material, Dielectric)
-            surface = Surface(SurfaceKind.DIELECTRIC, eta=material.ior, alpha=material.roughness)
+            medium = _medium(design, name, material)
+            surface = Surface(SurfaceKind.DIELECTRIC, eta=medium.ior, alpha=medium.roughness)
             pieces.append(kept.piece(name, mesh, surface, old))
         elif part.role is not Role.INDENTER:
             sheets.append(Sheet(name, mesh, part.role.value))
@@ -163,15 +163,28 @@ def assemble(design: SensorDesign, before: Assembly | None = None, bend: bool = 
     )
 
 
-def coating_surface(coating: Coating, ior: float, region: Region) -> Surface:
+def _medium(design: SensorDesign, part: str, material: Material | None) -> Medium:
+    medium = None if material is None else material.medium()
+    if medium is None:
+        raise DesignError(
+            f"part '{part}' must be transparent", where=design.where("parts", part, "material")
+        )
+    return medium
+
+
+def coating_surface(coating: CoatingModel, ior: float, region: Region) -> Surface:
     """The coating as seen from a medium of refractive index ``ior``."""
+    return _reflecting(SurfaceKind.OPAQUE, coating.reflection().seen_in(ior), region)
+
+
+def _reflecting(kind: SurfaceKind, reflection: Reflection, region: Region) -> Surface:
     return Surface(
-        SurfaceKind.OPAQUE,
-        alpha=library.specularity_to_roughness(coating.specularity),
-        specularity=coating.specularity,
-        reflectance=coating.reflectance,
-        metal_eta=_relative(coating.eta, ior),
-        metal_k=_relative(coating.k, ior),
+        kind,
+        alpha=reflection.roughness,
+        specularity=reflection.specularity,
+        reflectance=reflection.reflectance,
+        metal_eta=reflection.eta,
+        metal_k=reflection.k,
         region=region,
     )
 
@@ -182,24 +195,13 @@ def indenter_piece(mesh: TriangleMesh, coating: Surface) -> Piece:
     return Piece("indenter", mesh.vertices, mesh.faces, surface, mesh.normals)
 
 
-def _relative(values: tuple[float, float, float], ior: float) -> tuple[float, float, float]:
-    return values[0] / ior, values[1] / ior, values[2] / ior
-
-
 def _opaque(material: Material | None, ior: float) -> Surface:
-    if isinstance(material, Diffuse):
-        return Surface(SurfaceKind.OPAQUE, alpha=1.0, reflectance=material.reflectance)
-    if isinstance(material, Conductor):
-        kind = SurfaceKind.MIRROR if material.roughness < SMOOTH_METAL else SurfaceKind.OPAQUE
-        return Surface(
-            kind,
-            alpha=material.roughness,
-            specularity=1.0,
-            metal_eta=_relative(material.eta, ior),
-            metal_k=_relative(material.k, ior),
-        )
-    assert material is None or isinstance(material, Absorber)
-    return Surface(SurfaceKind.ABSORBER)
+    reflection = Reflection() if material is None else material.reflection()
+    if reflection.is_black:
+        return Surface(SurfaceKind.ABSORBER)
+    smooth = reflection.is_metal and reflection.roughness < SMOOTH_METAL
+    kind = SurfaceKind.MIRROR if smooth else SurfaceKind.OPAQUE
+    return _reflecting(kind, reflection.seen_in(ior), Region.OTHER)
 
 
 def _index_before(mesh: TriangleMesh, solids: list[Solid]) -> float:

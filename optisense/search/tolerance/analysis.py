@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from optisense.design import Dielectric, SensorDesign
+from optisense.design import SensorDesign
 from optisense.errors import SearchError
 from optisense.objectives.score import deviation_of
 from optisense.search.evaluation.evaluator import DesignEvaluator, Goal
@@ -136,7 +136,8 @@ def usual_errors(design: SensorDesign) -> ManufacturingErrors:
     found |= {f"cages.{name}.points": CAGE_POINT for name in design.cages}
     used = {part.material for part in design.parts.values()}
     for name, material in design.materials.items():
-        if isinstance(material, Dielectric) and name in used and material.ior > 1.001:
+        index = getattr(material, "ior", 1.0)
+        if name in used and index > 1.001:
             found[f"materials.{name}.ior"] = INDEX
     return ManufacturingErrors(found)
 

@@ -19,9 +19,9 @@ from optisense.design import (
     SensorDesign,
     Status,
 )
+from optisense.design.materials import kinds_for
 from optisense.design.parts import TRANSPARENT_SOLIDS
 from optisense.design.problems import design_error
-from optisense.design.sensor_design import KINDS_OF_ROLE
 from optisense.errors import DesignError, MeshError
 from optisense.geometry import TriangleMesh
 from optisense.geometry.repair import refuse_bad_sheet, repaired
@@ -191,11 +191,11 @@ class _Builder(RecipeState):
                 continue
             self.known("material", material, "parts", name, "material")
             used[material] = library.material(material)
-            kind, fitting = used[material].kind, KINDS_OF_ROLE.get(part.role, ())
-            if kind not in fitting:
+            if part.role not in used[material].roles:
+                fitting = kinds_for(part.role)
                 raise DesignError(
                     f"part '{name}' ({part.role.value}) can't be made of '{material}', which is "
-                    f"a {kind}",
+                    f"a {used[material].kind}",
                     where=self.recipe.where("parts", name, "material"),
                     hint="Choose a material of kind " + " or ".join(fitting)
                     if fitting
@@ -217,7 +217,13 @@ class _Builder(RecipeState):
     ) -> SensorDesign:
         coating = library.coating(self.recipe.coating)
         if self.recipe.specularity is not None:
-            coating.specularity = self.recipe.specularity
+            if "specularity" not in type(coating).model_fields:
+                raise DesignError(
+                    f"a coating of kind '{coating.kind}' has no specularity",
+                    where=self.recipe.where("specularity"),
+                    hint="Leave it out",
+                )
+            setattr(coating, "specularity", self.recipe.specularity)  # noqa: B010
         parts = {
             name: Part(
                 role=part.role,

@@ -1,0 +1,31 @@
+"""What parts are made of, and the coating of the sensing surface: a file for each kind.
+
+`Material` stands for any material of a part, `CoatingModel` for any coating.
+"""
+
+from optisense.design.materials.absorber import Absorber
+from optisense.design.materials.base import (
+    CoatingModel,
+    Material,
+    Medium,
+    Reflection,
+    kinds_for,
+)
+from optisense.design.materials.coating import Coating, specularity_to_roughness
+from optisense.design.materials.conductor import Conductor
+from optisense.design.materials.dielectric import Dielectric
+from optisense.design.materials.diffuse import Diffuse
+
+__all__ = [
+    "Absorber",
+    "Coating",
+    "CoatingModel",
+    "Conductor",
+    "Dielectric",
+    "Diffuse",
+    "Material",
+    "Medium",
+    "Reflection",
+    "kinds_for",
+    "specularity_to_roughness",
+]

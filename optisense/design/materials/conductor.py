@@ -1,0 +1,42 @@
+"""A metal."""
+
+from __future__ import annotations
+
+from typing import ClassVar, Literal
+
+from pydantic import Field
+
+from optisense.design.fields import Fraction, NonNegativeRGB, PositiveRGB
+from optisense.design.materials.base import Material, Reflection
+
+
+class Conductor(Material):
+    """A metal surface such as a mirror."""
+
+    title: ClassVar[str] = "Metal"
+
+    kind: Literal["conductor"] = "conductor"
+    eta: PositiveRGB = Field(
+        title="Index, real",
+        description="real part of the refractive index at R, G, B",
+        examples=[(1.0, 1.0, 1.0)],
+    )
+    k: NonNegativeRGB = Field(
+        title="Index, imaginary",
+        description="imaginary part of the refractive index at R, G, B",
+        examples=[(0.0, 0.0, 0.0)],
+    )
+    roughness: Fraction = Field(default=0.0, description="GGX alpha, 0 is a perfect mirror")
+
+    def reflection(self) -> Reflection:
+        """The metal alone."""
+        return Reflection(specularity=1.0, roughness=self.roughness, eta=self.eta, k=self.k)
+
+    def in_words(self) -> str:
+        """What it reflects head on."""
+        return f"reflects {100 * float(self.reflection().head_on().mean()):.0f} %"
+
+    def consequences(self) -> list[str]:
+        """What it reflects of each colour."""
+        share = 100 * self.reflection().head_on()
+        return ["reflects {:.1f}, {:.1f}, {:.1f} % of R, G, B in air".format(*share)]

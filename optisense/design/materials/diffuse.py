@@ -1,0 +1,23 @@
+"""A matt surface."""
+
+from __future__ import annotations
+
+from typing import ClassVar, Literal
+
+from pydantic import Field
+
+from optisense.design.fields import Colour
+from optisense.design.materials.base import Material, Reflection
+
+
+class Diffuse(Material):
+    """An opaque Lambertian surface."""
+
+    title: ClassVar[str] = "Diffuse"
+
+    kind: Literal["diffuse"] = "diffuse"
+    reflectance: Colour = Field(description="of R, G, B, 0 to 1", examples=[(0.5, 0.5, 0.5)])
+
+    def reflection(self) -> Reflection:
+        """The diffuse lobe alone."""
+        return Reflection(reflectance=self.reflectance)

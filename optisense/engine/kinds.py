@@ -1,0 +1,139 @@
+"""The request about kinds: what emitters, materials and coatings there are, and their fields."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from pydantic import TypeAdapter, ValidationError
+
+from optisense import library
+from optisense.design.emitters import LightModel
+from optisense.design.kinds import KindModel
+from optisense.design.materials import CoatingModel, Material, kinds_for
+from optisense.design.parts import Role
+from optisense.design.problems import design_error
+from optisense.engine.failures import ProtocolError
+from optisense.engine.jobs import Job
+from optisense.engine.protocol import Fields
+from optisense.engine.requests import Lane, handles
+from optisense.engine.session import Session
+from optisense.errors import DesignError
+
+NOUNS: dict[str, type[KindModel]] = {
+    "emitter": LightModel,
+    "material": Material,
+    "coating": CoatingModel,
+}
+"""What comes in kinds; each noun has its own registry."""
+
+NOT_SHOWN = ("kind", "library")
+"""Fields that say what a value is, and are no numbers to change."""
+
+BOUNDS = {
+    "minimum": "minimum",
+    "exclusiveMinimum": "above",
+    "maximum": "maximum",
+    "exclusiveMaximum": "below",
+}
+"""What a JSON schema calls a bound, and what a row calls it."""
+
+
+@handles("kinds", Fields, Lane.QUICK)
+def kinds(session: Session, fields: Fields, job: Job) -> dict[str, Any]:
+    """All kinds with their fields, and which materials suit a role."""
+    return {
+        "kinds": {
+            word: [_kind(noun.kinds.find(name)) for name in noun.kinds.names()]
+            for word, noun in NOUNS.items()
+        },
+        "materials_of_role": {role.value: kinds_for(role) for role in Role},
+    }
+
+
+class Lamp(Fields):
+    """See docs/engine.md."""
+
+    entry: str | None = None
+    value: dict[str, Any] | None = None
+    folder: str | None = None
+
+
+@handles("lamp", Lamp, Lane.QUICK)
+def lamp(session: Session, fields: Lamp, job: Job) -> dict[str, Any]:
+    """How a lamp is drawn: its window and its half angle."""
+    if (fields.entry is None) == (fields.value is None):
+        raise ProtocolError("give either 'entry' or 'value'", where="lamp")
+    if fields.value is None:
+        emitter = library.light(fields.entry or "")
+    else:
+        emitter = _emitter(fields.value)
+        emitter.located(None if fields.folder is None else Path(fields.folder))
+    window = emitter.window()
+    return {
+        "window": None if window is None else {"shape": window.shape, "size": window.size},
+        "half_angle": emitter.half_angle(),
+        "in_words": emitter.in_words(),
+    }
+
+
+def _emitter(value: dict[str, Any]) -> LightModel:
+    try:
+        return TypeAdapter(LightModel).validate_python(value)
+    except ValidationError as error:
+        found = design_error(error, value, where="value", model=LightModel)
+        raise DesignError(found.message, where=found.where, hint=found.hint) from None
+
+
+def _kind(kind: type[KindModel]) -> dict[str, Any]:
+    name = kind.model_fields["kind"].default
+    schema = kind.model_json_schema(mode="validation")
+    return {
+        "name": name,
+        "title": kind.title or name,
+        "summary": kind.summary(),
+        "fields": [
+            field_row(field, values, required=field in schema.get("required", ()))
+            for field, values in schema["properties"].items()
+            if field not in NOT_SHOWN and "const" not in values
+        ],
+    }
+
+
+def field_row(name: str, schema: dict[str, Any], *, required: bool) -> dict[str, Any]:
+    """A field as a front end shows it, of its JSON schema.
+
+    Returns:
+        `name`, `title`, `help`, `unit`; whether it is `required` and may be `absent`; `start`, a
+        value to begin with (null where there is none); `type`: number, numbers (with `size`),
+        flag, choice (with `choices`), file, text, or data where it is none of these. Numbers have
+        those of the bounds minimum, above, maximum and below that they have.
+    """
+    start = schema.get("default")
+    members = [each for each in schema.get("anyOf", ()) if each.get("type") != "null"]
+    row = {
+        "name": name,
+        "title": schema.get("title", name),
+        "help": schema.get("description", ""),
+        "unit": schema.get("unit", ""),
+        "required": required,
+        "absent": len(members) < len(schema.get("anyOf", ())),
+        "start": next(iter(schema.get("examples", ())), None) if start is None else start,
+    }
+    if len(members) == 1:
+        schema = members[0]
+    items = schema.get("prefixItems", ())
+    of_numbers = bool(items) and all(each.get("type") == "number" for each in items)
+    if schema.get("type") in ("number", "integer"):
+        return row | {"type": "number"} | _bounds(schema)
+    if of_numbers:
+        return row | {"type": "numbers", "size": len(items)} | _bounds(items[0])
+    if "enum" in schema:
+        return row | {"type": "choice", "choices": schema["enum"]}
+    if schema.get("type") == "string":
+        return row | {"type": "file" if schema.get("format") == "path" else "text"}
+    return row | {"type": "flag" if schema.get("type") == "boolean" else "data"}
+
+
+def _bounds(schema: dict[str, Any]) -> dict[str, Any]:
+    return {ours: schema[theirs] for theirs, ours in BOUNDS.items() if theirs in schema}

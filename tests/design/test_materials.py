@@ -1,0 +1,101 @@
+"""Kinds of materials and coatings: what they tell is what everything else shows and simulates."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any, ClassVar, Literal
+
+import numpy as np
+import pytest
+
+from optisense import sensors
+from optisense.design import SensorDesign, load_design, save_design
+from optisense.design.fields import Colour, Fraction
+from optisense.design.materials import (
+    Absorber,
+    Coating,
+    CoatingModel,
+    Conductor,
+    Dielectric,
+    Diffuse,
+    Material,
+    Reflection,
+    kinds_for,
+)
+from optisense.design.parts import Role
+from optisense.errors import DesignError
+
+SILVER: dict[str, Any] = {"eta": (0.15, 0.13, 0.14), "k": (3.9, 3.1, 2.4)}
+
+
+class Plastic(Material):
+    """A matt plastic with some gloss."""
+
+    roles: ClassVar[tuple[Role, ...]] = (Role.BLOCKER,)
+
+    kind: Literal["test-plastic"] = "test-plastic"
+    colour: Colour
+    gloss: Fraction = 0.1
+
+    def reflection(self) -> Reflection:
+        return Reflection(self.colour, self.gloss, 0.3, (1.5, 1.5, 1.5), (0.0, 0.0, 0.0))
+
+
+class Chalk(CoatingModel):
+    """A coating without flake."""
+
+    kind: Literal["test-chalk"] = "test-chalk"
+    white: Fraction
+
+    def reflection(self) -> Reflection:
+        return Reflection(reflectance=(self.white, self.white, self.white))
+
+
+def test_each_role_takes_the_kinds_that_say_so() -> None:
+    assert kinds_for(Role.ELASTOMER) == ("dielectric",)
+    assert set(kinds_for(Role.MIRROR)) == {"conductor", "diffuse"}
+    assert "test-plastic" in kinds_for(Role.BLOCKER)
+    assert kinds_for(Role.SENSING_SURFACE) == ()
+
+
+def test_a_part_of_a_kind_that_does_not_suit_it_is_refused() -> None:
+    data = sensors.load("builtin:gelsight-mini").model_dump(mode="json")
+    gel = next(name for name, part in data["parts"].items() if part["role"] == "elastomer")
+    data["materials"]["grey"] = {"kind": "test-plastic", "colour": [0.5, 0.5, 0.5]}
+    data["parts"][gel]["material"] = "grey"
+    with pytest.raises(ValueError, match=f"part '{gel}' .* can't be made of 'grey'"):
+        SensorDesign.model_validate(data)
+
+
+def test_head_on_reflection_is_the_blend_of_both_lobes() -> None:
+    metal = Conductor(**SILVER).reflection().head_on()
+    paint = Diffuse(reflectance=(0.2, 0.4, 0.6)).reflection().head_on()
+    both = Coating(reflectance=(0.2, 0.4, 0.6), specularity=0.25, **SILVER).reflection().head_on()
+    np.testing.assert_allclose(both, 0.75 * paint + 0.25 * metal)
+    assert Absorber().reflection().is_black and not Absorber().reflection().head_on().any()
+    n = 1.5  # Fresnel: the index alone tells what a clear face reflects
+    glass = Reflection(specularity=1.0, eta=(n, n, n)).head_on()
+    np.testing.assert_allclose(glass, ((n - 1) / (n + 1)) ** 2)
+
+
+def test_an_index_in_a_medium_is_relative_to_it() -> None:
+    seen = Conductor(**SILVER).reflection().seen_in(2.0)
+    np.testing.assert_allclose(seen.eta, np.array(SILVER["eta"]) / 2.0)
+    assert Dielectric(ior=1.4).medium().ior == 1.4
+
+
+def test_a_coating_of_another_kind_is_in_files_and_the_usual_one_need_not_be_named(
+    tmp_path: Path,
+) -> None:
+    design = sensors.load("builtin:gelsight-mini")
+    save_design(design, tmp_path / "usual")
+    assert "kind: flake" not in (tmp_path / "usual" / "design.yaml").read_text()
+    assert isinstance(load_design(tmp_path / "usual").coating, Coating)
+    design.coating = Chalk(white=0.75)
+    save_design(design, tmp_path / "chalk")
+    again = load_design(tmp_path / "chalk").coating
+    assert isinstance(again, Chalk) and again.white == 0.75
+    file = tmp_path / "chalk" / "design.yaml"
+    file.write_text(file.read_text().replace("test-chalk", "tset-chalk"))
+    with pytest.raises(DesignError, match=r"unknown kind 'tset-chalk' at 'coating\.kind'"):
+        load_design(tmp_path / "chalk")
