@@ -10,8 +10,7 @@ import typer
 from optisense.cli.console import ends_well, messages, output
 from optisense.cli.options import DesignArgument
 from optisense.cli.output_folder import take_folder
-
-FORMATS = ("stl", "obj", "3mf", "step")
+from optisense.workshop import FORMATS
 
 
 @ends_well
@@ -23,7 +22,7 @@ def export(
         typer.Option(
             "--format",
             "-f",
-            metavar="|".join(FORMATS),
+            metavar="|".join(FORMATS.names()),
             help="Of the parts' shapes; may be given several times. STL when left out. STEP needs "
             "the extra 'step'.",
             show_default=False,
@@ -37,25 +36,23 @@ def export(
     """
     wanted = [name.lower() for name in formats or ["stl"]]
     for name in wanted:
-        if name not in FORMATS:
+        if name not in FORMATS.names():
             raise typer.BadParameter(
-                f"'{name}' is none of {', '.join(FORMATS)}", param_hint="--format"
+                f"'{name}' is none of {', '.join(FORMATS.names())}", param_hint="--format"
             )
 
     from optisense.sensors import load
 
     sensor = load(design)
-    if "step" in wanted:
-        from optisense.workshop.step_format import require_step
-
-        require_step()
+    for name in wanted:
+        FORMATS.find(name).require()
     take_folder(out)
 
     from optisense.workshop import export as write
     from optisense.workshop.shapes import is_air, shapes
 
-    if "step" in wanted:
-        messages.print("writing STEP; a finely cut curved part takes half a minute", style="dim")
+    for note in filter(None, (FORMATS.find(name).note for name in wanted)):
+        messages.print(note, style="dim")
     files = write(sensor, out, wanted)
     sheets = [shape.name for shape in shapes(sensor) if not shape.is_solid]
     for file in files:

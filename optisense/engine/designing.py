@@ -78,7 +78,7 @@ class Export(OfDesign):
     """See docs/engine.md."""
 
     to: str
-    formats: list[Literal["stl", "obj", "3mf", "step"]] = Field(default=["stl"])
+    formats: list[str] = Field(default=["stl"])
 
 
 @handles("sensors", Fields, Lane.QUICK)

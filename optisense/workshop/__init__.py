@@ -1,13 +1,15 @@
 """Out to the workshop: shapes to print or machine, where the LEDs go, and what to buy."""
 
 from optisense.workshop.bill_of_materials import Bill, bill_of_materials
-from optisense.workshop.export import FORMATS, export
+from optisense.workshop.export import export
+from optisense.workshop.formats import FORMATS, ShapeFormat
 from optisense.workshop.placement import Placement, placements
 
 __all__ = [
     "FORMATS",
     "Bill",
     "Placement",
+    "ShapeFormat",
     "bill_of_materials",
     "export",
     "placements",

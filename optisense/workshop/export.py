@@ -4,24 +4,21 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 
 from optisense.design import SensorDesign
 from optisense.errors import DesignError
 from optisense.workshop.bill_of_materials import bill_of_materials
-from optisense.workshop.mesh_formats import obj_bytes, stl_bytes, three_mf_bytes
+from optisense.workshop.formats import FORMATS, ShapeFormat
 from optisense.workshop.placement import placement_csv, placements
 from optisense.workshop.shapes import Shape, shapes
-from optisense.workshop.step_format import require_step, write_step
 from optisense.writing import written_together
-
-FORMATS = ("stl", "obj", "3mf", "step")
-"""A file for each part as STL and OBJ, one file for all parts as 3MF and STEP."""
 
 PLACEMENT_FILE = "pick-and-place.csv"
 BILL_FILES = ("bill-of-materials.csv", "bill-of-materials.md")
 
-Writer = Callable[[Path], None]
+Writer = Callable[[Path], object]
 
 
 def export(
@@ -32,22 +29,18 @@ def export(
     Nothing appears under its own name before everything is written.
 
     Args:
-        formats: of `FORMATS`.
+        formats: names in `FORMATS`.
 
     Returns:
         The files, in the order of the parts.
 
     Raises:
         DesignError: a part has no mesh, or lies outside of the cage that deforms it.
-        SetupError: `step` is asked for, and its extra not installed.
-        OutputError: the folder can't be written.
-        ValueError: a format is none of `FORMATS`.
+        SetupError: a format needs something that is not installed.
+        OutputError: there is no such format, or the folder can't be written.
     """
-    unknown = [name for name in formats if name not in FORMATS]
-    if unknown:
-        raise ValueError(f"'{unknown[0]}' is none of {', '.join(FORMATS)}")
-    if "step" in formats:
-        require_step()
+    for name in formats:
+        FORMATS.find(name).require()
     made = shapes(design)
     writers: dict[str, Writer] = {}
     for name in dict.fromkeys(formats):
@@ -62,24 +55,26 @@ def export(
     return _write_all(Path(folder), writers)
 
 
-def _shape_writers(kind: str, title: str, made: Sequence[Shape]) -> dict[str, Writer]:
+def _shape_writers(name: str, title: str, made: Sequence[Shape]) -> dict[str, Writer]:
     """The files of a format, and what writes each."""
-    if kind == "3mf":
-        return {f"{file_name(title)}.3mf": _bytes_writer(three_mf_bytes(title, made))}
-    if kind == "step":
-        return {f"{file_name(title)}.step": lambda path: write_step(path, made)}
-    to_bytes = stl_bytes if kind == "stl" else obj_bytes
+    kind = FORMATS.find(name)
+    if kind.holds_all:
+        return {f"{file_name(title)}{kind.suffix}": lambda path: kind.write(path, title, made)}
     files: dict[str, Writer] = {}
     for shape in made:
-        file = f"{shape.name}.{kind}"
+        file = f"{shape.name}{kind.suffix}"
         if file.casefold() in {other.casefold() for other in files}:
             raise DesignError(
                 f"parts '{shape.name}' and another one differ only in upper and lower case",
                 where=f"parts.{shape.name}",
                 hint="Rename one: their files would overwrite each other on some systems",
             )
-        files[file] = _bytes_writer(to_bytes(shape))
+        files[file] = partial(_write_shape, kind, shape, title)
     return files
+
+
+def _write_shape(kind: ShapeFormat, shape: Shape, title: str, path: Path) -> None:
+    kind.write(path, title, [shape])
 
 
 def file_name(title: str) -> str:

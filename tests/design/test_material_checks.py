@@ -16,7 +16,7 @@ def mini() -> SensorDesign:
     return sensors.gelsight_mini()
 
 
-@pytest.mark.parametrize("name", sensors.registry.BUILDERS)
+@pytest.mark.parametrize("name", sensors.SENSORS.names())
 def test_materials_of_the_built_in_sensors_are_fine(name: str) -> None:
     assert index_problems(sensors.load(name)) == []
 

@@ -250,5 +250,5 @@ def test_a_failure_leaves_no_file_behind(
 
 
 def test_an_unknown_format(flat: SensorDesign, tmp_path: Path) -> None:
-    with pytest.raises(ValueError, match="'dxf' is none of"):
+    with pytest.raises(OutputError, match="no file format 'dxf'"):
         export(flat, tmp_path, ["dxf"])

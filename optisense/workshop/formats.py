@@ -1,0 +1,69 @@
+"""The file formats in which parts are exported: those of this package and of other packages."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from optisense.errors import OutputError
+from optisense.registry import Registry
+from optisense.workshop.mesh_formats import obj_bytes, stl_bytes, three_mf_bytes
+from optisense.workshop.shapes import Shape
+from optisense.workshop.step_format import require_step, write_step
+
+
+@dataclass(frozen=True)
+class ShapeFormat:
+    """A file format for the shapes of a design, in mm.
+
+    Attributes:
+        suffix: of the file name, with its dot.
+        write: writes a file; called with its path, the name of the design and the shapes.
+        holds_all: whether one file holds all shapes; otherwise each shape has a file of its own.
+        require: called before any work; raises `SetupError` where something is not installed.
+        note: what a user should know before a long export; empty if nothing.
+    """
+
+    suffix: str
+    write: Callable[[Path, str, Sequence[Shape]], object]
+    holds_all: bool = False
+    require: Callable[[], None] = lambda: None
+    note: str = ""
+
+
+STL = ShapeFormat(".stl", lambda path, title, shapes: path.write_bytes(stl_bytes(shapes[0])))
+OBJ = ShapeFormat(".obj", lambda path, title, shapes: path.write_bytes(obj_bytes(shapes[0])))
+THREE_MF = ShapeFormat(
+    ".3mf",
+    lambda path, title, shapes: path.write_bytes(three_mf_bytes(title, shapes)),
+    holds_all=True,
+)
+STEP = ShapeFormat(
+    ".step",
+    lambda path, title, shapes: write_step(path, shapes),
+    holds_all=True,
+    require=require_step,
+    note="writing STEP; a finely cut curved part takes half a minute",
+)
+
+
+def _check(name: str, given: Any) -> None:
+    if not isinstance(given, ShapeFormat):
+        raise OutputError(f"the file format '{name}' is no ShapeFormat")
+
+
+FORMATS: Registry[ShapeFormat] = Registry(
+    "file format",
+    "optisense.formats",
+    OutputError,
+    {
+        "stl": "optisense.workshop.formats:STL",
+        "obj": "optisense.workshop.formats:OBJ",
+        "3mf": "optisense.workshop.formats:THREE_MF",
+        "step": "optisense.workshop.formats:STEP",
+    },
+    _check,
+)
+"""All formats; other packages add theirs under the entry-point group `optisense.formats`."""

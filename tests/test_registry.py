@@ -1,0 +1,145 @@
+"""Things of other packages by entry points: found, named, refused and explained."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from optisense.errors import SearchError
+from optisense.registry import Registry
+
+MODULE = """
+import dataclasses
+
+import optisense as ots
+from optisense.geometry import IndenterKind, Sphere, quantity
+from optisense.search.methods import Method
+from optisense.workshop import ShapeFormat
+
+
+@dataclasses.dataclass(frozen=True)
+class Pea(IndenterKind):
+    kind, title, help = "pea", "Pea", "A small ball."
+    size: float = quantity("mm", "The diameter.", 1.0, low=0.1)
+
+    def mesh(self, reach, facet_error=4e-4):
+        return Sphere(self.size / 2).mesh(reach, facet_error)
+
+
+def wide_mini():
+    return ots.set_value(ots.load("gelsight-mini"), "camera.fov", 55.0)
+
+
+class Middle(Method):
+    name, summary = "middle", "the middle of the space"
+
+    def __init__(self, problem):
+        super().__init__(problem)
+        self._asked = False
+
+    def ask(self):
+        return self.space.from_unit([[0.5] * self.space.size] * (not self._asked))
+
+    def tell(self, vectors, outcomes):
+        self._asked = True
+
+
+def write(path, title, shapes):
+    path.write_text(str([shape.name for shape in shapes]))
+
+
+NAMES = ShapeFormat(".txt", write, holds_all=True)
+"""
+
+ENTRY_POINTS = """
+[optisense.indenters]
+pea = my_parts:Pea
+[optisense.sensors]
+wide-mini = my_parts:wide_mini
+broken-mini = my_parts:no_such_thing
+[optisense.methods]
+middle = my_parts:Middle
+[optisense.formats]
+names = my_parts:NAMES
+"""
+
+
+@pytest.fixture(scope="module")
+def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder of installed packages with one that brings something to each registry."""
+    folder = tmp_path_factory.mktemp("site")
+    (folder / "my_parts.py").write_text(MODULE)
+    info = folder / "my_parts-1.0.dist-info"
+    info.mkdir()
+    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: my-parts\nVersion: 1.0\n")
+    (info / "entry_points.txt").write_text(ENTRY_POINTS)
+    return folder
+
+
+def run(site: Path, folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
+    """An `optisense` command in a process that has the package."""
+    start = f"import sys; sys.path.insert(0, {str(site)!r}); from optisense.cli import main; main()"
+    command = [sys.executable, "-c", start, *arguments]
+    return subprocess.run(command, cwd=folder, capture_output=True, text=True)
+
+
+def test_a_package_brings_a_sensor_an_indenter_and_a_picture_of_both(
+    site: Path, tmp_path: Path
+) -> None:
+    done = run(
+        site, tmp_path, "render", "wide-mini", "--contact", "pea:2@0,0:0.5", "--photons", "20000",
+        "--resolution", "40x30", "--out", "touch",
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    assert (tmp_path / "touch" / "image.png").is_file()
+
+
+def test_a_package_brings_a_method(site: Path, tmp_path: Path) -> None:
+    done = run(
+        site, tmp_path, "search", "wide-mini", "--vary", "camera.fov=50:60", "--method", "middle",
+        "--objective", "aoap", "--out", "study",
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    assert "55" in done.stdout
+
+
+def test_a_package_brings_a_format(site: Path, tmp_path: Path) -> None:
+    done = run(site, tmp_path, "export", "wide-mini", "--format", "names", "--out", "parts")
+    assert done.returncode == 0, done.stderr
+    assert "gel" in next((tmp_path / "parts").glob("*.txt")).read_text()
+
+
+def test_a_package_that_does_not_fit_is_named(site: Path, tmp_path: Path) -> None:
+    done = run(site, tmp_path, "check", "broken-mini")
+    assert done.returncode == 2
+    assert "my-parts" in done.stderr
+    assert "Traceback" not in done.stderr
+
+
+def things() -> Registry[object]:
+    return Registry("thing", "optisense.no-such-group", SearchError, {"home": "pathlib:Path"})
+
+
+def test_the_same_name_is_taken_once() -> None:
+    registry = things()
+    registry.register("line", run)
+    registry.register("line", run)  # a file that was run once more
+    with pytest.raises(SearchError, match="already a thing 'line'"):
+        registry.register("line", things)
+    with pytest.raises(SearchError, match="already a thing 'home'"):
+        registry.register("home", things)
+
+
+@pytest.mark.parametrize("name", ["", "Line", " line", "a:b", "a@b", "a/b"])
+def test_names_that_text_could_not_hold_are_refused(name: str) -> None:
+    with pytest.raises(SearchError, match="can't be the name"):
+        things().register(name, run)
+
+
+def test_a_misspelt_name_gets_the_near_match() -> None:
+    assert things().find("home") is Path
+    with pytest.raises(SearchError, match="Did you mean 'home'"):
+        things().find("hoem")
