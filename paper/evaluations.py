@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from optisense.design import SensorDesign, set_value
 from optisense.geometry import Contact, parse_contact
 from optisense.objectives import Evaluation, Score, Settings, evaluate
-from optisense.search.evaluation.models import RAYS_ONLY, ModelKeeper
+from optisense.search.evaluation.models import ModelKeeper
 from optisense.sensors import SENSORS
 from paper.unit import Found
 
@@ -30,7 +30,7 @@ Plain = Mapping[str, Any]
 NINE = "nine balls"
 """As contacts: the balls that objectives press."""
 
-_keepers: dict[tuple[Any, ...], ModelKeeper] = {}
+_keepers: dict[tuple[Any, ...], tuple[SensorDesign, ModelKeeper]] = {}
 _current: dict[tuple[Any, ...], tuple[str, OpticalModel]] = {}
 """The model that a keeper gave last, with its change as text."""
 
@@ -61,7 +61,7 @@ def scores(inputs: Plain, folder: Path) -> Found:
 
     An objective that fails leaves a gap among `scores` and its reason among `failures`.
     """
-    model = _model(inputs["design"], lit=not set(inputs["objectives"]) <= RAYS_ONLY)
+    model = _model(inputs["design"])
     found = evaluate(model, list(inputs["objectives"]), **tuples(inputs["settings"]))
     return Found(_scores(found))
 
@@ -77,7 +77,7 @@ def relit_scores(inputs: Plain, folder: Path) -> Found:
     from optisense.objectives.relighting import Relighting
     from optisense.objectives.run import split_settings
 
-    model, own = _model(inputs["design"], lit=True), inputs["own"]
+    model, own = _model(inputs["design"]), inputs["own"]
     variants = inputs.get("normdiff_variants", {})
     names = dict.fromkeys([*inputs["objectives"], *(["normdiff"] if variants else [])])
     wanted = resolve(list(names))
@@ -105,7 +105,7 @@ def variants_of_score(inputs: Plain, folder: Path) -> Found:
 
     `design`, `objective`, `variants` (settings by name), `settings` of the images.
     """
-    model = _model(inputs["design"], lit=True)
+    model = _model(inputs["design"])
     evaluation = Evaluation(model, Settings(**tuples(inputs["settings"])))
     found = {
         name: evaluate(evaluation, inputs["objective"], **own)
@@ -123,7 +123,7 @@ def stretch(inputs: Plain, folder: Path) -> Found:
     ellipse that belongs to it is 1 where shapes are kept. Tells the median over pixels and the
     ratio that a tenth of them exceeds.
     """
-    rays = _model(inputs["design"], lit=False).chief_rays(tuple(inputs["ray_resolution"]))
+    rays = _model(inputs["design"]).chief_rays(tuple(inputs["ray_resolution"]))
     points = rays.points.astype(np.float64)
     right = (points[:, 1:] - points[:, :-1])[:-1]
     down = (points[1:] - points[:-1])[:, :-1]
@@ -154,7 +154,7 @@ def picture(inputs: Plain, folder: Path) -> Found:
     ``object:NAME`` is one of `paper.objects`. Also tells how bright the picture is,
     before exposure: `radiance`, the mean over the sensing surface and the channels.
     """
-    model = _model(inputs["design"], lit=True)
+    model = _model(inputs["design"])
     contacts: list[Contact]
     if inputs["contacts"] == NINE:
         contacts = model.nine_contacts(depth=inputs.get("depth", 0.3))
@@ -180,7 +180,7 @@ def perception(inputs: Plain, folder: Path) -> Found:
     from optisense.tasks import CylinderRadius, Misalignment, SampleSettings, perceive
 
     known = {"misalignment": Misalignment, "cylinder-radius": CylinderRadius}
-    model = _model(inputs["design"], lit=True)
+    model = _model(inputs["design"])
     found = {}
     for name, resolution in inputs["tasks"].items():
         settings = SampleSettings(
@@ -264,22 +264,22 @@ def _changed(design: SensorDesign, plain: Plain) -> SensorDesign:
     return design
 
 
-def _model(plain: Plain, lit: bool) -> OpticalModel:
+def _model(plain: Plain) -> OpticalModel:
     """A model of a design; the one given before must not be used any more.
 
     The design asked for last comes with the light that was traced for it.
     """
     from optisense.objectives.score import json_ready
 
-    key = (plain["sensor"], repr(json_ready(plain["dimensions"])), lit)
+    key = (plain["sensor"], repr(json_ready(plain["dimensions"])))
     if key not in _keepers:
         _keepers.clear()  # two models are more than many machines have memory for
         _current.clear()
-        _keepers[key] = ModelKeeper(_base(plain), lit=lit)
-    keeper, change = _keepers[key], repr(json_ready(plain["change"]))
+        _keepers[key] = _base(plain), ModelKeeper()
+    (base, keeper), change = _keepers[key], repr(json_ready(plain["change"]))
     if key not in _current or _current[key][0] != change:
         _current.pop(key, None)
-        _current[key] = (change, keeper.model(_changed(keeper.first, plain)))
+        _current[key] = (change, keeper.model(_changed(base, plain)))
     return _current[key][1]
 
 

@@ -22,7 +22,7 @@ from optisense.geometry import Contact, SensingSurface, TriangleMesh
 from optisense.geometry.indenter_kinds import FACET_ERROR
 from optisense.optics.imaging.tactile_image import TactileImage
 from optisense.optics.model import OpticalModel
-from optisense.optics.radiance_cache.store import CELL_SIZE, VIEW_MARGIN, CacheStore
+from optisense.optics.radiance_cache.store import CELL_SIZE, VIEW_MARGIN, CacheStore, PilotScene
 from optisense.optics.scene.emitters import EmitterTable
 from optisense.optics.scene.ray_scene import Piece, RayScene
 from optisense.optics.scene.surfaces import SurfaceKind
@@ -63,10 +63,11 @@ class DraftCacheStore(CacheStore):
         seen: NDArray[np.floating],
         coloured: bool,
         metallic: bool,
+        pilot: PilotScene,
         before: DraftCacheStore | None,
     ) -> None:
         """As of `CacheStore`; `before` is the store of the design before, if there is one."""
-        super().__init__(scene, opaque, table, seen, coloured, metallic)
+        super().__init__(scene, opaque, table, seen, coloured, metallic, pilot)
         self.seen = seen
         self._learned_on = opaque
         if before is None:
@@ -197,7 +198,14 @@ class DraftModel(OpticalModel):
             rays = self.chief_rays((96, 72))
             seen = self._seen = rays.points[rays.hit]
         return DraftCacheStore(
-            self.scene, opaque, self._emitter_table, seen, self._coloured, self._metallic, before
+            self.scene,
+            opaque,
+            self._emitter_table,
+            seen,
+            self._coloured,
+            self._metallic,
+            self._pilot_scene(),
+            before,
         )
 
     def _straightened(self, design: SensorDesign) -> SensorDesign:

@@ -21,10 +21,11 @@ from optisense.optics.backend.versions import versions
 from optisense.optics.camera.projection import RayCamera
 from optisense.optics.imaging.cached import ImageLayers, PixelImportance, render_cached
 from optisense.optics.imaging.tactile_image import RADIANCE_UNIT, TactileImage
-from optisense.optics.radiance_cache.store import CacheStore
-from optisense.optics.ray_model import RayModel
+from optisense.optics.radiance_cache.store import CacheStore, PilotScene
+from optisense.optics.ray_model import RayModel, is_coloured
+from optisense.optics.scene.bsdf import surface_table
 from optisense.optics.scene.contact_scenes import ContactScenes
-from optisense.optics.scene.surfaces import SurfaceKind
+from optisense.optics.scene.surfaces import Region, Surface, SurfaceKind
 from optisense.optics.transport.chief_rays import ChiefRays, sees_nothing, trace_chief_rays
 from optisense.optics.transport.emission_guide import EmissionGuide
 from optisense.optics.transport.photons import Emission
@@ -35,6 +36,12 @@ too."""
 
 MAX_PHOTONS = 512_000_000
 """Number of photons at which tracing ends even if the wanted noise is not reached."""
+
+PILOT_COATING = Surface(
+    SurfaceKind.OPAQUE, alpha=1.0, reflectance=(0.5,) * 3, region=Region.SENSING
+)
+"""The coating that pilot photons meet, whichever the sensor has: grey and diffuse, and neither so
+dark that scattered light would be missing nor so bright that it would prevail."""
 
 SPPM_PASS_PHOTONS = 1_000_000
 """Photons of one pass of the `sppm` estimator."""
@@ -86,7 +93,17 @@ class OpticalModel(RayModel):
             rays.points[rays.hit],
             self._coloured,
             self._metallic,
+            self._pilot_scene(),
         )
+
+    def _pilot_scene(self) -> PilotScene:
+        """The sensor with `PILOT_COATING`."""
+        surfaces = [
+            PILOT_COATING if surface.region is not Region.OTHER else surface
+            for surface in self._surfaces
+        ]
+        scene = self.scene.with_table(surface_table(surfaces))
+        return PilotScene(scene, any(is_coloured(surface) for surface in surfaces))
 
     def _recoat(self) -> None:
         super()._recoat()
@@ -127,8 +144,8 @@ class OpticalModel(RayModel):
             noise: per cent; trace until the relative RMS noise of the light on the sensing
                 surface is this small.
             seconds: stop tracing in time to be ready then.
-            seed: the same seed and settings give the same image, but for rounding, which in single
-                pixels at the edge of a contact turns a shadow ray.
+            seed: the same seed and settings give the same image, whatever was rendered before, but
+                for rounding, which in single pixels at the edge of a contact turns a shadow ray.
             progress: called now and then.
             estimator: "field" (pooled radiance cache, fast) or "sppm" (progressive photon mapping,
                 for checking).

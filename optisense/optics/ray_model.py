@@ -136,7 +136,7 @@ class RayModel:
 
     def _refresh_surfaces(self) -> None:
         self._table = surface_table(self._surfaces)
-        self._coloured = any(_is_coloured(surface) for surface in self._surfaces)
+        self._coloured = any(is_coloured(surface) for surface in self._surfaces)
         self._metallic = any(
             surface.kind is SurfaceKind.OPAQUE and surface.specularity > 0
             for surface in self._surfaces
@@ -360,7 +360,8 @@ def _ball(mesh: TriangleMesh) -> np.ndarray:
     return np.append(centre, np.linalg.norm(mesh.vertices - centre, axis=1).max())
 
 
-def _is_coloured(surface: Surface) -> bool:
+def is_coloured(surface: Surface) -> bool:
+    """Whether an opaque surface or mirror reflects some channels more than others."""
     metal = surface.specularity > 0 or surface.kind is SurfaceKind.MIRROR
     values = [surface.reflectance]
     if metal:

@@ -61,6 +61,21 @@ class _Running:
     per_light: int
 
 
+@dataclass(frozen=True)
+class PilotScene:
+    """What pilot photons fly through.
+
+    Attributes:
+        scene: the sensor without contacts, with any coating: where photons first land does not
+            depend on it. If it is always the same one, neither do images depend on the coating
+            that a sensor had when its guide was learned.
+        coloured: whether its surfaces are coloured.
+    """
+
+    scene: RayScene
+    coloured: bool
+
+
 class CacheStore:
     """Traces photons pass by pass, and keeps the tallies and the caches that they give."""
 
@@ -79,6 +94,7 @@ class CacheStore:
         seen: NDArray[np.floating],
         coloured: bool,
         metallic: bool = True,
+        pilot: PilotScene | None = None,
     ) -> None:
         """Keep what the caches depend on; nothing is traced yet.
 
@@ -89,7 +105,9 @@ class CacheStore:
             seen: (n, 3) mm, points that the camera sees.
             coloured: whether surfaces are coloured.
             metallic: whether a coating has a metallic lobe.
+            pilot: what pilot photons fly through; the scene itself if None.
         """
+        self._pilot_scene = PilotScene(scene, coloured) if pilot is None else pilot
         self._seen = seen
         self._scene = scene
         self._table = table
@@ -105,7 +123,11 @@ class CacheStore:
         self._done: dict[tuple[int, int, int], RadianceCache] = {}
 
     def forget_light(self, coloured: bool, metallic: bool = True) -> None:
-        """Drop the caches, as surfaces reflect in another way now; the guide and the cells stay."""
+        """Drop the caches, as surfaces reflect in another way now. The guide stays, and so do the
+        cells, unless other colours call for other sizes.
+        """
+        if coloured != self._coloured:
+            self._cells = self._above = self._kernels = None
         self._coloured = coloured
         self._metallic = metallic
         self._running.clear()
@@ -145,10 +167,10 @@ class CacheStore:
             cells, near = self._target
             per_light = max(1, PILOT_PHOTONS // lights)
             arrived, landed = trace_pilot(
-                self._scene,
+                self._pilot_scene.scene,
                 Emission(self._table, uniform_guide(lights), per_light, seed_of(0, 1)),
                 TargetCells(cells, mi.UInt32(near.astype(np.uint32))),
-                self._coloured,
+                self._pilot_scene.coloured,
             )
             self._guide = learn_guide(arrived, lights, per_light)
             if self.uses_pilot:
@@ -256,11 +278,9 @@ class CacheStore:
         if self._guide is None:
             tell(Stage.PILOT, 0.0, 0, None)
         running = self._running.get(key)
-        if (
-            running is None
-            or (wanted is not None and running.tally.passes > wanted)
-            or (wanted is None and seconds is None)
-        ):
+        # Only a number of photons is reached in the same way from those that are there already.
+        timed = noise is not None or seconds is not None
+        if running is None or wanted is None or timed or running.tally.passes > wanted:
             running = _Running(
                 CacheTally(
                     self.kernels,
@@ -311,13 +331,17 @@ class CacheStore:
                         break
                 tell(Stage.PHOTONS, fraction, tally.photons, reached)
         except KeyboardInterrupt:
+            self._running.clear()  # the last pass may be there in part
             if tally.passes < 1 or not partial:
                 raise
             interrupted = True
         name = (*key, tally.passes)
-        if name not in self._done:
+        if interrupted or name not in self._done:
             tell(Stage.SMOOTHING, 1.0, tally.photons, reached)
-            self._done[name] = tally.smoothed()
+            light = tally.smoothed()
+            if interrupted:
+                return light, True
+            self._done[name] = light
             while len(self._done) > MAX_CACHES:
                 del self._done[next(iter(self._done))]
-        return self._done[name], interrupted
+        return self._done[name], False

@@ -8,6 +8,7 @@ indenter never changes a compiled kernel.
 
 from __future__ import annotations
 
+from copy import copy
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -167,6 +168,12 @@ class RayScene:
             numbers.append(piece.patches + start)
             start += int(piece.patches.max(initial=-1)) + 1
         return indices(np.concatenate(numbers))
+
+    def with_table(self, table: mi.Float) -> RayScene:
+        """The same triangles with other optical data."""
+        other = copy(self)
+        other.table = table
+        return other
 
     def intersect(self, ray: Ray, coherent: bool = False) -> SurfaceHit:
         """First hit along rays, with normals; symbolic loops may call it.

@@ -19,7 +19,7 @@ from optisense.objectives.files import place_of
 from optisense.objectives.registry import resolve
 from optisense.objectives.run import split_settings
 from optisense.search.evaluation.mirror_views import SameMirrors, may_change_view
-from optisense.search.evaluation.models import RAYS_ONLY, ModelKeeper
+from optisense.search.evaluation.models import ModelKeeper
 from optisense.search.evaluation.outcome import Outcome
 from optisense.search.space.buildable import BentPartsRest, LightsRest, PartsRest, SolidsStay
 from optisense.search.space.constraints import Constraint, PartsApart, Unfolded, why_forbidden
@@ -104,8 +104,7 @@ class DesignEvaluator:
             self.constraints.append(PartsApart(space.design))
         if any(name.startswith("cages.") for name in space.names):
             self.constraints.append(Unfolded(space.design))
-        rays_only = set(self.names) <= RAYS_ONLY | set(self._functions)
-        self.keeper = ModelKeeper(space.prepared, lit=not rays_only, variant=variant)
+        self.keeper = ModelKeeper(variant)
         self._resolved: list[Objective] | None = None
         self.renders = bool(self._objectives)
         self.kept: list[Constraint] = []

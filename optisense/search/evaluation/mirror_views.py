@@ -55,7 +55,7 @@ class SameMirrors:
         )
 
     def _seen(self, design: SensorDesign) -> dict[frozenset[str], float]:
-        return self._keeper.ray_model(design).views_by_mirrors(VIEW_RAYS)
+        return self._keeper.model(design).views_by_mirrors(VIEW_RAYS)
 
 
 def may_change_view(names: Iterable[str]) -> bool:
