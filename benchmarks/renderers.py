@@ -15,7 +15,8 @@ from benchmarks.case import RESOLUTION, Case, FloatArray, ball, relative_error
 from benchmarks.mitsuba_path import case_pieces, render_path
 from benchmarks.reference import CACHE, Reference
 from benchmarks.snapshots import Snapshot
-from optisense.optics.camera.response import auto_exposure, encode
+from optisense.design.colour import encode
+from optisense.optics.camera.response import auto_exposure
 
 MITSUBA = "Mitsuba path"
 BUDGET = 60.0

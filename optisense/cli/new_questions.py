@@ -23,11 +23,11 @@ from optisense.cli.asking import (
 )
 from optisense.cli.console import messages
 from optisense.design import Role
+from optisense.design.colour import NAMED_COLOURS
 from optisense.design.materials import kinds_for
 from optisense.design.sensor_design import MATERIAL_REQUIRED
 from optisense.errors import DesignError
 from optisense.geometry import TriangleMesh
-from optisense.library.adding import COLOURS
 from optisense.sensors.from_meshes import guessing
 from optisense.sensors.from_meshes.building import USUAL_MATERIAL
 from optisense.sensors.from_meshes.directions import SIDES
@@ -249,7 +249,7 @@ def _ask_way(usual: str) -> dict[str, Any]:
 def _ask_group(name: str, colour: str) -> dict[str, Any]:
     return {
         "model": _ask_known("light", f"{name}: model", guessing.LIGHT),
-        "colour": ask_word(f"{name}: colour", COLOURS, colour),
+        "colour": ask_word(f"{name}: colour", NAMED_COLOURS, colour),
         "flux": ask_number(f"{name}: mW of each light", 10.0, least=0.0),
     }
 

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
+from optisense.design.colour import NAMED_COLOURS
 from optisense.design.emitters import IesEmitter
 from optisense.design.fields import Colour, Model
 from optisense.design.ies import parse_ies
@@ -22,14 +23,6 @@ from optisense.library.reading import KINDS, Kind, files_of, kind_of, read_entry
 from optisense.near import suggestion
 
 NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,63}")
-
-COLOURS: dict[str, Colour] = {
-    "red": (1.0, 0.0, 0.0),
-    "green": (0.0, 1.0, 0.0),
-    "blue": (0.0, 0.0, 1.0),
-    "white": (1.0, 1.0, 1.0),
-}
-"""Colours that have a name."""
 
 
 @dataclass(frozen=True)
@@ -192,14 +185,15 @@ def parse_colour(text: str) -> tuple[str, Colour]:
     Raises:
         LibraryError: it is neither.
     """
-    if text in COLOURS:
-        return text, COLOURS[text]
+    if text in NAMED_COLOURS:
+        return text, NAMED_COLOURS[text]
     try:
         red, green, blue = (float(word) for word in text.split(","))
     except ValueError:
         raise LibraryError(
             f"'{text}' is no colour",
-            hint=suggestion(text, COLOURS) or "Give red, green, blue, white or R,G,B from 0 to 1",
+            hint=suggestion(text, NAMED_COLOURS)
+            or "Give red, green, blue, white or R,G,B from 0 to 1",
         ) from None
     if not all(0.0 <= value <= 1.0 for value in (red, green, blue)) or red + green + blue <= 0.0:
         raise LibraryError(

@@ -92,7 +92,7 @@ class Press:
         Raises:
             ObjectiveError: another kind.
         """
-        from optisense.optics.camera.response import srgb_curve
+        from optisense.design.colour import srgb_curve
 
         chosen = self.response[where].astype(np.float64)
         if kind == "picture":

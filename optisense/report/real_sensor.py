@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from optisense.design import SensorDesign
+from optisense.design.colour import decode
 from optisense.geometry import Contact, Sphere
 
 if TYPE_CHECKING:
@@ -124,7 +125,7 @@ def compare_with_real(
     if image.interrupted:
         raise KeyboardInterrupt
     seen = np.asarray(image.radiance, dtype=np.float64)
-    linear = _linear(real)
+    linear = decode(real)
     exposure = float(np.median(linear) / np.median(seen))
     drawn = picture(image.radiance, exposure)
     rows, columns = np.mgrid[:height, :width] + 0.5
@@ -153,9 +154,3 @@ def _channels(values: FloatArray, digits: int) -> str:
 
 def _rms(values: FloatArray) -> float:
     return float(np.sqrt((values**2).mean()))
-
-
-def _linear(picture: NDArray[np.uint8]) -> FloatArray:
-    """(h, w, 3), 0 to 1: what an sRGB picture encodes (IEC 61966-2-1)."""
-    encoded = picture.astype(np.float64) / 255.0
-    return np.where(encoded <= 0.04045, encoded / 12.92, ((encoded + 0.055) / 1.055) ** 2.4)

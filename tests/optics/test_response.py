@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from optisense.optics.camera.response import encode, picture, saturate, srgb_curve
+from optisense.design.colour import encode, srgb_curve
+from optisense.optics.camera.response import picture, saturate
 from optisense.optics.imaging.tactile_image import TactileImage
 
 

@@ -6,12 +6,13 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
+from numpy.typing import ArrayLike
 
 from optisense.errors import SearchError
 from optisense.search.evaluation.outcome import Outcome
 from optisense.search.methods import Method, Problem, find, make, names, register
 from optisense.search.methods.base import values_to_maximise
-from optisense.search.methods.dominance import hypervolume
+from optisense.search.methods.dominance import front
 from optisense.search.space.search_space import BoundSpace, SearchSpace
 from optisense.sensors import load
 
@@ -206,6 +207,24 @@ def test_pareto_finds_a_known_front(two_numbers: BoundSpace) -> None:
         found += [list(outcome.scores.values()) for outcome in outcomes]
     reference = (-1.0, -1.0)
     assert hypervolume(found, reference) > 0.98 * hypervolume(true, reference)
+
+
+def hypervolume(values: ArrayLike, reference: ArrayLike) -> float:
+    """The volume between values (k, 2) and a reference point (2,) that they dominate.
+
+    For two goals only; values that do not dominate the reference count nothing.
+    """
+    given = np.asarray(values, dtype=np.float64).reshape(-1, 2)
+    low = np.asarray(reference, dtype=np.float64)
+    best = given[front(given)]
+    best = best[(best > low).all(axis=1)]
+    best = best[np.argsort(-best[:, 0])]
+    volume, height = 0.0, float(low[1])
+    for first, second in best.tolist():
+        if second > height:
+            volume += (first - float(low[0])) * (second - height)
+            height = second
+    return volume
 
 
 def test_pareto_needs_two_goals(two_numbers: BoundSpace) -> None:

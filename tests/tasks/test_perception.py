@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 
 from optisense import OpticalModel, load
+from optisense.design.colour import srgb_curve
 from optisense.errors import ContactError, TaskError
 from optisense.geometry import Contact, Cylinder
-from optisense.optics.camera.response import auto_exposure, srgb_curve
+from optisense.optics.camera.response import auto_exposure
 from optisense.tasks import CylinderRadius, Misalignment, SampleSettings, perceive
 from optisense.tasks.misalignment import plane_contact
 from optisense.tasks.perception import collect

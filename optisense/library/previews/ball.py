@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from optisense.design.colour import encode
 from optisense.design.materials import CoatingModel, Material, Medium, Reflection
 from optisense.design.materials.base import GEL_INDEX
 from optisense.design.reflectance import (
@@ -63,19 +64,12 @@ def picture_of_ball(
         u = _even(offsets[ball, 2:], number)[hit]
         shone[hit] = _from_ball(place, towards[hit], medium, surface, studio, u)
         light[ball] += np.minimum(shone, 4.0) / samples
-    return _coded(light).reshape(size, size, 3)
+    return encode(light).reshape(size, size, 3)
 
 
 def _even(offset: FloatArray, number: int) -> FloatArray:
     """(n, 2) the points of a sample's number in the unit square, shifted by (n, 2) offsets."""
     return np.asarray((offset + number * STEPS) % 1.0)
-
-
-def _coded(linear: FloatArray) -> NDArray[np.uint8]:
-    """Linear light as sRGB bytes."""
-    light = np.clip(linear, 0.0, 1.0)
-    coded = np.where(light <= 0.0031308, 12.92 * light, 1.055 * light ** (1 / 2.4) - 0.055)
-    return np.asarray(np.round(255.0 * coded), dtype=np.uint8)
 
 
 def _camera_rays(

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter
 
+from optisense.design.colour import encode
 from optisense.errors import RenderError
 
 KNEE = 1.0
@@ -56,35 +57,6 @@ def saturate(exposed: FloatArray, width: int | None = None) -> NDArray[np.float3
 def _brightest(image: FloatArray) -> FloatArray:
     """(h, w) the largest channel; several times sooner than NumPy's maximum along an axis of 3."""
     return np.maximum(np.maximum(image[..., 0], image[..., 1]), image[..., 2])
-
-
-def add_noise(
-    exposed: FloatArray, full_well: float, seed: int, read_noise: float = 0.0
-) -> NDArray[np.float32]:
-    """Shot noise of a sensor that holds ``full_well`` electrons at level 1, and read noise in
-    electrons RMS.
-    """
-    rng = np.random.default_rng(seed)
-    electrons = rng.poisson(np.maximum(np.asarray(exposed, dtype=float), 0) * full_well)
-    noisy = electrons + rng.normal(0.0, read_noise, electrons.shape)
-    return (noisy / full_well).astype(np.float32)
-
-
-def srgb_curve(linear: FloatArray) -> NDArray[np.float64]:
-    """The sRGB transfer curve (IEC 61966-2-1): from linear 0..1 to 0..1, before rounding."""
-    linear = np.clip(np.asarray(linear, dtype=float), 0.0, 1.0)
-    return np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
-
-
-def encode(linear: FloatArray) -> NDArray[np.uint8]:
-    """sRGB transfer curve and 8 bits; linear in 0..1."""
-    linear = np.clip(np.asarray(linear, dtype=np.float32), 0.0, 1.0)
-    curved = np.power(linear, np.float32(1 / 2.4))
-    curved *= np.float32(255 * 1.055)
-    curved += np.float32(0.5 - 255 * 0.055)  # cut off below, which rounds
-    dark = linear <= 0.0031308
-    curved[dark] = linear[dark] * np.float32(255 * 12.92) + np.float32(0.5)
-    return curved.astype(np.uint8)
 
 
 def picture(radiance: FloatArray, exposure: float | str = "auto") -> NDArray[np.uint8]:

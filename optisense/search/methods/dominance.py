@@ -75,24 +75,6 @@ def crowding(values: ArrayLike, rank: NDArray[np.int64]) -> FloatArray:
     return room
 
 
-def hypervolume(values: ArrayLike, reference: ArrayLike) -> float:
-    """The volume between values (k, 2) and a reference point (2,) that they dominate.
-
-    For two goals only; values that do not dominate the reference count nothing.
-    """
-    given = np.asarray(values, dtype=np.float64).reshape(-1, 2)
-    low = np.asarray(reference, dtype=np.float64)
-    best = given[front(given)]
-    best = best[(best > low).all(axis=1)]
-    best = best[np.argsort(-best[:, 0])]
-    volume, height = 0.0, float(low[1])
-    for first, second in best.tolist():
-        if second > height:
-            volume += (first - float(low[0])) * (second - height)
-            height = second
-    return volume
-
-
 def _fine(values: FloatArray) -> NDArray[np.bool_]:
     """(k,): which values have no part that failed."""
     return np.asarray(np.isfinite(values).all(axis=1))

@@ -12,6 +12,7 @@ from pydantic import BaseModel
 
 from optisense.design import Cage, SensorDesign, Share, get_value, parse_path, set_value
 from optisense.design.cage import as_array
+from optisense.design.colour import NAMED_COLOURS
 from optisense.errors import SearchError
 from optisense.search.space.design_variables import DesignVariable
 from optisense.search.space.parameters import (
@@ -24,14 +25,6 @@ from optisense.search.space.parameters import (
     Specification,
 )
 from optisense.search.space.variable_paths import find_variables
-
-COLOURS = {
-    "red": (1.0, 0.0, 0.0),
-    "green": (0.0, 1.0, 0.0),
-    "blue": (0.0, 0.0, 1.0),
-    "white": (1.0, 1.0, 1.0),
-}
-"""Names that stand for a light group's colour; R, G, B and W do too."""
 
 RGB_FIELDS = ("colour", "reflectance", "eta", "k", "dispersion")
 
@@ -354,16 +347,16 @@ def _colours_read(path: str, spec: Choice) -> Choice:
     """Names of colours as values, where the path is that of a colour."""
     if not path.endswith(".colour"):
         return spec
-    initials = {name[0]: name for name in COLOURS}
+    initials = {name[0]: name for name in NAMED_COLOURS}  # R, G, B and W
     options = []
     for option in spec.options:
         if isinstance(option, str):
             name = initials.get(option.lower(), option.lower())
-            if name not in COLOURS:
+            if name not in NAMED_COLOURS:
                 raise SearchError(
-                    f"there is no colour '{option}'", hint="Known: " + ", ".join(COLOURS)
+                    f"there is no colour '{option}'", hint="Known: " + ", ".join(NAMED_COLOURS)
                 )
-            options.append(COLOURS[name])
+            options.append(NAMED_COLOURS[name])
         else:
             options.append(option)
     return Choice(options, spec.labels)

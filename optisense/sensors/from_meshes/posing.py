@@ -8,12 +8,12 @@ from scipy.spatial import cKDTree
 
 from optisense import library
 from optisense.design import Camera, LightGroup, Provenance, Role, Status
+from optisense.design.colour import NAMED_COLOURS
 from optisense.design.problems import design_error
 from optisense.errors import DesignError
 from optisense.geometry import TriangleMesh
 from optisense.geometry.containment import inside
 from optisense.geometry.patches import middle
-from optisense.library.adding import COLOURS
 from optisense.sensors.from_meshes import lights as placing
 from optisense.sensors.from_meshes.camera import make_camera, share_seen
 from optisense.sensors.from_meshes.recipe import LightChoice, ShapeReference
@@ -56,7 +56,7 @@ def place_lights(bench: RecipeState, name: str, choice: LightChoice) -> LightGro
     try:
         group = LightGroup(
             model=choice.model,
-            colour=COLOURS[colour] if isinstance(colour, str) else colour,
+            colour=NAMED_COLOURS[colour] if isinstance(colour, str) else colour,
             flux=choice.flux,
             lights=lights,
         )

@@ -12,6 +12,7 @@ from typing import Annotated, Any, Literal
 from pydantic import Field, PlainValidator, PrivateAttr, ValidationError, model_validator
 
 from optisense.design import Light, Role
+from optisense.design.colour import NAMED_COLOURS
 from optisense.design.fields import (
     Count,
     Fraction,
@@ -26,7 +27,6 @@ from optisense.design.fields import (
 from optisense.design.problems import design_error
 from optisense.design.yaml_reader import Lines, read_yaml
 from optisense.errors import DesignError
-from optisense.library.adding import COLOURS
 from optisense.near import suggestion
 from optisense.sensors.from_meshes.directions import Direction, Side, Way, or_words
 
@@ -46,9 +46,9 @@ Lights = Annotated[Count, Field(le=MOST_LIGHTS)]
 
 def _colour(value: Any) -> str | tuple[float, float, float]:
     if isinstance(value, str):
-        if value in COLOURS:
+        if value in NAMED_COLOURS:
             return value
-        raise ValueError(f"unknown colour. {suggestion(value, COLOURS) or ''}".rstrip())
+        raise ValueError(f"unknown colour. {suggestion(value, NAMED_COLOURS) or ''}".rstrip())
     if (
         isinstance(value, list | tuple)
         and len(value) == 3
@@ -56,7 +56,7 @@ def _colour(value: Any) -> str | tuple[float, float, float]:
         and sum(value) > 0.0
     ):
         return float(value[0]), float(value[1]), float(value[2])
-    raise ValueError("must be " + ", ".join(COLOURS) + " or three numbers from 0 to 1")
+    raise ValueError("must be " + ", ".join(NAMED_COLOURS) + " or three numbers from 0 to 1")
 
 
 def _one_or_two(least: float, whole: bool, form: str) -> PlainValidator:
@@ -204,7 +204,7 @@ class LightChoice(Model):
     """A light group and how its lights are placed: give one of row, ring, over and at."""
 
     model: Name = Field(description="light of the library")
-    colour: ColourWord = Field(description=", ".join(COLOURS) + " or [r, g, b]")
+    colour: ColourWord = Field(description=", ".join(NAMED_COLOURS) + " or [r, g, b]")
     flux: NonNegative = Field(default=10.0, description="mW of each light")
     row: LightRow | None = Field(default=None, description="lights along one side of a part's box")
     ring: Ring | None = Field(default=None, description="lights in a circle around a part")
