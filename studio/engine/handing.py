@@ -46,16 +46,6 @@ def design(scene: bpy.types.Scene) -> dict[str, Any]:
     return {"data": document, "folder": str(folder)}
 
 
-def design_for(operator: bpy.types.Operator, scene: bpy.types.Scene) -> dict[str, Any] | None:
-    """As `design`; None where there is none, and the user is told why."""
-    try:
-        return design(scene)
-    except EngineError as error:
-        session.say(error)
-        operator.report({"ERROR"}, error.text())
-        return None
-
-
 def contacts(scene: bpy.types.Scene) -> list[dict[str, Any]]:
     """The scene's contacts that press, as requests to the engine name them.
 

@@ -44,3 +44,42 @@ def selected(
     if not found:
         operator.poll_message_set(f"Select {what} first")
     return found
+
+
+def needs(operator: type[bpy.types.Operator], is_there: object, text: str) -> bool:
+    """Whether something is there; where it is not, the button says what to do."""
+    if not is_there:
+        operator.poll_message_set(text)
+    return bool(is_there)
+
+
+class Designing:
+    """Operators that need a sensor in the scene."""
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return has_design(cls, context)
+
+
+class Arranging:
+    """Operators that change the objects of a sensor."""
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return has_design(cls, context) and in_object_mode(cls, context)
+
+
+class Asking:
+    """Operators that ask the engine about the scene's sensor."""
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return may_ask(cls, context)
+
+
+class Replacing:
+    """Operators that bring in what the engine reads."""
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return is_idle(cls, context) and in_object_mode(cls, context)

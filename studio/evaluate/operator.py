@@ -8,7 +8,8 @@ import bpy
 from bpy.props import StringProperty
 
 from ..core.numbers import shown_number
-from ..engine import catalogue, handing, polls, session
+from ..engine import catalogue, polls, session
+from ..engine.operators import Starting, refuse, start_with_design
 from ..scene.paths import objective
 from ..simulate import editors
 from . import figures, rays
@@ -33,13 +34,12 @@ class OPTISENSE_OT_choose_objective(bpy.types.Operator):
     def execute(self, context: bpy.types.Context) -> set[str]:
         values = context.window_manager.optisense_evaluation
         if self.objective not in {name for name, _, _ in catalogue.items("objectives")}:
-            self.report({"ERROR"}, f"There is no objective '{self.objective}'")
-            return {"CANCELLED"}
+            return refuse(self, f"There is no objective '{self.objective}'")
         values.chosen = set(values.chosen) ^ {self.objective}
         return {"FINISHED"}
 
 
-class OPTISENSE_OT_evaluate(bpy.types.Operator):
+class OPTISENSE_OT_evaluate(Starting, bpy.types.Operator):
     """Score the sensor by the chosen objectives"""
 
     bl_idname = "optisense.evaluate"
@@ -47,36 +47,22 @@ class OPTISENSE_OT_evaluate(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        if not polls.may_ask(cls, context):
-            return False
-        if not chosen(context):
-            cls.poll_message_set("Choose an objective first")
-            return False
-        return True
+        return polls.may_ask(cls, context) and polls.needs(
+            cls, chosen(context), "Choose an objective first"
+        )
 
-    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
-        return self._start(context, wait=False)
-
-    def execute(self, context: bpy.types.Context) -> set[str]:
-        return self._start(context, wait=True)
-
-    def _start(self, context: bpy.types.Context, *, wait: bool) -> set[str]:
-        design = handing.design_for(self, context.scene)
-        if design is None:
-            return {"CANCELLED"}
-        done = session.start_job(
+    def start(self, context: bpy.types.Context, *, wait: bool) -> set[str]:
+        return start_with_design(
+            self,
+            context,
             "Evaluating",
             "evaluate",
             take,
             wait=wait,
-            design=design,
             objectives=chosen(context),
             figures=True,
             name="scores",
         )
-        if not done:
-            self.report({"ERROR"}, session.state().problem)
-        return {"FINISHED"} if done else {"CANCELLED"}
 
 
 def chosen(context: bpy.types.Context) -> list[str]:
@@ -128,27 +114,21 @@ class OPTISENSE_OT_show_figure(bpy.types.Operator):
         drawn = [each for each in scores if figures.is_there(each.figure)]
         chosen = [each for each in drawn if self.objective in ("", each.name)]
         if not chosen:
-            self.report({"ERROR"}, f"There is no figure of '{self.objective}'; evaluate again")
-            return {"CANCELLED"}
+            return refuse(self, f"There is no figure of '{self.objective}'; evaluate again")
         try:
             # All of them, so that the editor's list of images offers the others too.
             shown = {each.name: figures.load(each.title, each.figure) for each in drawn}
         except RuntimeError as error:
-            self.report({"ERROR"}, f"The figure can't be read; evaluate again ({error})")
-            return {"CANCELLED"}
+            return refuse(self, f"The figure can't be read; evaluate again ({error})")
         editors.show(context, shown[chosen[0].name])
         return {"FINISHED"}
 
 
-class OPTISENSE_OT_show_rays(bpy.types.Operator):
+class OPTISENSE_OT_show_rays(polls.Asking, bpy.types.Operator):
     """Draw a coarse grid of chief rays, coloured by what becomes of them"""
 
     bl_idname = "optisense.show_rays"
     bl_label = "Show Chief Rays"
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        return polls.may_ask(cls, context)
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         name = context.scene.name
@@ -160,18 +140,9 @@ class OPTISENSE_OT_show_rays(bpy.types.Operator):
                 bpy.context.window_manager.optisense_evaluation.rays = text
                 session.push_undo("Chief rays")
 
-        design = handing.design_for(self, context.scene)
-        if design is None:
-            return {"CANCELLED"}
-        done = session.start_job(
-            "Tracing rays",
-            "chief_rays",
-            traced,
-            wait=bpy.app.background,
-            design=design,
-            resolution=list(RAYS),
+        return start_with_design(
+            self, context, "Tracing rays", "chief_rays", traced, resolution=list(RAYS)
         )
-        return {"FINISHED"} if done else {"CANCELLED"}
 
 
 class OPTISENSE_OT_hide_rays(bpy.types.Operator):
@@ -183,10 +154,7 @@ class OPTISENSE_OT_hide_rays(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        if not rays.drawn(context.scene):
-            cls.poll_message_set("No rays are shown")
-            return False
-        return True
+        return polls.needs(cls, rays.drawn(context.scene), "No rays are shown")
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         rays.clear(context.scene)

@@ -7,11 +7,12 @@ from typing import Any
 import bpy
 from bpy.props import BoolProperty, StringProperty
 
-from ..engine import handing, polls, session
+from ..engine import polls, session
+from ..engine.operators import ChoosingFile, refuse, start, start_with_design
 from ..scene.paths import chosen, suggested
 
 
-class OPTISENSE_OT_report(bpy.types.Operator):
+class OPTISENSE_OT_report(ChoosingFile, bpy.types.Operator):
     """Write a page (HTML, one file) about the picture that was simulated last"""
 
     bl_idname = "optisense.report"
@@ -26,23 +27,21 @@ class OPTISENSE_OT_report(bpy.types.Operator):
         if not polls.is_idle(cls, context):
             return False
         now = context.window_manager.optisense_picture
-        if not now.image or now.is_draft or session.running() is None:
-            cls.poll_message_set("Simulate a whole picture first")
-            return False
-        return True
+        return polls.needs(
+            cls,
+            now.image and not now.is_draft and session.running() is not None,
+            "Simulate a whole picture first",
+        )
 
-    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
-        self.filepath = suggested(context.scene, ".html")
-        context.window_manager.fileselect_add(self)
-        return {"RUNNING_MODAL"}
+    def suggested(self, context: bpy.types.Context) -> str:
+        return suggested(context.scene, ".html")
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         path = chosen(self, "a file")
         if path is None:
             return {"CANCELLED"}
         if path.is_dir():
-            self.report({"ERROR"}, f"{path} is a folder; name a file in it")
-            return {"CANCELLED"}
+            return refuse(self, f"{path} is a folder; name a file in it")
         if path.suffix.lower() not in (".html", ".htm"):
             path = path.with_name(f"{path.name}.html")
         image = context.window_manager.optisense_picture.image
@@ -51,15 +50,10 @@ class OPTISENSE_OT_report(bpy.types.Operator):
             session.state().note = f"Written to {result['file']}"
             session.state().written = result["file"]
 
-        done = session.start_job(
-            "Writing", "report", written, wait=bpy.app.background, image=image, file=str(path)
-        )
-        if not done:
-            self.report({"ERROR"}, session.state().problem)
-        return {"FINISHED"} if done else {"CANCELLED"}
+        return start(self, "Writing", "report", written, image=image, file=str(path))
 
 
-class OPTISENSE_OT_export(bpy.types.Operator):
+class OPTISENSE_OT_export(polls.Asking, ChoosingFile, bpy.types.Operator):
     """Write shapes, places of lights and a bill of materials for the workshop"""
 
     bl_idname = "optisense.export"
@@ -73,21 +67,14 @@ class OPTISENSE_OT_export(bpy.types.Operator):
         name="STEP", description="Solids, for CAD; needs the extra 'step' of the package"
     )
 
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        return polls.may_ask(cls, context)
-
-    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
-        self.filepath = suggested(context.scene, "-workshop")
-        context.window_manager.fileselect_add(self)
-        return {"RUNNING_MODAL"}
+    def suggested(self, context: bpy.types.Context) -> str:
+        return suggested(context.scene, "-workshop")
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         wanted = {"stl": self.stl, "obj": self.obj, "3mf": self.three_mf, "step": self.step}
         formats = [name for name, is_wanted in wanted.items() if is_wanted]
         if not formats:
-            self.report({"ERROR"}, "Choose a format")
-            return {"CANCELLED"}
+            return refuse(self, "Choose a format")
         target = chosen(self, "a folder")
         if target is None:
             return {"CANCELLED"}
@@ -97,21 +84,15 @@ class OPTISENSE_OT_export(bpy.types.Operator):
             session.state().note = f"{len(result['files'])} files in {folder}"
             session.state().written = folder
 
-        design = handing.design_for(self, context.scene)
-        if design is None:
-            return {"CANCELLED"}
-        done = session.start_job(
+        return start_with_design(
+            self,
+            context,
             "Writing",
             "export",
             written,
-            wait=bpy.app.background,
-            design=design,
             to=folder,
             formats=formats,
         )
-        if not done:
-            self.report({"ERROR"}, session.state().problem)
-        return {"FINISHED"} if done else {"CANCELLED"}
 
 
 CLASSES = (OPTISENSE_OT_report, OPTISENSE_OT_export)

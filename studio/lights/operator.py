@@ -13,6 +13,7 @@ from ..core.engine import EngineError
 from ..core.pose import unit
 from ..core.rows import row_on_face
 from ..engine import catalogue, polls, session
+from ..engine.operators import ChoosingProperties, refuse
 from ..scene.build import add_light_group
 from ..scene.cameras import add_camera
 from ..scene.collections import objects_of, select_only
@@ -43,7 +44,7 @@ SOLID = 1e-3
 """The faces of a closed surface look to all sides: their sum is less than this share of all."""
 
 
-class OPTISENSE_OT_add_light(bpy.types.Operator):
+class OPTISENSE_OT_add_light(polls.Arranging, ChoosingProperties, bpy.types.Operator):
     """Add a row of lights on the selected light reference, or one at the 3D cursor"""
 
     bl_idname = "optisense.add_light"
@@ -78,27 +79,17 @@ class OPTISENSE_OT_add_light(bpy.types.Operator):
         min=0.01, default=4.0,
     )  # fmt: skip
 
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        return polls.has_design(cls, context) and polls.in_object_mode(cls, context)
-
-    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
-        return context.window_manager.invoke_props_dialog(self)
-
     def execute(self, context: bpy.types.Context) -> set[str]:
         scene = context.scene
         design = scene.optisense
         poses = self._poses(context)
         if not poses:
-            self.report({"ERROR"}, "The light reference is an empty mesh")
-            return {"CANCELLED"}
+            return refuse(self, "The light reference is an empty mesh")
         if self.group in ("NEW", ""):
             if self.model in ("NONE", ""):
-                self.report({"ERROR"}, "The library is not loaded yet; try again in a moment")
-                return {"CANCELLED"}
+                return refuse(self, "The library is not loaded yet; try again in a moment")
             if max(self.colour) <= 0.0:
-                self.report({"ERROR"}, "A colour needs at least one channel above 0")
-                return {"CANCELLED"}
+                return refuse(self, "A colour needs at least one channel above 0")
             name = free_name(self.name, design.light_groups, "light")
             values = {"model": self.model, "colour": self.colour, "flux": self.flux}
             group = add_light_group(design, name, values)
@@ -155,7 +146,7 @@ def _normal(reference: bpy.types.Object, corners: np.ndarray, target: Vector) ->
     return way if np.linalg.norm(way) > 1e-9 else np.array((0.0, 0.0, 1.0))
 
 
-class OPTISENSE_OT_add_camera(bpy.types.Operator):
+class OPTISENSE_OT_add_camera(polls.Arranging, ChoosingProperties, bpy.types.Operator):
     """Put a library camera on the selected camera reference or the 3D cursor, for this one"""
 
     bl_idname = "optisense.add_camera"
@@ -167,20 +158,12 @@ class OPTISENSE_OT_add_camera(bpy.types.Operator):
         description="The library's camera; its picture is 320 pixels wide at most, to begin with",
     )  # fmt: skip
 
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        return polls.has_design(cls, context) and polls.in_object_mode(cls, context)
-
-    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
-        return context.window_manager.invoke_props_dialog(self)
-
     def execute(self, context: bpy.types.Context) -> set[str]:
         scene = context.scene
         try:
             entry = session.ask_and_wait("entry", kind="camera", entry=self.model)["entry"]
         except EngineError as error:
-            self.report({"ERROR"}, error.text())
-            return {"CANCELLED"}
+            return refuse(self, error.text())
         references = [
             each
             for each in context.selected_objects
@@ -214,7 +197,7 @@ class OPTISENSE_OT_add_camera(bpy.types.Operator):
         return {"FINISHED"}
 
 
-class OPTISENSE_OT_set_model(bpy.types.Operator):
+class OPTISENSE_OT_set_model(polls.Designing, bpy.types.Operator):
     """Use another lamp of the library for this group"""
 
     bl_idname = "optisense.set_model"
@@ -224,10 +207,6 @@ class OPTISENSE_OT_set_model(bpy.types.Operator):
 
     model: EnumProperty(name="Model", items=_light_models, description="The library's light")
     group: StringProperty(name="Group", description="Whose lamps change")
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        return polls.has_design(cls, context)
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         context.window_manager.invoke_search_popup(self)
@@ -244,7 +223,7 @@ class OPTISENSE_OT_set_model(bpy.types.Operator):
         return {"FINISHED"}
 
 
-class OPTISENSE_OT_set_group(bpy.types.Operator):
+class OPTISENSE_OT_set_group(ChoosingProperties, bpy.types.Operator):
     """Move the selected lights to another group"""
 
     bl_idname = "optisense.set_group"
@@ -263,9 +242,6 @@ class OPTISENSE_OT_set_group(bpy.types.Operator):
         return polls.has_design(cls, context) and bool(
             polls.selected(cls, context, "LIGHT", what="lights")
         )
-
-    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
-        return context.window_manager.invoke_props_dialog(self)
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         design = context.scene.optisense
@@ -304,8 +280,7 @@ class OPTISENSE_OT_look_through(bpy.types.Operator):
     def execute(self, context: bpy.types.Context) -> set[str]:
         cameras = objects_of(context.scene, "CAMERA")
         if not cameras:
-            self.report({"ERROR"}, "The sensor has no camera")
-            return {"CANCELLED"}
+            return refuse(self, "The sensor has no camera")
         context.scene.camera = cameras[0]
         context.space_data.region_3d.view_perspective = "CAMERA"
         return {"FINISHED"}

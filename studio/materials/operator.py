@@ -9,6 +9,7 @@ from bpy.props import EnumProperty, PointerProperty, StringProperty
 
 from ..core.engine import EngineError
 from ..engine import catalogue, handing, polls, session
+from ..engine.operators import fail, refuse, start
 from ..scene.build import add_material, set_coating
 from ..scene.gather import coating_values, free_name, material_values
 from ..scene.kinds import KINDS_OF_ROLE
@@ -85,16 +86,8 @@ class OPTISENSE_OT_preview_material(bpy.types.Operator):
             choice.previewed = entry
             session.redraw()
 
-        done = session.start_job(
-            "Drawing the material",
-            "preview",
-            drawn,
-            wait=bpy.app.background,
-            kind=choice.kind,
-            entry=entry,
-            name="material",
-        )
-        return {"FINISHED"} if done else {"CANCELLED"}
+        title = "Drawing the material"
+        return start(self, title, "preview", drawn, kind=choice.kind, entry=entry, name="material")
 
 
 class OPTISENSE_OT_material_pictures(bpy.types.Operator):
@@ -107,10 +100,9 @@ class OPTISENSE_OT_material_pictures(bpy.types.Operator):
     def poll(cls, context: bpy.types.Context) -> bool:
         if not _chosen(cls, context):
             return False
-        if not gallery.missing(_choice(context).kind):
-            cls.poll_message_set("All of them are drawn, or being drawn")
-            return False
-        return True
+        return polls.needs(
+            cls, gallery.missing(_choice(context).kind), "All of them are drawn, or being drawn"
+        )
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         gallery.draw_missing(_choice(context).kind)
@@ -146,9 +138,7 @@ class OPTISENSE_OT_apply_material(bpy.types.Operator):
         try:
             entry = session.ask_and_wait("entry", kind=choice.kind, entry=name)["entry"]
         except EngineError as error:
-            session.say(error)
-            self.report({"ERROR"}, error.text())
-            return {"CANCELLED"}
+            return fail(self, error)
         values = handing.without_nulls(entry["value"])
         design = context.scene.optisense
         if choice.kind == "coating":
@@ -218,8 +208,7 @@ class OPTISENSE_OT_keep_material(bpy.types.Operator):
             values = material_values(context.scene.optisense.materials[own.material])
         name = free_name(self.name, (), "")
         if not name:
-            self.report({"ERROR"}, "The name needs a letter from A to Z, or a digit")
-            return {"CANCELLED"}
+            return refuse(self, "The name needs a letter from A to Z, or a digit")
         now = session.state()
         now.about, now.problem, now.hint, now.note = KEEPING, "", "", ""
         try:
@@ -232,9 +221,7 @@ class OPTISENSE_OT_keep_material(bpy.types.Operator):
                 source=self.source,
             )
         except EngineError as error:
-            session.say(error)
-            self.report({"ERROR"}, error.text())
-            return {"CANCELLED"}
+            return fail(self, error)
         begun = gallery.is_begun(kind)
         gallery.forget(kind, name)
 

@@ -12,6 +12,7 @@ from bpy.props import BoolProperty, StringProperty
 from ..core import vary
 from ..core.engine import EngineError
 from ..engine import handing, polls, session
+from ..engine.operators import ChoosingFile, Starting, fail, refuse, start
 from ..scene.paths import chosen, objective
 from ..sensor.opening import new_stage, open_stage
 from . import following
@@ -23,7 +24,7 @@ WIDEST = 72
 """Characters of an entry of the menu Vary."""
 
 
-class OPTISENSE_OT_vary(bpy.types.Operator):
+class OPTISENSE_OT_vary(polls.Designing, bpy.types.Operator):
     """Let the search change this"""
 
     bl_idname = "optisense.vary"
@@ -34,10 +35,6 @@ class OPTISENSE_OT_vary(bpy.types.Operator):
     text: StringProperty(
         name="Range", description="PATH=LOW:HIGH, PATH=+-REACH, PATH=LOW:HIGH:STEPS or PATH=A,B"
     )
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        return polls.has_design(cls, context)
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         search = context.scene.optisense_search
@@ -74,10 +71,7 @@ class OPTISENSE_OT_vary_remove(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        if not context.scene.optisense_search.vary:
-            cls.poll_message_set("Nothing varies yet")
-            return False
-        return True
+        return polls.needs(cls, context.scene.optisense_search.vary, "Nothing varies yet")
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         search = context.scene.optisense_search
@@ -104,7 +98,7 @@ def wait_property() -> Any:
     )
 
 
-class OPTISENSE_OT_search(bpy.types.Operator):
+class OPTISENSE_OT_search(Starting, bpy.types.Operator):
     """Search for a better sensor; every trial is kept in a folder"""
 
     bl_idname = "optisense.search"
@@ -120,32 +114,28 @@ class OPTISENSE_OT_search(bpy.types.Operator):
         if not vary.texts_of(search.vary):
             cls.poll_message_set("Choose what may vary first")
             return False
-        if not search.study and not context.scene.optisense.is_saved:
-            cls.poll_message_set("Save the sensor first, or name a folder for the study")
-            return False
-        return True
+        return polls.needs(
+            cls,
+            search.study or context.scene.optisense.is_saved,
+            "Save the sensor first, or name a folder for the study",
+        )
 
-    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
-        return self._start(context, wait=False)
-
-    def execute(self, context: bpy.types.Context) -> set[str]:
-        return self._start(context, wait=self.wait)
-
-    def _start(self, context: bpy.types.Context, *, wait: bool) -> set[str]:
+    def start(self, context: bpy.types.Context, *, wait: bool) -> set[str]:
         search = context.scene.optisense_search
         study = study_of(context.scene)
         if not study or _is_taken(Path(study)):
             if not context.scene.optisense.is_saved:
-                self.report({"ERROR"}, "The folder of the study is not empty; name another one")
-                return {"CANCELLED"}
+                return refuse(self, "The folder of the study is not empty; name another one")
             study = search.study = str(new_study(Path(context.scene.optisense.folder)))
             session.push_undo("Search")  # so that Blender asks to save the file that names it
-        design = handing.design_for(self, context.scene)
-        if design is None:
-            return {"CANCELLED"}
+        try:
+            design = handing.design(context.scene)
+        except EngineError as error:
+            return fail(self, error)
         following.begin()
         fields: dict[str, Any] = {"budget": search.budget} if search.budget else {}
-        done = session.start_job(
+        return start(
+            self,
             TITLE,
             "search",
             following.finished,
@@ -162,9 +152,6 @@ class OPTISENSE_OT_search(bpy.types.Operator):
             name="search",
             **fields,
         )
-        if not done:
-            self.report({"ERROR"}, session.state().problem)
-        return {"FINISHED"} if done else {"CANCELLED"}
 
 
 class _WithStudy:
@@ -172,15 +159,14 @@ class _WithStudy:
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        if not polls.may_ask(cls, context):
-            return False
-        if not context.scene.optisense_search.study:
-            cls.poll_message_set("There is no study yet: search first, or name its folder")
-            return False
-        return True
+        return polls.may_ask(cls, context) and polls.needs(
+            cls,
+            context.scene.optisense_search.study,
+            "There is no study yet: search first, or name its folder",
+        )
 
 
-class OPTISENSE_OT_resume(_WithStudy, bpy.types.Operator):
+class OPTISENSE_OT_resume(_WithStudy, Starting, bpy.types.Operator):
     """Go on with the study, for as many trials as the budget says"""
 
     bl_idname = "optisense.resume"
@@ -188,13 +174,7 @@ class OPTISENSE_OT_resume(_WithStudy, bpy.types.Operator):
 
     wait: wait_property()
 
-    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
-        return self._start(context, wait=False)
-
-    def execute(self, context: bpy.types.Context) -> set[str]:
-        return self._start(context, wait=self.wait)
-
-    def _start(self, context: bpy.types.Context, *, wait: bool) -> set[str]:
+    def start(self, context: bpy.types.Context, *, wait: bool) -> set[str]:
         search = context.scene.optisense_search
         study = study_of(context.scene)
         fields: dict[str, Any] = {"workers": search.workers, "go_on": search.go_on}
@@ -220,10 +200,7 @@ class OPTISENSE_OT_resume(_WithStudy, bpy.types.Operator):
             else:
                 follow("resume", following.finished, **fields)
 
-        done = session.start_job("Reading the study", "study", known, wait=wait, study=study)
-        if not done:
-            self.report({"ERROR"}, session.state().problem)
-        return {"FINISHED"} if done else {"CANCELLED"}
+        return start(self, "Reading the study", "study", known, wait=wait, study=study)
 
 
 class OPTISENSE_OT_apply_best(_WithStudy, bpy.types.Operator):
@@ -239,8 +216,7 @@ class OPTISENSE_OT_apply_best(_WithStudy, bpy.types.Operator):
         try:
             stage = new_stage()
         except EngineError as error:
-            session.say(error)
-            return {"CANCELLED"}
+            return fail(self, error)
 
         def applied(_: dict[str, Any]) -> None:
             scene = bpy.data.scenes.get(name)
@@ -250,15 +226,18 @@ class OPTISENSE_OT_apply_best(_WithStudy, bpy.types.Operator):
                     scene, stage, wait=wait, folder=folder if saved else "", keep_others=True
                 )
 
-        done = session.start_job(
-            "Applying", "apply", applied, wait=wait, study=study_of(context.scene), to=str(stage)
+        return start(
+            self,
+            "Applying",
+            "apply",
+            applied,
+            wait=wait,
+            study=study_of(context.scene),
+            to=str(stage),
         )
-        if not done:
-            self.report({"ERROR"}, session.state().problem)
-        return {"FINISHED"} if done else {"CANCELLED"}
 
 
-class OPTISENSE_OT_keep_variant(_WithStudy, bpy.types.Operator):
+class OPTISENSE_OT_keep_variant(_WithStudy, ChoosingFile, bpy.types.Operator):
     """Write the best sensor of the study to a folder of its own; this one stays"""
 
     bl_idname = "optisense.keep_variant"
@@ -268,10 +247,8 @@ class OPTISENSE_OT_keep_variant(_WithStudy, bpy.types.Operator):
         name="Folder", description="That does not exist yet", subtype="DIR_PATH"
     )
 
-    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
-        self.filepath = f"{study_of(context.scene)}-best"
-        context.window_manager.fileselect_add(self)
-        return {"RUNNING_MODAL"}
+    def suggested(self, context: bpy.types.Context) -> str:
+        return f"{study_of(context.scene)}-best"
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         target = chosen(self, "a folder")
@@ -281,17 +258,14 @@ class OPTISENSE_OT_keep_variant(_WithStudy, bpy.types.Operator):
         def kept(result: dict[str, Any]) -> None:
             session.state().note = f"Written to {result['folder']}"
 
-        done = session.start_job(
+        return start(
+            self,
             "Applying",
             "apply",
             kept,
-            wait=bpy.app.background,
             study=study_of(context.scene),
             to=str(target),
         )
-        if not done:
-            self.report({"ERROR"}, session.state().problem)
-        return {"FINISHED"} if done else {"CANCELLED"}
 
 
 CLASSES = (

@@ -10,6 +10,7 @@ from bpy.props import StringProperty
 
 from ..core.engine import EngineError
 from ..engine import catalogue, handing, polls, session
+from ..engine.operators import ChoosingFile, Starting, fail, refuse, start
 from ..scene.paths import chosen, suggested
 from .opening import open_source
 
@@ -23,14 +24,11 @@ class _Opens:
         try:
             done = open_source(context.scene, source, folder, wait=wait)
         except EngineError as error:
-            session.say(error)
-            done = False
-        if not done:
-            self.report({"ERROR"}, session.state().problem)
-        return {"FINISHED"} if done else {"CANCELLED"}
+            return fail(self, error)
+        return {"FINISHED"} if done else refuse(self, session.state().problem)
 
 
-class OPTISENSE_OT_new(_Opens, bpy.types.Operator):
+class OPTISENSE_OT_new(polls.Replacing, _Opens, Starting, bpy.types.Operator):
     """Start from a built-in sensor, in place of the one in this scene"""
 
     bl_idname = "optisense.new"
@@ -41,15 +39,8 @@ class OPTISENSE_OT_new(_Opens, bpy.types.Operator):
         name="Sensor", description="The name of a built-in sensor", default="gelsight-mini"
     )
 
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        return polls.is_idle(cls, context) and polls.in_object_mode(cls, context)
-
-    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
-        return self._open(context, f"builtin:{self.sensor}", "", wait=False)
-
-    def execute(self, context: bpy.types.Context) -> set[str]:
-        return self._open(context, f"builtin:{self.sensor}", "", wait=True)
+    def start(self, context: bpy.types.Context, *, wait: bool) -> set[str]:
+        return self._open(context, f"builtin:{self.sensor}", "", wait=wait)
 
 
 class OPTISENSE_MT_new(bpy.types.Menu):
@@ -66,7 +57,7 @@ class OPTISENSE_MT_new(bpy.types.Menu):
             row.operator(OPTISENSE_OT_new.bl_idname, text=description or title).sensor = name
 
 
-class OPTISENSE_OT_open(_Opens, bpy.types.Operator):
+class OPTISENSE_OT_open(polls.Replacing, _Opens, ChoosingFile, bpy.types.Operator):
     """Open the design.yaml of a sensor's folder, in place of the sensor in this scene"""
 
     bl_idname = "optisense.open"
@@ -78,16 +69,9 @@ class OPTISENSE_OT_open(_Opens, bpy.types.Operator):
     )
     filter_glob: StringProperty(default="*.yaml", options={"HIDDEN"})
 
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        return polls.is_idle(cls, context) and polls.in_object_mode(cls, context)
-
-    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+    def suggested(self, context: bpy.types.Context) -> str:
         design = context.scene.optisense
-        if design.is_saved:
-            self.filepath = str(Path(design.folder) / "design.yaml")
-        context.window_manager.fileselect_add(self)
-        return {"RUNNING_MODAL"}
+        return str(Path(design.folder) / "design.yaml") if design.is_saved else self.filepath
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         path = chosen(self, "a design.yaml")
@@ -105,9 +89,7 @@ class _Saves:
         try:
             design = handing.design(scene)
         except EngineError as error:
-            session.say(error)
-            self.report({"ERROR"}, error.text())
-            return {"CANCELLED"}
+            return fail(self, error)
         name = scene.name
         own = scene.optisense.is_saved and Path(scene.optisense.folder) == Path(folder)
 
@@ -119,12 +101,9 @@ class _Saves:
             session.state().note = f"Saved in {result['folder']}"
 
         wait = bpy.app.background
-        done = session.start_job(
-            "Saving", "save", saved, wait=wait, design=design, to=folder, only_new=not own
+        return start(
+            self, "Saving", "save", saved, wait=wait, design=design, to=folder, only_new=not own
         )
-        if not done:
-            self.report({"ERROR"}, session.state().problem)
-        return {"FINISHED"} if done else {"CANCELLED"}
 
 
 class OPTISENSE_OT_save(_Saves, bpy.types.Operator):
@@ -135,18 +114,15 @@ class OPTISENSE_OT_save(_Saves, bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        if not polls.may_ask(cls, context):
-            return False
-        if not context.scene.optisense.is_saved:
-            cls.poll_message_set("It has no folder yet: use Save As")
-            return False
-        return True
+        return polls.may_ask(cls, context) and polls.needs(
+            cls, context.scene.optisense.is_saved, "It has no folder yet: use Save As"
+        )
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         return self._save(context, context.scene.optisense.folder)
 
 
-class OPTISENSE_OT_save_as(_Saves, bpy.types.Operator):
+class OPTISENSE_OT_save_as(polls.Asking, _Saves, ChoosingFile, bpy.types.Operator):
     """Write the sensor to a new folder"""
 
     bl_idname = "optisense.save_as"
@@ -156,29 +132,19 @@ class OPTISENSE_OT_save_as(_Saves, bpy.types.Operator):
         name="Folder", description="That does not exist yet", subtype="DIR_PATH"
     )
 
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        return polls.may_ask(cls, context)
-
-    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
-        self.filepath = suggested(context.scene)
-        context.window_manager.fileselect_add(self)
-        return {"RUNNING_MODAL"}
+    def suggested(self, context: bpy.types.Context) -> str:
+        return suggested(context.scene)
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         folder = chosen(self, "a folder")
         return {"CANCELLED"} if folder is None else self._save(context, str(folder))
 
 
-class OPTISENSE_OT_check(bpy.types.Operator):
+class OPTISENSE_OT_check(polls.Asking, bpy.types.Operator):
     """Find what is wrong without simulating; the object that it is about is selected"""
 
     bl_idname = "optisense.check"
     bl_label = "Check"
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        return polls.may_ask(cls, context)
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         def checked(result: dict[str, Any]) -> None:
@@ -189,11 +155,12 @@ class OPTISENSE_OT_check(bpy.types.Operator):
             worst = next((p for p in problems if p["severity"] == "error"), problems[0])
             session.say(EngineError({"kind": "DesignError", **worst}))
 
-        design = handing.design_for(self, context.scene)
-        if design is None:
-            return {"CANCELLED"}
+        try:
+            design = handing.design(context.scene)
+        except EngineError as error:
+            return fail(self, error)
         session.start_job("Checking", "check", checked, wait=bpy.app.background, design=design)
-        return {"FINISHED"}
+        return {"FINISHED"}  # the panels show what is wrong with the design
 
 
 class OPTISENSE_OT_start_engine(bpy.types.Operator):
@@ -204,10 +171,7 @@ class OPTISENSE_OT_start_engine(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        if session.running() is not None:
-            cls.poll_message_set("It runs")
-            return False
-        return True
+        return polls.needs(cls, session.running() is None, "It runs")
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         session.restart()
@@ -222,10 +186,7 @@ class OPTISENSE_OT_cancel(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        if not session.is_busy():
-            cls.poll_message_set("Nothing is going on")
-            return False
-        return True
+        return polls.needs(cls, session.is_busy(), "Nothing is going on")
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         session.cancel_job()

@@ -12,6 +12,7 @@ from bpy.props import EnumProperty, IntVectorProperty
 from ..core import cage as core
 from ..core.numbers import kept_array
 from ..engine import polls
+from ..engine.operators import refuse
 from ..scene.cages import (
     add_cage,
     as_array,
@@ -42,6 +43,14 @@ def _cage(
                 return cage
     operator.poll_message_set("Select a cage, or a part that is in one")
     return None
+
+
+class _OfCage:
+    """Operators on a cage: the active one, or the one around the active part."""
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return _cage(cls, context) is not None
 
 
 def _end_editing(cage: bpy.types.Object) -> None:
@@ -84,8 +93,7 @@ class OPTISENSE_OT_new_cage(bpy.types.Operator):
     def execute(self, context: bpy.types.Context) -> set[str]:
         scene = context.scene
         if np.prod(self.resolution) > 20_000:
-            self.report({"ERROR"}, "More than 20,000 control points")
-            return {"CANCELLED"}
+            return refuse(self, "More than 20,000 control points")
         named = {part: name for name, part in part_names(scene).items()}
         parts = [each for each in context.selected_objects if each.optisense.kind == "PART"]
         corners = []
@@ -111,16 +119,12 @@ class OPTISENSE_OT_new_cage(bpy.types.Operator):
         return {"FINISHED"}
 
 
-class OPTISENSE_OT_edit_shape(bpy.types.Operator):
+class OPTISENSE_OT_edit_shape(_OfCage, bpy.types.Operator):
     """Move control points; the parts in the cage follow. Press again, or Tab, to end"""
 
     bl_idname = "optisense.edit_shape"
     bl_label = "Edit Shape"
     bl_options = {"REGISTER", "UNDO"}
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        return _cage(cls, context) is not None
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         cage = _cage(type(self), context)
@@ -130,8 +134,7 @@ class OPTISENSE_OT_edit_shape(bpy.types.Operator):
         if context.mode != "OBJECT":
             bpy.ops.object.mode_set(mode="OBJECT")
         if cage.name not in context.view_layer.objects:
-            self.report({"ERROR"}, f"'{cage.name}' is hidden with its collection; show that first")
-            return {"CANCELLED"}
+            return refuse(self, f"'{cage.name}' is hidden with its collection; show that first")
         cage.hide_set(False)
         select_only(cage)
         bpy.ops.object.mode_set(mode="EDIT")
@@ -140,7 +143,7 @@ class OPTISENSE_OT_edit_shape(bpy.types.Operator):
         return {"FINISHED"}
 
 
-class OPTISENSE_OT_set_bound(bpy.types.Operator):
+class OPTISENSE_OT_set_bound(_OfCage, bpy.types.Operator):
     """Take the present shape as one end of the range that A blends and searches use"""
 
     bl_idname = "optisense.set_bound"
@@ -152,10 +155,6 @@ class OPTISENSE_OT_set_bound(bpy.types.Operator):
         description="Which end of the range",
     )  # fmt: skip
 
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        return _cage(cls, context) is not None
-
     def execute(self, context: bpy.types.Context) -> set[str]:
         cage = _cage(type(self), context)
         _end_editing(cage)
@@ -163,8 +162,7 @@ class OPTISENSE_OT_set_bound(bpy.types.Operator):
         try:
             values = cage_values(cage)
         except ValueError as error:
-            self.report({"ERROR"}, str(error))
-            return {"CANCELLED"}
+            return refuse(self, str(error))
         now = kept_array(current_points(values), shown)
         values[self.bound] = as_points(now)
         values.pop("blend", None)
@@ -186,10 +184,9 @@ class OPTISENSE_OT_blend(bpy.types.Operator):
         if cage is None:
             return False
         values = cage_data(cage)
-        if not (values.get("c_min") and values.get("c_max")):
-            cls.poll_message_set("Set C_min and C_max first")
-            return False
-        return True
+        return polls.needs(
+            cls, (values.get("c_min") and values.get("c_max")), "Set C_min and C_max first"
+        )
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         cage = _cage(type(self), context)
@@ -197,22 +194,17 @@ class OPTISENSE_OT_blend(bpy.types.Operator):
         values, shown = cage_data(cage), shown_points(cage)
         lower, upper = as_array(values["c_min"]), as_array(values["c_max"])
         if len(shown) != len(lower):
-            self.report({"ERROR"}, "Control points were added or removed; undo that first")
-            return {"CANCELLED"}
+            return refuse(self, "Control points were added or removed; undo that first")
         cage.optisense.blend = core.nearest_blend(shown, lower, upper)  # its update shows it
         return {"FINISHED"}
 
 
-class OPTISENSE_OT_rest_cage(bpy.types.Operator):
+class OPTISENSE_OT_rest_cage(_OfCage, bpy.types.Operator):
     """Put all control points back: the parts take their undeformed shape"""
 
     bl_idname = "optisense.rest_cage"
     bl_label = "Back to Rest"
     bl_options = {"REGISTER", "UNDO"}
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        return _cage(cls, context) is not None
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         cage = _cage(type(self), context)
@@ -225,8 +217,7 @@ class OPTISENSE_OT_rest_cage(bpy.types.Operator):
         try:
             set_points(cage, points)
         except ValueError:
-            self.report({"ERROR"}, "Control points were added or removed; undo that first")
-            return {"CANCELLED"}
+            return refuse(self, "Control points were added or removed; undo that first")
         follow(context.scene, cage)
         return {"FINISHED"}
 

@@ -10,6 +10,7 @@ from bpy.props import EnumProperty, FloatProperty, StringProperty
 
 from ..core.mesh_file import Mesh
 from ..engine import polls, session
+from ..engine.operators import ChoosingFile, ChoosingProperties, refuse
 from ..scene import kinds
 from ..scene.build import add_material, add_part
 from ..scene.collections import REFERENCE, collection, select_only
@@ -42,7 +43,7 @@ FIRST_MATERIAL: dict[str, tuple[str, dict[str, Any]]] = {
 aluminium (the index of the diffuse-grey coating's flake); a blocker absorbs."""
 
 
-class OPTISENSE_OT_add_mesh(bpy.types.Operator):
+class OPTISENSE_OT_add_mesh(polls.Replacing, ChoosingFile, bpy.types.Operator):
     """Read a mesh file (OBJ, STL, PLY) into the collection Reference"""
 
     bl_idname = "optisense.add_mesh"
@@ -58,14 +59,6 @@ class OPTISENSE_OT_add_mesh(bpy.types.Operator):
         max=1e6,
         default=1.0,
     )
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        return polls.is_idle(cls, context) and polls.in_object_mode(cls, context)
-
-    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
-        context.window_manager.fileselect_add(self)
-        return {"RUNNING_MODAL"}
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         path = chosen(self, "a mesh file")
@@ -102,7 +95,7 @@ def _bring(scene: bpy.types.Scene, name: str, result: dict[str, Any]) -> None:
     select_only(item)
 
 
-class OPTISENSE_OT_set_reference(bpy.types.Operator):
+class OPTISENSE_OT_set_reference(ChoosingProperties, bpy.types.Operator):
     """Say what the selected meshes are for; all but camera and light references become parts"""
 
     bl_idname = "optisense.set_reference"
@@ -119,16 +112,12 @@ class OPTISENSE_OT_set_reference(bpy.types.Operator):
             return False
         return bool(_meshes(cls, context))
 
-    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
-        return context.window_manager.invoke_props_dialog(self)
-
     def execute(self, context: bpy.types.Context) -> set[str]:
         scene = context.scene
         items = _meshes(type(self), context)
         empty = [each.name for each in items if not each.data.polygons]
         if empty and self.reference not in PLACES:
-            self.report({"ERROR"}, f"There is no face in {', '.join(empty)}")
-            return {"CANCELLED"}
+            return refuse(self, f"There is no face in {', '.join(empty)}")
         made = []
         for item in items:
             _into(scene, item, REFERENCE)

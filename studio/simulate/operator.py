@@ -10,7 +10,8 @@ from bpy_extras import view3d_utils
 from mathutils import Vector
 
 from ..core.engine import EngineError
-from ..engine import handing, polls, session
+from ..engine import polls, session
+from ..engine.operators import Starting, fail, refuse, start, start_with_design
 from ..scene.collections import objects_of, select_only
 from ..scene.contacts import add_contact, sensing_surface
 from . import editors, picture, requests
@@ -21,7 +22,7 @@ SHAPE = (
 """What a contact is like, wherever it is."""
 
 
-class OPTISENSE_OT_simulate(bpy.types.Operator):
+class OPTISENSE_OT_simulate(polls.Asking, Starting, bpy.types.Operator):
     """Make the picture that the sensor's camera would take"""
 
     bl_idname = "optisense.simulate"
@@ -34,34 +35,19 @@ class OPTISENSE_OT_simulate(bpy.types.Operator):
         options={"HIDDEN", "SKIP_SAVE"},
     )
 
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        return polls.may_ask(cls, context)
-
-    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
-        return self._start(context, wait=False)
-
-    def execute(self, context: bpy.types.Context) -> set[str]:
-        return self._start(context, wait=self.wait)
-
-    def _start(self, context: bpy.types.Context, *, wait: bool) -> set[str]:
+    def start(self, context: bpy.types.Context, *, wait: bool) -> set[str]:
         try:
             fields = requests.fields(context.scene)
         except EngineError as error:
-            session.say(error)
-            self.report({"ERROR"}, error.text())
-            return {"CANCELLED"}
-        done = session.start_job(
+            return fail(self, error)
+        return start(
+            self,
             "Simulating",
             "simulate",
             lambda result: requests.take(result, draft=False),
             wait=wait,
             **fields,
         )
-        if not done:
-            self.report({"ERROR"}, session.state().problem)
-            return {"CANCELLED"}
-        return {"FINISHED"}
 
 
 class OPTISENSE_OT_show_picture(bpy.types.Operator):
@@ -82,27 +68,21 @@ class OPTISENSE_OT_show_picture(bpy.types.Operator):
         return {"FINISHED"}
 
 
-class OPTISENSE_OT_add_contact(bpy.types.Operator):
+class OPTISENSE_OT_add_contact(polls.Arranging, bpy.types.Operator):
     """Press a ball on the middle of the sensing surface"""
 
     bl_idname = "optisense.add_contact"
     bl_label = "Add in the Middle"
     bl_options = {"REGISTER", "UNDO"}
 
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        return polls.has_design(cls, context) and polls.in_object_mode(cls, context)
-
     def execute(self, context: bpy.types.Context) -> set[str]:
         surface = sensing_surface(context.scene)
         if surface is None:
-            self.report({"ERROR"}, "There is no sensing surface")
-            return {"CANCELLED"}
+            return refuse(self, "There is no sensing surface")
         middle = sum((Vector(corner) for corner in surface.bound_box), Vector()) / 8.0
         found, point, normal, _ = surface.closest_point_on_mesh(middle)
         if not found:
-            self.report({"ERROR"}, "The sensing surface is empty")
-            return {"CANCELLED"}
+            return refuse(self, "The sensing surface is empty")
         _add(context, surface, point, normal)
         return {"FINISHED"}
 
@@ -208,21 +188,15 @@ class OPTISENSE_OT_nine_contacts(bpy.types.Operator):
 
         # Any shape finds the same places; that of a ball is always known.
         ball = {"kind": "sphere", "radius": 1.5}
-        design = handing.design_for(self, context.scene)
-        if design is None:
-            return {"CANCELLED"}
-        done = session.start_job(
+        return start_with_design(
+            self,
+            context,
             "Finding nine places",
             "nine_places",
             placed,
-            wait=bpy.app.background,
-            design=design,
             indenter=ball,
             depth=0.3,
         )
-        if not done:
-            self.report({"ERROR"}, session.state().problem)
-        return {"FINISHED"} if done else {"CANCELLED"}
 
     def _like(self, context: bpy.types.Context) -> dict[str, Any]:
         """What the nine contacts are like: the active one, or a ball."""
@@ -243,10 +217,7 @@ class OPTISENSE_OT_clear_contacts(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        if not objects_of(context.scene, "CONTACT"):
-            cls.poll_message_set("There are no contacts")
-            return False
-        return True
+        return polls.needs(cls, objects_of(context.scene, "CONTACT"), "There are no contacts")
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         for each in objects_of(context.scene, "CONTACT"):

@@ -1,0 +1,83 @@
+"""How operators end: with an error that the user sees, or with a request to the engine."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import bpy
+
+from ..core.engine import EngineError
+from . import handing, session
+
+
+def refuse(operator: bpy.types.Operator, text: str) -> set[str]:
+    """Report an error; returns what Blender wants of an operator that did nothing."""
+    operator.report({"ERROR"}, text)
+    return {"CANCELLED"}
+
+
+def fail(operator: bpy.types.Operator, error: EngineError) -> set[str]:
+    """As `refuse`, with the error on the panels too."""
+    session.say(error)
+    return refuse(operator, error.text())
+
+
+def start(
+    operator: bpy.types.Operator,
+    title: str,
+    what: str,
+    on_result: session.Answer,
+    *,
+    wait: bool | None = None,
+    **fields: Any,
+) -> set[str]:
+    """Begin a long job (see `session.start_job`) and report it where it does not begin.
+
+    Args:
+        wait: until the job is over; by default in scripts without a window.
+    """
+    wait = bpy.app.background if wait is None else wait
+    if session.start_job(title, what, on_result, wait=wait, **fields):
+        return {"FINISHED"}
+    return refuse(operator, session.state().problem)
+
+
+def start_with_design(
+    operator: bpy.types.Operator, context: bpy.types.Context, *args: Any, **fields: Any
+) -> set[str]:
+    """As `start`, with the scene's design among the fields of the request."""
+    try:
+        design = handing.design(context.scene)
+    except EngineError as error:
+        return fail(operator, error)
+    return start(operator, *args, design=design, **fields)
+
+
+class Starting:
+    """Operators that a click starts and a script waits for; their `start` does it."""
+
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        return self.start(context, wait=False)
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        return self.start(context, wait=getattr(self, "wait", True))
+
+
+class ChoosingFile:
+    """Operators that ask for a file or a folder first."""
+
+    def suggested(self, context: bpy.types.Context) -> str:
+        """The path that the file selector begins with."""
+        return self.filepath
+
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        self.filepath = self.suggested(context)
+        context.window_manager.fileselect_add(self)
+        return {"RUNNING_MODAL"}
+
+
+class ChoosingProperties:
+    """Operators that show their properties in a dialog first."""
+
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        return context.window_manager.invoke_props_dialog(self)
