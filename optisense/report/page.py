@@ -10,21 +10,19 @@ from pathlib import Path
 from typing import Any, Literal, Protocol
 
 import numpy as np
-from jinja2 import DictLoader, Environment, StrictUndefined
 from markupsafe import Markup
 from numpy.typing import NDArray
 
-from optisense import __version__
 from optisense.design import LightGroup, SensorDesign
+from optisense.design.colour import encode
 from optisense.geometry import Contact, TriangleMesh
-from optisense.optics.camera.response import auto_exposure, encode
+from optisense.optics.camera.response import auto_exposure
 from optisense.report import tables
 from optisense.report.camera_rays import CameraRays
-from optisense.report.files import template
+from optisense.report.files import page, template
 from optisense.report.pictures import data_uri, mask_overlay, normal_colours
 from optisense.report.real_sensor import RealComparison
 from optisense.report.scene_view import scene_data
-from optisense.text import shown_in_html
 from optisense.writing import write_text
 
 
@@ -88,12 +86,11 @@ def write_report(
     Raises:
         OutputError: the file can't be written.
     """
-    path = Path(path)
-    page = render_page(
+    text = render_page(
         design, image, contacts, exposure=exposure, indenters=indenters, rays=rays, real=real
     )
-    write_text(path, page)
-    return path
+    write_text(Path(path), text)
+    return Path(path)
 
 
 def render_page(
@@ -109,15 +106,8 @@ def render_page(
     """The page of `write_report` as text."""
     height, width = image.contact_mask.shape
     assumed, sourced = tables.provenance_rows(design)
-    environment = Environment(
-        loader=DictLoader({"report": template("report.html.j2")}),
-        autoescape=True,
-        finalize=shown_in_html,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-    return environment.get_template("report").render(
+    return page(
+        "report",
         title=design.name,
         description=design.description,
         headline=tables.headline(image.settings, width, height),
@@ -132,8 +122,6 @@ def render_page(
         real=None if real is None else _real(real),
         assumed=assumed,
         sourced=sourced,
-        version=__version__,
-        css=Markup(template("report.css")),
         scene=_json(scene_data(design, dict(indenters or {}), rays)),
         picture_script=Markup(template("picture.js")),
         viewer_script=Markup(template("viewer.js")),

@@ -8,10 +8,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from jinja2 import DictLoader, Environment, StrictUndefined
 from markupsafe import Markup
 
-from optisense import __version__
 from optisense.design.section import along_rows
 from optisense.design.section_drawing import DrawnRay, section_svg
 from optisense.errors import OptiSenseError
@@ -19,8 +17,7 @@ from optisense.objectives.registry import Objective
 from optisense.objectives.score import Score, shown_number
 from optisense.objectives.scored import Scored
 from optisense.report.camera_rays import CameraRays
-from optisense.report.files import template
-from optisense.text import shown_in_html
+from optisense.report.files import page
 from optisense.writing import write_text
 
 DOTS_PER_INCH = 110
@@ -50,15 +47,8 @@ def write_score_report(path: str | Path, scored: Scored, objectives: list[Object
 def render_scores(scored: Scored, objectives: list[Objective]) -> str:
     """The page of `write_score_report` as text."""
     summaries = {each.name: each.summary for each in objectives}
-    environment = Environment(
-        loader=DictLoader({"scores": template("scores.html.j2")}),
-        autoescape=True,
-        finalize=shown_in_html,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-    return environment.get_template("scores").render(
+    return page(
+        "scores",
         title=scored.design.name,
         description=scored.design.description,
         headline=_headline(scored),
@@ -73,8 +63,6 @@ def render_scores(scored: Scored, objectives: list[Objective]) -> str:
             (key.replace("_", " "), _text(value))
             for key, value in scored.to_dict().get("settings", {}).items()
         ],
-        version=__version__,
-        css=Markup(template("report.css")),
     )
 
 

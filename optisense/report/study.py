@@ -7,10 +7,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from jinja2 import DictLoader, Environment, StrictUndefined
 from markupsafe import Markup
 
-from optisense import __version__
 from optisense.design import SensorDesign
 from optisense.design.section import along_rows
 from optisense.design.section_drawing import section_svg
@@ -21,14 +19,13 @@ from optisense.report.balls import marks_svg, told
 from optisense.report.before_after import Look
 from optisense.report.cage_changes import CageChange, cage_changes, cage_figure
 from optisense.report.drawing import figure_uri
-from optisense.report.files import template
+from optisense.report.files import page
 from optisense.report.pictures import MOST_STRETCHED, data_uri, stretching_colours
 from optisense.report.tolerance import shown_size
 from optisense.search.methods import find
 from optisense.search.study.best import best_of
 from optisense.search.study.study import Study, front_among
 from optisense.search.study.trial import Trial
-from optisense.text import shown_in_html
 from optisense.writing import write_text
 
 MOST_COLUMNS = 8
@@ -78,15 +75,8 @@ def render_study(study: Study, looks: Mapping[str, Look] | None = None) -> str:
     cages = [] if after is None else cage_changes(study.space.design, after)
     changes = tables.changes(study, start, best, bool(cages))
     failures, more_causes = tables.failures(trials)
-    environment = Environment(
-        loader=DictLoader({"study": template("study.html.j2")}),
-        autoescape=True,
-        finalize=shown_in_html,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-    return environment.get_template("study").render(
+    return page(
+        "study",
         title=study.space.design.name,
         description=study.space.design.description,
         goal=" and ".join(weighed),
@@ -121,8 +111,6 @@ def render_study(study: Study, looks: Mapping[str, Look] | None = None) -> str:
         failures=failures,
         more_causes=more_causes,
         settings=tables.settings(study),
-        version=__version__,
-        css=Markup(template("report.css")),
     )
 
 

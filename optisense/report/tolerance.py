@@ -8,10 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from jinja2 import DictLoader, Environment, StrictUndefined
-from markupsafe import Markup
 
-from optisense import __version__
 from optisense.report.drawing import (
     AMBER,
     BLUE,
@@ -21,11 +18,10 @@ from optisense.report.drawing import (
     legend_above,
     new_figure,
 )
-from optisense.report.files import template
+from optisense.report.files import page
 from optisense.search.space.manufacturing import unit_of
 from optisense.search.tolerance.analysis import ScoreDistribution, Tolerance
 from optisense.search.tolerance.sensitivity import Estimate
-from optisense.text import shown_in_html
 from optisense.writing import write_text
 
 if TYPE_CHECKING:
@@ -44,16 +40,9 @@ def write_tolerance_report(path: str | Path, tolerance: Tolerance) -> Path:
 
 def render_tolerance(tolerance: Tolerance) -> str:
     """The page of `write_tolerance_report` as text."""
-    environment = Environment(
-        loader=DictLoader({"tolerance": template("tolerance.html.j2")}),
-        autoescape=True,
-        finalize=shown_in_html,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
     design = tolerance.design
-    return environment.get_template("tolerance").render(
+    return page(
+        "tolerance",
         title=design.name,
         description=design.description,
         headline=[
@@ -69,8 +58,6 @@ def render_tolerance(tolerance: Tolerance) -> str:
         ],
         failures=sorted(tolerance.failures.items(), key=lambda item: -item[1]),
         settings=[(key, str(value)) for key, value in tolerance.settings.items()],
-        version=__version__,
-        css=Markup(template("report.css")),
     )
 
 
