@@ -111,9 +111,9 @@ class TriangleMesh:
 
     def save_obj(self, path: str | Path) -> None:
         """Write a Wavefront OBJ file; every coordinate survives the round trip."""
-        from optisense.geometry.mesh_files import write_obj
+        from optisense.geometry.mesh_files import obj_text
 
-        write_obj(self, Path(path))
+        Path(path).write_text(obj_text(self), encoding="ascii")
 
     # ---- measuring
 

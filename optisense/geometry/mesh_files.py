@@ -48,9 +48,14 @@ def load_mesh(path: Path) -> TriangleMesh:
     return mesh
 
 
-def write_obj(mesh: TriangleMesh, path: Path) -> None:
-    """See `TriangleMesh.save_obj`."""
-    lines = ["# millimetres"]
+def obj_text(mesh: TriangleMesh, name: str | None = None) -> str:
+    """A mesh as the text of an OBJ file; every coordinate keeps all its digits.
+
+    Args:
+        mesh: mm; its normals are written too, where it has any.
+        name: of the object.
+    """
+    lines = ["# millimetres"] + ([] if name is None else [f"o {name}"])
     lines += [f"v {x!r} {y!r} {z!r}" for x, y, z in mesh.vertices.tolist()]
     faces = (mesh.faces + 1).tolist()
     if mesh.normals is None:
@@ -58,7 +63,7 @@ def write_obj(mesh: TriangleMesh, path: Path) -> None:
     else:
         lines += [f"vn {x!r} {y!r} {z!r}" for x, y, z in mesh.normals.tolist()]
         lines += [f"f {a}//{a} {b}//{b} {c}//{c}" for a, b, c in faces]
-    path.write_text("\n".join(lines) + "\n", encoding="ascii")
+    return "\n".join(lines) + "\n"
 
 
 def _refuse_cut_off_stl(data: bytes, path: Path) -> None:
@@ -99,7 +104,7 @@ def _load_with_trimesh(data: bytes, path: Path, suffix: str) -> TriangleMesh:
 
 
 def _parse_plain_obj(data: bytes) -> TriangleMesh | None:
-    """A file of triangles in the form that `write_obj` and most programs give it, read at once:
+    """A file of triangles in the form that `obj_text` and most programs give it, read at once:
     many times faster. None if anything is out of the ordinary; it is read line by line then.
     """
     lines = data.splitlines()

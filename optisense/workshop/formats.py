@@ -8,8 +8,9 @@ from pathlib import Path
 from typing import Any
 
 from optisense.errors import OutputError
+from optisense.geometry.mesh_files import obj_text
 from optisense.registry import Registry
-from optisense.workshop.mesh_formats import obj_bytes, stl_bytes, three_mf_bytes
+from optisense.workshop.mesh_formats import stl_bytes, three_mf_bytes
 from optisense.workshop.shapes import Shape
 from optisense.workshop.step_format import require_step, write_step
 
@@ -34,7 +35,12 @@ class ShapeFormat:
 
 
 STL = ShapeFormat(".stl", lambda path, title, shapes: path.write_bytes(stl_bytes(shapes[0])))
-OBJ = ShapeFormat(".obj", lambda path, title, shapes: path.write_bytes(obj_bytes(shapes[0])))
+OBJ = ShapeFormat(
+    ".obj",
+    lambda path, title, shapes: path.write_text(
+        obj_text(shapes[0].mesh, shapes[0].name), encoding="ascii"
+    ),
+)
 THREE_MF = ShapeFormat(
     ".3mf",
     lambda path, title, shapes: path.write_bytes(three_mf_bytes(title, shapes)),

@@ -1,4 +1,4 @@
-"""Shapes as STL, OBJ and 3MF files; lengths in mm."""
+"""Shapes as STL and 3MF files; lengths in mm."""
 
 from __future__ import annotations
 
@@ -46,14 +46,6 @@ def stl_bytes(shape: Shape) -> bytes:
     records["corners"] = mesh.triangles
     count = np.uint32(len(records)).astype("<u4").tobytes()
     return header.ljust(80, b"\0") + count + records.tobytes()
-
-
-def obj_bytes(shape: Shape) -> bytes:
-    """An OBJ file with one object; every coordinate keeps all its digits."""
-    lines = ["# millimetres", f"o {shape.name}"]
-    lines += [f"v {x!r} {y!r} {z!r}" for x, y, z in shape.mesh.vertices.tolist()]
-    lines += [f"f {a} {b} {c}" for a, b, c in (shape.mesh.faces + 1).tolist()]
-    return ("\n".join(lines) + "\n").encode("ascii")
 
 
 def three_mf_bytes(title: str, shapes: Sequence[Shape]) -> bytes:
