@@ -15,7 +15,7 @@ DARK, BRIGHT = 0.16, 0.62
 
 
 @dataclass(frozen=True)
-class Lamp:
+class DistantLamp:
     """A round, far lamp.
 
     Attributes:
@@ -51,7 +51,7 @@ class Studio:
         solid: how dark the ball's shadow is, 0 to 1.
     """
 
-    lamps: list[Lamp]
+    lamps: list[DistantLamp]
     sky: float
     floor: float
     solid: float
@@ -86,9 +86,11 @@ class Studio:
         return light
 
 
-def _lamp(direction: tuple[float, float, float], radiance: list[float], radius: float) -> Lamp:
+def _lamp(
+    direction: tuple[float, float, float], radiance: list[float], radius: float
+) -> DistantLamp:
     vector = np.array(direction)
-    return Lamp(vector / np.linalg.norm(vector), np.array(radiance), radius)
+    return DistantLamp(vector / np.linalg.norm(vector), np.array(radiance), radius)
 
 
 def white_studio(solid: float) -> Studio:
