@@ -17,9 +17,9 @@ STEP = 0.03
 """mm, about half of what a pixel sees. Weights follow boundaries exactly within a pixel, and to
 first order from one to the next: differences over less see the steps."""
 
-CLOSE = 0.03
+CLOSE = 0.015
 
-CANCELS = 0.003
+CANCELS = 0.002
 """Of the rays that arrive: what comes into view on one side leaves it on the other, and only the
 sum is compared. A mm, and `unit` times that for what moves rays by as much as `unit` mm."""
 

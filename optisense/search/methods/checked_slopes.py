@@ -1,0 +1,281 @@
+"""The smoothed score of a point and its gradient, by derivatives of rays that are checked against
+differences of the true score, or by such differences.
+
+A derivative holds where it agrees with central differences of the true score and these agree with
+each other over two steps. A score can fail this in two ways. Its differences are steady and the
+derivative is another one: then the gradient is made of differences. Or its differences change with
+their step: the score steps, because a row of pixels or a row of AOAP's triangles comes into view
+at once, or it has a kink, and no derivative describes it. The outcome tells the two apart.
+"""
+
+from __future__ import annotations
+
+import time
+import zlib
+from collections.abc import Iterator, Sequence
+from enum import Enum
+from inspect import signature
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from optisense.design import SensorDesign
+from optisense.errors import NoDerivativeError, OptiSenseError
+from optisense.objectives.smooth import SMOOTH, Slopes
+from optisense.search.evaluation.evaluator import DesignEvaluator
+from optisense.search.evaluation.outcome import Outcome
+from optisense.search.methods.base import FloatArray
+from optisense.search.methods.jacobian import Jacobian, holds, jacobian
+from optisense.search.space.search_space import BoundSpace
+
+if TYPE_CHECKING:
+    from optisense.optics.transport.ray_gradient import DifferentiableRays
+
+STEP = 0.05
+"""Central differences of the true score go so far to both sides, as a part of the parameters'
+ranges. A true score is a sum over pixels and triangles, which steps where a row of pixels comes
+into view, and which has small hills where an edge passes the picture's corner: over less than
+about this a derivative says little about the way up. Checks compare with half of this step."""
+
+FEW = 8
+"""With at most so many parameters differences by each cost no more scores than derivatives and the
+comparison with differences do. Over `STEP` they also see past the small hills of a true score, on
+which derivatives end."""
+
+TOLERANCE = 0.05
+"""A derivative along a direction holds if it is off the difference of the true score by at most
+this part of that difference, or of the slope that a random direction has on average (the
+gradient's length over the root of the number of parameters) where the difference is smaller."""
+
+CHECKS_AT_START, CHECKS = 4, 1
+"""Directions in which a gradient is compared with differences: its own, and at the start three
+random ones as well, along which errors show that the steepest direction hides. Each takes four
+scores for derivatives of rays, and two for differences."""
+
+SMOOTHED = "smoothed"
+"""Key of the smoothed score among an outcome's parts."""
+
+GRADIENT_BY = "gradient_by"
+"""Key of where the gradient comes from among an outcome's parts: `RAYS` or `DIFFERENCES`."""
+
+GRADIENT_HOLDS = "gradient_holds"
+"""Key among an outcome's parts: whether the gradient agrees with differences of the true score over
+two steps. Where it does not, the score has no derivative at this scale."""
+
+RAYS, DIFFERENCES = "derivatives of rays", "differences of scores"
+
+
+class Agreement(Enum):
+    """How a gradient compares with central differences of the true score."""
+
+    HOLDS = "agrees with differences over both steps"
+    DIFFERS = "differences over both steps agree with each other, the gradient is another one"
+    UNSTEADY = "differences over the two steps disagree: the score steps or has a kink"
+
+
+class CheckedSlope(NamedTuple):
+    """The smoothed score at a point, its gradient (n,) by the coordinates, where that comes from
+    (`RAYS` or `DIFFERENCES`), and whether it holds.
+    """
+
+    value: float
+    gradient: FloatArray
+    source: str
+    holds: bool
+
+
+class _Check(NamedTuple):
+    """A direction `way` (n,), as long as the ranges are, in which a gradient is checked; its slope
+    along that, its length, and the slope that random directions have on average.
+    """
+
+    way: FloatArray
+    slope: float
+    length: float
+    typical: float
+
+
+class SlopeEvaluator:
+    """Scores a point as usual, and adds the smoothed score and its gradient."""
+
+    def __init__(
+        self, usual: DesignEvaluator, parts: list[str], objective: str, resolution: int
+    ) -> None:
+        self.usual = usual
+        self.parts = parts
+        self.objective = objective
+        self.resolution = resolution
+        self._jacobian: Jacobian | None = None
+
+    def __call__(self, vector: FloatArray, seed: int) -> Outcome:
+        """See `Evaluator`."""
+        outcome = self.usual(vector, seed)
+        if outcome.failed:
+            return outcome
+        began = time.perf_counter()
+        try:
+            found = self.checked_slope(vector, seed)
+        except OptiSenseError as error:
+            return self.usual.failed(str(error), began)
+        parts = dict(outcome.parts)
+        facts = {SMOOTHED: found.value, GRADIENT_BY: found.source, GRADIENT_HOLDS: found.holds}
+        parts[self.objective] = {**parts.get(self.objective, {}), **facts}
+        seconds = outcome.seconds + time.perf_counter() - began
+        return Outcome(outcome.scores, None, parts, seconds, found.gradient)
+
+    def checked_slope(self, vector: FloatArray, seed: int) -> CheckedSlope:
+        """The smoothed score at a point (n,), and a gradient that has been compared with the score.
+
+        Derivatives of rays are used unless steady differences of the score contradict them: where
+        the score itself is unsteady, those of the smoothed score are as good as any, and cost less.
+
+        Raises:
+            OptiSenseError: the design can't be built, or no ray arrives.
+        """
+        if self.usual.space.size > FEW:
+            try:
+                slopes, gradient = self.slope(vector)
+            except NoDerivativeError:
+                pass
+            else:
+                found = self.agreement(vector, gradient, seed)
+                if found is not Agreement.DIFFERS:
+                    holds = found is Agreement.HOLDS
+                    return CheckedSlope(slopes.value, gradient, RAYS, holds)
+        gradient = self.differences(vector, seed)
+        steady = self.steady(vector, gradient, seed)
+        return CheckedSlope(self._smoothed(vector), gradient, DIFFERENCES, steady)
+
+    def slope(self, vector: FloatArray) -> tuple[Slopes, FloatArray]:
+        """The smoothed score at a point (n,), and its gradient (n,) by derivatives of rays.
+
+        Raises:
+            NoDerivativeError: a part moves by which rays have no derivative.
+            OptiSenseError: the design can't be built, or no ray arrives.
+        """
+        space = self.usual.space
+        design = space.apply(vector)
+        rays = self._rays(design, self.parts)
+        slopes = SMOOTH[self.objective](rays, **self._settings())
+        back = rays.pull_back(slopes.cosine, slopes.weight, slopes.points)
+        # The Jacobian of the start serves all points where shapes move linearly. It may not be
+        # that of whichever point came first: a study that is resumed would differ in rounding.
+        if self._jacobian is None:
+            self._jacobian = jacobian(space, space.start, self.parts)
+        moves = self._jacobian
+        if not holds(moves, space, design, vector):
+            moves = jacobian(space, np.array(vector, dtype=np.float64), self.parts)
+        gradient = moves.camera @ back.camera
+        for name, slope in moves.parts.items():
+            gradient = gradient + np.tensordot(slope, back.parts[name], axes=2)
+        return slopes, gradient
+
+    def agreement(self, vector: FloatArray, gradient: FloatArray, seed: int) -> Agreement:
+        """How derivatives (n,) compare with central differences of the true score over `STEP` and
+        over half of it, along directions that the bounds leave open.
+        """
+        found = Agreement.HOLDS
+        for check in self._checks(vector, gradient):
+            far, near = (self._difference(vector, check.way, h, seed) for h in (STEP, STEP / 2))
+            if far is None or near is None:
+                continue
+            allowed, doubt = TOLERANCE * max(abs(near), check.typical), abs(far - near)
+            steady = doubt <= allowed
+            # Differences that disagree with each other still refute what is far beyond both.
+            most = allowed if steady else TOLERANCE * max(abs(near), check.length) + doubt
+            if abs(check.slope - near) > most:
+                return Agreement.DIFFERS
+            if not steady:
+                found = Agreement.UNSTEADY
+        return found
+
+    def steady(self, vector: FloatArray, gradient: FloatArray, seed: int) -> bool:
+        """Whether a gradient (n,) of differences over `STEP` agrees with those over half of it."""
+        for check in self._checks(vector, gradient):
+            near = self._difference(vector, check.way, STEP / 2, seed)
+            if near is None:
+                continue
+            if abs(check.slope - near) > TOLERANCE * max(abs(near), check.typical):
+                return False
+        return True
+
+    def _checks(self, vector: FloatArray, gradient: FloatArray) -> Iterator[_Check]:
+        """The directions in which a gradient (n,) is compared with the score."""
+        space = self.usual.space
+        span = space.upper - space.lower
+        blocked = (gradient > 0) & (vector >= space.upper) | (gradient < 0) & (
+            vector <= space.lower
+        )
+        if blocked.all():
+            return
+        scaled = np.where(blocked, 0.0, gradient * span)
+        length = float(np.linalg.norm(scaled))
+        at_start = np.array_equal(vector, space.start)
+        random = np.random.default_rng(zlib.crc32(np.asarray(vector, dtype="<f8").tobytes()))
+        ways = [scaled / length] if length > 0 else []
+        while len(ways) < (CHECKS_AT_START if at_start else CHECKS):
+            way = np.where(blocked, 0.0, random.normal(size=space.size))
+            ways.append(way / np.linalg.norm(way))
+        typical = length / float(np.sqrt(np.count_nonzero(~blocked)))
+        for way in ways:
+            yield _Check(way * span, float(way @ scaled), length, typical)
+
+    def differences(self, vector: FloatArray, seed: int) -> FloatArray:
+        """(n,) gradient of the true score at a point (n,) by central differences over `STEP`; 0
+        for coordinates by which there is no score on one of the sides.
+        """
+        space = self.usual.space
+        gradient = np.zeros(space.size)
+        for number, span in enumerate(space.upper - space.lower):
+            way = np.zeros(space.size)
+            way[number] = span
+            found = self._difference(vector, way, STEP, seed)
+            gradient[number] = 0.0 if found is None else found / span
+        return gradient
+
+    def _difference(
+        self, vector: FloatArray, way: FloatArray, step: float, seed: int
+    ) -> float | None:
+        """How the true score changes along `way` (n,), for a whole one, over `step` of it to both
+        sides, or as far as the bounds allow; None if that is less than half of a step in all, or
+        if there is no score on one of the sides.
+        """
+        space = self.usual.space
+        room = [_room(space, vector, side * way, step) for side in (1.0, -1.0)]
+        if sum(room) < step / 2:
+            return None
+        found = []
+        for side in (room[0], -room[1]):
+            point = np.clip(vector + side * way, space.lower, space.upper)
+            try:
+                score = self.usual.objective_scores(space.apply(point), seed)[self.objective]
+            except OptiSenseError:
+                return None
+            if score.failure is not None:
+                return None
+            found.append(score.value)
+        return (found[0] - found[1]) / sum(room)
+
+    def _smoothed(self, vector: FloatArray) -> float:
+        rays = self._rays(self.usual.space.apply(vector), ())
+        return SMOOTH[self.objective](rays, **self._settings()).value
+
+    def _rays(self, design: SensorDesign, moving: Sequence[str]) -> DifferentiableRays:
+        width, height = design.camera.resolution
+        size = self.resolution, max(1, round(self.resolution * height / width))
+        return self.usual.keeper.model(design).differentiable_rays(moving, size)
+
+    def _settings(self) -> dict[str, Any]:
+        """The objective's own settings that its smoothed form knows too."""
+        known = signature(SMOOTH[self.objective]).parameters
+        return {name: value for name, value in self.usual.settings.items() if name in known}
+
+    def __getstate__(self) -> dict[str, object]:
+        return {**self.__dict__, "_jacobian": None}
+
+
+def _room(space: BoundSpace, vector: FloatArray, way: FloatArray, most: float) -> float:
+    """How often `way` (n,), at most so often, fits between a point (n,) and the bounds."""
+    ahead = np.where(way > 0, space.upper - vector, vector - space.lower)
+    moving = way != 0
+    return float(np.min(ahead[moving] / np.abs(way[moving]), initial=most).clip(0.0))
