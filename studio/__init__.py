@@ -15,6 +15,7 @@ from .export import operator as export_operator
 from .export import ui as export_ui
 from .lights import operator as light_operator
 from .lights import ui as light_ui
+from .lights import windows
 from .materials import gallery
 from .materials import operator as material_operator
 from .materials import ui as material_ui
@@ -22,7 +23,7 @@ from .optimise import following, offering
 from .optimise import operator as optimise_operator
 from .optimise import prop as optimise_prop
 from .optimise import ui as optimise_ui
-from .scene import cages, object_properties, properties
+from .scene import cages, fields, object_properties, old_files, properties
 from .sensor import operator as sensor_operator
 from .sensor import starting
 from .sensor import ui as sensor_ui
@@ -37,7 +38,9 @@ MODULES = (
     preferences,
     session,
     catalogue,
+    fields,
     properties,
+    old_files,
     object_properties,
     cages,
     picture,
@@ -55,6 +58,7 @@ MODULES = (
     gallery,
     material_operator,
     light_operator,
+    windows,
     simulate_operator,
     evaluate_operator,
     optimise_operator,

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+
+from .schema import Row
 
 TRIAL, BEST = (0.55, 0.75, 0.95, 1.0), (0.95, 0.55, 0.15, 1.0)
 """Colours of the curve: each trial, and the line of the best so far."""
@@ -21,6 +23,10 @@ REACH = 2.0
 
 TURN = 10.0
 """Degrees to either side that a direction may turn, until the user says otherwise."""
+
+
+NEAR = 0.1
+"""How far a number without two bounds may change, as a share of what it is now."""
 
 
 @dataclass(frozen=True)
@@ -72,23 +78,43 @@ def for_light(
 
 
 def for_surface(
-    library: str, libraries: Sequence[str], specularity: float, reflectance: Sequence[float]
+    library: str, libraries: Sequence[str], values: Mapping[str, Any], rows: Mapping[str, Row]
 ) -> list[Suggestion]:
     """What the sensing surface is coated with.
 
     Args:
         library: the library coating that it is now.
         libraries: those of the library.
-        specularity, reflectance: of the coating now; the latter of R, G, B.
+        values: of its fields, now.
+        rows: what the engine says of them.
     """
     return [
-        Suggestion("Specularity", f"coating.specularity={_around(specularity, 0.0, 1.0)}"),
-        *(
-            Suggestion(f"Reflectance {c}", f"coating.reflectance.{c}={_around(now, 0.05, 0.9)}")
-            for c, now in zip("rgb", reflectance, strict=True)
-        ),
+        *_for_fields("", "coating", values, rows),
         *_one_of("Coating", "coating.library", library, libraries),
     ]
+
+
+def _for_fields(
+    label: str, path: str, values: Mapping[str, Any], rows: Mapping[str, Row]
+) -> list[Suggestion]:
+    """The numbers of a material or coating: fractions over their range, others near to now."""
+    found = []
+    for name, row in rows.items():
+        value = values.get(name)
+        fraction = (row.get("minimum"), row.get("maximum")) == (0.0, 1.0)
+        title = f"{label} {row['title'].lower()}" if label else row["title"]
+        if value is None:
+            continue
+        if row["type"] == "number" and fraction:
+            found.append(Suggestion(title, f"{path}.{name}={_around(value, 0.0, 1.0)}"))
+        elif row["type"] == "number":
+            reach = NEAR * abs(value) or NEAR
+            found.append(Suggestion(title, f"{path}.{name}=+-{reach:.2g}"))
+        elif row["type"] == "numbers" and fraction and row["size"] == 3:
+            for letter, now in zip("rgb", value, strict=True):
+                around = _around(now, 0.05, 0.9)
+                found.append(Suggestion(f"{title} {letter}", f"{path}.{name}.{letter}={around}"))
+    return found
 
 
 def for_pose(part: str) -> list[Suggestion]:
@@ -100,24 +126,22 @@ def for_pose(part: str) -> list[Suggestion]:
 
 
 def for_material(
-    part: str, material: str, kind: str, roughness: float, choices: Sequence[str]
+    part: str,
+    material: str,
+    values: Mapping[str, Any],
+    rows: Mapping[str, Row],
+    choices: Sequence[str],
 ) -> list[Suggestion]:
     """What a part is made of.
 
     Args:
         part: its name.
         material: its name.
-        kind: of the material; empty where the part has none.
-        roughness: of the material now.
+        values: of the material's fields, now.
+        rows: what the engine says of them.
         choices: materials of the library that suit the part.
     """
-    path = f"materials.{material}"
-    found = []
-    if kind == "dielectric":
-        found.append(Suggestion(f"{material} index", f"{path}.ior=+-0.1"))
-    if kind in ("dielectric", "conductor"):
-        rough = _around(roughness, 0.0, 0.5)
-        found.append(Suggestion(f"{material} roughness", f"{path}.roughness={rough}"))
+    found = _for_fields(material, f"materials.{material}", values, rows)
     return [*found, *_one_of(f"{part} material", f"parts.{part}.material", material, choices)]
 
 

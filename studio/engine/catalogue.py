@@ -7,6 +7,7 @@ from typing import Any
 
 import bpy
 
+from ..core import schema
 from ..core.engine import Engine
 from . import session
 
@@ -43,8 +44,19 @@ def refresh(engine: Engine) -> None:
         ("methods", "methods"),
     ):
         engine.send(what, on_result=lambda result, name=name: _keep(name, result[name]))
+    engine.send("kinds", on_result=schema.learn)
     for kind in LIBRARY_KINDS:
         refresh_library(engine, kind)
+
+
+def learn_kinds() -> None:
+    """Wait until the kinds and their fields are known.
+
+    Raises:
+        EngineError: there is no engine, or it does not answer.
+    """
+    if not schema.is_known():
+        schema.learn(session.ask_and_wait("kinds"))
 
 
 def refresh_library(engine: Engine, kind: str, then: Callable[[], None] | None = None) -> None:
@@ -76,5 +88,6 @@ def register() -> None:
 
 
 def unregister() -> None:
+    schema.learn({})
     _lists.clear()
     _items.clear()

@@ -10,7 +10,7 @@ from typing import Any
 import bpy
 import numpy as np
 
-from ..core import mesh_file
+from ..core import mesh_file, schema
 from ..core.engine import EngineError
 from ..core.errors import SceneError
 from ..core.mesh_file import Mesh
@@ -18,7 +18,7 @@ from ..scene.contacts import contact_list
 from ..scene.gather import caged_parts, gather_document, part_names
 from ..scene.meshes import REST, corners_of, part_mesh, shown_vertices
 from ..scene.paths import absolute
-from . import session
+from . import catalogue, session
 
 _written: dict[str, bytes] = {}
 
@@ -42,7 +42,8 @@ def design(scene: bpy.types.Scene) -> dict[str, Any]:
         if _written.get(str(path)) != digest or not path.is_file():
             mesh_file.write(part_mesh(part, caged=name in caged), path)
             _written[str(path)] = digest
-    _copy_profiles(document, Path(scene.optisense.folder), folder)
+    catalogue.learn_kinds()
+    _copy_lamp_files(document, Path(scene.optisense.folder), folder)
     return {"data": document, "folder": str(folder)}
 
 
@@ -86,22 +87,28 @@ def _digest(part: bpy.types.Object, *, caged: bool) -> bytes:
     return text.digest()
 
 
-def _copy_profiles(document: dict[str, Any], source: Path, folder: Path) -> None:
-    """IES files of the design go along; those from elsewhere join it under their own name."""
+def _copy_lamp_files(document: dict[str, Any], source: Path, folder: Path) -> None:
+    """Files of lamps go along; those from elsewhere join the design under their own name."""
     for group in document["lights"].values():
-        file = (group.get("emitter") or {}).get("file")
-        if not file:
-            continue
-        origin = source / file
-        if file.startswith("//") or Path(file).is_absolute() or ".." in Path(file).parts:
-            origin = absolute(file)
-            group["emitter"]["file"] = origin.name
-        inside = folder / group["emitter"]["file"]
-        if not origin.is_file():
-            origin = source / origin.name  # it joined the design when that was saved
-        if origin.is_file() and origin != inside:
-            inside.parent.mkdir(parents=True, exist_ok=True)
-            shutil.copyfile(origin, inside)
+        emitter = group.get("emitter") or {"kind": "library"}
+        for field in schema.file_fields("emitter", emitter["kind"]):
+            if emitter.get(field):
+                emitter[field] = _copy_file(emitter[field], source, folder)
+
+
+def _copy_file(file: str, source: Path, folder: Path) -> str:
+    """Copy a lamp's file into the folder; returns its name there."""
+    origin, name = source / file, file
+    if file.startswith("//") or Path(file).is_absolute() or ".." in Path(file).parts:
+        origin = absolute(file)
+        name = origin.name
+    inside = folder / name
+    if not origin.is_file():
+        origin = source / origin.name  # it joined the design when that was saved
+    if origin.is_file() and origin != inside:
+        inside.parent.mkdir(parents=True, exist_ok=True)
+        shutil.copyfile(origin, inside)
+    return name
 
 
 def without_nulls(values: Any) -> Any:

@@ -217,8 +217,8 @@ class OPTISENSE_OT_set_model(polls.Designing, bpy.types.Operator):
         if group is None or self.model in ("NONE", ""):
             return {"CANCELLED"}
         group.model = self.model
-        group.library_window = ""
-        group.emitter = "library"
+        group.drawn = ""
+        group.become("library")
         ask_for_windows(context.scene)
         return {"FINISHED"}
 

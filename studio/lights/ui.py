@@ -51,14 +51,7 @@ def _group(layout: bpy.types.UILayout, group: bpy.types.PropertyGroup) -> None:
     column.use_property_split = True
     column.use_property_decorate = False
     column.prop(group, "emitter")
-    if group.emitter == "area":
-        column.prop(group, "shape")
-        column.prop(group, "size", text="Size (mm)")
-    elif group.emitter == "ies":
-        column.prop(group, "file")
-    elif group.emitter == "spot":
-        column.prop(group, "beam")
-        column.prop(group, "cutoff")
+    group.draw(column)
 
 
 def _camera(layout: bpy.types.UILayout, camera: bpy.types.PropertyGroup) -> None:

@@ -1,4 +1,4 @@
-"""How large the library's lights are, to draw them in their real size."""
+"""How the lamps of light groups look, asked of the engine, to draw them in their real size."""
 
 from __future__ import annotations
 
@@ -8,39 +8,43 @@ from typing import Any
 import bpy
 
 from ..engine import session
+from ..scene import properties
+from ..scene.gather import emitter_values
 from ..scene.lamps import redraw
 
 
 def ask_for_windows(scene: bpy.types.Scene) -> None:
-    """Ask the engine for the windows of all library lights of a design, and draw them."""
-    name = scene.name
-    models = {each.model for each in scene.optisense.light_groups if each.emitter == "library"}
-    for model in sorted(models):
-
-        def known(result: dict[str, Any], model: str = model) -> None:
-            window = window_of(result["entry"])
-            scene = bpy.data.scenes.get(name)
-            if window is None or scene is None:
-                return
-            for group in scene.optisense.light_groups:
-                if group.model == model and group.emitter == "library":
-                    group.library_window = json.dumps(window)
-                    redraw(scene, group)
-
-        session.ask("entry", known, lambda error: None, kind="light", entry=model)
+    """Ask the engine about the lamps of all groups of a design, and draw them."""
+    for group in scene.optisense.light_groups:
+        ask_for_window(scene, group)
 
 
-def window_of(entry: dict[str, Any]) -> dict[str, Any] | None:
-    """Shape, size (mm) and half angle (degrees) of a library light; None where it says none."""
-    return _find(entry)
+def ask_for_window(scene: bpy.types.Scene, group: bpy.types.PropertyGroup) -> None:
+    """Ask the engine about the lamps of a group, and draw them; what it refuses stays as it is."""
+    name, lamps = scene.name, group.name
+    value = emitter_values(group)
+    asked = {"entry": group.model} if value is None else {"value": value}
+    if value is not None and scene.optisense.folder:
+        asked["folder"] = scene.optisense.folder
+
+    def known(result: dict[str, Any]) -> None:
+        scene = bpy.data.scenes.get(name)
+        group = None if scene is None else scene.optisense.light_groups.get(lamps)
+        if group is not None and emitter_values(group) == value:
+            group.drawn = json.dumps(result)
+            redraw(scene, group)
+
+    session.ask("lamp", known, lambda error: None, **asked)
 
 
-def _find(values: Any) -> dict[str, Any] | None:
-    if not isinstance(values, dict):
-        return None
-    if values.get("kind") == "spot" and "cutoff" in values:
-        return {"shape": "disc", "size": [0.6, 0.6], "angle": values["cutoff"]}
-    if isinstance(values.get("size"), list) and len(values["size"]) == 2:
-        return {"shape": values.get("shape", "rectangle"), "size": values["size"], "angle": 60.0}
-    found = (_find(each) for each in values.values())
-    return next((each for each in found if each is not None), None)
+def _reshaped(scene: bpy.types.Scene, group: bpy.types.PropertyGroup) -> None:
+    if session.running() is not None:
+        ask_for_window(scene, group)
+
+
+def register() -> None:
+    properties.when_reshaped.append(_reshaped)
+
+
+def unregister() -> None:
+    properties.when_reshaped.remove(_reshaped)

@@ -7,12 +7,12 @@ from typing import Any
 import bpy
 from bpy.props import EnumProperty, PointerProperty, StringProperty
 
+from ..core import schema
 from ..core.engine import EngineError
 from ..engine import catalogue, handing, polls, session
 from ..engine.operators import fail, refuse, start
 from ..scene.build import add_material, set_coating
 from ..scene.gather import coating_values, free_name, material_values
-from ..scene.kinds import KINDS_OF_ROLE
 from . import gallery
 
 KEEPING = "Keeping the material"
@@ -136,6 +136,7 @@ class OPTISENSE_OT_apply_material(bpy.types.Operator):
         choice = _choice(context)
         name = choice.entry
         try:
+            catalogue.learn_kinds()
             entry = session.ask_and_wait("entry", kind=choice.kind, entry=name)["entry"]
         except EngineError as error:
             return fail(self, error)
@@ -150,7 +151,7 @@ class OPTISENSE_OT_apply_material(bpy.types.Operator):
             if each.optisense.kind == "PART" and each.optisense.role != "sensing_surface"
         ]
         for part in parts:
-            fitting = KINDS_OF_ROLE[part.optisense.role]
+            fitting = schema.materials_of(part.optisense.role)
             if values["kind"] not in fitting:
                 self.report(
                     {"ERROR"},

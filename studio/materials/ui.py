@@ -51,8 +51,7 @@ def _part(
     column.use_property_decorate = False
     if own.role == "sensing_surface":
         layout.label(text=f"Coating: {design.coating.library or 'own'}")
-        for field in ("reflectance", "specularity", "eta", "k"):
-            column.prop(design.coating, field)
+        design.coating.draw(column)
     else:
         column.prop_search(own, "material", design, "materials")
         material = design.materials.get(own.material)
@@ -60,22 +59,10 @@ def _part(
             none = "absorbs all light" if own.role == "blocker" else "needs a material"
             layout.label(text=f"No material: {none}", icon="INFO")
             return
-        _material(column, material)
+        column.prop(material, "kind")
+        material.draw(column)
     layout.operator("optisense.keep_material", icon="FILE_TICK")
     show_outcome(layout, KEEPING)
-
-
-def _material(column: bpy.types.UILayout, material: bpy.types.PropertyGroup) -> None:
-    column.prop(material, "kind")
-    if material.kind == "dielectric":
-        column.prop(material, "ior", text="Index")
-    if material.kind == "conductor":
-        column.prop(material, "eta")
-        column.prop(material, "k")
-    if material.kind == "diffuse":
-        column.prop(material, "reflectance")
-    if material.kind in ("dielectric", "conductor"):
-        column.prop(material, "roughness")
 
 
 register, unregister = bpy.utils.register_classes_factory((OPTISENSE_PT_materials,))

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import bpy
 
-from ..core import vary
+from ..core import schema, vary
 from ..engine import catalogue
 from ..scene.cages import cage_data
 from ..scene.collections import objects_of
 from ..scene.gather import part_names
-from ..scene.kinds import KINDS_OF_ROLE
 
 
 def suggestions(context: bpy.types.Context) -> list[vary.Suggestion]:
@@ -39,7 +38,7 @@ def _of_light(scene: bpy.types.Scene, light: bpy.types.Object) -> list[vary.Sugg
     if group is None:
         return []
     lights = [e for e in objects_of(scene, "LIGHT") if e.optisense.group == group.name]
-    models = _names("light") if group.emitter == "library" else []
+    models = _names("light") if group.kind_name == "library" else []
     return vary.for_light(
         group.name, lights.index(light), flux=group.flux, model=group.model, models=models
     )
@@ -53,17 +52,17 @@ def _of_part(scene: bpy.types.Scene, part: bpy.types.Object) -> list[vary.Sugges
     if own.role == "sensing_surface":
         coating = design.coating
         made = vary.for_surface(
-            coating.library, _names("coating"), coating.specularity, coating.reflectance
+            coating.library, _names("coating"), coating.field_values(), coating.field_rows()
         )
         return [*made, *pose]
     material = design.materials.get(own.material)
-    fitting = KINDS_OF_ROLE[own.role]
+    fitting = schema.materials_of(own.role)
     choices = [row["name"] for row in catalogue.entries("material") if row.get("kind") in fitting]
     made = vary.for_material(
         name,
         own.material,
-        "" if material is None else material.kind,
-        0.0 if material is None else material.roughness,
+        {} if material is None else material.field_values(),
+        {} if material is None else material.field_rows(),
         choices,
     )
     return [*made, *pose]

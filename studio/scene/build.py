@@ -15,6 +15,7 @@ from .collections import ALL, OPTICAL_SYSTEM, clear, collection, next_order, obj
 from .contacts import stay_on_surface
 from .lamps import add_light
 from .meshes import new_mesh
+from .properties import USUAL_COATING
 
 MILLIMETRE = 0.001
 
@@ -64,8 +65,7 @@ def build(
 
 def _coating(coating: bpy.types.PropertyGroup, values: dict[str, Any]) -> None:
     coating.library = values.get("library") or ""
-    for name in ("reflectance", "eta", "k", "specularity"):
-        setattr(coating, name, values[name])
+    coating.fill(values.get("kind", USUAL_COATING), values)
 
 
 def set_coating(scene: bpy.types.Scene, values: dict[str, Any]) -> None:
@@ -79,11 +79,7 @@ def add_material(
     """A material, or the one of that name with other values."""
     material = design.materials.get(name) or design.materials.add()
     material.name = name
-    material.kind = values["kind"]
-    for field in ("ior", "roughness", "eta", "k", "reflectance", "dispersion"):
-        if values.get(field) is not None:
-            setattr(material, field, values[field])
-    material.has_dispersion = values.get("dispersion") is not None
+    material.fill(values["kind"], values)
     return material
 
 
@@ -118,8 +114,5 @@ def add_light_group(
     group.flux = values["flux"]
     emitter = values.get("emitter")
     if emitter:
-        group.emitter = emitter["kind"]
-        for field in ("shape", "size", "file", "beam", "cutoff"):
-            if field in emitter:
-                setattr(group, field, emitter[field])
+        group.fill(emitter["kind"], emitter)
     return group

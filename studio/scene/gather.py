@@ -16,15 +16,10 @@ from ..core.numbers import kept, kept_list
 from .cages import cage_values
 from .cameras import camera_values
 from .collections import objects_of
+from .fields import NOT_FIELDS
 from .lamps import light_pose
 from .meshes import part_mesh
-
-MATERIAL_FIELDS = {
-    "dielectric": ("ior", "dispersion", "roughness"),
-    "conductor": ("eta", "k", "roughness"),
-    "diffuse": ("reflectance",),
-    "absorber": (),
-}
+from .properties import USUAL_COATING
 
 
 def gather(scene: bpy.types.Scene) -> tuple[dict[str, Any], dict[str, Mesh]]:
@@ -131,10 +126,10 @@ def free_name(wanted: str, taken: Any, instead: str = "part") -> str:
 
 def _coating(coating: bpy.types.PropertyGroup, before: dict[str, Any]) -> dict[str, Any]:
     values: dict[str, Any] = {"library": coating.library} if coating.library else {}
-    for field in ("reflectance", "eta", "k"):
-        values[field] = kept_list(before.get(field), getattr(coating, field))
-    values["specularity"] = kept(before.get("specularity"), coating.specularity)
-    return values
+    if coating.kind_name != USUAL_COATING:
+        values["kind"] = coating.kind_name
+    found = coating.gathered({"kind": USUAL_COATING, **before})
+    return values | {name: each for name, each in found.items() if name not in NOT_FIELDS}
 
 
 def coating_values(scene: bpy.types.Scene) -> dict[str, Any]:
@@ -147,17 +142,7 @@ def material_values(
     material: bpy.types.PropertyGroup, before: dict[str, Any] | None = None
 ) -> dict[str, Any]:
     """A material as the design file holds it."""
-    before = before or {}
-    values: dict[str, Any] = {"kind": material.kind}
-    for field in MATERIAL_FIELDS[material.kind]:
-        shown = getattr(material, field)
-        if field == "dispersion" and not material.has_dispersion:
-            continue
-        if field in ("ior", "roughness"):
-            values[field] = kept(before.get(field), shown)
-        else:
-            values[field] = kept_list(before.get(field), shown)
-    return values
+    return {"kind": material.kind_name, **material.gathered(before or {})}
 
 
 def _part(name: str, part: bpy.types.Object) -> dict[str, Any]:
@@ -193,7 +178,7 @@ def _lights(scene: bpy.types.Scene, before: dict[str, Any]) -> dict[str, Any]:
             "colour": kept_list(was.get("colour"), group.colour),
             "flux": kept(was.get("flux"), group.flux),
         }
-        emitter = _emitter(group, was.get("emitter") or {})
+        emitter = emitter_values(group, was.get("emitter"))
         if emitter is not None:
             values["emitter"] = emitter
         groups[group.name] = {**values, "lights": poses}
@@ -209,18 +194,10 @@ def _pose(light: bpy.types.Object, number: int) -> dict[str, Any]:
         raise SceneError(f"light '{light.name}' {error}", path) from error
 
 
-def _emitter(group: bpy.types.PropertyGroup, was: dict[str, Any]) -> dict[str, Any] | None:
-    if group.emitter == "library":
+def emitter_values(
+    group: bpy.types.PropertyGroup, was: dict[str, Any] | None = None
+) -> dict[str, Any] | None:
+    """A group's own emitter as the design file holds it; None where it has the library's."""
+    if group.kind_name == "library":
         return None
-    values: dict[str, Any] = {"kind": group.emitter}
-    if was.get("kind") == group.emitter:
-        values |= was
-    if group.emitter == "area":
-        values["shape"] = group.shape
-        values["size"] = kept_list(was.get("size"), group.size)
-    elif group.emitter == "ies":
-        values["file"] = group.file
-    else:
-        values["cutoff"] = kept(was.get("cutoff"), group.cutoff)
-        values["beam"] = kept(was.get("beam"), group.beam)
-    return values
+    return {"kind": group.kind_name, **group.gathered(was or {})}

@@ -37,33 +37,6 @@ REFERENCES: Items = [
     ("interface", "Interface reference", "Becomes a refracting sheet"),
 ]
 
-MATERIAL_KINDS: Items = [
-    ("dielectric", "Transparent", "Refracts: silicone, acrylic, glass"),
-    ("conductor", "Metal", "Reflects: a mirror"),
-    ("diffuse", "Diffuse", "An opaque matt surface"),
-    ("absorber", "Absorber", "Absorbs all light"),
-]
-
-KINDS_OF_ROLE: dict[str, tuple[str, ...]] = {
-    "sensing_surface": (),
-    "elastomer": ("dielectric",),
-    "support": ("dielectric",),
-    "interface": ("dielectric",),
-    "mirror": ("conductor", "diffuse"),
-    "blocker": ("absorber", "diffuse", "conductor"),
-    "indenter": ("diffuse", "conductor", "absorber"),
-}
-"""Which kinds of material a role can be made of; a sensing surface wears the coating."""
-
-EMITTERS: Items = [
-    ("library", "Library", "As the library's light"),
-    ("area", "Flat window", "A flat emitting window"),
-    ("ies", "IES profile", "A point that radiates as an IES file says"),
-    ("spot", "Spot", "A point with a cut-off angle"),
-]
-
-WINDOWS: Items = [("disc", "Disc", ""), ("rectangle", "Rectangle", "")]
-
 PROJECTIONS: Items = [
     ("perspective", "Perspective", "A pinhole camera"),
     ("equidistant", "Fisheye", "Equal angles are equal distances in the picture"),

@@ -20,6 +20,9 @@ ARROW = 2.0
 MOST_POSES = 4096
 """How many poses of lights are kept."""
 
+USUAL_HALF_ANGLE = 60.0
+"""Degrees: that of a flat LED, for a lamp of which nothing is known yet."""
+
 POINT_SIZE = (0.6, 0.6)
 """How large (mm) a lamp is drawn that is a point or whose size is not known."""
 
@@ -86,14 +89,9 @@ def lamp_colour(group: bpy.types.PropertyGroup) -> tuple[float, float, float, fl
 
 def window(group: bpy.types.PropertyGroup) -> tuple[str, tuple[float, float], float]:
     """Shape, size (mm) and half angle (degrees) in which a group's lamps are drawn."""
-    if group.emitter == "area":
-        return group.shape, tuple(group.size), 60.0
-    if group.emitter == "spot":
-        return "disc", POINT_SIZE, group.cutoff
-    if group.emitter == "library" and group.library_window:
-        known = json.loads(group.library_window)
-        return known["shape"], tuple(known["size"]), known.get("angle", 60.0)
-    return "disc", POINT_SIZE, 60.0
+    known = json.loads(group.drawn) if group.drawn else {}
+    face = known.get("window") or {"shape": "disc", "size": POINT_SIZE}
+    return face["shape"], tuple(face["size"]), known.get("half_angle", USUAL_HALF_ANGLE)
 
 
 def _mesh(group: bpy.types.PropertyGroup) -> bpy.types.Mesh:

@@ -17,9 +17,12 @@ from bpy.props import (
     StringProperty,
 )
 
-from . import kinds
+from .fields import HasFields, OPTISENSE_PG_field, kind_menu
 
 NAME_LENGTH = 64
+
+USUAL_COATING = "flake"
+"""The kind of a coating whose file names none."""
 
 
 def rgb(name: str, description: str, **limits: Any) -> Any:
@@ -27,49 +30,22 @@ def rgb(name: str, description: str, **limits: Any) -> Any:
     return FloatVectorProperty(name=name, description=description, size=3, precision=4, **limits)
 
 
-class OPTISENSE_PG_coating(bpy.types.PropertyGroup):
+class OPTISENSE_PG_coating(HasFields, bpy.types.PropertyGroup):
     """The coating of the sensing surface."""
 
+    noun = "coating"
     library: StringProperty(name="Library", description="The library coating it started from")
-    reflectance: rgb(
-        "Reflectance", "Diffuse reflectance", min=0.0, max=1.0, subtype="COLOR", default=(0.5,) * 3
-    )
-    eta: rgb("Index, real", "Metal flake: real part of the index", min=1e-6, default=(1.0,) * 3)
-    k: rgb("Index, imaginary", "Metal flake: imaginary part of the index", min=0.0)
-    specularity: FloatProperty(
-        name="Specularity",
-        description="0 is diffuse paint, 1 is mirror-like",
-        min=0.0,
-        max=1.0,
-        precision=3,
-    )
+    kind_name: StringProperty(options={"HIDDEN"}, default=USUAL_COATING)
+    fields: CollectionProperty(type=OPTISENSE_PG_field)
 
 
-class OPTISENSE_PG_material(bpy.types.PropertyGroup):
+class OPTISENSE_PG_material(HasFields, bpy.types.PropertyGroup):
     """An optical material of parts; its name is what parts refer to."""
 
-    kind: EnumProperty(
-        name="Kind", items=kinds.MATERIAL_KINDS, description="What it does with light"
-    )
-    ior: FloatProperty(
-        name="Refractive index", min=1.0, max=4.0, default=1.5, precision=4,
-        description="Of all colours alike: 1 is air, 1.41 silicone, 1.49 acrylic",
-    )  # fmt: skip
-    roughness: FloatProperty(
-        name="Roughness", description="GGX alpha; 0 is smooth", min=0.0, max=1.0, precision=3
-    )
-    has_dispersion: BoolProperty(
-        name="Index for R, G, B", description="It is kept with the material"
-    )
-    dispersion: rgb(
-        "Index at R, G, B", "Kept with the material, and not used",
-        min=1.0, max=4.0, default=(1.5,) * 3,
-    )  # fmt: skip
-    eta: rgb("Index, real", "At R, G, B", min=1e-6, default=(1.0,) * 3)
-    k: rgb("Index, imaginary", "At R, G, B", min=0.0)
-    reflectance: rgb(
-        "Reflectance", "Of R, G, B", min=0.0, max=1.0, subtype="COLOR", default=(0.5,) * 3
-    )
+    noun = "material"
+    kind: EnumProperty(name="Kind", description="What it does with light", **kind_menu("material"))
+    kind_name: StringProperty(options={"HIDDEN"}, default="absorber")
+    fields: CollectionProperty(type=OPTISENSE_PG_field)
 
 
 def _relight(group: bpy.types.PropertyGroup, context: bpy.types.Context) -> None:
@@ -79,6 +55,9 @@ def _relight(group: bpy.types.PropertyGroup, context: bpy.types.Context) -> None
 
 when_relit: list[Callable[[], None]] = []
 """Called when the flux or colour of a light group changes."""
+
+when_reshaped: list[Callable[[bpy.types.Scene, bpy.types.PropertyGroup], None]] = []
+"""Called when the kind or a number of the lamps of a light group changes."""
 
 
 def _recolour(group: bpy.types.PropertyGroup, context: bpy.types.Context) -> None:
@@ -92,9 +71,10 @@ def _redraw_group(group: bpy.types.PropertyGroup, context: bpy.types.Context) ->
     redraw(group.id_data, group)
 
 
-class OPTISENSE_PG_light_group(bpy.types.PropertyGroup):
+class OPTISENSE_PG_light_group(HasFields, bpy.types.PropertyGroup):
     """Lights of one type and colour; its name is what lights refer to."""
 
+    noun = "emitter"
     model: StringProperty(name="Model", description="A light of the library")
     colour: rgb(
         "Colour",
@@ -110,30 +90,19 @@ class OPTISENSE_PG_light_group(bpy.types.PropertyGroup):
         precision=3, update=_relight,
     )  # fmt: skip
     emitter: EnumProperty(
-        name="Lamp", items=kinds.EMITTERS, update=_redraw_group,
-        description="How each light of the group radiates",
+        name="Lamp", description="How each light of the group radiates",
+        **kind_menu("emitter", [("library", "Library", "As the library's light")]),
     )  # fmt: skip
-    shape: EnumProperty(
-        name="Window", items=kinds.WINDOWS, update=_redraw_group,
-        description="The shape of what emits",
-    )  # fmt: skip
-    size: FloatVectorProperty(
-        name="Size", description="mm, of the window", size=2, min=1e-4, default=(2.0, 2.0),
-        precision=3, update=_redraw_group,
-    )  # fmt: skip
-    file: StringProperty(
-        name="IES file", subtype="FILE_PATH",
-        description="In the design's folder, or anywhere else: Save copies it to there",
-    )  # fmt: skip
-    beam: FloatProperty(
-        name="Beam", description="Degrees up to which a spot is full", min=0.01, max=90.0,
-        default=30.0, update=_redraw_group,
-    )  # fmt: skip
-    cutoff: FloatProperty(
-        name="Cut-off", description="Degrees where a spot's light ends", min=0.01, max=90.0,
-        default=45.0, update=_redraw_group,
-    )  # fmt: skip
-    library_window: StringProperty(options={"HIDDEN"})
+    kind_name: StringProperty(options={"HIDDEN"}, default="library")
+    fields: CollectionProperty(type=OPTISENSE_PG_field)
+    drawn: StringProperty(
+        description="How its lamps are drawn, as the engine has told", options={"HIDDEN"}
+    )
+
+    def fields_changed(self) -> None:
+        """Draw its lamps anew."""
+        for each in when_reshaped:
+            each(self.id_data, self)
 
 
 class OPTISENSE_PG_design(bpy.types.PropertyGroup):

@@ -59,7 +59,7 @@ def test_an_own_material_does_not_change_what_is_chosen(
     gel = object_of(mini, "PART", "gel")
     select(gel)
     assert bpy.ops.optisense.apply_material() == {"FINISHED"}
-    mini.optisense.materials["pdms-soft"].ior = 1.43
+    mini.optisense.materials["pdms-soft"].put("ior", 1.43)
     session.ask_and_wait("library", kind="material")  # answered after the pictures
     assert bpy.ops.optisense.keep_material(name="my-gel") == {"FINISHED"}
     assert (own_library / "materials" / "my-gel.yaml").is_file()
@@ -70,7 +70,7 @@ def test_an_own_material_does_not_change_what_is_chosen(
     choice.material = "my-gel"
     assert bpy.ops.optisense.apply_material() == {"FINISHED"}
     assert gel.optisense.material == "my-gel"
-    assert mini.optisense.materials["my-gel"].ior == pytest.approx(1.43)
+    assert mini.optisense.materials["my-gel"].value("ior") == pytest.approx(1.43)
 
 
 def test_a_material_needs_a_name_that_files_can_have(

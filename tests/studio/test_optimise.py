@@ -55,8 +55,8 @@ def test_a_search_starts_from_what_is_there(
 ) -> None:
     design = mini.optisense
     design.light_groups["red"].flux = 30.0
-    design.coating.reflectance = (0.95, 0.01, 0.5)
-    design.materials["silicone-xp565"].roughness = 0.75
+    design.coating.put("reflectance", (0.95, 0.01, 0.5))
+    design.materials["silicone-xp565"].put("roughness", 0.75)
     starts: dict[str, float] = {}
     for kind in ("LIGHT", "PART"):
         for each in objects_of(mini, kind):

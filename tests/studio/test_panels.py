@@ -92,8 +92,9 @@ def test_every_panel_with_each_kind_of_object(mini: Any, select: Callable[..., N
     for kind, shown in (("cylinder", "length"), ("plane", "tilt"), ("mesh", "file")):
         contact.optisense.indenter = kind
         assert shown in draw_all()["Simulate"].properties
+    catalogue.learn_kinds()
     group = mini.optisense.light_groups[0]
-    for kind, shown in (("area", "size"), ("ies", "file"), ("spot", "cutoff")):
+    for kind, shown in (("area", "pair"), ("ies", "file"), ("spot", "number")):
         group.emitter = kind
         assert shown in draw_all()["Lights and Camera"].properties
     select(object_of(mini, "PART", "gel"))

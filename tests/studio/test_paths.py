@@ -75,7 +75,7 @@ def test_an_own_objective_lies_beside_the_blend_file(mini: Any, tmp_path: Path) 
     cube.optisense.kind = "REFERENCE"
     bpy.context.scene.collection.objects.link(cube)
     assert bpy.ops.optisense.apply_best() == {"FINISHED"}
-    assert bpy.context.scene.optisense.coating.specularity == pytest.approx(0.7)
+    assert bpy.context.scene.optisense.coating.value("specularity") == pytest.approx(0.7)
     assert "mine" in bpy.context.scene.objects  # a better sensor is made of the same references
 
 

@@ -87,7 +87,7 @@ def test_what_is_edited_is_written_and_nothing_else(mini: Any) -> None:
     before = gather_document(mini)
     light = objects_of(mini, "LIGHT")[0]
     light.location.z = -7.0
-    mini.optisense.coating.specularity = 0.3
+    mini.optisense.coating.put("specularity", 0.3)
     mini.optisense.light_groups["blue"].flux = 1.2
     camera = objects_of(mini, "CAMERA")[0]
     camera.optisense.fov = 60.5
@@ -146,7 +146,7 @@ def test_a_moved_part_is_written_where_it_is(mini: Any) -> None:
         lambda scene: bpy.ops.optisense.add_contact(),
         lambda scene: bpy.ops.optisense.add_light(group="red", count=2),
         lambda scene: setattr(objects_of(scene, "LIGHT")[3], "location", (1, 2, 3)),
-        lambda scene: setattr(scene.optisense.coating, "specularity", 0.8),
+        lambda scene: scene.optisense.coating.put("specularity", 0.8),
         lambda scene: setattr(objects_of(scene, "CAMERA")[0].optisense, "fov", 71.0),
         lambda scene: bpy.data.objects.remove(object_of(scene, "PART", "tray")),
     ],

@@ -32,7 +32,8 @@ def test_an_ies_file_from_anywhere_joins_the_design(mini: Any, tmp_path: Path) -
     elsewhere.parent.mkdir()
     elsewhere.write_text(IES, encoding="ascii")
     group = mini.optisense.light_groups["red"]
-    group.emitter, group.file = "ies", str(elsewhere)
+    group.emitter = "ies"
+    group.put("file", str(elsewhere))
     bpy.ops.optisense.check()
     assert not session.state().problem
     assert bpy.ops.optisense.save_as(filepath=str(tmp_path / "mini")) == {"FINISHED"}
@@ -40,8 +41,8 @@ def test_an_ies_file_from_anywhere_joins_the_design(mini: Any, tmp_path: Path) -
     elsewhere.unlink()  # the design has one of its own now
     assert bpy.ops.optisense.save() == {"FINISHED"}
     assert bpy.ops.optisense.open(filepath=str(tmp_path / "mini" / "design.yaml")) == {"FINISHED"}
-    assert mini.optisense.light_groups["red"].file == elsewhere.name
-    mini.optisense.light_groups["red"].file = "../gone.ies"
+    assert mini.optisense.light_groups["red"].value("file") == elsewhere.name
+    mini.optisense.light_groups["red"].put("file", "../gone.ies")
     bpy.ops.optisense.check()
     assert "gone.ies" in session.state().problem
     assert {each.optisense.group for each in bpy.context.selected_objects} == {"red"}
