@@ -124,6 +124,15 @@ def generate(
     return Dataset.load(folder)
 
 
+def _too_small(resolution: tuple[int, int]) -> str:
+    """What to say of a contact of fewer pixels than a sample needs; the same for all."""
+    width, height = resolution
+    return (
+        f"fewer than {LEAST_PIXELS} pixels of {width}x{height} show the contact: raise the "
+        "resolution, or press deeper or with something larger"
+    )
+
+
 class _Maker:
     """One dataset being made."""
 
@@ -173,7 +182,7 @@ class _Maker:
             if image.contact_mask.sum() >= LEAST_PIXELS:
                 self._write(index, attempt, drawn, image)
                 return
-            reason = "the camera does not see the contact"
+            reason = _too_small(self._resolution)
         self._failures.add({"index": index, "reason": reason})
 
     def _why_not(self, drawn: DrawnContact) -> str:
@@ -184,7 +193,7 @@ class _Maker:
         """
         mask = self._model.chief_rays(self._resolution, [drawn.contact]).contact_mask
         if mask.sum() < LEAST_PIXELS:
-            return "the camera does not see the contact"
+            return _too_small(self._resolution)
         margin = self._settings.contacts.margin
         if drawn.indenter not in self._larger_than_view and not keeps_margin(mask, margin):
             return "the picture's edge cuts the contact, or is too near to it"

@@ -158,6 +158,18 @@ def test_contacts_that_cannot_be_made_are_recorded(mini: OpticalModel, tmp_path:
     assert "mm thick" in dataset.failures[0]["reason"]
 
 
+def test_a_picture_of_too_few_pixels_says_so(tmp_path: Path) -> None:
+    """A pixel of GelSight Svelte's skin at 32 x 24 is 6 mm² large: more than a ball touches."""
+    svelte = OpticalModel(load("gelsight-svelte"))
+    coarse = DatasetSettings(
+        ContactDraw(("sphere:1.5",), depth=(0.3, 0.3)), resolution=(32, 24), photons=20_000
+    )
+    dataset = generate(svelte, tmp_path / "d", 1, coarse)
+    assert "fewer than 4 pixels of 32x24 show the contact" in dataset.failures[0]["reason"]
+    fine = generate(svelte, tmp_path / "fine", 1, replace(coarse, resolution=(96, 72)))
+    assert len(fine) == 1
+
+
 def test_a_missing_mesh_is_told_before_anything_is_written(
     mini: OpticalModel, tmp_path: Path
 ) -> None:

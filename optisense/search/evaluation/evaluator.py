@@ -18,9 +18,9 @@ from optisense.objectives.evaluation import ProgressCallback
 from optisense.objectives.files import place_of
 from optisense.objectives.registry import resolve
 from optisense.objectives.run import split_settings
-from optisense.search.evaluation.mirror_views import SameMirrors, may_change_view
 from optisense.search.evaluation.models import ModelKeeper
 from optisense.search.evaluation.outcome import Outcome
+from optisense.search.evaluation.views import SameMirrors, least_skin, may_change_view
 from optisense.search.space.buildable import BentPartsRest, LightsRest, PartsRest, SolidsStay
 from optisense.search.space.constraints import Constraint, PartsApart, Unfolded, why_forbidden
 from optisense.search.space.rigid_moves import PartShift, PartTurn
@@ -110,6 +110,8 @@ class DesignEvaluator:
         self.kept: list[Constraint] = []
         if keeps:
             self._keep(apart is None or apart)
+        self._asks_view = keeps and self.renders and may_change_view(space.names)
+        self._least_skin: float | None = None
         self.variant = variant
         self._progress: ProgressCallback | None = None
         self._check_settings()
@@ -163,8 +165,13 @@ class DesignEvaluator:
 
     def objective_scores(self, design: SensorDesign, seed: int) -> Mapping[str, Score]:
         """Scores by the objectives, plain functions left out; a quicker way may stand in here."""
+        settings = dict(self.settings)
+        if self._asks_view and "least_skin" not in settings:
+            if self._least_skin is None:
+                self._least_skin = least_skin(self.space.design, self.keeper)
+            settings["least_skin"] = self._least_skin
         model = self.keeper.model(design)
-        return evaluate(model, self._ready(), progress=self._progress, seed=seed, **self.settings)
+        return evaluate(model, self._ready(), progress=self._progress, seed=seed, **settings)
 
     def _score(
         self, design: SensorDesign, seed: int
@@ -195,7 +202,7 @@ class DesignEvaluator:
             self.kept.append(BentPartsRest(design))
         if any(name.startswith("materials.") for name in names):
             self.kept.append(SolidsStay(design))
-        if self.renders and design.parts_of(Role.MIRROR) and may_change_view(names):
+        if self.renders and may_change_view(names) and design.parts_of(Role.MIRROR):
             self.kept.append(SameMirrors(design, self.keeper))
 
     def _ready(self) -> list[Objective]:

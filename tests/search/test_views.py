@@ -1,4 +1,4 @@
-"""Cameras that look past the mirrors of their sensor.
+"""Cameras that look past the mirrors of their sensor, or at a small part of what they should.
 
 The points are winners of `benchmarks/single_parameters.py` that a person would not accept.
 """
@@ -14,7 +14,7 @@ import optisense as ots
 from optisense import sensors
 from optisense.design import SensorDesign
 from optisense.search.evaluation.evaluator import DesignEvaluator
-from optisense.search.evaluation.mirror_views import SameMirrors
+from optisense.search.evaluation.views import SameMirrors
 from optisense.search.space.search_space import SearchSpace
 
 RAYS = {"ray_resolution": (40, 30)}
@@ -67,3 +67,24 @@ def test_a_camera_that_looks_by_them(svelte: SensorDesign, path: str, value: flo
 def test_light_does_not_ask_for_the_view(svelte: SensorDesign) -> None:
     bound = SearchSpace({"lights.red.flux": (0.0, 1.0)}).bind(svelte)
     assert DesignEvaluator(bound, ["aoap"], RAYS).kept == []
+
+
+class TestLeastOfTheStart:
+    """GelSight360 sees 0.75 of its skin, so that trials must see 0.375; 50 degrees show 0.31."""
+
+    def failure(self, value: float, settings: dict[str, float]) -> str | None:
+        design = sensors.load("gelsight360")
+        bound = SearchSpace({"camera.fov": (20.0, 200.0)}).bind(design)
+        one = DesignEvaluator(bound, ["aoap"], {**RAYS, **settings})
+        return one(np.array([value]), 0).failure
+
+    def test_the_tip_of_a_finger_is_not_the_finger(self) -> None:
+        said = str(self.failure(50.0, {}))
+        assert "of the sensing surface's area is seen, and a score needs 37." in said
+        assert "least_skin" in said
+
+    def test_a_wider_view_is_scored(self) -> None:
+        assert self.failure(80.0, {}) is None
+
+    def test_a_setting_goes_before(self) -> None:
+        assert self.failure(50.0, {"least_skin": 0.25}) is None

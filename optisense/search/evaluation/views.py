@@ -1,11 +1,20 @@
-"""A sensor whose camera looks by mirrors must go on doing so: past them it is another sensor."""
+"""What the camera of a trial must see of what it sees at the start: else it is another sensor."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
 
 from optisense.design import SensorDesign
+from optisense.design.camera_checks import LEAST_SKIN
+from optisense.errors import OptiSenseError, SetupError
+from optisense.objectives.evaluation import Evaluation
 from optisense.search.evaluation.models import ModelKeeper
+
+LEAST_OF_START = 0.5
+"""Share of the sensing surface seen at the start that a trial must see. Scores grow as the camera
+looks at less, so a search over the field of view ends where it sees as little as it may: a
+GelSight360 that sees its tip only, 0.41 of what it should, is none, and cameras that see 0.56 of
+the start or more by `benchmarks/single_parameters.py` are zooms that a person may want."""
 
 VIEW_RAYS = (96, 72)
 """Width and height of the chief rays that tell by which mirrors the camera looks: a share of 0.1 is
@@ -56,6 +65,25 @@ class SameMirrors:
 
     def _seen(self, design: SensorDesign) -> dict[frozenset[str], float]:
         return self._keeper.model(design).views_by_mirrors(VIEW_RAYS)
+
+
+def least_skin(design: SensorDesign, keeper: ModelKeeper) -> float:
+    """The share of the sensing surface that trials must see, where no setting says otherwise.
+
+    Args:
+        design: that the search starts from.
+        keeper: of the optical model.
+
+    Raises:
+        SetupError: the renderer can't run on this machine.
+    """
+    try:
+        seen = Evaluation(keeper.model(design)).view.skin
+    except SetupError:
+        raise
+    except OptiSenseError:  # the start has no score either, and says why
+        return LEAST_SKIN
+    return max(LEAST_SKIN, LEAST_OF_START * seen)
 
 
 def may_change_view(names: Iterable[str]) -> bool:
