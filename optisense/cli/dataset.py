@@ -24,6 +24,7 @@ from optisense.cli.sampling import (
     sample_steps,
     shown_samples,
 )
+from optisense.optics.estimators import ESTIMATORS, RADIANCE_CACHE
 
 if TYPE_CHECKING:
     from optisense.tasks import Dataset
@@ -109,9 +110,9 @@ def dataset(
     estimator: Annotated[
         str,
         typer.Option(
-            metavar="field|sppm", help="sppm is slow, and exact where plates cover the gel."
+            metavar="|".join(ESTIMATORS), help="sppm is slow, and exact where plates cover the gel."
         ),
-    ] = "field",
+    ] = RADIANCE_CACHE,
     variant: VariantOption = "auto",
 ) -> None:
     """Make a dataset of random contacts: pictures, depth, normals, masks and labels.

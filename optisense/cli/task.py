@@ -27,6 +27,7 @@ from optisense.cli.sampling import (
     sample_steps,
     shown_samples,
 )
+from optisense.optics.estimators import ESTIMATORS, RADIANCE_CACHE
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -77,7 +78,9 @@ PhotonsOption = Annotated[
 ]
 EstimatorOption = Annotated[
     str,
-    typer.Option(metavar="field|sppm", help="sppm is slow, and exact where plates cover the gel."),
+    typer.Option(
+        metavar="|".join(ESTIMATORS), help="sppm is slow, and exact where plates cover the gel."
+    ),
 ]
 OutOption = Annotated[
     Path | None,
@@ -122,7 +125,7 @@ def misalignment(
     neighbours: NeighboursOption = NEIGHBOURS,
     resolution: ResolutionOption = None,
     photons: PhotonsOption = PHOTONS,
-    estimator: EstimatorOption = "field",
+    estimator: EstimatorOption = RADIANCE_CACHE,
     out: OutOption = None,
     as_json: JsonOption = False,
     variant: VariantOption = "auto",
@@ -147,7 +150,7 @@ def cylinder_radius(
     neighbours: NeighboursOption = NEIGHBOURS,
     resolution: ResolutionOption = None,
     photons: PhotonsOption = PHOTONS,
-    estimator: EstimatorOption = "field",
+    estimator: EstimatorOption = RADIANCE_CACHE,
     out: OutOption = None,
     as_json: JsonOption = False,
     variant: VariantOption = "auto",
@@ -171,7 +174,7 @@ def snr(
     neighbours: NeighboursOption = NEIGHBOURS,
     resolution: ResolutionOption = None,
     photons: PhotonsOption = PHOTONS,
-    estimator: EstimatorOption = "field",
+    estimator: EstimatorOption = RADIANCE_CACHE,
     out: OutOption = None,
     as_json: JsonOption = False,
     variant: VariantOption = "auto",

@@ -19,6 +19,7 @@ from optisense.optics.backend.interrupts import lets_ctrl_c_through
 from optisense.optics.backend.stages import Stage, TellStage, fraction_done
 from optisense.optics.backend.versions import versions
 from optisense.optics.camera.projection import RayCamera
+from optisense.optics.estimators import ESTIMATORS, RADIANCE_CACHE, SPPM
 from optisense.optics.imaging.cached import ImageLayers, PixelImportance, render_cached
 from optisense.optics.imaging.tactile_image import RADIANCE_UNIT, TactileImage
 from optisense.optics.radiance_cache.store import CacheStore, PilotScene
@@ -130,7 +131,7 @@ class OpticalModel(RayModel):
         seconds: float | None = None,
         seed: int = 0,
         progress: Callable[[RenderProgress], None] | None = None,
-        estimator: str = "field",
+        estimator: str = RADIANCE_CACHE,
         only_contacts: bool = False,
         pixel_importance: PixelImportance | None = None,
         partial: bool = True,
@@ -147,8 +148,7 @@ class OpticalModel(RayModel):
             seed: the same seed and settings give the same image, whatever was rendered before, but
                 for rounding, which in single pixels at the edge of a contact turns a shadow ray.
             progress: called now and then.
-            estimator: "field" (pooled radiance cache, fast) or "sppm" (progressive photon mapping,
-                for checking).
+            estimator: "radiance-cache" (fast) or "sppm" (progressive photon mapping, to check it).
             only_contacts: light only the pixels that see an indenter and leave the others dark,
                 several times sooner; for scores that read nothing else.
             pixel_importance: with ``only_contacts``, a function of the chief rays that gives the
@@ -164,8 +164,10 @@ class OpticalModel(RayModel):
             RenderError: the camera sees nothing of the sensing surface, or a setting makes no
                 sense.
         """
-        if estimator not in ("field", "sppm"):
-            raise RenderError(f"there is no estimator '{estimator}'", hint="use field or sppm")
+        if estimator not in ESTIMATORS:
+            raise RenderError(
+                f"there is no estimator '{estimator}'", hint="Use " + " or ".join(ESTIMATORS)
+            )
         for name, value in (("photons", photons), ("noise", noise), ("seconds", seconds)):
             if value is not None and not value > 0:
                 raise RenderError(f"{name} is {value}", hint="give a number above 0")
@@ -193,7 +195,7 @@ class OpticalModel(RayModel):
             raise sees_nothing(rays)
         built = time.perf_counter()
 
-        if estimator == "sppm":
+        if estimator == SPPM:
             layers = self._render_sppm(scenes, camera, rays, photons, seconds, seed, began, tell)
         else:
             target = None if noise is None else noise / 100

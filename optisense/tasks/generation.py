@@ -18,6 +18,7 @@ from optisense.errors import ContactError, TaskError
 from optisense.folders import LOCK_FILE, FolderLock, held
 from optisense.geometry import Contact, Indenter
 from optisense.library import with_own_lights
+from optisense.optics.estimators import RADIANCE_CACHE, current_name
 from optisense.sensors import save_design
 from optisense.tasks.camera_noise import add_camera_noise
 from optisense.tasks.dataset import (
@@ -65,7 +66,7 @@ class DatasetSettings:
         camera_noise: standard deviation in levels of 255 (see `camera_noise`); 0 leaves pictures
             clean, so that noise can be added when they are used.
         radiance: also write linear radiance as EXR.
-        estimator: of the light, "field" or "sppm" (see the documentation of the simulation).
+        estimator: "radiance-cache" or "sppm"; see docs/simulation.md.
     """
 
     contacts: ContactDraw = field(default_factory=ContactDraw)
@@ -75,7 +76,7 @@ class DatasetSettings:
     exposure: float | str = "auto"
     camera_noise: float = 0.0
     radiance: bool = False
-    estimator: str = "field"
+    estimator: str = RADIANCE_CACHE
 
     def __post_init__(self) -> None:
         if not 0 <= self.camera_noise < 256:
@@ -219,8 +220,9 @@ class _Maker:
         info_file = self._folder / INFO
         if info_file.exists():
             before = read_json(info_file)
-            # Datasets of earlier releases had no margin.
-            (before.get("settings") or {}).get("contacts", {}).setdefault("margin", 0.0)
+            kept = before.get("settings") or {}  # release 0.1 had no margin, and another name
+            kept.get("contacts", {}).setdefault("margin", 0.0)
+            kept["estimator"] = current_name(kept.get("estimator"))
             known = {key: before.get(key) for key in common}
             known["design"] = design_values(load_design(self._folder / DESIGN))
             now = common | {"design": design_values(with_own_lights(self._model.design))}

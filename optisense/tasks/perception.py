@@ -20,6 +20,7 @@ from optisense.errors import TaskError
 from optisense.folders import held
 from optisense.geometry import Contact
 from optisense.objectives.score import json_ready
+from optisense.optics.estimators import RADIANCE_CACHE, current_name
 from optisense.tasks.camera_noise import MEASURED_NOISE, add_camera_noise
 from optisense.tasks.generation import design_values, mesh_digests
 from optisense.tasks.records import KEPT, CsvTable, read_json, refuse_differences
@@ -105,7 +106,7 @@ class SampleSettings:
         camera_noise: standard deviation in levels of 255 (see `camera_noise`).
         resolution: (width, height) pixels; what the task needs, in the camera's shape, if None.
         photons: of the light that all samples share.
-        estimator: of the light, "field" or "sppm".
+        estimator: of the light, "radiance-cache" or "sppm".
     """
 
     count: int = 200
@@ -113,7 +114,7 @@ class SampleSettings:
     camera_noise: float = MEASURED_NOISE
     resolution: tuple[int, int] | None = None
     photons: int = 5_000_000
-    estimator: str = "field"
+    estimator: str = RADIANCE_CACHE
 
 
 @dataclass(frozen=True)
@@ -303,7 +304,10 @@ def _open_table(
         "meshes": mesh_digests(model.design),
     }
     if (folder / SETTINGS).exists():
-        refuse_differences("samples", folder, read_json(folder / SETTINGS), now)
+        before = read_json(folder / SETTINGS)
+        kept = before.get("samples") or {}
+        kept["estimator"] = current_name(kept.get("estimator"))
+        refuse_differences("samples", folder, before, now)
     else:
         write_json(folder / SETTINGS, now, "the results", KEPT)
     return CsvTable(folder / SAMPLES, names)

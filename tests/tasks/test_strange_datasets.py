@@ -66,7 +66,7 @@ def test_layers_are_not_written_through(mini: OpticalModel, tmp_path: Path) -> N
     assert [path.name for path in out.iterdir()] == ["layers"]
 
 
-@pytest.mark.parametrize("estimator", ["field", "sppm"])
+@pytest.mark.parametrize("estimator", ["radiance-cache", "sppm"])
 def test_photons_may_be_a_float(estimator: str, mini: OpticalModel) -> None:
     """As in photons=12e6; half a photon is told."""
     from optisense.errors import RenderError
