@@ -14,6 +14,7 @@ from optisense.cli.options import (
     VariantOption,
     parse_exposure,
     parse_resolution,
+    photons_option,
 )
 from optisense.cli.output_folder import take_folder
 from optisense.cli.progress import progress_line
@@ -25,6 +26,7 @@ from optisense.cli.sampling import (
     shown_samples,
 )
 from optisense.optics.estimators import ESTIMATORS, RADIANCE_CACHE
+from optisense.quality import SAMPLE_PHOTONS
 
 if TYPE_CHECKING:
     from optisense.tasks import Dataset
@@ -84,8 +86,8 @@ def dataset(
         ),
     ] = None,
     photons: Annotated[
-        int, typer.Option(min=1, metavar="N", help="Photons of the light that all samples share.")
-    ] = 5_000_000,
+        int, photons_option("Photons of the light that all samples share.")
+    ] = SAMPLE_PHOTONS,
     seed: Annotated[
         int, typer.Option(min=0, max=2**32 - 1, metavar="N", help="Of places, depths and noise.")
     ] = 0,

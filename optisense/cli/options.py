@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
+from optisense.quality import LEVELS, photons_of
+
 if TYPE_CHECKING:
     from optisense.geometry import Contact
 
@@ -90,11 +92,21 @@ ScoreResolutionOption = Annotated[
     ),
 ]
 
+
+def photons_option(help: str, **more: Any) -> Any:
+    """An option `--photons` that takes a number or a level of quality."""
+    return typer.Option("--photons", parser=_photons, metavar=f"N|{LEVELS}", help=help, **more)
+
+
+def _photons(text: str) -> int:
+    try:
+        return photons_of(text)
+    except ValueError as error:
+        raise typer.BadParameter(str(error)) from None
+
+
 ScorePhotonsOption = Annotated[
-    int | None,
-    typer.Option(
-        "--photons", min=1, metavar="N", help="Photons to trace.", show_default="5 million"
-    ),
+    int | None, photons_option("Photons to trace.", show_default="fine, 5 million")
 ]
 
 

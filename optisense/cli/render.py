@@ -16,9 +16,11 @@ from optisense.cli.options import (
     parse_contacts,
     parse_exposure,
     parse_resolution,
+    photons_option,
 )
 from optisense.cli.output_folder import take_folder
 from optisense.cli.progress import ProgressLine, about, progress_line
+from optisense.quality import PICTURE_PHOTONS
 from optisense.time_left import TimedStep
 
 if TYPE_CHECKING:
@@ -26,8 +28,6 @@ if TYPE_CHECKING:
     from optisense.report.real_sensor import RealComparison
 
 PICTURE = "image.png"
-ONE_PICTURE = 1_000_000
-"""Photons for a single picture. A program that keeps its model pays once and takes more."""
 
 
 @ends_well
@@ -47,11 +47,8 @@ def render(
     ] = None,
     photons: Annotated[
         int | None,
-        typer.Option(
-            min=1,
-            metavar="N",
-            help="Photons to trace: 1 million when no limit is given, enough for a good picture.",
-            show_default=False,
+        photons_option(
+            "Photons to trace: normal, 1 million, when no limit is given.", show_default=False
         ),
     ] = None,
     noise: Annotated[
@@ -126,7 +123,7 @@ def render(
         image = model.render(
             contacts,
             resolution=size,
-            photons=photons if photons or noise or seconds else ONE_PICTURE,
+            photons=photons if photons or noise or seconds else PICTURE_PHOTONS,
             noise=noise,
             seconds=seconds,
             seed=seed,
@@ -170,7 +167,7 @@ USUAL_PIXELS = 320 * 240
 def _steps(photons: int | None, noise: float | None, seconds: float | None) -> list[TimedStep]:
     """The steps of a render and their usual times (seconds on two cores of a desktop processor,
     GelSight Mini, some kernels compiled and others found in the cache)."""
-    tracing = TimedStep(TRACING, (photons or ONE_PICTURE) / 1e6, 2.2)
+    tracing = TimedStep(TRACING, (photons or PICTURE_PHOTONS) / 1e6, 2.2)
     if photons is None and noise is not None:
         tracing = TimedStep(TRACING, NOISE_PHOTONS, 2.2)
     if photons is None and seconds is not None:

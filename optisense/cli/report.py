@@ -8,7 +8,9 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from optisense.cli.console import ends_well, output
+from optisense.cli.options import photons_option
 from optisense.cli.progress import ProgressLine, progress_line
+from optisense.quality import PICTURE_PHOTONS
 from optisense.time_left import TimedStep
 
 if TYPE_CHECKING:
@@ -36,9 +38,7 @@ def report(
             show_default="STUDY/report.html",
         ),
     ] = None,
-    photons: Annotated[
-        int, typer.Option(min=1, metavar="N", help="Photons to trace for each picture.")
-    ] = 1_000_000,
+    photons: Annotated[int, photons_option("Photons to trace for each picture.")] = PICTURE_PHOTONS,
     pictures: Annotated[
         bool, typer.Option(help="Render the sensor as it was and as it is best.")
     ] = True,

@@ -17,6 +17,7 @@ from optisense.cli.options import (
     VariantOption,
     parse_contacts,
     parse_resolution,
+    photons_option,
 )
 from optisense.cli.output_folder import take_folder
 from optisense.cli.progress import progress_line
@@ -28,6 +29,7 @@ from optisense.cli.sampling import (
     shown_samples,
 )
 from optisense.optics.estimators import ESTIMATORS, RADIANCE_CACHE
+from optisense.quality import SAMPLE_PHOTONS
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -73,9 +75,7 @@ ResolutionOption = Annotated[
         show_default=False,
     ),
 ]
-PhotonsOption = Annotated[
-    int, typer.Option(min=1, metavar="N", help="Photons of the light that all pictures share.")
-]
+PhotonsOption = Annotated[int, photons_option("Photons of the light that all pictures share.")]
 EstimatorOption = Annotated[
     str,
     typer.Option(
@@ -98,7 +98,6 @@ JsonOption = Annotated[bool, typer.Option("--json", help="Print JSON instead of 
 PICTURES = "pictures"
 """The step of the progress of reconstructions."""
 
-PHOTONS = 5_000_000
 SAMPLES = 200
 NOISE = 1.5
 NEIGHBOURS = 5
@@ -124,7 +123,7 @@ def misalignment(
     camera_noise: NoiseOption = NOISE,
     neighbours: NeighboursOption = NEIGHBOURS,
     resolution: ResolutionOption = None,
-    photons: PhotonsOption = PHOTONS,
+    photons: PhotonsOption = SAMPLE_PHOTONS,
     estimator: EstimatorOption = RADIANCE_CACHE,
     out: OutOption = None,
     as_json: JsonOption = False,
@@ -149,7 +148,7 @@ def cylinder_radius(
     camera_noise: NoiseOption = NOISE,
     neighbours: NeighboursOption = NEIGHBOURS,
     resolution: ResolutionOption = None,
-    photons: PhotonsOption = PHOTONS,
+    photons: PhotonsOption = SAMPLE_PHOTONS,
     estimator: EstimatorOption = RADIANCE_CACHE,
     out: OutOption = None,
     as_json: JsonOption = False,
@@ -173,7 +172,7 @@ def snr(
     camera_noise: NoiseOption = NOISE,
     neighbours: NeighboursOption = NEIGHBOURS,
     resolution: ResolutionOption = None,
-    photons: PhotonsOption = PHOTONS,
+    photons: PhotonsOption = SAMPLE_PHOTONS,
     estimator: EstimatorOption = RADIANCE_CACHE,
     out: OutOption = None,
     as_json: JsonOption = False,
@@ -216,7 +215,7 @@ def reconstruction(
     seed: SeedOption = 0,
     camera_noise: NoiseOption = NOISE,
     resolution: ResolutionOption = None,
-    photons: PhotonsOption = PHOTONS,
+    photons: PhotonsOption = SAMPLE_PHOTONS,
     out: Annotated[
         Path | None,
         typer.Option(

@@ -5,11 +5,11 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field
+from pydantic import BeforeValidator, Field
 
 from optisense.design import LightGroup, SensorDesign
 from optisense.engine.contacts import (
@@ -27,14 +27,11 @@ from optisense.engine.requests import Lane, handles
 from optisense.engine.session import KeptImage, Session, name_of
 from optisense.errors import RenderError
 from optisense.near import suggestion
+from optisense.quality import PICTURE_PHOTONS, photons_of
 
 if TYPE_CHECKING:
     from optisense.optics import RenderProgress, TactileImage
 
-PHOTONS = 1_000_000
-"""Of an image where nothing is asked, as of `optisense render`."""
-
-DRAFT_PHOTONS = 60_000
 DRAFT_WIDTH = 160
 
 MOST_PIXELS = 20_000_000
@@ -65,7 +62,7 @@ class Simulate(OfDesign):
 
     contacts: list[AnyContact] = Field(default_factory=list)
     resolution: tuple[int, int] | None = None
-    photons: int | None = Field(default=None, gt=0)
+    photons: Annotated[int, BeforeValidator(photons_of)] | None = None
     noise: float | None = Field(default=None, gt=0.0)
     seconds: float | None = Field(default=None, gt=0.0)
     seed: int = Field(default=0, ge=0, lt=2**32)
@@ -119,13 +116,13 @@ def warm(session: Session, fields: Warm, job: Job) -> dict[str, Any]:
     model = session.renderer.model(design)
     job.progress(0.2, "building the sensor")
     size = _draft_size(design)
-    model.render((), size, photons=DRAFT_PHOTONS, progress=_progress_of(job))
+    model.render((), size, photons="draft", progress=_progress_of(job))
     if fields.contacts:
         job.progress(0.7, "pressing once")
-        model.render(contacts_of(["sphere:1.5@0,0:0.2"]), size, photons=DRAFT_PHOTONS)
+        model.render(contacts_of(["sphere:1.5@0,0:0.2"]), size, photons="draft")
     if fields.drafts:
         job.progress(0.8, "getting drafts ready")
-        session.renderer.draft_model(design).render((), size, photons=DRAFT_PHOTONS)
+        session.renderer.draft_model(design).render((), size, photons="draft")
     return {"seconds": round(time.perf_counter() - began, 3)}
 
 
@@ -141,10 +138,10 @@ def simulate(session: Session, fields: Simulate, job: Job) -> dict[str, Any]:
     photons = fields.photons
     if fields.draft:
         size = fields.resolution or _draft_size(design)
-        photons = photons if photons or fields.noise or fields.seconds else DRAFT_PHOTONS
+        photons = photons if photons or fields.noise or fields.seconds else photons_of("draft")
     else:
         session.designs.must_be_sound(design)
-        photons = photons if photons or fields.noise or fields.seconds else PHOTONS
+        photons = photons if photons or fields.noise or fields.seconds else PICTURE_PHOTONS
         job.progress(0.0, "building the sensor")
     renderer = session.renderer
     model = renderer.draft_model(design) if fields.draft else renderer.model(design)

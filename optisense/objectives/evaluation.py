@@ -20,6 +20,7 @@ from optisense.geometry import Contact, SensingSurface, Sphere, locate
 from optisense.objectives.press import Press
 from optisense.objectives.settings import VIEW_ACROSS, Settings, size_for
 from optisense.objectives.view import View, view_of
+from optisense.quality import SCORE_PHOTONS
 
 if TYPE_CHECKING:
     from optisense.optics import ChiefRays, OpticalModel, RenderProgress, TactileImage
@@ -351,7 +352,7 @@ class Evaluation:
         image = self.model.render(
             contacts,
             resolution=self.resolution,
-            photons=self.settings.photons,
+            photons=SCORE_PHOTONS if self.settings.photons is None else self.settings.photons,
             seed=self.settings.seed,
             progress=report,
             only_contacts=bool(contacts),

@@ -8,6 +8,7 @@ from typing import Any, Literal
 
 from optisense.design.camera_checks import LEAST_PICTURE, LEAST_SKIN
 from optisense.errors import ObjectiveError
+from optisense.quality import LEVELS, photons_of
 
 BALL_RADIUS = 1.5
 """mm, of the ball that presses (the OptiSense paper, "RGB2Normal")."""
@@ -46,7 +47,7 @@ class Settings:
     Attributes:
         resolution: (width, height) of the images; 640 wide, in the camera's shape, if None.
         ray_resolution: (width, height) of the chief rays; likewise.
-        photons: to trace for the light; the model's default if None.
+        photons: to trace for the light: a number or a level of `optisense.quality`; fine if None.
         seed: of the photons and camera samples.
         radius: of the ball that presses.
         depth: to which it presses.
@@ -61,7 +62,7 @@ class Settings:
 
     resolution: tuple[int, int] | None = None
     ray_resolution: tuple[int, int] | None = None
-    photons: int | None = None
+    photons: int | str | None = None
     seed: int = 0
     radius: float = BALL_RADIUS
     depth: float = PRESS_DEPTH
@@ -76,13 +77,8 @@ class Settings:
             size = getattr(self, name)
             if size is not None:
                 object.__setattr__(self, name, _size(name, size))
-        if self.photons is not None and not (
-            _is_whole(self.photons) and 0 < self.photons <= MOST_PHOTONS
-        ):
-            raise ObjectiveError(
-                f"photons are {self.photons!r}",
-                hint=f"Give a whole number from 1 to {MOST_PHOTONS:,}",
-            )
+        if self.photons is not None:
+            object.__setattr__(self, "photons", _photons(self.photons))
         if not (_is_whole(self.seed) and 0 <= self.seed < 2**32):
             raise ObjectiveError(f"the seed is {self.seed!r}", hint="Give a whole number from 0")
         if self.exposure != "auto" and not (
@@ -174,3 +170,16 @@ def _pairs(places: Any) -> tuple[tuple[float, float], ...]:
 def size_for(camera: tuple[int, int], across: int = ACROSS) -> tuple[int, int]:
     """(width, height) of images and rays, `across` wide, for a camera of that many pixels."""
     return across, max(1, round(across * camera[1] / camera[0]))
+
+
+def _photons(given: int | str) -> int:
+    try:
+        number = photons_of(given)
+    except ValueError:
+        number = 0
+    if not 0 < number <= MOST_PHOTONS:
+        raise ObjectiveError(
+            f"photons are {given!r}",
+            hint=f"Give a whole number from 1 to {MOST_PHOTONS:,}, or {LEVELS}",
+        )
+    return number

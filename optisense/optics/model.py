@@ -30,10 +30,7 @@ from optisense.optics.scene.surfaces import Region, Surface, SurfaceKind
 from optisense.optics.transport.chief_rays import ChiefRays, sees_nothing, trace_chief_rays
 from optisense.optics.transport.emission_guide import EmissionGuide
 from optisense.optics.transport.photons import Emission
-
-DEFAULT_PHOTONS = 5_000_000
-"""Photons of a radiance cache where no other limit is given; the cache serves the next images,
-too."""
+from optisense.quality import PICTURE_PHOTONS, SCORE_PHOTONS, photons_of
 
 MAX_PHOTONS = 512_000_000
 """Number of photons at which tracing ends even if the wanted noise is not reached."""
@@ -126,7 +123,7 @@ class OpticalModel(RayModel):
         self,
         contacts: Sequence[Contact] = (),
         resolution: tuple[int, int] | None = None,
-        photons: int | None = None,
+        photons: int | str | None = None,
         noise: float | None = None,
         seconds: float | None = None,
         seed: int = 0,
@@ -141,7 +138,8 @@ class OpticalModel(RayModel):
         Args:
             contacts: indenters, places and depths; none for the untouched sensor.
             resolution: (width, height) pixels; the camera's own by default.
-            photons: to trace in all; DEFAULT_PHOTONS if no other limit is given.
+            photons: to trace in all: a number or a level of `optisense.quality`; normal if no other
+                limit is given.
             noise: per cent; trace until the relative RMS noise of the light on the sensing
                 surface is this small.
             seconds: stop tracing in time to be ready then.
@@ -168,13 +166,10 @@ class OpticalModel(RayModel):
             raise RenderError(
                 f"there is no estimator '{estimator}'", hint="Use " + " or ".join(ESTIMATORS)
             )
-        for name, value in (("photons", photons), ("noise", noise), ("seconds", seconds)):
+        for name, value in (("noise", noise), ("seconds", seconds)):
             if value is not None and not value > 0:
                 raise RenderError(f"{name} is {value}", hint="give a number above 0")
-        if photons is not None:
-            if not float(photons).is_integer():
-                raise RenderError(f"photons is {photons}", hint="give a whole number")
-            photons = int(photons)  # 12e6 is a float
+        number = None if photons is None else _photons_of(photons)
         began = time.perf_counter()
 
         listener = progress or self.listener
@@ -196,12 +191,12 @@ class OpticalModel(RayModel):
         built = time.perf_counter()
 
         if estimator == SPPM:
-            layers = self._render_sppm(scenes, camera, rays, photons, seconds, seed, began, tell)
+            layers = self._render_sppm(scenes, camera, rays, number, seconds, seed, began, tell)
         else:
             target = None if noise is None else noise / 100
-            wanted = photons
-            if photons is None and noise is None and seconds is None:
-                wanted = DEFAULT_PHOTONS
+            wanted = number
+            if number is None and noise is None and seconds is None:
+                wanted = PICTURE_PHOTONS
             field = self._store.field(
                 seed, wanted, target, seconds, MAX_PHOTONS, began, tell, partial
             )
@@ -241,7 +236,7 @@ class OpticalModel(RayModel):
             "estimator": estimator,
             "units": {"radiance": RADIANCE_UNIT, "length": "mm"},
             "photons": layers.photons,
-            "photons_asked": photons,
+            "photons_asked": number,
             "noise_asked_percent": noise,
             "seconds_asked": seconds,
             "noise_reached_percent": _percent(layers.noise),
@@ -273,7 +268,7 @@ class OpticalModel(RayModel):
 
         per_light = max(1, SPPM_PASS_PHOTONS // self._emitter_table.count)
         emitted = per_light * self._emitter_table.count
-        passes = max(1, -(-(photons or 16 * DEFAULT_PHOTONS) // emitted))
+        passes = max(1, -(-(photons or 16 * SCORE_PHOTONS) // emitted))
 
         def stop(done: int) -> bool:
             tell(Stage.PHOTONS, done / passes, done * emitted, None)
@@ -292,3 +287,10 @@ class OpticalModel(RayModel):
 
 def _percent(noise: float) -> float | None:
     return round(100 * noise, 4) if np.isfinite(noise) else None
+
+
+def _photons_of(given: int | str) -> int:
+    try:
+        return photons_of(given)
+    except ValueError as error:
+        raise RenderError(str(error)) from None

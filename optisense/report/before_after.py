@@ -13,14 +13,12 @@ from optisense.design import SensorDesign
 from optisense.errors import OptiSenseError, SetupError
 from optisense.geometry import Contact, Sphere
 from optisense.objectives import Evaluation, Settings, evaluate
+from optisense.quality import PICTURE_PHOTONS
 from optisense.report.balls import Ball, find_balls
 from optisense.report.camera_rays import CameraRays
 
 if TYPE_CHECKING:
     from optisense.optics import OpticalModel
-
-PHOTONS = 1_000_000
-"""Of a picture on the page: enough to look at."""
 
 ACROSS = 320
 """Pixels across a picture."""
@@ -82,7 +80,7 @@ def look(
     settings: Mapping[str, Any] | None = None,
     *,
     pictures: bool = True,
-    photons: int = PHOTONS,
+    photons: int = PICTURE_PHOTONS,
     seed: int = 0,
 ) -> Look:
     """Trace a design's chief rays, and render it with the balls that its objectives press into it.

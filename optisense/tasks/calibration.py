@@ -15,6 +15,7 @@ from scipy.ndimage import distance_transform_edt, gaussian_filter
 
 from optisense.errors import ContactError, TaskError
 from optisense.geometry import Contact, Sphere
+from optisense.quality import SAMPLE_PHOTONS
 from optisense.tasks.camera_noise import MEASURED_NOISE, add_camera_noise
 from optisense.tasks.colour_to_normal import METHODS, TiltReader, fit_reader, normals_of, tilts_of
 from optisense.tasks.draws import Places
@@ -68,7 +69,7 @@ class ReconstructionSettings:
     seed: int = 0
     camera_noise: float = MEASURED_NOISE
     resolution: tuple[int, int] | None = None
-    photons: int = 5_000_000
+    photons: int = SAMPLE_PHOTONS
 
     def __post_init__(self) -> None:
         if self.method not in METHODS:

@@ -19,6 +19,7 @@ from optisense.folders import LOCK_FILE, FolderLock, held
 from optisense.geometry import Contact, Indenter
 from optisense.library import with_own_lights
 from optisense.optics.estimators import RADIANCE_CACHE, current_name
+from optisense.quality import SAMPLE_PHOTONS
 from optisense.sensors import save_design
 from optisense.tasks.camera_noise import add_camera_noise
 from optisense.tasks.dataset import (
@@ -71,7 +72,7 @@ class DatasetSettings:
 
     contacts: ContactDraw = field(default_factory=ContactDraw)
     resolution: tuple[int, int] | None = None
-    photons: int = 5_000_000
+    photons: int = SAMPLE_PHOTONS
     seed: int = 0
     exposure: float | str = "auto"
     camera_noise: float = 0.0

@@ -21,6 +21,7 @@ from optisense.folders import held
 from optisense.geometry import Contact
 from optisense.objectives.score import json_ready
 from optisense.optics.estimators import RADIANCE_CACHE, current_name
+from optisense.quality import SAMPLE_PHOTONS
 from optisense.tasks.camera_noise import MEASURED_NOISE, add_camera_noise
 from optisense.tasks.generation import design_values, mesh_digests
 from optisense.tasks.records import KEPT, CsvTable, read_json, refuse_differences
@@ -113,7 +114,7 @@ class SampleSettings:
     seed: int = 0
     camera_noise: float = MEASURED_NOISE
     resolution: tuple[int, int] | None = None
-    photons: int = 5_000_000
+    photons: int = SAMPLE_PHOTONS
     estimator: str = RADIANCE_CACHE
 
 

@@ -15,9 +15,9 @@ import pytest
 
 from optisense.design import SensorDesign, save_design, set_value
 from optisense.errors import FolderInUseError, OutputError, SearchError
+from optisense.quality import TRIAL_PHOTONS
 from optisense.search import Plan, SearchProgress, SearchSpace, Study, search
 from optisense.search.run_search import run_study
-from optisense.search.study.plan import PHOTONS
 from optisense.search.study.store import START, STORE_VERSION
 
 SPACE = {"coating.specularity": (0.0, 1.0, 5), "camera.position.x": (-1.0, 3.0, 3)}
@@ -363,7 +363,7 @@ class TestFolder:
 @pytest.mark.parametrize(
     ("goals", "method", "given", "settings"),
     [
-        (["rgb2normal"], "cma-es", {}, {"photons": PHOTONS}),
+        (["rgb2normal"], "cma-es", {}, {"photons": TRIAL_PHOTONS}),
         (["rgb2normal"], "cma-es", {"photons": 10}, {"photons": 10}),
         (["aoap"], "cma-es", {}, {"ray_resolution": [320, 240]}),
         (["rgb2normal"], "light-colours", {}, {}),

@@ -75,7 +75,7 @@ def test_photons_may_be_a_float(estimator: str, mini: OpticalModel) -> None:
     one, other = (mini.render(photons=photons, **given) for photons in (2e4, 20_000))
     assert np.allclose(one.radiance, other.radiance, rtol=1e-3, atol=1e-6 * other.radiance.max())
     for wrong in (2e4 + 0.5, float("inf"), float("nan")):
-        with pytest.raises(RenderError, match="photons is"):
+        with pytest.raises(RenderError, match="photons are"):
             mini.render(photons=wrong, **given)
 
 

@@ -13,6 +13,7 @@ from optisense.design.difference import fingerprint
 from optisense.errors import SearchError
 from optisense.objectives import Objective
 from optisense.objectives.settings import size_for
+from optisense.quality import TRIAL_PHOTONS
 from optisense.search.evaluation.evaluator import DesignEvaluator, Goal, goal_name, placed
 from optisense.search.evaluation.models import RAYS_ONLY
 from optisense.search.methods import Problem, find, make
@@ -28,14 +29,6 @@ RAYS_ACROSS = 320
 """Chief rays across the image unless `ray_resolution` is given: a quarter of the rays that a single
 evaluation traces. Over shapes of GelSight Svelte's mirror they rank alike (Spearman 0.99) and AOAP
 differs by 0.0001 +- 0.0002."""
-
-PHOTONS = 2_000_000
-"""Photons of a trial unless `photons` is given, where a single evaluation traces 5 million.
-
-Measured by RGB2Normal on coatings of a GelSight Mini (specularity 0.3, 0.5 and 0.6, two seeds):
-scores are 0.002 lower, and differences between coatings, 0.014 in all, are 0.003 off; two seeds of
-5 million differ by 0.002. The best trials are scored again with more seeds. Methods that render
-once for all trials take the 5 million."""
 
 
 @dataclass(frozen=True)
@@ -70,7 +63,7 @@ class Plan:
         chosen = find(self.method)
         rendered = [goal for goal in self.goals if isinstance(goal, str | Objective)]
         if not {goal_name(goal) for goal in rendered} <= RAYS_ONLY and not chosen.renders_once:
-            settings.setdefault("photons", PHOTONS)
+            settings.setdefault("photons", TRIAL_PHOTONS)
         evaluator = DesignEvaluator(bound, self.goals, settings, apart=self.apart)
         if self.errors is not None:
             self.errors.bind(design)

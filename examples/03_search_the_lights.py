@@ -1,0 +1,16 @@
+"""Search the positions of a GelSight Mini's red lamps for a better score, and keep the study."""
+
+import optisense as ots
+from optisense.search import Around, search
+
+result = search(
+    ots.load("gelsight-mini"),
+    {"lights.red.shift.z": Around(1.5), "lights.red.flux": (1.0, 5.0)},
+    objective="normdiff",
+    budget=8,  # a real search takes a few hundred trials
+    settings={"resolution": (120, 90), "photons": "draft"},
+    out="study",
+)
+print(f"{result.start.score:.4g} -> {result.best.score:.4g}")
+print(result.best.values)
+ots.save_design(result.best.design, "better-mini")

@@ -1,0 +1,51 @@
+"""How many photons the light is traced with: one table for Python, commands and front ends.
+
+The relative RMS noise of the light on the skin of the built-in sensors is about 3 % with a million
+photons and falls with the square root of their number; docs/performance.md has the times.
+"""
+
+from __future__ import annotations
+
+PHOTONS = {"draft": 60_000, "normal": 1_000_000, "fine": 5_000_000}
+"""Photons of each quality level.
+
+draft: what follows the mouse in the studio, and a first look. normal: pictures, and the trials of
+searches. fine: scores, datasets and tasks, whose numbers are compared with one another.
+"""
+
+PICTURE_PHOTONS = PHOTONS["normal"]
+"""The default of a picture."""
+
+TRIAL_PHOTONS = PHOTONS["normal"]
+"""The default of a trial of a search. Another seed changes the score of a design by as much as five
+million photons do (RGB2Normal of a GelSight Mini: 0.001 to 0.002; NormDiff: 1 to 2 %), and the best
+trials are scored again with fresh seeds."""
+
+SCORE_PHOTONS = PHOTONS["fine"]
+"""The default of an evaluation, whose scores are compared with one another."""
+
+SAMPLE_PHOTONS = PHOTONS["fine"]
+"""The default of what is made of many pictures: datasets, perception tasks, calibrations."""
+
+LEVELS = "|".join(PHOTONS)
+"""The levels, as help texts list them."""
+
+
+def photons_of(quality: int | float | str) -> int:
+    """The number of photons of a level, or a number as it is.
+
+    Args:
+        quality: a level, or a whole number above 0, also as text or as a float such as 2e6.
+
+    Raises:
+        ValueError: it is neither.
+    """
+    if isinstance(quality, str) and quality.strip().lower() in PHOTONS:
+        return PHOTONS[quality.strip().lower()]
+    try:
+        number = float(quality)
+        if not isinstance(quality, bool) and number.is_integer() and number > 0:
+            return int(number)
+    except (ValueError, OverflowError):
+        pass
+    raise ValueError(f"photons are {quality!r}, neither a whole number above 0 nor {LEVELS}")
