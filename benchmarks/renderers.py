@@ -16,7 +16,7 @@ from benchmarks.mitsuba_path import case_pieces, render_path
 from benchmarks.reference import CACHE, Reference
 from benchmarks.snapshots import Snapshot
 from optisense.design.colour import encode
-from optisense.optics.camera.response import auto_exposure
+from optisense.design.responses import USUAL_RESPONSE
 
 MITSUBA = "Mitsuba path"
 BUDGET = 60.0
@@ -119,7 +119,7 @@ def _save_pictures(images: dict[str, FloatArray]) -> None:
     folder: Path = CACHE / "pictures"
     folder.mkdir(parents=True, exist_ok=True)
     ours = images["OptiSense"]
-    exposure = auto_exposure(ours)
+    exposure = USUAL_RESPONSE.auto_exposure(ours)
     for name, image in images.items():
         scale = ours.mean() / max(float(image.mean()), sys.float_info.min)
         shown = encode(image * (scale * exposure))

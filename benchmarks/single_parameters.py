@@ -81,7 +81,7 @@ def values_of(design: SensorDesign) -> dict[str, list[Any]]:
         wanted[f"camera.direction.{axis}"] = _around(design, f"camera.direction.{axis}", STEPS[:6])
         wanted[f"camera.up.{axis}"] = _around(design, f"camera.up.{axis}", STEPS[:6])
     for name, material in design.materials.items():
-        if material.kind == "dielectric":
+        if "ior" in type(material).model_fields:
             wanted[f"materials.{name}.ior"] = [*INDICES]
     group = next(iter(design.lights))
     wanted[f"lights.{group}.flux"] = [0.0, 1.0, 1000.0]

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field, model_validator
+from pydantic import Field, SerializerFunctionWrapHandler, model_serializer, model_validator
 
 from optisense.design.fields import Count, Direction, Model, Name, Number, Vector
+from optisense.design.responses import USUAL_RESPONSE, CameraResponse
 
 Pixels = Annotated[Count, Field(le=65_536)]
 
@@ -27,6 +28,22 @@ class Camera(Model):
     position: Vector = Field(description="mm, entrance pupil, x y z")
     direction: Direction = Field(description="where it looks, any length")
     up: Direction = Field(description="upward in the picture, any length")
+    response: CameraResponse | None = Field(
+        default=None, description="how light becomes the picture, instead of the usual way"
+    )
+
+    @property
+    def any_response(self) -> CameraResponse:
+        """Its response: the usual one where it names none."""
+        return USUAL_RESPONSE if self.response is None else self.response
+
+    @model_serializer(mode="wrap")
+    def _without_the_usual(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        """A camera of the usual response is written as ever."""
+        values: dict[str, Any] = handler(self)
+        if values.get("response") is None:
+            values.pop("response", None)
+        return values
 
     @model_validator(mode="after")
     def _makes_sense(self) -> Camera:

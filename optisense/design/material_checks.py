@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from optisense.design.materials import Dielectric
+from optisense.design.materials import Medium
 from optisense.design.parts import TRANSPARENT_SOLIDS, Role
 from optisense.design.problems import Diagnostic
 from optisense.design.sensor_design import SensorDesign
@@ -28,9 +28,9 @@ Mosley et al., "High refractive index thermally stable phenoxyphenyl and phenylt
 for light-emitting diode applications", J. Appl. Polym. Sci. 131, 39824 (2014)."""
 
 
-def is_gas(material: Dielectric) -> bool:
+def is_gas(medium: Medium) -> bool:
     """Whether a medium can only be a gas, such as air."""
-    return material.ior <= MOST_OF_A_GAS
+    return medium.ior <= MOST_OF_A_GAS
 
 
 def index_problems(design: SensorDesign) -> list[Diagnostic]:
@@ -42,19 +42,20 @@ def index_problems(design: SensorDesign) -> list[Diagnostic]:
     told: set[str] = set()
     for name, part in design.parts.items():
         material = design.materials.get(part.material or "")
-        if part.material is None or part.material in told or not isinstance(material, Dielectric):
+        medium = None if material is None else material.medium()
+        if part.material is None or part.material in told or medium is None:
             continue
         if part.role not in TRANSPARENT_SOLIDS:  # the index of a sheet is relative
             continue
         soft = part.role is Role.ELASTOMER
         most = MOST_OF_AN_ELASTOMER if soft else MOST_OF_A_SOLID
-        if is_gas(material) or LEAST_OF_A_SOLID <= material.ior <= most:
+        if is_gas(medium) or LEAST_OF_A_SOLID <= medium.ior <= most:
             continue
         told.add(part.material)
         what = "clear elastomer" if soft else "transparent solid"
         problems.append(
             Diagnostic(
-                f"no {what} has a refractive index of {material.ior:g}: material "
+                f"no {what} has a refractive index of {medium.ior:g}: material "
                 f"'{part.material}' of part '{name}'",
                 design.where("materials", part.material, "ior"),
                 f"Give {LEAST_OF_A_SOLID:g} to {most:g}, or 1 for air",

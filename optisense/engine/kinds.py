@@ -13,6 +13,7 @@ from optisense.design.kinds import KindModel
 from optisense.design.materials import CoatingModel, Material, kinds_for
 from optisense.design.parts import Role
 from optisense.design.problems import design_error
+from optisense.design.responses import CameraResponse
 from optisense.engine.failures import ProtocolError
 from optisense.engine.jobs import Job
 from optisense.engine.protocol import Fields
@@ -24,6 +25,7 @@ NOUNS: dict[str, type[KindModel]] = {
     "emitter": LightModel,
     "material": Material,
     "coating": CoatingModel,
+    "response": CameraResponse,
 }
 """What comes in kinds; each noun has its own registry."""
 

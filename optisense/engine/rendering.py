@@ -303,9 +303,7 @@ def _progress_of(job: Job) -> Callable[[RenderProgress], None]:
 
 def _exposure(image: TactileImage, given: float | Literal["auto", "same"]) -> float:
     if isinstance(given, str):
-        from optisense.optics.camera.response import auto_exposure
-
-        return auto_exposure(image.radiance)
+        return image.auto_exposure()
     if not given > 0.0:
         raise RenderError(f"the exposure is {given:g}", hint='Give "auto" or a factor above 0')
     return given

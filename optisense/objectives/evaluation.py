@@ -15,6 +15,7 @@ from optisense.design import SensorDesign
 from optisense.design.camera_checks import camera_fault
 from optisense.design.material_checks import index_problems
 from optisense.design.problems import Diagnostic
+from optisense.design.responses import USUAL_RESPONSE, CameraResponse
 from optisense.errors import ObjectiveError, OptiSenseError
 from optisense.geometry import Contact, SensingSurface, Sphere, locate
 from optisense.objectives.press import Press
@@ -38,9 +39,6 @@ of the camera samples will do."""
 FIRST_IMAGE = 0.6
 """The share of the first image in the time of all rendering, since light is traced for it: GelSight
 Mini, nine presses, one million photons."""
-
-BLUR_REACH = 4.0
-"""Standard deviations after which the blur of overexposure ends (SciPy's own choice)."""
 
 GAP = 0.5
 """mm that must be free between contacts which share an image."""
@@ -227,6 +225,7 @@ class Evaluation:
                 normals=seen.normals,
                 points=seen.points,
                 before=before,
+                camera=self.design.camera.any_response,
                 **frames[number],
             )
 
@@ -285,6 +284,7 @@ class Evaluation:
         return exposure_for(
             self._untouched_radiance,
             [each.radiance[each.press.mask[each.touched]] for each in seen],
+            self.design.camera.any_response,
         )
 
     def _presses(self) -> list[Press]:
@@ -304,12 +304,12 @@ class Evaluation:
         Overexposure spreads as far as its blur reaches, so only what lies that near to a contact
         is worked out anew.
         """
-        from optisense.optics.camera.response import BLUR_WIDTH, saturate
-
         exposure, untouched = np.float32(self.exposure), self._untouched_radiance
-        response = self._once("untouched response", lambda: saturate(untouched * exposure)).copy()
+        camera = self.design.camera.any_response
+        known = self._once("untouched response", lambda: camera.respond(untouched * exposure))
+        response = known.copy()
         if touched.any():
-            reach = int(BLUR_REACH * BLUR_WIDTH * touched.shape[1]) + 2
+            reach = camera.reach(touched.shape[1])
             changed, needed = _around(touched, reach), _around(touched, 2 * reach)
             part = untouched[needed].copy()
             part[touched[needed]] = radiance
@@ -317,7 +317,7 @@ class Evaluation:
                 slice(small.start - large.start, small.stop - large.start)
                 for small, large in zip(changed, needed, strict=True)
             )
-            response[changed] = saturate(part * exposure, touched.shape[1])[inner]
+            response[changed] = camera.respond(part * exposure, touched.shape[1])[inner]
         return response
 
     def _are_apart(self, places: Sequence[NDArray[np.float64]]) -> bool:
@@ -379,7 +379,11 @@ def _radiance(image: TactileImage, where: NDArray[np.bool_]) -> NDArray[np.float
     return total
 
 
-def exposure_for(untouched: NDArray[np.float32], contacts: Iterable[NDArray[np.float32]]) -> float:
+def exposure_for(
+    untouched: NDArray[np.float32],
+    contacts: Iterable[NDArray[np.float32]],
+    response: CameraResponse = USUAL_RESPONSE,
+) -> float:
     """The factor from radiance to what the camera reads that suits a sensor and its contacts.
 
     The untouched sensor is exposed well (`auto_exposure`), unless more than `MOST_SATURATED` of
@@ -388,16 +392,15 @@ def exposure_for(untouched: NDArray[np.float32], contacts: Iterable[NDArray[np.f
     Args:
         untouched: (h, w, 3) radiance.
         contacts: (n, 3) radiance of the pixels of each contact.
+        response: of the camera.
     """
-    from optisense.optics.camera.response import KNEE, auto_exposure
-
-    exposure = auto_exposure(untouched)
+    exposure = response.auto_exposure(untouched)
     for radiance in contacts:
         brightest = radiance.max(axis=1)
         kept = min(len(brightest) - 1, int((1.0 - MOST_SATURATED) * len(brightest)))
         level = float(np.partition(brightest, kept)[kept])
-        if level * exposure > KNEE:
-            exposure = KNEE / level
+        if level * exposure > response.full_level():
+            exposure = response.full_level() / level
     return exposure
 
 

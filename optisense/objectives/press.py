@@ -10,6 +10,7 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from optisense.design.responses import USUAL_RESPONSE, CameraResponse
 from optisense.errors import ObjectiveError
 
 FloatArray = NDArray[np.float64]
@@ -41,6 +42,7 @@ class Press:
         normals: (h, w, 3) unit, of the surface seen.
         points: (h, w, 3) mm, what is seen.
         before: (h, w, 3) unit normals of the untouched surface.
+        camera: turns the response into what is stored.
         geometry: what objectives have derived of all but the response (see `derived`).
     """
 
@@ -55,6 +57,7 @@ class Press:
     normals: NDArray[np.float32]
     points: NDArray[np.float32]
     before: NDArray[np.float32]
+    camera: CameraResponse = field(default_factory=lambda: USUAL_RESPONSE)
     geometry: dict[Hashable, Any] = field(default_factory=dict, repr=False, compare=False)
 
     def derived(self, key: Hashable, derive: Callable[[], Value]) -> Value:
@@ -92,11 +95,9 @@ class Press:
         Raises:
             ObjectiveError: another kind.
         """
-        from optisense.design.colour import srgb_curve
-
         chosen = self.response[where].astype(np.float64)
         if kind == "picture":
-            return srgb_curve(chosen)
+            return self.camera.curve(chosen)
         if kind == "response":
             return chosen
         raise _no_such(kind)

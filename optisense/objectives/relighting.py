@@ -14,10 +14,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from optisense.design.responses import CameraResponse
 from optisense.errors import ObjectiveError
 from optisense.objectives.evaluation import Evaluation, exposure_for
 from optisense.objectives.press import Press
-from optisense.optics.camera.response import BLUR_WIDTH, KNEE, saturate
 
 if TYPE_CHECKING:
     from optisense.design import SensorDesign
@@ -25,12 +25,6 @@ if TYPE_CHECKING:
 
 ByteMask = NDArray[np.bool_]
 Layers = NDArray[np.float32]
-
-BLUR_REACH = 4.0
-"""Standard deviations after which the blur of overexposure ends (SciPy's own choice), ..."""
-
-SPARE = 2
-"""... and pixels more, to be on the safe side of its rounding."""
 
 
 @dataclass(frozen=True)
@@ -149,7 +143,7 @@ class Relighting:
     def _keep(self, press: Press, image: TactileImage) -> _Seen:
         rows, columns = press.box
         height, width = press.mask.shape
-        reach = int(BLUR_REACH * BLUR_WIDTH * width) + SPARE
+        reach = self._camera.reach(width)
         around = (
             slice(max(0, rows.start - reach), min(height, rows.stop + reach)),
             slice(max(0, columns.start - reach), min(width, columns.stop + reach)),
@@ -181,7 +175,7 @@ class Relighting:
         if given != "auto":
             return float(given)
         pairs = zip(self._seen, contacts, strict=True)
-        return exposure_for(untouched, [contact[seen.own] for seen, contact in pairs])
+        return exposure_for(untouched, [contact[seen.own] for seen, contact in pairs], self._camera)
 
     def _response(
         self,
@@ -198,14 +192,18 @@ class Relighting:
         if whole:
             image = background * np.float32(exposure)
             image[seen.around] = exposed
-            return saturate(image)
+            return self._camera.respond(image)
         inner = tuple(
             slice(box.start - around.start, box.stop - around.start)
             for box, around in zip(seen.box, seen.around, strict=True)
         )
-        if exposed.max() <= KNEE:  # nothing spreads
-            return np.asarray(np.clip(exposed[inner], 0.0, 1.0))
-        return saturate(exposed, self._shape[1])[inner]
+        if not self._camera.spreads(exposed):
+            return self._camera.respond(exposed[inner], self._shape[1])
+        return self._camera.respond(exposed, self._shape[1])[inner]
+
+    @property
+    def _camera(self) -> CameraResponse:
+        return self.model.design.camera.any_response
 
 
 class _Relit(Evaluation):

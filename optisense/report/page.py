@@ -14,9 +14,8 @@ from markupsafe import Markup
 from numpy.typing import NDArray
 
 from optisense.design import LightGroup, SensorDesign
-from optisense.design.colour import encode
+from optisense.design.responses import CameraResponse
 from optisense.geometry import Contact, TriangleMesh
-from optisense.optics.camera.response import auto_exposure
 from optisense.report import tables
 from optisense.report.camera_rays import CameraRays
 from optisense.report.files import page, template
@@ -133,11 +132,12 @@ def _pictures(
 ) -> list[dict[str, str]]:
     """The pictures with their captions; the tactile image comes first."""
     picture = image.picture(exposure)
-    factor = auto_exposure(image.radiance) if exposure == "auto" else float(exposure)
+    camera = design.camera.any_response
+    factor = camera.auto_exposure(image.radiance) if exposure == "auto" else float(exposure)
     shown: list[tuple[str, Callable[[], NDArray[np.uint8]], str, str]]
     shown = [("picture", lambda: picture, "tactile image", "")]
     for name, layer in image.layers.items():
-        exposed = partial(_exposed, layer, factor)
+        exposed = partial(_exposed, layer, factor, camera)
         shown.append((f"layer {name}", exposed, f"{name} lights alone", ""))
     normals = partial(normal_colours, image.normals, design.camera.axes())
     shown.append(("normals", normals, "surface normals", "red right, green up, blue to the camera"))
@@ -153,8 +153,10 @@ def _pictures(
     ]
 
 
-def _exposed(layer: NDArray[np.float32], factor: float) -> NDArray[np.uint8]:
-    return encode(factor * layer)
+def _exposed(
+    layer: NDArray[np.float32], factor: float, camera: CameraResponse
+) -> NDArray[np.uint8]:
+    return camera.encode(factor * layer)
 
 
 def _place_to_look_at(mask: NDArray[np.bool_]) -> tuple[int, int]:

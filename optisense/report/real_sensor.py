@@ -109,7 +109,6 @@ def compare_with_real(
         KeyboardInterrupt: Ctrl-C ended the rendering.
         OptiSenseError: the model can't be rendered.
     """
-    from optisense.optics.camera.response import picture
     from optisense.tasks.dataset import read_picture
 
     with as_file(files("optisense.report") / "real" / PICTURE) as path:
@@ -127,7 +126,7 @@ def compare_with_real(
     seen = np.asarray(image.radiance, dtype=np.float64)
     linear = decode(real)
     exposure = float(np.median(linear) / np.median(seen))
-    drawn = picture(image.radiance, exposure)
+    drawn = image.picture(exposure)
     rows, columns = np.mgrid[:height, :width] + 0.5
     radius = math.sqrt(image.contact_mask.sum() / math.pi)
     away = np.hypot(columns - column, rows - row) > AROUND * radius

@@ -97,8 +97,6 @@ class CalibratedSensor:
         progress: Callable[[int], None] = lambda done: None,
     ) -> None:
         """Press the balls and fit the reader. progress: called with the number of balls pressed."""
-        from optisense.optics.camera.response import auto_exposure
-
         self._model = model
         self._settings = settings
         camera = model.design.camera
@@ -108,7 +106,7 @@ class CalibratedSensor:
         self._frames = self.untouched.frames(model.surface.u_axis)
         self._integrator = NormalIntegrator(self.untouched)
         blank = self._render([])
-        self._exposure = auto_exposure(blank.radiance)
+        self._exposure = blank.auto_exposure()
         # A real one is the mean of many pictures, without noise.
         self._background = blank.picture(self._exposure).astype(np.float64)
         samples = [np.hstack(self._press(i)) for i in _counted(settings.presses, progress)]

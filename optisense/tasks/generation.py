@@ -250,10 +250,8 @@ class _Maker:
             estimator=self._settings.estimator,
             partial=False,
         )
-        from optisense.optics.camera.response import auto_exposure
-
         asked = self._settings.exposure
-        exposure = float(auto_exposure(image.radiance) if asked == "auto" else asked)
+        exposure = float(image.auto_exposure() if asked == "auto" else asked)
         save_design(self._model.design, self._folder / DESIGN)
         arrays = {
             "image": image.picture(exposure),

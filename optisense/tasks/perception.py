@@ -244,12 +244,10 @@ class _Camera:
     """Takes the pictures of one task with a fixed exposure."""
 
     def __init__(self, task: PerceptionTask, model: OpticalModel, settings: SampleSettings) -> None:
-        from optisense.optics.camera.response import auto_exposure
-
         self._task = task
         self._model = model
         self._settings = settings
-        self._exposure = auto_exposure(self._render([]).radiance)
+        self._exposure = self._render([]).auto_exposure()
 
     def sample(self, index: int) -> list[float]:
         """Features and targets of one contact."""

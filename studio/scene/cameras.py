@@ -78,4 +78,5 @@ def camera_values(scene: bpy.types.Scene) -> dict[str, Any] | None:
         "fov": kept(before.get("fov"), values.fov),
         "resolution": list(values.pixels),
         **{name: pose[name] for name in ("position", "direction", "up")},
+        **({"response": before["response"]} if before.get("response") else {}),
     }

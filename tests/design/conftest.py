@@ -78,6 +78,7 @@ def full_data() -> dict[str, object]:
         "camera": {
             "model": "pi-v2", "projection": "equidistant", "fov": 150, "resolution": [64, 48],
             "position": [0.5, 0, -20], "direction": [0, 0, 1], "up": [0, 1, 0],
+            "response": {"kind": "full-well", "full_well": 0.9, "blur": 0.01},
         },
         "cages": {
             "skin": {

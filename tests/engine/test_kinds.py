@@ -10,8 +10,14 @@ import pytest
 from optisense.design import AreaEmitter, Role
 from optisense.design.emitters import LightModel
 from optisense.design.materials import CoatingModel, Material
+from optisense.design.responses import CameraResponse
 
-NOUNS = {"emitter": LightModel, "material": Material, "coating": CoatingModel}
+NOUNS = {
+    "emitter": LightModel,
+    "material": Material,
+    "coating": CoatingModel,
+    "response": CameraResponse,
+}
 
 
 def test_all_kinds_and_their_fields_are_told(engine: Any) -> None:

@@ -15,13 +15,13 @@ from comparing import SCORE_ROUNDING, same_light
 
 from optisense import OpticalModel, Score, evaluate, load
 from optisense.design import set_value
+from optisense.design.responses import USUAL_RESPONSE
 from optisense.errors import ObjectiveError
 from optisense.objectives import BUILT_IN, Evaluation, Objective, Press, Settings
 from optisense.objectives.evaluation import MOST_SATURATED, exposure_for
 from optisense.objectives.normdiff import CROWD, indented_pixels
 from optisense.objectives.registry import find, pixels_read
 from optisense.objectives.rgb2normal import lines_of
-from optisense.optics.camera.response import auto_exposure, saturate
 from optisense.optics.radiance_cache import store
 from optisense.optics.transport.photons import trace_photons
 
@@ -160,7 +160,7 @@ def test_what_the_camera_reads_is_the_whole_image_saturated(
         touched = image.contact_mask[..., None]
         whole = np.where(touched, image.radiance, background) * judged.exposure
         overexposed += int((whole > 1).sum())
-        assert np.array_equal(press.response, saturate(whole))
+        assert np.array_equal(press.response, USUAL_RESPONSE.respond(whole))
     assert overexposed > 10
 
 
@@ -396,7 +396,7 @@ def test_automatic_exposure_leaves_a_contact_its_highlights_and_no_more() -> Non
     random = np.random.default_rng(1)
     untouched = random.uniform(0.5, 1.0, (40, 50, 3)).astype(np.float32)
     dim = random.uniform(0.0, 1.0, (500, 3)).astype(np.float32)
-    usual = auto_exposure(untouched)
+    usual = USUAL_RESPONSE.auto_exposure(untouched)
     assert exposure_for(untouched, []) == usual
     assert exposure_for(untouched, [dim]) == usual
     shiny, shinier = 8.0 * dim, 30.0 * dim

@@ -12,7 +12,6 @@ from optisense import OpticalModel, load
 from optisense.design.colour import srgb_curve
 from optisense.errors import ContactError, TaskError
 from optisense.geometry import Contact, Cylinder
-from optisense.optics.camera.response import auto_exposure
 from optisense.tasks import CylinderRadius, Misalignment, SampleSettings, perceive
 from optisense.tasks.misalignment import plane_contact
 from optisense.tasks.perception import collect
@@ -38,7 +37,7 @@ def test_the_mean_colour_of_a_tilted_plane_is_what_lambert_says(
     angles: tuple[float, float], lambertian: Any
 ) -> None:
     image = lambertian.render([plane_contact(lambertian, *angles, 0.8)], (48, 36))
-    exposure = auto_exposure(lambertian.render([], (48, 36)).radiance)
+    exposure = lambertian.render([], (48, 36)).auto_exposure()
     measured = Misalignment().measure(image.picture(exposure), image)
     assert measured == pytest.approx(levels(turned(*angles), exposure), abs=0.51)
 
@@ -64,7 +63,7 @@ def test_the_spread_of_colours_over_a_cylinder_is_what_lambert_says(
     depth = 0.5
     contact = Contact(Cylinder(radius), at=(0, 0), depth=depth)
     image = lambertian.render([contact], (320, 240))
-    exposure = auto_exposure(lambertian.render([], (320, 240)).radiance)
+    exposure = lambertian.render([], (320, 240)).auto_exposure()
     measured = CylinderRadius().measure(image.picture(exposure), image)
     # It lies along x: normals turn about x by the angle whose sine is y / radius.
     half = np.sqrt(2 * radius * depth - depth**2)

@@ -25,6 +25,9 @@ COARSE_POLAR = 0.25
 """Degrees between the angles at which the end of a beam is looked for: a beam is rarely narrower
 than this, and one that is keeps its axis."""
 
+DARK = 1e-6
+"""A share of the peak: a lamp that sends less than this counts as dark."""
+
 POLAR_ANGLES = 1025
 """Polar angles of a table over the beam; a beam of 90 degrees gets one every 0.09 degrees."""
 
@@ -95,7 +98,8 @@ class LightModel(KindModel):
         """
         azimuth = np.linspace(0.0, 360.0, AZIMUTHS)
         polar = np.arange(0.0, 180.0 + COARSE_POLAR, COARSE_POLAR)
-        bright = self.relative_intensity(polar[:, None], azimuth[None, :]).max(axis=1) > 0.0
+        light = self.relative_intensity(polar[:, None], azimuth[None, :]).max(axis=1)
+        bright = light > DARK
         last = int(np.flatnonzero(bright)[-1]) if bright.any() else 0
         return np.linspace(0.0, polar[min(last + 1, len(polar) - 1)], POLAR_ANGLES), azimuth
 

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from optisense.design.emitters import LightModel
+from optisense.design.emitters.base import DARK
 from optisense.library.entries import LightEntry, TypicalLight
 
 if TYPE_CHECKING:
@@ -42,7 +43,7 @@ def _intensity(axes: Any, entry: LightEntry) -> str:
     emitter: LightModel = entry.value
     axes.set_theta_zero_location("N")
     axes.set_theta_direction(-1)
-    widest = 180.0 if emitter.relative_intensity([95.0, 120.0, 150.0]).max() > 0.0 else 90.0
+    widest = 180.0 if emitter.relative_intensity([95.0, 120.0, 150.0]).max() > DARK else 90.0
     axes.set(thetamin=-widest, thetamax=widest)
     angle = np.linspace(-widest, widest, 1441)
     azimuths = [0.0, 90.0]

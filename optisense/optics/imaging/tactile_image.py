@@ -16,8 +16,9 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from optisense.design.responses import USUAL_RESPONSE, CameraResponse
 from optisense.errors import RenderError
-from optisense.optics.camera.response import auto_exposure, picture
+from optisense.optics.camera.response import picture
 from optisense.writing import inside, remove_own_page, written_together
 
 RADIANCE_UNIT = "mW/(mm^2 sr)"
@@ -37,7 +38,8 @@ class TactileImage:
         side; NaN where the camera sees none. contact_mask: where an indenter is seen. depth: mm
         that the coating is pushed in along the inward normal, 0 outside contacts. settings:
         what was asked and what was reached, ready for JSON. unit_layers: each group's layer for
-        lights of 1 mW in every channel, from which others follow (see ``relight``).
+        lights of 1 mW in every channel, from which others follow (see ``relight``). response: of
+        the camera.
     """
 
     layers: dict[str, NDArray[np.float32]]
@@ -47,6 +49,7 @@ class TactileImage:
     settings: dict[str, Any] = field(default_factory=dict)
     interrupted: bool = False
     unit_layers: dict[str, NDArray[np.float32]] = field(default_factory=dict)
+    response: CameraResponse = field(default_factory=lambda: USUAL_RESPONSE)
 
     def relight(self, flux: Mapping[str, ArrayLike]) -> TactileImage:
         """The same image under lights of other colours and powers; exact, with no new rendering.
@@ -79,8 +82,12 @@ class TactileImage:
         return total
 
     def picture(self, exposure: float | str = "auto") -> NDArray[np.uint8]:
-        """(h, w, 3) uint8: exposed, saturated and sRGB-encoded."""
-        return picture(self.radiance, exposure)
+        """(h, w, 3) uint8: exposed, and stored as the camera does."""
+        return picture(self.radiance, exposure, self.response)
+
+    def auto_exposure(self) -> float:
+        """The factor that makes a good picture of the radiance."""
+        return self.response.auto_exposure(self.radiance)
 
     def _repr_png_(self) -> bytes:
         """The exposed picture as a PNG file, for notebooks."""
@@ -107,9 +114,7 @@ class TactileImage:
             OutputError: a file can't be written, for instance because the disk is full.
         """
         out = Path(folder)
-        self.settings["exposure"] = (
-            auto_exposure(self.radiance) if exposure == "auto" else float(exposure)
-        )
+        self.settings["exposure"] = self.auto_exposure() if exposure == "auto" else float(exposure)
         bitmaps = {"image.png": self.picture(exposure), "radiance.exr": self.radiance}
         bitmaps |= {f"layers/{name}.exr": layer for name, layer in self.layers.items()}
         with written_together("the results") as stage:

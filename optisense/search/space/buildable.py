@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 from optisense.design import Role, SensorDesign
 from optisense.design.cage_checks import contact_problems
 from optisense.design.material_checks import is_gas
-from optisense.design.materials import Dielectric
 from optisense.geometry import TriangleMesh
 from optisense.geometry.coincidence import find_coincident
 from optisense.geometry.meeting import CONTACT, near_surface
@@ -207,19 +206,20 @@ class SolidsStay:
     def __init__(self, design: SensorDesign) -> None:
         """Look at the design that the search starts from."""
         self._gases = {
-            name: is_gas(material)
+            name: is_gas(medium)
             for name, material in design.materials.items()
-            if isinstance(material, Dielectric)
+            if (medium := material.medium()) is not None
         }
 
     def __call__(self, design: SensorDesign) -> str | None:
         """Which material has changed its state, or None."""
         for name, was_gas in self._gases.items():
             material = design.materials.get(name)
-            if isinstance(material, Dielectric) and is_gas(material) != was_gas:
+            medium = None if material is None else material.medium()
+            if medium is not None and is_gas(medium) != was_gas:
                 now, before = ("a solid", "air") if was_gas else ("air", "a solid")
                 return (
-                    f"with a refractive index of {material.ior:g} material '{name}' is {now}, and "
+                    f"with a refractive index of {medium.ior:g} material '{name}' is {now}, and "
                     f"in the design that the search starts from it is {before}"
                 )
         return None

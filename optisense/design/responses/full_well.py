@@ -1,0 +1,73 @@
+"""A sensor whose pixels overflow into their neighbours.
+
+Exposure, then saturation as in the OptiSense paper (section "Camera"): where a channel is
+overexposed, a mask of the excess is blurred and spread over all three channels, which gives the
+whitish spots around bright lights. The paper gives no constants: the full well at a level of 1 and
+the blur of 6 pixels at a width of 640 are assumptions.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, ClassVar, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field
+from scipy.ndimage import gaussian_filter
+
+from optisense.design.colour import encode
+from optisense.design.fields import NonNegative, Positive
+from optisense.design.responses.base import CameraResponse, FloatArray, brightest
+
+MAX_EXCESS = 4.0
+"""Largest excess over the full well that the mask counts, so that a lamp in view does not whiten
+the whole picture."""
+
+BLUR_REACH = 4.0
+"""Standard deviations after which the blur of overexposure ends (SciPy's own choice)."""
+
+SPARE = 2
+"""Pixels added to the reach of the blur, to be on the safe side of its rounding."""
+
+
+class FullWellResponse(CameraResponse):
+    """Overexposure spreads over the channels and into the neighbourhood; sRGB curve."""
+
+    title: ClassVar[str] = "Full well"
+
+    kind: Literal["full-well"] = "full-well"
+    full_well: Annotated[Positive, Field(le=1.0)] = Field(
+        default=1.0, description="exposed level above which a channel is overexposed"
+    )
+    blur: Annotated[NonNegative, Field(le=0.5)] = Field(
+        default=6.0 / 640.0,
+        description="standard deviation of the spread of overexposure, as a share of the width",
+    )
+
+    def full_level(self) -> float:
+        """The full well."""
+        return self.full_well
+
+    def reach(self, width: int) -> int:
+        """How far the blur reaches."""
+        return int(BLUR_REACH * self.blur * width) + SPARE
+
+    def spreads(self, exposed: FloatArray) -> bool:
+        """Whether a pixel is overexposed."""
+        return bool(exposed.max() > self.full_well)
+
+    def respond(self, exposed: FloatArray, width: int | None = None) -> NDArray[np.float32]:
+        """Spread overexposure over the channels and clip."""
+        exposed = np.asarray(exposed, dtype=np.float32)
+        excess = np.clip(brightest(exposed) - self.full_well, 0.0, MAX_EXCESS)
+        if excess.any():
+            blur = self.blur * (width or exposed.shape[1])
+            mask = np.clip(gaussian_filter(excess, blur), 0.0, 1.0)
+            exposed = exposed + mask[:, :, None] * (
+                self.full_well - np.minimum(exposed, self.full_well)
+            )
+        return np.clip(exposed, 0.0, 1.0, dtype=np.float32)
+
+    def encode(self, linear: FloatArray) -> NDArray[np.uint8]:
+        """sRGB curve and 8 bits, in single precision."""
+        return encode(linear)
