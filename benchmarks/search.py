@@ -240,20 +240,28 @@ def _table(found: dict[str, Any]) -> str:
             f"{PAPER['start']} to {PAPER['best']} in 300 s |"
         )
     if "gradient" in found:
-        row = found["gradient"]
+        row, about = found["gradient"], found["gradient"]["machine"]
+        at_target = row["at_target_seconds"]
         lines.append(
-            f"| The same by gradient, {row['trials']} trials in {row['seconds']:.0f} s | "
-            f"{row['start']['aoap']:.3f} to {row['best']['aoap']:.3f} (coverage "
-            f"{row['start']['coverage']:.2f} to {row['best']['coverage']:.2f}); after 20 s "
-            f"{row['at_target_seconds']:.3f} | within 1 % of that in 20 s |"
+            f"| The same by gradient, {row['trials']} trials in {row['processor_seconds']:.0f} s "
+            f"of processor time ({row['seconds']:.0f} s at a load of {about['load_at_start']:.0f} "
+            f"on {about['cores']} cores) | {row['start']['aoap']:.3f} to "
+            f"{row['best']['aoap']:.3f} (coverage {row['start']['coverage']:.2f} to "
+            f"{row['best']['coverage']:.2f}); after 20 s "
+            f"{'no trial' if at_target is None else format(at_target, '.3f')} | within 1 % of "
+            "that in 20 s |"
         )
     lines += [
         "",
         "The mirror's control points may move 8 mm towards the skin and back, 1 mm across and 2 mm",
         "along the finger, wherever no part cuts through another. Rays are 320 across the image.",
     ]
-    about = next(iter(found.values()))["machine"]
-    lines += ["", f"{about['processor']}, {about['cores']} cores, {about['date']}."]
+    parts: dict[str, list[str]] = {}
+    for part, row in found.items():
+        about = row["machine"]
+        where = f"{about['processor']}, {about['cores']} cores, {about['date']}"
+        parts.setdefault(where, []).append(part)
+    lines += ["", *(f"{', '.join(names)}: {where}.  " for where, names in parts.items())]
     return "\n".join(lines) + "\n"
 
 
