@@ -11,10 +11,15 @@ import typer
 from optisense.cli.console import EXIT_FAILURE, ends_well, messages, output
 from optisense.cli.options import (
     DesignArgument,
+    EstimatorOption,
+    NoiseOption,
+    SamplePhotonsOption,
+    SampleResolutionOption,
     VariantOption,
+    out_option,
     parse_exposure,
     parse_resolution,
-    photons_option,
+    seed_option,
 )
 from optisense.cli.output_folder import take_folder
 from optisense.cli.progress import progress_line
@@ -25,7 +30,7 @@ from optisense.cli.sampling import (
     sample_steps,
     shown_samples,
 )
-from optisense.optics.estimators import ESTIMATORS, RADIANCE_CACHE
+from optisense.optics.estimators import RADIANCE_CACHE
 from optisense.quality import SAMPLE_PHOTONS
 
 if TYPE_CHECKING:
@@ -39,12 +44,7 @@ SAMPLES = "samples"
 @ends_well
 def dataset(
     design: DesignArgument,
-    out: Annotated[
-        Path,
-        typer.Option(
-            "--out", "-o", metavar="DIR", help="Folder of the dataset; a new one, or one to go on."
-        ),
-    ],
+    out: Annotated[Path, out_option("Folder of the dataset; a new one, or one to go on.")],
     count: Annotated[
         int, typer.Option("--count", "-n", min=1, metavar="N", help="Samples in all.")
     ] = 100,
@@ -77,44 +77,20 @@ def dataset(
             "edge; 0 lets the edge cut contacts.",
         ),
     ] = 2.0,
-    resolution: Annotated[
-        str | None,
-        typer.Option(
-            metavar="WIDTHxHEIGHT",
-            help="Pixels of the pictures. The camera's own when left out.",
-            show_default=False,
-        ),
-    ] = None,
-    photons: Annotated[
-        int, photons_option("Photons of the light that all samples share.")
-    ] = SAMPLE_PHOTONS,
-    seed: Annotated[
-        int, typer.Option(min=0, max=2**32 - 1, metavar="N", help="Of places, depths and noise.")
-    ] = 0,
+    resolution: SampleResolutionOption = None,
+    photons: SamplePhotonsOption = SAMPLE_PHOTONS,
+    seed: Annotated[int, seed_option("Of places, depths and noise.")] = 0,
     exposure: Annotated[
         str,
         typer.Option(
             metavar="auto|VALUE", help="One for all pictures; auto suits the untouched sensor."
         ),
     ] = "auto",
-    camera_noise: Annotated[
-        float,
-        typer.Option(
-            min=0.0,
-            max=255.0,
-            metavar="LEVELS",
-            help="Noise to add, of 255. A real GelSight Mini shows about 1.5; 0 leaves it to you.",
-        ),
-    ] = 0.0,
+    camera_noise: NoiseOption = 0.0,
     radiance: Annotated[
         bool, typer.Option("--radiance", help="Also write linear radiance as EXR files.")
     ] = False,
-    estimator: Annotated[
-        str,
-        typer.Option(
-            metavar="|".join(ESTIMATORS), help="sppm is slow, and exact where plates cover the gel."
-        ),
-    ] = RADIANCE_CACHE,
+    estimator: EstimatorOption = RADIANCE_CACHE,
     variant: VariantOption = "auto",
 ) -> None:
     """Make a dataset of random contacts: pictures, depth, normals, masks and labels.

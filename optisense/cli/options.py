@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
+from optisense.optics.estimators import ESTIMATORS
 from optisense.quality import LEVELS, photons_of
 
 if TYPE_CHECKING:
@@ -71,6 +72,26 @@ def out_option(text: str, metavar: str = "DIR") -> Any:
     return typer.Option("--out", "-o", metavar=metavar, help=text, show_default=False)
 
 
+NoiseOption = Annotated[
+    float,
+    typer.Option(
+        min=0.0,
+        max=255.0,
+        metavar="LEVELS",
+        help="Noise of the camera to add, of 255; a real GelSight Mini shows 1.1 to 1.9.",
+    ),
+]
+
+SampleResolutionOption = Annotated[
+    str | None,
+    typer.Option(
+        "--resolution",
+        metavar="WIDTHxHEIGHT",
+        help="Pixels of the pictures; those of the camera, or what the task needs, when left out.",
+        show_default=False,
+    ),
+]
+
 SettingOption = Annotated[
     list[str] | None,
     typer.Option(
@@ -104,6 +125,17 @@ def _photons(text: str) -> int:
     except ValueError as error:
         raise typer.BadParameter(str(error)) from None
 
+
+SamplePhotonsOption = Annotated[
+    int, photons_option("Photons of the light that all pictures share.")
+]
+
+EstimatorOption = Annotated[
+    str,
+    typer.Option(
+        metavar="|".join(ESTIMATORS), help="sppm is slow, and exact where plates cover the gel."
+    ),
+]
 
 ScorePhotonsOption = Annotated[
     int | None, photons_option("Photons to trace.", show_default="fine, 5 million")

@@ -14,10 +14,15 @@ from optisense.cli.console import ends_well, messages, output
 from optisense.cli.dataset import parse_range
 from optisense.cli.options import (
     DesignArgument,
+    EstimatorOption,
+    NoiseOption,
+    SamplePhotonsOption,
+    SampleResolutionOption,
     VariantOption,
+    out_option,
     parse_contacts,
     parse_resolution,
-    photons_option,
+    seed_option,
 )
 from optisense.cli.output_folder import take_folder
 from optisense.cli.progress import progress_line
@@ -28,7 +33,7 @@ from optisense.cli.sampling import (
     sample_steps,
     shown_samples,
 )
-from optisense.optics.estimators import ESTIMATORS, RADIANCE_CACHE
+from optisense.optics.estimators import RADIANCE_CACHE
 from optisense.quality import SAMPLE_PHOTONS
 
 if TYPE_CHECKING:
@@ -52,45 +57,15 @@ task_app = typer.Typer(
 SamplesOption = Annotated[
     int, typer.Option("--samples", "-n", min=10, metavar="N", help="Random contacts.")
 ]
-SeedOption = Annotated[
-    int, typer.Option(min=0, max=2**32 - 1, metavar="N", help="The same seed, the same contacts.")
-]
-NoiseOption = Annotated[
-    float,
-    typer.Option(
-        min=0.0,
-        max=255.0,
-        metavar="LEVELS",
-        help="Noise of the camera, of 255; a real GelSight Mini shows 1.1 to 1.9.",
-    ),
-]
+SeedOption = Annotated[int, seed_option("The same seed, the same contacts.")]
 NeighboursOption = Annotated[
     int, typer.Option(min=2, metavar="K", help="Neighbours of the signal-to-noise ratio.")
 ]
-ResolutionOption = Annotated[
-    str | None,
-    typer.Option(
-        metavar="WIDTHxHEIGHT",
-        help="Pixels of the pictures; what the task needs when left out.",
-        show_default=False,
-    ),
-]
-PhotonsOption = Annotated[int, photons_option("Photons of the light that all pictures share.")]
-EstimatorOption = Annotated[
-    str,
-    typer.Option(
-        metavar="|".join(ESTIMATORS), help="sppm is slow, and exact where plates cover the gel."
-    ),
-]
 OutOption = Annotated[
     Path | None,
-    typer.Option(
-        "--out",
-        "-o",
-        metavar="DIR",
-        help="Folder for result.json and figure.png. Samples are kept there, so that the same "
-        "command continues when it was stopped.",
-        show_default=False,
+    out_option(
+        "Folder for result.json and figure.png. Samples are kept there, so that the same "
+        "command continues when it was stopped."
     ),
 ]
 JsonOption = Annotated[bool, typer.Option("--json", help="Print JSON instead of a table.")]
@@ -122,8 +97,8 @@ def misalignment(
     seed: SeedOption = 0,
     camera_noise: NoiseOption = NOISE,
     neighbours: NeighboursOption = NEIGHBOURS,
-    resolution: ResolutionOption = None,
-    photons: PhotonsOption = SAMPLE_PHOTONS,
+    resolution: SampleResolutionOption = None,
+    photons: SamplePhotonsOption = SAMPLE_PHOTONS,
     estimator: EstimatorOption = RADIANCE_CACHE,
     out: OutOption = None,
     as_json: JsonOption = False,
@@ -147,8 +122,8 @@ def cylinder_radius(
     seed: SeedOption = 0,
     camera_noise: NoiseOption = NOISE,
     neighbours: NeighboursOption = NEIGHBOURS,
-    resolution: ResolutionOption = None,
-    photons: PhotonsOption = SAMPLE_PHOTONS,
+    resolution: SampleResolutionOption = None,
+    photons: SamplePhotonsOption = SAMPLE_PHOTONS,
     estimator: EstimatorOption = RADIANCE_CACHE,
     out: OutOption = None,
     as_json: JsonOption = False,
@@ -171,8 +146,8 @@ def snr(
     seed: SeedOption = 0,
     camera_noise: NoiseOption = NOISE,
     neighbours: NeighboursOption = NEIGHBOURS,
-    resolution: ResolutionOption = None,
-    photons: PhotonsOption = SAMPLE_PHOTONS,
+    resolution: SampleResolutionOption = None,
+    photons: SamplePhotonsOption = SAMPLE_PHOTONS,
     estimator: EstimatorOption = RADIANCE_CACHE,
     out: OutOption = None,
     as_json: JsonOption = False,
@@ -214,18 +189,9 @@ def reconstruction(
     ),
     seed: SeedOption = 0,
     camera_noise: NoiseOption = NOISE,
-    resolution: ResolutionOption = None,
-    photons: PhotonsOption = SAMPLE_PHOTONS,
-    out: Annotated[
-        Path | None,
-        typer.Option(
-            "--out",
-            "-o",
-            metavar="DIR",
-            help="Folder for result.json and figure.png.",
-            show_default=False,
-        ),
-    ] = None,
+    resolution: SampleResolutionOption = None,
+    photons: SamplePhotonsOption = SAMPLE_PHOTONS,
+    out: Annotated[Path | None, out_option("Folder for result.json and figure.png.")] = None,
     as_json: JsonOption = False,
     variant: VariantOption = "auto",
 ) -> None:

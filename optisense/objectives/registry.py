@@ -24,8 +24,6 @@ if TYPE_CHECKING:
     from optisense.objectives.evaluation import Evaluation, Reads
     from optisense.objectives.press import Press
 
-    Function = Callable[..., Any]
-
 ENTRY_POINTS = "optisense.objectives"
 """Installed packages add objectives under this group: name = "module:function"."""
 
