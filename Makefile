@@ -25,7 +25,7 @@ WINDOW_STAMP := .blender-window/.set-up
 
 LOCK := --universal --python-version 3.11 --generate-hashes --no-emit-index-url --upgrade
 
-.PHONY: help setup demo test quick-test lint types import-rules docs docs-as-typed pytest quick-pytest \
+.PHONY: help setup demo test quick-test lint types import-rules docs docs-as-typed pytest bare-pytest quick-pytest \
     studio-tests test-blender studio-window-test package-test extension setup-blender \
     format bench lock clean
 
@@ -56,7 +56,7 @@ demo: setup
 	@printf '\nThat was the demo. What to try next:\n'; sh scripts/next_steps.sh
 
 # Each of these runs whatever becomes of the others; a summary at the end says what failed.
-CHECKS := lint types import-rules docs pytest studio-tests
+CHECKS := lint types import-rules docs pytest bare-pytest studio-tests
 test: setup
 	@MAKE="$(MAKE)" sh scripts/run_checks.sh $(CHECKS)
 
@@ -90,6 +90,13 @@ QUICK := tests/test_environment.py tests/test_package.py tests/test_errors.py te
     tests/geometry tests/design tests/sensors/test_every_sensor.py tests/optics/test_llvm.py \
     tests/optics/test_closed_forms.py tests/objectives/test_registry.py tests/search/test_space.py \
     tests/search/test_methods.py tests/cli/test_render.py tests/engine/test_conversation.py
+# Without the optional dependencies, as for a user who installed no extra.
+BARE := tests/test_package.py tests/geometry/test_step.py tests/workshop tests/sensors/from_meshes \
+    tests/search/test_executors.py tests/search/test_run.py tests/cli/test_export.py \
+    tests/cli/test_commands.py
+bare-pytest: setup
+	PYTHONPATH=tests/helpers $(BIN)/python -m pytest -p without_optional $(BARE)
+
 quick-pytest: setup
 	$(BIN)/python -m pytest -m "not slow" $(QUICK)
 

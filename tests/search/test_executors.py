@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib.util
 import os
 import signal
 import subprocess
@@ -142,6 +143,20 @@ def test_any_executor_will_do(two_numbers: BoundSpace, goals: ModuleType) -> Non
     assert outcome.scores["nearness"] == goals.nearness(two_numbers.design)
 
 
+needs_dask = pytest.mark.skipif(
+    importlib.util.find_spec("distributed") is None, reason="the extra 'dask' is not installed"
+)
+
+
+def test_without_dask_the_extra_is_named(
+    mini: SensorDesign, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, "distributed", None)
+    with pytest.raises(SetupError, match=r"optisense\[dask\]"):
+        search(mini, {"camera.fov": (40, 50)}, "aoap", budget=1, cluster="tcp://127.0.0.1:1")
+
+
+@needs_dask
 class TestDask:
     @pytest.mark.slow
     def test_no_scheduler(

@@ -1,0 +1,15 @@
+"""A plugin of pytest that takes the optional dependencies away: `pytest -p without_optional`.
+
+A user who installed OptiSense Studio without its extras has none of them. Processes that a test
+starts have them again.
+"""
+
+from __future__ import annotations
+
+import sys
+
+OPTIONAL = ("OCP", "dask", "distributed", "lxml", "networkx", "pyluxcore", "pyte")
+"""Top-level modules of the extras `step`, `dask` and `bench`, and of the tests' own readers."""
+
+for name in OPTIONAL:
+    sys.modules[name] = None  # type: ignore[assignment]  # an import of it fails, and none finds it
