@@ -1,8 +1,9 @@
 """A search over each single parameter of each built-in sensor, as widely as the design file allows.
 
 A score can be won in ways that nobody would accept: by a camera that sees nothing, stands inside
-the gel, or has an angle that no lens has. This script looks for such ways, by AOAP and 2to3PW, and
-draws what the camera of each winner sees, so that a person can judge all of them at a glance::
+the gel, looks past its mirrors or has an angle that no lens has, by a material that there is not,
+or by parts that have left what they rest on. This script looks for such ways, by AOAP and 2to3PW,
+and draws what the camera of each winner sees, so that a person can judge all of them at a glance::
 
     python -m benchmarks.single_parameters FOLDER [--sensor NAME]
 
