@@ -99,8 +99,9 @@ def contact_problems(design: SensorDesign) -> list[Diagnostic]:
     bent = design.deformed_meshes() if moved else {}
     problems: list[Diagnostic] = []
     for cage_name, cage in moved.items():
-        for name in cage.parts:
-            for other in set(bent) - set(cage.parts) if name in bent else ():
+        others = [other for other in bent if other not in cage.parts]
+        for name in (name for name in cage.parts if name in bent):
+            for other in others:
                 solids = all(
                     design.parts[each].role in TRANSPARENT_SOLIDS for each in (name, other)
                 )
