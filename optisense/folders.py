@@ -20,24 +20,18 @@ import errno
 import fcntl
 import json
 import os
-import socket
-import sys
 import threading
 import weakref
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
-from dataclasses import asdict, dataclass, replace
-from datetime import datetime
+from dataclasses import asdict, replace
 from pathlib import Path, PurePosixPath
-from typing import Any
 
 from optisense.errors import FolderInUseError, OutputError
+from optisense.lock_holder import UNKNOWN, Holder, process_lives, read_holder
 from optisense.writing import FREE_SPACE, TEMPORARY
 
 LOCK_FILE = ".optisense.lock"
-
-BOOT_FILE = Path("/proc/sys/kernel/random/boot_id")
-"""Identifies the running kernel on Linux; absent elsewhere."""
 
 SUBFOLDERS = (
     "arrays",
@@ -54,54 +48,6 @@ SUBFOLDERS = (
     "units",
 )
 """Where commands write temporary files besides the folder itself."""
-
-MOST_TEXT = 1_000_000
-"""Bytes of a lock file that are read; the files of a design of 1000 parts take 40,000."""
-
-
-@dataclass(frozen=True)
-class Holder:
-    """What a lock file tells.
-
-    Attributes:
-        process: number of the process that wrote it.
-        host: name of its machine.
-        boot: boot identifier of its machine; empty where there is none.
-        began: local time, ISO 8601.
-        command: what the process was called with.
-        making: files that it was about to make, relative to the folder; empty once they are whole.
-        folders: folders that it was about to make for them.
-    """
-
-    process: int
-    host: str
-    boot: str
-    began: str
-    command: str
-    making: tuple[str, ...] = ()
-    folders: tuple[str, ...] = ()
-
-    @staticmethod
-    def of_this_process() -> Holder:
-        """Who this process is."""
-        words = [Path(sys.argv[0]).name if sys.argv else "python", *sys.argv[1:2]]
-        return Holder(
-            process=os.getpid(),
-            host=socket.gethostname(),
-            boot=_boot(),
-            began=datetime.now().astimezone().isoformat(timespec="seconds"),
-            command=" ".join(words),
-        )
-
-    @property
-    def is_elsewhere(self) -> bool:
-        """Whether it is on another machine, as far as can be told."""
-        if self.boot and self.boot == _boot():
-            return False
-        return self.host != socket.gethostname()
-
-    def __str__(self) -> str:
-        return f"process {self.process} on {self.host}, '{self.command}', since {self.began}"
 
 
 class FolderLock:
@@ -229,12 +175,12 @@ class FolderLock:
             try:
                 fcntl.flock(file, fcntl.LOCK_EX | (0 if wait else fcntl.LOCK_NB))
                 if _is_still(file, self._path):
-                    left = _read(file)
+                    left = read_holder(file)
                     if left is None or not left.is_elsewhere:
                         return file, left
                     raise _elsewhere(self.folder, left)
             except BlockingIOError:
-                raise _in_use(self.folder, _read(file)) from None
+                raise _in_use(self.folder, read_holder(file)) from None
             except BaseException:
                 os.close(file)
                 raise
@@ -341,7 +287,7 @@ def holder_of(folder: Path) -> Holder | None:
     except OSError:
         return None
     try:
-        told = _read(file)
+        told = read_holder(file)
         fcntl.flock(file, fcntl.LOCK_SH | fcntl.LOCK_NB)
     except BlockingIOError:
         return told or UNKNOWN
@@ -361,12 +307,8 @@ def sweep(folder: Path, subfolders: Iterable[str]) -> None:
                 continue
             for each in place.iterdir():
                 found = TEMPORARY.fullmatch(each.name)
-                if found and not _lives(int(found["process"])) and not each.is_dir():
+                if found and not process_lives(int(found["process"])) and not each.is_dir():
                     each.unlink()
-
-
-UNKNOWN = Holder(0, "this machine", "", "now", "unknown")
-"""Stands for a holder that has not written down yet who it is."""
 
 
 def _key(folder: Path) -> tuple[int, int, int] | None:
@@ -397,17 +339,6 @@ def _is_still(file: int, path: Path) -> bool:
     return (here.st_dev, here.st_ino) == (there.st_dev, there.st_ino)
 
 
-def _read(file: int) -> Holder | None:
-    """What a lock file says; None where it says nothing that can be read."""
-    try:
-        data: Any = json.loads(os.pread(file, MOST_TEXT, 0))
-        texts = {name: str(data[name]) for name in ("host", "boot", "began", "command")}
-        making, folders = ([str(each) for each in data[name]] for name in ("making", "folders"))
-        return Holder(int(data["process"]), **texts, making=tuple(making), folders=tuple(folders))
-    except (OSError, ValueError, KeyError, TypeError, RecursionError):
-        return None
-
-
 def _remove(folder: Path, files: Iterable[str], folders: Iterable[str]) -> None:
     """Remove files of a folder, and folders in it that are empty then; links are not followed."""
     for name, remove in [
@@ -431,23 +362,6 @@ def _is_whole(folder: Path, left: Holder) -> bool:
         return bool(left.making) and os.path.lexists(folder / left.making[-1])
     except ValueError:  # a name that no file can have
         return False
-
-
-def _lives(process: int) -> bool:
-    try:
-        os.kill(process, 0)
-    except ProcessLookupError:
-        return False
-    except (OSError, OverflowError):
-        return True
-    return True
-
-
-def _boot() -> str:
-    try:
-        return BOOT_FILE.read_text(encoding="ascii").strip()
-    except OSError:
-        return ""
 
 
 def _in_use(folder: Path, holder: Holder | None) -> FolderInUseError:

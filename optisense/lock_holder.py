@@ -1,0 +1,97 @@
+"""Which process holds the lock of a folder, as its lock file tells."""
+
+from __future__ import annotations
+
+import json
+import os
+import socket
+import sys
+from dataclasses import dataclass
+from datetime import datetime
+from pathlib import Path
+from typing import Any
+
+BOOT_FILE = Path("/proc/sys/kernel/random/boot_id")
+"""Identifies the running kernel on Linux; absent elsewhere."""
+
+MOST_TEXT = 1_000_000
+"""Bytes of a lock file that are read; the files of a design of 1000 parts take 40,000."""
+
+
+@dataclass(frozen=True)
+class Holder:
+    """What a lock file tells.
+
+    Attributes:
+        process: number of the process that wrote it.
+        host: name of its machine.
+        boot: boot identifier of its machine; empty where there is none.
+        began: local time, ISO 8601.
+        command: what the process was called with.
+        making: files that it was about to make, relative to the folder; empty once they are whole.
+        folders: folders that it was about to make for them.
+    """
+
+    process: int
+    host: str
+    boot: str
+    began: str
+    command: str
+    making: tuple[str, ...] = ()
+    folders: tuple[str, ...] = ()
+
+    @staticmethod
+    def of_this_process() -> Holder:
+        """Who this process is."""
+        words = [Path(sys.argv[0]).name if sys.argv else "python", *sys.argv[1:2]]
+        return Holder(
+            process=os.getpid(),
+            host=socket.gethostname(),
+            boot=boot_identifier(),
+            began=datetime.now().astimezone().isoformat(timespec="seconds"),
+            command=" ".join(words),
+        )
+
+    @property
+    def is_elsewhere(self) -> bool:
+        """Whether it is on another machine, as far as can be told."""
+        if self.boot and self.boot == boot_identifier():
+            return False
+        return self.host != socket.gethostname()
+
+    def __str__(self) -> str:
+        return f"process {self.process} on {self.host}, '{self.command}', since {self.began}"
+
+
+UNKNOWN = Holder(0, "this machine", "", "now", "unknown")
+"""Stands for a holder that has not written down yet who it is."""
+
+
+def read_holder(file: int) -> Holder | None:
+    """What a lock file says; None where it says nothing that can be read."""
+    try:
+        data: Any = json.loads(os.pread(file, MOST_TEXT, 0))
+        texts = {name: str(data[name]) for name in ("host", "boot", "began", "command")}
+        making, folders = ([str(each) for each in data[name]] for name in ("making", "folders"))
+        return Holder(int(data["process"]), **texts, making=tuple(making), folders=tuple(folders))
+    except (OSError, ValueError, KeyError, TypeError, RecursionError):
+        return None
+
+
+def process_lives(process: int) -> bool:
+    """Whether a process of this machine is running."""
+    try:
+        os.kill(process, 0)
+    except ProcessLookupError:
+        return False
+    except (OSError, OverflowError):
+        return True
+    return True
+
+
+def boot_identifier() -> str:
+    """The identifier of the running kernel; empty where there is none."""
+    try:
+        return BOOT_FILE.read_text(encoding="ascii").strip()
+    except OSError:
+        return ""
