@@ -4,7 +4,7 @@ Work is a sequence of steps, and a step is a number of like pieces: trials, sens
 What is measured of a step tells how long its other pieces take. What has not begun yet is expected
 to take its usual time, longer or shorter by as much as the steps before it differed from theirs.
 The first piece of each worker also loads and compiles programs, so it says nothing about the
-others and is left out.
+others and is left out. What work usually takes stands in `optisense.usual_times`.
 """
 
 from __future__ import annotations
@@ -18,6 +18,10 @@ from dataclasses import dataclass
 USUAL_PIECES = 0.5
 """Pieces that the usual time of a piece counts as, where it is averaged with measured ones: enough
 to steady an estimate from a part of the first piece, little against two whole ones."""
+
+USUAL_SHARE = 0.15
+"""Share of a step's pieces that the usual time counts as, where parts of pieces are told and that
+is more than `USUAL_PIECES`: the first ones, which compile, differ from the others."""
 
 ROUNDS = 3
 """Pieces per worker after which the time between pieces is measured by the clock. Before that the
@@ -36,12 +40,15 @@ class TimedStep:
         count: its pieces; fractions of pieces may be done.
         seconds: a piece usually takes, all workers together; None if nobody can know beforehand.
         warm_up: first pieces that also load and compile, and say nothing about the others.
+        gauges: whether the time it takes tells how fast this machine is; loading from a disk, say,
+            does not.
     """
 
     name: str
     count: float = 1.0
     seconds: float | None = None
     warm_up: float = 0.0
+    gauges: bool = True
 
 
 class TimeLeft:
@@ -199,7 +206,8 @@ class TimeLeft:
             return usual
         if not math.isfinite(usual):
             return (end - began) / (done - first)
-        return (end - began + USUAL_PIECES * usual) / (done - first + USUAL_PIECES)
+        weight = _steadying(self._steps[self._current])
+        return (end - began + weight * usual) / (done - first + weight)
 
     def _window(self) -> tuple[float, float]:
         """When the pieces that the pace is measured by began, and how many were done then.
@@ -220,11 +228,19 @@ class TimeLeft:
     def _slowness(self) -> float:
         """Seconds that work takes here for each second of its usual time.
 
-        The piece at hand counts once it is late.
+        Finished parts of the step at hand count, and the rest of it once it is late.
         """
         before = self._measured / self._expected if self._expected > 0.0 else 1.0
         step = self._steps[self._current] if self._current >= 0 else None
         if step is None or step.seconds is None:
+            return before
+        done = self._done - self._first
+        if step.gauges and done > 0.0 and not self._known_workers:
+            usual = _steadying(step) * step.seconds
+            finished = self._expected + step.seconds * done + usual
+            spent = self._measured + self._advanced - self._step_began
+            before = (spent + usual * before) / finished
+        if not step.gauges and self._expected > 0.0:
             return before
         pieces = min(self._done + 1.0, step.count) - self._first
         expected = self._expected + step.seconds * max(0.0, pieces)
@@ -236,6 +252,11 @@ class TimeLeft:
         if self._current < 0:
             return
         step = self._steps[self._current]
-        if step.seconds is not None and step.count > self._first:
+        if step.gauges and step.seconds is not None and step.count > self._first:
             self._expected += step.seconds * (step.count - self._first)
             self._measured += self._clock() - self._step_began
+
+
+def _steadying(step: TimedStep) -> float:
+    """Pieces that the usual time of a step's piece counts as."""
+    return max(USUAL_PIECES, USUAL_SHARE * step.count)

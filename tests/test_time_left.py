@@ -2,10 +2,19 @@
 
 from __future__ import annotations
 
+import json
 import math
+import os
+import time
+from pathlib import Path
 
 import pytest
 
+from benchmarks.progress_records import promised
+from optisense import usual_times
+from optisense.objectives import Settings
+from optisense.objectives.usual_score import usual_score
+from optisense.sensors import load
 from optisense.time_left import TimedStep, TimeLeft
 
 
@@ -166,3 +175,46 @@ def test_an_unknown_step_is_refused(clock: Clock) -> None:
     left.begin("b")
     with pytest.raises(ValueError, match="no step 'a' follows"):
         left.begin("a")
+
+
+RECORDS = sorted((Path(__file__).parent / "assets" / "progress").glob("*.json"))
+"""What the progress lines of commands were told, with processor seconds: see
+benchmarks/progress_records.py."""
+
+
+LONG = 10.0
+"""Seconds of a run, of whose first tenth loading is not the most."""
+
+
+@pytest.mark.parametrize("file", RECORDS, ids=lambda file: file.stem)
+def test_a_tenth_of_a_command_tells_its_total_within_a_quarter(file: Path) -> None:
+    told = json.loads(file.read_text(encoding="utf-8"))
+    first, *later, whole = promised(told, (0.1, 0.25, 0.5, 0.75))
+    if whole >= LONG:
+        assert 0.8 <= first <= 1.25
+    known = [each for each in later if math.isfinite(each)]
+    assert len(known) >= 2
+    assert all(0.7 <= each <= 1.45 for each in known)
+
+
+def test_what_a_score_usually_takes_grows_with_its_work() -> None:
+    mini, large = load("gelsight-mini"), load("gelbelt")
+    few, many = Settings(photons=1_000_000), Settings(photons=5_000_000)
+    one, more = (usual_score(mini, ["rgb2normal"], each) for each in (few, many))
+    assert more.light > 3.0 * one.light
+    assert more.images == pytest.approx(one.images, rel=0.2)
+    assert usual_score(large, ["rgb2normal"], few).light > 2.0 * one.light
+    assert usual_score(mini, ["aoap", "2to3pw"], few).light == 0.0
+    assert 0.0 < one.share_of_first_image < more.share_of_first_image < 1.0
+
+
+def test_work_of_other_processes_slows_this_one_and_a_wait_does_not(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(usual_times, "processors", lambda: 2)
+    monkeypatch.setattr(
+        usual_times, "_BEGAN", (time.monotonic() - 30.0, time.process_time() - 10.0)
+    )
+    for load_average, expected in [(0.2, 1.0), (3.0, 2.0), (20.0, 3.0)]:
+        monkeypatch.setattr(os, "getloadavg", lambda load=load_average: (load, 0.0, 0.0), False)
+        assert usual_times.crowding() == pytest.approx(expected, rel=0.01)

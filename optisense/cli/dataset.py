@@ -26,12 +26,15 @@ from optisense.cli.progress import progress_line
 from optisense.cli.sampling import (
     BUILDING,
     LOADING,
+    expect_here,
     loading_steps,
     sample_steps,
     shown_samples,
 )
 from optisense.optics.estimators import RADIANCE_CACHE
 from optisense.quality import SAMPLE_PHOTONS
+from optisense.time_left import TimedStep
+from optisense.usual_times import USUAL_PIXELS, UsualTimes
 
 if TYPE_CHECKING:
     from optisense.tasks import Dataset
@@ -39,6 +42,9 @@ if TYPE_CHECKING:
 
 SAMPLES = "samples"
 """The step of the progress."""
+
+SAMPLE_WORK = 0.5
+"""Processor seconds that a sample of `USUAL_PIXELS` usually takes, its files included."""
 
 
 @ends_well
@@ -103,9 +109,12 @@ def dataset(
     depths = parse_range(depth, "--depth")
     rotations = parse_range(rotation, "--rotation")
 
-    steps = [*loading_steps(), *sample_steps(SAMPLES, photons, count, 0.9, 0.2)]
+    def steps(times: UsualTimes, pixels: int = USUAL_PIXELS) -> list[TimedStep]:
+        work = SAMPLE_WORK * (0.5 + 0.5 * pixels / USUAL_PIXELS)
+        return sample_steps(SAMPLES, photons, count, work, 0.2, times=times)
+
     try:
-        with progress_line(*steps) as line:
+        with progress_line(*loading_steps(), *steps(UsualTimes.here())) as line:
             line.begin(LOADING)
             from optisense.sensors import load
             from optisense.tasks import ContactDraw, DatasetSettings, generate
@@ -128,6 +137,8 @@ def dataset(
             from optisense.optics import OpticalModel
 
             line.begin(BUILDING)
+            width, height = size or sensor.camera.resolution
+            expect_here(line, sensor, lambda times: steps(times, width * height))
             model = OpticalModel(sensor, variant)
             show = shown_samples(line, model, SAMPLES, "reading the dataset")
             made = generate(model, out, count, settings, show)

@@ -27,12 +27,17 @@ from optisense.cli.options import (
 )
 from optisense.cli.output_folder import take_folder
 from optisense.cli.progress import ProgressLine, progress_line
+from optisense.quality import SCORE_PHOTONS, photons_of
 from optisense.time_left import TimedStep
+from optisense.usual_times import BUILDING as BUILDING_TIME
+from optisense.usual_times import LOADING as LOADING_TIME
+from optisense.usual_times import UsualTimes
 from optisense.writing import remove_own_page, write_text
 
 if TYPE_CHECKING:
     from optisense.objectives import Objective
     from optisense.objectives.scored import Scored
+    from optisense.objectives.usual_score import UsualScore
     from optisense.optics import OpticalModel
 
 JSON_FILE = "scores.json"
@@ -81,11 +86,14 @@ def evaluate(
     settings = score_settings(setting, photons, resolution)
 
     interrupted = False
-    with progress_line(*_steps(seeds)) as line:
+    with progress_line(
+        *_steps(seeds, photons_of(settings.get("photons") or SCORE_PHOTONS))
+    ) as line:
         line.begin(LOADING)
         from optisense.objectives import BUILT_IN, Settings
         from optisense.objectives.registry import resolve
         from optisense.objectives.run import split_settings
+        from optisense.objectives.usual_score import usual_score
         from optisense.sensors import load
 
         objectives = resolve(objective or BUILT_IN)
@@ -100,12 +108,15 @@ def evaluate(
 
         scored = Scored(sensor)
         line.begin(BUILDING)
+        usual = usual_score(sensor, [each.name for each in objectives], Settings(**shared))
+        whole = usual.first + (seeds - 1) * usual.whole
+        line.time_left.expect(SCORING, count=whole)
         model = OpticalModel(sensor, variant=variant)
         line.begin(SCORING)
         try:
             for number in range(seeds):
                 seed_of_run = {**settings, "seed": seed + number}
-                told = _Told(line, number, seeds, len(objectives))
+                told = _Told(line, number, seeds, len(objectives), usual)
                 _score(model, objectives, seed_of_run, scored, told)
         except KeyboardInterrupt:
             if not scored.scores:
@@ -190,28 +201,36 @@ def _print_table(scored: Scored) -> None:
 LOADING, BUILDING, SCORING = "loading", "building the scene", "scoring"
 
 
-def _steps(seeds: int) -> list[TimedStep]:
-    """The steps, with their usual times (seconds on two cores of a desktop processor, GelSight
-    Mini, all four objectives, some kernels compiled and others found in the cache)."""
+USUAL_SCORING = 3.0
+"""Processor seconds that scoring with one seed takes, light apart, before the sensor and the
+objectives are known."""
+
+
+def _steps(seeds: int, photons: int) -> list[TimedStep]:
+    """The steps, with their usual times; a piece of scoring usually takes one second."""
+    times = UsualTimes.here()
+    each = USUAL_SCORING * times.pace + times.tracing(photons)
     return [
-        TimedStep(LOADING, 1, 2.4),
-        TimedStep(BUILDING, 1, 0.8),
-        TimedStep(SCORING, seeds, 11.0),
+        TimedStep(LOADING, 1, LOADING_TIME * times.thread_pace, gauges=False),
+        TimedStep(BUILDING, 1, BUILDING_TIME * times.thread_pace, gauges=False),
+        TimedStep(SCORING, seeds * each, 1.0),
     ]
 
 
 class _Told:
     """Shows how far the scoring with one seed is: images, which objectives share, and objectives.
 
-    The images are most of the work where any are rendered, so they count `IMAGES` of it.
+    Each part of the work counts as many pieces as it usually takes seconds.
     """
 
-    IMAGES = 0.85
-
-    def __init__(self, line: ProgressLine, number: int, seeds: int, objectives: int) -> None:
+    def __init__(
+        self, line: ProgressLine, number: int, seeds: int, objectives: int, usual: UsualScore
+    ) -> None:
         """Seed ``number`` (from 0) of ``seeds``, for so many objectives."""
         self._line = line
         self._number, self._seeds, self._objectives = number, seeds, objectives
+        self._usual = usual
+        self._before = number * usual.whole + (usual.first - usual.whole) * (number > 0)
         self._images = 0.0
         self._finished = 0
         self._title = ""
@@ -232,10 +251,11 @@ class _Told:
         self._show(f"{self._title}: {text}")
 
     def _show(self, text: str) -> None:
-        scored = self._finished / self._objectives
+        usual, scored = self._usual, self._finished / self._objectives
         # An objective without images may come first; then its share of the rest is done.
-        part = self.IMAGES * max(self._images, scored if scored == 1.0 else 0.0)
-        part += (1.0 - self.IMAGES) * scored
-        self._line.time_left.advance(self._number + part)
+        rendered = max(self._images, scored if scored == 1.0 else 0.0)
+        judging = usual.judging + (usual.libraries if self._number == 0 else 0.0)
+        done = usual.done(rendered, first=self._number == 0) + scored * judging
+        self._line.time_left.advance(self._before + done)
         of = f"seed {self._number + 1} of {self._seeds}, " if self._seeds > 1 else ""
         self._line.say(f"{of}{text}")

@@ -20,8 +20,12 @@ from optisense.cli.options import (
 )
 from optisense.cli.output_folder import take_folder
 from optisense.cli.progress import ProgressLine, about, progress_line
+from optisense.cli.sampling import expect_here
 from optisense.quality import PICTURE_PHOTONS
 from optisense.time_left import TimedStep
+from optisense.usual_times import BUILDING as BUILDING_TIME
+from optisense.usual_times import LOADING as LOADING_TIME
+from optisense.usual_times import USUAL_PIXELS, UsualTimes
 
 if TYPE_CHECKING:
     from optisense.optics import OpticalModel, RenderProgress, TactileImage
@@ -92,7 +96,7 @@ def render(
     contacts = parse_contacts(contact)
 
     with (
-        progress_line(*_steps(photons, noise, seconds), waits=_waits) as line,
+        progress_line(*_steps(UsualTimes.here(), photons, noise, seconds), waits=_waits) as line,
         held_interrupt() as interrupt,
     ):
         line.begin(LOADING)
@@ -110,7 +114,9 @@ def render(
 
         interrupt.raise_if_requested()
         line.begin(BUILDING)
-        line.time_left.expect(SHADING, count=_pictures(size or sensor.camera.resolution))
+        width, height = size or sensor.camera.resolution
+        pixels = width * height
+        expect_here(line, sensor, lambda times: _steps(times, photons, noise, seconds, pixels))
         model = OpticalModel(sensor, variant=variant)
         interrupt.raise_if_requested()
         told = RenderStages(line)
@@ -157,36 +163,35 @@ LOADING, BUILDING, WRITING = "loading", "building the scene", "writing the repor
 TRACING, SHADING = "tracing photons", "shading the picture"
 COMPARING = "comparing with a real sensor"
 
-NOISE_PHOTONS = 4.0
-"""Million photons that a noise target is expected to take, before the noise is known."""
+NOISE_PHOTONS = 4_000_000
+"""Photons that a noise target is expected to take, before the noise is known."""
 
-USUAL_PIXELS = 320 * 240
-"""Pixels of a picture for which the usual time of shading is stated."""
+WRITING_TIME = 0.8
+"""Seconds to write the files and the report."""
 
 
-def _steps(photons: int | None, noise: float | None, seconds: float | None) -> list[TimedStep]:
-    """The steps of a render and their usual times (seconds on two cores of a desktop processor,
-    GelSight Mini, some kernels compiled and others found in the cache)."""
-    tracing = TimedStep(TRACING, (photons or PICTURE_PHOTONS) / 1e6, 2.2)
-    if photons is None and noise is not None:
-        tracing = TimedStep(TRACING, NOISE_PHOTONS, 2.2)
+def _steps(
+    times: UsualTimes,
+    photons: int | None,
+    noise: float | None,
+    seconds: float | None,
+    pixels: int = USUAL_PIXELS,
+) -> list[TimedStep]:
+    """The steps of a render of so many pixels, and their usual times."""
+    tracing = times.tracing(photons or (NOISE_PHOTONS if noise is not None else PICTURE_PHOTONS))
     if photons is None and seconds is not None:
-        tracing = TimedStep(TRACING, 1.0, max(1.0, seconds - 5.0))
+        tracing = max(1.0, seconds - 5.0)
+    compiling = times.compiling() / 2.0
     return [
-        TimedStep(LOADING, 1, 2.4),
-        TimedStep(BUILDING, 1, 0.8),
-        TimedStep("preparing the scene", 1, 0.4),
-        TimedStep("tracing pilot photons", 1, 1.4),
-        tracing,
-        TimedStep("smoothing the light", 1, 0.9),
-        TimedStep(SHADING, 1, 2.0),
-        TimedStep(WRITING, 1, 0.8),
+        TimedStep(LOADING, 1, LOADING_TIME * times.thread_pace, gauges=False),
+        TimedStep(BUILDING, 1, BUILDING_TIME * times.thread_pace, gauges=False),
+        TimedStep("preparing the scene", 1, times.preparing()),
+        TimedStep("tracing pilot photons", 1, times.pilot()),
+        TimedStep(TRACING, 1, tracing + compiling),
+        TimedStep("smoothing the light", 1, times.smoothing()),
+        TimedStep(SHADING, 1, times.picture(pixels) + compiling),
+        TimedStep(WRITING, 1, WRITING_TIME * times.thread_pace),
     ]
-
-
-def _pictures(resolution: tuple[int, int]) -> float:
-    """How many pictures of the usual size take as long to shade as one of this size."""
-    return 0.5 + 0.5 * resolution[0] * resolution[1] / USUAL_PIXELS
 
 
 def _waits(line: ProgressLine) -> str:

@@ -7,23 +7,39 @@ from typing import TYPE_CHECKING
 
 from optisense.cli.progress import ProgressLine
 from optisense.time_left import TimedStep
+from optisense.usual_times import BUILDING as BUILDING_TIME
+from optisense.usual_times import LOADING as LOADING_TIME
+from optisense.usual_times import UsualTimes
 
 if TYPE_CHECKING:
+    from optisense.design import SensorDesign
     from optisense.optics import OpticalModel, RenderProgress
 
 LOADING, BUILDING = "loading", "building the scene"
 
-MILLION_PHOTONS = 1.6
-"""Seconds to trace so many, on two cores of a desktop processor, GelSight Mini."""
 
+def loading_steps(libraries: float = 0.0) -> list[TimedStep]:
+    """Steps before any picture, with their usual times.
 
-def loading_steps() -> list[TimedStep]:
-    """Steps before any picture, with their usual times on such a machine."""
-    return [TimedStep(LOADING, 1, 2.4), TimedStep(BUILDING, 1, 0.8)]
+    Args:
+        libraries: seconds that libraries of the command's own take to load.
+    """
+    pace = UsualTimes.here().thread_pace
+    return [
+        TimedStep(LOADING, 1, pace * (LOADING_TIME + libraries), gauges=False),
+        TimedStep(BUILDING, 1, pace * BUILDING_TIME, gauges=False),
+    ]
 
 
 def sample_steps(
-    name: str, photons: int, count: int, seconds: float, after: float
+    name: str,
+    photons: int,
+    count: int,
+    work: float,
+    after: float,
+    *,
+    again: bool = False,
+    times: UsualTimes | None = None,
 ) -> list[TimedStep]:
     """Steps of samples: their light and the first one, the others, and what follows.
 
@@ -31,14 +47,34 @@ def sample_steps(
         name: of the samples, which none of another name shares.
         photons: of their light.
         count: of all samples.
-        seconds: that one usually takes.
+        work: processor seconds that a sample usually takes on GelSight Mini.
         after: seconds that usually follow the last one.
+        again: whether the light is there already, since other samples had it.
+        times: of the sensor; those of a GelSight Mini on an idle machine if None.
     """
+    usual = times or UsualTimes.here()
+    light = 0.0 if again else usual.first_light(photons) + usual.compiling()
+    sample = work * usual.shading * usual.pace
     return [
-        TimedStep(_light(name), 1, photons / 1e6 * MILLION_PHOTONS + 4.0),
-        TimedStep(name, count, seconds),
-        TimedStep(_after(name), 1, after),
+        TimedStep(_light(name), 1, light + sample),
+        TimedStep(name, count, sample),
+        TimedStep(_after(name), 1, after * usual.thread_pace, gauges=False),
     ]
+
+
+def expect_here(
+    line: ProgressLine, design: SensorDesign, steps: Callable[[UsualTimes], list[TimedStep]]
+) -> None:
+    """Expect the times of this sensor on this machine, now that both are known.
+
+    Args:
+        line: shows the steps.
+        design: of the sensor.
+        steps: makes steps for usual times.
+    """
+    times = UsualTimes.here(design.sensing_area, len(design.lights))
+    for step in steps(times):
+        line.time_left.expect(step.name, seconds=step.seconds)
 
 
 def shown_samples(

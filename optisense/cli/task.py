@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -29,21 +29,22 @@ from optisense.cli.progress import progress_line
 from optisense.cli.sampling import (
     BUILDING,
     LOADING,
+    expect_here,
     loading_steps,
     sample_steps,
     shown_samples,
 )
+from optisense.cli.task_result import print_perception, print_reconstruction
 from optisense.optics.estimators import RADIANCE_CACHE
 from optisense.quality import SAMPLE_PHOTONS
+from optisense.time_left import TimedStep
+from optisense.usual_times import UsualTimes
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from optisense.tasks import (
-        PerceptionResult,
         PerceptionTask,
-        ReconstructionResult,
-        SampleSettings,
     )
 
 RESULT = "result.json"
@@ -72,6 +73,18 @@ JsonOption = Annotated[bool, typer.Option("--json", help="Print JSON instead of 
 
 PICTURES = "pictures"
 """The step of the progress of reconstructions."""
+
+SAMPLE_WORK, PICTURE_WORK = 0.23, 0.25
+"""Processor seconds that a sample of the tasks, and a picture of a reconstruction, usually take."""
+
+LIBRARIES_TIME = 1.0
+"""Seconds that the libraries of the tasks take to load."""
+
+USUAL_OBJECTS = 3
+"""Unseen objects of a reconstruction where none is named."""
+
+READING_TIME, FITTING_TIME = 1.0, 3.0
+"""Seconds that usually follow the samples of the tasks, and the pictures of a reconstruction."""
 
 SAMPLES = 200
 NOISE = 1.5
@@ -105,11 +118,14 @@ def misalignment(
     variant: VariantOption = "auto",
 ) -> None:
     """The angle between the sensor and a plane, from the mean colour in the middle."""
-    from optisense.tasks import Misalignment
+
+    def task() -> PerceptionTask:
+        from optisense.tasks import Misalignment
+
+        return Misalignment(range=angle, depth=depth, crop=crop)
 
     settings = _settings(samples, seed, camera_noise, resolution, photons, estimator)
-    task = Misalignment(range=angle, depth=depth, crop=crop)
-    _perceive(design, [task], settings, neighbours, out, as_json, variant)
+    _perceive(design, {"misalignment": task}, settings, neighbours, out, as_json, variant)
 
 
 @task_app.command("cylinder-radius")
@@ -130,12 +146,15 @@ def cylinder_radius(
     variant: VariantOption = "auto",
 ) -> None:
     """The radius of a touching cylinder, from the spread of colours in the contact."""
-    from optisense.tasks import CylinderRadius
+    least, most = parse_range(radius, "--radius")
+
+    def task() -> PerceptionTask:
+        from optisense.tasks import CylinderRadius
+
+        return CylinderRadius(least=least, most=most, depth=depth)
 
     settings = _settings(samples, seed, camera_noise, resolution, photons, estimator)
-    least, most = parse_range(radius, "--radius")
-    task = CylinderRadius(least=least, most=most, depth=depth)
-    _perceive(design, [task], settings, neighbours, out, as_json, variant)
+    _perceive(design, {"cylinder-radius": task}, settings, neighbours, out, as_json, variant)
 
 
 @task_app.command()
@@ -154,10 +173,19 @@ def snr(
     variant: VariantOption = "auto",
 ) -> None:
     """The signal-to-noise ratio of both tasks' samples: how well colours tell, with no model."""
-    from optisense.tasks import CylinderRadius, Misalignment
+
+    def angles() -> PerceptionTask:
+        from optisense.tasks import Misalignment
+
+        return Misalignment()
+
+    def radii() -> PerceptionTask:
+        from optisense.tasks import CylinderRadius
+
+        return CylinderRadius()
 
     settings = _settings(samples, seed, camera_noise, resolution, photons, estimator)
-    tasks: list[PerceptionTask] = [Misalignment(), CylinderRadius()]
+    tasks = {"misalignment": angles, "cylinder-radius": radii}
     _perceive(design, tasks, settings, neighbours, out, as_json, variant)
 
 
@@ -200,30 +228,34 @@ def reconstruction(
     size = None if resolution is None else parse_resolution(resolution)
     contacts = dict(zip(thing or [], parse_contacts(thing), strict=True)) or None
 
-    from optisense.sensors import load
-    from optisense.tasks import ReconstructionSettings, reconstruct
-    from optisense.tasks.reconstruction import unseen_objects
+    count = presses + (len(contacts) if contacts is not None else USUAL_OBJECTS)
 
-    settings = ReconstructionSettings(
-        method=method,
-        presses=presses,
-        radius=radius,
-        depth=depths,
-        seed=seed,
-        camera_noise=camera_noise,
-        resolution=size,
-        photons=photons,
-    )
-    sensor = load(design)
-    if out is not None:
-        take_folder(out)
-    count = presses + len(contacts or unseen_objects())
-    with progress_line(*loading_steps(), *sample_steps(PICTURES, photons, count, 0.3, 0.2)) as line:
+    def steps(times: UsualTimes) -> list[TimedStep]:
+        return sample_steps(PICTURES, photons, count, PICTURE_WORK, FITTING_TIME, times=times)
+
+    with progress_line(*loading_steps(LIBRARIES_TIME), *steps(UsualTimes.here())) as line:
         line.begin(LOADING)
+        from optisense.sensors import load
+        from optisense.tasks import ReconstructionSettings, reconstruct
+
+        settings = ReconstructionSettings(
+            method=method,
+            presses=presses,
+            radius=radius,
+            depth=depths,
+            seed=seed,
+            camera_noise=camera_noise,
+            resolution=size,
+            photons=photons,
+        )
+        sensor = load(design)
+        if out is not None:
+            take_folder(out)
         from optisense.optics import OpticalModel
         from optisense.tasks.figures import draw_reconstruction
 
         line.begin(BUILDING)
+        expect_here(line, sensor, steps)
         model = OpticalModel(sensor, variant)
         show = shown_samples(line, model, PICTURES, "comparing")
         result = reconstruct(model, settings, contacts, show)
@@ -232,7 +264,7 @@ def reconstruction(
     if as_json:
         _print_json(result.to_dict())
     else:
-        _print_reconstruction(result)
+        print_reconstruction(result)
         _say_where(out)
 
 
@@ -243,52 +275,58 @@ def _settings(
     resolution: str | None,
     photons: int,
     estimator: str,
-) -> SampleSettings:
-    size = None if resolution is None else parse_resolution(resolution)
-
-    from optisense.tasks import SampleSettings
-
-    return SampleSettings(
-        count=samples,
-        seed=seed,
-        camera_noise=camera_noise,
-        resolution=size,
-        photons=photons,
-        estimator=estimator,
-    )
+) -> dict[str, Any]:
+    """The keyword arguments of `SampleSettings`, which takes a second to load."""
+    return {
+        "count": samples,
+        "seed": seed,
+        "camera_noise": camera_noise,
+        "resolution": None if resolution is None else parse_resolution(resolution),
+        "photons": photons,
+        "estimator": estimator,
+    }
 
 
 def _perceive(
     design: str,
-    tasks: list[PerceptionTask],
-    settings: SampleSettings,
+    tasks: Mapping[str, Callable[[], PerceptionTask]],
+    given: Mapping[str, Any],
     neighbours: int,
     out: Path | None,
     as_json: bool,
     variant: str,
 ) -> None:
-    """Run tasks one after the other; several have a folder each."""
+    """Run tasks, which are made by name, one after the other; several have a folder each."""
 
-    from optisense.sensors import load
-
-    sensor = load(design)
-    if out is not None:
-        take_folder(out)
+    def steps(times: UsualTimes) -> list[TimedStep]:
+        found: list[TimedStep] = []
+        for name in tasks:
+            photons, count, again = given["photons"], given["count"], bool(found)
+            found += sample_steps(
+                name, photons, count, SAMPLE_WORK, READING_TIME, again=again, times=times
+            )
+        return found
 
     results = []
-    steps = loading_steps()
-    for task in tasks:
-        steps += sample_steps(task.name, settings.photons, settings.count, 0.35, 3.0)
-    with _keeping(out), progress_line(*steps) as line:
+    line_of_steps = progress_line(*loading_steps(LIBRARIES_TIME), *steps(UsualTimes.here()))
+    with _keeping(out), line_of_steps as line:
         line.begin(LOADING)
-        from optisense.optics import OpticalModel
-        from optisense.tasks import perceive
-        from optisense.tasks.figures import draw_perception
+        from optisense.sensors import load
+        from optisense.tasks import SampleSettings, perceive
         from optisense.writing import inside
 
+        settings = SampleSettings(**given)
+        made = [make() for make in tasks.values()]
+        sensor = load(design)
+        if out is not None:
+            take_folder(out)
+        from optisense.optics import OpticalModel
+        from optisense.tasks.figures import draw_perception
+
         line.begin(BUILDING)
+        expect_here(line, sensor, steps)
         model = OpticalModel(sensor, variant)
-        for task in tasks:
+        for task in made:
             folder = out if out is None or len(tasks) == 1 else inside(out, task.name)
             show = shown_samples(line, model, task.name, f"{task.name}: reading the samples")
             results.append(perceive(task, model, settings, neighbours, folder, show))
@@ -298,7 +336,7 @@ def _perceive(
         values = [result.to_dict() for result in results]
         _print_json(values[0] if len(values) == 1 else {"tasks": values})
     else:
-        _print_perception(results)
+        print_perception(results)
         _say_where(out)
 
 
@@ -311,48 +349,6 @@ def _keeping(out: Path | None) -> Iterator[None]:
         if out is not None:
             messages.print("finished samples are kept; the same command continues")
         raise
-
-
-def _print_perception(results: Iterable[PerceptionResult]) -> None:
-    from rich.table import Table
-
-    table = Table(box=None, pad_edge=False)
-    table.add_column("task")
-    for heading in ("mean error", "among folds", "of guessing", "signal to noise", "samples"):
-        table.add_column(heading, justify="right")
-    for result in results:
-        reading = result.reading
-        table.add_row(
-            result.task,
-            f"{reading.error:.3g} {result.unit}",
-            f"± {reading.spread:.2g}",
-            f"{reading.guess:.3g} {result.unit}",
-            f"{result.snr:.3g}",
-            f"{len(result.samples.targets)}",
-        )
-    output.print(table)
-
-
-def _print_reconstruction(result: ReconstructionResult) -> None:
-    from rich.table import Table
-
-    table = Table(box=None, pad_edge=False)
-    table.add_column("object")
-    for heading in ("normals off by", "of reading nothing", "depth off by", "deepest", "read"):
-        table.add_column(heading, justify="right")
-    for name, each in result.objects.items():
-        values = each.to_dict()
-        table.add_row(
-            name,
-            f"{values['normal_error']:.1f} degrees",
-            f"{values['normal_error_of_reading_nothing']:.1f} degrees",
-            f"{values['depth_error']:.3f} mm",
-            f"{values['deepest']:.2f} mm",
-            f"{values['deepest_read']:.2f} mm",
-        )
-    means = f"{result.normal_error:.1f} degrees", "", f"{result.depth_error:.3f} mm"
-    table.add_row("mean", *means, "", "", style="bold")
-    output.print(table)
 
 
 def _write(folder: Path, values: dict[str, Any], figure: Figure) -> None:

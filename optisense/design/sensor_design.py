@@ -137,6 +137,12 @@ class SensorDesign(Model):
         """The undeformed mesh of each part, by part name."""
         return self._meshes
 
+    @property
+    def sensing_area(self) -> float:
+        """Area of the undeformed sensing surfaces, mm2."""
+        skins = [self._meshes.get(name) for name in self.parts_of(Role.SENSING_SURFACE)]
+        return float(sum(skin.face_areas.sum() for skin in skins if skin is not None))
+
     def deformed_meshes(self) -> dict[str, TriangleMesh]:
         """The mesh of each part in its current shape: as stored, then moved by its cage.
 

@@ -36,9 +36,6 @@ Reads = Callable[[Press], NDArray[np.float64]]
 """The pixels (h, w) of a press, not exposed, that objectives read: 1 one by one, less where a part
 of the camera samples will do."""
 
-FIRST_IMAGE = 0.6
-"""The share of the first image in the time of all rendering, since light is traced for it: GelSight
-Mini, nine presses, one million photons."""
 
 GAP = 0.5
 """mm that must be free between contacts which share an image."""
@@ -143,7 +140,7 @@ class Evaluation:
     @property
     def untouched(self) -> TactileImage:
         """The image of the untouched sensor."""
-        return self._once("untouched image", lambda: self._render((), 0.0, FIRST_IMAGE))
+        return self._once("untouched image", lambda: self._render((), 0.0, self._first_image))
 
     @property
     def exposure(self) -> float:
@@ -212,7 +209,7 @@ class Evaluation:
         frames = [_frame(contact, surface) for contact in contacts]
         together = self.settings.together and self._are_apart([each["place"] for each in frames])
         groups = [contacts] if together else [[contact] for contact in contacts]
-        part = (1.0 - FIRST_IMAGE) / len(groups)
+        part = (1.0 - self._first_image) / len(groups)
 
         def press_of(number: int, seen: ChiefRays | TactileImage) -> Press:
             mask = seen.contact_mask
@@ -240,7 +237,7 @@ class Evaluation:
                 )
                 image = self._render(
                     [contacts[each] for each in numbers],
-                    FIRST_IMAGE + (not together) * number * part,
+                    self._first_image + (not together) * number * part,
                     part,
                     pixel_importance,
                     "pressing" if together else f"press {number + 1} of {len(frames)}",
@@ -267,6 +264,15 @@ class Evaluation:
             except ObjectiveError:
                 return np.ones(press.mask.shape)
         return np.maximum.reduce(found)
+
+    @property
+    def _first_image(self) -> float:
+        """The share of the first image in the time of all rendering: light is traced for it."""
+        from optisense.objectives.registry import BUILT_IN
+        from optisense.objectives.usual_score import usual_score
+
+        usual = usual_score(self.design, BUILT_IN[:1], self.settings)
+        return self._once("first image", lambda: usual.share_of_first_image)
 
     def _unexposed(self) -> list[_Unexposed]:
         self.untouched  # noqa: B018  light is traced for it, which progress counts first

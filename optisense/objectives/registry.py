@@ -29,6 +29,9 @@ ENTRY_POINTS = "optisense.objectives"
 
 BUILT_IN = ("rgb2normal", "normdiff", "aoap", "2to3pw")
 
+RAYS_ONLY = frozenset({"aoap", "2to3pw"})
+"""Objectives that trace chief rays and need no light."""
+
 UNBOUNDED = (-math.inf, math.inf)
 
 Range = tuple[float, float] | Callable[..., tuple[float, float]]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import os
+import re
 import time
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Protocol
@@ -18,6 +19,7 @@ from optisense.objectives.evaluation import ProgressCallback
 from optisense.objectives.files import place_of
 from optisense.objectives.registry import resolve
 from optisense.objectives.run import split_settings
+from optisense.objectives.usual_score import UsualScore, UsualTrials, usual_score
 from optisense.search.evaluation.models import ModelKeeper
 from optisense.search.evaluation.outcome import Outcome
 from optisense.search.evaluation.views import SameMirrors, least_skin, may_change_view
@@ -33,6 +35,10 @@ DesignFunction = Callable[[SensorDesign], float]
 
 Goal = str | Objective | DesignFunction
 """What can be searched for."""
+
+
+RELIT = re.compile(r"^lights\..*\.(flux|colour)(\W|$)")
+"""Parameters that change how light of a group counts, and no ray."""
 
 
 class Evaluator(Protocol):
@@ -158,6 +164,26 @@ class DesignEvaluator:
     def report_progress_to(self, callback: ProgressCallback) -> None:
         """Call `callback` while images are rendered in this process; copies elsewhere don't."""
         self._progress = callback
+
+    def usual_score(self) -> UsualScore | None:
+        """What scores usually take; None where only functions of the design are wanted."""
+        if not self._objectives:
+            return None
+        shared, _ = split_settings(self.settings, self._ready())
+        names = [each.name for each in self._ready()]
+        return usual_score(self.space.design, names, Settings(**shared))
+
+    def usual_trials(self) -> UsualTrials | None:
+        """What the trials usually take; None where nobody can know.
+
+        Other colours and powers of lights need no other light.
+        """
+        usual = self.usual_score()
+        if usual is None:
+            return None
+        relit = all(RELIT.search(name) for name in self.space.names)
+        trial = usual.relit if relit else usual.building + usual.whole
+        return UsualTrials.of(usual, trial, usual.whole)
 
     def failed(self, reason: str, began: float) -> Outcome:
         """An outcome without scores; `began` by `time.perf_counter`."""

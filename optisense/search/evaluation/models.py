@@ -13,9 +13,6 @@ from optisense.design import SensorDesign
 if TYPE_CHECKING:
     from optisense.optics import OpticalModel
 
-RAYS_ONLY = frozenset({"aoap", "2to3pw"})
-"""Objectives that trace chief rays and need no light."""
-
 
 class ModelKeeper:
     """Models of designs that are variations of one design."""

@@ -10,7 +10,7 @@ from types import TracebackType
 import numpy as np
 from numpy.typing import NDArray
 
-from optisense.errors import SearchError
+from optisense.errors import OptiSenseError, SearchError
 from optisense.search.evaluation.evaluator import Evaluator
 from optisense.search.evaluation.outcome import Outcome
 
@@ -44,6 +44,21 @@ class Runner(ABC):
         trace: TracebackType | None,
     ) -> None:
         self.close()
+
+
+def outcome_of(done: Future[Outcome]) -> Outcome:
+    """The outcome of a future.
+
+    Raises:
+        OptiSenseError: no trial can be worked out.
+    """
+    error = done.exception()
+    if error is None:
+        return done.result()
+    if isinstance(error, OptiSenseError):
+        raise error
+    why = str(error) or type(error).__name__
+    raise SearchError(f"a trial could not be worked out: {why}") from error
 
 
 def packed(evaluator: Evaluator) -> bytes:

@@ -27,6 +27,7 @@ from optisense.search.evaluation.evaluator import Evaluator
 from optisense.search.evaluation.outcome import Outcome
 from optisense.search.executors.base import Runner, packed
 from optisense.search.executors.wire import receive, send
+from optisense.usual_times import processors
 
 MOST_DEATHS = 2
 """A trial whose workers die so often is itself the reason, and fails."""
@@ -232,13 +233,6 @@ class ProcessPool(Runner):
         with self._changed:
             if self._processes.get(place) is process:
                 del self._processes[place]
-
-
-def processors() -> int:
-    """How many processors this process may use."""
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1
 
 
 def _never_ready(code: int, words: str) -> SetupError:

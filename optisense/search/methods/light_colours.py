@@ -21,6 +21,7 @@ from optisense.objectives.evaluation import ProgressCallback
 from optisense.objectives.registry import pixels_read
 from optisense.objectives.relighting import Relighting
 from optisense.objectives.run import run_objective, split_settings
+from optisense.objectives.usual_score import UsualTrials
 from optisense.search.evaluation.evaluator import DesignEvaluator, Evaluator
 from optisense.search.methods.base import Problem
 from optisense.search.methods.combinations import Combinations, Stage
@@ -70,6 +71,11 @@ class LightColours(Combinations):
         return RelitEvaluator(usual)
 
 
+RELIGHTING_SHARE = 0.02
+"""The time to relight and judge the images of a score, as a share of the time to render and judge
+them: GelSight Mini, nine presses of which only the contacts are read."""
+
+
 class RelitEvaluator(DesignEvaluator):
     """Scores designs that differ in the colours and powers of their lights only."""
 
@@ -87,6 +93,15 @@ class RelitEvaluator(DesignEvaluator):
             self._lit[seed] = _Lit(model, self._ready(), self.settings, seed, self._progress)
         self._lit.move_to_end(seed)
         return self._lit[seed].scores(design)
+
+    def usual_trials(self) -> UsualTrials | None:
+        """See `DesignEvaluator.usual_trials`; a trial renders nothing, and designs share the light
+        of a fresh seed."""
+        usual = self.usual_score()
+        if usual is None:
+            return None
+        trial = RELIGHTING_SHARE * (usual.images + usual.judging)
+        return UsualTrials.of(usual, trial, trial)
 
     def __getstate__(self) -> dict[str, object]:
         return {**super().__getstate__(), "_lit": OrderedDict()}

@@ -12,10 +12,12 @@ from functools import partial
 
 import numpy as np
 
-from optisense.errors import OptiSenseError, SearchError
+from optisense.errors import SearchError
+from optisense.objectives.usual_score import UsualTrials
 from optisense.search.evaluation.evaluator import Evaluator
 from optisense.search.evaluation.outcome import Outcome
 from optisense.search.executors import Runner, SerialRunner
+from optisense.search.executors.base import outcome_of
 from optisense.search.methods import Method, Problem, make
 from optisense.search.space.manufacturing import ManufacturingErrors
 from optisense.search.study.best import tie_note
@@ -98,6 +100,8 @@ class StudyRun:
 
             errors = ManufacturingErrors.from_plain(settings.errors)
             self._evaluator = RobustEvaluator(usual, errors, settings.seed, settings.samples)
+        tell = getattr(self._evaluator, "usual_trials", None)
+        self._usual: UsualTrials | None = None if tell is None else tell()
         self._make_runner = make_runner
         self._progress = progress or (lambda progress: None)
         self._notes: list[str] = []
@@ -128,17 +132,12 @@ class StudyRun:
         interrupted, ended = False, ""
         self._count_known()
         with self._make_runner(self._evaluator) as runner:
-            self._time_left = TimeLeft(
-                [
-                    TimedStep(START_STAGE),
-                    TimedStep(TRIALS, self.limit),
-                    TimedStep(FRESH, USUAL_FRESH),
-                ],
-                runner.workers,
-            )
+            self._time_left = TimeLeft(self._steps(runner.workers), runner.workers)
             if isinstance(runner, SerialRunner):
                 runner.report_progress_to(self._trial_progress)
             try:
+                if self._usual is not None:
+                    self._expect_fresh_scores(USUAL_FRESH)
                 self._begin(START_STAGE)
                 self._score_start(runner)
                 self._begin(TRIALS, self._done)
@@ -155,6 +154,21 @@ class StudyRun:
         tie = None if several else tie_note(study.trials)
         notes = [*self._notes, *self.method.notes(), *([] if tie is None else [tie])]
         return SearchResult(study, interrupted, ended, tuple(notes))
+
+    def _steps(self, workers: int) -> list[TimedStep]:
+        """The stages, with what their scores usually take as far as the evaluator knows it."""
+        usual = self._usual
+        if usual is None:
+            return [
+                TimedStep(START_STAGE),
+                TimedStep(TRIALS, self.limit),
+                TimedStep(FRESH, USUAL_FRESH),
+            ]
+        return [
+            TimedStep(START_STAGE, 1, usual.first * workers),  # on a share of the processors
+            TimedStep(TRIALS, self.limit, usual.trial),
+            TimedStep(FRESH, USUAL_FRESH, usual.fresh),
+        ]
 
     def _search(self, runner: Runner) -> str:
         """All generations; returns why the search is over."""
@@ -260,7 +274,7 @@ class StudyRun:
                 self._report()
                 continue
             open_jobs -= 1
-            finished(number, _outcome(done))
+            finished(number, outcome_of(done))
 
     def _hand_over(self, number: int, done: Future[Outcome]) -> None:
         """Called in whatever thread a trial is finished."""
@@ -332,23 +346,29 @@ class StudyRun:
         if self._stage == START_STAGE:
             self._first_seconds = outcome.seconds
         pace = self._time_left.pace
-        if math.isfinite(pace):
+        if math.isfinite(pace) and self._stage == TRIALS:
             self._pace = pace
             self._expect_fresh_scores(USUAL_FRESH)
-            if self._stage == TRIALS and pace > 0.0:
+            if pace > 0.0:
                 self._trials_an_hour = 3600.0 / pace
 
     def _expect_fresh_scores(self, count: int) -> None:
         """Expect so many scores with fresh seeds, the first one of each seed with its own light."""
-        first = max(self._pace, FRESH_SHARE * self._first_seconds / self._time_left.workers)
         seeds = min(count, FRESH_SEEDS)
-        each = (seeds * first + (count - seeds) * self._pace) / count
+        if self._usual is not None:
+            first, again = self._usual.fresh, self._usual.fresh_again
+        else:
+            again = self._pace
+            first = max(again, FRESH_SHARE * self._first_seconds / self._time_left.workers)
+        each = (seeds * first + (count - seeds) * again) / count
         known = each if math.isfinite(each) else None
         self._time_left.expect(FRESH, count=count, seconds=known)
 
     def _trial_progress(self, fraction: float, text: str) -> None:
         """Note the progress of the trial that this process is scoring."""
         self._doing = text
+        if self._stage == START_STAGE and self._usual is not None:
+            self._time_left.advance(self._usual.done(fraction))
         self._report()
 
     def _report(self, now: bool = False) -> None:
@@ -371,18 +391,3 @@ class StudyRun:
                 doing=self._doing,
             )
         )
-
-
-def _outcome(done: Future[Outcome]) -> Outcome:
-    """The outcome of a future.
-
-    Raises:
-        OptiSenseError: no trial can be worked out.
-    """
-    error = done.exception()
-    if error is None:
-        return done.result()
-    if isinstance(error, OptiSenseError):
-        raise error
-    why = str(error) or type(error).__name__
-    raise SearchError(f"a trial could not be worked out: {why}") from error

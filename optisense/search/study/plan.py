@@ -12,10 +12,10 @@ from optisense.design import SensorDesign
 from optisense.design.difference import fingerprint
 from optisense.errors import SearchError
 from optisense.objectives import Objective
+from optisense.objectives.registry import RAYS_ONLY
 from optisense.objectives.settings import size_for
 from optisense.quality import TRIAL_PHOTONS
 from optisense.search.evaluation.evaluator import DesignEvaluator, Goal, goal_name, placed
-from optisense.search.evaluation.models import RAYS_ONLY
 from optisense.search.methods import Problem, find, make
 from optisense.search.space.constraints import Constraint, UserRule
 from optisense.search.space.manufacturing import SAMPLES, ManufacturingErrors
