@@ -13,8 +13,8 @@ from optisense.optics.radiance_cache.angular_variance import (
 )
 from optisense.optics.radiance_cache.beams import Beams
 from optisense.optics.radiance_cache.irradiance import vector
-from optisense.optics.scene.bsdf import CoatingBsdf, albedo_of, evaluate_coating, grey
-from optisense.optics.transport.camera_paths import VisiblePoints
+from optisense.optics.radiance_cache.shading_points import ShadingPoints
+from optisense.optics.scene.bsdf import albedo_of, evaluate_coating, grey
 
 MIN_STEP = 1e-20
 """Lower bound on the step of the systematic sampling; it avoids a division by zero without
@@ -25,19 +25,16 @@ light."""
 def sum_beams(
     beams: Beams,
     groups: int,
-    coating: CoatingBsdf,
-    points: VisiblePoints,
-    cell: mi.UInt32,
-    active: mi.Bool,
+    at: ShadingPoints,
 ) -> list[mi.Color3f]:
     """Radiance towards the camera due to all beams, for points on the undeformed surface."""
     totals = [mi.Color3f(0) for _ in range(groups)]
-    j = dr.gather(mi.UInt32, beams.starts, cell * groups, active)
-    end = dr.gather(mi.UInt32, beams.starts, (cell + 1) * groups, active)
+    j = dr.gather(mi.UInt32, beams.starts, at.cell * groups, at.active)
+    end = dr.gather(mi.UInt32, beams.starts, (at.cell + 1) * groups, at.active)
     while j < end:
         towards, cosine, flux, group = beam_at(beams, j)
         reflected = flux * evaluate_coating(
-            broadened_coating(coating, cosine), points.normal, towards, points.towards_eye
+            broadened_coating(at.coating, cosine), at.seen.normal, towards, at.seen.towards_eye
         )
         for g in range(groups):
             totals[g] += dr.select(group == g, reflected, 0)
@@ -48,18 +45,15 @@ def sum_beams(
 def sum_diffuse(
     table: mi.Float,
     groups: int,
-    coating: CoatingBsdf,
-    points: VisiblePoints,
-    cell: mi.UInt32,
-    active: mi.Bool,
+    at: ShadingPoints,
 ) -> list[mi.Color3f]:
     """The same where coatings are diffuse and grey, from the `irradiance_table`: the vector sum of
     the
     beams gives what all of them bring.
     """
-    reflectance = dr.select(active, albedo_of(coating) * dr.inv_pi, 0)
+    reflectance = dr.select(at.active, albedo_of(at.coating) * dr.inv_pi, 0)
     return [
-        reflectance * dr.maximum(dr.dot(vector(table, cell * groups + g), points.normal), 0)
+        reflectance * dr.maximum(dr.dot(vector(table, at.cell * groups + g), at.seen.normal), 0)
         for g in range(groups)
     ]
 
@@ -69,12 +63,7 @@ def sum_hidden(
     beams: Beams,
     totals: list[mi.Color3f],
     indenters: mi.Scene,
-    coating: CoatingBsdf,
-    points: VisiblePoints,
-    start: mi.Point3f,
-    cell: mi.UInt32,
-    active: mi.Bool,
-    random: mi.UInt32,
+    at: ShadingPoints,
     shadow_rays: mi.Float,
 ) -> list[mi.Color3f]:
     """The part of ``totals`` that indenters occlude.
@@ -87,14 +76,14 @@ def sum_hidden(
     groups = len(totals)
     hidden = [mi.Color3f(0) for _ in range(groups)]
     steps = [dr.maximum(grey(total) / shadow_rays, MIN_STEP) for total in totals]
-    state = next_random(random)
+    state = next_random(at.seen.random)
     running = unit_float(state)
-    j = dr.gather(mi.UInt32, beams.starts, cell * groups, active)
-    end = dr.gather(mi.UInt32, beams.starts, (cell + 1) * groups, active)
+    j = dr.gather(mi.UInt32, beams.starts, at.cell * groups, at.active)
+    end = dr.gather(mi.UInt32, beams.starts, (at.cell + 1) * groups, at.active)
     while j < end:
         towards, cosine, flux, group = beam_at(beams, j)
         reflected = flux * evaluate_coating(
-            broadened_coating(coating, cosine), points.normal, towards, points.towards_eye
+            broadened_coating(at.coating, cosine), at.seen.normal, towards, at.seen.towards_eye
         )
         step = mi.Float(MIN_STEP)
         for g in range(groups):
@@ -107,7 +96,7 @@ def sum_hidden(
         while times > 0:
             state = next_random(state)
             blocked = indenters.ray_test(
-                mi.Ray3f(start, sample_direction(isotropic_variance(towards, cosine), state)),
+                mi.Ray3f(at.start, sample_direction(isotropic_variance(towards, cosine), state)),
                 coherent=False,
                 active=mi.Bool(True),
             )

@@ -144,6 +144,40 @@ class RadianceCache:
     noise: float
     above_surface: Tables | None = None
 
+    def binned(self) -> BinnedLight:
+        """The light by direction bins."""
+        return BinnedLight(
+            cells=self.cells,
+            tables=Tables(self.moments, self.heights, self.colours),
+            above=self.above_surface,
+            centres=self.centres,
+            irradiance=self.irradiance,
+            bins=dr.opaque(mi.UInt32, self.bins),
+            groups=self.groups,
+            coloured=self.coloured,
+        )
+
+
+@dataclass
+class BinnedLight:
+    """What of a radiance cache points on and near indenters read.
+
+    Attributes:
+        cells, centres, irradiance, groups, coloured: as in `RadianceCache`.
+        tables: the light on the surface.
+        above: the light half-way up the flux layer, if there is one.
+        bins: number of direction bins, as an opaque array.
+    """
+
+    cells: SurfaceCells
+    tables: Tables
+    above: Tables | None
+    centres: mi.Float
+    irradiance: mi.Float
+    bins: mi.UInt32
+    groups: int
+    coloured: bool
+
 
 class CacheTally:
     """Sums of photons per cell, direction bin and light group, over photon passes."""

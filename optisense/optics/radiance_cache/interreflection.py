@@ -15,11 +15,11 @@ import mitsuba as mi
 from optisense.optics.backend.sequences import STEPS_2D, next_random, unit_float
 from optisense.optics.radiance_cache.cache import RadianceCache
 from optisense.optics.radiance_cache.irradiance import irradiance
-from optisense.optics.scene.bsdf import CoatingBsdf, albedo_of, sample_coating
+from optisense.optics.radiance_cache.shading_points import ShadingPoints
+from optisense.optics.scene.bsdf import albedo_of, sample_coating
 from optisense.optics.scene.contact_scenes import ContactScenes
-from optisense.optics.scene.ray_scene import Ray, RayScene, leave
+from optisense.optics.scene.ray_scene import Ray, leave
 from optisense.optics.scene.surface_cells import SurfaceCells, cell_at
-from optisense.optics.transport.camera_paths import VisiblePoints
 
 DIRECTIONS = 8
 """Directions per camera sample in which interreflected light is looked for."""
@@ -32,38 +32,31 @@ def _sample(
     cells: SurfaceCells,
     table: mi.Float,
     groups: int,
-    indenters: RayScene,
-    fixed: RayScene,
-    coating: CoatingBsdf,
-    normal: mi.Vector3f,
-    face_normal: mi.Vector3f,
-    towards_eye: mi.Vector3f,
-    point: mi.Point3f,
-    cell: mi.UInt32,
-    active: mi.Bool,
-    raised: mi.Bool,
-    random: mi.UInt32,
-    series: mi.UInt32,
-    first: mi.UInt32,
+    scenes: ContactScenes,
+    at: ShadingPoints,
     directions: mi.UInt32,
 ) -> list[mi.Color3f]:
+    """Radiance of interreflected light; ``table`` is that of `irradiance_table`."""
+    assert scenes.indenters is not None
+    indenters, fixed, points = scenes.indenters, scenes.fixed, at.seen
+    series, first = points.series, points.number * directions
     totals = [mi.Color3f(0) for _ in range(groups)]
     # How much of the light the places that are seen send on, if they are diffuse.
-    albedo = albedo_of(coating)
+    albedo = albedo_of(at.coating)
     survival = dr.max(albedo)
     k = mi.UInt32(0)
-    while active & (k < directions):
+    while at.active & (k < directions):
         # One sequence goes through all samples of a pixel.
         u = unit_float(series + (first + k) * STEPS_2D[0])
         v = unit_float(series * 277803737 + (first + k) * STEPS_2D[1])
-        state = (random ^ (k * 0x9E3779B9)) * 69069
+        state = (points.random ^ (k * 0x9E3779B9)) * 69069
         way, weight = sample_coating(
-            coating, normal, -towards_eye, unit_float(state), mi.Point2f(u, v)
+            at.coating, points.normal, -points.towards_eye, unit_float(state), mi.Point2f(u, v)
         )
         weight *= albedo
-        above = mi.Bool(raised)
-        start = leave(point, face_normal, way)
-        walking = (dr.dot(way, face_normal) > 0) & (dr.max(weight) > 0)
+        above = mi.Bool(at.raised)
+        start = leave(points.point, points.face_normal, way)
+        walking = (dr.dot(way, points.face_normal) > 0) & (dr.max(weight) > 0)
         places = mi.UInt32(0)
         while walking:
             pressed = indenters.intersect(Ray(start, way, mi.Bool(True)))
@@ -79,7 +72,7 @@ def _sample(
                 there, exists = cell_at(cells, skin.point, ~on_indenter)
                 # An indenter's place is lit like its neighbourhood, which is where the point
                 # stands.
-                there = dr.select(exists, there, cell)
+                there = dr.select(exists, there, at.cell)
                 lift = leave(seen, facing, facing)
                 for g in range(groups):
                     light, _mean, towards = irradiance(table, there * groups + g, facing)
@@ -106,13 +99,7 @@ def _sample(
 
 
 def interreflected(
-    field: RadianceCache,
-    scenes: ContactScenes,
-    points: VisiblePoints,
-    coating: CoatingBsdf,
-    cell: mi.UInt32,
-    active: mi.Bool,
-    raised: mi.Bool,
+    field: RadianceCache, scenes: ContactScenes, at: ShadingPoints
 ) -> list[mi.Color3f]:
     """Radiance towards the camera that points reflect of interreflected light, one colour per
     group.
@@ -120,29 +107,7 @@ def interreflected(
     Args:
         field: the radiance cache.
         scenes: the scenes of the image, with indenters.
-        points: the visible points.
-        coating: their coating.
-        cell: the cell where each point reads the cache.
-        active: which points count.
-        raised: which points lie on an indenter.
+        at: the points.
     """
-    assert scenes.indenters is not None
-    return _sample(
-        field.cells,
-        field.irradiance,
-        field.groups,
-        scenes.indenters,
-        scenes.fixed,
-        coating,
-        points.normal,
-        points.face_normal,
-        points.towards_eye,
-        points.point,
-        cell,
-        active,
-        raised,
-        points.random,
-        points.series,
-        points.number * DIRECTIONS,
-        dr.opaque(mi.UInt32, DIRECTIONS),
-    )
+    directions = dr.opaque(mi.UInt32, DIRECTIONS)
+    return _sample(field.cells, field.irradiance, field.groups, scenes, at, directions)

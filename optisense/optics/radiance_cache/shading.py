@@ -9,6 +9,8 @@ the skin beside them reflect to each other is added by `interreflection`.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import drjit as dr
 import mitsuba as mi
 
@@ -25,11 +27,11 @@ from optisense.optics.radiance_cache.angular_variance import (
 )
 from optisense.optics.radiance_cache.beam_sums import sum_beams, sum_diffuse, sum_hidden
 from optisense.optics.radiance_cache.beams import Beams
-from optisense.optics.radiance_cache.cache import MIN_COSINE, RadianceCache
+from optisense.optics.radiance_cache.cache import MIN_COSINE, BinnedLight, RadianceCache
 from optisense.optics.radiance_cache.interreflection import interreflected
 from optisense.optics.radiance_cache.irradiance import irradiance
+from optisense.optics.radiance_cache.shading_points import ShadingPoints
 from optisense.optics.scene.bsdf import (
-    CoatingBsdf,
     albedo_of,
     coating_of,
     evaluate_coating,
@@ -37,7 +39,7 @@ from optisense.optics.scene.bsdf import (
     surface_region,
 )
 from optisense.optics.scene.contact_scenes import ContactScenes
-from optisense.optics.scene.ray_scene import Ray, leave
+from optisense.optics.scene.ray_scene import Ray, RayScene, leave
 from optisense.optics.scene.surface_cells import SurfaceCells, bin_axis, cell_at, plane_of
 from optisense.optics.scene.surfaces import Region
 from optisense.optics.transport.camera_paths import VisiblePoints
@@ -66,26 +68,10 @@ light."""
 
 @dr.syntax
 def _sum_chosen(
-    cells: SurfaceCells,
-    tables: tuple[mi.Float, mi.Float, mi.Float],
-    upper: tuple[mi.Float, mi.Float, mi.Float] | None,
-    centres: mi.Float,
-    table: mi.Float,
-    bins: mi.UInt32,
-    groups: int,
-    coloured: bool,
-    indenters: mi.Scene,
-    fixed: mi.Scene,
-    curved: bool,
-    coating: CoatingBsdf,
-    points: VisiblePoints,
-    start: mi.Point3f,
-    cell: mi.UInt32,
-    active: mi.Bool,
-    raised: mi.Bool,
-    shift: mi.Vector3f,
-    random: mi.UInt32,
-    chosen: mi.Float,
+    light: BinnedLight,
+    scenes: ContactScenes,
+    at: ShadingPoints,
+    shadow_rays: mi.Float,
     sky: mi.Float,
 ) -> list[mi.Color3f]:
     """Every bin, looked up along its own line, with shadow rays for some of the bins.
@@ -95,41 +81,34 @@ def _sum_chosen(
     drawn in proportion to the light, evenly spaced in its running sum (systematic sampling); where
     nothing is occluded, the sum is exact to half a step.
 
-    With ``upper`` tables (the light half-way up the flux layer), points on indenters interpolate
-    between these and the tables of the surface below them.
+    With light above the surface (half-way up the flux layer), points on indenters interpolate
+    between it and that of the surface below them.
     """
-    moments, heights, colours = tables
+    moments, heights, colours = light.tables
+    upper, groups, bins, points = light.above, light.groups, light.bins, at.seen
+    assert scenes.indenters is not None
+    indenters, active, raised = scenes.indenters.scene, at.active, at.raised
     totals = [mi.Color3f(0) for _ in range(groups)]
-    state = mi.UInt32(random)
+    state = mi.UInt32(points.random)
     steps = []
     running = []
     for g in range(groups):
         # About what the bins bring in all: how far apart the shadow rays are in the running sum.
-        falling, mean, _ = irradiance(table, cell * groups + g, points.normal)
-        expected = (falling + MIN_IRRADIANCE_SHARE * mean) * grey(albedo_of(coating)) * dr.inv_pi
-        steps.append(dr.maximum(expected / chosen, MIN_STEP))
+        falling, mean, _ = irradiance(light.irradiance, at.cell * groups + g, points.normal)
+        expected = (falling + MIN_IRRADIANCE_SHARE * mean) * grey(albedo_of(at.coating))
+        expected *= dr.inv_pi
+        steps.append(dr.maximum(expected / shadow_rays, MIN_STEP))
         # Of the samples of a pixel, each begins at another part of a step.
         running.append(in_series(points.series + (g + 1), points.number, 0))
-    upright, offset = plane_of(cells, cell, active)
+    upright, offset = plane_of(light.cells, at.cell, active)
     up = dr.select(raised, (dr.dot(upright, points.point) - offset) / (LAYER_HEIGHT / 2), 0)
     up = dr.clip(up, 0, MAX_EXTRAPOLATION)
-    axis = bin_axis(cells, 2)
+    axis = bin_axis(light.cells, 2)
     k = mi.UInt32(0)
     while active & (k < bins):
-        there = mi.UInt32(cell)
+        there = mi.UInt32(at.cell)
         if upper is None:
-            there = _place(
-                cells,
-                centres,
-                fixed,
-                curved,
-                points,
-                cell,
-                shift,
-                raised,
-                active,
-                k,
-            )
+            there = _place(light, scenes.fixed, at, k)
         for g in range(groups):
             entry = (there * bins + k) * groups + g
             value = dr.gather(mi.Vector4f, moments, entry, active)
@@ -142,11 +121,11 @@ def _sum_chosen(
                 if upper is not None:
                     height = dr.lerp(height, dr.gather(mi.Float, upper[1], entry, raised), up)
                 height = dr.maximum(height, 0) / value.w
-                light = angular_variance(axis, towards, cosine, height)
+                beam = angular_variance(axis, towards, cosine, height)
                 # On the undeformed surface the mean cosine is the sum's already.
-                half_width = dr.select(raised, cosine_half_width(light, points.normal, upright), 0)
+                half_width = dr.select(raised, cosine_half_width(beam, points.normal, upright), 0)
                 reflected = evaluate_coating(
-                    broadened_coating(coating, cosine),
+                    broadened_coating(at.coating, cosine),
                     points.normal,
                     towards,
                     points.towards_eye,
@@ -161,14 +140,14 @@ def _sum_chosen(
                 times = dr.floor(running[g]) - before
                 if times > 0:
                     state = next_random(state)
-                    way = mirrored_above(sample_direction(light, state), points.face_normal)
+                    way = mirrored_above(sample_direction(beam, state), points.face_normal)
                     blocked = indenters.ray_test(
-                        mi.Ray3f(start, way),
+                        mi.Ray3f(at.start, way),
                         coherent=False,
                         active=mi.Bool(True),
                     )
                     weight = dr.select(blocked, 0.0, times / share)
-                if dr.hint(coloured, mode="scalar"):
+                if dr.hint(light.coloured, mode="scalar"):
                     flux = dr.gather(mi.Vector4f, colours, entry)
                     if upper is not None:
                         flux = dr.lerp(flux, dr.gather(mi.Vector4f, upper[2], entry, raised), up)
@@ -181,18 +160,7 @@ def _sum_chosen(
 
 
 @dr.syntax
-def _place(
-    cells: SurfaceCells,
-    centres: mi.Float,
-    fixed: mi.Scene,
-    curved: bool,
-    points: VisiblePoints,
-    cell: mi.UInt32,
-    shift: mi.Vector3f,
-    raised: mi.Bool,
-    active: mi.Bool,
-    k: mi.UInt32,
-) -> mi.UInt32:
+def _place(light: BinnedLight, fixed: RayScene, at: ShadingPoints, k: mi.UInt32) -> mi.UInt32:
     """The cell where bin ``k`` is looked up for points.
 
     On an indenter it is where the line through the point along the bin's middle goes on to meet the
@@ -201,26 +169,27 @@ def _place(
     these planes are followed by a ray. (The mean direction of the bin's light would not do: where a
     lamp straddles two bins, its halves would be read at places that do not belong together.)
     """
-    middle = dr.gather(mi.Vector4f, centres, k)
+    cells, point = light.cells, at.seen.point
+    middle = dr.gather(mi.Vector4f, light.centres, k)
     towards = mi.Vector3f(middle.x, middle.y, middle.z)
-    there = mi.UInt32(cell)
-    exists = active & raised
-    for _ in range(2 if curved else 1):
+    there = mi.UInt32(at.cell)
+    exists = at.active & at.raised
+    for _ in range(2 if fixed.smooth else 1):
         normal, offset = plane_of(cells, there, exists)
         facing = dr.dot(normal, towards)
         exists &= facing > MIN_COSINE
-        way = (dr.dot(normal, points.point) - offset) / dr.maximum(facing, MIN_COSINE)
-        there, found = cell_at(cells, points.point - towards * way + shift, exists)
+        way = (dr.dot(normal, point) - offset) / dr.maximum(facing, MIN_COSINE)
+        there, found = cell_at(cells, point - towards * way + at.shift, exists)
         exists &= found
-    if dr.hint(curved, mode="scalar"):  # noqa: SIM102 (the one is Python's, the other Dr.Jit's)
-        if active & raised & ~exists:
-            below = fixed.ray_intersect_preliminary(
-                mi.Ray3f(points.point, -towards), coherent=False, active=mi.Bool(True)
+    if dr.hint(fixed.smooth, mode="scalar"):  # noqa: SIM102 (the one is Python's, the other Dr.Jit's)
+        if at.active & at.raised & ~exists:
+            below = fixed.scene.ray_intersect_preliminary(
+                mi.Ray3f(point, -towards), coherent=False, active=mi.Bool(True)
             )
             reached = below.is_valid()
-            landing = points.point - towards * dr.select(reached, below.t, 0)
-            there, exists = cell_at(cells, landing + shift, reached)
-    return dr.select(exists, there, cell)
+            landing = point - towards * dr.select(reached, below.t, 0)
+            there, exists = cell_at(cells, landing + at.shift, reached)
+    return dr.select(exists, there, at.cell)
 
 
 def shade(
@@ -256,69 +225,38 @@ def shade(
     cell, shift, active = _interpolating_cell(field.cells, base, seen, points, points.number)
     start = leave(points.point, points.face_normal, points.face_normal)
     coating = coating_of(table, points.surface, active, field.metallic)
-    tables = (field.moments, field.heights, field.colours)
-    bins = dr.opaque(mi.UInt32, field.bins)
+    at = ShadingPoints(points, coating, start, cell, shift, active, raised)
     indenters = scenes.indenters
     if thorough:
-        assert indenters is not None
-        far = _sum_chosen(
-            field.cells,
-            tables,
-            field.above_surface,
-            field.centres,
-            field.irradiance,
-            bins,
-            field.groups,
-            field.coloured,
-            indenters.scene,
-            scenes.fixed.scene,
-            scenes.fixed.smooth,
-            coating,
-            points,
-            start,
-            cell,
-            active,
-            raised,
-            shift,
-            points.random,
-            dr.opaque(mi.Float, CONTACT_SHADOW_RAYS),
-            occluder_horizon(
-                scenes.balls,
-                dr.opaque(mi.UInt32, dr.width(scenes.balls) // 4),
-                points.point,
-                plane_of(field.cells, cell, active)[0],
-                raised & dr.opaque(mi.Bool, scenes.convex),
-            ),
+        sky = occluder_horizon(
+            scenes.balls,
+            dr.opaque(mi.UInt32, dr.width(scenes.balls) // 4),
+            points.point,
+            plane_of(field.cells, cell, active)[0],
+            raised & dr.opaque(mi.Bool, scenes.convex),
         )
-        near = interreflected(field, scenes, points, coating, cell, active, raised)
+        shadow_rays = dr.opaque(mi.Float, CONTACT_SHADOW_RAYS)
+        far = _sum_chosen(field.binned(), scenes, at, shadow_rays, sky)
+        near = interreflected(field, scenes, at)
         return [one + other for one, other in zip(far, near, strict=True)]
-    where = (coating, points, cell, active)
     totals: list[mi.Color3f]
     if field.metallic or field.coloured:
-        totals = sum_beams(field.beams, field.groups, *where)
+        totals = sum_beams(field.beams, field.groups, at)
     else:
         totals = [mi.Color3f(0) for _ in range(field.groups)]
         for k in range(CELLS_PER_SAMPLE):
             number = points.number * CELLS_PER_SAMPLE + k
             beside, _, lit = _interpolating_cell(field.cells, base, seen, points, number)
-            light = sum_diffuse(field.irradiance, field.groups, coating, points, beside, lit)
+            light = sum_diffuse(
+                field.irradiance, field.groups, replace(at, cell=beside, active=lit)
+            )
             totals = [
                 one + each / CELLS_PER_SAMPLE for one, each in zip(totals, light, strict=True)
             ]
     if indenters is None:
         return totals
-    hidden = sum_hidden(
-        culled_beams,
-        totals,
-        indenters.scene,
-        coating,
-        points,
-        start,
-        cell,
-        active,
-        points.random,
-        dr.opaque(mi.Float, REFLECTED_SHADOW_RAYS if reflected else SHADOW_RAYS),
-    )
+    shadow_rays = dr.opaque(mi.Float, REFLECTED_SHADOW_RAYS if reflected else SHADOW_RAYS)
+    hidden = sum_hidden(culled_beams, totals, indenters.scene, at, shadow_rays)
     # Where all is hidden, the sum of the shares may be a little more than all.
     return [dr.maximum(one - other, 0) for one, other in zip(totals, hidden, strict=True)]
 
