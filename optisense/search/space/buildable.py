@@ -157,7 +157,7 @@ class LightsRest:
                 for index in range(len(lights.lights))
                 if _off(design, group, index, meshes[part]) <= LIGHT_SEAT
             ]
-            for part in moved
+            for part in sorted(moved)
             if part in meshes and design.parts[part].role in opaque
         }
 
