@@ -58,6 +58,7 @@ def check_design(
     problems += lens_problems(design.camera, design.where("camera", "fov"))
     problems += index_problems(design)
     problems += _check_lights(design, light_names)
+    problems += _check_kinds(design)
     if not any(problem.severity == "error" for problem in problems):
         try:
             meshes = {n: m for n, m in design.deformed_meshes().items() if n in meshes}
@@ -115,13 +116,7 @@ def _check_lights(design: SensorDesign, light_names: Collection[str] | None) -> 
             )
         )
     for name, group in design.lights.items():
-        if group.emitter is not None:
-            try:
-                group.emitter.check()
-            except OptiSenseError as error:
-                place = error.where or design.where("lights", name, "emitter")
-                problems.append(Diagnostic(error.message, place, error.hint))
-        elif light_names is not None and group.model not in light_names:
+        if group.emitter is None and light_names is not None and group.model not in light_names:
             problems.append(
                 Diagnostic(
                     f"light group '{name}' has an unknown model '{group.model}'",
@@ -129,6 +124,18 @@ def _check_lights(design: SensorDesign, light_names: Collection[str] | None) -> 
                     unknown_light_hint(group.model, light_names),
                 )
             )
+    return problems
+
+
+def _check_kinds(design: SensorDesign) -> list[Diagnostic]:
+    """What lamps, materials and the like find wrong with themselves, such as a missing file."""
+    problems: list[Diagnostic] = []
+    for path, value in design.values_of_kinds().items():
+        try:
+            value.check()
+        except OptiSenseError as error:
+            place = error.where or design.where(*path)
+            problems.append(Diagnostic(error.message, place, error.hint))
     return problems
 
 

@@ -26,10 +26,9 @@ def fingerprint(design: SensorDesign) -> str:
         mesh = design.meshes[name]
         digest.update(name.encode())
         _digest(mesh, digest)
-    for group in design.lights.values():
-        if group.emitter is not None:
-            for data in group.emitter.contents().values():
-                digest.update(data)
+    for value in design.values_of_kinds().values():
+        for data in value.contents().values():
+            digest.update(data)
     return digest.hexdigest()
 
 

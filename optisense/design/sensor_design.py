@@ -13,6 +13,7 @@ from pydantic import Field, PrivateAttr, StringConstraints, model_validator
 from optisense.design.cage import Cage
 from optisense.design.camera import Camera
 from optisense.design.fields import MisfitError, Model, Name
+from optisense.design.kinds import KindModel
 from optisense.design.lights import LightGroup
 from optisense.design.materials import CoatingModel, Material, kinds_for
 from optisense.design.parts import Part, Role
@@ -165,6 +166,19 @@ class SensorDesign(Model):
                         raise DesignError(message, where=where, hint=error.hint) from error
         return result
 
+    def values_of_kinds(self) -> dict[tuple[str | int, ...], KindModel]:
+        """All that comes in kinds and may name files, by its path: coating, materials, emitters and
+        the camera's response."""
+        found: dict[tuple[str | int, ...], KindModel] = {("coating",): self.coating}
+        for name, material in self.materials.items():
+            found["materials", name] = material
+        for name, group in self.lights.items():
+            if group.emitter is not None:
+                found["lights", name, "emitter"] = group.emitter
+        if self.camera.response is not None:
+            found["camera", "response"] = self.camera.response
+        return found
+
     def parts_of(self, *roles: Role) -> list[str]:
         """The names of the parts that have one of the roles, in file order."""
         return [name for name, part in self.parts.items() if part.role in roles]
@@ -215,10 +229,10 @@ class SensorDesign(Model):
         design._meshes = {n: m for n, m in self._meshes.items() if n in design.parts}
         design._source = self._source
         design._lines = self._lines
-        for name, group in design.lights.items():
-            old = self.lights.get(name)
-            if old is not None and old.emitter is not None and group.emitter is not None:
-                group.emitter.located(old.emitter.folder)
+        before = self.values_of_kinds()
+        for path, value in design.values_of_kinds().items():
+            if path in before:
+                value.located(before[path].folder)
         return design
 
 

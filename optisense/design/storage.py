@@ -11,7 +11,7 @@ from pydantic import ValidationError
 from optisense.design.limits import unit_slips
 from optisense.design.parts import TRANSPARENT_SOLIDS
 from optisense.design.problems import design_error, raise_problems
-from optisense.design.sensor_design import SCHEMA_VERSION, SensorDesign
+from optisense.design.sensor_design import SCHEMA_VERSION, SensorDesign, dotted
 from optisense.design.yaml_reader import Lines, read_yaml
 from optisense.design.yaml_writer import to_yaml
 from optisense.errors import DesignError, MeshError
@@ -52,10 +52,9 @@ def load_design(path: str | Path) -> SensorDesign:
     for name, part in design.parts.items():
         mesh_path = _inside(folder, part.mesh, design.where("parts", name, "mesh"))
         design.meshes[name] = _load_mesh(mesh_path, name, design)
-    for name, group in design.lights.items():
-        if group.emitter is not None:
-            for field, named in group.emitter.located(folder).files().items():
-                _inside(folder, named, design.where("lights", name, "emitter", field))
+    for place, value in design.values_of_kinds().items():
+        for field, named in value.located(folder).files().items():
+            _inside(folder, named, design.where(*place, field))
     raise_problems(unit_slips(design), str(file))
     return design
 
@@ -73,8 +72,8 @@ def save_design(design: SensorDesign, folder: str | Path, *, new: bool = False) 
             nothing in it then, and what a killed process has left of one is removed first.
 
     Raises:
-        DesignError: a part has no mesh, or two parts with different meshes (or two light groups
-            with different files of their lamps) share a file.
+        DesignError: a part has no mesh, or two parts with different meshes (or two lamps
+            or materials with different files) share a file.
         FolderInUseError: another process is writing to the folder.
         OutputError: the folder can't be written, or is not empty though it must be.
     """
@@ -91,7 +90,7 @@ def save_design(design: SensorDesign, folder: str | Path, *, new: bool = False) 
     with held(folder), written_together("the design") as stage:
         for file, name in {file: name for name, file in meshes.items()}.items():
             design.meshes[name].save_obj(stage(inside(folder, file)))
-        for file, data in _lamp_files(design).items():
+        for file, data in _named_files(design).items():
             stage(inside(folder, file)).write_bytes(data)
         stage(inside(folder, DESIGN_FILE)).write_text(to_yaml(saved, HEAD), encoding="utf-8")
 
@@ -99,7 +98,7 @@ def save_design(design: SensorDesign, folder: str | Path, *, new: bool = False) 
 def files_of(design: SensorDesign) -> list[str]:
     """The files that `save_design` writes, relative to the folder."""
     meshes = dict.fromkeys(_as_obj(part.mesh) for part in design.parts.values())
-    return [*meshes, *_lamp_files(design), DESIGN_FILE]
+    return [*meshes, *_named_files(design), DESIGN_FILE]
 
 
 def _check_version(data: dict[str, Any], lines: Lines, source: str) -> None:
@@ -174,18 +173,17 @@ def _check_saveable(design: SensorDesign, files: dict[str, str]) -> None:
             )
 
 
-def _lamp_files(design: SensorDesign) -> dict[str, bytes]:
-    """What is in the files of the lamps, by their paths inside the design folder."""
+def _named_files(design: SensorDesign) -> dict[str, bytes]:
+    """What is in the files of lamps and materials, by their paths inside the design folder."""
     files: dict[str, bytes] = {}
     owner: dict[str, str] = {}
-    for name, group in design.lights.items():
-        for file, data in ({} if group.emitter is None else group.emitter.contents()).items():
-            first = owner.setdefault(file, name)
+    for path, value in design.values_of_kinds().items():
+        for file, data in value.contents().items():
+            first = owner.setdefault(file, dotted(path))
             if files.setdefault(file, data) != data:
                 raise DesignError(
-                    f"light groups '{first}' and '{name}' have different lights but one file "
-                    f"'{file}'",
-                    where=f"lights.{name}.emitter",
+                    f"'{first}' and '{dotted(path)}' have different files but one name '{file}'",
+                    where=dotted(path),
                     hint="Give each its own file",
                 )
     return files

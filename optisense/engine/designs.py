@@ -14,6 +14,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from optisense.design import SensorDesign, check_design, load_design, set_value
 from optisense.design.parts import TRANSPARENT_SOLIDS, Role
 from optisense.design.problems import Diagnostic, design_error
+from optisense.design.sensor_design import dotted
 from optisense.design.storage import DESIGN_FILE
 from optisense.engine.failures import ProtocolError, UnsoundDesignError, place_in
 from optisense.errors import DesignError, MeshError
@@ -171,10 +172,9 @@ class Designs:
             if name not in elsewhere:
                 path = _inside(base, part.mesh, f"parts.{name}.mesh")
                 design.meshes[name] = self._checked(self._read(path, name), name, part.role)
-        for name, group in design.lights.items():
-            if group.emitter is not None:
-                for field, named in group.emitter.located(base).files().items():
-                    _inside(base, named, f"lights.{name}.emitter.{field}")
+        for place, value in design.values_of_kinds().items():
+            for field, named in value.located(base).files().items():
+                _inside(base, named, dotted((*place, field)))
         return design
 
     def _read(self, path: Path, part: str) -> TriangleMesh:
@@ -220,8 +220,8 @@ def _same(one: SensorDesign, other: SensorDesign) -> bool:
 def _stamps(design: SensorDesign, file: Path) -> list[Stamp]:
     """What tells whether any file of a design has changed."""
     meshes = [file.parent / part.mesh for part in design.parts.values()]
-    emitters = [group.emitter for group in design.lights.values() if group.emitter is not None]
-    others = [file.parent / name for each in emitters for name in each.files().values()]
+    kinds = design.values_of_kinds().values()
+    others = [file.parent / name for each in kinds for name in each.files().values()]
     return [_stamp(path) for path in (file, *meshes, *others)]
 
 

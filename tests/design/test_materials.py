@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 
 from optisense import sensors
-from optisense.design import SensorDesign, load_design, save_design
-from optisense.design.fields import Colour, Fraction
+from optisense.design import SensorDesign, check_design, load_design, save_design
+from optisense.design.difference import fingerprint
+from optisense.design.fields import Colour, Fraction, RelativePath
 from optisense.design.materials import (
     Absorber,
     Coating,
@@ -49,6 +50,43 @@ class Chalk(CoatingModel):
 
     def reflection(self) -> Reflection:
         return Reflection(reflectance=(self.white, self.white, self.white))
+
+
+class Measured(Material):
+    """A surface whose reflectance is in a file beside the design."""
+
+    roles: ClassVar[tuple[Role, ...]] = (Role.BLOCKER,)
+
+    kind: Literal["test-measured"] = "test-measured"
+    table: RelativePath
+
+    def reflection(self) -> Reflection:
+        red, green, blue = np.loadtxt(self.path("table")).tolist()
+        return Reflection(reflectance=(red, green, blue))
+
+    def check(self) -> None:
+        self.contents()
+
+
+def test_the_file_of_a_material_goes_where_its_design_goes(tmp_path: Path) -> None:
+    (tmp_path / "white.txt").write_text("0.9 0.8 0.7")
+    design = sensors.load("builtin:gelsight-mini")
+    design.materials["white"] = Measured(table="white.txt").located(tmp_path)
+    before = fingerprint(design)
+    save_design(design, tmp_path / "saved")
+    again = load_design(tmp_path / "saved")
+    copied = again.copy().materials["white"]
+    assert copied.reflection().reflectance == (0.9, 0.8, 0.7)
+    assert fingerprint(again) == before
+    (tmp_path / "saved" / "white.txt").write_text("0.1 0.1 0.1")
+    assert fingerprint(again) != before
+    (tmp_path / "saved" / "white.txt").unlink()
+    problems = [each for each in check_design(again) if "can't read" in each.message]
+    assert [each.severity for each in problems] == ["error"]
+    file = tmp_path / "saved" / "design.yaml"
+    file.write_text(file.read_text().replace("white.txt", "../white.txt"))
+    with pytest.raises(DesignError, match="inside the design folder"):
+        load_design(tmp_path / "saved")
 
 
 def test_each_role_takes_the_kinds_that_say_so() -> None:
