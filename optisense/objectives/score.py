@@ -128,7 +128,9 @@ def json_ready(value: Any) -> Any:
     if isinstance(value, Mapping):
         return {str(key): json_ready(inner) for key, inner in value.items()}
     if isinstance(value, np.ndarray):
-        return json_ready(value.tolist())
+        listed = value.tolist()
+        is_plain = value.dtype.kind == "f" and np.isfinite(value).all()
+        return listed if is_plain else json_ready(listed)  # element by element takes long
     if isinstance(value, list | tuple):
         return [json_ready(inner) for inner in value]
     raise ObjectiveError(
