@@ -18,7 +18,14 @@ author = "The OptiSense Studio developers"
 version = release = optisense.__version__
 
 root_doc = "docs/index"
-include_patterns = ["docs/**.md", "benchmarks/*.md", "README.md", "CONTRIBUTING.md", "LICENSE"]
+include_patterns = [
+    "docs/**.md",
+    "benchmarks/*.md",
+    "README.md",
+    "CHANGELOG.md",
+    "CONTRIBUTING.md",
+    "LICENSE",
+]
 exclude_patterns = ["docs/examples/**"]
 extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon"]
 
