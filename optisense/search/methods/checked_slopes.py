@@ -86,12 +86,11 @@ class CheckedSlope(NamedTuple):
 
 class _Check(NamedTuple):
     """A direction `way` (n,), as long as the ranges are, in which a gradient is checked; its slope
-    along that, its length, and the slope that random directions have on average.
+    along that, and the slope that random directions have on average.
     """
 
     way: FloatArray
     slope: float
-    length: float
     typical: float
 
 
@@ -179,14 +178,11 @@ class SlopeEvaluator:
             far, near = (self._difference(vector, check.way, h, seed) for h in (STEP, STEP / 2))
             if far is None or near is None:
                 continue
-            allowed, doubt = TOLERANCE * max(abs(near), check.typical), abs(far - near)
-            steady = doubt <= allowed
-            # Differences that disagree with each other still refute what is far beyond both.
-            most = allowed if steady else TOLERANCE * max(abs(near), check.length) + doubt
-            if abs(check.slope - near) > most:
-                return Agreement.DIFFERS
-            if not steady:
+            allowed = TOLERANCE * max(abs(near), check.typical)
+            if abs(far - near) > allowed:
                 found = Agreement.UNSTEADY
+            elif abs(check.slope - near) > allowed:
+                return Agreement.DIFFERS
         return found
 
     def steady(self, vector: FloatArray, gradient: FloatArray, seed: int) -> bool:
@@ -218,7 +214,7 @@ class SlopeEvaluator:
             ways.append(way / np.linalg.norm(way))
         typical = length / float(np.sqrt(np.count_nonzero(~blocked)))
         for way in ways:
-            yield _Check(way * span, float(way @ scaled), length, typical)
+            yield _Check(way * span, float(way @ scaled), typical)
 
     def differences(self, vector: FloatArray, seed: int) -> FloatArray:
         """(n,) gradient of the true score at a point (n,) by central differences over `STEP`; 0
