@@ -1,0 +1,370 @@
+"""What each acceleration and refinement of the optics brings: each is switched off in turn.
+
+``python -m benchmarks.ablation [--sensor NAME] [--only WORD ...] [--dry]`` writes ablation.json and
+ablation.md beside this file. The four built-in sensors, each with a diffuse and with a metallic
+coating and a ball pressed in, are compared with progressive photon mapping, which shares the photon
+pass and the surfaces with the radiance cache but neither its cells nor its shading. Nothing of the
+product is made for this: constants and functions are replaced while an image is rendered.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, NamedTuple
+from unittest import mock
+
+import numpy as np
+from numpy.typing import NDArray
+from rich.console import Console
+from scipy.ndimage import uniform_filter
+
+from benchmarks.results import machine
+from optisense import OpticalModel, sensors
+from optisense.design import set_value
+from optisense.geometry import Contact, Sphere
+
+FOLDER = Path(__file__).parent
+CACHE = FOLDER / ".cache"
+SENSORS = ("gelsight-mini", "gelsight-svelte", "gelbelt", "gelsight360")
+COATINGS = {"diffuse": 0.0, "metallic": 0.6}
+"""Specularity of each coating."""
+RESOLUTION = (160, 120)
+PHOTONS = 600_000
+"""Of an image."""
+SEEDS = (1, 2)
+"""Of the images; the first also compiles, so the last is timed."""
+RUNS = 4
+"""Images in light that is there, of which the fastest counts."""
+REFERENCE_PHOTONS = 6_000_000
+"""Of each seed of the reference, at most."""
+REFERENCE_SEEDS = (101, 102)
+BOX = 3
+"""Side (pixels) of the square over which pictures are averaged before they are compared, which
+takes off most of the reference's noise."""
+RADIUS, DEPTH = 1.5, 0.8
+"""mm: the ball that is pressed in."""
+WORTH = 0.1
+"""Relative change of error or time below which a refinement is not worth its code."""
+ERRORS = ("error_in_contact", "error_elsewhere")
+TIMES = ("cpu_s_new_light", "cpu_s_kept_light")
+
+FloatArray = NDArray[np.floating]
+
+
+class Change(NamedTuple):
+    """A value of a module or class that is replaced."""
+
+    place: Any
+    name: str
+    value: Any
+
+
+@dataclass(frozen=True)
+class Ablation:
+    """Something that is switched off.
+
+    Attributes:
+        name: of it.
+        changes: gives what is replaced; called when Mitsuba is loaded.
+        light: whether the light in the cache depends on it, and not only what is read from there.
+    """
+
+    name: str
+    changes: Callable[[], Sequence[Change]]
+    light: bool
+
+    @contextmanager
+    def applied(self) -> Iterator[None]:
+        """Switch it off while the context lasts."""
+        with ExitStack() as stack:
+            for change in self.changes():
+                stack.enter_context(mock.patch.object(*change))
+            yield
+
+
+def ablations() -> list[Ablation]:
+    """All of them; those of shading alone first, as they share one light."""
+    import drjit as dr
+    import mitsuba as mi
+
+    from optisense.optics.backend import sequences
+    from optisense.optics.imaging import cached
+    from optisense.optics.radiance_cache import (
+        angular_variance,
+        beams,
+        cache,
+        interreflection,
+        shading,
+        smoothing,
+        store,
+    )
+    from optisense.optics.scene import assembly
+    from optisense.optics.transport import emission_guide, interact, photons
+
+    def random_4d(index: Any, stream: Any, seed: Any) -> tuple[Any, ...]:
+        first, second = mi.sample_tea_32(index, stream ^ (seed * 0x9E3779B9))
+        both = mi.sample_tea_32(first ^ 0x85EBCA6B, second)
+        return tuple(sequences.unit_float(bits) for bits in (first, second, *both))
+
+    def random_in_series(series: Any, number: Any, dimension: int) -> Any:
+        return sequences.unit_float(mi.sample_tea_32(series ^ mi.UInt32(dimension), number)[0])
+
+    def own_cell(
+        cells: Any, base: Any, active: Any, points: Any, number: Any
+    ) -> tuple[Any, Any, Any]:
+        home, found = shading.cell_at(cells, base, active)
+        return home, mi.Vector3f(0), found
+
+    def no_interreflection(field: Any, *rest: Any) -> list[Any]:
+        return [mi.Color3f(0) for _ in range(field.groups)]
+
+    def always_doubtful(balls: Any, count: Any, point: Any, *rest: Any) -> Any:
+        return dr.zeros(mi.Float, dr.width(point)) + 2
+
+    def isotropic(axis: Any, towards: Any, cosine: Any, height: Any) -> Any:
+        return angular_variance.isotropic_variance(towards, cosine)
+
+    def here(light: Any, fixed: Any, at: Any, k: Any) -> Any:
+        return at.cell
+
+    def sharp(coating: Any, cosine: Any) -> Any:
+        return coating
+
+    def one_length(cells: Any, halves: Any, radii: FloatArray) -> FloatArray:
+        return np.full(cells.cells, np.inf)
+
+    def every_facet(mesh: Any) -> Any:
+        return mesh
+
+    def shading_only(name: str, *changes: Change) -> Ablation:
+        return Ablation(name, lambda: changes, False)
+
+    def of_light(name: str, *changes: Change) -> Ablation:
+        return Ablation(name, lambda: changes, True)
+
+    coherent = property(lambda path: False)
+    return [
+        shading_only("culled beams", Change(cached, "cull_beams", lambda b, *rest: b)),
+        shading_only("every second pixel", Change(cached, "SPARSE_SHADING_BEAMS", np.inf)),
+        shading_only("more samples where grainy", Change(cached, "GRAIN_THRESHOLD", np.inf)),
+        shading_only("more samples in small contacts", Change(cached, "MIN_CONTACT_SAMPLES", 0)),
+        shading_only("several cells a sample", Change(shading, "CELLS_PER_SAMPLE", 1)),
+        shading_only("interpolation of cells", Change(shading, "_interpolating_cell", own_cell)),
+        shading_only("even spread of a pixel's samples",
+                     Change(shading, "in_series", random_in_series)),
+        shading_only("interreflection in contacts",
+                     Change(shading, "interreflected", no_interreflection)),
+        shading_only("interreflection beyond one bounce",
+                     Change(interreflection, "MAX_BOUNCES", 1)),
+        shading_only("occluder horizon", Change(shading, "occluder_horizon", always_doubtful)),
+        shading_only("light partly below the horizon",
+                     Change(shading, "cosine_half_width", lambda *rest: mi.Float(0))),
+        shading_only("variance of each direction", Change(shading, "angular_variance", isotropic)),
+        shading_only("lookup along the light's line", Change(shading, "_place", here)),
+        shading_only("lobes broadened by the light", Change(shading, "broadened_coating", sharp)),
+        shading_only("coherent camera rays", Change(interact.Path, "is_coherent", coherent)),
+        of_light("emission guiding", Change(emission_guide, "MIN_DENSITY", 1.0)),
+        of_light("low-discrepancy photons", Change(photons, "sequence_4d", random_4d)),
+        of_light("surviving photons gathered", Change(photons, "STAGES", ())),
+        of_light("volume flux", Change(store, "GRAZING_SHARE_LIMIT", 2.0)),
+        of_light("kernels by the pilot photons", Change(smoothing, "varies_over", one_length)),
+        of_light("narrow kernels out of view", Change(store, "SMOOTHED_MARGIN", 1e6)),
+        of_light("sharpening", Change(smoothing, "MAX_SHARPENING", 0.0)),
+        of_light("overlapping bins",
+                 Change(cache, "OVERLAP", 0.0), Change(cache, "METAL_OVERLAP", 0.0)),
+        of_light("weak beams merged", Change(beams, "STRONG_SHARE", 0.0)),
+        of_light("flat faces merged", Change(assembly, "_merged", every_facet)),
+    ]  # fmt: skip
+
+
+def main() -> None:
+    """Measure, print and write."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--sensor", choices=SENSORS, help="measure one sensor only")
+    parser.add_argument(
+        "--only", nargs="+", default=[""], help="switch off only what has such a word in its name"
+    )
+    parser.add_argument("--dry", action="store_true", help="print only, write no results")
+    options = parser.parse_args()
+    console = Console()
+    about = machine()
+    if about["busy"]:
+        console.print(f"[yellow]The load is {about['load_at_start']}: timings will be noisy.")
+    path = FOLDER / "ablation.json"
+    for name in (options.sensor,) if options.sensor else SENSORS:
+        for coating in COATINGS:
+            case = f"{name}, {coating}"
+            for what, row in measure(name, coating, options.only):
+                # Read anew: sensors may be measured by processes of their own.
+                found = json.loads(path.read_text(encoding="utf-8")) if path.is_file() else {}
+                known = found.setdefault(case, {"machine": about, "rows": {}})
+                known["machine"] = about
+                known["rows"][what] = row
+                console.print(f"{case}: {what} " + json.dumps(row), highlight=False)
+                if not options.dry:
+                    path.write_text(json.dumps(found, indent=1) + "\n", encoding="utf-8")
+                    (FOLDER / "ablation.md").write_text(table(found), encoding="utf-8")
+
+
+def measure(name: str, coating: str, only: Sequence[str]) -> Iterator[tuple[str, dict[str, float]]]:
+    """What each ablation gives on a sensor; first "nothing", with all that there is."""
+    model = OpticalModel(set_value(sensors.build(name), "coating.specularity", COATINGS[coating]))
+    place = model.nine_contacts()[4].point
+    assert place is not None
+    ball = Contact(Sphere(radius=RADIUS), point=place, depth=DEPTH)
+    truth, noise = reference(model, ball, f"{name}-{coating}")
+    yield "nothing", judged(model, ball, truth, noise, True)
+    for ablation in ablations():
+        if any(word in ablation.name for word in only):
+            with ablation.applied():
+                if ablation.name == "flat faces merged":
+                    yield (
+                        ablation.name,
+                        judged(OpticalModel(model.design), ball, truth, noise, True),
+                    )
+                else:
+                    yield ablation.name, judged(model, ball, truth, noise, ablation.light)
+    model.forget_light()
+
+
+def judged(
+    model: OpticalModel, ball: Contact, truth: FloatArray, noise: FloatArray, light: bool
+) -> dict[str, float]:
+    """Errors, bias and processor seconds of images.
+
+    Args:
+        model: the sensor.
+        ball: what presses.
+        truth: (h, w, 3) of the reference.
+        noise: its variance in each mask of `masks`.
+        light: whether the light is traced anew, with its pilot pass, and timed.
+    """
+    errors, ratios, cpu = [], [], {}
+    if light:
+        model._forget("_store")
+    for seed in SEEDS:
+        if light and seed == SEEDS[-1]:
+            model._forget("_store")
+        began = time.process_time()
+        image = model.render([ball], RESOLUTION, PHOTONS, seed=seed)
+        cpu["cpu_s_new_light"] = time.process_time() - began
+        got = smooth(image.radiance)
+        where = masks(image.contact_mask, truth)
+        errors.append([((got - truth)[mask] ** 2).mean() for mask in where])
+        ratios.append([got[mask].mean() / truth[mask].mean() for mask in where])
+    kept = []
+    for _ in range(RUNS):
+        began = time.process_time()
+        model.render([ball], RESOLUTION, PHOTONS, seed=SEEDS[-1])
+        kept.append(time.process_time() - began)
+    cpu["cpu_s_kept_light"] = min(kept)
+    if not light:
+        del cpu["cpu_s_new_light"]
+    if light:  # the others read both of these lights
+        model.render([ball], RESOLUTION, PHOTONS, seed=SEEDS[0])
+    means = [truth[mask].mean() for mask in where]
+    square = np.maximum(np.mean(errors, axis=0) - noise, 0.0)
+    relative = np.sqrt(square) / means
+    bias = np.mean(ratios, axis=0) - 1
+    return {
+        **{key: round(float(v), 5) for key, v in zip(ERRORS, relative, strict=True)},
+        "bias_in_contact": round(float(bias[0]), 5),
+        "bias_elsewhere": round(float(bias[1]), 5),
+        **{key: round(value, 3) for key, value in cpu.items()},
+    }
+
+
+def masks(contact: NDArray[np.bool_], truth: FloatArray) -> list[NDArray[np.bool_]]:
+    """The pixels of the contact, and all others that are not dark."""
+    return [contact, ~contact & (truth.sum(axis=-1) > 0.02 * truth.sum(axis=-1).mean())]
+
+
+def smooth(image: FloatArray) -> FloatArray:
+    """Averaged over `BOX` pixels."""
+    return np.asarray(uniform_filter(image.astype(np.float64), (BOX, BOX, 1)))
+
+
+def reference(model: OpticalModel, ball: Contact, name: str) -> tuple[FloatArray, FloatArray]:
+    """The smoothed reference, and the variance of its noise in each mask; kept in a file."""
+    CACHE.mkdir(exist_ok=True)
+    path = CACHE / f"ablation-{name}-{REFERENCE_PHOTONS}.npz"
+    if not path.is_file():
+        images = [
+            model.render([ball], RESOLUTION, REFERENCE_PHOTONS, seed=seed, estimator="sppm")
+            for seed in REFERENCE_SEEDS
+        ]
+        seen = images[0].contact_mask
+        np.savez(path, *(image.radiance for image in images), contact=seen)
+    with np.load(path) as kept:
+        one, other, contact = smooth(kept["arr_0"]), smooth(kept["arr_1"]), kept["contact"]
+    truth = (one + other) / 2
+    noise = [((one - other)[mask] ** 2).mean() / 4 for mask in masks(contact, truth)]
+    return truth, np.array(noise)
+
+
+def changes(rows: dict[str, dict[str, float]], what: str) -> dict[str, float]:
+    """What the lack of something adds to each error and time, relative to having it."""
+    with_it, without = rows["nothing"], rows[what]
+    return {
+        key: without[key] / with_it[key] - 1
+        for key in (*ERRORS, *TIMES)
+        if key in without and with_it[key] > 0
+    }
+
+
+def table(found: dict[str, Any]) -> str:
+    """The results as Markdown."""
+    lines = [
+        "# What each refinement of the optics brings", "",
+        "Written by `python -m benchmarks.ablation`; do not edit.", "",
+        f"One thing at a time is switched off, at {RESOLUTION[0]}x{RESOLUTION[1]} with "
+        f"{PHOTONS:,} photons, a ball of radius {RADIUS} mm pressed in by {DEPTH} mm, and "
+        f"coatings of specularity {COATINGS['diffuse']:g} (diffuse) and {COATINGS['metallic']:g} "
+        f"(metallic). Errors are RMS differences from progressive photon mapping with "
+        f"{2 * REFERENCE_PHOTONS / 1e6:g} million photons, over squares of {BOX} pixels, relative "
+        "to the mean, the reference's own noise taken off; bias is that of the mean. Seconds are "
+        "those of the processor, all threads: of an image with its pilot pass and light, and of a "
+        "further image in light that is there.", "",
+        "## The largest effect of each", "",
+        "What its lack adds to the error or the time, in the case where it adds most of those that "
+        "were measured.", "",
+        "| switched off | error in the contact | error elsewhere | seconds, new light "
+        "| seconds, light kept |", "|---|---|---|---|---|",
+    ]  # fmt: skip
+    names = list(dict.fromkeys(what for case in found.values() for what in case["rows"]))
+    for what in names:
+        cells = []
+        for key in (*ERRORS, *TIMES):
+            known = [
+                (changes(case["rows"], what)[key], name)
+                for name, case in found.items()
+                if {what, "nothing"} <= set(case["rows"]) and key in changes(case["rows"], what)
+            ]
+            most = max(known, default=None)
+            cells.append("" if most is None else f"{100 * most[0]:+.0f} % ({most[1]})")
+        if what != "nothing":
+            lines.append(f"| {what} | " + " | ".join(cells) + " |")
+    for name, case in found.items():
+        lines += ["", f"## {name}", "",
+                  "| switched off | error in the contact | error elsewhere | bias in the contact "
+                  "| bias elsewhere | seconds, new light | seconds, light kept |",
+                  "|---|---|---|---|---|---|---|"]  # fmt: skip
+        for what, row in case["rows"].items():
+            cells = [f"{100 * row[key]:.2f} %" for key in ERRORS]
+            cells += [f"{100 * row[key]:+.2f} %" for key in ("bias_in_contact", "bias_elsewhere")]
+            cells += [f"{row[key]:.2f}" if key in row else "" for key in TIMES]
+            lines.append(f"| {what} | " + " | ".join(cells) + " |")
+        about = case["machine"]
+        busy = f"; the machine was busy (load {about['load_at_start']})" if about["busy"] else ""
+        lines += ["", f"{about['date']}, {about['processor']}, {about['cores']} cores{busy}"]
+    return "\n".join(lines) + "\n"
+
+
+if __name__ == "__main__":
+    main()
