@@ -23,7 +23,13 @@ from optisense.objectives.usual_score import UsualScore, UsualTrials, usual_scor
 from optisense.search.evaluation.models import ModelKeeper
 from optisense.search.evaluation.outcome import Outcome
 from optisense.search.evaluation.views import SameMirrors, least_skin, may_change_view
-from optisense.search.space.buildable import BentPartsRest, LightsRest, PartsRest, SolidsStay
+from optisense.search.space.buildable import (
+    BentPartsRest,
+    LightsRest,
+    PartsRest,
+    SolidsStay,
+    StaysInSize,
+)
 from optisense.search.space.constraints import Constraint, PartsApart, Unfolded, why_forbidden
 from optisense.search.space.rigid_moves import PartShift, PartTurn
 from optisense.search.space.search_space import BoundSpace
@@ -224,8 +230,11 @@ class DesignEvaluator:
         design, names, moved = self.space.design, self.space.names, moved_parts(self.space)
         if apart and moved:
             self.kept += [PartsRest(design, moved), LightsRest(design, moved)]
-        if apart and any(name.startswith("cages.") for name in names):
+        bends = any(name.startswith("cages.") for name in names)
+        if apart and bends:
             self.kept.append(BentPartsRest(design))
+        if apart and (moved or bends):
+            self.kept.append(StaysInSize(design))
         if any(name.startswith("materials.") for name in names):
             self.kept.append(SolidsStay(design))
         if self.renders and may_change_view(names) and design.parts_of(Role.MIRROR):

@@ -40,6 +40,11 @@ LIGHT_SEAT = 0.1
 0.01 mm off their boards, and 0.2 mm or more off the transparent parts into which they shine."""
 
 
+REACH_OUT = 0.25
+"""Part of the sensor's largest side by which a search may make it larger on each side: the model of
+a GelSight Mini, 28 mm long, may grow by 7 mm. A larger sensor starts from a larger design."""
+
+
 class PartsRest:
     """Parts that rest on one another must go on doing so where a search shifts or turns them.
 
@@ -194,6 +199,39 @@ class BentPartsRest:
             if problem.where not in self._always:
                 return problem.message
         return None
+
+
+class StaysInSize:
+    """Parts that a search bends or moves may not reach far beyond the sensor that it starts from.
+
+    A gel that is drawn out to three times its width scores a little better and fits no housing.
+    """
+
+    def __init__(self, design: SensorDesign) -> None:
+        """Look at the design that the search starts from."""
+        self._names = [
+            name for name, part in design.parts.items() if part.role is not Role.INDENTER
+        ]
+        bounds = self._bounds(design)
+        lower = np.min([each[0] for each in bounds.values()], axis=0)
+        upper = np.max([each[1] for each in bounds.values()], axis=0)
+        self._most = REACH_OUT * float((upper - lower).max())
+        self._lower, self._upper = lower - self._most, upper + self._most
+
+    def __call__(self, design: SensorDesign) -> str | None:
+        """Which part reaches too far, or None."""
+        for name, (lower, upper) in self._bounds(design).items():
+            if (lower < self._lower).any() or (upper > self._upper).any():
+                out = float(np.maximum(self._lower - lower, upper - self._upper).max())
+                return (
+                    f"part '{name}' reaches {out + self._most:.1f} mm beyond the sensor that the "
+                    f"search starts from; {self._most:.1f} mm is the most"
+                )
+        return None
+
+    def _bounds(self, design: SensorDesign) -> dict[str, NDArray[np.float64]]:
+        meshes = design.deformed_meshes()
+        return {name: meshes[name].bounds for name in self._names if name in meshes}
 
 
 class SolidsStay:
