@@ -128,7 +128,8 @@ def search(
         bool,
         typer.Option(
             "--may-cross",
-            help="Let parts cut through one another, and leave those on which they rest.",
+            help="Let parts cut through one another, leave those on which they rest, and "
+            "outgrow the sensor.",
         ),
     ] = False,
     error: Annotated[

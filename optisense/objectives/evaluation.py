@@ -15,9 +15,10 @@ from optisense.design import SensorDesign
 from optisense.design.camera_checks import camera_fault
 from optisense.design.material_checks import index_problems
 from optisense.design.problems import Diagnostic
-from optisense.design.responses import USUAL_RESPONSE, CameraResponse
 from optisense.errors import ObjectiveError, OptiSenseError
-from optisense.geometry import Contact, SensingSurface, Sphere, locate
+from optisense.geometry import Contact, Sphere
+from optisense.objectives.exposure import exposure_for
+from optisense.objectives.frames import frame_of, nearest_press
 from optisense.objectives.press import Press
 from optisense.objectives.settings import VIEW_ACROSS, Settings, size_for
 from optisense.objectives.view import View, view_of
@@ -30,7 +31,6 @@ _T = TypeVar("_T")
 
 ProgressCallback = Callable[[float, str], None]
 """Called with the finished fraction (0 to 1) of the work and a few words on what is being done."""
-"""Called with a fraction 0..1 of the rendering that is done, and with what is being done."""
 
 Reads = Callable[[Press], NDArray[np.float64]]
 """The pixels (h, w) of a press, not exposed, that objectives read: 1 one by one, less where a part
@@ -39,10 +39,6 @@ of the camera samples will do."""
 
 GAP = 0.5
 """mm that must be free between contacts which share an image."""
-
-MOST_SATURATED = 0.02
-"""Automatic exposure lets so many of a contact's pixels be overexposed: a person who sets up a
-shiny sensor turns the exposure down until the highlights on what is pressed in are small."""
 
 
 class Evaluation:
@@ -206,7 +202,7 @@ class Evaluation:
         contacts, surface = self.contacts, self.model.surface
         before = self.model.chief_rays(self.resolution).normals
         dark = np.broadcast_to(np.float32(0.0), before.shape)
-        frames = [_frame(contact, surface) for contact in contacts]
+        frames = [frame_of(contact, surface) for contact in contacts]
         together = self.settings.together and self._are_apart([each["place"] for each in frames])
         groups = [contacts] if together else [[contact] for contact in contacts]
         part = (1.0 - self._first_image) / len(groups)
@@ -214,7 +210,7 @@ class Evaluation:
         def press_of(number: int, seen: ChiefRays | TactileImage) -> Press:
             mask = seen.contact_mask
             if together:
-                mask = mask & (_nearest(seen.points, mask, frames) == number)
+                mask = mask & (nearest_press(seen.points, mask, frames) == number)
             return Press(
                 number=number + 1,
                 mask=mask,
@@ -385,48 +381,6 @@ def _radiance(image: TactileImage, where: NDArray[np.bool_]) -> NDArray[np.float
     return total
 
 
-def exposure_for(
-    untouched: NDArray[np.float32],
-    contacts: Iterable[NDArray[np.float32]],
-    response: CameraResponse = USUAL_RESPONSE,
-) -> float:
-    """The factor from radiance to what the camera reads that suits a sensor and its contacts.
-
-    The untouched sensor is exposed well (`auto_exposure`), unless more than `MOST_SATURATED` of
-    the pixels of a contact would be overexposed; then as little less as is needed.
-
-    Args:
-        untouched: (h, w, 3) radiance.
-        contacts: (n, 3) radiance of the pixels of each contact.
-        response: of the camera.
-    """
-    exposure = response.auto_exposure(untouched)
-    for radiance in contacts:
-        brightest = radiance.max(axis=1)
-        kept = min(len(brightest) - 1, int((1.0 - MOST_SATURATED) * len(brightest)))
-        level = float(np.partition(brightest, kept)[kept])
-        if level * exposure > response.full_level():
-            exposure = response.full_level() / level
-    return exposure
-
-
-def _frame(contact: Contact, surface: SensingSurface) -> dict[str, Any]:
-    """Where a press sits: place, inward normal, compass directions, the ball's centre."""
-    assert isinstance(contact.indenter, Sphere)
-    spot = locate(contact, surface)
-    east = surface.u_axis - (surface.u_axis @ spot.inward) * spot.inward
-    if np.linalg.norm(east) < 1e-6:  # the surface has turned by 90 degrees since the origin
-        east = np.cross(surface.v_axis, spot.inward)
-    east = east / np.linalg.norm(east)
-    return {
-        "place": spot.point,
-        "inward": spot.inward,
-        "east": east,
-        "north": np.cross(spot.inward, east),
-        "centre": spot.point + (contact.depth - contact.indenter.radius) * spot.inward,
-    }
-
-
 def _around(mask: NDArray[np.bool_], reach: int) -> tuple[slice, slice]:
     """Rows and columns of a mask's true pixels and of those within `reach` of them."""
     rows, columns = (np.flatnonzero(mask.any(axis=axis)) for axis in (1, 0))
@@ -434,16 +388,3 @@ def _around(mask: NDArray[np.bool_], reach: int) -> tuple[slice, slice]:
         slice(max(0, rows[0] - reach), rows[-1] + 1 + reach),
         slice(max(0, columns[0] - reach), columns[-1] + 1 + reach),
     )
-
-
-def _nearest(
-    points: NDArray[np.float32],
-    mask: NDArray[np.bool_],
-    frames: Sequence[dict[str, Any]],
-) -> NDArray[np.int64]:
-    """(h, w): the press whose centre is nearest to what a pixel of the mask sees, else -1."""
-    centres = np.array([frame["centre"] for frame in frames])
-    owner = np.full(mask.shape, -1, dtype=np.int64)
-    seen = points[mask].astype(np.float64)
-    owner[mask] = np.linalg.norm(seen[:, None] - centres, axis=2).argmin(axis=1)
-    return owner

@@ -16,7 +16,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from optisense.design.responses import CameraResponse
 from optisense.errors import ObjectiveError
-from optisense.objectives.evaluation import Evaluation, exposure_for
+from optisense.objectives.evaluation import Evaluation
+from optisense.objectives.exposure import exposure_for
 from optisense.objectives.press import Press
 
 if TYPE_CHECKING:

@@ -54,7 +54,7 @@ class Settings:
         places: (u, v) on the sensing surface; nine that cover it evenly if None.
         together: press at all places in one image, where contacts do not overlap.
         exposure: factor on the radiance; "auto" exposes the untouched sensor well and keeps that,
-            or less where contacts would be overexposed (`evaluation.exposure_for`).
+            or less where contacts would be overexposed (`exposure.exposure_for`).
         least_skin: share of the sensing surface's area that the camera must see, 0 to 1, or there
             is no score.
         least_picture: share of the pixels that must see the sensing surface, 0 to 1.

@@ -16,7 +16,7 @@ import numpy as np
 from optisense.errors import RenderError
 from optisense.geometry import Contact
 from optisense.optics.backend.interrupts import lets_ctrl_c_through
-from optisense.optics.backend.stages import Stage, TellStage, fraction_done
+from optisense.optics.backend.stages import Stage, StageCallback, fraction_done
 from optisense.optics.backend.versions import versions
 from optisense.optics.camera.projection import RayCamera
 from optisense.optics.estimators import ESTIMATORS, RADIANCE_CACHE, SPPM
@@ -174,7 +174,7 @@ class OpticalModel(RayModel):
 
         listener = progress or self.listener
 
-        def tell(stage: Stage, part: float, traced: int, reached: float | None) -> None:
+        def on_stage(stage: Stage, part: float, traced: int, reached: float | None) -> None:
             if listener is not None:
                 shown = None if reached is None or not np.isfinite(reached) else 100 * reached
                 now = time.perf_counter() - began
@@ -182,7 +182,7 @@ class OpticalModel(RayModel):
                     RenderProgress(stage, part, fraction_done(stage, part), traced, shown, now)
                 )
 
-        tell(Stage.PREPARING, 0.0, 0, None)
+        on_stage(Stage.PREPARING, 0.0, 0, None)
         camera = self.camera(resolution)
         scenes = self._scenes(contacts)
         rays = trace_chief_rays(scenes.full, camera)
@@ -191,17 +191,17 @@ class OpticalModel(RayModel):
         built = time.perf_counter()
 
         if estimator == SPPM:
-            layers = self._render_sppm(scenes, camera, rays, number, seconds, seed, began, tell)
+            layers = self._render_sppm(scenes, camera, rays, number, seconds, seed, began, on_stage)
         else:
             target = None if noise is None else noise / 100
             wanted = number
             if number is None and noise is None and seconds is None:
                 wanted = PICTURE_PHOTONS
             field = self._store.field(
-                seed, wanted, target, seconds, MAX_PHOTONS, began, tell, partial
+                seed, wanted, target, seconds, MAX_PHOTONS, began, on_stage, partial
             )
             lit = time.perf_counter()
-            tell(Stage.SHADING, 1.0, field[0].photons, field[0].noise)
+            on_stage(Stage.SHADING, 1.0, field[0].photons, field[0].noise)
             layers = render_cached(
                 field,
                 scenes,
@@ -216,7 +216,7 @@ class OpticalModel(RayModel):
             )
             layers.light_seconds = lit - built
         ended = time.perf_counter()
-        tell(Stage.DONE, 1.0, layers.photons, layers.noise)
+        on_stage(Stage.DONE, 1.0, layers.photons, layers.noise)
         units = dict(zip(self.groups, layers.radiance, strict=True))
         image = TactileImage(
             layers={
@@ -263,7 +263,7 @@ class OpticalModel(RayModel):
         seconds: float | None,
         seed: int,
         began: float,
-        tell: TellStage,
+        on_stage: StageCallback,
     ) -> ImageLayers:
         from optisense.optics.imaging.sppm import render_sppm
 
@@ -272,7 +272,7 @@ class OpticalModel(RayModel):
         passes = max(1, -(-(photons or 16 * SCORE_PHOTONS) // emitted))
 
         def stop(done: int) -> bool:
-            tell(Stage.PHOTONS, done / passes, done * emitted, None)
+            on_stage(Stage.PHOTONS, done / passes, done * emitted, None)
             return seconds is not None and time.perf_counter() - began > seconds
 
         result = render_sppm(

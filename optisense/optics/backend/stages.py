@@ -17,7 +17,7 @@ class Stage(Enum):
     DONE = "done"
 
 
-TellStage = Callable[[Stage, float, int, float | None], None]
+StageCallback = Callable[[Stage, float, int, float | None], None]
 """Called with the stage, the part of the photons that is traced (0 to 1), their number, and the
 relative noise if it is known."""
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from optisense.optics.backend.sequences import seed_of
-from optisense.optics.backend.stages import Stage, TellStage
+from optisense.optics.backend.stages import Stage, StageCallback
 from optisense.optics.radiance_cache.cache import BINS, CacheTally, RadianceCache
 from optisense.optics.radiance_cache.pilot_photons import PilotPhotons
 from optisense.optics.radiance_cache.smoothing import Kernels
@@ -246,7 +246,7 @@ class CacheStore:
         seconds: float | None,
         most: int,
         began: float,
-        tell: TellStage,
+        on_stage: StageCallback,
         partial: bool = True,
     ) -> tuple[RadianceCache, bool]:
         """The cache after ``photons``, or once ``noise`` or ``seconds`` are reached.
@@ -258,7 +258,7 @@ class CacheStore:
             seconds: since ``began``; None for no such limit.
             most: number of photons at which tracing ends in any case.
             began: start of the render (`time.perf_counter`).
-            tell: called when a stage begins and after each pass; see `TellStage`.
+            on_stage: called when a stage begins and after each pass; see `StageCallback`.
             partial: whether Ctrl-C after the first pass ends the tracing; else it is raised.
 
         Returns:
@@ -276,7 +276,7 @@ class CacheStore:
             if done is not None:
                 return done, False
         if self._guide is None:
-            tell(Stage.PILOT, 0.0, 0, None)
+            on_stage(Stage.PILOT, 0.0, 0, None)
         running = self._running.get(key)
         # Only a number of photons is reached in the same way from those that are there already.
         timed = noise is not None or seconds is not None
@@ -297,7 +297,7 @@ class CacheStore:
         check, reached, interrupted = 1, None, False
         if tally.passes < limit:
             self.guide  # noqa: B018  learned before photons are counted
-            tell(Stage.PHOTONS, 0.0, tally.photons, None)
+            on_stage(Stage.PHOTONS, 0.0, tally.photons, None)
         try:
             while tally.passes < limit:
                 started = time.perf_counter()
@@ -329,7 +329,7 @@ class CacheStore:
                     fraction = max(fraction, min(0.95, (now - began) / seconds))
                     if now - began + (now - started) > 0.8 * seconds:
                         break
-                tell(Stage.PHOTONS, fraction, tally.photons, reached)
+                on_stage(Stage.PHOTONS, fraction, tally.photons, reached)
         except KeyboardInterrupt:
             self._running.clear()  # the last pass may be there in part
             if tally.passes < 1 or not partial:
@@ -337,7 +337,7 @@ class CacheStore:
             interrupted = True
         name = (*key, tally.passes)
         if interrupted or name not in self._done:
-            tell(Stage.SMOOTHING, 1.0, tally.photons, reached)
+            on_stage(Stage.SMOOTHING, 1.0, tally.photons, reached)
             light = tally.smoothed()
             if interrupted:
                 return light, True

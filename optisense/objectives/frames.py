@@ -1,0 +1,41 @@
+"""Where presses sit: the frame of each, and which press a pixel belongs to."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from optisense.geometry import Contact, SensingSurface, Sphere, locate
+
+
+def frame_of(contact: Contact, surface: SensingSurface) -> dict[str, Any]:
+    """Where a press sits: place, inward normal, compass directions, the ball's centre."""
+    assert isinstance(contact.indenter, Sphere)
+    spot = locate(contact, surface)
+    east = surface.u_axis - (surface.u_axis @ spot.inward) * spot.inward
+    if np.linalg.norm(east) < 1e-6:  # the surface has turned by 90 degrees since the origin
+        east = np.cross(surface.v_axis, spot.inward)
+    east = east / np.linalg.norm(east)
+    return {
+        "place": spot.point,
+        "inward": spot.inward,
+        "east": east,
+        "north": np.cross(spot.inward, east),
+        "centre": spot.point + (contact.depth - contact.indenter.radius) * spot.inward,
+    }
+
+
+def nearest_press(
+    points: NDArray[np.float32],
+    mask: NDArray[np.bool_],
+    frames: Sequence[dict[str, Any]],
+) -> NDArray[np.int64]:
+    """(h, w): the press whose centre is nearest to what a pixel of the mask sees, else -1."""
+    centres = np.array([frame["centre"] for frame in frames])
+    owner = np.full(mask.shape, -1, dtype=np.int64)
+    seen = points[mask].astype(np.float64)
+    owner[mask] = np.linalg.norm(seen[:, None] - centres, axis=2).argmin(axis=1)
+    return owner
