@@ -46,6 +46,9 @@ if ! has_llvm; then
     fi
 fi
 has_atomic || [ "$can_install" = no ] || apt_install libatomic1 || true
+# Open CASCADE, which reads and writes STEP files, links to libGL; all else works without it.
+has_gl() { probe 'import ctypes, sys; sys.platform != "linux" or ctypes.CDLL("libGL.so.1")'; }
+has_gl || [ "$can_install" = no ] || apt_install libgl1 || true
 
 # --- what could not be installed, and comes another way or not at all ----------------------------
 scratch=$(mktemp -d)

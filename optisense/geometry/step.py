@@ -6,6 +6,7 @@ calls used are the same in the releases of Open CASCADE from 7.8 to 8.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -43,6 +44,30 @@ class StepBody:
     solid: bool
 
 
+def no_step(error: ImportError, action: str, instead: str, where: Path | None = None) -> SetupError:
+    """What to say where Open CASCADE can't be imported.
+
+    Args:
+        error: of the import.
+        action: "reading" or "writing".
+        instead: what a user can do without it.
+        where: the file.
+    """
+    place = None if where is None else str(where)
+    library = re.match(r"(lib[^:]*\.so[^:]*):", str(error))
+    if library:
+        return SetupError(
+            f"{action} STEP files needs {library[1]}, which this system lacks",
+            where=place,
+            hint=f"On Debian and Ubuntu: sudo apt-get install libgl1. Or {instead}",
+        )
+    return SetupError(
+        f"{action} STEP files needs the extra 'step', which is not installed",
+        where=place,
+        hint=f"pip install 'optisense[step]', or {instead}",
+    )
+
+
 def read_step(path: str | Path) -> list[StepBody]:
     """All bodies of a STEP file, in its order, each where its assembly puts it.
 
@@ -57,11 +82,7 @@ def read_step(path: str | Path) -> list[StepBody]:
         from OCP.TDocStd import TDocStd_Document
         from OCP.XCAFDoc import XCAFDoc_DocumentTool
     except ImportError as error:
-        raise SetupError(
-            "reading STEP files needs the extra 'step', which is not installed",
-            where=str(path),
-            hint="pip install 'optisense[step]', or export STL files from the CAD tool",
-        ) from error
+        raise no_step(error, "reading", "export STL files from the CAD tool", path) from error
     if not path.is_file():
         raise MeshError("there is no such file", where=str(path), hint="check the path")
     quiet()

@@ -12,10 +12,11 @@ from typing import Any
 
 import numpy as np
 
-from optisense.errors import OutputError, SetupError
+from optisense.errors import OutputError
 from optisense.geometry import TriangleMesh
 from optisense.geometry.containment import inside
 from optisense.geometry.patches import patches
+from optisense.geometry.step import no_step
 from optisense.workshop.shapes import Shape
 
 
@@ -28,10 +29,7 @@ def require_step() -> None:
     try:
         import OCP.STEPCAFControl  # noqa: F401
     except ImportError as error:
-        raise SetupError(
-            "writing STEP files needs the extra 'step', which is not installed",
-            hint="pip install 'optisense[step]', or export STL, OBJ or 3MF files",
-        ) from error
+        raise no_step(error, "writing", "export STL, OBJ or 3MF files") from error
 
 
 def write_step(path: Path, shapes: Sequence[Shape]) -> None:

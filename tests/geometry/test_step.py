@@ -2,20 +2,16 @@
 
 from __future__ import annotations
 
-import importlib.util
 import sys
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from step_extra import needs_step
 
 from optisense.errors import MeshError, SetupError
-from optisense.geometry.step import read_step
-
-needs_extra = pytest.mark.skipif(
-    importlib.util.find_spec("OCP") is None, reason="the extra 'step' is not installed"
-)
+from optisense.geometry.step import no_step, read_step
 
 
 def write_step(path: Path, parts: dict[str, tuple[Any, float]], unit: str = "MM") -> Path:
@@ -58,7 +54,7 @@ def box_and_ball() -> dict[str, tuple[Any, float]]:
     }
 
 
-@needs_extra
+@needs_step
 @pytest.mark.parametrize("unit", ["MM", "INCH", "M"])
 def test_solids_come_in_millimetres_at_their_places(tmp_path: Path, unit: str) -> None:
     gel, ball = read_step(write_step(tmp_path / "sensor.step", box_and_ball(), unit))
@@ -71,14 +67,14 @@ def test_solids_come_in_millimetres_at_their_places(tmp_path: Path, unit: str) -
     assert radius == pytest.approx(3.0, abs=1e-5)
 
 
-@needs_extra
+@needs_step
 def test_triangles_stay_near_the_exact_surface(tmp_path: Path) -> None:
     ball = read_step(write_step(tmp_path / "sensor.step", box_and_ball()))[1].mesh
     depth = 3.0 - np.linalg.norm(ball.triangles.mean(axis=1) - [20, 0, 0], axis=1)
     assert depth.max() < 0.006
 
 
-@needs_extra
+@needs_step
 def test_a_surface_without_a_solid_is_an_open_body(tmp_path: Path) -> None:
     from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeFace
     from OCP.gp import gp_Pln
@@ -89,7 +85,7 @@ def test_a_surface_without_a_solid_is_an_open_body(tmp_path: Path) -> None:
     assert sheet.mesh.area == pytest.approx(8.0)
 
 
-@needs_extra
+@needs_step
 def test_parts_used_twice_get_numbers(tmp_path: Path) -> None:
     from OCP.BRepPrimAPI import BRepPrimAPI_MakeBox
 
@@ -108,7 +104,7 @@ def test_parts_used_twice_get_numbers(tmp_path: Path) -> None:
     assert [body.name for body in bodies] == ["led", "led-2"]
 
 
-@needs_extra
+@needs_step
 def test_what_is_no_step_file_is_told(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     file = tmp_path / "bad.step"
     file.write_text("solid ascii\nendsolid\n")
@@ -127,3 +123,9 @@ def test_without_the_extra_its_name_is_told(
     with pytest.raises(SetupError) as error:
         read_step(tmp_path / "sensor.step")
     assert "optisense[step]" in (error.value.hint or "")
+
+
+def test_a_system_without_libgl_is_told_from_a_missing_extra() -> None:
+    lacking = ImportError("libGL.so.1: cannot open shared object file: No such file or directory")
+    assert "libgl1" in str(no_step(lacking, "reading", "export STL files"))
+    assert "optisense[step]" in str(no_step(ImportError("No module named 'OCP'"), "reading", "x"))

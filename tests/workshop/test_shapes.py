@@ -9,6 +9,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pytest
+from step_extra import needs_step
 
 from optisense import sensors
 from optisense.design import Part, Point, Role, SensorDesign
@@ -126,8 +127,8 @@ def test_names_that_xml_would_stumble_over(flat: SensorDesign, tmp_path: Path) -
     assert set(objects(file)) == set(design.parts)
 
 
+@needs_step
 def test_a_step_file_reads_back(tmp_path: Path) -> None:
-    pytest.importorskip("OCP", reason="the extra 'step' is not installed")
     from optisense.geometry.step import read_step
 
     dome = sensors.gelsight_mini(tessellation=2.5)
@@ -165,8 +166,8 @@ def test_bodies_keep_their_cavities() -> None:
     assert volumes == [[1.0], [1.0], [27.0, -8.0]]
 
 
+@needs_step
 def test_a_part_of_several_bodies_as_a_step_file(tmp_path: Path) -> None:
-    pytest.importorskip("OCP", reason="the extra 'step' is not installed")
     from optisense.geometry.step import read_step
 
     mesh = hollow_and_apart()

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import importlib.util
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 import trimesh
+from step_extra import needs_step
 
 from optisense import load
 from optisense.design import Role, SensorDesign, Status
@@ -233,9 +233,7 @@ def test_an_indenter_is_kept_for_reference(cad: Any) -> None:
     assert any("--contact mesh:" in note for note in made.notes)
 
 
-@pytest.mark.skipif(
-    importlib.util.find_spec("OCP") is None, reason="the extra 'step' is not installed"
-)
+@needs_step
 class TestStep:
     """All parts in one STEP file, exact and in millimetres."""
 
