@@ -93,6 +93,11 @@ class Registry(Generic[T]):
             hint=suggestion(key, self.names(), limit=MOST_SUGGESTED),
         )
 
+    def __contains__(self, name: object) -> bool:
+        """Whether there is a thing of this name; installed packages are asked last."""
+        known = name in self._registered or name in self._homes
+        return known or any(point.name == name for point in entry_points(group=self.group))
+
     def names(self) -> list[str]:
         """All names: first the built-in ones in their order, then all others by the alphabet."""
         offered = {point.name for point in entry_points(group=self.group)}

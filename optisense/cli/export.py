@@ -36,7 +36,7 @@ def export(
     """
     wanted = [name.lower() for name in formats or ["stl"]]
     for name in wanted:
-        if name not in FORMATS.names():
+        if name not in FORMATS:
             raise typer.BadParameter(
                 f"'{name}' is none of {', '.join(FORMATS.names())}", param_hint="--format"
             )

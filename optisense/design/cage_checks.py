@@ -51,7 +51,7 @@ def cage_problems(design: SensorDesign, meshes: Meshes | None = None) -> list[Di
     Raises:
         DesignError: a vertex of a caged part lies outside the cage's box.
     """
-    moved = {name: cage for name, cage in design.cages.items() if _has_moved(cage)}
+    moved = _moved_cages(design)
     if not moved:
         return []
     bent = design.deformed_meshes() if meshes is None else meshes
@@ -78,7 +78,7 @@ def fold_problems(design: SensorDesign) -> list[Diagnostic]:
     Raises:
         DesignError: a vertex of a caged part lies outside the cage's box.
     """
-    moved = {name: cage for name, cage in design.cages.items() if _has_moved(cage)}
+    moved = _moved_cages(design)
     bent = design.deformed_meshes() if moved else {}
     problems: list[Diagnostic] = []
     for cage_name, cage in moved.items():
@@ -95,7 +95,7 @@ def contact_problems(design: SensorDesign) -> list[Diagnostic]:
     Raises:
         DesignError: a vertex of a caged part lies outside the cage's box.
     """
-    moved = {name: cage for name, cage in design.cages.items() if _has_moved(cage)}
+    moved = _moved_cages(design)
     bent = design.deformed_meshes() if moved else {}
     problems: list[Diagnostic] = []
     for cage_name, cage in moved.items():
@@ -137,6 +137,11 @@ def half_caged(design: SensorDesign, meshes: Meshes) -> list[Diagnostic]:
                     )
                 )
     return problems
+
+
+def _moved_cages(design: SensorDesign) -> dict[str, Cage]:
+    """The cages whose points are no longer at rest, by name."""
+    return {name: cage for name, cage in design.cages.items() if _has_moved(cage)}
 
 
 def _has_moved(cage: Cage) -> bool:

@@ -53,7 +53,7 @@ def load(name_or_folder: str | Path) -> SensorDesign:
     if text.startswith(BUILT_IN):
         return build(text.removeprefix(BUILT_IN))
     path = Path(name_or_folder)
-    if isinstance(name_or_folder, str) and text in SENSORS.names():
+    if isinstance(name_or_folder, str) and text in SENSORS:
         if path.is_dir():
             raise DesignError(
                 f"'{text}' is a built-in sensor and also a folder here",

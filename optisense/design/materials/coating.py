@@ -18,7 +18,7 @@ class Coating(CoatingModel):
 
     Seven numbers as in the OptiSense paper (section "Optical material"): reflectance of R, G, B,
     a complex index of R, G, B, and one specularity. How specularity turns into a scattering law
-    is written at `optisense.library.specularity_to_roughness`. A file need not name this kind.
+    is written at `specularity_to_roughness`. A file need not name this kind.
     """
 
     title: ClassVar[str] = "Paint with metal flake"
