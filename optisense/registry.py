@@ -95,6 +95,8 @@ class Registry(Generic[T]):
 
     def __contains__(self, name: object) -> bool:
         """Whether there is a thing of this name; installed packages are asked last."""
+        if not isinstance(name, str):  # of a file from a stranger
+            return False
         known = name in self._registered or name in self._homes
         return known or any(point.name == name for point in entry_points(group=self.group))
 

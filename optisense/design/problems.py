@@ -182,7 +182,7 @@ def _fields_at(
         return []
     if issubclass(kind, KindModel) and isinstance(data, dict):
         name = str(data.get("kind", kind.usual_kind))
-        kind = kind.kinds.find(name) if name in kind.kinds.names() else kind
+        kind = kind.kinds.find(name) if name in kind.kinds else kind
     return list(kind.model_fields)
 
 

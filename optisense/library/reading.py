@@ -89,10 +89,10 @@ def kind_of(data: dict[str, Any]) -> Kind | None:
     value = data.get("value")
     if not isinstance(value, dict):
         return None
-    if value.get("kind") in LightModel.kinds.names():
+    if value.get("kind") in LightModel.kinds:
         return "light"
-    if value.get("kind") in Material.kinds.names():
+    if value.get("kind") in Material.kinds:
         return "material"
-    if value.get("kind") in CoatingModel.kinds.names() or "specularity" in value:
+    if value.get("kind") in CoatingModel.kinds or "specularity" in value:
         return "coating"
     return "camera" if "fov" in value or "projection" in value else None
