@@ -7,6 +7,7 @@ imports bpy, numpy and the standard library only.
 
 from __future__ import annotations
 
+from . import registration
 from .engine import catalogue, preferences, session
 from .evaluate import operator as evaluate_operator
 from .evaluate import prop as evaluate_prop
@@ -79,10 +80,10 @@ MODULES = (
 def register() -> None:
     """Add everything to Blender."""
     for each in MODULES:
-        each.register()
+        registration.add(each)
 
 
 def unregister() -> None:
     """Take everything out of Blender again, and end the engine."""
     for each in reversed(MODULES):
-        each.unregister()
+        registration.remove(each)

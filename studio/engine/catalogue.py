@@ -83,8 +83,7 @@ def _keep(name: str, rows: list[dict[str, Any]]) -> None:
     session.redraw()
 
 
-def register() -> None:
-    session.on_start(refresh)
+HOOKS = ((session.when_started, refresh),)
 
 
 def unregister() -> None:

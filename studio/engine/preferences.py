@@ -74,11 +74,6 @@ def _split(told: str) -> list[str]:
 
 
 def register() -> None:
-    bpy.utils.register_class(OPTISENSE_AP_preferences)
     told, own = os.environ.get(ENVIRONMENT, ""), preferences()
     if told and own is not None and own.engine != told:
         own.engine = told  # so that a Blender started without `optisense studio` finds it too
-
-
-def unregister() -> None:
-    bpy.utils.unregister_class(OPTISENSE_AP_preferences)

@@ -9,7 +9,7 @@ from collections.abc import Callable
 from typing import Any
 
 import bpy
-from bpy.props import BoolProperty, FloatProperty, PointerProperty, StringProperty
+from bpy.props import BoolProperty, FloatProperty, StringProperty
 
 from ..core.engine import Answer, Engine, EngineError, Request
 from .preferences import HOW_TO_GET, engine_command
@@ -23,25 +23,16 @@ PATIENCE = 20.0
 _engine: Engine | None = None
 _folder: str | None = None
 _job: Request | None = None
-_each_tick: list[Callable[[], None]] = []
-_each_start: list[Callable[[Engine], None]] = []
-_each_load: list[Callable[[], None]] = []
 _job_goes_on = False
 
+when_ticking: list[Callable[[], None]] = []
+"""Called some twenty times a second while the engine runs."""
 
-def on_tick(work: Callable[[], None]) -> None:
-    """Let something be done some twenty times a second while the engine runs."""
-    _each_tick.append(work)
+when_started: list[Callable[[Engine], None]] = []
+"""Called with every engine that is started, to ask it something."""
 
-
-def on_start(work: Callable[[Engine], None]) -> None:
-    """Let something be asked of every engine that is started."""
-    _each_start.append(work)
-
-
-def on_load(work: Callable[[], None]) -> None:
-    """Let something be done before another .blend file is opened."""
-    _each_load.append(work)
+when_leaving: list[Callable[[], None]] = []
+"""Called before another .blend file is opened."""
 
 
 class OPTISENSE_PG_session(bpy.types.PropertyGroup):
@@ -85,7 +76,7 @@ def engine() -> Engine:
     if _folder is None:
         _folder = tempfile.mkdtemp(prefix="optisense-")
     _engine = Engine(command, _folder)
-    for each in _each_start:
+    for each in when_started:
         each(_engine)
     if not bpy.app.timers.is_registered(_tick):
         bpy.app.timers.register(_tick, first_interval=TICK, persistent=True)
@@ -229,7 +220,7 @@ def _loading(*_: Any) -> None:
         if _engine is not None and not _job_goes_on:
             _engine.cancel(_job)
         _over()
-    for each in _each_load:
+    for each in when_leaving:
         each()
 
 
@@ -307,7 +298,7 @@ def _tick() -> float | None:
     try:
         if _engine.poll():
             redraw()
-        for each in _each_tick:
+        for each in when_ticking:
             each()
     except Exception as error:  # Blender would never call a timer again that raised
         traceback.print_exc()
@@ -320,21 +311,11 @@ def _tick() -> float | None:
     return BRISK if _engine.waiting else TICK
 
 
-def register() -> None:
-    bpy.utils.register_class(OPTISENSE_PG_session)
-    bpy.types.WindowManager.optisense = PointerProperty(
-        type=OPTISENSE_PG_session, options={"SKIP_SAVE"}
-    )
-    bpy.app.handlers.load_pre.append(_loading)
+PROPERTIES = {"WindowManager": {"optisense": OPTISENSE_PG_session}}
+HOOKS = ((bpy.app.handlers.load_pre, _loading),)
 
 
 def unregister() -> None:
-    bpy.app.handlers.load_pre.remove(_loading)
     if bpy.app.timers.is_registered(_tick):
         bpy.app.timers.unregister(_tick)
     stop()
-    _each_tick.clear()
-    _each_start.clear()
-    _each_load.clear()
-    del bpy.types.WindowManager.optisense
-    bpy.utils.unregister_class(OPTISENSE_PG_session)

@@ -160,14 +160,3 @@ class OPTISENSE_OT_hide_rays(bpy.types.Operator):
         rays.clear(context.scene)
         context.window_manager.optisense_evaluation.rays = ""
         return {"FINISHED"}
-
-
-CLASSES = (
-    OPTISENSE_OT_choose_objective,
-    OPTISENSE_OT_evaluate,
-    OPTISENSE_OT_show_figure,
-    OPTISENSE_OT_show_rays,
-    OPTISENSE_OT_hide_rays,
-)
-
-register, unregister = bpy.utils.register_classes_factory(CLASSES)

@@ -7,7 +7,6 @@ from bpy.props import (
     BoolProperty,
     CollectionProperty,
     EnumProperty,
-    PointerProperty,
     StringProperty,
 )
 
@@ -47,15 +46,4 @@ class OPTISENSE_PG_evaluation(bpy.types.PropertyGroup):
     rays: StringProperty(description="What became of the chief rays", options={"SKIP_SAVE"})
 
 
-def register() -> None:
-    bpy.utils.register_class(OPTISENSE_PG_score)
-    bpy.utils.register_class(OPTISENSE_PG_evaluation)
-    bpy.types.WindowManager.optisense_evaluation = PointerProperty(
-        type=OPTISENSE_PG_evaluation, options={"SKIP_SAVE"}
-    )
-
-
-def unregister() -> None:
-    del bpy.types.WindowManager.optisense_evaluation
-    bpy.utils.unregister_class(OPTISENSE_PG_evaluation)
-    bpy.utils.unregister_class(OPTISENSE_PG_score)
+PROPERTIES = {"WindowManager": {"optisense_evaluation": OPTISENSE_PG_evaluation}}

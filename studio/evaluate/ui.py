@@ -69,6 +69,3 @@ def _score(layout: bpy.types.UILayout, score: bpy.types.PropertyGroup) -> None:
         layout.template_icon(icon_value=icon, scale=FIGURE)
     if figures.is_there(score.figure):
         layout.operator("optisense.show_figure", icon="IMAGE_DATA").objective = score.name
-
-
-register, unregister = bpy.utils.register_classes_factory((OPTISENSE_PT_evaluate,))

@@ -93,8 +93,3 @@ class OPTISENSE_OT_export(polls.Asking, ChoosingFile, bpy.types.Operator):
             to=folder,
             formats=formats,
         )
-
-
-CLASSES = (OPTISENSE_OT_report, OPTISENSE_OT_export)
-
-register, unregister = bpy.utils.register_classes_factory(CLASSES)

@@ -28,6 +28,3 @@ class OPTISENSE_PT_export(SidebarPanel, bpy.types.Panel):
             text = f"Open {Path(written).name}"
             row = self.layout.row()
             row.operator("wm.path_open", text=text, icon="URL").filepath = written
-
-
-register, unregister = bpy.utils.register_classes_factory((OPTISENSE_PT_export,))

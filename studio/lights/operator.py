@@ -284,14 +284,3 @@ class OPTISENSE_OT_look_through(bpy.types.Operator):
         context.scene.camera = cameras[0]
         context.space_data.region_3d.view_perspective = "CAMERA"
         return {"FINISHED"}
-
-
-CLASSES = (
-    OPTISENSE_OT_add_light,
-    OPTISENSE_OT_add_camera,
-    OPTISENSE_OT_set_model,
-    OPTISENSE_OT_set_group,
-    OPTISENSE_OT_look_through,
-)
-
-register, unregister = bpy.utils.register_classes_factory(CLASSES)

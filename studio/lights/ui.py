@@ -64,8 +64,3 @@ def _camera(layout: bpy.types.UILayout, camera: bpy.types.PropertyGroup) -> None
     column.prop(camera, "projection")
     column.prop(camera, "fov", text="Field of view (°)")
     column.prop(camera, "pixels")
-
-
-CLASSES = (OPTISENSE_UL_light_groups, OPTISENSE_PT_lights)
-
-register, unregister = bpy.utils.register_classes_factory(CLASSES)

@@ -42,9 +42,4 @@ def _reshaped(scene: bpy.types.Scene, group: bpy.types.PropertyGroup) -> None:
         ask_for_window(scene, group)
 
 
-def register() -> None:
-    properties.when_reshaped.append(_reshaped)
-
-
-def unregister() -> None:
-    properties.when_reshaped.remove(_reshaped)
+HOOKS = ((properties.when_reshaped, _reshaped),)

@@ -86,10 +86,6 @@ def forget(kind: str, name: str) -> None:
     _asked.discard((kind, name))
 
 
-def register() -> None:
-    unregister()
-
-
 def unregister() -> None:
     _files.clear()
     _asked.clear()

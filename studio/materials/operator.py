@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import bpy
-from bpy.props import EnumProperty, PointerProperty, StringProperty
+from bpy.props import EnumProperty, StringProperty
 
 from ..core import schema
 from ..core.engine import EngineError
@@ -235,24 +235,4 @@ class OPTISENSE_OT_keep_material(bpy.types.Operator):
         return {"FINISHED"}
 
 
-CLASSES = (
-    OPTISENSE_PG_material_choice,
-    OPTISENSE_OT_preview_material,
-    OPTISENSE_OT_material_pictures,
-    OPTISENSE_OT_apply_material,
-    OPTISENSE_OT_keep_material,
-)
-
-
-def register() -> None:
-    for each in CLASSES:
-        bpy.utils.register_class(each)
-    bpy.types.WindowManager.optisense_material = PointerProperty(
-        type=OPTISENSE_PG_material_choice, options={"SKIP_SAVE"}
-    )
-
-
-def unregister() -> None:
-    del bpy.types.WindowManager.optisense_material
-    for each in reversed(CLASSES):
-        bpy.utils.unregister_class(each)
+PROPERTIES = {"WindowManager": {"optisense_material": OPTISENSE_PG_material_choice}}

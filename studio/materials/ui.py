@@ -63,6 +63,3 @@ def _part(
         material.draw(column)
     layout.operator("optisense.keep_material", icon="FILE_TICK")
     show_outcome(layout, KEEPING)
-
-
-register, unregister = bpy.utils.register_classes_factory((OPTISENSE_PT_materials,))

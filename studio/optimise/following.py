@@ -127,7 +127,3 @@ def finished(result: dict[str, Any]) -> None:
 
 def unregister() -> None:
     _curve.clear()
-
-
-def register() -> None:
-    _curve.clear()

@@ -89,11 +89,4 @@ def _opened(scene: bpy.types.Scene) -> None:
         offer(scene)
 
 
-def register() -> None:
-    bpy.app.handlers.load_post.append(_loaded)
-    opening.when_opened.append(_opened)
-
-
-def unregister() -> None:
-    bpy.app.handlers.load_post.remove(_loaded)
-    opening.when_opened.remove(_opened)
+HOOKS = ((bpy.app.handlers.load_post, _loaded), (opening.when_opened, _opened))

@@ -266,16 +266,3 @@ class OPTISENSE_OT_keep_variant(_WithStudy, ChoosingFile, bpy.types.Operator):
             study=study_of(context.scene),
             to=str(target),
         )
-
-
-CLASSES = (
-    OPTISENSE_OT_vary,
-    OPTISENSE_MT_vary,
-    OPTISENSE_OT_vary_remove,
-    OPTISENSE_OT_search,
-    OPTISENSE_OT_resume,
-    OPTISENSE_OT_apply_best,
-    OPTISENSE_OT_keep_variant,
-)
-
-register, unregister = bpy.utils.register_classes_factory(CLASSES)

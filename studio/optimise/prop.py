@@ -8,7 +8,6 @@ from bpy.props import (
     CollectionProperty,
     EnumProperty,
     IntProperty,
-    PointerProperty,
     StringProperty,
 )
 
@@ -106,20 +105,7 @@ class OPTISENSE_PG_found(bpy.types.PropertyGroup):
     offer: StringProperty(description="What a study waits for", options={"SKIP_SAVE"})
 
 
-CLASSES = (OPTISENSE_PG_vary, OPTISENSE_PG_search, OPTISENSE_PG_found)
-
-
-def register() -> None:
-    for each in CLASSES:
-        bpy.utils.register_class(each)
-    bpy.types.Scene.optisense_search = PointerProperty(type=OPTISENSE_PG_search)
-    bpy.types.WindowManager.optisense_found = PointerProperty(
-        type=OPTISENSE_PG_found, options={"SKIP_SAVE"}
-    )
-
-
-def unregister() -> None:
-    del bpy.types.WindowManager.optisense_found
-    del bpy.types.Scene.optisense_search
-    for each in reversed(CLASSES):
-        bpy.utils.unregister_class(each)
+PROPERTIES = {
+    "Scene": {"optisense_search": OPTISENSE_PG_search},
+    "WindowManager": {"optisense_found": OPTISENSE_PG_found},
+}

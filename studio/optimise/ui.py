@@ -71,8 +71,3 @@ class OPTISENSE_PT_optimise(SidebarPanel, bpy.types.Panel):
             row.operator("optisense.apply_best", icon="CHECKMARK")
             row.operator("optisense.keep_variant", icon="DUPLICATE")
         show_outcome(layout, "Applying")
-
-
-CLASSES = (OPTISENSE_UL_vary, OPTISENSE_PT_optimise)
-
-register, unregister = bpy.utils.register_classes_factory(CLASSES)

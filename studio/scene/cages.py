@@ -210,14 +210,12 @@ def _undone(*_: Any) -> None:
         follow(bpy.context.scene, cage)
 
 
-def register() -> None:
-    bpy.app.handlers.depsgraph_update_post.append(_moved)
-    bpy.app.handlers.undo_post.append(_undone)
-    bpy.app.handlers.redo_post.append(_undone)
+HOOKS = (
+    (bpy.app.handlers.depsgraph_update_post, _moved),
+    (bpy.app.handlers.undo_post, _undone),
+    (bpy.app.handlers.redo_post, _undone),
+)
 
 
 def unregister() -> None:
-    bpy.app.handlers.depsgraph_update_post.remove(_moved)
-    bpy.app.handlers.undo_post.remove(_undone)
-    bpy.app.handlers.redo_post.remove(_undone)
     _weights.clear()

@@ -295,8 +295,3 @@ def kind_menu(noun: str, first: Items = ()) -> Any:
         owner.become(items(owner, None)[chosen][0])
 
     return {"items": items, "get": number, "set": choose}
-
-
-CLASSES = (OPTISENSE_PG_field, OPTISENSE_OT_reset_field)
-
-register, unregister = bpy.utils.register_classes_factory(CLASSES)

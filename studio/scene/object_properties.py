@@ -137,11 +137,4 @@ class OPTISENSE_PG_object(bpy.types.PropertyGroup):
     )
 
 
-def register() -> None:
-    bpy.utils.register_class(OPTISENSE_PG_object)
-    bpy.types.Object.optisense = PointerProperty(type=OPTISENSE_PG_object)
-
-
-def unregister() -> None:
-    del bpy.types.Object.optisense
-    bpy.utils.unregister_class(OPTISENSE_PG_object)
+PROPERTIES = {"Object": {"optisense": OPTISENSE_PG_object}}

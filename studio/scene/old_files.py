@@ -65,9 +65,4 @@ def _loaded(*_: Any) -> None:
         bring_up_to_date(scene)
 
 
-def register() -> None:
-    bpy.app.handlers.load_post.append(_loaded)
-
-
-def unregister() -> None:
-    bpy.app.handlers.load_post.remove(_loaded)
+HOOKS = ((bpy.app.handlers.load_post, _loaded),)

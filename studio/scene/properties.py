@@ -126,21 +126,4 @@ class OPTISENSE_PG_design(bpy.types.PropertyGroup):
         return bool(self.document)
 
 
-CLASSES = (
-    OPTISENSE_PG_coating,
-    OPTISENSE_PG_material,
-    OPTISENSE_PG_light_group,
-    OPTISENSE_PG_design,
-)
-
-
-def register() -> None:
-    for each in CLASSES:
-        bpy.utils.register_class(each)
-    bpy.types.Scene.optisense = PointerProperty(type=OPTISENSE_PG_design)
-
-
-def unregister() -> None:
-    del bpy.types.Scene.optisense
-    for each in reversed(CLASSES):
-        bpy.utils.unregister_class(each)
+PROPERTIES = {"Scene": {"optisense": OPTISENSE_PG_design}}

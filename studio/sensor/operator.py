@@ -191,17 +191,3 @@ class OPTISENSE_OT_cancel(bpy.types.Operator):
     def execute(self, context: bpy.types.Context) -> set[str]:
         session.cancel_job()
         return {"FINISHED"}
-
-
-CLASSES = (
-    OPTISENSE_OT_new,
-    OPTISENSE_MT_new,
-    OPTISENSE_OT_open,
-    OPTISENSE_OT_save,
-    OPTISENSE_OT_save_as,
-    OPTISENSE_OT_check,
-    OPTISENSE_OT_start_engine,
-    OPTISENSE_OT_cancel,
-)
-
-register, unregister = bpy.utils.register_classes_factory(CLASSES)

@@ -43,13 +43,14 @@ def _loaded(*_: Any) -> None:
         warm_up(scene)
 
 
+HOOKS = ((bpy.app.handlers.load_post, _loaded),)
+
+
 def register() -> None:
-    bpy.app.handlers.load_post.append(_loaded)
     if not bpy.app.background:
         bpy.app.timers.register(_start, first_interval=SOON)
 
 
 def unregister() -> None:
-    bpy.app.handlers.load_post.remove(_loaded)
     if bpy.app.timers.is_registered(_start):
         bpy.app.timers.unregister(_start)

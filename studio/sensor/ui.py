@@ -42,6 +42,3 @@ class OPTISENSE_PT_sensor(SidebarPanel, bpy.types.Panel):
                 layout.operator("optisense.check", icon="CHECKMARK")
         show_job(layout, "Opening the sensor", "Saving")
         show_messages(layout)
-
-
-register, unregister = bpy.utils.register_classes_factory((OPTISENSE_PT_sensor,))

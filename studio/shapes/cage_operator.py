@@ -254,15 +254,3 @@ def active_cage(context: bpy.types.Context) -> tuple[bpy.types.Object, dict[str,
         if cage == active or (active is not None and active.optisense.key in values["parts"]):
             return cage, values
     return None
-
-
-CLASSES = (
-    OPTISENSE_OT_new_cage,
-    OPTISENSE_OT_edit_shape,
-    OPTISENSE_OT_set_bound,
-    OPTISENSE_OT_blend,
-    OPTISENSE_OT_rest_cage,
-    OPTISENSE_OT_remove_cage,
-)
-
-register, unregister = bpy.utils.register_classes_factory(CLASSES)

@@ -56,13 +56,10 @@ def _take(result: dict[str, Any]) -> None:
     session.redraw()
 
 
-def register() -> None:
-    cages.when_bent.append(_wanted)
-    session.on_tick(_look)
+HOOKS = ((cages.when_bent, _wanted), (session.when_ticking, _look))
 
 
 def unregister() -> None:
     global _bent, _open
-    cages.when_bent.remove(_wanted)
     _bent = _open = None
     _found.clear()

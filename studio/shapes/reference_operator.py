@@ -220,13 +220,3 @@ class OPTISENSE_OT_flip(bpy.types.Operator):
                 each.data.flip_normals()
                 each.data.update()
         return {"FINISHED"}
-
-
-CLASSES = (
-    OPTISENSE_OT_add_mesh,
-    OPTISENSE_OT_set_reference,
-    OPTISENSE_OT_remove_part,
-    OPTISENSE_OT_flip,
-)
-
-register, unregister = bpy.utils.register_classes_factory(CLASSES)

@@ -79,6 +79,3 @@ def _cage(layout: bpy.types.UILayout, cage: bpy.types.Object, values: dict) -> N
     row = layout.row(align=True)
     row.operator("optisense.rest_cage", icon="LOOP_BACK")
     row.operator("optisense.remove_cage", text="", icon="X")
-
-
-register, unregister = bpy.utils.register_classes_factory((OPTISENSE_PT_shapes,))

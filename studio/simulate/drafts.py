@@ -116,14 +116,14 @@ def _changed(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
             return
 
 
-def register() -> None:
-    bpy.app.handlers.depsgraph_update_post.append(_changed)
-    session.on_tick(_ask)
-    session.on_load(_leave)
+HOOKS = (
+    (bpy.app.handlers.depsgraph_update_post, _changed),
+    (session.when_ticking, _ask),
+    (session.when_leaving, _leave),
+)
 
 
 def unregister() -> None:
     if bpy.app.timers.is_registered(_soon):
         bpy.app.timers.unregister(_soon)
-    bpy.app.handlers.depsgraph_update_post.remove(_changed)
     _leave()

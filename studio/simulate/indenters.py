@@ -41,11 +41,9 @@ def ask_for_mesh(file: str) -> None:
     session.ask("mesh", known, refused, file=file, role="indenter", name="indenter")
 
 
-def register() -> None:
-    when_file_unknown.append(ask_for_mesh)
+HOOKS = ((when_file_unknown, ask_for_mesh),)
 
 
 def unregister() -> None:
-    when_file_unknown.remove(ask_for_mesh)
     file_meshes.clear()
     _asked.clear()

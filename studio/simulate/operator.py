@@ -223,15 +223,3 @@ class OPTISENSE_OT_clear_contacts(bpy.types.Operator):
         for each in objects_of(context.scene, "CONTACT"):
             bpy.data.objects.remove(each)
         return {"FINISHED"}
-
-
-CLASSES = (
-    OPTISENSE_OT_simulate,
-    OPTISENSE_OT_show_picture,
-    OPTISENSE_OT_add_contact,
-    OPTISENSE_OT_place_contact,
-    OPTISENSE_OT_nine_contacts,
-    OPTISENSE_OT_clear_contacts,
-)
-
-register, unregister = bpy.utils.register_classes_factory(CLASSES)

@@ -8,7 +8,6 @@ from bpy.props import (
     EnumProperty,
     FloatProperty,
     IntProperty,
-    PointerProperty,
     StringProperty,
 )
 
@@ -70,17 +69,7 @@ class OPTISENSE_PG_picture(bpy.types.PropertyGroup):
     file: StringProperty(options={"SKIP_SAVE"})
 
 
-def register() -> None:
-    bpy.utils.register_class(OPTISENSE_PG_simulation)
-    bpy.utils.register_class(OPTISENSE_PG_picture)
-    bpy.types.Scene.optisense_simulation = PointerProperty(type=OPTISENSE_PG_simulation)
-    bpy.types.WindowManager.optisense_picture = PointerProperty(
-        type=OPTISENSE_PG_picture, options={"SKIP_SAVE"}
-    )
-
-
-def unregister() -> None:
-    del bpy.types.WindowManager.optisense_picture
-    del bpy.types.Scene.optisense_simulation
-    bpy.utils.unregister_class(OPTISENSE_PG_picture)
-    bpy.utils.unregister_class(OPTISENSE_PG_simulation)
+PROPERTIES = {
+    "Scene": {"optisense_simulation": OPTISENSE_PG_simulation},
+    "WindowManager": {"optisense_picture": OPTISENSE_PG_picture},
+}

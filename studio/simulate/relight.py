@@ -111,17 +111,15 @@ def _forget(_: Engine) -> None:
     bpy.context.window_manager.optisense_picture.image = ""
 
 
-def register() -> None:
-    session.on_tick(_ask)
-    session.on_start(_forget)
-    session.on_load(_leave)
-    when_relit.append(wanted)
-    bpy.app.handlers.undo_post.append(_undone)
-    bpy.app.handlers.redo_post.append(_undone)
+HOOKS = (
+    (session.when_ticking, _ask),
+    (session.when_started, _forget),
+    (session.when_leaving, _leave),
+    (when_relit, wanted),
+    (bpy.app.handlers.undo_post, _undone),
+    (bpy.app.handlers.redo_post, _undone),
+)
 
 
 def unregister() -> None:
     _leave()
-    when_relit.remove(wanted)
-    bpy.app.handlers.undo_post.remove(_undone)
-    bpy.app.handlers.redo_post.remove(_undone)

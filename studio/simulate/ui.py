@@ -89,6 +89,3 @@ def _light_levels(layout: bpy.types.UILayout, scene: bpy.types.Scene) -> None:
         row.label(text=group.name)
         row.prop(group, "flux", text="")
         row.prop(group, "colour", text="")
-
-
-register, unregister = bpy.utils.register_classes_factory((OPTISENSE_PT_simulate,))
