@@ -19,6 +19,7 @@ import typer
 from rich.console import Console, ConsoleOptions, RenderableType
 from rich.segment import Segment
 
+from optisense.cli.from_options import with_options
 from optisense.errors import OptiSenseError, OutputError, SetupError
 from optisense.text import visible
 
@@ -75,8 +76,10 @@ def say_error(message: str, *, where: str | None = None, hint: str | None = None
         messages.print(f"  try:   {hint}", markup=False)
 
 
-def ends_well(command: Callable[_P, _R]) -> Callable[_P, _R]:
+def ends_well(command: Callable[_P, _R]) -> Callable[..., _R]:
     """Decorate a command so that no error of the user's shows a traceback.
+
+    Its parameters that are models of options become options of the command line.
 
     Exit codes: 2 for bad input, 1 for a failure, 130 for Ctrl-C.
     """
@@ -120,7 +123,7 @@ def ends_well(command: Callable[_P, _R]) -> Callable[_P, _R]:
             _show_traceback()
             raise typer.Exit(EXIT_FAILURE) from None
 
-    return run
+    return with_options(run)
 
 
 def output_error(error: OSError) -> OutputError:

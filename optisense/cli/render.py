@@ -14,13 +14,11 @@ from optisense.cli.options import (
     DesignArgument,
     VariantOption,
     parse_contacts,
-    parse_exposure,
-    parse_resolution,
-    photons_option,
 )
 from optisense.cli.output_folder import take_folder
 from optisense.cli.progress import ProgressLine, about, progress_line
 from optisense.cli.sampling import expect_here
+from optisense.commands.rendering import RenderOptions
 from optisense.quality import PICTURE_PHOTONS
 from optisense.time_left import TimedStep
 from optisense.usual_times import BUILDING as BUILDING_TIME
@@ -41,47 +39,8 @@ def render(
         Path, typer.Option("--out", "-o", metavar="DIR", help="Folder for the results.")
     ],
     contact: ContactOption = None,
-    resolution: Annotated[
-        str | None,
-        typer.Option(
-            metavar="WIDTHxHEIGHT",
-            help="Pixels of the picture, as 320x240. The camera's own when left out.",
-            show_default=False,
-        ),
-    ] = None,
-    photons: Annotated[
-        int | None,
-        photons_option(
-            "Photons to trace: normal, 1 million, when no limit is given.", show_default=False
-        ),
-    ] = None,
-    noise: Annotated[
-        float | None,
-        typer.Option(
-            min=0.01,
-            max=100.0,
-            metavar="PERCENT",
-            help="Stop when the noise has come down to this.",
-            show_default=False,
-        ),
-    ] = None,
-    seconds: Annotated[
-        float | None,
-        typer.Option(min=0.01, metavar="S", help="Stop after this time.", show_default=False),
-    ] = None,
-    seed: Annotated[
-        int,
-        typer.Option(
-            min=0, max=2**32 - 1, metavar="N", help="The same seed gives the same picture."
-        ),
-    ] = 0,
-    exposure: Annotated[
-        str,
-        typer.Option(
-            metavar="auto|VALUE",
-            help="Brightness of the picture: a factor on the radiance, or found by itself.",
-        ),
-    ] = "auto",
+    *,
+    options: RenderOptions,
     variant: VariantOption = "auto",
 ) -> None:
     """Render what the sensor's camera sees, with or without contacts.
@@ -89,14 +48,13 @@ def render(
     Writes image.png, radiance.exr, normals.npy, contact_mask.npy, layers/*.exr, run.json and
     report.html into the folder. Ctrl-C stops early and writes what there is.
     """
-    size = None if resolution is None else parse_resolution(resolution)
-    brightness = parse_exposure(exposure)
-    if noise is not None and seconds is not None:
+    size = options.resolution
+    if options.noise is not None and options.seconds is not None:
         raise typer.BadParameter("give one of them, not both", param_hint="--noise, --seconds")
     contacts = parse_contacts(contact)
 
     with (
-        progress_line(*_steps(UsualTimes.here(), photons, noise, seconds), waits=_waits) as line,
+        progress_line(*_steps(UsualTimes.here(), options), waits=_waits) as line,
         held_interrupt() as interrupt,
     ):
         line.begin(LOADING)
@@ -116,7 +74,7 @@ def render(
         line.begin(BUILDING)
         width, height = size or sensor.camera.resolution
         pixels = width * height
-        expect_here(line, sensor, lambda times: _steps(times, photons, noise, seconds, pixels))
+        expect_here(line, sensor, lambda times: _steps(times, options, pixels))
         model = OpticalModel(sensor, variant=variant)
         interrupt.raise_if_requested()
         told = RenderStages(line)
@@ -129,15 +87,15 @@ def render(
         image = model.render(
             contacts,
             resolution=size,
-            photons=photons if photons or noise or seconds else PICTURE_PHOTONS,
-            noise=noise,
-            seconds=seconds,
-            seed=seed,
+            photons=options.photons_to_trace(),
+            noise=options.noise,
+            seconds=options.seconds,
+            seed=options.seed,
             progress=report_progress,
         )
         line.begin(WRITING)
         image.settings["contacts"] = list(contact or [])
-        image.save(out, brightness)
+        image.save(out, options.exposure)
         real = None
         if has_real_picture(sensor) and not image.interrupted and not interrupt.requested:
             line.say(COMPARING)
@@ -147,7 +105,7 @@ def render(
             sensor,
             image,
             contacts,
-            exposure=brightness,
+            exposure=options.exposure,
             indenters=place_contacts(model, contacts),
             rays=CameraRays.of(model),
             real=real,
@@ -171,16 +129,13 @@ WRITING_TIME = 0.8
 
 
 def _steps(
-    times: UsualTimes,
-    photons: int | None,
-    noise: float | None,
-    seconds: float | None,
-    pixels: int = USUAL_PIXELS,
+    times: UsualTimes, options: RenderOptions, pixels: int = USUAL_PIXELS
 ) -> list[TimedStep]:
     """The steps of a render of so many pixels, and their usual times."""
-    tracing = times.tracing(photons or (NOISE_PHOTONS if noise is not None else PICTURE_PHOTONS))
-    if photons is None and seconds is not None:
-        tracing = max(1.0, seconds - 5.0)
+    usual = NOISE_PHOTONS if options.noise is not None else PICTURE_PHOTONS
+    tracing = times.tracing(options.photons or usual)
+    if options.photons is None and options.seconds is not None:
+        tracing = max(1.0, options.seconds - 5.0)
     compiling = times.compiling() / 2.0
     return [
         TimedStep(LOADING, 1, LOADING_TIME * times.thread_pace, gauges=False),

@@ -5,12 +5,13 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BeforeValidator, Field
+from pydantic import Field
 
+from optisense.commands.rendering import RenderOptions
 from optisense.design import LightGroup, SensorDesign
 from optisense.engine.contacts import (
     AnyContact,
@@ -27,7 +28,6 @@ from optisense.engine.requests import Lane, handles
 from optisense.engine.session import KeptImage, Session, name_of
 from optisense.errors import RenderError
 from optisense.near import suggestion
-from optisense.quality import PICTURE_PHOTONS, photons_of
 
 if TYPE_CHECKING:
     from optisense.optics import RenderProgress, TactileImage
@@ -57,16 +57,10 @@ class Warm(OfDesign):
     drafts: bool = False
 
 
-class Simulate(OfDesign):
+class Simulate(OfDesign, RenderOptions):
     """See docs/engine.md."""
 
     contacts: list[AnyContact] = Field(default_factory=list)
-    resolution: tuple[int, int] | None = None
-    photons: Annotated[int, BeforeValidator(photons_of)] | None = None
-    noise: float | None = Field(default=None, gt=0.0)
-    seconds: float | None = Field(default=None, gt=0.0)
-    seed: int = Field(default=0, ge=0, lt=2**32)
-    exposure: float | Literal["auto"] = "auto"
     draft: bool = False
     files: list[ImageFile] = Field(default=["picture"])
 
@@ -135,13 +129,10 @@ def simulate(session: Session, fields: Simulate, job: Job) -> dict[str, Any]:
     design = design_of(session, fields, job)
     contacts = contacts_of(fields.contacts)
     size = _checked_size(fields.resolution, design)
-    photons = fields.photons
     if fields.draft:
         size = fields.resolution or _draft_size(design)
-        photons = photons if photons or fields.noise or fields.seconds else photons_of("draft")
     else:
         session.designs.must_be_sound(design)
-        photons = photons if photons or fields.noise or fields.seconds else PICTURE_PHOTONS
         job.progress(0.0, "building the sensor")
     renderer = session.renderer
     model = renderer.draft_model(design) if fields.draft else renderer.model(design)
@@ -149,7 +140,7 @@ def simulate(session: Session, fields: Simulate, job: Job) -> dict[str, Any]:
         image = model.render(
             contacts,
             resolution=size,
-            photons=photons,
+            photons=fields.photons_to_trace("draft" if fields.draft else "normal"),
             noise=fields.noise,
             seconds=fields.seconds,
             seed=fields.seed,

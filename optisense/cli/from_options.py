@@ -1,0 +1,117 @@
+"""Options of the command line, made from the models in `optisense.commands`."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable
+from types import UnionType
+from typing import Annotated, Any, Union, get_args, get_origin, get_type_hints
+
+import typer
+from annotated_types import Ge, Le
+from pydantic import ValidationError
+from pydantic.fields import FieldInfo
+
+from optisense.commands.options import CommandOptions, Written
+
+
+def with_options(command: Callable[..., Any]) -> Callable[..., Any]:
+    """A command whose parameters of a type `CommandOptions` are options for each of its fields."""
+    hints = get_type_hints(command, include_extras=True)
+    models = {
+        name: kind
+        for name, kind in hints.items()
+        if isinstance(kind, type) and issubclass(kind, CommandOptions)
+    }
+    if not models:
+        return command
+    parameters = []
+    for each in inspect.signature(command).parameters.values():
+        if each.name in models:
+            fields = models[each.name].model_fields
+            parameters += [_parameter(name, field) for name, field in fields.items()]
+        else:
+            parameters.append(each.replace(annotation=hints[each.name]))
+
+    def run(**given: Any) -> Any:
+        for name, model in models.items():
+            values = {field: given.pop(field) for field in model.model_fields}
+            given[name] = _model(model, values)
+        return command(**given)
+
+    run.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
+    run.__annotations__ = {each.name: each.annotation for each in parameters}
+    run.__doc__, run.__name__ = command.__doc__, command.__name__
+    return run
+
+
+def _parameter(name: str, field: FieldInfo) -> inspect.Parameter:
+    """The parameter from which Typer makes the option of a field."""
+    kind, notes = _plain(field.annotation)
+    notes += field.metadata
+    written = _written(notes)
+    bounds: dict[str, Any] = {}
+    for note in notes:
+        bounds |= {"min": note.ge} if isinstance(note, Ge) else {}
+        bounds |= {"max": note.le} if isinstance(note, Le) else {}
+    usual = field.get_default(call_default_factory=True) or None
+    if get_origin(kind) in (list, dict):
+        kind, usual = list[str] | None, usual if written.usual is None else None
+    elif kind is bool:
+        usual = False
+    else:
+        usual = field.default
+        kind = str if written.is_text else kind
+        usual = str(usual) if written.is_text and usual is not None else usual
+        kind = kind | None if usual is None else kind
+    option = typer.Option(
+        *_flags(name, written),
+        metavar=written.form,
+        help=field.description,
+        show_default=usual is not None if written.usual is None else written.usual,
+        **bounds,
+    )
+    return inspect.Parameter(
+        name,
+        inspect.Parameter.KEYWORD_ONLY,
+        default=usual,
+        annotation=Annotated[kind, option],
+    )
+
+
+def _plain(annotation: Any) -> tuple[Any, list[Any]]:
+    """The type of a field without None, and what is noted beside it."""
+    if get_origin(annotation) in (Union, UnionType):
+        annotation = next(each for each in get_args(annotation) if each is not type(None))
+    if get_origin(annotation) is Annotated:
+        kind, *notes = get_args(annotation)
+        return kind, notes
+    return annotation, []
+
+
+def _written(notes: list[Any]) -> Written:
+    return next((note for note in reversed(notes) if isinstance(note, Written)), Written())
+
+
+def _flags(name: str, written: Written) -> tuple[str, ...]:
+    return written.flags or ("--" + name.replace("_", "-"),)
+
+
+def _model(model: type[CommandOptions], values: dict[str, Any]) -> CommandOptions:
+    """The options as given; those that were left out keep the model's defaults.
+
+    Raises:
+        typer.BadParameter: one makes no sense.
+    """
+    try:
+        return model.model_validate({k: v for k, v in values.items() if v is not None and v != []})
+    except ValidationError as error:
+        found = error.errors()[0]
+        cause = found.get("ctx", {}).get("error")
+        name = str(found["loc"][0]) if found["loc"] else ""
+        field = model.model_fields.get(name)
+        hint = None
+        if field is not None:
+            _, notes = _plain(field.annotation)
+            hint = _flags(name, _written([*notes, *field.metadata]))[0]
+        raise typer.BadParameter(str(cause or found["msg"]), param_hint=hint) from None

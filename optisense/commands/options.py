@@ -1,0 +1,136 @@
+"""What models of options consist of, and how values are read that people write as text."""
+
+from __future__ import annotations
+
+import math
+import re
+from dataclasses import dataclass
+from typing import Annotated, Any, Literal
+
+from annotated_types import Ge, Le
+from pydantic import BaseModel, BeforeValidator, ConfigDict
+
+from optisense.quality import LEVELS, photons_of
+
+MAX_PIXELS = 100_000_000
+"""Of a picture; more is a slip, and would take all memory."""
+
+MOST_SEED = 2**32 - 1
+"""The largest seed of NumPy's older generators and of Mitsuba's samplers: 32 bits."""
+
+
+class CommandOptions(BaseModel):
+    """Options of a command; those that it does not have are refused."""
+
+    model_config = ConfigDict(extra="forbid", strict=False)
+
+
+@dataclass(frozen=True)
+class Written:
+    """How an option is written on the command line.
+
+    Attributes:
+        form: what stands for its value in help texts, such as WIDTHxHEIGHT.
+        flags: its names; made of the field's name if there are none.
+        usual: what help texts say of the default where the field has none.
+        is_text: whether it is read from text, by the field's own validator.
+    """
+
+    form: str | None = None
+    flags: tuple[str, ...] = ()
+    usual: str | None = None
+    is_text: bool = False
+
+
+def read_resolution(value: Any) -> Any:
+    """Width and height in pixels, from a pair of numbers or WIDTHxHEIGHT.
+
+    Raises:
+        ValueError: the text is something else, or there are too many pixels.
+    """
+    if not isinstance(value, str):
+        return value
+    match = re.fullmatch(r"\s*(\d{1,6})\s*[xX×]\s*(\d{1,6})\s*", value)
+    if match is None:
+        raise ValueError(f"'{value}' is not WIDTHxHEIGHT, such as 320x240")
+    width, height = int(match[1]), int(match[2])
+    if width < 1 or height < 1 or width * height > MAX_PIXELS:
+        raise ValueError(f"'{value}' is not between 1x1 and {MAX_PIXELS:,} pixels")
+    return width, height
+
+
+def read_exposure(value: Any) -> float | Literal["auto"]:
+    """A positive factor, or "auto".
+
+    Raises:
+        ValueError: it is something else.
+    """
+    if isinstance(value, str) and value.strip().lower() == "auto":
+        return "auto"
+    try:
+        number = float(value)
+    except (TypeError, ValueError):
+        number = math.nan
+    if not 0.0 < number < math.inf:
+        raise ValueError(f"'{value}' is neither 'auto' nor a number above 0")
+    return number
+
+
+def read_range(value: Any) -> Any:
+    """Two numbers, from a pair, LOW:HIGH or one number.
+
+    Raises:
+        ValueError: the text is something else.
+    """
+    if not isinstance(value, str):
+        return value
+    low, _, high = value.partition(":")
+    try:
+        return float(low), float(high or low)
+    except ValueError:
+        raise ValueError(f"'{value}' is not LOW:HIGH, such as 0.3:1") from None
+
+
+def read_named(value: Any) -> Any:
+    """Values by name, from a mapping or NAME=VALUE texts.
+
+    Values are read as those of a design file are: 1e-3 is a number.
+
+    Raises:
+        ValueError: a text is something else.
+    """
+    if not isinstance(value, list):
+        return value
+    from optisense.design.yaml_reader import parse_yaml
+    from optisense.errors import OptiSenseError
+
+    found = {}
+    for text in value:
+        name, equals, given = text.partition("=")
+        if not equals or not name.strip():
+            raise ValueError(f"'{text}' is not NAME=VALUE")
+        try:
+            read, _ = parse_yaml(f"value: {given}", name)
+        except OptiSenseError:
+            raise ValueError(f"the value in '{text}' can't be read") from None
+        found[name.strip().replace("-", "_")] = read["value"]
+    return found
+
+
+Seed = Annotated[int, Ge(0), Le(MOST_SEED), Written("N")]
+
+Resolution = Annotated[
+    tuple[int, int], BeforeValidator(read_resolution), Written("WIDTHxHEIGHT", is_text=True)
+]
+
+Photons = Annotated[int, BeforeValidator(photons_of), Written(f"N|{LEVELS}", is_text=True)]
+
+Exposure = Annotated[
+    float | Literal["auto"], BeforeValidator(read_exposure), Written("auto|VALUE", is_text=True)
+]
+
+Range = Annotated[
+    tuple[float, float], BeforeValidator(read_range), Written("LOW:HIGH", is_text=True)
+]
+
+NamedValues = Annotated[dict[str, Any], BeforeValidator(read_named)]

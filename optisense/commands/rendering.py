@@ -1,0 +1,39 @@
+"""The options of a rendered picture."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from annotated_types import Ge, Le
+from pydantic import Field
+
+from optisense.commands.options import CommandOptions, Exposure, Photons, Resolution, Seed, Written
+from optisense.quality import photons_of
+
+
+class RenderOptions(CommandOptions):
+    """What a picture is like, and when its light is good enough."""
+
+    resolution: Resolution | None = Field(
+        None,
+        description="Pixels of the picture, as 320x240. The camera's own when left out.",
+    )
+    photons: Photons | None = Field(
+        None, description="Photons to trace: normal, 1 million, when no limit is given."
+    )
+    noise: Annotated[float, Ge(0.01), Le(100.0), Written("PERCENT")] | None = Field(
+        None, description="Stop when the noise has come down to this."
+    )
+    seconds: Annotated[float, Ge(0.01), Written("S")] | None = Field(
+        None, description="Stop after this time."
+    )
+    seed: Seed = Field(0, description="The same seed gives the same picture.")
+    exposure: Exposure = Field(
+        "auto",
+        description="Brightness of the picture: a factor on the radiance, or found by itself.",
+    )
+
+    def photons_to_trace(self, usual: str = "normal") -> int | None:
+        """Those asked for, or of the usual level; None where another limit is given."""
+        limited = self.photons or self.noise or self.seconds
+        return self.photons if limited else photons_of(usual)
