@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from optisense.design.camera import Camera
 from optisense.design.parts import TRANSPARENT_SOLIDS
 from optisense.design.problems import Diagnostic
+from optisense.design.projection import directions, picture_places
 from optisense.design.sensor_design import SensorDesign
 from optisense.geometry import TriangleMesh
 from optisense.geometry.common_space import common_space
@@ -54,31 +55,13 @@ def overlaps(design: SensorDesign, meshes: dict[str, TriangleMesh]) -> list[Diag
 
 def in_picture(camera: Camera, points: NDArray[np.float64]) -> NDArray[np.bool_]:
     """(n,) whether points lie in the picture, seen straight."""
-    right, up, depth = camera.axes() @ (points - np.array(camera.position)).T
-    aside = np.hypot(right, up)
-    angle = np.arctan2(aside, depth)
-    half = np.radians(0.5 * camera.fov)
-    if camera.projection == "equidistant":
-        height, edge = angle, half
-    else:
-        height = np.where(depth > 0.0, np.tan(np.minimum(angle, 1.57)), np.inf)
-        edge = float(np.tan(half))
-    scale = height / np.maximum(aside, 1e-300)
-    tall = edge * camera.resolution[1] / camera.resolution[0]
-    with np.errstate(invalid="ignore"):  # on the axis of what is behind: infinity times zero
-        inside: NDArray[np.bool_] = (np.abs(right * scale) <= edge) & (np.abs(up * scale) <= tall)
+    across, down = picture_places(camera, points)
+    with np.errstate(invalid="ignore"):
+        inside: NDArray[np.bool_] = (np.abs(across - 0.5) <= 0.5) & (np.abs(down - 0.5) <= 0.5)
     return inside
 
 
 def straight_rays(camera: Camera) -> NDArray[np.float64]:
     """(k, 3) the directions of some places spread over the picture."""
-    half = np.radians(0.5 * camera.fov)
-    edge = half if camera.projection == "equidistant" else float(np.tan(half))
-    tall = edge * camera.resolution[1] / camera.resolution[0]
-    x, y = np.meshgrid(np.linspace(-edge, edge, SAMPLES[0]), np.linspace(-tall, tall, SAMPLES[1]))
-    height = np.hypot(x, y)
-    angle = height if camera.projection == "equidistant" else np.arctan(height)
-    across = np.sin(angle) / np.maximum(height, 1e-300)
-    axes = np.stack([x * across, y * across, np.cos(angle)], axis=-1).reshape(-1, 3)
-    rays: NDArray[np.float64] = axes @ camera.axes()
-    return rays
+    across, down = np.meshgrid(np.linspace(0.0, 1.0, SAMPLES[0]), np.linspace(0.0, 1.0, SAMPLES[1]))
+    return directions(camera, across, down).reshape(-1, 3)

@@ -1,4 +1,4 @@
-"""The camera of a design."""
+"""The camera of a design: its pose, its lens, and how it makes a picture of the light."""
 
 from __future__ import annotations
 
@@ -8,14 +8,79 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, SerializerFunctionWrapHandler, model_serializer, model_validator
 
-from optisense.design.fields import Count, Direction, Model, Name, Number, Vector
-from optisense.design.responses import USUAL_RESPONSE, CameraResponse
+from optisense.design.fields import (
+    Count,
+    Direction,
+    MisfitError,
+    Model,
+    Name,
+    Number,
+    PositiveRGB,
+    Vector,
+)
+from optisense.design.kinds import KindModel
+from optisense.design.lenses import LensBlur, LensDistortion, LensShading
+from optisense.design.responses import (
+    USUAL_RESPONSE,
+    BlackLevel,
+    CameraResponse,
+    PictureChain,
+    SensorNoise,
+    ToneCurve,
+)
+from optisense.design.responses.chain import SoftFocus
+from optisense.design.responses.electronics import ChannelMatrix
 
 Pixels = Annotated[Count, Field(le=65_536)]
 
 
-class Camera(Model):
-    """A pinhole with a pose. Image right is direction x up: pictures are never mirrored."""
+class ImagingModel(Model):
+    """What a lens, a sensor and its processor do to a picture; None is an ideal one.
+
+    Designs and entries of the library share these fields. The order of the chain is that of
+    `design.responses.chain`.
+    """
+
+    distortion: LensDistortion | None = Field(
+        default=None, description="of the lens; fov is that of the lens without it"
+    )
+    shading: LensShading | None = Field(
+        default=None, description="how the lens dims the picture towards its corners"
+    )
+    blur: LensBlur | None = Field(default=None, description="of the lens")
+    crosstalk: ChannelMatrix | None = Field(
+        default=None, description="rows: what R, G, B of the sensor see of R, G, B of the light"
+    )
+    response: CameraResponse | None = Field(
+        default=None, description="how light becomes the picture, instead of the usual way"
+    )
+    noise: SensorNoise | None = Field(default=None, description="of the sensor")
+    black_level: BlackLevel | None = Field(default=None, description="of the sensor")
+    white_balance: PositiveRGB | None = Field(default=None, description="gains of R, G, B")
+    colour_matrix: ChannelMatrix | None = Field(
+        default=None, description="rows: R, G, B of the picture of R, G, B of the sensor"
+    )
+    tone_curve: ToneCurve | None = Field(
+        default=None, description="what is stored, instead of the response's own curve"
+    )
+
+    def kinds_of_imaging(self) -> dict[str, KindModel]:
+        """What of it comes in kinds and is there, by field."""
+        given = ((name, getattr(self, name)) for name in ImagingModel.model_fields)
+        return {name: value for name, value in given if isinstance(value, KindModel)}
+
+    @model_serializer(mode="wrap")
+    def _without_the_usual(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        """What is ideal or usual is not written."""
+        values: dict[str, Any] = handler(self)
+        for name in ImagingModel.model_fields:
+            if values.get(name) is None:
+                values.pop(name, None)
+        return values
+
+
+class Viewpoint(Model):
+    """Where a camera is, where it looks, and how large the picture is that it sees."""
 
     model: Name = Field(description="library camera it started from")
     projection: Literal["perspective", "equidistant"] = Field(
@@ -28,22 +93,43 @@ class Camera(Model):
     position: Vector = Field(description="mm, entrance pupil, x y z")
     direction: Direction = Field(description="where it looks, any length")
     up: Direction = Field(description="upward in the picture, any length")
-    response: CameraResponse | None = Field(
-        default=None, description="how light becomes the picture, instead of the usual way"
-    )
+
+
+class Camera(ImagingModel, Viewpoint):
+    """A camera with a pose. Image right is direction x up: pictures are never mirrored."""
 
     @property
     def any_response(self) -> CameraResponse:
         """Its response: the usual one where it names none."""
         return USUAL_RESPONSE if self.response is None else self.response
 
-    @model_serializer(mode="wrap")
-    def _without_the_usual(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        """A camera of the usual response is written as ever."""
-        values: dict[str, Any] = handler(self)
-        if values.get("response") is None:
-            values.pop("response", None)
-        return values
+    @property
+    def angle_scale(self) -> float:
+        """Widths of the picture a radian, in its middle."""
+        half = np.radians(0.5 * self.fov)
+        return float(0.5 / (half if self.projection == "equidistant" else np.tan(half)))
+
+    def picture_chain(self, vergence: NDArray[np.floating] | None = None) -> PictureChain:
+        """What makes its picture of radiance.
+
+        Args:
+            vergence: (h, w) of any size, 1/mm: one over the distance at which what the camera sees
+                appears to lie. A blur that depends on depth is left out without it.
+        """
+        focus = None
+        if self.blur is not None and (vergence is not None or not self.blur.by_depth):
+            focus = SoftFocus.of(self.blur, self, vergence)
+        return PictureChain(
+            response=self.any_response,
+            shading=self.shading,
+            focus=focus,
+            crosstalk=self.crosstalk,
+            noise=self.noise,
+            black_level=self.black_level,
+            white_balance=self.white_balance,
+            colour_matrix=self.colour_matrix,
+            tone_curve=self.tone_curve,
+        )
 
     @model_validator(mode="after")
     def _makes_sense(self) -> Camera:
@@ -53,6 +139,13 @@ class Camera(Model):
         across = np.linalg.norm(np.cross(direction, up))
         if across < 1e-6 * np.linalg.norm(direction) * np.linalg.norm(up):
             raise ValueError("direction and up are parallel; up must point to the picture's top")
+        if self.distortion is not None and self.distortion.projection != self.projection:
+            raise MisfitError(
+                f"a lens distortion of kind '{self.distortion.kind}' is one of "
+                f"{self.distortion.projection} lenses, and this one is {self.projection}",
+                ("distortion", "kind"),
+                f"Use 'projection: {self.distortion.projection}', or another kind of distortion",
+            )
         return self
 
     def axes(self) -> NDArray[np.float64]:

@@ -1,6 +1,6 @@
 """What no camera can be or see: angles without a lens, a place inside a part, a view past the skin.
 
-Only a pinhole is known of a design's camera, so its lens is taken for as small as the smallest
+A design does not say how large its camera's lens is, so it is taken for as small as the smallest
 camera there is.
 """
 
@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from optisense.design.arrangement import in_picture, straight_rays
 from optisense.design.camera import Camera
+from optisense.design.lens_checks import fold_problems
 from optisense.design.parts import TRANSPARENT_SOLIDS, Role
 from optisense.design.problems import Diagnostic
 from optisense.design.sensor_design import SensorDesign
@@ -140,6 +141,7 @@ def camera_fault(design: SensorDesign, meshes: dict[str, TriangleMesh]) -> Diagn
         meshes: the deformed meshes, mm.
     """
     found = lens_problems(design.camera, design.where("camera", "fov"))
+    found = found or fold_problems(design.camera, design.where("camera", "distortion"))
     found = found or place_problems(design, meshes)
     return found[0] if found else None
 

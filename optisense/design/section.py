@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from optisense.design.parts import Role
+from optisense.design.projection import directions
 from optisense.geometry import TriangleMesh
 
 if TYPE_CHECKING:
@@ -79,13 +80,9 @@ def section(design: SensorDesign) -> Section:
     is_wide = along_rows(design)
     across = right if is_wide else up
     normal = np.cross(across, forward)
-    width, height = camera.resolution
-    share = 1.0 if is_wide else height / width
-    half = np.radians(camera.fov / 2)
-    if camera.projection == "equidistant":
-        half_angle = share * half
-    else:
-        half_angle = np.arctan(share * np.tan(half))
+    ends = np.array([0.0, 1.0]), np.array([0.5, 0.5])
+    rays = directions(camera, *(ends if is_wide else ends[::-1]))
+    half_angle = np.arccos(np.clip(rays @ forward, -1.0, 1.0)).mean()
 
     def flat(places: FloatArray) -> FloatArray:
         return np.stack([places @ across, places @ forward], axis=-1)

@@ -167,16 +167,16 @@ class SensorDesign(Model):
         return result
 
     def values_of_kinds(self) -> dict[tuple[str | int, ...], KindModel]:
-        """All that comes in kinds and may name files, by its path: coating, materials, emitters and
-        the camera's response."""
+        """All that comes in kinds and may name files, by its path: coating, materials, emitters,
+        and what the camera's lens and sensor do."""
         found: dict[tuple[str | int, ...], KindModel] = {("coating",): self.coating}
         for name, material in self.materials.items():
             found["materials", name] = material
         for name, group in self.lights.items():
             if group.emitter is not None:
                 found["lights", name, "emitter"] = group.emitter
-        if self.camera.response is not None:
-            found["camera", "response"] = self.camera.response
+        for name, value in self.camera.kinds_of_imaging().items():
+            found["camera", name] = value
         return found
 
     def parts_of(self, *roles: Role) -> list[str]:

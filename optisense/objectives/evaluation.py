@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from optisense.design import SensorDesign
 from optisense.design.camera_checks import camera_fault
+from optisense.design.lenses.film import PictureWindow
 from optisense.design.material_checks import index_problems
 from optisense.design.problems import Diagnostic
 from optisense.errors import ObjectiveError, OptiSenseError
@@ -218,7 +219,7 @@ class Evaluation:
                 normals=seen.normals,
                 points=seen.points,
                 before=before,
-                camera=self.design.camera.any_response,
+                camera=self.model.picture_chain,
                 **frames[number],
             )
 
@@ -283,11 +284,12 @@ class Evaluation:
 
     def _auto_exposure(self) -> float:
         seen = self._once("pressed images", self._unexposed)
-        return exposure_for(
-            self._untouched_radiance,
-            [each.radiance[each.press.mask[each.touched]] for each in seen],
-            self.design.camera.any_response,
-        )
+        camera = self.model.picture_chain
+        pressed = [
+            camera.metered(each.radiance[each.press.mask[each.touched]], each.press.mask)
+            for each in seen
+        ]
+        return exposure_for(self._untouched_radiance, pressed, camera)
 
     def _presses(self) -> list[Press]:
         presses = []
@@ -307,8 +309,10 @@ class Evaluation:
         is worked out anew.
         """
         exposure, untouched = np.float32(self.exposure), self._untouched_radiance
-        camera = self.design.camera.any_response
-        known = self._once("untouched response", lambda: camera.respond(untouched * exposure))
+        camera, seed = self.model.picture_chain, self.settings.seed
+        known = self._once(
+            "untouched response", lambda: camera.respond(untouched * exposure, seed=seed)
+        )
         response = known.copy()
         if touched.any():
             reach = camera.reach(touched.shape[1])
@@ -319,7 +323,8 @@ class Evaluation:
                 slice(small.start - large.start, small.stop - large.start)
                 for small, large in zip(changed, needed, strict=True)
             )
-            response[changed] = camera.respond(part * exposure, touched.shape[1])[inner]
+            window = PictureWindow.part(touched.shape, needed)
+            response[changed] = camera.respond(part * exposure, window, seed)[inner]
         return response
 
     def _are_apart(self, places: Sequence[NDArray[np.float64]]) -> bool:

@@ -7,7 +7,7 @@ from collections.abc import Iterable
 import numpy as np
 from numpy.typing import NDArray
 
-from optisense.design.responses import USUAL_RESPONSE, CameraResponse
+from optisense.design.responses import PictureChain
 
 MOST_SATURATED = 0.02
 """Automatic exposure lets so many of a contact's pixels be overexposed: a person who sets up a
@@ -17,7 +17,7 @@ shiny sensor turns the exposure down until the highlights on what is pressed in 
 def exposure_for(
     untouched: NDArray[np.float32],
     contacts: Iterable[NDArray[np.float32]],
-    response: CameraResponse = USUAL_RESPONSE,
+    chain: PictureChain | None = None,
 ) -> float:
     """The factor from radiance to what the camera reads that suits a sensor and its contacts.
 
@@ -26,9 +26,10 @@ def exposure_for(
 
     Args:
         untouched: (h, w, 3) radiance.
-        contacts: (n, 3) radiance of the pixels of each contact.
-        response: of the camera.
+        contacts: (n, 3) of the pixels of each contact: radiance as `PictureChain.metered` sees it.
+        chain: of the camera; the usual one if None.
     """
+    response = chain or PictureChain()
     exposure = response.auto_exposure(untouched)
     for radiance in contacts:
         brightest = radiance.max(axis=1)

@@ -10,7 +10,7 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from optisense.design.responses import USUAL_RESPONSE, CameraResponse
+from optisense.design.responses import PictureChain
 from optisense.errors import ObjectiveError
 
 FloatArray = NDArray[np.float64]
@@ -57,7 +57,7 @@ class Press:
     normals: NDArray[np.float32]
     points: NDArray[np.float32]
     before: NDArray[np.float32]
-    camera: CameraResponse = field(default_factory=lambda: USUAL_RESPONSE)
+    camera: PictureChain = field(default_factory=PictureChain)
     geometry: dict[Hashable, Any] = field(default_factory=dict, repr=False, compare=False)
 
     def derived(self, key: Hashable, derive: Callable[[], Value]) -> Value:

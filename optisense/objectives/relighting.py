@@ -14,7 +14,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from optisense.design.responses import CameraResponse
+from optisense.design.lenses.film import PictureWindow
+from optisense.design.responses import PictureChain
 from optisense.errors import ObjectiveError
 from optisense.objectives.evaluation import Evaluation
 from optisense.objectives.exposure import exposure_for
@@ -176,7 +177,8 @@ class Relighting:
         if given != "auto":
             return float(given)
         pairs = zip(self._seen, contacts, strict=True)
-        return exposure_for(untouched, [contact[seen.own] for seen, contact in pairs], self._camera)
+        pressed = [self._camera.metered(each[seen.own], seen.press.mask) for seen, each in pairs]
+        return exposure_for(untouched, pressed, self._camera)
 
     def _response(
         self,
@@ -189,22 +191,24 @@ class Relighting:
         """The camera's response: of the whole image, or of the box of the contact."""
         radiance = background[seen.around].copy()
         radiance[seen.touched] = contact
-        exposed = radiance * np.float32(exposure)
+        exposed, seed = radiance * np.float32(exposure), self.settings.seed
         if whole:
             image = background * np.float32(exposure)
             image[seen.around] = exposed
-            return self._camera.respond(image)
+            return self._camera.respond(image, seed=seed)
         inner = tuple(
             slice(box.start - around.start, box.stop - around.start)
             for box, around in zip(seen.box, seen.around, strict=True)
         )
-        if not self._camera.spreads(exposed):
-            return self._camera.respond(exposed[inner], self._shape[1])
-        return self._camera.respond(exposed, self._shape[1])[inner]
+        around = PictureWindow.part(self._shape, seen.around)
+        if not self._camera.spreads(exposed, around):
+            box = PictureWindow.part(self._shape, seen.box)
+            return self._camera.respond(exposed[inner], box, seed)
+        return self._camera.respond(exposed, around, seed)[inner]
 
     @property
-    def _camera(self) -> CameraResponse:
-        return self.model.design.camera.any_response
+    def _camera(self) -> PictureChain:
+        return self.model.picture_chain
 
 
 class _Relit(Evaluation):

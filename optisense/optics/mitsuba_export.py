@@ -129,6 +129,10 @@ def _mesh(piece: Piece) -> Any:
 def _sensor(camera: RayCamera, samples: int) -> dict[str, Any]:
     if camera.equidistant:
         raise RenderError("Mitsuba has no equidistant camera", hint="use a perspective one")
+    if camera.distortion is not None:
+        raise RenderError(
+            "Mitsuba's cameras have no lens distortion", hint="Remove the camera's 'distortion'"
+        )
     target = np.asarray(camera.position, float) + np.asarray(camera.direction, float)
     return {
         "type": "perspective",

@@ -228,7 +228,7 @@ class OpticalModel(RayModel):
             contact_mask=layers.contact_mask,
             points=layers.points,
             interrupted=layers.interrupted,
-            response=self.design.camera.any_response,
+            chain=self.picture_chain,
         )
         image.settings = {
             "design": self.design.name,

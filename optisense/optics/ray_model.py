@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -11,6 +12,9 @@ import numpy as np
 
 from optisense import geometry
 from optisense.design import SensorDesign, set_value
+from optisense.design.lens_checks import fold_problems
+from optisense.design.problems import raise_problems
+from optisense.design.responses import PictureChain
 from optisense.design.sensor_design import refuse_no_design
 from optisense.errors import ContactError, OptiSenseError, RenderError
 from optisense.geometry import (
@@ -30,6 +34,7 @@ from optisense.optics.scene.contact_scenes import ContactScenes
 from optisense.optics.scene.emitters import EmitterTable, emitter_table
 from optisense.optics.scene.ray_scene import Piece, RayScene
 from optisense.optics.scene.surfaces import Region, Surface, SurfaceKind
+from optisense.optics.transport.apparent_distance import focused_chain
 from optisense.optics.transport.chief_rays import (
     MIRROR_BITS,
     ChiefRays,
@@ -79,6 +84,7 @@ class RayModel:
         self._surfaces.append(self._indenter_surface())
         self._refresh_surfaces()
         self._forget("surface", "scene", "_watched", "_fixed", "_fine", "_emitter_table", "_store")
+        self._forget("picture_chain")
 
     @property
     def groups(self) -> list[str]:
@@ -175,7 +181,7 @@ class RayModel:
         if old.coating != design.coating:
             self._recoat()
         if old.camera != design.camera:
-            self._forget("surface", "_store")
+            self._forget("surface", "_store", "picture_chain")
 
     def _recoat(self) -> None:
         coat = coating_surface(self.design.coating, self._parts.ior_before, Region.SENSING)
@@ -194,6 +200,7 @@ class RayModel:
         width, height = camera.resolution if resolution is None else resolution
         if width < 1 or height < 1:
             raise RenderError(f"the resolution is {width}x{height}", hint="give e.g. 320x240")
+        raise_problems(fold_problems(camera, self.design.where("camera", "distortion")), "camera")
         return RayCamera(
             position=camera.position,
             direction=camera.direction,
@@ -202,7 +209,14 @@ class RayModel:
             width=int(width),
             height=int(height),
             equidistant=camera.projection == "equidistant",
+            distortion=camera.distortion,
         )
+
+    @cached_property
+    def picture_chain(self) -> PictureChain:
+        """What the camera makes of radiance; where its blur depends on depth, with the depths that
+        it sees in the untouched sensor."""
+        return focused_chain(self.design.camera, lambda: self._fine.scene, self.camera)
 
     @cached_property
     def surface(self) -> SensingSurface:
@@ -212,7 +226,9 @@ class RayModel:
         towards the right and v towards the top of the image.
         """
         axes = self.design.camera.axes()
-        rays = self.chief_rays((3, 3))
+        # Of a lens without distortion, which may show its axis beside the picture's middle.
+        straight = replace(self.camera((3, 3)), distortion=None)
+        rays = trace_chief_rays(self._fine.scene, straight)
         if rays.hit[1, 1]:
             origin = rays.points[1, 1].astype(float)
         else:

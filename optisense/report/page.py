@@ -14,7 +14,7 @@ from markupsafe import Markup
 from numpy.typing import NDArray
 
 from optisense.design import LightGroup, SensorDesign
-from optisense.design.responses import CameraResponse
+from optisense.design.responses import PictureChain
 from optisense.geometry import Contact, TriangleMesh
 from optisense.report import tables
 from optisense.report.camera_rays import CameraRays
@@ -132,7 +132,7 @@ def _pictures(
 ) -> list[dict[str, str]]:
     """The pictures with their captions; the tactile image comes first."""
     picture = image.picture(exposure)
-    camera = design.camera.any_response
+    camera = design.camera.picture_chain().without_noise()
     factor = camera.auto_exposure(image.radiance) if exposure == "auto" else float(exposure)
     shown: list[tuple[str, Callable[[], NDArray[np.uint8]], str, str]]
     shown = [("picture", lambda: picture, "tactile image", "")]
@@ -153,10 +153,9 @@ def _pictures(
     ]
 
 
-def _exposed(
-    layer: NDArray[np.float32], factor: float, camera: CameraResponse
-) -> NDArray[np.uint8]:
-    return camera.encode(factor * layer)
+def _exposed(layer: NDArray[np.float32], factor: float, camera: PictureChain) -> NDArray[np.uint8]:
+    exposed = factor * layer
+    return camera.encode(exposed if camera.is_plain else camera.respond(exposed))
 
 
 def _place_to_look_at(mask: NDArray[np.bool_]) -> tuple[int, int]:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from optisense.design import LightGroup, SensorDesign
 from optisense.design.looks import ROLE_LOOKS
+from optisense.design.projection import directions
 from optisense.errors import OptiSenseError
 from optisense.geometry import TriangleMesh
 from optisense.report.camera_rays import CameraRays
@@ -113,7 +114,7 @@ def _camera(design: SensorDesign, meshes: dict[str, TriangleMesh]) -> dict[str, 
     """The pupil and the four corners of what the camera sees, at the sensing surface's depth."""
     camera = design.camera
     position = np.asarray(camera.position, dtype=np.float64)
-    right, up, forward = camera.axes()
+    _, up, forward = camera.axes()
     surfaces = [
         mesh.vertices
         for name, mesh in meshes.items()
@@ -121,13 +122,9 @@ def _camera(design: SensorDesign, meshes: dict[str, TriangleMesh]) -> dict[str, 
     ]
     depths = (np.concatenate(surfaces) - position) @ forward if surfaces else np.array([20.0])
     depth = max(float(np.median(depths)), 1.0)
-    half_angle = np.radians(min(camera.fov, 150.0) / 2)
-    half_width = depth * np.tan(half_angle)
-    half_height = half_width * camera.resolution[1] / camera.resolution[0]
-    corners = [
-        position + depth * forward + x * half_width * right + y * half_height * up
-        for x, y in ((-1, 1), (1, 1), (1, -1), (-1, -1))
-    ]
+    rays = directions(camera, np.array([0.0, 1.0, 1.0, 0.0]), np.array([0.0, 0.0, 1.0, 1.0]))
+    ahead = np.maximum(rays @ forward, np.cos(np.radians(75.0)))  # of a fisheye's, not too far
+    corners = list(position + depth * rays / ahead[:, None])
     return {
         "name": camera.model,
         "position": _rounded(position),

@@ -44,7 +44,7 @@ QUIET_BLUR = 1.5
 """Where a picture, blurred by QUIET_BLUR pixels, differs from the untouched one by less than QUIET
 levels in each channel, nothing is read: small errors over a wide, flat surface would add up."""
 
-_PLACE, _CAMERA, _SAMPLES = 5, 6, 7  # what a seed is for
+_PLACE, _CAMERA, _SAMPLES, _SENSOR = 5, 6, 7, 10  # what a seed is for
 
 
 @dataclass(frozen=True)
@@ -108,7 +108,7 @@ class CalibratedSensor:
         blank = self._render([])
         self._exposure = blank.auto_exposure()
         # A real one is the mean of many pictures, without noise.
-        self._background = blank.picture(self._exposure).astype(np.float64)
+        self._background = blank.without_noise().picture(self._exposure).astype(np.float64)
         samples = [np.hstack(self._press(i)) for i in _counted(settings.presses, progress)]
         chosen = np.concatenate(samples)
         if len(chosen) > MOST_SAMPLES:
@@ -183,7 +183,8 @@ class CalibratedSensor:
         return image
 
     def _picture(self, image: TactileImage, seed: list[int]) -> NDArray[np.uint8]:
-        return add_camera_noise(image.picture(self._exposure), self._settings.camera_noise, seed)
+        picture = image.picture(self._exposure, (*seed, _SENSOR))
+        return add_camera_noise(picture, self._settings.camera_noise, seed)
 
     def _features(self, picture: NDArray[np.uint8]) -> tuple[FloatArray, FloatArray]:
         """Colour differences (h, w, 3) and places (h, w, 2)."""

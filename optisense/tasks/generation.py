@@ -50,7 +50,7 @@ that is thrown away costs chief rays and no rendering."""
 LEAST_PIXELS = 4
 """A contact that shows fewer pixels counts as unseen."""
 
-_CONTACT, _CAMERA = 1, 2  # what a seed is for
+_CONTACT, _CAMERA, _SENSOR = 1, 2, 8  # what a seed is for
 
 
 @dataclass(frozen=True)
@@ -254,7 +254,7 @@ class _Maker:
         exposure = float(image.auto_exposure() if asked == "auto" else asked)
         save_design(self._model.design, self._folder / DESIGN)
         arrays = {
-            "image": image.picture(exposure),
+            "image": image.without_noise().picture(exposure),
             "points": image.points,
             "normals": image.normals,
         }
@@ -305,7 +305,9 @@ class _Maker:
         settings = self._settings
         name = f"{index:06d}"
         picture = add_camera_noise(
-            image.picture(self._exposure), settings.camera_noise, [settings.seed, index, _CAMERA]
+            image.picture(self._exposure, (settings.seed, index, _SENSOR)),
+            settings.camera_noise,
+            [settings.seed, index, _CAMERA],
         )
         depth = self._untouched.image_depth(image)
         arrays = {"depth": depth, "normals": image.normals, "mask": image.contact_mask}

@@ -38,7 +38,7 @@ ByteArray = NDArray[np.uint8]
 SETTINGS = "task.json"
 SAMPLES = "samples.csv"
 
-_CONTACT, _CAMERA = 3, 4  # what a seed is for
+_CONTACT, _CAMERA, _SENSOR = 3, 4, 9  # what a seed is for
 
 
 class PerceptionTask(Protocol):
@@ -256,7 +256,9 @@ class _Camera:
         contact, targets = self._task.contact(self._model, rng)
         image = self._render([contact])
         picture = add_camera_noise(
-            image.picture(self._exposure), self._settings.camera_noise, [seed, index, _CAMERA]
+            image.picture(self._exposure, (seed, index, _SENSOR)),
+            self._settings.camera_noise,
+            [seed, index, _CAMERA],
         )
         return [*map(float, self._task.measure(picture, image)), *map(float, targets)]
 

@@ -9,7 +9,12 @@ import pytest
 
 from optisense import sensors
 from optisense.design.colour import encode, srgb_curve
-from optisense.design.responses import USUAL_RESPONSE, CameraResponse, FullWellResponse
+from optisense.design.responses import (
+    USUAL_RESPONSE,
+    CameraResponse,
+    FullWellResponse,
+    PictureChain,
+)
 from optisense.optics.camera.response import picture
 from optisense.optics.imaging.tactile_image import TactileImage
 
@@ -62,7 +67,8 @@ class SquareRoot(CameraResponse):
 
 def test_an_image_is_stored_as_its_camera_does() -> None:
     light = np.random.default_rng(2).random((5, 7, 3)).astype(np.float32)
-    image = TactileImage({"all": light}, light, light[..., 0] > 2, light, response=SquareRoot())
+    chain = PictureChain(SquareRoot())
+    image = TactileImage({"all": light}, light, light[..., 0] > 2, light, chain=chain)
     stored = image.picture(0.25).astype(float) / 255
     assert np.abs(stored**2 - 0.25 * light).max() < 2 / 255
     assert image.auto_exposure() == pytest.approx(0.55 / np.percentile(light.max(axis=2), 95))

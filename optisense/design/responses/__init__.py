@@ -1,9 +1,21 @@
-"""How a camera turns light into a picture: a file for each kind, `CameraResponse` for any."""
+"""How a camera turns light into a picture: `PictureChain`, and the pieces that it is made of.
+
+`CameraResponse` has a file for each kind, `tone_curve` the tone curves, `electronics` noise, black
+level and colours; what the lens does is in `design/lenses`.
+"""
 
 from optisense.design.responses.base import CameraResponse
+from optisense.design.responses.chain import USUAL_RESPONSE, PictureChain
+from optisense.design.responses.electronics import BlackLevel, SensorNoise
 from optisense.design.responses.full_well import FullWellResponse
+from optisense.design.responses.tone_curve import ToneCurve
 
-USUAL_RESPONSE = FullWellResponse()
-"""The response of a camera whose design names none."""
-
-__all__ = ["USUAL_RESPONSE", "CameraResponse", "FullWellResponse"]
+__all__ = [
+    "USUAL_RESPONSE",
+    "BlackLevel",
+    "CameraResponse",
+    "FullWellResponse",
+    "PictureChain",
+    "SensorNoise",
+    "ToneCurve",
+]

@@ -1,11 +1,12 @@
-"""From linear radiance to the picture that a camera would store, by its response."""
+"""From linear radiance to the picture that a camera would store, by its chain."""
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
 
-from optisense.design.responses import USUAL_RESPONSE, CameraResponse
+from optisense.design.responses import PictureChain
+from optisense.design.responses.electronics import NoiseSeed
 from optisense.errors import RenderError
 
 FloatArray = NDArray[np.floating]
@@ -14,15 +15,23 @@ FloatArray = NDArray[np.floating]
 def picture(
     radiance: FloatArray,
     exposure: float | str = "auto",
-    response: CameraResponse = USUAL_RESPONSE,
+    chain: PictureChain | None = None,
+    noise_seed: NoiseSeed = 0,
 ) -> NDArray[np.uint8]:
     """An 8-bit picture (h, w, 3) of a radiance image.
+
+    Args:
+        radiance: (h, w, 3).
+        exposure: "auto" or a factor above 0.
+        chain: of the camera; the usual one if None.
+        noise_seed: of its noise, where it has some.
 
     Raises:
         RenderError: the exposure is neither "auto" nor a number above 0.
     """
+    chain = chain or PictureChain()
     if exposure == "auto":
-        factor = response.auto_exposure(radiance)
+        factor = chain.auto_exposure(radiance)
     else:
         try:
             factor = float(exposure)
@@ -32,4 +41,4 @@ def picture(
             raise RenderError(
                 f"the exposure is {exposure!r}", hint='give "auto" or a factor above 0'
             )
-    return response.encode(response.respond(np.asarray(radiance) * factor))
+    return chain.encode(chain.respond(np.asarray(radiance) * factor, seed=noise_seed))

@@ -16,7 +16,8 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from optisense.design.responses import USUAL_RESPONSE, CameraResponse
+from optisense.design.responses import PictureChain
+from optisense.design.responses.electronics import NoiseSeed
 from optisense.errors import RenderError
 from optisense.optics.camera.response import picture
 from optisense.writing import inside, remove_own_page, written_together
@@ -38,8 +39,8 @@ class TactileImage:
         side; NaN where the camera sees none. contact_mask: where an indenter is seen. depth: mm
         that the coating is pushed in along the inward normal, 0 outside contacts. settings:
         what was asked and what was reached, ready for JSON. unit_layers: each group's layer for
-        lights of 1 mW in every channel, from which others follow (see ``relight``). response: of
-        the camera.
+        lights of 1 mW in every channel, from which others follow (see ``relight``). chain: of the
+        camera, from radiance to the picture.
     """
 
     layers: dict[str, NDArray[np.float32]]
@@ -49,7 +50,7 @@ class TactileImage:
     settings: dict[str, Any] = field(default_factory=dict)
     interrupted: bool = False
     unit_layers: dict[str, NDArray[np.float32]] = field(default_factory=dict)
-    response: CameraResponse = field(default_factory=lambda: USUAL_RESPONSE)
+    chain: PictureChain = field(default_factory=PictureChain)
 
     def relight(self, flux: Mapping[str, ArrayLike]) -> TactileImage:
         """The same image under lights of other colours and powers; exact, with no new rendering.
@@ -81,13 +82,27 @@ class TactileImage:
             total += layer
         return total
 
-    def picture(self, exposure: float | str = "auto") -> NDArray[np.uint8]:
-        """(h, w, 3) uint8: exposed, and stored as the camera does."""
-        return picture(self.radiance, exposure, self.response)
+    def picture(
+        self, exposure: float | str = "auto", noise_seed: NoiseSeed | None = None
+    ) -> NDArray[np.uint8]:
+        """(h, w, 3) uint8: exposed, and stored as the camera does.
+
+        Args:
+            exposure: the factor on the radiance, or "auto".
+            noise_seed: of the noise, where the camera has some; that of the image if None.
+        """
+        own = int(self.settings.get("seed", 0))
+        return picture(
+            self.radiance, exposure, self.chain, own if noise_seed is None else noise_seed
+        )
+
+    def without_noise(self) -> TactileImage:
+        """The same image by a camera without noise, as the mean of many pictures has none."""
+        return replace(self, chain=self.chain.without_noise())
 
     def auto_exposure(self) -> float:
         """The factor that makes a good picture of the radiance."""
-        return self.response.auto_exposure(self.radiance)
+        return self.chain.auto_exposure(self.radiance)
 
     def _repr_png_(self) -> bytes:
         """The exposed picture as a PNG file, for notebooks."""

@@ -122,6 +122,28 @@ def trace_path_codes(
     return np.asarray(codes).astype(np.uint32)
 
 
+def trace_to_skin(
+    scene: RayScene, origin: NDArray[np.floating], direction: NDArray[np.floating]
+) -> tuple[NDArray[np.bool_], NDArray[np.float64]]:
+    """Follow rays from anywhere.
+
+    Args:
+        scene: the surfaces.
+        origin: (k, 3) mm.
+        direction: (k, 3), unit.
+
+    Returns:
+        (k,) whether each arrives at the sensing surface, and (k, 3) mm where.
+    """
+    start, way = (
+        dr.unravel(kind, floats(each.ravel()))
+        for kind, each in ((mi.Point3f, origin), (mi.Vector3f, direction))
+    )
+    outcome, point = _trace(scene, None, Ray(start, way, mi.Bool(True)))[:2]
+    hit = np.asarray(outcome) == int(RayOutcome.HIT)
+    return hit, np.asarray(point, dtype=np.float64).T
+
+
 def trace_chief_rays(
     scene: RayScene, camera: RayCamera, sensing_faces: NDArray[np.int64] | None = None
 ) -> ChiefRays:

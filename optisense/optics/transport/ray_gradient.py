@@ -99,7 +99,7 @@ class DifferentiableRays:
         self._faces = indices(self._scene.faces)
         self._pose = camera.pose()
         turning = self._boundary_slopes()
-        dr.enable_grad(self._vertices, *self._pose)
+        dr.enable_grad(self._vertices, *self._pose.numbers())
         self._normals = self._vertex_normals()
         self._record(x[self.hit.ravel()], y[self.hit.ravel()])
         self.weight = self._record_edges(*turning)
@@ -279,7 +279,7 @@ class DifferentiableRays:
             sheet = self._sheets.get(piece.name)
             if sheet is not None:
                 parts[piece.name] = sheet.gathered(moved[start : start + len(piece.vertices)])
-        camera = [np.ravel(np.asarray(dr.grad(value))) for value in self._pose]
+        camera = [np.ravel(np.asarray(dr.grad(value))) for value in self._pose.numbers()]
         return RayGradient(parts, np.concatenate(camera).astype(np.float64))
 
 

@@ -60,7 +60,8 @@ def moving_parts(space: BoundSpace) -> list[str]:
         changed = [n for n, m in design.deformed_meshes().items() if not _same(m, meshes[n])]
         # The middle of a cage may have no part in it: its points then have a gradient, of 0.
         harmless = parameter.name.startswith("cages.")
-        if not changed and not harmless and design.camera == start.camera:
+        still = np.array_equal(camera_numbers(design.camera), camera_numbers(start.camera))
+        if not changed and not harmless and still:
             raise SearchError(
                 "it moves neither a surface nor the camera, so chief rays have no gradient by it",
                 where=parameter.name,
@@ -101,8 +102,10 @@ def holds(known: Jacobian, space: BoundSpace, design: SensorDesign, point: Float
 
 
 def camera_numbers(camera: Camera) -> FloatArray:
-    """(13,): position (mm), the rows of the camera's axes, and the field of view (degrees)."""
-    return np.concatenate([camera.position, np.ravel(camera.axes()), [camera.fov]])
+    """(13,) or more: position (mm), the rows of the camera's axes, the field of view (degrees), and
+    the coefficients of the lens's distortion."""
+    lens = () if camera.distortion is None else camera.distortion.coefficients()
+    return np.concatenate([camera.position, np.ravel(camera.axes()), [camera.fov], lens])
 
 
 def _beside(space: BoundSpace, point: FloatArray, number: int) -> tuple[FloatArray, FloatArray]:

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from optisense import library
 from optisense.design import Camera
+from optisense.design.projection import picture_places
 from optisense.errors import DesignError
 from optisense.geometry import TriangleMesh
 from optisense.geometry.containment import inside
@@ -117,20 +118,11 @@ def share_seen(camera: Camera, skin: TriangleMesh) -> tuple[float, float]:
         picture's width or height (the larger) over which that spreads.
     """
     centres, areas = skin.triangles.mean(axis=1), skin.face_areas
-    right, up, ahead = camera.axes()
     way = centres - np.array(camera.position)
-    depth = way @ ahead
-    across = np.hypot(way @ right, way @ up)
-    half = np.radians(camera.fov) / 2.0
-    angle = np.arctan2(across, depth)
-    reach = np.tan(half) if camera.projection == "perspective" else half
-    radius = np.tan(np.minimum(angle, 1.55)) if camera.projection == "perspective" else angle
-    turn = np.arctan2(way @ up, way @ right)
-    u, v = radius * np.cos(turn) / reach, radius * np.sin(turn) / reach
-    v *= camera.resolution[0] / camera.resolution[1]
+    across, down = picture_places(camera, centres)
+    u, v = 2.0 * across - 1.0, 2.0 * down - 1.0
     facing = np.einsum("ij,ij->i", way, skin.face_normals) < 0.0
     seen = (np.abs(u) <= 1.0) & (np.abs(v) <= 1.0) & facing
-    seen &= (depth > 0.0) | (camera.projection == "equidistant")
     if not seen.any():
         return 0.0, 0.0
     spread = max(float(np.ptp(u[seen])), float(np.ptp(v[seen]))) / 2.0

@@ -1,0 +1,28 @@
+"""Lenses that show a thing twice."""
+
+from __future__ import annotations
+
+from optisense.design.camera import Camera
+from optisense.design.problems import Diagnostic
+from optisense.design.projection import folding_angle
+
+
+def fold_problems(camera: Camera, where: str) -> list[Diagnostic]:
+    """A distortion that folds within the picture.
+
+    Args:
+        camera: of the design.
+        where: the place of its distortion in the design.
+    """
+    angle = folding_angle(camera)
+    if angle is None:
+        return []
+    return [
+        Diagnostic(
+            f"the lens's distortion folds {angle:.3g} degrees off its axis, inside the picture: "
+            "what lies there is shown twice, or some pixels show nothing",
+            where,
+            "Give coefficients nearer to 0, or a smaller field of view (fov); a calibration holds "
+            "only as far out as its marks were",
+        )
+    ]

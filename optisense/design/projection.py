@@ -1,0 +1,137 @@
+"""Where a design's camera shows points, and where its pixels look, along straight lines.
+
+A place of the picture is given by shares: 0 to 1 across from the left and down from the top.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from optisense.design.camera import Camera
+
+FloatArray = NDArray[np.float64]
+
+FOLD_PLACES = 13
+"""Places along the picture's width and its height at which a lens is tried for folding; the
+borders and the corners, where lenses fold first, are among them."""
+
+FOLD_STEPS = 24
+"""Steps from the axis to each of these places."""
+
+UNDISTORTED_TO = 1e-9
+"""Distance on the image plane to which a place that a lens shows is found again; a lens that folds
+has no such place, or another one."""
+
+
+def image_edges(camera: Camera) -> tuple[float, float]:
+    """Half the width and half the height of the picture on the image plane (see `distortion`)."""
+    half = np.radians(0.5 * camera.fov)
+    edge = float(half if camera.projection == "equidistant" else np.tan(half))
+    return edge, edge * camera.resolution[1] / camera.resolution[0]
+
+
+def shown_places(camera: Camera, across: FloatArray, down: FloatArray) -> FloatArray:
+    """(2, ...) x and y on the image plane, as the lens shows them, of places of the picture."""
+    edge, tall = image_edges(camera)
+    middle = (0.5, 0.5) if camera.distortion is None else camera.distortion.centre
+    return np.array([2.0 * edge * (across - middle[0]), 2.0 * tall * (down - middle[1])])
+
+
+def ideal_places(camera: Camera, across: FloatArray, down: FloatArray) -> FloatArray:
+    """(2, ...) x and y on the image plane of an ideal lens of what the picture shows at places."""
+    shown = shown_places(camera, across, down)
+    lens = camera.distortion
+    if lens is None:
+        return shown
+    with np.errstate(all="ignore"):  # a lens that folds has places without any
+        return np.array(lens.undistort(shown[0], shown[1], lens.coefficients()))
+
+
+def directions(camera: Camera, across: FloatArray, down: FloatArray) -> FloatArray:
+    """(..., 3) unit vectors in which places of the picture look."""
+    x, y = ideal_places(camera, across, down)
+    height = np.hypot(x, y)
+    angle = height if camera.projection == "equidistant" else np.arctan(height)
+    scale = np.sin(angle) / np.maximum(height, 1e-300)
+    scale = np.where(height < 1e-12, 1.0, scale)
+    return np.stack([x * scale, -y * scale, np.cos(angle)], axis=-1) @ camera.axes()
+
+
+def picture_places(camera: Camera, points: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Where points are shown: (n,), (n,) across and down; NaN for those that the lens can't show.
+
+    Places may lie outside of the picture, where they are below 0 or above 1.
+
+    Args:
+        camera: of the design.
+        points: (n, 3) mm.
+    """
+    right, up, depth = camera.axes() @ (np.asarray(points) - np.array(camera.position)).T
+    aside = np.hypot(right, up)
+    angle = np.arctan2(aside, depth)
+    if camera.projection == "equidistant":
+        height = angle
+    else:
+        height = np.where(depth > 0.0, np.tan(np.minimum(angle, 1.57)), np.nan)
+    scale = height / np.maximum(aside, 1e-300)
+    x, y = right * scale, -up * scale
+    edge, tall = image_edges(camera)
+    lens = camera.distortion
+    middle = (0.5, 0.5)
+    if lens is not None:
+        middle = lens.centre
+        # Farther off the axis than any corner of the picture, its polynomial means nothing.
+        beyond = np.hypot(x, y) > 1.001 * _largest_height(camera)
+        with np.errstate(all="ignore"):
+            x, y = lens.distort(x, y, lens.coefficients())
+        x, y = np.where(beyond, np.nan, x), np.where(beyond, np.nan, y)
+    return middle[0] + 0.5 * x / edge, middle[1] + 0.5 * y / tall
+
+
+def _largest_height(camera: Camera) -> float:
+    """The largest distance from the axis, on the ideal image plane, that the picture shows."""
+    along = np.linspace(0.0, 1.0, FOLD_PLACES)
+    across = np.concatenate([along, along, 0.0 * along, 0.0 * along + 1.0])
+    down = np.concatenate([0.0 * along, 0.0 * along + 1.0, along, along])
+    return float(np.nanmax(np.hypot(*ideal_places(camera, across, down))))
+
+
+def folding_angle(camera: Camera) -> float | None:
+    """Degrees off the axis from which on the lens shows things again that are in the picture.
+
+    There its distortion has no inverse: two directions are shown at one place, and others nowhere.
+
+    Returns:
+        None for a lens that shows each place of the picture once.
+    """
+    lens = camera.distortion
+    if lens is None:
+        return None
+    numbers = lens.coefficients()
+    along = np.linspace(0.0, 1.0, FOLD_PLACES)
+    across, down = np.meshgrid(along, along)
+    shown = shown_places(camera, across, down)
+    ideal = ideal_places(camera, across, down)
+    with np.errstate(all="ignore"):
+        off = np.hypot(*(np.array(lens.distort(ideal[0], ideal[1], numbers)) - shown))
+        found = off <= UNDISTORTED_TO * np.maximum(1.0, np.hypot(*shown))
+        way = np.linspace(0.0, 1.0, FOLD_STEPS).reshape(-1, 1, 1)
+        a, b, c, d = lens.slopes(way * ideal[0], way * ideal[1], numbers)
+        unfolded = (a * d - b * c > 0.0).all(axis=0)
+    bad = ~(found & unfolded)
+    return _first_fold(camera, shown[:, bad]) if bad.any() else None
+
+
+def _first_fold(camera: Camera, shown: FloatArray) -> float:
+    """Degrees off the axis at which the lens first folds on the way to places that it shows."""
+    lens = camera.distortion
+    assert lens is not None
+    farthest = shown[:, np.argmax(np.hypot(*shown))]
+    way = farthest / np.hypot(*farthest)
+    limit = np.pi if camera.projection == "equidistant" else np.tan(np.radians(89.9))
+    height = np.geomspace(1e-3, limit, 4000)
+    a, b, c, d = lens.slopes(way[0] * height, way[1] * height, lens.coefficients())
+    folds = np.flatnonzero(a * d - b * c <= 0.0)
+    at = float(height[folds[0]] if len(folds) else limit)
+    return float(np.degrees(at if camera.projection == "equidistant" else np.arctan(at)))

@@ -1,0 +1,244 @@
+"""The chain from the light of a scene to the picture that a camera stores.
+
+In the order of a real camera:
+
+1. the lens: shading, blur;
+2. the sensor: crosstalk between the channels, overexposure (`CameraResponse`), noise, black level;
+3. its processor: the black level is subtracted, the shading corrected, the colours are balanced and
+   mixed by a matrix, levels are clipped, and the tone curve gives what is stored.
+
+A sensor overflows before its processor amplifies, so what is white in the picture may be a clipped
+red; noise is added before the gains, and grows with them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import map_coordinates
+
+from optisense.design.fields import PositiveRGB
+from optisense.design.lenses.blur import LEAST_WIDTH, LensBlur, LensView, blurred, reach_of
+from optisense.design.lenses.film import PictureWindow, film_places
+from optisense.design.lenses.shading import LensShading
+from optisense.design.responses.base import CameraResponse
+from optisense.design.responses.electronics import (
+    BlackLevel,
+    ChannelMatrix,
+    NoiseSeed,
+    SensorNoise,
+    mixed,
+    normal_numbers,
+)
+from optisense.design.responses.full_well import FullWellResponse
+from optisense.design.responses.tone_curve import ToneCurve
+
+FloatArray = NDArray[np.floating]
+
+USUAL_RESPONSE = FullWellResponse()
+"""The response of a camera whose design names none."""
+
+
+@dataclass(frozen=True)
+class SoftFocus:
+    """A lens's blur over the picture.
+
+    Attributes:
+        deviation: (h, w) of any size, or (1, 1): the standard deviation as a share of the picture's
+            width.
+    """
+
+    deviation: FloatArray
+
+    @classmethod
+    def of(cls, blur: LensBlur, camera: LensView, vergence: FloatArray | None = None) -> SoftFocus:
+        """The blur of a lens; `vergence` (h, w), 1/mm, is needed where it depends on depth."""
+        given = np.zeros((1, 1)) if vergence is None else vergence
+        return cls(np.atleast_2d(blur.deviation(camera, given)))
+
+    def in_pixels(self, window: PictureWindow) -> FloatArray:
+        """(h, w) standard deviation in pixels of a window of a picture."""
+        rows, columns = self.deviation.shape
+        down = (np.arange(window.height)[window.rows] + 0.5) / window.height * rows - 0.5
+        across = (np.arange(window.width)[window.columns] + 0.5) / window.width * columns - 0.5
+        at = np.meshgrid(down, across, indexing="ij")
+        return window.width * map_coordinates(self.deviation, at, order=1, mode="nearest")
+
+    @property
+    def largest(self) -> float:
+        """The largest standard deviation, a share of the picture's width."""
+        return float(self.deviation.max())
+
+
+@dataclass(frozen=True)
+class PictureChain:
+    """All that a camera does to the light, from radiance to the stored picture.
+
+    What is None is not done; a chain of nothing but a response does what that response does.
+
+    Attributes:
+        response: how its sensor is filled and overflows.
+        shading: of its lens, and how much its processor corrects of it.
+        focus: the blur of its lens.
+        crosstalk: how much of the R, G and B of the light each channel of the sensor sees.
+        noise: of its sensor.
+        black_level: of its sensor, and what is subtracted.
+        white_balance: gains of R, G and B.
+        colour_matrix: what its processor makes of R, G and B.
+        tone_curve: what is stored of a level, in place of the response's own curve.
+    """
+
+    response: CameraResponse = field(default_factory=lambda: USUAL_RESPONSE)
+    shading: LensShading | None = None
+    focus: SoftFocus | None = None
+    crosstalk: ChannelMatrix | None = None
+    noise: SensorNoise | None = None
+    black_level: BlackLevel | None = None
+    white_balance: PositiveRGB | None = None
+    colour_matrix: ChannelMatrix | None = None
+    tone_curve: ToneCurve | None = None
+
+    @property
+    def is_plain(self) -> bool:
+        """Whether the response alone makes the picture, but for its tone curve."""
+        stages = (self.shading, self.focus, self.crosstalk, self.noise, self.black_level)
+        return all(each is None for each in (*stages, self.white_balance, self.colour_matrix))
+
+    def without_noise(self) -> PictureChain:
+        """The same camera without noise, as the mean of many pictures has none."""
+        return self if self.noise is None else replace(self, noise=None)
+
+    def respond(
+        self, exposed: FloatArray, window: PictureWindow | None = None, seed: NoiseSeed = 0
+    ) -> NDArray[np.float32]:
+        """(h, w, 3) linear levels, 0 to 1, of which the tone curve makes the picture.
+
+        Args:
+            exposed: (h, w, 3) radiance times the exposure, of a picture or of a part of it.
+            window: which part, where it is one.
+            seed: of the noise; the same one gives a pixel the same noise.
+        """
+        place = window or PictureWindow.whole(*exposed.shape[:2])
+        if self.is_plain:
+            return self.response.respond(exposed, place.width)
+        level = self.response.respond(self._on_sensor(exposed, place), place.width)
+        return self._processed(self._read(level, place, seed), place)
+
+    def _on_sensor(self, exposed: FloatArray, window: PictureWindow) -> FloatArray:
+        """What fills the pixels of the sensor, before they overflow."""
+        level: FloatArray = np.asarray(exposed, dtype=np.float32)
+        if self.shading is not None:
+            level = level * self._transmission(window)
+        if self.focus is not None:
+            level = blurred(level, self.focus.in_pixels(window))
+        return level if self.crosstalk is None else mixed(level, self.crosstalk)
+
+    def _read(self, level: FloatArray, window: PictureWindow, seed: NoiseSeed) -> FloatArray:
+        """What the sensor gives of filled pixels, less the black level."""
+        if self.noise is not None:
+            normal = normal_numbers(seed, window.height, window.width)[window.box]
+            level = self.noise.add(level, normal)
+        if self.black_level is not None:
+            return self.black_level.subtract(self.black_level.read(level))
+        return np.clip(level, 0.0, 1.0)
+
+    def _processed(self, level: FloatArray, window: PictureWindow) -> NDArray[np.float32]:
+        """What the processor makes of levels above black."""
+        level = self._balanced(level, None if self.shading is None else self._transmission(window))
+        return np.clip(level, 0.0, 1.0).astype(np.float32, copy=False)
+
+    def _balanced(self, level: FloatArray, transmission: FloatArray | None) -> FloatArray:
+        if self.shading is not None and transmission is not None:
+            level = level * self.shading.correction(transmission).astype(np.float32)
+        if self.white_balance is not None:
+            level = level * np.array(self.white_balance, dtype=np.float32)
+        return level if self.colour_matrix is None else mixed(level, self.colour_matrix)
+
+    def _transmission(self, window: PictureWindow) -> FloatArray:
+        assert self.shading is not None
+        data = self.shading.model_dump_json()
+        return _transmission(_Shown(self.shading, data), window.height, window.width)[window.box]
+
+    def metered(
+        self, radiance: FloatArray, where: NDArray[np.bool_] | None = None
+    ) -> NDArray[np.floating]:
+        """What automatic exposure looks at: levels that must not exceed the full one.
+
+        The larger of what fills the sensor's pixels and of what its processor makes of them,
+        without blur, noise and overexposure.
+
+        Args:
+            radiance: (h, w, 3) of a picture, or (n, 3) of the pixels of a mask.
+            where: (h, w) the mask.
+        """
+        if self.is_plain:
+            return radiance
+        level: FloatArray = np.asarray(radiance, dtype=np.float32)
+        transmission = None
+        if self.shading is not None:
+            height, width = radiance.shape[:2] if where is None else where.shape
+            whole = self._transmission(PictureWindow.whole(height, width))
+            transmission = whole if where is None else whole[where]
+            level = level * transmission
+        if self.crosstalk is not None:
+            level = mixed(level, self.crosstalk)
+        return np.maximum(level, self._balanced(level, transmission))
+
+    def auto_exposure(self, radiance: FloatArray) -> float:
+        """The factor that makes a good picture of a radiance image (h, w, 3)."""
+        return self.response.auto_exposure(self.metered(radiance))
+
+    def full_level(self) -> float:
+        """The level that automatic exposure must not exceed."""
+        return self.response.full_level()
+
+    def reach(self, width: int) -> int:
+        """Pixels as far as light in one pixel changes others, in a picture so many wide."""
+        own = self.response.reach(width)
+        return own if not self._softens(width) else own + reach_of(self._largest, width)
+
+    def spreads(self, exposed: FloatArray, window: PictureWindow | None = None) -> bool:
+        """Whether light in some pixel of a picture, or of a part of it, changes others."""
+        if self.is_plain:
+            return self.response.spreads(exposed)
+        place = window or PictureWindow.whole(*exposed.shape[:2])
+        return self._softens(place.width) or self.response.spreads(self._on_sensor(exposed, place))
+
+    @property
+    def _largest(self) -> float:
+        return 0.0 if self.focus is None else self.focus.largest
+
+    def _softens(self, width: int) -> bool:
+        return self._largest * width >= LEAST_WIDTH
+
+    def curve(self, linear: FloatArray) -> NDArray[np.float64]:
+        """What is stored, 0 to 1 before rounding, of linear levels."""
+        return (self.tone_curve or self.response).curve(linear)
+
+    def encode(self, linear: FloatArray) -> NDArray[np.uint8]:
+        """The same in 8 bits."""
+        return (self.tone_curve or self.response).encode(linear)
+
+
+@dataclass(frozen=True)
+class _Shown:
+    """A shading that is compared by its numbers."""
+
+    shading: LensShading
+    data: str
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, _Shown) and self.data == other.data
+
+    def __hash__(self) -> int:
+        return hash(self.data)
+
+
+@lru_cache(maxsize=4)
+def _transmission(shown: _Shown, height: int, width: int) -> FloatArray:
+    found = shown.shading.transmission(film_places(height, width)).astype(np.float32)
+    found.setflags(write=False)
+    return found

@@ -1,0 +1,111 @@
+"""What a camera's sensor and its processor add to the light: noise, black level, colours.
+
+Levels are shares of the largest that a pixel can hold: 1 is full.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import lru_cache
+from typing import Annotated
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import AfterValidator, Field
+
+from optisense.design.fields import Fraction, Model, NonNegative, Number, Positive
+
+FloatArray = NDArray[np.floating]
+
+Row = tuple[Number, Number, Number]
+
+NoiseSeed = int | tuple[int, ...]
+"""What names a random sequence of noise: one or several numbers from 0 up."""
+
+
+def _invertible(matrix: tuple[Row, Row, Row]) -> tuple[Row, Row, Row]:
+    if abs(np.linalg.det(np.array(matrix))) < 1e-6:
+        raise ValueError("the matrix mixes the channels so that they can't be told apart")
+    return matrix
+
+
+ChannelMatrix = Annotated[tuple[Row, Row, Row], AfterValidator(_invertible)]
+"""Rows of what R, G and B become: each has the shares of R, G and B in it."""
+
+
+class BlackLevel(Model):
+    """The level that a sensor adds to all that it reads, and how much of it is taken off again."""
+
+    level: Annotated[Number, Field(ge=0.0, lt=0.9)] = Field(
+        description="what the sensor reads in the dark, a share of its range"
+    )
+    subtracted: Fraction = Field(
+        default=1.0, description="share of it that is subtracted before anything is done with it"
+    )
+
+    def read(self, level: FloatArray) -> FloatArray:
+        """What the converter gives, 0 to 1, of levels above black, negative ones included."""
+        return np.clip(self.level + (1.0 - self.level) * level, 0.0, 1.0)
+
+    def subtract(self, read: FloatArray) -> FloatArray:
+        """Levels above what is taken for black, scaled so that a full pixel stays at 1."""
+        off = self.subtracted * self.level
+        return (read - off) / (1.0 - off)
+
+
+class SensorNoise(Model):
+    """Shot noise of the light and read noise of the sensor (as in the EMVA standard 1288).
+
+    A pixel that is full holds `full_well` / `gain` electrons. The number of electrons varies by its
+    square root from picture to picture (shot noise; a normal distribution stands for Poisson's),
+    and reading adds `read_noise` electrons.
+    """
+
+    full_well: Positive = Field(
+        description="electrons of a pixel that is full at a gain of 1", examples=[4866.0]
+    )
+    read_noise: NonNegative = Field(
+        default=0.0, description="electrons, standard deviation in the dark"
+    )
+    gain: Annotated[Positive, Field(le=1000.0)] = Field(
+        default=1.0, description="analogue gain; 1 is the sensor's lowest"
+    )
+    binning: Annotated[Number, Field(ge=1.0)] = Field(
+        default=1.0, description="pixels of the sensor whose mean is one pixel of the picture"
+    )
+
+    def deviation(self, level: FloatArray) -> FloatArray:
+        """The standard deviation of levels, as a share of a full pixel."""
+        per_electron = self.gain / self.full_well
+        shot = np.maximum(level, 0.0) * per_electron
+        return np.sqrt((shot + (self.read_noise * per_electron) ** 2) / self.binning)
+
+    def add(self, level: FloatArray, normal: FloatArray) -> FloatArray:
+        """Levels with noise.
+
+        Args:
+            level: of each pixel and channel.
+            normal: as many numbers of the standard normal distribution.
+        """
+        return level + self.deviation(level) * normal
+
+
+def normal_numbers(seed: NoiseSeed | Sequence[int], height: int, width: int) -> FloatArray:
+    """(h, w, 3) numbers of the standard normal distribution for all pixels of a picture.
+
+    The same seed and size give the same numbers; they are not to be changed.
+    """
+    return _normal_numbers(seed if isinstance(seed, int) else tuple(seed), height, width)
+
+
+@lru_cache(maxsize=2)
+def _normal_numbers(seed: NoiseSeed, height: int, width: int) -> FloatArray:
+    numbers = np.random.default_rng(seed).standard_normal((height, width, 3), dtype=np.float32)
+    numbers.setflags(write=False)
+    return numbers
+
+
+def mixed(levels: FloatArray, matrix: ChannelMatrix) -> FloatArray:
+    """Levels (..., 3) with their channels mixed by a matrix."""
+    mix: FloatArray = levels @ np.array(matrix, dtype=np.float32).T
+    return mix

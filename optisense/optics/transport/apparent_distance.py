@@ -1,0 +1,138 @@
+"""How far away the skin appears to the camera, through all that bends its rays.
+
+A lens sees a point from all over its pupil. Seen from a place beside the pupil's middle, the point
+appears in another direction; the nearer it is, the more. How much is found with two rays more per
+place of the picture, one from a shifted pupil for each of its axes, and two in slightly other
+directions: all five meet the skin, and from where they do follows by how much the direction must
+change with the pupil for the same point to be seen. Refraction and mirrors are followed as they
+are. In air the result is one over the distance.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import drjit as dr
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import distance_transform_edt
+
+from optisense.design.camera import Camera
+from optisense.design.responses import PictureChain
+from optisense.optics.backend.arrays import floats
+from optisense.optics.camera.projection import RayCamera
+from optisense.optics.scene.ray_scene import RayScene
+from optisense.optics.transport.chief_rays import trace_to_skin
+
+FloatArray = NDArray[np.float64]
+
+PUPIL_SHIFT = 0.02
+"""mm by which the pupil is shifted: small against all distances, and large against the rounding of
+points (some 1e-6 mm)."""
+
+FILM_SHIFT = 0.1
+"""Pixels by which rays are turned."""
+
+LARGEST = 10.0
+"""1/mm: nothing appears nearer than a tenth of a millimetre; larger values come from rays that meet
+another part than their neighbours."""
+
+
+FOCUS_ACROSS = 64
+"""Places across the picture at which it is found how far away things appear: depth of field varies
+slowly over a picture."""
+
+
+def focused_chain(
+    camera: Camera,
+    scene: Callable[[], RayScene],
+    rays: Callable[[tuple[int, int]], RayCamera],
+) -> PictureChain:
+    """The chain of a design's camera, with the blur of its depth of field, if it has one.
+
+    Args:
+        camera: of the design.
+        scene: makes the surfaces; called where the blur depends on depth.
+        rays: makes the camera of a resolution.
+    """
+    if camera.blur is None or not camera.blur.by_depth:
+        return camera.picture_chain()
+    width, height = camera.resolution
+    size = FOCUS_ACROSS, max(2, round(FOCUS_ACROSS * height / width))
+    return camera.picture_chain(apparent_vergence(scene(), rays(size)))
+
+
+def apparent_vergence(scene: RayScene, camera: RayCamera) -> FloatArray:
+    """One over the distance at which the skin appears, for the middle of each pixel.
+
+    Distances are measured along the axis for perspective lenses, whose field of focus is flat, and
+    along the ray for fisheyes. A lens that sees the two directions across a ray at different
+    distances (astigmatism) gets the mean. Pixels that do not see the skin get the value of the
+    nearest one that does.
+
+    Args:
+        scene: the surfaces.
+        camera: its pixels.
+
+    Returns:
+        (h, w) 1/mm; 0 where no pixel sees the skin.
+    """
+    height, width = camera.height, camera.width
+    index = np.arange(height * width)
+    x, y = index % width + 0.5, index // width + 0.5
+    origin, direction = _rays(camera, x, y)
+    turned = [_rays(camera, x + FILM_SHIFT, y)[1], _rays(camera, x, y + FILM_SHIFT)[1]]
+    right, up, forward = camera.axes()
+    seen, points = trace_to_skin(scene, origin, direction)
+    by_film, by_pupil = [], []
+    for way in turned:
+        there, moved = trace_to_skin(scene, origin, way)
+        seen &= there
+        by_film.append((moved - points) / FILM_SHIFT)
+    for shift in (right, up):
+        there, moved = trace_to_skin(scene, origin + PUPIL_SHIFT * shift, direction)
+        seen &= there
+        by_pupil.append((moved - points) / PUPIL_SHIFT)
+    turning = np.stack([(way - direction) / FILM_SHIFT for way in turned], axis=-1)
+    across = (
+        np.stack([right, up], axis=-1)
+        - direction[:, :, None] * np.stack([direction @ right, direction @ up], axis=-1)[:, None, :]
+    )
+    with np.errstate(all="ignore"):
+        needed = _solved(np.stack(by_film, axis=-1), np.stack(by_pupil, axis=-1))
+        in_air = _solved(turning, across)  # at a distance of 1 mm
+        ratio = needed @ np.linalg.inv(_safe(in_air))
+        vergence = 0.5 * np.trace(ratio, axis1=1, axis2=2)
+        if not camera.equidistant:
+            vergence = vergence / (direction @ forward)
+    good = seen & np.isfinite(vergence) & (np.abs(vergence) < LARGEST)
+    return _filled(vergence.reshape(height, width), good.reshape(height, width))
+
+
+def _rays(
+    camera: RayCamera, x: NDArray[np.floating], y: NDArray[np.floating]
+) -> tuple[FloatArray, FloatArray]:
+    """(k, 3), (k, 3): places and directions in double precision."""
+    origin, direction = camera.rays(floats(x), floats(y))
+    dr.eval(origin, direction)
+    unit = np.asarray(direction, dtype=np.float64).T
+    return np.asarray(origin, dtype=np.float64).T, unit / np.linalg.norm(unit, axis=1)[:, None]
+
+
+def _solved(matrix: FloatArray, right: FloatArray) -> FloatArray:
+    """(k, 2, 2): the least-squares solution of matrix (k, 3, 2) times it = right (k, 3, 2)."""
+    turned = np.swapaxes(matrix, 1, 2)
+    return np.linalg.inv(_safe(turned @ matrix)) @ turned @ right
+
+
+def _safe(matrix: FloatArray) -> FloatArray:
+    """Matrices (k, 2, 2) with NaN in place of those that can't be inverted."""
+    single = np.abs(np.linalg.det(matrix)) < 1e-30
+    return np.where(single[:, None, None], np.nan, matrix)
+
+
+def _filled(values: FloatArray, good: NDArray[np.bool_]) -> FloatArray:
+    if not good.any():
+        return np.zeros_like(values)
+    nearest = distance_transform_edt(~good, return_distances=False, return_indices=True)
+    return np.asarray(values[tuple(nearest)])

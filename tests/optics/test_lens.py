@@ -1,0 +1,163 @@
+"""The lens in front of the renderer's camera: distorted rays, ground truth, depth of field."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+import pytest
+
+import optisense as ots
+from optisense.design import SensorDesign
+from optisense.design.projection import directions, ideal_places, image_edges
+from optisense.design.responses import PictureChain
+from optisense.errors import DesignError
+from optisense.optics import OpticalModel
+from optisense.optics.backend.arrays import floats
+from optisense.optics.camera.projection import Pose, RayCamera
+from optisense.optics.transport.apparent_distance import apparent_vergence
+from optisense.sensors import SENSORS
+
+BARREL = {"kind": "brown-conrady", "k1": -0.3, "k2": 0.05, "p1": 0.004, "centre": [0.52, 0.49]}
+FISHEYE = {"kind": "kannala-brandt", "k1": -0.04, "k2": 0.003}
+
+BALL = ots.Contact(ots.Sphere(1.5), at=(3.0, 2.0), depth=0.8)
+
+
+def mini(**changes: Any) -> SensorDesign:
+    """GelSight Mini with other values of its camera."""
+    design = ots.load("builtin:gelsight-mini")
+    return ots.set_value(design, "camera", design.camera.model_dump(mode="json") | changes)
+
+
+def rays_of(camera: RayCamera, x: Any, y: Any, pose: Pose | None = None) -> Any:
+    """(k, 3) directions through film positions."""
+    return np.asarray(camera.rays(floats(x), floats(y), pose)[1], dtype=np.float64).T
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {},
+        {"distortion": BARREL},
+        {"projection": "equidistant", "fov": 130.0, "distortion": FISHEYE},
+    ],
+)
+def test_rays_are_those_of_the_design(changes: dict[str, Any]) -> None:
+    design = mini(**changes)
+    camera = OpticalModel(design).camera((64, 48))
+    x, y = (each.ravel() for each in np.meshgrid(np.arange(64) + 0.5, np.arange(48) + 0.5))
+    exact = directions(design.camera, x / 64, y / 48)
+    assert np.abs(rays_of(camera, x, y) - exact).max() < 1e-6
+
+
+def test_ground_truth_follows_the_distorted_camera() -> None:
+    """A pixel of the distorted camera sees what the plain one sees at the ideal place."""
+    plain, bent = OpticalModel(mini()), OpticalModel(mini(distortion=BARREL))
+    size = 160, 120
+    seen = bent.chief_rays(size, [BALL])
+    x, y = np.meshgrid((np.arange(160) + 0.5) / 160, (np.arange(120) + 0.5) / 120)
+    edge, tall = image_edges(bent.design.camera)
+    ideal = ideal_places(bent.design.camera, x, y)
+    column, row = 80.0 * (1.0 + ideal[0] / edge), 60.0 * (1.0 + ideal[1] / tall)
+    # A picture of the plain camera so fine that its nearest pixel will do.
+    fine = plain.chief_rays((1600, 1200), [BALL])
+    row, column = (np.round(10.0 * each - 0.5).astype(int) for each in (row, column))
+    inside = (row >= 0) & (row < 1200) & (column >= 0) & (column < 1600)
+    assert inside.mean() > 0.8
+    at = row[inside], column[inside]
+    off = np.linalg.norm(seen.points[inside] - fine.points[at], axis=1)
+    assert np.quantile(off, 0.99) < 0.01 and off.max() < 0.1  # at the rim of the contact
+    assert (seen.contact_mask[inside] == fine.contact_mask[at]).mean() > 0.999
+    image = bent.render([BALL], size, photons=20_000)
+    assert np.array_equal(image.contact_mask, seen.contact_mask)
+    middle = plain.chief_rays(size, [BALL])
+    assert np.abs(middle.contact_mask.sum() / seen.contact_mask.sum() - 1.0) > 0.02
+
+
+def test_a_lens_that_folds_is_an_error_of_the_design() -> None:
+    lens = {"kind": "brown-conrady", "k1": -0.6}
+    with pytest.raises(DesignError, match=r"folds 36\.7 degrees off its axis"):
+        OpticalModel(mini(distortion=lens)).chief_rays((32, 24))
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [{"distortion": BARREL}, {"projection": "equidistant", "fov": 130.0, "distortion": FISHEYE}],
+)
+def test_rays_have_derivatives_by_the_lens(changes: dict[str, Any]) -> None:
+    design = mini(**changes)
+    camera = OpticalModel(design).camera((64, 48))
+    x, y = np.array([3.0, 50.0, 60.5]), np.array([44.0, 8.0, 3.5])
+    weights = np.random.default_rng(1).random((3, 3))
+    pose = camera.pose()
+    numbers = pose.fov, *pose.lens
+    dr.enable_grad(*numbers)
+    _, direction = camera.rays(floats(x), floats(y), pose)
+    dr.backward(dr.sum(dr.dot(direction, dr.unravel(mi.Vector3f, floats(weights)))))
+    for number, value in enumerate(numbers):
+        step = 0.02 if number == 0 else 0.0004
+
+        def moved(change: float, at: int = number) -> float:
+            given = [pose.fov, *pose.lens]
+            given[at] = dr.detach(given[at]) + change
+            other = pose._replace(fov=given[0], lens=tuple(given[1:]))
+            return float((rays_of(camera, x, y, other) * weights).sum())
+
+        slope = (moved(step) - moved(-step)) / (2 * step)
+        assert float(dr.grad(value)[0]) == pytest.approx(slope, rel=5e-3, abs=2e-5)
+
+
+def test_the_skin_appears_as_far_away_as_the_layers_in_front_of_it_say() -> None:
+    """13 mm of air, 5 mm of acrylic and 4.25 mm of gel: on the axis each appears thinner by its
+    index."""
+    model = OpticalModel(mini())
+    vergence = apparent_vergence(model._fine.scene, model.camera((33, 25)))
+    assert 1.0 / vergence[12, 16] == pytest.approx(13.0 + 5.0 / 1.491 + 4.25 / 1.41, rel=1e-3)
+
+
+def test_in_air_the_distance_is_the_distance() -> None:
+    """A camera cast into a gel that fills all of its view sees nothing bent."""
+    design = mini()
+    for name in ("silicone-xp565", "acrylic"):
+        design = ots.set_value(design, f"materials.{name}.ior", 1.0)
+    for changes in ({}, {"distortion": BARREL}):
+        camera = design.camera.model_dump(mode="json") | changes
+        model = OpticalModel(ots.set_value(design, "camera", camera))
+        vergence = apparent_vergence(model._fine.scene, model.camera((32, 24)))
+        assert 1.0 / vergence == pytest.approx(22.25, rel=3e-3)
+
+
+def test_what_is_in_focus_stays_sharp_and_what_is_not_is_blurred() -> None:
+    def contrast(focus: float) -> tuple[float, float]:
+        blur = {"kind": "defocus", "focal_length": 3.0, "f_number": 1.8, "focus_distance": focus}
+        image = OpticalModel(mini(blur=blur)).render([BALL], (160, 120), photons=50_000)
+        plain = OpticalModel(mini()).render([BALL], (160, 120), photons=50_000)
+        edges = [
+            float(np.abs(np.diff(each.picture().astype(float), axis=1)).max())
+            for each in (image, plain)
+        ]
+        return edges[0], edges[1]
+
+    sharp, plain = contrast(19.36)
+    soft, _ = contrast(12.0)
+    assert sharp > 0.9 * plain
+    assert soft < 0.6 * plain
+
+
+def test_pictures_are_noisy_by_their_seed_alone() -> None:
+    design = mini(noise={"full_well": 1000.0, "gain": 2.0})
+    image = OpticalModel(design).render((), (80, 60), photons=50_000, seed=4)
+    plain = replace(image, chain=PictureChain())
+    first = image.picture()
+    assert np.array_equal(first, image.picture()) and not np.array_equal(first, plain.picture())
+    assert not np.array_equal(first, image.picture(noise_seed=5))
+    assert np.array_equal(image.without_noise().picture(), plain.picture())
+
+
+@pytest.mark.parametrize("name", SENSORS.names())
+def test_the_built_in_sensors_have_plain_cameras(name: str) -> None:
+    assert ots.load(f"builtin:{name}").camera.picture_chain().is_plain
