@@ -17,16 +17,12 @@ from optisense.cli.console import (
 )
 from optisense.cli.options import (
     DesignArgument,
-    ScorePhotonsOption,
-    ScoreResolutionOption,
-    SettingOption,
     VariantOption,
     out_option,
-    score_settings,
-    seed_option,
 )
 from optisense.cli.output_folder import take_folder
 from optisense.cli.progress import ProgressLine, progress_line
+from optisense.commands.scoring import EvaluateOptions
 from optisense.quality import SCORE_PHOTONS, photons_of
 from optisense.time_left import TimedStep
 from optisense.usual_times import BUILDING as BUILDING_TIME
@@ -47,25 +43,8 @@ REPORT_FILE = "scores.html"
 @ends_well
 def evaluate(
     design: DesignArgument,
-    objective: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--objective",
-            "-b",
-            metavar="NAME",
-            help="rgb2normal, normdiff, aoap, 2to3pw, one that an installed package brings, or "
-            "your own as FILE.py:FUNCTION. May be given several times.  [default: all four]",
-            show_default=False,
-        ),
-    ] = None,
-    setting: SettingOption = None,
-    resolution: ScoreResolutionOption = None,
-    photons: ScorePhotonsOption = None,
-    seed: Annotated[int, seed_option("The same seed gives the same scores.")] = 0,
-    seeds: Annotated[
-        int,
-        typer.Option(min=1, metavar="N", help="Score with so many seeds, and tell the spread."),
-    ] = 1,
+    *,
+    options: EvaluateOptions,
     out: Annotated[Path | None, out_option("Folder for scores.json.")] = None,
     report: Annotated[
         bool,
@@ -83,7 +62,7 @@ def evaluate(
     """
     if report and out is None:
         raise typer.BadParameter("needs a folder: --out DIR", param_hint="--report")
-    settings = score_settings(setting, photons, resolution)
+    settings, seeds = options.for_objectives(), options.seeds
 
     interrupted = False
     with progress_line(
@@ -96,7 +75,7 @@ def evaluate(
         from optisense.objectives.usual_score import usual_score
         from optisense.sensors import load
 
-        objectives = resolve(objective or BUILT_IN)
+        objectives = resolve(options.objectives or BUILT_IN)
         shared, _ = split_settings(settings, objectives)
         Settings(**shared)
         sensor = load(design)
@@ -115,7 +94,7 @@ def evaluate(
         line.begin(SCORING)
         try:
             for number in range(seeds):
-                seed_of_run = {**settings, "seed": seed + number}
+                seed_of_run = {**settings, "seed": options.seed + number}
                 told = _Told(line, number, seeds, len(objectives), usual)
                 _score(model, objectives, seed_of_run, scored, told)
         except KeyboardInterrupt:

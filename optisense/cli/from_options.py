@@ -28,8 +28,7 @@ def with_options(command: Callable[..., Any]) -> Callable[..., Any]:
     parameters = []
     for each in inspect.signature(command).parameters.values():
         if each.name in models:
-            fields = models[each.name].model_fields
-            parameters += [_parameter(name, field) for name, field in fields.items()]
+            parameters += [_parameter(*field) for field in _fields(models[each.name])]
         else:
             parameters.append(each.replace(annotation=hints[each.name]))
 
@@ -45,6 +44,12 @@ def with_options(command: Callable[..., Any]) -> Callable[..., Any]:
     return run
 
 
+def _fields(model: type[CommandOptions]) -> list[tuple[str, FieldInfo]]:
+    """The fields of a model by name, its own before those of the models that it builds on."""
+    names = dict.fromkeys(name for kind in model.__mro__ for name in inspect.get_annotations(kind))
+    return [(name, model.model_fields[name]) for name in names if name in model.model_fields]
+
+
 def _parameter(name: str, field: FieldInfo) -> inspect.Parameter:
     """The parameter from which Typer makes the option of a field."""
     kind, notes = _plain(field.annotation)
@@ -56,7 +61,7 @@ def _parameter(name: str, field: FieldInfo) -> inspect.Parameter:
         bounds |= {"max": note.le} if isinstance(note, Le) else {}
     usual = field.get_default(call_default_factory=True) or None
     if get_origin(kind) in (list, dict):
-        kind, usual = list[str] | None, usual if written.usual is None else None
+        kind = list[str] | None
     elif kind is bool:
         usual = False
     else:

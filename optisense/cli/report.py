@@ -8,9 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from optisense.cli.console import ends_well, output
-from optisense.cli.options import photons_option
 from optisense.cli.progress import ProgressLine, progress_line
-from optisense.quality import PICTURE_PHOTONS
+from optisense.commands.rendering import BeforeAndAfterOptions
 from optisense.time_left import TimedStep
 
 if TYPE_CHECKING:
@@ -38,7 +37,8 @@ def report(
             show_default="STUDY/report.html",
         ),
     ] = None,
-    photons: Annotated[int, photons_option("Photons to trace for each picture.")] = PICTURE_PHOTONS,
+    *,
+    options: BeforeAndAfterOptions,
     pictures: Annotated[
         bool, typer.Option(help="Render the sensor as it was and as it is best.")
     ] = True,
@@ -57,8 +57,8 @@ def report(
         if page.is_dir():
             raise typer.BadParameter(f"'{page}' is a folder", param_hint="--out")
         ensure_writable(page.parent)
-        with progress_line(*_steps(photons, pictures)) as line:
-            looks = _looks(opened, photons, pictures, line)
+        with progress_line(*_steps(options.photons, pictures)) as line:
+            looks = _looks(opened, options.photons, pictures, line)
             line.begin(WRITING)
             write_study_report(page, opened, looks)
     finally:

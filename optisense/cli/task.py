@@ -11,19 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from optisense.cli.console import ends_well, messages, output
-from optisense.cli.dataset import parse_range
-from optisense.cli.options import (
-    DesignArgument,
-    EstimatorOption,
-    NoiseOption,
-    SamplePhotonsOption,
-    SampleResolutionOption,
-    VariantOption,
-    out_option,
-    parse_contacts,
-    parse_resolution,
-    seed_option,
-)
+from optisense.cli.options import DesignArgument, VariantOption, out_option, parse_contacts
 from optisense.cli.output_folder import take_folder
 from optisense.cli.progress import progress_line
 from optisense.cli.sampling import (
@@ -35,8 +23,7 @@ from optisense.cli.sampling import (
     shown_samples,
 )
 from optisense.cli.task_result import print_perception, print_reconstruction
-from optisense.optics.estimators import RADIANCE_CACHE
-from optisense.quality import SAMPLE_PHOTONS
+from optisense.commands.sampling import CylinderOptions, ReconstructionOptions, SampleOptions
 from optisense.time_left import TimedStep
 from optisense.usual_times import UsualTimes
 
@@ -55,13 +42,6 @@ task_app = typer.Typer(
     no_args_is_help=True,
 )
 
-SamplesOption = Annotated[
-    int, typer.Option("--samples", "-n", min=10, metavar="N", help="Random contacts.")
-]
-SeedOption = Annotated[int, seed_option("The same seed, the same contacts.")]
-NeighboursOption = Annotated[
-    int, typer.Option(min=2, metavar="K", help="Neighbours of the signal-to-noise ratio.")
-]
 OutOption = Annotated[
     Path | None,
     out_option(
@@ -86,16 +66,11 @@ USUAL_OBJECTS = 3
 READING_TIME, FITTING_TIME = 1.0, 3.0
 """Seconds that usually follow the samples of the tasks, and the pictures of a reconstruction."""
 
-SAMPLES = 200
-NOISE = 1.5
-NEIGHBOURS = 5
-
 
 @task_app.command()
 @ends_well
 def misalignment(
     design: DesignArgument,
-    samples: SamplesOption = SAMPLES,
     angle: Annotated[
         float,
         typer.Option("--range", min=0.1, max=44.0, metavar="DEGREES", help="The largest angle."),
@@ -107,12 +82,8 @@ def misalignment(
         float,
         typer.Option(min=0.01, max=1.0, metavar="PART", help="Of the picture that is averaged."),
     ] = 0.25,
-    seed: SeedOption = 0,
-    camera_noise: NoiseOption = NOISE,
-    neighbours: NeighboursOption = NEIGHBOURS,
-    resolution: SampleResolutionOption = None,
-    photons: SamplePhotonsOption = SAMPLE_PHOTONS,
-    estimator: EstimatorOption = RADIANCE_CACHE,
+    *,
+    options: SampleOptions,
     out: OutOption = None,
     as_json: JsonOption = False,
     variant: VariantOption = "auto",
@@ -124,50 +95,37 @@ def misalignment(
 
         return Misalignment(range=angle, depth=depth, crop=crop)
 
-    settings = _settings(samples, seed, camera_noise, resolution, photons, estimator)
-    _perceive(design, {"misalignment": task}, settings, neighbours, out, as_json, variant)
+    _perceive(design, {"misalignment": task}, options, out, as_json, variant)
 
 
 @task_app.command("cylinder-radius")
 @ends_well
 def cylinder_radius(
     design: DesignArgument,
-    samples: SamplesOption = SAMPLES,
-    radius: Annotated[str, typer.Option(metavar="LOW:HIGH", help="mm.")] = "1:6",
     depth: Annotated[float, typer.Option(min=0.01, metavar="MM", help="The same for all.")] = 0.5,
-    seed: SeedOption = 0,
-    camera_noise: NoiseOption = NOISE,
-    neighbours: NeighboursOption = NEIGHBOURS,
-    resolution: SampleResolutionOption = None,
-    photons: SamplePhotonsOption = SAMPLE_PHOTONS,
-    estimator: EstimatorOption = RADIANCE_CACHE,
+    *,
+    options: CylinderOptions,
     out: OutOption = None,
     as_json: JsonOption = False,
     variant: VariantOption = "auto",
 ) -> None:
     """The radius of a touching cylinder, from the spread of colours in the contact."""
-    least, most = parse_range(radius, "--radius")
+    least, most = options.radius
 
     def task() -> PerceptionTask:
         from optisense.tasks import CylinderRadius
 
         return CylinderRadius(least=least, most=most, depth=depth)
 
-    settings = _settings(samples, seed, camera_noise, resolution, photons, estimator)
-    _perceive(design, {"cylinder-radius": task}, settings, neighbours, out, as_json, variant)
+    _perceive(design, {"cylinder-radius": task}, options, out, as_json, variant)
 
 
 @task_app.command()
 @ends_well
 def snr(
     design: DesignArgument,
-    samples: SamplesOption = SAMPLES,
-    seed: SeedOption = 0,
-    camera_noise: NoiseOption = NOISE,
-    neighbours: NeighboursOption = NEIGHBOURS,
-    resolution: SampleResolutionOption = None,
-    photons: SamplePhotonsOption = SAMPLE_PHOTONS,
-    estimator: EstimatorOption = RADIANCE_CACHE,
+    *,
+    options: SampleOptions,
     out: OutOption = None,
     as_json: JsonOption = False,
     variant: VariantOption = "auto",
@@ -184,9 +142,8 @@ def snr(
 
         return CylinderRadius()
 
-    settings = _settings(samples, seed, camera_noise, resolution, photons, estimator)
     tasks = {"misalignment": angles, "cylinder-radius": radii}
-    _perceive(design, tasks, settings, neighbours, out, as_json, variant)
+    _perceive(design, tasks, options, out, as_json, variant)
 
 
 @task_app.command()
@@ -203,51 +160,27 @@ def reconstruction(
             show_default=False,
         ),
     ] = None,
-    method: Annotated[
-        str, typer.Option(metavar="network|table", help="What colours are read with.")
-    ] = "network",
-    presses: Annotated[
-        int, typer.Option(min=1, metavar="N", help="Balls that it is fitted to.")
-    ] = 40,
-    radius: Annotated[
-        float, typer.Option(min=0.01, metavar="MM", help="Radius of these balls.")
-    ] = 1.5,
-    depth: Annotated[str, typer.Option(metavar="LOW:HIGH", help="How deep they press, mm.")] = (
-        "0.2:0.6"
-    ),
-    seed: SeedOption = 0,
-    camera_noise: NoiseOption = NOISE,
-    resolution: SampleResolutionOption = None,
-    photons: SamplePhotonsOption = SAMPLE_PHOTONS,
+    *,
+    options: ReconstructionOptions,
     out: Annotated[Path | None, out_option("Folder for result.json and figure.png.")] = None,
     as_json: JsonOption = False,
     variant: VariantOption = "auto",
 ) -> None:
     """Shapes from pictures: errors of normals (degrees) and depth (mm) on unseen objects."""
-    depths = parse_range(depth, "--depth")
-    size = None if resolution is None else parse_resolution(resolution)
     contacts = dict(zip(thing or [], parse_contacts(thing), strict=True)) or None
 
-    count = presses + (len(contacts) if contacts is not None else USUAL_OBJECTS)
+    count = options.presses + (len(contacts) if contacts is not None else USUAL_OBJECTS)
 
     def steps(times: UsualTimes) -> list[TimedStep]:
-        return sample_steps(PICTURES, photons, count, PICTURE_WORK, FITTING_TIME, times=times)
+        work, photons = PICTURE_WORK, options.photons
+        return sample_steps(PICTURES, photons, count, work, FITTING_TIME, times=times)
 
     with progress_line(*loading_steps(LIBRARIES_TIME), *steps(UsualTimes.here())) as line:
         line.begin(LOADING)
         from optisense.sensors import load
         from optisense.tasks import ReconstructionSettings, reconstruct
 
-        settings = ReconstructionSettings(
-            method=method,
-            presses=presses,
-            radius=radius,
-            depth=depths,
-            seed=seed,
-            camera_noise=camera_noise,
-            resolution=size,
-            photons=photons,
-        )
+        settings = ReconstructionSettings(**options.model_dump())
         sensor = load(design)
         if out is not None:
             take_folder(out)
@@ -268,30 +201,10 @@ def reconstruction(
         _say_where(out)
 
 
-def _settings(
-    samples: int,
-    seed: int,
-    camera_noise: float,
-    resolution: str | None,
-    photons: int,
-    estimator: str,
-) -> dict[str, Any]:
-    """The keyword arguments of `SampleSettings`, which takes a second to load."""
-    return {
-        "count": samples,
-        "seed": seed,
-        "camera_noise": camera_noise,
-        "resolution": None if resolution is None else parse_resolution(resolution),
-        "photons": photons,
-        "estimator": estimator,
-    }
-
-
 def _perceive(
     design: str,
     tasks: Mapping[str, Callable[[], PerceptionTask]],
-    given: Mapping[str, Any],
-    neighbours: int,
+    options: SampleOptions,
     out: Path | None,
     as_json: bool,
     variant: str,
@@ -301,7 +214,7 @@ def _perceive(
     def steps(times: UsualTimes) -> list[TimedStep]:
         found: list[TimedStep] = []
         for name in tasks:
-            photons, count, again = given["photons"], given["count"], bool(found)
+            photons, count, again = options.photons, options.samples, bool(found)
             found += sample_steps(
                 name, photons, count, SAMPLE_WORK, READING_TIME, again=again, times=times
             )
@@ -315,7 +228,7 @@ def _perceive(
         from optisense.tasks import SampleSettings, perceive
         from optisense.writing import inside
 
-        settings = SampleSettings(**given)
+        settings = SampleSettings(**options.settings())
         made = [make() for make in tasks.values()]
         sensor = load(design)
         if out is not None:
@@ -329,7 +242,7 @@ def _perceive(
         for task in made:
             folder = out if out is None or len(tasks) == 1 else inside(out, task.name)
             show = shown_samples(line, model, task.name, f"{task.name}: reading the samples")
-            results.append(perceive(task, model, settings, neighbours, folder, show))
+            results.append(perceive(task, model, settings, options.neighbours, folder, show))
             if folder is not None:
                 _write(folder, results[-1].to_dict(), draw_perception(results[-1]))
     if as_json:

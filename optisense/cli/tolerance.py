@@ -13,17 +13,13 @@ from optisense.cli import stopping
 from optisense.cli.console import EXIT_INTERRUPTED, ends_well, messages, output
 from optisense.cli.options import (
     DesignArgument,
-    ScorePhotonsOption,
-    ScoreResolutionOption,
-    SettingOption,
     VariantOption,
     WorkersOption,
     out_option,
-    score_settings,
-    seed_option,
 )
 from optisense.cli.output_folder import take_folder
 from optisense.cli.progress import about, progress_line
+from optisense.commands.scoring import ToleranceOptions
 from optisense.writing import remove_own_page, write_text
 
 if TYPE_CHECKING:
@@ -37,37 +33,9 @@ REPORT_FILE = "tolerance.html"
 @ends_well
 def tolerance(
     design: DesignArgument,
-    objective: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--objective",
-            "-b",
-            metavar="NAME",
-            help="rgb2normal, normdiff, aoap, 2to3pw, or your own as FILE.py:FUNCTION. May be "
-            "given several times.",
-            show_default="rgb2normal",
-        ),
-    ] = None,
-    error: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--error",
-            metavar="PATH=SIZE",
-            help="What may be off, and its standard deviation (mm, degrees, or the value's own "
-            "unit); PATH=+-LIMIT for any error up to a limit. lights.position and lights.angle "
-            "mean each light by itself. May be given several times.",
-            show_default="usual ones",
-        ),
-    ] = None,
-    sensors: Annotated[
-        int,
-        typer.Option(min=8, metavar="N", help="About how many manufactured sensors to try."),
-    ] = 120,
+    *,
+    options: ToleranceOptions,
     workers: WorkersOption = 1,
-    seed: Annotated[int, seed_option("The same seed gives the same sensors.")] = 0,
-    setting: SettingOption = None,
-    resolution: ScoreResolutionOption = None,
-    photons: ScorePhotonsOption = None,
     out: Annotated[Path | None, out_option("Folder for tolerance.json.")] = None,
     report: Annotated[
         bool, typer.Option("--report", help="Also write tolerance.html, with figures, into it.")
@@ -84,7 +52,7 @@ def tolerance(
     """
     if report and out is None:
         raise typer.BadParameter("needs a folder: --out DIR", param_hint="--report")
-    settings = score_settings(setting, photons, resolution)
+    settings = options.for_objectives()
 
     last: list[tuple[int, float]] = []
     with progress_line(waits=(lambda line: _waits(last)) if workers == 1 else None) as line:
@@ -93,7 +61,7 @@ def tolerance(
         from optisense.search.tolerance.analysis import tolerance as find_tolerance
         from optisense.sensors import load
 
-        errors = parse_errors(error) if error else None
+        errors = parse_errors(options.errors) if options.errors else None
         sensor = load(design)
         if out is not None:
             take_folder(out)
@@ -104,10 +72,10 @@ def tolerance(
 
         found = find_tolerance(
             sensor,
-            list(objective or ["rgb2normal"]),
+            options.objectives,
             errors,
-            sensors=sensors,
-            seed=seed,
+            sensors=options.sensors,
+            seed=options.seed,
             workers=workers,
             settings=settings,
             variant=variant,

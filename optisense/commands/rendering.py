@@ -8,7 +8,7 @@ from annotated_types import Ge, Le
 from pydantic import Field
 
 from optisense.commands.options import CommandOptions, Exposure, Photons, Resolution, Seed, Written
-from optisense.quality import photons_of
+from optisense.quality import PICTURE_PHOTONS, photons_of
 
 
 class RenderOptions(CommandOptions):
@@ -37,3 +37,9 @@ class RenderOptions(CommandOptions):
         """Those asked for, or of the usual level; None where another limit is given."""
         limited = self.photons or self.noise or self.seconds
         return self.photons if limited else photons_of(usual)
+
+
+class BeforeAndAfterOptions(CommandOptions):
+    """The pictures of a study's page."""
+
+    photons: Photons = Field(PICTURE_PHOTONS, description="Photons to trace for each picture.")

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from pydantic import Field
 
+from optisense.commands.searching import SearchOptions
 from optisense.engine.designing import bent_shapes
 from optisense.engine.failures import ProtocolError
 from optisense.engine.following import Following
@@ -33,17 +34,11 @@ class Space(OfDesign):
     vary: list[str] = Field(min_length=1)
 
 
-class Search(Space):
+class Search(Space, SearchOptions):
     """See docs/engine.md."""
 
     study: str
     objectives: list[str] = Field(min_length=1)
-    method: str = "cma-es"
-    budget: int | None = Field(default=None, ge=1)
-    seed: int = Field(default=0, ge=0, lt=2**32)
-    settings: dict[str, Any] = Field(default_factory=dict)
-    options: dict[str, Any] = Field(default_factory=dict)
-    may_cross: bool = False
     workers: int = Field(default=1, ge=1)
     go_on: bool = False
 
@@ -104,25 +99,14 @@ def search(session: Session, fields: Search, job: Job) -> dict[str, Any]:
 
 def _begun(session: Session, fields: Search, job: Job) -> SearchProcess:
     """The process that runs a new study."""
-    from optisense.search import Plan, SearchSpace, Study
-    from optisense.search.space.text import parse_space
+    from optisense.search import Study
 
     folder = _absolute(fields.study)
     design = design_of(session, fields, job)
     session.designs.must_be_sound(design)
-    plan = Plan(
-        space=SearchSpace(parse_space(fields.vary)),
-        goals=fields.objectives,
-        method=fields.method,
-        options=fields.options or None,
-        budget=fields.budget,
-        seed=fields.seed,
-        settings=fields.settings or None,
-        apart=not fields.may_cross,
-    )
     job.check()
     with own_objectives():
-        Study.create(folder, design, plan).close()
+        Study.create(folder, design, fields.plan()).close()
     return SearchProcess(folder, fields.workers, None, fields.go_on)
 
 

@@ -128,9 +128,9 @@ def test_bad_input_exits_with_2(arguments: tuple[str, ...], complaint: str) -> N
 
 
 def test_settings_are_read_as_numbers_are_written() -> None:
-    from optisense.cli.options import parse_settings
+    from optisense.commands.options import read_named
 
-    read = parse_settings(["exposure=1e-9", "half-lines=true", "places=[[0, 1e0]]", "colours=no"])
+    read = read_named(["exposure=1e-9", "half-lines=true", "places=[[0, 1e0]]", "colours=no"])
     assert read == {
         "exposure": 1e-9,
         "half_lines": True,

@@ -1,0 +1,126 @@
+"""The options of commands that press things into a sensor at random places."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any
+
+from annotated_types import Ge, Le
+from pydantic import Field
+
+from optisense.commands.options import (
+    CommandOptions,
+    Exposure,
+    Photons,
+    Range,
+    Resolution,
+    Seed,
+    Written,
+)
+from optisense.optics.estimators import ESTIMATORS, RADIANCE_CACHE
+from optisense.quality import SAMPLE_PHOTONS
+
+NOISE = 1.5
+"""Levels of 255: the noise of pictures that tasks are read from, as of a real GelSight Mini."""
+
+CameraNoise = Annotated[float, Ge(0.0), Le(255.0), Written("LEVELS")]
+NOISE_HELP = "Noise of the camera to add, of 255; a real GelSight Mini shows 1.1 to 1.9."
+
+
+class PictureOptions(CommandOptions):
+    """How the pictures of a task are made."""
+
+    seed: Seed = Field(0, description="The same seed, the same contacts.")
+    camera_noise: CameraNoise = Field(NOISE, description=NOISE_HELP)
+    resolution: Resolution | None = Field(
+        None,
+        description="Pixels of the pictures; those of the camera, or what the task needs, when "
+        "left out.",
+    )
+    photons: Photons = Field(
+        SAMPLE_PHOTONS, description="Photons of the light that all pictures share."
+    )
+
+
+class EstimatorOptions(PictureOptions):
+    """The same, by either estimator."""
+
+    estimator: Annotated[str, Written("|".join(ESTIMATORS))] = Field(
+        RADIANCE_CACHE, description="sppm is slow, and exact where plates cover the gel."
+    )
+
+
+class SampleOptions(EstimatorOptions):
+    """The samples of a perception task."""
+
+    samples: Annotated[int, Ge(10), Written("N", ("--samples", "-n"))] = Field(
+        200, description="Random contacts."
+    )
+    neighbours: Annotated[int, Ge(2), Written("K")] = Field(
+        5, description="Neighbours of the signal-to-noise ratio."
+    )
+
+    def settings(self) -> dict[str, Any]:
+        """The arguments of `optisense.tasks.SampleSettings`, which takes a second to load."""
+        made = self.model_dump(include=set(EstimatorOptions.model_fields))
+        return made | {"count": self.samples}
+
+
+class CylinderOptions(SampleOptions):
+    """The samples of the task that tells the radius of a cylinder."""
+
+    radius: Range = Field("1:6", validate_default=True, description="mm.")
+
+
+class DatasetOptions(EstimatorOptions):
+    """The samples of a dataset."""
+
+    indenter: Annotated[list[str], Written("KIND:SIZE")] = Field(
+        ["sphere:1.5"],
+        description="What presses: sphere:1.5, cylinder:2,6, plane or mesh:FILE. Given several "
+        "times, each is as likely as the others.",
+    )
+    depth: Range = Field(
+        "0.3:1", validate_default=True, description="How deep, mm; drawn evenly in between."
+    )
+    rotation: Range = Field(
+        "0:360", validate_default=True, description="Degrees about the surface normal."
+    )
+    tilt: Annotated[float, Ge(0.0), Le(89.0), Written("DEGREES")] = Field(
+        0.0, description="The most it tilts, about 2 axes."
+    )
+    margin: Annotated[float, Ge(0.0), Le(49.0), Written("PERCENT")] = Field(
+        2.0,
+        description="Of the picture's width that stays free between a contact and the picture's "
+        "edge; 0 lets the edge cut contacts.",
+    )
+    seed: Seed = Field(0, description="Of places, depths and noise.")
+    camera_noise: CameraNoise = Field(0.0, description=NOISE_HELP)
+    exposure: Exposure = Field(
+        "auto", description="One for all pictures; auto suits the untouched sensor."
+    )
+    radiance: bool = Field(False, description="Also write linear radiance as EXR files.")
+
+    def settings(self) -> dict[str, Any]:
+        """The arguments of `optisense.tasks.DatasetSettings`, which takes a second to load."""
+        from optisense.tasks import ContactDraw
+
+        drawn = {"indenter", "depth", "rotation", "tilt", "margin"}
+        contacts = ContactDraw(
+            tuple(self.indenter), self.depth, self.rotation, self.tilt, self.margin / 100
+        )
+        return self.model_dump(exclude=drawn) | {"contacts": contacts}
+
+
+class ReconstructionOptions(PictureOptions):
+    """How colours are read that tell the shape of what presses."""
+
+    method: Annotated[str, Written("network|table")] = Field(
+        "network", description="What colours are read with."
+    )
+    presses: Annotated[int, Ge(1), Written("N")] = Field(
+        40, description="Balls that it is fitted to."
+    )
+    radius: Annotated[float, Ge(0.01), Written("MM")] = Field(
+        1.5, description="Radius of these balls."
+    )
+    depth: Range = Field("0.2:0.6", validate_default=True, description="How deep they press, mm.")

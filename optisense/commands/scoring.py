@@ -1,0 +1,78 @@
+"""The options of scores."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any
+
+from annotated_types import Ge
+from pydantic import Field
+
+from optisense.commands.options import (
+    CommandOptions,
+    NamedValues,
+    Photons,
+    Resolution,
+    Seed,
+    Written,
+)
+from optisense.quality import LEVELS
+
+ScorePhotons = Annotated[Photons, Written(f"N|{LEVELS}", usual="fine, 5 million", is_text=True)]
+
+
+class ScoreOptions(CommandOptions):
+    """How the images and rays of objectives are made."""
+
+    settings: Annotated[NamedValues, Written("NAME=VALUE", ("--set",))] = Field(
+        {},
+        description="A setting of the objectives, such as depth=0.5, noise=0.2 or photons=1000000. "
+        "May be given several times.",
+    )
+    resolution: Resolution | None = Field(
+        None,
+        description="Pixels of images and rays. 640 across, in the camera's shape, when left out.",
+    )
+    photons: ScorePhotons | None = Field(None, description="Photons to trace.")
+
+    def for_objectives(self) -> dict[str, Any]:
+        """All of them as settings of objectives."""
+        found = dict(self.settings)
+        if self.photons is not None:
+            found["photons"] = self.photons
+        if self.resolution is not None:
+            found["resolution"] = found["ray_resolution"] = self.resolution
+        return found
+
+
+class EvaluateOptions(ScoreOptions):
+    """The scores of a design."""
+
+    objectives: Annotated[list[str], Written("NAME", ("--objective", "-b"), "all four")] = Field(
+        [],
+        description="rgb2normal, normdiff, aoap, 2to3pw, one that an installed package brings, or "
+        "your own as FILE.py:FUNCTION. May be given several times.",
+    )
+    seed: Seed = Field(0, description="The same seed gives the same scores.")
+    seeds: Annotated[int, Ge(1), Written("N")] = Field(
+        1, description="Score with so many seeds, and tell the spread."
+    )
+
+
+class ToleranceOptions(ScoreOptions):
+    """The scores of a design whose sensors come out a little other than designed."""
+
+    objectives: Annotated[list[str], Written("NAME", ("--objective", "-b"))] = Field(
+        ["rgb2normal"],
+        description="rgb2normal, normdiff, aoap, 2to3pw, or your own as FILE.py:FUNCTION. May be "
+        "given several times.",
+    )
+    errors: Annotated[list[str], Written("PATH=SIZE", ("--error",), "usual ones")] = Field(
+        [],
+        description="What may be off, and its standard deviation (mm, degrees, or the value's own "
+        "unit); PATH=+-LIMIT for any error up to a limit. lights.position and lights.angle mean "
+        "each light by itself. May be given several times.",
+    )
+    sensors: Annotated[int, Ge(8), Written("N")] = Field(
+        120, description="About how many manufactured sensors to try."
+    )
+    seed: Seed = Field(0, description="The same seed gives the same sensors.")

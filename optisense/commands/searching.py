@@ -1,0 +1,117 @@
+"""The options of searches, and the plan of a study that they make."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Annotated, Any
+
+from annotated_types import Ge
+from pydantic import Field
+
+from optisense.commands.options import CommandOptions, NamedValues, Seed, Written
+from optisense.commands.scoring import ScoreOptions
+
+if TYPE_CHECKING:
+    from optisense.search import Plan
+
+ScoreSettings = ScoreOptions.model_fields["settings"]
+
+
+class SearchOptions(CommandOptions):
+    """What may change, what is maximised and how. None is the usual value of a new study."""
+
+    vary: Annotated[list[str], Written("PATH=LO:HI[:N]")] = Field(
+        [],
+        description="What may change: between two bounds (N values of it for a grid), or around "
+        "what it is now as PATH=+-REACH, or one of several as PATH=NAME,NAME. May be given several "
+        "times.",
+    )
+    objectives: Annotated[list[str], Written("NAME", ("--objective", "-b"))] = Field(
+        [],
+        description="What to maximise: rgb2normal, normdiff, aoap, 2to3pw, or your own as "
+        "FILE.py:FUNCTION. Given several times, the first is maximised and the others are told, "
+        "or all are weighed by --method pareto.",
+    )
+    method: Annotated[str, Written("NAME", usual="cma-es")] | None = Field(
+        None, description="How to search; --methods lists them."
+    )
+    budget: Annotated[int, Ge(1), Written("N")] | None = Field(
+        None,
+        description="Trials in all; the method's own idea when left out. With --resume, trials "
+        "including those that are finished.",
+    )
+    seed: Annotated[Seed, Written("N", usual="0")] | None = Field(
+        None, description="The same seed gives the same search."
+    )
+    settings: Annotated[NamedValues, Written("NAME=VALUE", ("--set",))] = Field(
+        {}, description=ScoreSettings.description
+    )
+    options: Annotated[NamedValues, Written("NAME=VALUE", ("--option",))] = Field(
+        {},
+        description="An option of the method, such as sigma=0.1 or population=20. May be given "
+        "several times.",
+    )
+    rules: Annotated[list[str], Written("FILE.py:FUNCTION", ("--rule",))] = Field(
+        [],
+        description="A function of a design that returns False, or why, for one that must not be. "
+        "May be given several times.",
+    )
+    may_cross: bool = Field(
+        False,
+        description="Let parts cut through one another, leave those on which they rest, and "
+        "outgrow the sensor.",
+    )
+    errors: Annotated[list[str], Written("PATH=SIZE", ("--error",))] = Field(
+        [],
+        description="A manufacturing error (standard deviation). With one or more, what nine of "
+        "ten manufactured sensors reach is maximised.",
+    )
+    samples: Annotated[int, Ge(2), Written("N", usual="8")] | None = Field(
+        None, description="Manufactured sensors a trial, with --error."
+    )
+
+    def plan(self) -> Plan:
+        """The plan of a new study.
+
+        Raises:
+            SearchError: something can't be read, or a rule can't be loaded.
+        """
+        from optisense.search import Plan, SearchSpace
+        from optisense.search.space.constraints import UserRule
+        from optisense.search.space.text import parse_errors, parse_space
+
+        rules = [UserRule(text) for text in self.rules]
+        for rule in rules:
+            rule.load()  # a missing file is told now, not by trials that fail
+        space = SearchSpace(parse_space(self.vary), rules)
+        errors = parse_errors(self.errors) if self.errors else None
+        names = ("method", "options", "budget", "seed", "settings", "samples")
+        given = {name: getattr(self, name) for name in names}
+        return Plan(
+            space=space,
+            goals=self.objectives,
+            apart=not self.may_cross,
+            errors=errors,
+            **{name: value for name, value in given.items() if value not in (None, {})},
+        )
+
+    def as_stored(self) -> dict[str, Any]:
+        """What was given, as a study keeps it.
+
+        Raises:
+            SearchError: something can't be read.
+        """
+        from optisense.search import SearchSpace
+        from optisense.search.space.constraints import UserRule
+        from optisense.search.space.text import parse_errors, parse_space
+        from optisense.search.study.plan import reference, rule_reference
+
+        found: dict[str, Any] = {
+            "space": SearchSpace(parse_space(self.vary)).to_plain() if self.vary else None,
+            "objectives": [reference(goal) for goal in self.objectives],
+            "rules": [rule_reference(UserRule(text)) for text in self.rules],
+            "errors": parse_errors(self.errors).to_plain() if self.errors else None,
+            "apart": False if self.may_cross else None,
+        }
+        for name in ("method", "options", "seed", "settings", "samples"):
+            found[name] = getattr(self, name)
+        return {name: value for name, value in found.items() if value not in (None, {}, [])}
