@@ -33,10 +33,10 @@ def overlaps(design: SensorDesign, meshes: dict[str, TriangleMesh]) -> list[Diag
     solids = [n for n in meshes if design.parts[n].role in TRANSPARENT_SOLIDS]
     for name, other in combinations(solids, 2):
         parts = design.parts[name], design.parts[other]
-        one, two = (getattr(design.materials[p.material or ""], "ior", None) for p in parts)
+        one, two = (design.materials[p.material or ""].medium() for p in parts)
         if parts[0].priority != parts[1].priority or one is None or two is None:
             continue
-        if abs(one - two) <= EQUAL_INDEX:
+        if abs(one.ior - two.ior) <= EQUAL_INDEX and one.absorption == two.absorption:
             continue
         place = common_space(meshes[name], meshes[other], CONTACT)
         if place is not None:

@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 FloatArray = NDArray[np.float64]
 
 
-def fresnel_dielectric(cosine: ArrayLike, eta: float) -> FloatArray:
+def fresnel_dielectric(cosine: ArrayLike, eta: float | FloatArray) -> FloatArray:
     """The share of unpolarised light that a smooth face between transparent media reflects.
 
     Args:

@@ -64,6 +64,9 @@ class SensorDesign(Model):
     cages: dict[Name, Cage] = Field(
         default_factory=dict, description="control points that deform parts"
     )
+    dispersion: bool | None = Field(
+        default=None, description="whether R, G and B are refracted by indices of their own"
+    )
     provenance: dict[str, Provenance] = Field(
         default_factory=dict, description="where the numbers come from, by dotted path"
     )

@@ -19,7 +19,7 @@ from optisense.optics.camera.projection import RayCamera
 from optisense.optics.scene.bsdf import SMOOTH_ALPHA
 from optisense.optics.scene.emitters import Emitter, EmitterShape
 from optisense.optics.scene.ray_scene import Piece
-from optisense.optics.scene.surfaces import Surface, SurfaceKind
+from optisense.optics.scene.surfaces import CLEAR, Surface, SurfaceKind
 
 Colour = tuple[float, float, float]
 
@@ -45,8 +45,11 @@ def mitsuba_scene(
     *,
     samples: int = 64,
     max_depth: int = PATH_DEPTH,
+    channel: int | None = None,
 ) -> dict[str, Any]:
     """A dictionary for ``mi.load_dict``.
+
+    Where a medium absorbs, the integrator is ``volpath``, which follows media, and else ``path``.
 
     Args:
         pieces: all surfaces; the emitting faces among them are left out, the emitters bring theirs.
@@ -55,27 +58,34 @@ def mitsuba_scene(
         flux: mW per channel of each light of a group, in the order of the groups.
         samples: per pixel.
         max_depth: as Mitsuba counts it.
+        channel: 0 to 2 for a scene whose indices are those of R, G or B; the picture is right in
+            that channel. By default all light has the mean index, as Mitsuba's dielectrics have one
+            index each.
 
     Raises:
         RenderError: Mitsuba has no such camera, or a light's profile reaches too far from its axis.
     """
+    absorbing = any(piece.surface.absorbs for piece in pieces)
+    integrator = "volpath" if absorbing else "path"
     scene: dict[str, Any] = {
         "type": "scene",
-        "integrator": {"type": "path", "max_depth": max_depth, "rr_depth": 16},
+        "integrator": {"type": integrator, "max_depth": max_depth, "rr_depth": 16},
         "sensor": _sensor(camera, samples),
     }
     for number, piece in enumerate(pieces):
         if piece.surface.kind is not SurfaceKind.LIGHT:
-            scene[f"piece_{number}"] = _mesh(piece)
+            scene[f"piece_{number}"] = _mesh(piece, channel)
     for number, emitter in enumerate(emitters):
         scene[f"light_{number}"] = _emitter(emitter, np.asarray(flux[emitter.group], float))
     return scene
 
 
-def surface_bsdf(surface: Surface) -> dict[str, Any]:
+def surface_bsdf(surface: Surface, channel: int | None = None) -> dict[str, Any]:
     """Mitsuba's description of a surface. Indices are relative to the medium before it already."""
     if surface.kind is SurfaceKind.DIELECTRIC:
-        smooth = {"int_ior": float(surface.eta), "ext_ior": 1.0}
+        own = channel is not None and surface.etas is not None
+        eta = surface.etas[channel] if own else surface.eta  # type: ignore[index]
+        smooth = {"int_ior": float(eta), "ext_ior": 1.0}
         if surface.alpha <= SMOOTH_ALPHA:
             return {"type": "dielectric", **smooth}
         return {
@@ -110,9 +120,20 @@ def _rgb(values: Sequence[float] | NDArray[np.floating]) -> dict[str, Any]:
     return {"type": "rgb", "value": [float(v) for v in values]}
 
 
-def _mesh(piece: Piece) -> Any:
+def _medium(absorption: Colour) -> Any:
+    """Mitsuba's medium that absorbs and scatters nothing."""
+    return mi.load_dict(
+        {"type": "homogeneous", "albedo": _rgb((0.0,) * 3), "sigma_t": _rgb(absorption)}
+    )
+
+
+def _mesh(piece: Piece, channel: int | None) -> Any:
     properties = mi.Properties()
-    properties["bsdf"] = mi.load_dict(surface_bsdf(piece.surface))
+    properties["bsdf"] = mi.load_dict(surface_bsdf(piece.surface, channel))
+    media = piece.surface.absorption or (CLEAR, CLEAR)
+    for side, absorption in zip(("interior", "exterior"), media, strict=True):
+        if max(absorption) > 0.0:
+            properties[side] = _medium(absorption)
     vertices = np.asarray(piece.vertices, dtype=np.float32)
     smooth = piece.normals is not None
     mesh = mi.Mesh(piece.name, len(vertices), len(piece.faces), properties, smooth)

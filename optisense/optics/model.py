@@ -23,10 +23,10 @@ from optisense.optics.estimators import ESTIMATORS, RADIANCE_CACHE, SPPM
 from optisense.optics.imaging.cached import ImageLayers, PixelImportance, render_cached
 from optisense.optics.imaging.tactile_image import RADIANCE_UNIT, TactileImage
 from optisense.optics.radiance_cache.store import CacheStore, PilotScene
-from optisense.optics.ray_model import RayModel, is_coloured
+from optisense.optics.ray_model import RayModel
 from optisense.optics.scene.bsdf import surface_table
 from optisense.optics.scene.contact_scenes import ContactScenes
-from optisense.optics.scene.surfaces import Region, Surface, SurfaceKind
+from optisense.optics.scene.surfaces import Region, Surface, SurfaceKind, is_coloured
 from optisense.optics.transport.chief_rays import ChiefRays, sees_nothing, trace_chief_rays
 from optisense.optics.transport.emission_guide import EmissionGuide
 from optisense.optics.transport.photons import Emission

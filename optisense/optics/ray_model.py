@@ -7,6 +7,7 @@ from dataclasses import replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+import drjit as dr
 import mitsuba as mi
 import numpy as np
 
@@ -33,7 +34,7 @@ from optisense.optics.scene.bsdf import surface_table
 from optisense.optics.scene.contact_scenes import ContactScenes
 from optisense.optics.scene.emitters import EmitterTable, emitter_table
 from optisense.optics.scene.ray_scene import Piece, RayScene
-from optisense.optics.scene.surfaces import Region, Surface, SurfaceKind
+from optisense.optics.scene.surfaces import Region, Surface, SurfaceKind, is_coloured
 from optisense.optics.transport.apparent_distance import focused_chain
 from optisense.optics.transport.chief_rays import (
     MIRROR_BITS,
@@ -337,7 +338,12 @@ class RayModel:
             self._indenters(placed),
             mi.Float(np.concatenate([_ball(mesh) for mesh in placed]).astype(np.float32)),
             all(getattr(contact.indenter, "convex", False) for contact in contacts),
+            self._gel_absorption(),
         )
+
+    def _gel_absorption(self) -> mi.Color3f | None:
+        absorption = self._parts.absorption_before
+        return dr.opaque(mi.Color3f, absorption) if max(absorption) > 0.0 else None
 
     def _indenters(self, placed: list[TriangleMesh]) -> RayScene:
         """Indenters alone."""
@@ -367,24 +373,13 @@ def _shapes(design: SensorDesign) -> tuple[Any, ...]:
     lights = {
         name: (group.model, group.emitter, group.lights) for name, group in design.lights.items()
     }
-    return design.parts, design.materials, design.cages, lights
+    return design.parts, design.materials, design.cages, design.dispersion, lights
 
 
 def _ball(mesh: TriangleMesh) -> np.ndarray:
     """(4,) centre and radius of a ball around a mesh."""
     centre = mesh.bounds.mean(axis=0)
     return np.append(centre, np.linalg.norm(mesh.vertices - centre, axis=1).max())
-
-
-def is_coloured(surface: Surface) -> bool:
-    """Whether an opaque surface or mirror reflects some channels more than others."""
-    metal = surface.specularity > 0 or surface.kind is SurfaceKind.MIRROR
-    values = [surface.reflectance]
-    if metal:
-        values += [surface.metal_eta, surface.metal_k]
-    if surface.kind not in (SurfaceKind.OPAQUE, SurfaceKind.MIRROR):
-        return False
-    return any(max(v) - min(v) > 1e-6 for v in values)
 
 
 def _sensing_faces(pieces: list[Piece]) -> np.ndarray:

@@ -46,6 +46,15 @@ def full_data() -> dict[str, object]:
                 "kind": "dielectric", "ior": 1.41, "dispersion": [1.40, 1.41, 1.43],
                 "roughness": 0.125,
             },
+            "dyed": {"kind": "dielectric", "ior": 1.41, "absorption": [0.01, 0.02, 0.03]},
+            "sellmeier": {
+                "kind": "dielectric", "ior": 1.43, "sellmeier_b": [1.0093, 0, 0],
+                "sellmeier_c": [0.013185, 0, 0], "extinction": [1e-6, 2e-6, 3e-6],
+            },
+            "cauchy": {
+                "kind": "dielectric", "ior": 1.5, "cauchy": [1.49, 0.004, 0],
+                "transmittance": [0.9, 0.8, 0.7], "thickness": 3,
+            },
             "silver": {"kind": "conductor", "eta": [0.1] * 3, "k": [3] * 3, "roughness": 0.01},
             "white": {"kind": "diffuse", "reflectance": [0.8, 0.7, 0.6]},
             "black": {"kind": "absorber"},
@@ -93,6 +102,7 @@ def full_data() -> dict[str, object]:
                 "blend": [corner(0.5, 0.25, 0.75)] * 8,
             },
         },
+        "dispersion": True,
         "provenance": {"parts.gel": {"status": "assumed", "source": "for the test"}},
     }  # fmt: skip
 

@@ -25,7 +25,7 @@ from optisense.optics.scene.emitters import (
     emitter_table,
 )
 from optisense.optics.scene.ray_scene import Piece, RayScene
-from optisense.optics.scene.surfaces import Region, Surface, SurfaceKind
+from optisense.optics.scene.surfaces import Region, Surface, SurfaceKind, is_coloured
 from optisense.optics.transport.chief_rays import ChiefRays, trace_chief_rays
 from optisense.optics.transport.emission_guide import uniform_guide
 from optisense.optics.transport.photons import Emission
@@ -58,10 +58,7 @@ class ReferenceScene:
         return emitter_table(self.emitters, len(self.flux))
 
     def _coloured(self) -> bool:
-        surfaces = [p.surface for p in self.pieces if p.surface.kind is not SurfaceKind.DIELECTRIC]
-        return any(
-            np.ptp(s.reflectance) + np.ptp(s.metal_eta) + np.ptp(s.metal_k) > 0 for s in surfaces
-        )
+        return any(is_coloured(piece.surface) for piece in self.pieces)
 
     def chief_rays(self) -> ChiefRays:
         """One ray through the middle of every pixel."""

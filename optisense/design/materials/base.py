@@ -27,12 +27,18 @@ class Medium:
     """What light meets that enters a transparent material.
 
     Attributes:
-        ior: refractive index, of all colours.
+        ior: refractive index, of all colours where dispersion is not simulated.
         roughness: GGX alpha of its surface; 0 is smooth.
+        absorption: coefficient per mm at R, G, B: of light that has travelled d mm, the share
+            exp(-absorption d) is left (Beer and Lambert).
+        indices: refractive index at R, G, B, for designs that ask for dispersion; None where it is
+            not known, and `ior` stands for all.
     """
 
     ior: float
     roughness: float = 0.0
+    absorption: RGB = (0.0, 0.0, 0.0)
+    indices: RGB | None = None
 
 
 @dataclass(frozen=True)

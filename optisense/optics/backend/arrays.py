@@ -6,10 +6,25 @@ compiled kernels, which could then not be used again.
 
 from __future__ import annotations
 
+from dataclasses import fields, is_dataclass
+from typing import TypeVar
+
 import drjit as dr
 import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
+
+Value = TypeVar("Value")
+
+
+def gathered(value: Value, lanes: mi.UInt32) -> Value:
+    """Some lanes of an array, or of a dataclass of arrays, in which what is None stays so."""
+    if value is None:
+        return value
+    if is_dataclass(value) and not isinstance(value, type):
+        parts = {each.name: gathered(getattr(value, each.name), lanes) for each in fields(value)}
+        return type(value)(**parts)
+    return dr.gather(type(value), value, lanes)
 
 
 def floats(values: NDArray[np.floating]) -> mi.Float:

@@ -183,17 +183,18 @@ def render_cached(
     def sample(pixel: mi.UInt32, number: mi.UInt32, thorough: bool, again: bool = False) -> None:
         spots = film_samples(pixel, width, number, seed_of(seed, 3))
         own = seed_of(seed, 4, int(thorough))
-        main, reflected = find_visible_points(
-            scenes.full, camera, pixel, number, spots, own, only_main=again
-        )
         film.count(pixel)
-        film.add(main, shade(field, scenes, culled_beams, main, thorough, False))
-        film.add_light(main, emitters, areas)
         if not again:
             mirrored.count(pixel)
-        if reflected is not None:
-            mirrored.add(reflected, shade(field, scenes, culled_beams, reflected, False, True))
-            mirrored.add_light(reflected, emitters, areas)
+        for channel in scenes.full.channels:
+            main, reflected = find_visible_points(
+                scenes.full, camera, pixel, number, spots, own, again, channel
+            )
+            film.add(main, shade(field, scenes, culled_beams, main, thorough, False))
+            film.add_light(main, emitters, areas)
+            if reflected is not None:
+                mirrored.add(reflected, shade(field, scenes, culled_beams, reflected, False, True))
+                mirrored.add_light(reflected, emitters, areas)
 
     region_image = np.where(rays.hit, rays.region, 0)
     mask = region_image == Region.INDENTER

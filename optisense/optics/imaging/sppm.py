@@ -69,16 +69,17 @@ def render_sppm(
     for number in range(passes):
         sample = dr.opaque(mi.UInt32, number + 1)
         film = film_samples(pixel, width, sample, seed)
-        main, reflected = find_visible_points(scene, camera, pixel, sample, film, seed)
         sent = replace(emission, first=number * emission.per_light)
         photons = trace_photons(scene, sent, coloured=coloured)
         reach = radius * (number + 1) ** (-1 / 6)
         grid = build_grid(photons, *scene.bounds, reach)
         image = Film(width * height, table.groups)
         image.count(pixel)
-        for points in (main, reflected):
-            if points is None:
-                continue
+        ways = [
+            find_visible_points(scene, camera, pixel, sample, film, seed, channel=channel)
+            for channel in scene.channels
+        ]
+        for points in (end for pair in ways for end in pair if end is not None):
             light = gather_pairwise(
                 grid, scene.table, points, dr.opaque(mi.Float, reach), table.groups
             )

@@ -61,6 +61,9 @@ CELLS_PER_SAMPLE = 8
 MAX_EXTRAPOLATION = 1.5
 """Largest height, in units of half the flux layer's height, up to which the light above the surface
 is extrapolated; it is constant above."""
+MIN_SINE = 0.1
+"""Lower bound on the sine of elevation by which the way of light from a point on an indenter on to
+the undeformed surface is found: lower light meets another indenter or a wall before it."""
 MIN_STEP = 1e-20
 """Lower bound on the step of the systematic sampling; it avoids a division by zero without
 light."""
@@ -103,6 +106,7 @@ def _sum_chosen(
     upright, offset = plane_of(light.cells, at.cell, active)
     up = dr.select(raised, (dr.dot(upright, points.point) - offset) / (LAYER_HEIGHT / 2), 0)
     up = dr.clip(up, 0, MAX_EXTRAPOLATION)
+    rise = dr.dot(upright, points.point) - offset
     axis = bin_axis(light.cells, 2)
     k = mi.UInt32(0)
     while active & (k < bins):
@@ -154,9 +158,23 @@ def _sum_chosen(
                     reflected *= mi.Color3f(flux.x, flux.y, flux.z)
                 else:
                     reflected *= value.w
+                if dr.hint(scenes.absorption is not None and upper is None, mode="scalar"):
+                    reflected *= _spared(scenes, rise, dr.dot(upright, towards))
                 totals[g] += reflected * weight
         k += 1
     return totals
+
+
+def _spared(scenes: ContactScenes, rise: mi.Float, sine: mi.Float) -> mi.Color3f:
+    """By what factor light is stronger on an indenter, as it has come a shorter way through gel.
+
+    Args:
+        scenes: the scenes, in a gel that absorbs.
+        rise: mm, height of the point above the undeformed surface; 0 and less there.
+        sine: of the light's elevation above that surface.
+    """
+    way = dr.maximum(rise, 0) / dr.maximum(sine, MIN_SINE)
+    return dr.exp(scenes.absorption * way)
 
 
 @dr.syntax

@@ -8,7 +8,7 @@ from functools import lru_cache
 import numpy as np
 
 from optisense import library
-from optisense.design import LightGroup, LightModel, SensorDesign
+from optisense.design import Light, LightGroup, LightModel, SensorDesign
 from optisense.design.check import inside
 from optisense.design.emitters import Intensity
 from optisense.design.materials import CoatingModel, Material, Medium, Reflection
@@ -21,9 +21,10 @@ from optisense.optics.scene.emitters import (
     EmitterShape,
     frame_of,
 )
-from optisense.optics.scene.media import Media, Sheet, Solid, same_faces
+from optisense.optics.scene.media import Media, same_faces
 from optisense.optics.scene.ray_scene import Piece
-from optisense.optics.scene.surfaces import Region, Surface, SurfaceKind
+from optisense.optics.scene.solids import Interface, Sheet, Solid
+from optisense.optics.scene.surfaces import CLEAR, RGB, Region, Surface, SurfaceKind
 
 SMOOTH_METAL = 0.01
 """GGX roughness below which a metal is an ideal mirror."""
@@ -49,6 +50,7 @@ class Assembly:
         light_areas: mm^2 of the lights' windows, 0 for points.
         fine: for pieces of the sensing surface, by number, the same with all its triangles.
         ior_before: refractive index on the inner side of the (first) sensing surface.
+        absorption_before: what the medium there absorbs, per mm at R, G, B.
         media: the resolved boundaries.
         kept: what else the assembly of a similar design can take over.
     """
@@ -61,6 +63,7 @@ class Assembly:
     light_areas: list[float]
     fine: dict[int, Piece]
     ior_before: float
+    absorption_before: RGB
     media: Media
     kept: Kept
 
@@ -106,6 +109,7 @@ def assemble(design: SensorDesign, before: Assembly | None = None, bend: bool = 
     meshes = design.deformed_meshes()
     solids, sheets, pieces, fine = [], [], [], {}
     indices: list[float] = []
+    absorptions: list[RGB] = []
     kept, old = Kept(), Kept() if before is None else before.kept
     for name, part in design.parts.items():
         if name not in meshes:
@@ -114,13 +118,22 @@ def assemble(design: SensorDesign, before: Assembly | None = None, bend: bool = 
         material = design.materials.get(part.material) if part.material else None
         if part.role in TRANSPARENT_SOLIDS:
             medium = _medium(design, name, material)
+            seen = medium.indices if design.dispersion else None
             solids.append(
-                Solid(name, mesh, part.material or "", medium.ior, medium.roughness, part.priority)
+                Solid(
+                    name,
+                    mesh,
+                    part.material or "",
+                    medium.ior,
+                    medium.roughness,
+                    part.priority,
+                    medium.absorption,
+                    seen,
+                )
             )
         elif part.role is Role.INTERFACE:
             medium = _medium(design, name, material)
-            surface = Surface(SurfaceKind.DIELECTRIC, eta=medium.ior, alpha=medium.roughness)
-            pieces.append(kept.piece(name, mesh, surface, old))
+            pieces.append(kept.piece(name, mesh, _refracting_sheet(medium, design), old))
         elif part.role is not Role.INDENTER:
             sheets.append(Sheet(name, mesh, part.role.value))
     if before is not None and before.media.holds_for(solids, sheets):
@@ -129,23 +142,22 @@ def assemble(design: SensorDesign, before: Assembly | None = None, bend: bool = 
         bent = before.media.bend(solids, sheets) if before is not None and bend else None
         media = Media(solids, sheets) if bent is None else bent
     for face in media.interfaces:
-        surface = Surface(
-            SurfaceKind.DIELECTRIC, eta=face.ior_inside / face.ior_outside, alpha=face.roughness
-        )
         name = "/".join(face.names) + "|" + face.outside
-        pieces.append(kept.piece(name, face.mesh, surface, old))
+        pieces.append(kept.piece(name, face.mesh, _interface_surface(face), old))
     for sheet in sheets:
         part = design.parts[sheet.name]
-        ior = _index_before(sheet.mesh, solids)
+        before_it = _solid_before(sheet.mesh, solids)
+        ior = 1.0 if before_it is None else before_it.ior
         if part.role is Role.SENSING_SURFACE:
             indices.append(ior)
+            absorptions.append(CLEAR if before_it is None else before_it.absorption)
             surface = coating_surface(design.coating, ior, Region.SENSING)
             fine[len(pieces)] = kept.piece(sheet.name, meshes[sheet.name], surface, old)
         else:
             surface = _opaque(design.materials.get(part.material or ""), ior)
         pieces.append(kept.piece(sheet.name, sheet.mesh, surface, old))
     sensing = [meshes[name] for name in design.parts_of(Role.SENSING_SURFACE)]
-    emitters, areas = _emitters(design)
+    emitters, areas = _emitters(design, solids)
     for number, emitter in enumerate(emitters):
         if emitter.shape is not EmitterShape.POINT:
             pieces.append(_window(number, emitter))
@@ -158,6 +170,7 @@ def assemble(design: SensorDesign, before: Assembly | None = None, bend: bool = 
         light_areas=areas,
         fine=fine,
         ior_before=indices[0],
+        absorption_before=absorptions[0],
         media=media,
         kept=kept,
     )
@@ -204,12 +217,28 @@ def _opaque(material: Material | None, ior: float) -> Surface:
     return _reflecting(kind, reflection.seen_in(ior), Region.OTHER)
 
 
-def _index_before(mesh: TriangleMesh, solids: list[Solid]) -> float:
-    """Refractive index on the side that the middle face's normal points to."""
+def _interface_surface(face: Interface) -> Surface:
+    return Surface(
+        SurfaceKind.DIELECTRIC,
+        eta=face.ior_inside / face.ior_outside,
+        alpha=face.roughness,
+        etas=face.etas,
+        absorption=face.absorption,
+    )
+
+
+def _refracting_sheet(medium: Medium, design: SensorDesign) -> Surface:
+    """A part that is a sheet; what is behind it is not known, so nothing is absorbed there."""
+    etas = medium.indices if design.dispersion else None
+    return Surface(SurfaceKind.DIELECTRIC, eta=medium.ior, alpha=medium.roughness, etas=etas)
+
+
+def _solid_before(mesh: TriangleMesh, solids: list[Solid]) -> Solid | None:
+    """The solid on the side that the largest face's normal points to; None for air."""
     face = int(np.argmax(mesh.face_areas))
     probe = (mesh.triangles[face].mean(axis=0) + PROBE * mesh.face_normals[face])[None]
     around = [solid for solid in solids if inside(probe, solid.mesh)[0]]
-    return max(around, key=lambda solid: solid.priority).ior if around else 1.0
+    return max(around, key=lambda solid: solid.priority) if around else None
 
 
 def _merged(mesh: TriangleMesh) -> TriangleMesh:
@@ -244,14 +273,29 @@ class _Lamp:
     area: float
 
 
-def _emitters(design: SensorDesign) -> tuple[list[Emitter], list[float]]:
+def _absorption_at(places: list[Light], solids: list[Solid]) -> list[RGB]:
+    """What the media absorb that lights stand in, per mm at R, G, B."""
+    found = [(-np.inf, CLEAR)] * len(places)
+    if all(solid.absorption == CLEAR for solid in solids):
+        return [CLEAR] * len(places)
+    points = np.array([light.position for light in places])
+    ways = np.array([light.direction for light in places])
+    points += PROBE * ways / np.linalg.norm(ways, axis=1, keepdims=True)
+    for solid in solids:
+        for number in np.flatnonzero(inside(points, solid.mesh)).tolist():
+            found[number] = max(found[number], (solid.priority, solid.absorption))
+    return [absorption for _, absorption in found]
+
+
+def _emitters(design: SensorDesign, solids: list[Solid]) -> tuple[list[Emitter], list[float]]:
     emitters, areas = [], []
     for number, group in enumerate(design.lights.values()):
         if group.emitter is None and not library.is_own("light", group.model):
             lamp = _built_in_lamp(group.model)
         else:
             lamp = _lamp(library.emitter(group))
-        for light in group.lights:
+        media = _absorption_at(group.lights, solids)
+        for light, absorption in zip(group.lights, media, strict=True):
             emitters.append(
                 Emitter(
                     group=number,
@@ -262,6 +306,7 @@ def _emitters(design: SensorDesign) -> tuple[list[Emitter], list[float]]:
                     size=lamp.size,
                     exponent=lamp.exponent,
                     intensity=lamp.intensity,
+                    absorption=absorption,
                 )
             )
             areas.append(float(lamp.area))

@@ -14,7 +14,7 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from optisense.optics.scene.surfaces import Surface
+from optisense.optics.scene.surfaces import CLEAR, Surface, SurfaceKind
 
 FLOATS_PER_SURFACE = 16
 """Floats per surface in the table of optical data."""
@@ -29,7 +29,10 @@ def surface_table(surfaces: list[Surface]) -> mi.Float:
 
 def surface_rows(surfaces: list[Surface]) -> np.ndarray:
     """(n, 16) float32: kind (as bits), eta, alpha, specularity | reflectance, region | metal
-    eta | metal k.
+    eta, light | metal k.
+
+    Of a dielectric: etas of the channels, in place of the reflectance, the absorption coefficients
+    inside and outside, in place of eta and k of a metal, and at last whether these are known.
     """
     rows = np.zeros((len(surfaces), FLOATS_PER_SURFACE), dtype=np.float32)
     for row, surface in zip(rows, surfaces, strict=True):
@@ -39,6 +42,10 @@ def surface_rows(surfaces: list[Surface]) -> np.ndarray:
         row[4:7] = surface.reflectance
         row[8:11] = surface.metal_eta
         row[12:15] = surface.metal_k
+        if surface.kind is SurfaceKind.DIELECTRIC:
+            row[4:7] = surface.eta if surface.etas is None else surface.etas
+            row[8:11], row[12:15] = surface.absorption or (CLEAR, CLEAR)
+            row[15] = surface.absorption is not None
     return rows
 
 
@@ -64,6 +71,25 @@ def surface_kind(
     """kind, eta, alpha of surfaces."""
     row = dr.gather(mi.Vector4f, table, surface * 4, active)
     return dr.reinterpret_array(mi.UInt32, row.x), row.y, row.z
+
+
+def channel_eta(
+    table: mi.Float, surface: mi.UInt32, channel: mi.UInt32, active: mi.Bool
+) -> mi.Float:
+    """eta of dielectrics for light of one channel, 0 to 2."""
+    return dr.gather(mi.Float, table, surface * FLOATS_PER_SURFACE + 4 + channel, active)
+
+
+def media_absorption(
+    table: mi.Float, surface: mi.UInt32, active: mi.Bool
+) -> tuple[mi.Bool, mi.Color3f, mi.Color3f]:
+    """Whether the media of dielectrics are known, and what they absorb (per mm) in front of the
+    face normal and behind it.
+    """
+    inside = dr.gather(mi.Vector4f, table, surface * 4 + 2, active)
+    outside = dr.gather(mi.Vector4f, table, surface * 4 + 3, active)
+    behind = mi.Color3f(inside.x, inside.y, inside.z)
+    return outside.w > 0, mi.Color3f(outside.x, outside.y, outside.z), behind
 
 
 def surface_region(table: mi.Float, surface: mi.UInt32, active: mi.Bool) -> mi.UInt32:

@@ -19,6 +19,8 @@ class ContactScenes:
         indenters: the indenters alone; None without contacts.
         balls: a bounding ball around each indenter; centre (3) and radius, four floats (mm) each.
         convex: whether every indenter is convex, so that none can shadow itself.
+        absorption: coefficient of the gel before the sensing surface, per mm and channel; None
+            where it is clear.
     """
 
     full: RayScene
@@ -26,3 +28,4 @@ class ContactScenes:
     indenters: RayScene | None
     balls: mi.Float
     convex: bool = False
+    absorption: mi.Color3f | None = None

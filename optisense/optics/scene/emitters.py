@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from optisense.design.emitters import Intensity
-from optisense.optics.scene.surfaces import RAY_OFFSET
+from optisense.optics.scene.surfaces import CLEAR, RAY_OFFSET, RGB
 
 FloatArray = NDArray[np.floating]
 
@@ -43,7 +43,8 @@ class Emitter:
     """One light. Lengths mm; ``direction`` and ``up`` need not be unit vectors; size is (width,
     height).
 
-    ``exponent`` is the power of the cosine of a profile without a table.
+    ``exponent`` is the power of the cosine of a profile without a table, and ``absorption`` the
+    coefficient (per mm, at R, G, B) of the medium that it shines into.
     """
 
     group: int
@@ -54,6 +55,7 @@ class Emitter:
     size: tuple[float, float] = (0.0, 0.0)
     exponent: float = 1.0
     intensity: Intensity | None = None
+    absorption: RGB = CLEAR
 
     @property
     def area(self) -> float:
@@ -90,7 +92,7 @@ def frame_of(
 @dataclass
 class EmitterTable:
     """All lights on the device: ``rows`` of `FLOATS_PER_EMITTER` floats, and inverse profile
-    tables.
+    tables; ``absorption`` holds three floats a light.
     """
 
     count: int
@@ -98,6 +100,7 @@ class EmitterTable:
     rows: mi.Float
     polar: mi.Float
     azimuth: mi.Float
+    absorption: mi.Float
     emitters: list[Emitter] = field(default_factory=list)
 
 
@@ -168,6 +171,7 @@ def emitter_table(emitters: list[Emitter], groups: int) -> EmitterTable:
         rows=mi.Float(rows.ravel()),
         polar=mi.Float(np.concatenate(polar).astype(np.float32)),
         azimuth=mi.Float(np.concatenate(azimuth).astype(np.float32)),
+        absorption=mi.Float(np.array([e.absorption for e in emitters], np.float32).ravel()),
         emitters=list(emitters),
     )
 

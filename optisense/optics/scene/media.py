@@ -15,7 +15,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from copy import copy
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import combinations
 from typing import Any
 
@@ -27,6 +27,7 @@ from optisense.errors import DesignError, MeshError
 from optisense.geometry.anchors import Anchors, anchored
 from optisense.geometry.coincidence import Overlay, boxes_overlap, cut, find_coincident
 from optisense.geometry.mesh import TriangleMesh
+from optisense.optics.scene.solids import AROUND, Interface, Sheet, Solid
 
 COINCIDENCE_TOLERANCE = 0.002
 """Faces closer than this (mm) touch; overlaps thinner than this are contacts. A gap that is
@@ -38,66 +39,6 @@ CUT_CLEARANCE = 2e-5
 BENT_TOLERANCE = 0.02
 """mm that surfaces which touch may come apart while they bend: triangles of two tessellations
 differ by less over one shape."""
-
-AIR = "air"
-"""Name of the medium around all solids."""
-
-
-@dataclass(frozen=True)
-class Solid:
-    """A closed transparent part.
-
-    Attributes:
-        name: the part's name, for messages.
-        mesh: closed, mm.
-        medium: the name of its optical material.
-        ior: its refractive index.
-        roughness: of its surface (microfacet alpha), 0 for smooth.
-        priority: where solids overlap, the larger number keeps the place.
-    """
-
-    name: str
-    mesh: TriangleMesh
-    medium: str
-    ior: float
-    roughness: float = 0.0
-    priority: int = 0
-
-
-@dataclass(frozen=True)
-class Sheet:
-    """An opaque surface (a coating, a mirror, the skin of a blocker), which may lie on solids.
-
-    Attributes:
-        name: the part's name.
-        mesh: open or closed, mm.
-        kind: what it is, for messages.
-    """
-
-    name: str
-    mesh: TriangleMesh
-    kind: str = "coating"
-
-
-@dataclass(frozen=True)
-class Interface:
-    """A refracting surface between two media.
-
-    Attributes:
-        mesh: open or closed, mm; its normals point from `inside` to `outside`.
-        inside, outside: names of the media; "air" where there is no solid.
-        ior_inside, ior_outside: their refractive indices.
-        roughness: microfacet alpha: the rougher one of the two solids that touch.
-        names: the solids that it bounds, the one on its inside first.
-    """
-
-    mesh: TriangleMesh
-    inside: str
-    outside: str
-    ior_inside: float
-    ior_outside: float
-    roughness: float
-    names: tuple[str, ...]
 
 
 def resolve_media(
@@ -270,16 +211,25 @@ class Media:
 
 
 def _interface(mesh: TriangleMesh, solid: Solid, neighbour: Solid | None) -> Interface:
-    if neighbour is None:
-        return Interface(mesh, solid.medium, AIR, solid.ior, 1.0, solid.roughness, (solid.name,))
+    names: tuple[str, ...] = (solid.name,)
+    other, roughness = AROUND, solid.roughness
+    if neighbour is not None:
+        names, other = (solid.name, neighbour.name), neighbour
+        roughness = max(solid.roughness, neighbour.roughness)
+    etas = None
+    if solid.indices is not None or other.indices is not None:
+        red, green, blue = (solid.index(k) / other.index(k) for k in range(3))
+        etas = red, green, blue
     return Interface(
         mesh,
         solid.medium,
-        neighbour.medium,
+        other.medium,
         solid.ior,
-        neighbour.ior,
-        max(solid.roughness, neighbour.roughness),
-        (solid.name, neighbour.name),
+        other.ior,
+        roughness,
+        names,
+        etas,
+        (solid.absorption, other.absorption),
     )
 
 
@@ -291,8 +241,12 @@ def same_faces(one: TriangleMesh, other: TriangleMesh) -> bool:
 
 
 def _refracts(interface: Interface) -> bool:
+    """Whether light notices an interface: its index changes there, or what absorbs it."""
     step = abs(interface.ior_inside - interface.ior_outside)
-    return len(interface.mesh.faces) > 0 and step > EQUAL_INDEX
+    if interface.etas is not None:
+        step = max(step, *(abs(eta - 1.0) for eta in interface.etas))
+    differs = step > EQUAL_INDEX or interface.absorption[0] != interface.absorption[1]
+    return len(interface.mesh.faces) > 0 and differs
 
 
 def _contacts(solids: list[Solid], tolerance: float) -> dict[tuple[int, int], Overlay]:
@@ -317,7 +271,7 @@ def _disjoint(solids: list[Solid], tolerance: float) -> list[Solid]:
         place = _overlap_place(_manifold(result[i]) ^ smaller, tolerance - CUT_CLEARANCE)
         if place is None:
             continue
-        same_index = abs(result[i].ior - result[j].ior) <= EQUAL_INDEX
+        same_index = _alike(result[i], result[j])
         if result[i].priority == result[j].priority and not same_index:
             raise DesignError(
                 f"parts '{result[i].name}' and '{result[j].name}' overlap and have the same "
@@ -329,6 +283,12 @@ def _disjoint(solids: list[Solid], tolerance: float) -> list[Solid]:
         larger = _manifold(_grown(result[i], CUT_CLEARANCE))
         result[j] = replace(result[j], mesh=_from_manifold(_manifold(result[j]) - larger))
     return [solid for solid in result if len(solid.mesh.faces)]
+
+
+def _alike(one: Solid, other: Solid) -> bool:
+    """Whether light does not notice which of two media it is in."""
+    same_index = all(abs(one.index(k) - other.index(k)) <= EQUAL_INDEX for k in range(3))
+    return same_index and one.absorption == other.absorption
 
 
 def _grown(solid: Solid, room: float) -> Solid:

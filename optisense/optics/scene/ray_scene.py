@@ -93,12 +93,18 @@ class Ray:
         direction: unit vector.
         active: which of them are followed.
         depth: number of surfaces that they have met.
+        absorption: coefficient (per mm, per channel) of the medium that they are in, where the
+            scene absorbs.
+        channel: of the light, 0 to 2 for R, G, B; None for light of all channels, which has the
+            mean index.
     """
 
     origin: mi.Point3f
     direction: mi.Vector3f
     active: mi.Bool
     depth: mi.UInt32 = field(default_factory=lambda: mi.UInt32(0))
+    absorption: mi.Color3f | None = None
+    channel: mi.UInt32 | None = None
 
 
 @dataclass
@@ -159,6 +165,13 @@ class RayScene:
         self.rough = any(
             s.kind is SurfaceKind.DIELECTRIC and s.alpha > SMOOTH_ALPHA for s in surfaces
         )
+        self.absorbing = any(surface.absorbs for surface in surfaces)
+        self.dispersive = any(surface.etas is not None for surface in surfaces)
+
+    @property
+    def channels(self) -> tuple[int | None, ...]:
+        """The channels that have rays of their own; None stands for all that share theirs."""
+        return (0, 1, 2) if self.dispersive else (None,)
 
     @cached_property
     def patches(self) -> mi.UInt32:

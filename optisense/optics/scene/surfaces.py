@@ -28,12 +28,21 @@ class Region(IntEnum):
     INDENTER = 2
 
 
+RGB = tuple[float, float, float]
+
+CLEAR: RGB = (0.0, 0.0, 0.0)
+"""The absorption coefficient of a medium that absorbs nothing, per mm at R, G, B."""
+
+
 @dataclass(frozen=True)
 class Surface:
     """Optical data of one surface.
 
     For a dielectric ``eta`` is the index on the inside (behind the face normal) over the index
-    on the outside. ``reflectance``, ``metal_eta`` and ``metal_k`` are per channel R, G, B.
+    on the outside, and ``etas`` the same per channel where it differs between them.
+    ``absorption`` is the absorption coefficient (per mm, per channel) inside and outside; None
+    where the media are not known, which then are those that a ray comes from. ``reflectance``,
+    ``metal_eta`` and ``metal_k`` are per channel R, G, B.
     """
 
     kind: SurfaceKind
@@ -45,3 +54,23 @@ class Surface:
     metal_k: tuple[float, float, float] = (0.0, 0.0, 0.0)
     region: Region = Region.OTHER
     light: int = 0
+    etas: RGB | None = None
+    absorption: tuple[RGB, RGB] | None = None
+
+    @property
+    def absorbs(self) -> bool:
+        """Whether the medium on one of its sides absorbs light."""
+        return self.absorption is not None and max(map(max, self.absorption)) > 0.0
+
+
+def is_coloured(surface: Surface) -> bool:
+    """Whether a surface, or a medium beside it, treats some channels otherwise than others."""
+    if surface.etas is not None:
+        return True
+    metal = surface.specularity > 0 or surface.kind is SurfaceKind.MIRROR
+    values = [surface.reflectance]
+    if metal:
+        values += [surface.metal_eta, surface.metal_k]
+    if surface.kind not in (SurfaceKind.OPAQUE, SurfaceKind.MIRROR):
+        values = [] if surface.absorption is None else list(surface.absorption)
+    return any(max(v) - min(v) > 1e-6 for v in values)

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import drjit as dr
 import mitsuba as mi
 
+from optisense.optics.backend.arrays import gathered
 from optisense.optics.backend.sequences import sequence_2d
 from optisense.optics.camera.projection import RayCamera
 from optisense.optics.scene.bsdf import grey, surface_light
@@ -84,6 +85,7 @@ def _follow(
     total = mi.Color3f(0)
     branch_origin = mi.Point3f(0)
     branch_direction = mi.Vector3f(0, 0, 1)
+    branch_absorption = ray.absorption
     while ray.active:
         sample = None
         if dr.hint(path.draws or scene.rough, mode="scalar"):
@@ -102,6 +104,7 @@ def _follow(
         towards_eye = dr.select(ends, -ray.direction, towards_eye)
         surface = dr.select(seen, hit.surface, surface)
         found |= seen
+        weight *= step.transmittance
         if dr.hint(path is Path.CAMERA, mode="scalar"):
             branch = weight * step.reflection.weight
             total += branch
@@ -110,10 +113,14 @@ def _follow(
             away = step.reflection.direction
             branch_origin = dr.select(chosen, leave(hit.point, hit.normal, away), branch_origin)
             branch_direction = dr.select(chosen, away, branch_direction)
+            if dr.hint(scene.absorbing, mode="scalar"):
+                branch_absorption = dr.select(chosen, step.absorption, branch_absorption)
         weight = dr.select(step.goes_on, weight * step.lobe.weight, weight)
         ray = step.ray
     end = PathEnd(found, weight, point, normal, face_normal, towards_eye, surface, light)
-    return end, Ray(branch_origin, branch_direction, dr.max(total) > 1e-5), total
+    branched = Ray(branch_origin, branch_direction, dr.max(total) > 1e-5)
+    branched.absorption, branched.channel = branch_absorption, ray.channel
+    return end, branched, total
 
 
 def film_samples(pixel: mi.UInt32, width: int, sample: mi.UInt32, seed: int) -> mi.Point2f:
@@ -135,10 +142,12 @@ def find_visible_points(
     film: mi.Point2f,
     seed: int,
     only_main: bool = False,
+    channel: int | None = None,
 ) -> tuple[VisiblePoints, VisiblePoints | None]:
     """Main and reflected visible points of film positions (the second are fewer, or none, as they
     are with ``only_main``).
 
+    With a ``channel`` the paths are those of its light alone, and have no weight in others.
     What is drawn at random follows from pixel, ``number`` of the sample and seed alone, so that
     each path is the same whichever others are traced with it.
     """
@@ -147,7 +156,13 @@ def find_visible_points(
     own, other = mi.sample_tea_32(pixel, stream)
     series = mi.sample_tea_32(pixel, dr.opaque(mi.UInt32, seed))[1]
     start = Ray(*camera.rays(film.x, film.y), dr.full(mi.Bool, True, dr.width(film)))
-    end, branch, total = _follow(scene, start, mi.Color3f(1), _generator(own), Path.CAMERA)
+    weight = mi.Color3f(1)
+    if scene.absorbing:
+        start.absorption = mi.Color3f(0)  # a camera stands in air
+    if channel is not None:
+        start.channel = dr.opaque(mi.UInt32, channel, dr.width(film))
+        weight = mi.Color3f(*(dr.select(start.channel == k, mi.Float(1), 0) for k in range(3)))
+    end, branch, total = _follow(scene, start, weight, _generator(own), Path.CAMERA)
     dr.eval(end, branch, total, own, other, series)
     main = VisiblePoints(**vars(end), pixel=pixel, random=own, series=series, number=number)
     if only_main:
@@ -158,7 +173,7 @@ def find_visible_points(
     other, series, number = (dr.gather(mi.UInt32, each, lanes) for each in (other, series, number))
     end, _, _ = _follow(
         scene,
-        dr.gather(Ray, branch, lanes),
+        gathered(branch, lanes),
         dr.gather(mi.Color3f, total, lanes),
         _generator(other),
         Path.REFLECTION,

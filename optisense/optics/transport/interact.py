@@ -15,8 +15,10 @@ import mitsuba as mi
 
 from optisense.optics.scene.bsdf import (
     SMOOTH_ALPHA,
+    channel_eta,
     coating_of,
     fresnel_metal,
+    media_absorption,
     refract,
     sample_coating,
     sample_rough_interface,
@@ -96,6 +98,10 @@ class Interaction:
         lobe: the lobe that it follows.
         reflection: what a smooth interface reflects beside the light that the ray goes on with;
             of weight 0 where there is none.
+        absorption: the coefficient of the medium that the ray came through, per mm; None where
+            nothing absorbs.
+        transmittance: the share of the light that the medium leaves on the way to the surface, per
+            channel. No weight of a lobe includes it.
         ray: the ray that goes on; inactive where none does, or where it has met `MAX_DEPTH`
             surfaces, and otherwise unchanged where none does.
     """
@@ -114,7 +120,35 @@ class Interaction:
     turned: mi.Bool
     lobe: Lobe
     reflection: Lobe
+    absorption: mi.Color3f | None
+    transmittance: mi.Color3f
     ray: Ray
+
+
+@dataclass
+class _Media:
+    """What is absorbed around a surface that rays meet.
+
+    Attributes:
+        known: whether the surface tells its media; elsewhere light stays in the one it is in.
+        before, behind: absorption coefficients in front of the face normal and behind it.
+        here: that of the medium that the ray comes through.
+    """
+
+    known: mi.Bool
+    before: mi.Color3f
+    behind: mi.Color3f
+    here: mi.Color3f
+
+
+def _media(
+    scene: RayScene, ray: Ray, hit: SurfaceHit, side: mi.Float, interface: mi.Bool
+) -> _Media:
+    told, before, behind = media_absorption(scene.table, hit.surface, interface)
+    known = interface & told
+    carried = mi.Color3f(0) if ray.absorption is None else ray.absorption
+    here = dr.select(known, dr.select(side > 0, before, behind), carried)
+    return _Media(known, before, behind, here)
 
 
 @dr.syntax
@@ -137,6 +171,10 @@ def interact(
     interface = hit.valid & (kind == int(SurfaceKind.DIELECTRIC))
     mirror = hit.valid & (kind == int(SurfaceKind.MIRROR))
     opaque = hit.valid & (kind == int(SurfaceKind.OPAQUE))
+    if dr.hint(ray.channel is not None, mode="scalar"):
+        eta = dr.select(
+            interface, channel_eta(scene.table, hit.surface, ray.channel, interface), eta
+        )
     sensed = opaque & (region != int(Region.OTHER))
     scattered = mirror
     goes_on = interface | mirror
@@ -185,11 +223,21 @@ def interact(
 
     direction = dr.normalize(outgoing)
     depth = ray.depth + 1
+    transmittance = mi.Color3f(1)
+    here = absorption = ray.absorption
+    if dr.hint(scene.absorbing and path is not Path.CHIEF, mode="scalar"):
+        media = _media(scene, ray, hit, side, interface)
+        transmittance = dr.exp(-media.here * dr.select(hit.valid, hit.distance, 0))
+        leaving = dr.select(dr.dot(direction, hit.normal) > 0, media.before, media.behind)
+        here = media.here
+        absorption = dr.select(media.known, leaving, here)
     onward = Ray(
         origin=dr.select(goes_on, leave(hit.point, hit.normal, direction), ray.origin),
         direction=dr.select(goes_on, direction, ray.direction),
         active=goes_on & (depth < MAX_DEPTH),
         depth=depth,
+        absorption=absorption,
+        channel=ray.channel,
     )
     return Interaction(
         hit=hit,
@@ -206,5 +254,7 @@ def interact(
         turned=turned,
         lobe=Lobe(direction, weight),
         reflection=Lobe(reflected, mi.Color3f(beside)),
+        absorption=here,
+        transmittance=transmittance,
         ray=onward,
     )

@@ -14,7 +14,7 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from optisense.optics.backend.arrays import indices
+from optisense.optics.backend.arrays import gathered, indices
 from optisense.optics.backend.sequences import seed_of, sequence_4d, unit_float
 from optisense.optics.scene.emitters import EmitterTable, emit
 from optisense.optics.scene.ray_scene import Ray, RayScene
@@ -122,8 +122,12 @@ class _Recording:
     crossings: Records
 
 
-def _launch(emission: Emission, lights: mi.UInt32) -> tuple[_Flight, mi.UInt32]:
-    """Photons as they leave the lights, and the guide's cell of each."""
+def _launch(scene: RayScene, emission: Emission, lights: mi.UInt32) -> tuple[_Flight, mi.UInt32]:
+    """Photons as they leave the lights, and the guide's cell of each.
+
+    Where indices differ between channels, each photon is light of one channel, the channels in
+    turn.
+    """
     table = emission.table
     first, per_light, seed = (
         dr.opaque(mi.UInt32, value) for value in (emission.first, emission.per_light, emission.seed)
@@ -137,9 +141,16 @@ def _launch(emission: Emission, lights: mi.UInt32) -> tuple[_Flight, mi.UInt32]:
     u0, u1, u2, u3 = sequence_4d(number, light, seed)
     angle, weight, cell = warp(emission.guide, light, mi.Point2f(u0, u1))
     origin, direction, group = emit(table, light, angle, mi.Point2f(u2, u3))
+    ray = Ray(origin, direction, dr.full(mi.Bool, True, photons))
+    power = mi.Color3f(weight / mi.Float(per_light))
+    if scene.absorbing:
+        ray.absorption = dr.gather(mi.Color3f, table.absorption, light)
+    if scene.dispersive:
+        ray.channel = number % 3
+        power = mi.Color3f(*(dr.select(ray.channel == k, 3 * power[k], 0) for k in range(3)))
     flight = _Flight(
-        ray=Ray(origin, direction, dr.full(mi.Bool, True, photons)),
-        throughput=mi.Color3f(weight / mi.Float(per_light)),
+        ray=ray,
+        throughput=power,
         group=group | ((number & 1) << HALF_SHIFT),
         landed=dr.full(mi.Bool, False, photons),
         scattered=dr.full(mi.Bool, False, photons),
@@ -177,10 +188,15 @@ def _fly(
                     recording.flux_layer, ray, hit, chance, piece, step.opaque
                 )
                 if crosses:
-                    crossing = Landing(spot, ray.direction, share, throughput, flight.group)
+                    power = mi.Color3f(throughput)
+                    if dr.hint(scene.absorbing, mode="scalar"):
+                        part = dr.norm(spot - ray.origin) / hit.distance
+                        power *= dr.power(step.transmittance, part)
+                    crossing = Landing(spot, ray.direction, share, power, flight.group)
                     recording.crossings.write(crossing, crosses)
                 piece += 1
             scattered = step.opaque
+        throughput *= step.transmittance
         if step.opaque:
             cosine = dr.abs(dr.dot(ray.direction, hit.normal))
             bits = flight.group | (hit.surface << SURFACE_SHIFT)
@@ -208,7 +224,7 @@ def _trace(
         The guide's cell of each photon, or all ones if it never landed.
     """
     photons = emission.per_light * dr.width(lights)
-    flight, cell = _launch(emission, lights)
+    flight, cell = _launch(scene, emission, lights)
     arrived = dr.zeros(mi.UInt32, photons)
     stages = STAGES if photons > MIN_GATHERED_PHOTONS else ()
     limits = [*np.cumsum(stages, dtype=int).tolist(), MAX_DEPTH]
@@ -226,7 +242,7 @@ def _trace(
         lanes = dr.compress(flight.ray.active)
         if dr.width(lanes) == 0:
             break
-        flight = dr.gather(_Flight, flight, lanes)
+        flight = gathered(flight, lanes)
     return dr.select(arrived != 0, cell, mi.UInt32(0xFFFFFFFF))
 
 

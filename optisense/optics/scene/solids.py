@@ -1,0 +1,87 @@
+"""Transparent solids, the opaque sheets on them, and the interfaces between media."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from optisense.geometry.mesh import TriangleMesh
+from optisense.optics.scene.surfaces import CLEAR, RGB
+
+AIR = "air"
+"""Name of the medium around all solids."""
+
+
+@dataclass(frozen=True)
+class Solid:
+    """A closed transparent part.
+
+    Attributes:
+        name: the part's name, for messages.
+        mesh: closed, mm.
+        medium: the name of its optical material.
+        ior: its refractive index.
+        roughness: of its surface (microfacet alpha), 0 for smooth.
+        priority: where solids overlap, the larger number keeps the place.
+        absorption: of the medium, per mm at R, G, B.
+        indices: its refractive index at R, G, B; None for `ior` at all.
+    """
+
+    name: str
+    mesh: TriangleMesh
+    medium: str
+    ior: float
+    roughness: float = 0.0
+    priority: int = 0
+    absorption: RGB = CLEAR
+    indices: RGB | None = None
+
+    def index(self, channel: int) -> float:
+        """The refractive index at R, G or B (0 to 2)."""
+        return self.ior if self.indices is None else self.indices[channel]
+
+
+AROUND = Solid("", TriangleMesh(np.zeros((0, 3)), np.zeros((0, 3), dtype=np.int32)), AIR, 1.0)
+"""The air around all solids, which has no shape."""
+
+
+@dataclass(frozen=True)
+class Sheet:
+    """An opaque surface (a coating, a mirror, the skin of a blocker), which may lie on solids.
+
+    Attributes:
+        name: the part's name.
+        mesh: open or closed, mm.
+        kind: what it is, for messages.
+    """
+
+    name: str
+    mesh: TriangleMesh
+    kind: str = "coating"
+
+
+@dataclass(frozen=True)
+class Interface:
+    """A refracting surface between two media.
+
+    Attributes:
+        mesh: open or closed, mm; its normals point from `inside` to `outside`.
+        inside, outside: names of the media; "air" where there is no solid.
+        ior_inside, ior_outside: their refractive indices.
+        roughness: microfacet alpha: the rougher one of the two solids that touch.
+        names: the solids that it bounds, the one on its inside first.
+        etas: at R, G, B, the index on the inside over that on the outside; None where the ratio of
+            `ior_inside` and `ior_outside` stands for all.
+        absorption: per mm at R, G, B, on the inside and on the outside.
+    """
+
+    mesh: TriangleMesh
+    inside: str
+    outside: str
+    ior_inside: float
+    ior_outside: float
+    roughness: float
+    names: tuple[str, ...]
+    etas: RGB | None = None
+    absorption: tuple[RGB, RGB] = (CLEAR, CLEAR)
