@@ -15,6 +15,7 @@ from optisense.search.methods.checked_slopes import (
     FEW,
     GRADIENT_BY,
     GRADIENT_HOLDS,
+    RAYS,
     Agreement,
     SlopeEvaluator,
 )
@@ -198,6 +199,37 @@ def test_a_few_steps_make_the_camera_see_more_uprightly(svelte: SensorDesign) ->
     best = result.best
     assert best is not None
     assert best.outcome.scores["aoap"] > 1.5 * first
+
+
+MIRROR = {
+    "cages.M1.points.x": Around(8.0),
+    "cages.M1.points.y": Around(1.0),
+    "cages.M1.points.z": Around(2.0),
+}
+"""All points of the cage of GelSight Svelte's mirror, which soon meets the body and the gel."""
+
+
+def test_an_ascent_slides_along_the_parts_that_the_mirror_meets() -> None:
+    """It gets to 0.668 where forbidden points are bad points to the ascent."""
+    result = search(load("gelsight-svelte"), MIRROR, "aoap", method="gradient", budget=20)
+    assert not any(trial.outcome.failed for trial in result.trials)
+    assert result.best.outcome.scores["aoap"] > 0.69
+    assert result.trials[1].outcome.seconds == 0.0  # the start is scored once
+    assert sum(GRADIENT_HOLDS in trial.parts["aoap"] for trial in result.trials[1:]) == 1
+
+
+def test_derivatives_that_differences_contradict_at_the_start_are_checked_everywhere(
+    svelte: SensorDesign,
+) -> None:
+    bound = SearchSpace(MIRROR).bind(svelte)
+    point = bound.start + 0.01 * (bound.upper - bound.lower)
+    for contradicted in (False, True):
+        evaluator = slopes_of(Gradient(Problem(bound, ("aoap",), 10), resolution=RESOLUTION))
+        evaluator._contradicted = contradicted
+        parts = evaluator(point, 0).parts["aoap"]
+        assert (GRADIENT_HOLDS in parts) is contradicted
+        if not contradicted:
+            assert parts[GRADIENT_BY] == RAYS
 
 
 def test_the_same_search_takes_the_same_steps(svelte: SensorDesign) -> None:

@@ -50,7 +50,9 @@ gradient's length over the root of the number of parameters) where the differenc
 CHECKS_AT_START, CHECKS = 4, 1
 """Directions in which a gradient is compared with differences: its own, and at the start three
 random ones as well, along which errors show that the steepest direction hides. Each takes four
-scores for derivatives of rays, and two for differences."""
+scores for derivatives of rays, and two for differences. Derivatives of rays that no difference
+contradicts at the start are not compared elsewhere: on GelSight Svelte's mirror that took more time
+than the search, and the differences that it then used were those of kinks and led no higher."""
 
 SMOOTHED = "smoothed"
 """Key of the smoothed score among an outcome's parts."""
@@ -75,13 +77,13 @@ class Agreement(Enum):
 
 class CheckedSlope(NamedTuple):
     """The smoothed score at a point, its gradient (n,) by the coordinates, where that comes from
-    (`RAYS` or `DIFFERENCES`), and whether it holds.
+    (`RAYS` or `DIFFERENCES`), and whether it holds; None where that was not looked at.
     """
 
     value: float
     gradient: FloatArray
     source: str
-    holds: bool
+    holds: bool | None
 
 
 class _Check(NamedTuple):
@@ -105,6 +107,7 @@ class SlopeEvaluator:
         self.objective = objective
         self.resolution = resolution
         self._jacobian: Jacobian | None = None
+        self._contradicted: bool | None = None
 
     def __call__(self, vector: FloatArray, seed: int) -> Outcome:
         """See `Evaluator`."""
@@ -117,7 +120,9 @@ class SlopeEvaluator:
         except OptiSenseError as error:
             return self.usual.failed(str(error), began)
         parts = dict(outcome.parts)
-        facts = {SMOOTHED: found.value, GRADIENT_BY: found.source, GRADIENT_HOLDS: found.holds}
+        facts = {SMOOTHED: found.value, GRADIENT_BY: found.source}
+        if found.holds is not None:
+            facts[GRADIENT_HOLDS] = found.holds
         parts[self.objective] = {**parts.get(self.objective, {}), **facts}
         seconds = outcome.seconds + time.perf_counter() - began
         return Outcome(outcome.scores, None, parts, seconds, found.gradient)
@@ -127,23 +132,51 @@ class SlopeEvaluator:
 
         Derivatives of rays are used unless steady differences of the score contradict them: where
         the score itself is unsteady, those of the smoothed score are as good as any, and cost less.
+        Where none contradicts them at the start, they are trusted everywhere.
 
         Raises:
             OptiSenseError: the design can't be built, or no ray arrives.
         """
         if self.usual.space.size > FEW:
             try:
-                slopes, gradient = self.slope(vector)
-            except NoDerivativeError:
+                return self._by_rays(vector, seed)
+            except (NoDerivativeError, _ContradictedError):
                 pass
-            else:
-                found = self.agreement(vector, gradient, seed)
-                if found is not Agreement.DIFFERS:
-                    holds = found is Agreement.HOLDS
-                    return CheckedSlope(slopes.value, gradient, RAYS, holds)
         gradient = self.differences(vector, seed)
         steady = self.steady(vector, gradient, seed)
         return CheckedSlope(self._smoothed(vector), gradient, DIFFERENCES, steady)
+
+    def _by_rays(self, vector: FloatArray, seed: int) -> CheckedSlope:
+        """The smoothed score at a point (n,) and its gradient by derivatives of rays.
+
+        Raises:
+            NoDerivativeError: a part moves by which rays have no derivative.
+            _ContradictedError: differences of the true score contradict the gradient.
+            OptiSenseError: the design can't be built, or no ray arrives.
+        """
+        slopes, gradient = self.slope(vector)
+        holds = None
+        at_start = np.array_equal(vector, self.usual.space.start)
+        if at_start or self._contradicted_at_start(seed):
+            found = self.agreement(vector, gradient, seed)
+            if at_start:
+                self._contradicted = found is Agreement.DIFFERS
+            if found is Agreement.DIFFERS:
+                raise _ContradictedError
+            holds = found is Agreement.HOLDS
+        return CheckedSlope(slopes.value, gradient, RAYS, holds)
+
+    def _contradicted_at_start(self, seed: int) -> bool:
+        """Whether differences contradict derivatives of rays at the start; looked at once."""
+        if self._contradicted is None:
+            start = self.usual.space.start
+            try:
+                _, gradient = self.slope(start)
+            except OptiSenseError:  # nothing is known: then every point is looked at
+                self._contradicted = True
+            else:
+                self._contradicted = self.agreement(start, gradient, seed) is Agreement.DIFFERS
+        return self._contradicted
 
     def slope(self, vector: FloatArray) -> tuple[Slopes, FloatArray]:
         """The smoothed score at a point (n,), and its gradient (n,) by derivatives of rays.
@@ -268,6 +301,10 @@ class SlopeEvaluator:
 
     def __getstate__(self) -> dict[str, object]:
         return {**self.__dict__, "_jacobian": None}
+
+
+class _ContradictedError(Exception):
+    """Differences of the true score are steady and contradict derivatives of rays."""
 
 
 def _room(space: BoundSpace, vector: FloatArray, way: FloatArray, most: float) -> float:

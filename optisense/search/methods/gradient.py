@@ -5,7 +5,11 @@ for bound constrained optimization", SIAM J. Sci. Comput. 16, 1995), on a smooth
 score (`optisense.objectives.smooth`) whose derivatives come from retracing the rays. The scores
 that are stored are the true ones.
 
-At each point the derivative is compared with central differences of the true score
+A point that constraints on shapes forbid is not tried: the nearest one that can be built is
+(`optisense.search.methods.feasible`), so that the ascent slides along the constraint and no trial
+is spent. An ascent that told the forbidden point as a bad one came to a stop at the first wall.
+
+At the start the derivative is compared with central differences of the true score
 (`optisense.search.methods.checked_slopes`). Where the two disagree, where rays have no derivative
 at all (by the shape of a transparent part), and where there are few parameters, the gradient is
 taken from central differences by each parameter. The outcome says so, and it says where the score
@@ -23,6 +27,7 @@ from optisense.errors import SearchError
 from optisense.objectives.smooth import SMOOTH
 from optisense.search.evaluation.evaluator import DesignEvaluator, Evaluator
 from optisense.search.evaluation.outcome import Outcome
+from optisense.search.evaluation.views import SameMirrors
 from optisense.search.methods.base import FloatArray, Method, Problem
 from optisense.search.methods.checked_slopes import (
     DIFFERENCES,
@@ -35,6 +40,7 @@ from optisense.search.methods.checked_slopes import (
     TOLERANCE,
     SlopeEvaluator,
 )
+from optisense.search.methods.feasible import FeasibleRegion, Placed
 from optisense.search.methods.jacobian import moving_parts
 from optisense.search.space.search_space import BoundSpace
 
@@ -85,8 +91,12 @@ class Gradient(Method):
         self.resolution, self.memory = int(resolution), int(memory)
         self._starts = _starts(problem, int(starts))
         self.parts = moving_parts(problem.space)
+        span = self.space.upper - self.space.lower
+        self._start_unit = np.clip((self.space.start - self.space.lower) / span, 0.0, 1.0)
         self._known: dict[bytes, Outcome] = {}
         self._message = ""
+        self._region: FeasibleRegion | None = None
+        self._places: dict[bytes, Placed] = {}
 
     @classmethod
     def usual_budget(cls, space: BoundSpace) -> int:
@@ -95,6 +105,10 @@ class Gradient(Method):
 
     def evaluator(self, usual: DesignEvaluator) -> Evaluator:
         """Scores and slopes."""
+        rules = [*usual.constraints, *usual.kept]
+        shapes = [rule for rule in rules if not isinstance(rule, SameMirrors)]  # which traces rays
+        region = FeasibleRegion(self.space, shapes, self.parts)
+        self._region = region if shapes and region.allows(self._start_unit) else None
         return SlopeEvaluator(usual, self.parts, self.objective, self.resolution)
 
     def ask(self) -> FloatArray:
@@ -102,44 +116,87 @@ class Gradient(Method):
         converged.
         """
         space = self.space
-        for start in self._starts:
-            point = self._ascend((start - space.lower) / (space.upper - space.lower))
-            if point is not None:
-                return point[None]
+        try:
+            for start in self._starts:
+                unit = (start - space.lower) / (space.upper - space.lower)
+                self._climb(np.clip(unit, 0.0, 1.0))
+        except _PointWantedError as wanted:
+            return wanted.point[None]
         return np.empty((0, space.size))
 
-    def _ascend(self, start: FloatArray) -> FloatArray | None:
-        """The next point (n,) that an ascent from a point (n,), as parts of the ranges, wants to
-        know of; None when it has converged.
+    def _climb(self, unit: FloatArray) -> None:
+        """Ascend from a point (n,), as parts of the ranges, and again from the best point that was
+        reached, for as long as that gains something: a line search gives up at a kink, and slides
+        along constraints end where the way leads off them again.
+
+        Raises:
+            _PointWantedError: the score of a point is wanted.
+        """
+        best = -np.inf
+        while True:
+            value, unit = self._ascend(unit)
+            if not value - best > CONVERGED * max(1.0, abs(value)):  # NaN where none has a score
+                return
+            best = value
+
+    def _ascend(self, start: FloatArray) -> tuple[float, FloatArray]:
+        """The best smoothed score that an ascent from a point (n,) reaches, and the point of that,
+        both points as parts of the ranges.
+
+        Raises:
+            _PointWantedError: the score of a point is wanted.
         """
         from scipy.optimize import minimize
 
-        space = self.space
-        span = space.upper - space.lower
+        best, at = -np.inf, start
+        allowed = self._start_unit
 
         def downhill(unit: FloatArray) -> tuple[float, FloatArray]:
-            point = np.clip(space.lower + unit * span, space.lower, space.upper)
+            nonlocal best, at, allowed
+            placed = self._placed(unit, allowed)
+            point = self._point(placed.point)
             outcome = self._known.get(point.tobytes())
             if outcome is None:
                 raise _PointWantedError(point)
             if outcome.gradient is None:
-                return self._worst(), np.zeros_like(unit)  # forbidden: a shorter step is tried
-            return -_smoothed(outcome, self.objective), -outcome.gradient * span
+                return self._worst(), np.zeros_like(unit)  # no score: a shorter step is tried
+            allowed, value = placed.point, _smoothed(outcome, self.objective)
+            if value > best:
+                best, at = value, placed.point
+            span = self.space.upper - self.space.lower
+            return -value, -placed.along(outcome.gradient * span)
 
-        options = {"maxcor": self.memory, "ftol": CONVERGED, "maxiter": 10_000, "maxfun": 100_000}
-        try:
-            found = minimize(
-                downhill,
-                start,
-                jac=True,
-                method="L-BFGS-B",
-                bounds=[(0.0, 1.0)] * space.size,
-                options=options,
-            )
-        except _PointWantedError as wanted:
-            return wanted.point
+        found = minimize(
+            downhill,
+            start,
+            jac=True,
+            method="L-BFGS-B",
+            bounds=[(0.0, 1.0)] * self.space.size,
+            options={
+                "maxcor": self.memory,
+                "ftol": CONVERGED,
+                "maxiter": 10_000,
+                "maxfun": 100_000,
+            },
+        )
         self._message = str(found.message)
-        return None
+        return best, at
+
+    def _placed(self, unit: FloatArray, allowed: FloatArray) -> Placed:
+        """Where a wanted point (n,) is scored: at the nearest one that constraints allow."""
+        key = unit.tobytes()
+        if key not in self._places:
+            if self._region is None:
+                self._places[key] = Placed.unchanged(unit)
+            else:
+                self._places[key] = self._region.nearest(unit, allowed)
+        return self._places[key]
+
+    def _point(self, unit: FloatArray) -> FloatArray:
+        """The point (n,) of parts of the ranges; the start as it is, which is scored already."""
+        space = self.space
+        point = np.clip(space.lower + unit * (space.upper - space.lower), space.lower, space.upper)
+        return np.where(unit == self._start_unit, space.start, point)
 
     def tell(self, vectors: FloatArray, outcomes: Sequence[Outcome]) -> None:
         """Remember slopes by their points."""
@@ -147,14 +204,16 @@ class Gradient(Method):
             self._known[np.asarray(vector, dtype=np.float64).tobytes()] = outcome
 
     def describe(self) -> dict[str, Any]:
-        """How many gradients are known, how many of them come from differences, how many do not
-        hold because the score steps, and why the ascent ended.
+        """How many gradients are known, how many of them come from differences, how many were
+        compared with the score and do not hold because it steps, and why the ascent ended.
         """
         found = [o.parts[self.objective] for o in self._known.values() if o.gradient is not None]
-        unsteady = [parts for parts in found if not parts[GRADIENT_HOLDS]]
+        checked = [parts for parts in found if GRADIENT_HOLDS in parts]
+        unsteady = [parts for parts in checked if not parts[GRADIENT_HOLDS]]
         return {
             "slopes": len(found),
             "by_differences": sum(parts[GRADIENT_BY] == DIFFERENCES for parts in found),
+            "checked": len(checked),
             "unsteady": len(unsteady),
             "unsteady_by_rays": sum(parts[GRADIENT_BY] == RAYS for parts in unsteady),
             "ended": self._message,
@@ -178,10 +237,10 @@ class Gradient(Method):
         if facts["unsteady"]:
             notes.append(
                 f"{self.objective} has no steady derivative at {facts['unsteady']} of "
-                f"{facts['slopes']} points: its rate of change over {STEP / 2:.1%} of the ranges "
-                f"is more than {TOLERANCE:.0%} off that over {STEP:.0%}, because rows of pixels or "
-                "triangles come into view at once, an edge reaches the picture's border, or single "
-                "rays go astray. The "
+                f"{facts['checked']} points where that was checked: its rate of change over "
+                f"{STEP / 2:.1%} of the ranges is more than {TOLERANCE:.0%} off that over "
+                f"{STEP:.0%}, because rows of pixels or triangles come into view at once, an edge "
+                "reaches the picture's border, or single rays go astray. The "
                 f"gradients used there ({facts['unsteady_by_rays']} of the smoothed score, by "
                 f"rays; {facts['unsteady'] - facts['unsteady_by_rays']} by differences) show the "
                 "way up only roughly; --method cma-es needs none"
@@ -194,7 +253,7 @@ class Gradient(Method):
 
 
 class _PointWantedError(Exception):
-    """Ends a run of the optimiser at a point whose slope is not known yet."""
+    """Ends a run of the optimiser at a point whose score is not known yet."""
 
     def __init__(self, point: FloatArray) -> None:
         super().__init__()

@@ -6,6 +6,7 @@ import os
 from collections.abc import Callable, Sequence
 from itertools import combinations
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +20,14 @@ from optisense.geometry.crossings import crossings
 
 Constraint = Callable[[SensorDesign], bool | str | None]
 """False, or a text that says why, for a design that must not be."""
+
+
+class Meeting(NamedTuple):
+    """Two parts that cut through each other, and a place where they do, (3,) mm."""
+
+    one: str
+    other: str
+    place: NDArray[np.float64]
 
 
 class PartsApart:
@@ -40,6 +49,17 @@ class PartsApart:
 
     def __call__(self, design: SensorDesign) -> str | None:
         """Which two parts cut through each other, or None."""
+        found = self.meeting(design)
+        if found is None:
+            return None
+        x, y, z = found.place
+        return (
+            f"parts '{found.one}' and '{found.other}' cut through each other at "
+            f"({x:.2f}, {y:.2f}, {z:.2f}) mm"
+        )
+
+    def meeting(self, design: SensorDesign) -> Meeting | None:
+        """The first two parts that cut through each other and did not at the start, or None."""
         meshes = design.deformed_meshes()
         moved = {
             name for name, mesh in meshes.items() if not same_shape(mesh, self._meshes.get(name))
@@ -51,11 +71,7 @@ class PartsApart:
                 continue
             place = _crossing(meshes[one], meshes[other])
             if place is not None:
-                x, y, z = place
-                return (
-                    f"parts '{one}' and '{other}' cut through each other at "
-                    f"({x:.2f}, {y:.2f}, {z:.2f}) mm"
-                )
+                return Meeting(one, other, place)
         return None
 
     def _crossed_before(self, one: str, other: str) -> bool:
