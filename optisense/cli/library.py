@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 from rich.table import Table
@@ -113,7 +113,9 @@ def add_entry(
     file: Annotated[
         Path,
         typer.Argument(
-            metavar="FILE", help="An entry (.yaml, as `library show --yaml` prints), or an .ies."
+            metavar="FILE",
+            help="An entry (.yaml, as `library show --yaml` prints), an .ies, or the word camera "
+            "with --tuning.",
         ),
     ],
     kind: KindOption = None,
@@ -145,7 +147,8 @@ def add_entry(
         typer.Option(metavar="WxLxH", help="With an .ies: size of its body in mm, as 2.8x3.5x1.9."),
     ] = None,
     description: Annotated[
-        str | None, typer.Option(metavar="TEXT", help="With an .ies: what it is, in a line.")
+        str | None,
+        typer.Option(metavar="TEXT", help="With an .ies or --tuning: what it is, in a line."),
     ] = None,
     source: Annotated[
         str | None, typer.Option(metavar="TEXT", help="With an .ies: where these numbers are from.")
@@ -157,6 +160,24 @@ def add_entry(
             help="With an .ies: measured, datasheet, sourced, derived or assumed.",
         ),
     ] = "assumed",
+    tuning: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE.json",
+            help="libcamera's tuning file of a camera: noise, shading, colours, tone curve.",
+            show_default=False,
+        ),
+    ] = None,
+    like: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NAME", help="With --tuning: library camera whose view and pixels it has."
+        ),
+    ] = None,
+    temperature: Annotated[
+        float | None,
+        typer.Option(metavar="K", help="With --tuning: colour temperature; 5000 by default."),
+    ] = None,
 ) -> None:
     """Check a part of your own and store it in your library folder.
 
@@ -169,10 +190,20 @@ def add_entry(
         "--window": window, "--package": package, "--description": description,
         "--source": source,
     }  # fmt: skip
-    if file.suffix.lower() != ".ies":
-        for option, value in given.items():
+    if tuning is None:
+        for option, value in (("--like", like), ("--temperature", temperature)):
             if value is not None:
-                raise typer.BadParameter("is for .ies files only", param_hint=option)
+                raise typer.BadParameter("is for --tuning only", param_hint=option)
+    if tuning is not None:
+        from optisense.cli.library_tuning import add_tuning_file
+
+        del given["--description"]
+        _refuse(given, "--tuning has none")
+        added = add_tuning_file(
+            file, tuning, like=like, temperature=temperature, name=name, description=description
+        )
+    elif file.suffix.lower() != ".ies":
+        _refuse(given, "is for .ies files only")
         added = library.add_file(file, kind, name)
     else:
         if kind not in (None, "light", "lights"):
@@ -193,6 +224,17 @@ def add_entry(
             status=status,
         )
     _say_added(added)
+
+
+def _refuse(given: dict[str, Any], why: str) -> None:
+    """Refuse options that were given.
+
+    Raises:
+        typer.BadParameter: one was.
+    """
+    for option, value in given.items():
+        if value is not None:
+            raise typer.BadParameter(why, param_hint=option)
 
 
 def _say_added(added: Added) -> None:

@@ -69,6 +69,11 @@ class ImagingModel(Model):
         given = ((name, getattr(self, name)) for name in ImagingModel.model_fields)
         return {name: value for name, value in given if isinstance(value, KindModel)}
 
+    @property
+    def is_ideal(self) -> bool:
+        """Whether nothing but the usual response makes its pictures."""
+        return all(getattr(self, name) is None for name in ImagingModel.model_fields)
+
     @model_serializer(mode="wrap")
     def _without_the_usual(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
         """What is ideal or usual is not written."""

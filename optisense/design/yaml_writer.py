@@ -18,6 +18,9 @@ _PLAIN = re.compile(r"[A-Za-z_][A-Za-z0-9_./-]*$")
 _WORDS = {"true", "false", "null", "yes", "no", "on", "off"}
 _NOT_PRINTABLE = re.compile("[\x7f-\x9f\u2028\u2029\ufeff\ufffe\uffff\ud800-\udfff]")
 
+TABLE_ROWS = 5
+"""Lists of so many lists stand on a line each; a matrix of three rows stands on one."""
+
 ONE_LINE = (Point, Share, Light, Provenance)
 """Models that stand on one line; the list they are in carries their comment."""
 
@@ -59,7 +62,8 @@ def _fits_one_line(value: Any) -> bool:
     if isinstance(value, BaseModel):
         return isinstance(value, ONE_LINE)
     if isinstance(value, list | tuple):
-        return not any(isinstance(item, BaseModel) for item in value)
+        rows = sum(isinstance(item, list | tuple) for item in value)
+        return rows < TABLE_ROWS and not any(isinstance(item, BaseModel) for item in value)
     return not isinstance(value, dict) or not value
 
 

@@ -2,8 +2,9 @@
 
 from optisense.design.materials import specularity_to_roughness
 from optisense.library import ies
-from optisense.library.adding import Added, add_file, add_ies, parse_colour
+from optisense.library.adding import Added, add_file, add_ies, add_tuning, parse_colour
 from optisense.library.entries import AnyEntry, CameraModel, Entry, LightEntry, Source, TypicalLight
+from optisense.library.imaging import with_imaging
 from optisense.library.loader import (
     camera,
     coating,
@@ -27,6 +28,7 @@ __all__ = [
     "TypicalLight",
     "add_file",
     "add_ies",
+    "add_tuning",
     "camera",
     "coating",
     "emitter",
@@ -39,5 +41,6 @@ __all__ = [
     "own_folder",
     "parse_colour",
     "specularity_to_roughness",
+    "with_imaging",
     "with_own_lights",
 ]

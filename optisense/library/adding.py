@@ -17,9 +17,10 @@ from optisense.design.yaml_reader import read_yaml
 from optisense.errors import LibraryError
 from optisense.folders import held
 from optisense.library.entries import AnyEntry, LightEntry, Source, TypicalLight
-from optisense.library.loader import is_own, kind_named, names
+from optisense.library.loader import entry, is_own, kind_named, names
 from optisense.library.own_parts import WHERE_TO_STORE, own_folder, write_own
-from optisense.library.reading import KINDS, Kind, files_of, kind_of, read_entry
+from optisense.library.reading import KINDS, Kind, files_of, kind_of, make_entry, read_entry
+from optisense.library.tuning import DAYLIGHT, read_tuning
 from optisense.near import suggestion
 
 NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,63}")
@@ -149,6 +150,55 @@ def add_ies(
         sources=sources,
     )
     return Added("light", name, entry, _stored("light", name, entry, {f"{name}.ies": data}))
+
+
+def add_tuning(
+    file: str | Path,
+    *,
+    like: str,
+    name: str | None = None,
+    description: str | None = None,
+    temperature: float = DAYLIGHT,
+) -> Added:
+    """Add a camera with what a tuning file of libcamera says of its lens, sensor and processor.
+
+    Args:
+        file: JSON.
+        like: the camera of the library whose projection, field of view and size it has.
+        name: what designs call it; None takes the name of the file.
+        description: what it is, in a line.
+        temperature: K, of the light for which its colours are taken.
+
+    Raises:
+        LibraryError: the file can't be read or is no tuning file, there is no such camera, or the
+            name is taken.
+        OutputError: the user's folder can't be written.
+    """
+    file = Path(file)
+    name = file.stem if name is None else name
+    check_new_name(name)
+    known, tuning = entry("camera", like), read_tuning(file, temperature)
+    kept = set(type(known.value).model_fields) - set(tuning.values)
+    given = Source(status=Status.SOURCED, source=f"tuning file {file.name} at {temperature:g} K")
+    sources = {
+        field: source for field, source in known.sources.items() if field in {*kept, "maker"}
+    }
+    sources |= dict.fromkeys(tuning.values, given)
+    for field, why in tuning.derived.items():
+        sources[field] = Source(status=Status.DERIVED, source=why)
+    own = known.value.model_dump(mode="json", exclude_none=True, include=kept)
+    made = make_entry(
+        "camera",
+        name,
+        {
+            "description": description or f"{known.description}, tuned by {file.name}",
+            "value": own | tuning.values,
+            "sources": {field: source.model_dump(mode="json") for field, source in sources.items()},
+        },
+        {(): 1},
+        str(file),
+    )
+    return Added("camera", name, made, _stored("camera", name, made, {}))
 
 
 def check_new_name(name: str) -> None:

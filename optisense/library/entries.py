@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Generic, Literal, TypeVar
+from typing import Annotated, Any, Generic, Literal, TypeVar
 
 import numpy as np
 from pydantic import Field, model_validator
 
-from optisense.design.camera import Pixels
+from optisense.design.camera import ImagingModel, Pixels
 from optisense.design.emitters import LightModel
 from optisense.design.fields import Colour, MisfitError, Model, Name, Number, Positive
 from optisense.design.materials import CoatingModel, Material
@@ -132,8 +132,8 @@ class LightEntry(Entry[LightModel]):
         return self.sources.get(field) or self.sources.get(field.split(".")[0])
 
 
-class CameraModel(Model):
-    """A camera module as sold.
+class LensFacts(Model):
+    """The view of a camera module as sold.
 
     Attributes:
         projection: how angle turns into image height.
@@ -141,6 +141,7 @@ class CameraModel(Model):
         resolution: pixels of the sensor, width and height.
         pixel_size: micrometres.
         focal_length: mm.
+        f_number: focal length over the diameter of the entrance pupil.
     """
 
     projection: Literal["perspective", "equidistant"] = "perspective"
@@ -148,12 +149,32 @@ class CameraModel(Model):
     resolution: tuple[Pixels, Pixels]
     pixel_size: Positive | None = None
     focal_length: Positive | None = None
+    f_number: Positive | None = None
+
+
+class CameraModel(ImagingModel, LensFacts):
+    """A camera module as sold: its view, and what its lens, its sensor and its processor do.
+
+    `imaging` has what a design can take over besides the view.
+    """
+
+    def imaging(self) -> dict[str, Any]:
+        """What of `ImagingModel` is known of it: plain values by field, as for a design file."""
+        values = self.model_dump(mode="json", include=set(ImagingModel.model_fields))
+        return {name: value for name, value in values.items() if value is not None}
 
     @model_validator(mode="after")
     def _makes_sense(self) -> CameraModel:
         if self.projection == "perspective" and self.fov >= 180.0:
             raise MisfitError(
                 "a perspective camera sees less than 180 degrees", ("fov",), "Use equidistant"
+            )
+        if self.distortion is not None and self.distortion.projection != self.projection:
+            raise MisfitError(
+                f"a lens distortion of kind '{self.distortion.kind}' is one of "
+                f"{self.distortion.projection} lenses",
+                ("distortion", "kind"),
+                f"Use 'projection: {self.distortion.projection}', or another kind of distortion",
             )
         misfit = lens_misfit(
             self.projection, self.fov, self.resolution, self.pixel_size, self.focal_length

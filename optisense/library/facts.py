@@ -24,6 +24,10 @@ UNITS = {
 """Units of the fields around a value, and of a camera; those of a kind are in its class."""
 
 
+LONGEST_TABLE = 4
+"""Rows of a table that is shown number by number."""
+
+
 @dataclass(frozen=True)
 class Fact:
     """A field of an entry.
@@ -92,7 +96,16 @@ def consequences(entry: AnyEntry) -> list[str]:
 def _text(name: str, value: object, unit: str = "") -> str:
     """A value with its unit, without Python's quotes and brackets."""
     unit = unit or UNITS.get(name, "")
-    if isinstance(value, list | tuple):
+    if isinstance(value, dict):
+        text = ", ".join(
+            f"{_text('', item)}" if key == "kind" else f"{key} {_text('', item)}"
+            for key, item in value.items()
+        )
+    elif isinstance(value, list | tuple) and value and isinstance(value[0], list | tuple):
+        rows = ["(" + ", ".join(_text("", each) for each in row) + ")" for row in value]
+        size = f"{len(value)} rows of {len(value[0])} numbers"
+        text = " ".join(rows) if len(value) <= LONGEST_TABLE else size
+    elif isinstance(value, list | tuple):
         joint = " x " if unit in ("mm", "pixels") else ", "
         text = joint.join(_text("", item) for item in value)
     elif isinstance(value, bool):

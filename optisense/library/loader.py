@@ -136,9 +136,10 @@ def kind_named(text: str) -> Kind:
 
 @cache
 def _built_in(kind: Kind) -> dict[str, AnyEntry]:
-    """All built-in entries of a kind by name; lights have a file each, other kinds share one."""
-    if kind == "light":
-        files = sorted((FOLDER / "lights").glob("*.yaml"))
+    """All built-in entries of a kind by name; lights and cameras have a file each, materials and
+    coatings share one."""
+    if kind in ("light", "camera"):
+        files = sorted((FOLDER / f"{kind}s").glob("*.yaml"))
         return {file.stem: read_entry(kind, file) for file in files}
     file = FOLDER / f"{kind}s.yaml"
     data, lines = read_yaml(file, LibraryError)

@@ -138,3 +138,35 @@ def test_a_folder_that_can_not_be_written_is_a_failure(own: Path) -> None:
     code, text = run("add", str(IES), "--name", "ours", "--colour", "red", "--flux", "3")
     assert code == 1
     assert "OPTISENSE_LIBRARY" in text
+
+
+class TestTuning:
+    @pytest.fixture
+    def file(self, tmp_path: Path) -> Path:
+        path = tmp_path / "cam.json"
+        path.write_text('{"rpi.noise": {"reference_constant": 0, "reference_slope": 3.67}}')
+        return path
+
+    def test_a_tuning_file_becomes_a_camera(self, own: Path, file: Path) -> None:
+        code, _ = run("add", "camera", "--tuning", str(file), "--like", "pi-v2", "--name", "us")
+        assert code == 0 and (own / "cameras" / "us.yaml").is_file()
+        assert "full_well 4865.7" in run("show", "us")[1]
+
+    @pytest.mark.parametrize(
+        ("arguments", "says"),
+        [
+            (["camera", "--tuning", "FILE"], "name a camera of the library"),
+            (["lamp", "--tuning", "FILE", "--like", "pi-v2"], "a tuning file is of a camera"),
+            (["camera", "--tuning", "FILE", "--like", "pi-v2", "--flux", "3"], "has none"),
+            (["camera", "--tuning", "FILE", "--like", "pi-v2", "--temperature", "5"], "5 K is no"),
+            (["a.yaml", "--like", "pi-v2"], "is for --tuning only"),
+            (["camera", "--tuning", "no.json", "--like", "pi-v2"], "can't read the tuning file"),
+        ],
+    )
+    def test_what_makes_no_sense_is_told(
+        self, own: Path, file: Path, arguments: list[str], says: str
+    ) -> None:
+        given = [str(file) if each == "FILE" else each for each in arguments]
+        code, text = run("add", *given)
+        assert code == 2 and says in " ".join(text.replace("│", " ").split())
+        assert not (own / "cameras").exists()

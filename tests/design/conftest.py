@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from optisense.design import SensorDesign
+from optisense.design import Camera, SensorDesign
 from optisense.design.ies import parse_ies
 from optisense.geometry import TriangleMesh
 
@@ -24,6 +24,24 @@ def lattice(lower: list[float], upper: list[float], lift: float = 0.0) -> list[d
         for y in (lower[1], upper[1])
         for z in (lower[2], upper[2])
     ]
+
+
+TABLE = [[1.5, 1.2, 1.25, 1.6], [1.3, 1.1, 1.05, 1.4]] * 3
+
+OTHER_KINDS = {
+    "distortion": {
+        "kind": "brown-conrady",
+        "k1": 0.1,
+        "k2": 0.02,
+        "p1": 0.01,
+        "p2": -0.01,
+        "k3": 1,
+    },
+    "shading": {"kind": "radial", "corrected": 0.3, "falloff": 0.4, "power": 3},
+    "blur": {"kind": "gaussian", "width": 0.8},
+    "tone_curve": {"kind": "gamma", "gamma": 1.9},
+}  # fmt: skip
+"""Of what a camera has one of several kinds: those that `full_data` does not have."""
 
 
 def full_data() -> dict[str, object]:
@@ -88,6 +106,23 @@ def full_data() -> dict[str, object]:
             "model": "pi-v2", "projection": "equidistant", "fov": 150, "resolution": [64, 48],
             "position": [0.5, 0, -20], "direction": [0, 0, 1], "up": [0, 1, 0],
             "response": {"kind": "full-well", "full_well": 0.9, "blur": 0.01},
+            "distortion": {
+                "kind": "kannala-brandt", "centre": [0.49, 0.51],
+                "k1": -0.02, "k2": 0.003, "k3": -1e-4, "k4": 1e-5,
+            },
+            "shading": {
+                "kind": "table", "corrected": 0.7, "gain": TABLE, "red": TABLE, "blue": TABLE,
+                "colour_corrected": 0.9,
+            },
+            "blur": {
+                "kind": "defocus", "focal_length": 1.6, "f_number": 2.2, "focus_distance": 25,
+            },
+            "crosstalk": [[0.8, 0.1, 0.1], [0.2, 0.7, 0.1], [0, 0.2, 0.8]],
+            "noise": {"full_well": 4865.7, "read_noise": 2, "gain": 1.5, "binning": 4},
+            "black_level": {"level": 0.0625, "subtracted": 0.9},
+            "white_balance": [1.6, 1, 1.5],
+            "colour_matrix": [[1.5, -0.3, -0.2], [-0.2, 1.4, -0.2], [0, -0.5, 1.5]],
+            "tone_curve": {"kind": "points", "points": [[0, 0], [0.25, 0.6], [1, 1]]},
         },
         "cages": {
             "skin": {
@@ -105,6 +140,16 @@ def full_data() -> dict[str, object]:
         "dispersion": True,
         "provenance": {"parts.gel": {"status": "assumed", "source": "for the test"}},
     }  # fmt: skip
+
+
+@pytest.fixture
+def other_cameras() -> list[Camera]:
+    """The camera of `full_data` with others of what comes in kinds."""
+    camera = full_data()["camera"]
+    assert isinstance(camera, dict)
+    given = camera | {"projection": "perspective", "fov": 50} | OTHER_KINDS
+    last = {"tone_curve": {"kind": "srgb"}}
+    return [Camera.model_validate(given), Camera.model_validate(given | last)]
 
 
 @pytest.fixture

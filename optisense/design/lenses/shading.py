@@ -96,6 +96,9 @@ class TableShading(LensShading):
     blue: GainTable | None = Field(
         default=None, description="rows of blue's further gain, over that of green"
     )
+    colour_corrected: Fraction = Field(
+        default=0.0, description="share of the further gains that the camera's processor applies"
+    )
 
     @model_validator(mode="after")
     def _tables_fit(self) -> TableShading:
@@ -132,3 +135,10 @@ class TableShading(LensShading):
         green = spread(self.gain)
         further = [1.0 if table is None else spread(table) for table in (self.red, self.blue)]
         return 1.0 / np.stack([green * further[0], green, green * further[1]], axis=-1)
+
+    def correction(self, transmission: FloatArray) -> FloatArray:
+        """The gain of green, and the further ones of red and blue, each by its share."""
+        green = transmission[..., 1:2]
+        further = green / transmission
+        gain = 1.0 + self.corrected * (1.0 / green - 1.0)
+        return gain * (1.0 + self.colour_corrected * (further - 1.0))

@@ -2,8 +2,9 @@
 
 In the order of a real camera:
 
-1. the lens: shading, blur;
-2. the sensor: crosstalk between the channels, overexposure (`CameraResponse`), noise, black level;
+1. the lens: blur;
+2. the sensor: crosstalk between the channels, the shading by lens and pixels, which is measured of
+   each channel, overexposure (`CameraResponse`), noise, black level;
 3. its processor: the black level is subtracted, the shading corrected, the colours are balanced and
    mixed by a matrix, levels are clipped, and the tone curve gives what is stored.
 
@@ -81,9 +82,9 @@ class PictureChain:
 
     Attributes:
         response: how its sensor is filled and overflows.
-        shading: of its lens, and how much its processor corrects of it.
         focus: the blur of its lens.
         crosstalk: how much of the R, G and B of the light each channel of the sensor sees.
+        shading: how dim each channel is by place, and how much its processor corrects of it.
         noise: of its sensor.
         black_level: of its sensor, and what is subtracted.
         white_balance: gains of R, G and B.
@@ -92,9 +93,9 @@ class PictureChain:
     """
 
     response: CameraResponse = field(default_factory=lambda: USUAL_RESPONSE)
-    shading: LensShading | None = None
     focus: SoftFocus | None = None
     crosstalk: ChannelMatrix | None = None
+    shading: LensShading | None = None
     noise: SensorNoise | None = None
     black_level: BlackLevel | None = None
     white_balance: PositiveRGB | None = None
@@ -130,11 +131,11 @@ class PictureChain:
     def _on_sensor(self, exposed: FloatArray, window: PictureWindow) -> FloatArray:
         """What fills the pixels of the sensor, before they overflow."""
         level: FloatArray = np.asarray(exposed, dtype=np.float32)
-        if self.shading is not None:
-            level = level * self._transmission(window)
         if self.focus is not None:
             level = blurred(level, self.focus.in_pixels(window))
-        return level if self.crosstalk is None else mixed(level, self.crosstalk)
+        if self.crosstalk is not None:
+            level = mixed(level, self.crosstalk)
+        return level if self.shading is None else level * self._transmission(window)
 
     def _read(self, level: FloatArray, window: PictureWindow, seed: NoiseSeed) -> FloatArray:
         """What the sensor gives of filled pixels, less the black level."""
@@ -178,13 +179,13 @@ class PictureChain:
             return radiance
         level: FloatArray = np.asarray(radiance, dtype=np.float32)
         transmission = None
+        if self.crosstalk is not None:
+            level = mixed(level, self.crosstalk)
         if self.shading is not None:
             height, width = radiance.shape[:2] if where is None else where.shape
             whole = self._transmission(PictureWindow.whole(height, width))
             transmission = whole if where is None else whole[where]
             level = level * transmission
-        if self.crosstalk is not None:
-            level = mixed(level, self.crosstalk)
         return np.maximum(level, self._balanced(level, transmission))
 
     def auto_exposure(self, radiance: FloatArray) -> float:

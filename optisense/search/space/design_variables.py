@@ -8,6 +8,7 @@ from typing import Any, ClassVar
 
 from optisense import library
 from optisense.design import SensorDesign
+from optisense.design.camera import ImagingModel
 
 LONGEST_NAME = 64
 
@@ -55,7 +56,11 @@ class LibraryCoating(DesignVariable):
 
 
 class LibraryCamera(DesignVariable):
-    """Projection, field of view and resolution of a camera of the library; the pose stays."""
+    """Projection, field of view and resolution of a camera of the library; the pose stays.
+
+    Where the design's camera has a lens, a sensor or a processor that is not ideal, it gets those
+    of the library's camera.
+    """
 
     def start(self, design: SensorDesign) -> str:
         return design.camera.model
@@ -66,6 +71,9 @@ class LibraryCamera(DesignVariable):
         known = library.camera(str(value))
         optics = {"projection": known.projection, "fov": known.fov, "resolution": known.resolution}
         camera = design.camera.model_copy(update={"model": str(value), **optics})
+        if not design.camera.is_ideal:
+            imaging = {field: getattr(known, field) for field in ImagingModel.model_fields}
+            camera = camera.model_copy(update=imaging)
         return design.model_copy(update={"camera": camera})
 
 

@@ -1,0 +1,64 @@
+"""Cameras of designs that do with the light what a camera of the library does."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from optisense.design.addressing import set_value
+from optisense.design.sensor_design import Provenance, SensorDesign
+from optisense.errors import LibraryError
+from optisense.library.loader import camera, entry
+
+
+def with_imaging(
+    design: SensorDesign, name: str, *, focus_distance: float | None = None
+) -> SensorDesign:
+    """The design with a camera of the library's shading, noise, colours and tone curve.
+
+    The view stays as it is: pose, projection, field of view and resolution. What the library does
+    not know of that camera, such as its distortion, stays too. The sources of the numbers become
+    the design's provenance.
+
+    Args:
+        design: not changed.
+        name: of the library's camera.
+        focus_distance: mm, from the entrance pupil to what is sharp, in air; gives the lens the
+            blur of its depth of field. None leaves the blur as it is.
+
+    Raises:
+        LibraryError: there is no such camera, it has no such numbers, or the focal length and
+            f-number that its depth of field follows from are not known.
+        DesignError: the numbers do not fit the design.
+    """
+    known, found = camera(name), entry("camera", name)
+    values: dict[str, Any] = known.imaging()
+    sources = {field: found.source(field) for field in values}
+    if focus_distance is not None:
+        if known.focal_length is None or known.f_number is None:
+            raise LibraryError(
+                f"the focal length or the f-number of camera '{name}' is not known",
+                hint="Give the design's camera a blur of kind 'defocus' with its numbers",
+            )
+        values["blur"] = {
+            "kind": "defocus",
+            "focal_length": known.focal_length,
+            "f_number": known.f_number,
+            "focus_distance": focus_distance,
+        }
+        sources["blur"] = found.source("f_number")
+    if not values:
+        knowing = "no distortion, shading, noise, colours or tone curve"
+        raise LibraryError(f"the library knows {knowing} of camera '{name}'")
+    of_camera = design.camera.model_dump(mode="json") | values
+    result = set_value(design, "camera", of_camera)
+    replaced = [["camera", field] for field in values]
+    provenance = {
+        path: value
+        for path, value in design.provenance.items()
+        if path.split(".")[:2] not in replaced
+    }
+    for field, source in sources.items():
+        if source is not None:
+            provenance[f"camera.{field}"] = Provenance(status=source.status, source=source.source)
+    result.provenance = provenance
+    return result

@@ -1,0 +1,256 @@
+"""Tuning files of libcamera: what a camera's sensor and lens do, measured by its maker.
+
+The files of the Raspberry Pi's cameras are JSON; `src/ipa/rpi/vc4/data` of libcamera has them, and
+`docs/library.md` says what is taken from them. Their levels run from 0 to 65536 (16 bits).
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from optisense.errors import LibraryError
+
+FloatArray = NDArray[np.float64]
+
+FULL = 65536.0
+"""The level of a full pixel in tuning files, which have 16 bits whatever the sensor has."""
+
+TABLE_SIZES = {192: (12, 16), 1024: (32, 32)}
+"""Rows and columns of shading tables by how many numbers they have: those of the Raspberry Pi's
+processors VC4 and PiSP."""
+
+DAYLIGHT = 5000.0
+"""K, the colour temperature for which tables and matrices are taken: white LEDs for lighting rooms
+in neutral white have it. Tactile sensors have no white light of their own to balance by."""
+
+LARGEST_FILE = 4_000_000
+"""Bytes; the largest of libcamera's own tuning files has some 100,000."""
+
+ROUNDING = 5
+"""Decimals that are kept of what is worked out: the files have up to 5."""
+
+LEAST_DETERMINANT = 1e-3
+"""Of a colour matrix that can be undone; those of real cameras have some 2 to 10."""
+
+NO_TUNING = "Name a tuning file of libcamera for the Raspberry Pi, such as imx219.json"
+
+
+@dataclass(frozen=True)
+class Tuning:
+    """What a tuning file says of a camera.
+
+    Attributes:
+        values: fields of `ImagingModel` as plain values, those that the file has.
+        derived: how those that are worked out follow from the file, by field.
+    """
+
+    values: dict[str, Any]
+    derived: dict[str, str]
+
+
+def read_tuning(file: str | Path, temperature: float = DAYLIGHT) -> Tuning:
+    """Read a tuning file.
+
+    Args:
+        file: JSON, of format 1 or 2.
+        temperature: K; white balance and colour matrix are interpolated to it, and the colours'
+            shading is that of the nearest temperature in the file.
+
+    Raises:
+        LibraryError: the file can't be read, is no tuning file, or has a table of another size.
+    """
+    path = Path(file)
+    algorithms = _algorithms(path)
+    values: dict[str, Any] = {}
+    derived: dict[str, str] = {}
+    readers: dict[str, Callable[[dict[str, Any], float], dict[str, Any]]] = {
+        "black_level": _black_level,
+        "noise": _noise,
+        "alsc": _shading,
+        "awb": _white_balance,
+        "ccm": _colour_matrix,
+        "contrast": _tone_curve,
+    }
+    for name, read in readers.items():
+        if name not in algorithms:
+            continue
+        try:
+            values |= read(algorithms[name], temperature)
+        except LibraryError as error:
+            raise LibraryError(error.message, where=f"{path}: rpi.{name}", hint=NO_TUNING) from None
+        except (KeyError, TypeError, ValueError, IndexError) as error:
+            raise LibraryError(
+                f"'rpi.{name}' is not as in a tuning file ({type(error).__name__}: {error})",
+                where=str(path),
+                hint=NO_TUNING,
+            ) from None
+    if not values:
+        raise LibraryError(
+            "the tuning file tells nothing of black level, noise, shading, colours or tone curve",
+            where=str(path),
+            hint=NO_TUNING,
+        )
+    try:
+        _add_crosstalk(values, derived)
+    except LibraryError as error:
+        raise LibraryError(error.message, where=f"{path}: rpi.ccm", hint=NO_TUNING) from None
+    return Tuning(values, derived)
+
+
+def _algorithms(path: Path) -> dict[str, Any]:
+    """The sections of a tuning file, by name without its 'rpi.'."""
+    try:
+        with path.open("rb") as stream:
+            data = stream.read(LARGEST_FILE + 1)
+    except OSError as error:
+        raise LibraryError(
+            f"can't read the tuning file: {error.strerror or error}",
+            where=str(path),
+            hint="Check the path",
+        ) from error
+    if len(data) > LARGEST_FILE:
+        raise LibraryError("the file is too large for a tuning file", where=str(path))
+    try:
+        content = json.loads(data.decode("utf-8"), parse_constant=_no_number)
+    except (UnicodeDecodeError, ValueError, RecursionError) as error:
+        line = f":{error.lineno}" if isinstance(error, json.JSONDecodeError) else ""
+        raise LibraryError(
+            f"this is no tuning file: it is no JSON ({error})",
+            where=f"{path}{line}",
+            hint=NO_TUNING,
+        ) from None
+    found: dict[str, Any] = {}
+    if isinstance(content, dict):
+        listed = content.get("algorithms")
+        sections = listed if isinstance(listed, list) else [content]
+        for section in sections:
+            if isinstance(section, dict):
+                found |= {
+                    key.removeprefix("rpi."): value
+                    for key, value in section.items()
+                    if key.startswith("rpi.")
+                }
+    if not found:
+        raise LibraryError(
+            "this is no tuning file: it has no section whose name begins with 'rpi.'",
+            where=str(path),
+            hint=NO_TUNING,
+        )
+    return found
+
+
+def _no_number(text: str) -> float:
+    raise ValueError(f"{text} is no number")
+
+
+def _black_level(section: dict[str, Any], temperature: float) -> dict[str, Any]:
+    return {"black_level": {"level": _rounded(_number(section["black_level"]) / FULL)}}
+
+
+def _noise(section: dict[str, Any], temperature: float) -> dict[str, Any]:
+    """Standard deviation: constant + slope sqrt(level); so a full pixel holds FULL / slope^2
+    electrons."""
+    slope, constant = (_number(section[f"reference_{name}"]) for name in ("slope", "constant"))
+    if slope <= 0.0 or constant < 0.0:
+        raise LibraryError(f"the noise has a slope of {slope:g} and a constant of {constant:g}")
+    electrons = FULL / slope**2
+    read = constant / FULL * electrons
+    return {"noise": {"full_well": round(electrons, 1), "read_noise": round(read, 2)}}
+
+
+def _shading(section: dict[str, Any], temperature: float) -> dict[str, Any]:
+    if "luminance_lut" not in section:
+        return {}
+    strength = min(max(_number(section.get("luminance_strength", 1.0)), 0.0), 1.0)
+    shading: dict[str, Any] = {
+        "kind": "table",
+        "corrected": strength,
+        "gain": _table(section["luminance_lut"]),
+    }
+    for colour, name in (("red", "calibrations_Cr"), ("blue", "calibrations_Cb")):
+        tables = section.get(name) or []
+        if tables:
+            nearest = min(tables, key=lambda each: abs(_number(each["ct"]) - temperature))
+            table = np.array(_table(nearest["table"]))
+            shading[colour] = np.round(table / table.min(), ROUNDING - 1).tolist()
+            shading["colour_corrected"] = 1.0
+    return {"shading": shading}
+
+
+def _table(numbers: Any) -> list[list[float]]:
+    values = _numbers(numbers)
+    if values.size not in TABLE_SIZES:
+        sizes = " or ".join(f"{size} ({a} x {b})" for size, (a, b) in TABLE_SIZES.items())
+        raise LibraryError(f"a shading table has {values.size} numbers, and not {sizes}")
+    if values.min() <= 0.0:
+        raise LibraryError(f"a shading table has the gain {values.min():g}")
+    table: list[list[float]] = values.reshape(TABLE_SIZES[values.size]).tolist()
+    return table
+
+
+def _white_balance(section: dict[str, Any], temperature: float) -> dict[str, Any]:
+    """The curve has the temperature and the shares of red and blue in the green of a grey sheet."""
+    if "ct_curve" not in section:
+        return {}
+    curve = _numbers(section["ct_curve"]).reshape(-1, 3)
+    if curve.min() <= 0.0 or (np.diff(curve[:, 0]) <= 0.0).any():
+        raise LibraryError("the curve of colour temperatures does not rise, or is not above 0")
+    red, blue = (np.interp(temperature, curve[:, 0], curve[:, k]) for k in (1, 2))
+    return {"white_balance": [_rounded(1.0 / red), 1.0, _rounded(1.0 / blue)]}
+
+
+def _colour_matrix(section: dict[str, Any], temperature: float) -> dict[str, Any]:
+    entries = sorted(section["ccms"], key=lambda each: _number(each["ct"]))
+    places = np.array([_number(each["ct"]) for each in entries])
+    matrices = np.array([_numbers(each["ccm"]).reshape(3, 3) for each in entries])
+    matrix = [
+        [_rounded(float(np.interp(temperature, places, matrices[:, row, k]))) for k in range(3)]
+        for row in range(3)
+    ]
+    return {"colour_matrix": matrix}
+
+
+def _tone_curve(section: dict[str, Any], temperature: float) -> dict[str, Any]:
+    points = _numbers(section["gamma_curve"]).reshape(-1, 2)
+    scaled = np.round(np.minimum(points / (FULL - 1.0), 1.0), ROUNDING)
+    return {"tone_curve": {"kind": "points", "points": scaled.tolist()}}
+
+
+def _add_crosstalk(values: dict[str, Any], derived: dict[str, str]) -> None:
+    """What the sensor must see of the light for its processor to undo it."""
+    if "colour_matrix" not in values:
+        return
+    matrix = np.array(values["colour_matrix"])
+    if abs(np.linalg.det(matrix)) < LEAST_DETERMINANT:
+        raise LibraryError(
+            "the colour matrix mixes the channels so that it can't be undone", hint=NO_TUNING
+        )
+    undone = np.linalg.inv(matrix * np.array(values.get("white_balance", (1.0, 1.0, 1.0))))
+    values["crosstalk"] = np.round(undone, ROUNDING).tolist()
+    derived["crosstalk"] = (
+        "the inverse of white balance and colour matrix: the maker chose these so that the "
+        "picture has the colours of the light"
+    )
+
+
+def _number(value: Any) -> float:
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise TypeError(f"{value!r} is no number")
+    return float(value)
+
+
+def _numbers(values: Any) -> FloatArray:
+    if not isinstance(values, list) or not values:
+        raise TypeError("a list of numbers is missing")
+    return np.array([_number(each) for each in values])
+
+
+def _rounded(value: float) -> float:
+    return round(value, ROUNDING)
