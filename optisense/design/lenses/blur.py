@@ -7,24 +7,17 @@ width, so that it does not depend on the resolution of a render.
 from __future__ import annotations
 
 from abc import abstractmethod
-from typing import Annotated, Any, ClassVar, Literal, Protocol
+from typing import Any, ClassVar, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field
 from scipy.ndimage import gaussian_filter
 
-from optisense.design.fields import MILLIMETRES, NonNegative, Positive
 from optisense.design.kinds import KindModel
 from optisense.errors import DesignError
 from optisense.registry import Registry
 
 FloatArray = NDArray[np.floating]
-
-HOME = "optisense.design.lenses.blur"
-
-DISC_DEVIATION = 0.25
-"""Standard deviation along an axis of a uniformly lit disc, over its diameter."""
 
 REACH = 4.0
 """Standard deviations after which a blur ends (SciPy's own choice)."""
@@ -59,7 +52,10 @@ class LensBlur(KindModel):
         "kind of lens blur",
         "optisense.blurs",
         DesignError,
-        {"gaussian": f"{HOME}:GaussianBlur", "defocus": f"{HOME}:Defocus"},
+        {
+            "gaussian": "optisense.design.lenses.gaussian_blur:GaussianBlur",
+            "defocus": "optisense.design.lenses.defocus:Defocus",
+        },
     )
 
     by_depth: ClassVar[bool] = False
@@ -74,58 +70,6 @@ class LensBlur(KindModel):
             vergence: (...) 1/mm: one over the distance at which what a pixel sees appears to lie.
                 Where `by_depth` is false, it is a single 0.
         """
-
-
-class GaussianBlur(LensBlur):
-    """The same width everywhere."""
-
-    title: ClassVar[str] = "Gaussian"
-
-    kind: Literal["gaussian"] = "gaussian"
-    width: Annotated[NonNegative, Field(le=1000.0)] = Field(
-        description="standard deviation in pixels of the camera's own resolution",
-        examples=[0.7],
-        json_schema_extra={"unit": "pixels"},
-    )
-
-    def deviation(self, camera: LensView, vergence: FloatArray) -> FloatArray:
-        """The width over the pixels across."""
-        return np.asarray(self.width / camera.resolution[0]) + 0.0 * vergence
-
-
-class Defocus(LensBlur):
-    """A thin lens: what lies nearer or farther than the focus is spread over a disc.
-
-    A point at the distance z from the entrance pupil is seen under the angle A |1/z - 1/z_f|, with
-    A the diameter of the entrance pupil and z_f the distance in focus: the circle of confusion. Its
-    disc is taken for a normal distribution of the same variance.
-    """
-
-    title: ClassVar[str] = "Defocus"
-    by_depth: ClassVar[bool] = True
-
-    kind: Literal["defocus"] = "defocus"
-    focal_length: Positive = Field(
-        description="of the lens", examples=[3.04], json_schema_extra=MILLIMETRES
-    )
-    f_number: Positive = Field(
-        description="focal length over the diameter of the entrance pupil", examples=[2.0]
-    )
-    focus_distance: Positive = Field(
-        description="from the entrance pupil to what is sharp, in air",
-        examples=[25.0],
-        json_schema_extra=MILLIMETRES,
-    )
-
-    def circle(self, camera: LensView, vergence: FloatArray) -> FloatArray:
-        """Diameter of the circle of confusion, as a share of the picture's width."""
-        pupil = self.focal_length / self.f_number
-        angle = pupil * np.abs(vergence - 1.0 / self.focus_distance)
-        return np.asarray(angle * camera.angle_scale)
-
-    def deviation(self, camera: LensView, vergence: FloatArray) -> FloatArray:
-        """A quarter of the circle's diameter."""
-        return DISC_DEVIATION * self.circle(camera, vergence)
 
 
 def reach_of(deviation: float, width: int) -> int:

@@ -8,30 +8,19 @@ libcamera's `luminance_strength` scales its table. The noise is amplified with i
 from __future__ import annotations
 
 from abc import abstractmethod
-from typing import Annotated, Any, ClassVar, Literal
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field, model_validator
-from scipy.ndimage import map_coordinates
+from pydantic import Field
 
-from optisense.design.fields import Fraction, MisfitError, Number
+from optisense.design.fields import Fraction
 from optisense.design.kinds import KindModel
 from optisense.design.lenses.film import FilmPlaces
 from optisense.errors import DesignError
 from optisense.registry import Registry
 
 FloatArray = NDArray[np.floating]
-
-HOME = "optisense.design.lenses.shading"
-
-TABLE_ROWS, TABLE_COLUMNS = 12, 16
-"""Size of the shading tables that libcamera's tuning files for the Raspberry Pi hold (rpi.alsc on
-the VC4 processor)."""
-
-Gain = Annotated[Number, Field(ge=0.1, le=1000.0)]
-
-GainTable = list[list[Gain]]
 
 
 class LensShading(KindModel):
@@ -41,7 +30,10 @@ class LensShading(KindModel):
         "kind of lens shading",
         "optisense.shadings",
         DesignError,
-        {"table": f"{HOME}:TableShading", "radial": f"{HOME}:RadialShading"},
+        {
+            "table": "optisense.design.lenses.table_shading:TableShading",
+            "radial": "optisense.design.lenses.radial_shading:RadialShading",
+        },
     )
 
     kind: str
@@ -56,89 +48,3 @@ class LensShading(KindModel):
     def correction(self, transmission: FloatArray) -> FloatArray:
         """(h, w, 3) the gain by which the processor undoes a transmission."""
         return 1.0 + self.corrected * (1.0 / transmission - 1.0)
-
-
-class RadialShading(LensShading):
-    """The transmission is a polynomial of the distance from the picture's middle."""
-
-    title: ClassVar[str] = "Radial"
-
-    kind: Literal["radial"] = "radial"
-    falloff: Annotated[Number, Field(ge=0.0, lt=1.0)] = Field(
-        default=0.5, description="share of the light that is lost in the picture's corners"
-    )
-    power: Annotated[Number, Field(ge=1.0, le=16.0)] = Field(
-        default=2.0, description="power of the distance with which the loss grows"
-    )
-
-    def transmission(self, places: FilmPlaces) -> FloatArray:
-        """1 in the middle, 1 - falloff in the corners."""
-        share = 1.0 - self.falloff * places.radius**self.power
-        return np.repeat(share[..., None], 3, axis=-1)
-
-
-class TableShading(LensShading):
-    """A table of the gains that undo the shading, as tuning files of cameras hold it.
-
-    A row of the table stands for a band of the picture and a number in it for a cell of that band;
-    between the middles of cells the gain is interpolated, and it is level beyond the outermost.
-    """
-
-    title: ClassVar[str] = "Table"
-
-    kind: Literal["table"] = "table"
-    gain: GainTable = Field(
-        description="rows, from the top, of the gain that undoes the shading of green"
-    )
-    red: GainTable | None = Field(
-        default=None, description="rows of red's further gain, over that of green"
-    )
-    blue: GainTable | None = Field(
-        default=None, description="rows of blue's further gain, over that of green"
-    )
-    colour_corrected: Fraction = Field(
-        default=0.0, description="share of the further gains that the camera's processor applies"
-    )
-
-    @model_validator(mode="after")
-    def _tables_fit(self) -> TableShading:
-        for name in ("gain", "red", "blue"):
-            table = getattr(self, name)
-            if table is None:
-                continue
-            widths = [len(row) for row in table]
-            if len(table) < 2 or min(widths) < 2 or len(set(widths)) > 1:
-                shape = f"{len(table)} rows of " + " or ".join(map(str, sorted(set(widths))))
-                raise MisfitError(
-                    f"the shading table '{name}' has {shape} numbers",
-                    (name,),
-                    "Give rows of equal length, two or more of each, such as "
-                    f"{TABLE_ROWS} rows of {TABLE_COLUMNS}",
-                )
-            if (len(table), widths[0]) != (len(self.gain), len(self.gain[0])):
-                raise MisfitError(
-                    f"the shading table '{name}' has {len(table)} rows of {widths[0]} numbers, "
-                    f"and 'gain' has {len(self.gain)} of {len(self.gain[0])}",
-                    (name,),
-                    "Give tables of one size",
-                )
-        return self
-
-    def transmission(self, places: FilmPlaces) -> FloatArray:
-        """The inverse of the gains."""
-        rows, columns = len(self.gain), len(self.gain[0])
-        at = np.array([places.down * rows - 0.5, places.across * columns - 0.5])
-
-        def spread(table: GainTable) -> FloatArray:
-            return map_coordinates(np.array(table), at, order=1, mode="nearest")
-
-        green = spread(self.gain)
-        further = [1.0 if table is None else spread(table) for table in (self.red, self.blue)]
-        return 1.0 / np.stack([green * further[0], green, green * further[1]], axis=-1)
-
-    def correction(self, transmission: FloatArray) -> FloatArray:
-        """The gain of green, and the further ones of red and blue, each by its share."""
-        green = transmission[..., 1:2]
-        further = green / transmission
-        gain = 1.0 + self.corrected * (1.0 / green - 1.0)
-        return gain * (1.0 + self.colour_corrected * (further - 1.0))

@@ -1,0 +1,52 @@
+"""Blur by depth of field."""
+
+from __future__ import annotations
+
+from typing import ClassVar, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field
+
+from optisense.design.fields import MILLIMETRES, Positive
+from optisense.design.lenses.blur import LensBlur, LensView
+
+FloatArray = NDArray[np.floating]
+
+DISC_DEVIATION = 0.25
+"""Standard deviation along an axis of a uniformly lit disc, over its diameter."""
+
+
+class Defocus(LensBlur):
+    """A thin lens: what lies nearer or farther than the focus is spread over a disc.
+
+    A point at the distance z from the entrance pupil is seen under the angle A |1/z - 1/z_f|, with
+    A the diameter of the entrance pupil and z_f the distance in focus: the circle of confusion. Its
+    disc is taken for a normal distribution of the same variance.
+    """
+
+    title: ClassVar[str] = "Defocus"
+    by_depth: ClassVar[bool] = True
+
+    kind: Literal["defocus"] = "defocus"
+    focal_length: Positive = Field(
+        description="of the lens", examples=[3.04], json_schema_extra=MILLIMETRES
+    )
+    f_number: Positive = Field(
+        description="focal length over the diameter of the entrance pupil", examples=[2.0]
+    )
+    focus_distance: Positive = Field(
+        description="from the entrance pupil to what is sharp, in air",
+        examples=[25.0],
+        json_schema_extra=MILLIMETRES,
+    )
+
+    def circle(self, camera: LensView, vergence: FloatArray) -> FloatArray:
+        """Diameter of the circle of confusion, as a share of the picture's width."""
+        pupil = self.focal_length / self.f_number
+        angle = pupil * np.abs(vergence - 1.0 / self.focus_distance)
+        return np.asarray(angle * camera.angle_scale)
+
+    def deviation(self, camera: LensView, vergence: FloatArray) -> FloatArray:
+        """A quarter of the circle's diameter."""
+        return DISC_DEVIATION * self.circle(camera, vergence)

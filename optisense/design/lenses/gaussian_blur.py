@@ -1,0 +1,31 @@
+"""Blur of one width over all of the picture."""
+
+from __future__ import annotations
+
+from typing import Annotated, ClassVar, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field
+
+from optisense.design.fields import NonNegative
+from optisense.design.lenses.blur import LensBlur, LensView
+
+FloatArray = NDArray[np.floating]
+
+
+class GaussianBlur(LensBlur):
+    """The same width everywhere."""
+
+    title: ClassVar[str] = "Gaussian"
+
+    kind: Literal["gaussian"] = "gaussian"
+    width: Annotated[NonNegative, Field(le=1000.0)] = Field(
+        description="standard deviation in pixels of the camera's own resolution",
+        examples=[0.7],
+        json_schema_extra={"unit": "pixels"},
+    )
+
+    def deviation(self, camera: LensView, vergence: FloatArray) -> FloatArray:
+        """The width over the pixels across."""
+        return np.asarray(self.width / camera.resolution[0]) + 0.0 * vergence

@@ -1,0 +1,28 @@
+"""A power as a tone curve."""
+
+from __future__ import annotations
+
+from typing import ClassVar, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field
+
+from optisense.design.fields import Positive
+from optisense.design.responses.tone_curve import ToneCurve
+
+FloatArray = NDArray[np.floating]
+
+
+class GammaCurve(ToneCurve):
+    """A power: the stored level is the linear one to the power of 1 / gamma."""
+
+    title: ClassVar[str] = "Gamma"
+
+    kind: Literal["gamma"] = "gamma"
+    gamma: Positive = Field(default=2.2, description="1 stores linear levels", examples=[2.2])
+
+    def curve(self, linear: FloatArray) -> NDArray[np.float64]:
+        """The power."""
+        level = np.clip(np.asarray(linear, dtype=float), 0.0, 1.0)
+        return np.asarray(level ** (1.0 / self.gamma))

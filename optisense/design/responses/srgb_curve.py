@@ -1,0 +1,29 @@
+"""The tone curve of sRGB."""
+
+from __future__ import annotations
+
+from typing import ClassVar, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from optisense.design.colour import encode, srgb_curve
+from optisense.design.responses.tone_curve import ToneCurve
+
+FloatArray = NDArray[np.floating]
+
+
+class SrgbCurve(ToneCurve):
+    """The transfer curve of sRGB (IEC 61966-2-1)."""
+
+    title: ClassVar[str] = "sRGB"
+
+    kind: Literal["srgb"] = "srgb"
+
+    def curve(self, linear: FloatArray) -> NDArray[np.float64]:
+        """A power of 1 / 2.4 with a straight piece in the dark."""
+        return srgb_curve(linear)
+
+    def encode(self, linear: FloatArray) -> NDArray[np.uint8]:
+        """The same in 8 bits, worked out in single precision."""
+        return encode(linear)
