@@ -10,10 +10,11 @@ from pydantic import TypeAdapter, ValidationError
 from optisense import library
 from optisense.design.emitters import LightModel
 from optisense.design.kinds import KindModel
+from optisense.design.lenses import LensBlur, LensDistortion, LensShading
 from optisense.design.materials import CoatingModel, Material, kinds_for
 from optisense.design.parts import Role
 from optisense.design.problems import design_error
-from optisense.design.responses import CameraResponse
+from optisense.design.responses import CameraResponse, ToneCurve
 from optisense.engine.failures import ProtocolError
 from optisense.engine.jobs import Job
 from optisense.engine.protocol import Fields
@@ -26,6 +27,10 @@ NOUNS: dict[str, type[KindModel]] = {
     "material": Material,
     "coating": CoatingModel,
     "response": CameraResponse,
+    "distortion": LensDistortion,
+    "shading": LensShading,
+    "blur": LensBlur,
+    "tone_curve": ToneCurve,
 }
 """What comes in kinds; each noun has its own registry."""
 

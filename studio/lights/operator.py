@@ -6,7 +6,14 @@ from typing import Any
 
 import bpy
 import numpy as np
-from bpy.props import EnumProperty, FloatProperty, FloatVectorProperty, IntProperty, StringProperty
+from bpy.props import (
+    BoolProperty,
+    EnumProperty,
+    FloatProperty,
+    FloatVectorProperty,
+    IntProperty,
+    StringProperty,
+)
 from mathutils import Vector
 
 from ..core.engine import EngineError
@@ -15,7 +22,7 @@ from ..core.rows import row_on_face
 from ..engine import catalogue, polls, session
 from ..engine.operators import ChoosingProperties, refuse
 from ..scene.build import add_light_group
-from ..scene.cameras import add_camera
+from ..scene.cameras import add_camera, imaging
 from ..scene.collections import objects_of, select_only
 from ..scene.gather import free_name
 from ..scene.lamps import add_light, lamp_colour, redraw
@@ -157,6 +164,11 @@ class OPTISENSE_OT_add_camera(polls.Arranging, ChoosingProperties, bpy.types.Ope
         name="Model", items=_camera_models,
         description="The library's camera; its picture is 320 pixels wide at most, to begin with",
     )  # fmt: skip
+    imaging: BoolProperty(
+        name="With Noise and Colours", default=False,
+        description="Take over what the library knows of its lens, its sensor and its processor, "
+        "such as noise, shading, colour matrix and tone curve; else it is an ideal camera",
+    )  # fmt: skip
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         scene = context.scene
@@ -192,6 +204,7 @@ class OPTISENSE_OT_add_camera(polls.Arranging, ChoosingProperties, bpy.types.Ope
                 "position": [round(value, 4) for value in place],
                 "direction": unit(way),
                 "up": list(up),
+                **(imaging(entry["value"]) if self.imaging else {}),
             },
         )
         return {"FINISHED"}

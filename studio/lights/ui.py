@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import json
+
 import bpy
 
 from ..engine.layout import SidebarPanel
+from ..scene.cameras import imaging
 from ..scene.collections import objects_of
 
 
@@ -64,3 +67,7 @@ def _camera(layout: bpy.types.UILayout, camera: bpy.types.PropertyGroup) -> None
     column.prop(camera, "projection")
     column.prop(camera, "fov", text="Field of view (°)")
     column.prop(camera, "pixels")
+    given = imaging(json.loads(camera.data)) if camera.data else {}
+    if given:
+        names = ", ".join(name.replace("_", " ") for name in given)
+        layout.label(text=f"With {names}", icon="INFO")

@@ -18,6 +18,13 @@ from .lamps import place
 DRAWN_SIZE = 5.0
 """How large (mm) the pyramid of the camera is drawn."""
 
+VIEW = ("model", "projection", "fov", "resolution")
+POSE = ("position", "direction", "up")
+"""What properties and the object hold of a camera."""
+
+FACTS = ("pixel_size", "focal_length", "f_number")
+"""What the library says of a camera that is no part of designs."""
+
 WIDEST_DRAWN = 170.0
 """Degrees; Blender's pinhole cameras see less than 180."""
 
@@ -77,6 +84,12 @@ def camera_values(scene: bpy.types.Scene) -> dict[str, Any] | None:
         "projection": values.projection,
         "fov": kept(before.get("fov"), values.fov),
         "resolution": list(values.pixels),
-        **{name: pose[name] for name in ("position", "direction", "up")},
-        **({"response": before["response"]} if before.get("response") else {}),
+        **{name: pose[name] for name in POSE},
+        **imaging(before),
     }
+
+
+def imaging(values: dict[str, Any]) -> dict[str, Any]:
+    """What a camera has besides its view: what its lens, its sensor and its processor do."""
+    others = (*VIEW, *POSE, *FACTS)
+    return {name: value for name, value in values.items() if name not in others and value}

@@ -9,14 +9,19 @@ import pytest
 
 from optisense.design import AreaEmitter, Role
 from optisense.design.emitters import LightModel
+from optisense.design.lenses import LensBlur, LensDistortion, LensShading
 from optisense.design.materials import CoatingModel, Material
-from optisense.design.responses import CameraResponse
+from optisense.design.responses import CameraResponse, ToneCurve
 
 NOUNS = {
     "emitter": LightModel,
     "material": Material,
     "coating": CoatingModel,
     "response": CameraResponse,
+    "distortion": LensDistortion,
+    "shading": LensShading,
+    "blur": LensBlur,
+    "tone_curve": ToneCurve,
 }
 
 

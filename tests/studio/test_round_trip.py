@@ -178,3 +178,21 @@ def test_undo_of_a_bent_cage_straightens_its_parts(mini: Any) -> None:
     bpy.ops.ed.undo()
     skin = object_of(bpy.context.scene, "PART", "skin")
     assert np.array_equal(cages.shown_vertices(skin.data), flat)
+
+
+def test_what_a_camera_does_with_light_comes_back(scene: Any, tmp_path: Path) -> None:
+    bpy.ops.optisense.new(sensor="gelsight-mini")
+    bpy.ops.optisense.add_camera(model="pi-v2", imaging=True)
+    assert bpy.ops.optisense.save_as(filepath=str(tmp_path / "saved")) == {"FINISHED"}
+    camera = as_read(str(tmp_path / "saved"))[0]["camera"]
+    assert camera["noise"]["full_well"] == 4865.7
+    assert camera["tone_curve"]["kind"] == "points" and len(camera["shading"]["gain"]) == 12
+    assert "f_number" not in camera
+    bpy.ops.optisense.open(filepath=str(tmp_path / "saved"))
+    assert bpy.ops.optisense.save_as(filepath=str(tmp_path / "again")) == {"FINISHED"}
+    assert as_read(str(tmp_path / "again"))[0]["camera"] == camera
+    bpy.ops.optisense.add_camera(model="pi-v2")
+    assert set(gather_document(bpy.context.scene)["camera"]) == {
+        *("model", "projection", "fov", "resolution"),
+        *("position", "direction", "up"),
+    }
