@@ -26,7 +26,7 @@ from optisense.design.materials import (
     Diffuse,
     Material,
 )
-from optisense.design.parts import Part, Role
+from optisense.design.parts import FaceFinish, Part, Role
 from optisense.design.problems import Diagnostic
 from optisense.design.sensor_design import Provenance, SensorDesign, Status
 from optisense.design.storage import load_design, save_design
@@ -41,6 +41,7 @@ __all__ = [
     "Diagnostic",
     "Dielectric",
     "Diffuse",
+    "FaceFinish",
     "IesEmitter",
     "Light",
     "LightGroup",

@@ -14,6 +14,7 @@ from optisense.design.camera_checks import lens_problems, place_problems, view_p
 from optisense.design.lens_checks import fold_problems
 from optisense.design.limits import unit_slips
 from optisense.design.material_checks import index_problems
+from optisense.design.part_faces import finished_faces
 from optisense.design.parts import TRANSPARENT_SOLIDS, Role
 from optisense.design.problems import Diagnostic
 from optisense.design.sensor_design import SensorDesign
@@ -60,6 +61,7 @@ def check_design(
     problems += lens_problems(design.camera, design.where("camera", "fov"))
     problems += fold_problems(design.camera, design.where("camera", "distortion"))
     problems += index_problems(design)
+    problems += _check_finishes(design, meshes)
     problems += _check_lights(design, light_names)
     problems += _check_kinds(design)
     if not any(problem.severity == "error" for problem in problems):
@@ -105,6 +107,21 @@ def _check_mesh(
             )
         ]
     return []
+
+
+def _check_finishes(design: SensorDesign, meshes: Collection[str]) -> list[Diagnostic]:
+    """Frosted and painted faces must be there."""
+    problems = []
+    for name, part in design.parts.items():
+        for label, finish in (part.faces or {}).items():
+            if name not in meshes:
+                continue
+            where = design.where("parts", name, "faces", label)
+            try:
+                finished_faces(design.meshes[name], finish, f"'{label}' of part '{name}'", where)
+            except DesignError as error:
+                problems.append(Diagnostic(error.message, where, error.hint))
+    return problems
 
 
 def _check_lights(design: SensorDesign, light_names: Collection[str] | None) -> list[Diagnostic]:

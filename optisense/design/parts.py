@@ -5,9 +5,19 @@ from __future__ import annotations
 from enum import StrEnum
 from typing import Annotated
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
-from optisense.design.fields import Model, Name, RelativePath
+from optisense.design.fields import (
+    DEGREES,
+    Direction,
+    Fraction,
+    MisfitError,
+    Model,
+    Name,
+    Number,
+    RelativePath,
+    Vector,
+)
 
 
 class Role(StrEnum):
@@ -33,6 +43,44 @@ TRANSPARENT_SOLIDS = frozenset({Role.ELASTOMER, Role.SUPPORT})
 """Roles whose meshes must be closed, since light is refracted into and out of them."""
 
 
+class FaceFinish(Model):
+    """Some faces of a transparent solid, and what was done to them.
+
+    The faces are those of the mesh at rest that look along `direction` and lie within `box`; one of
+    the two is enough.
+    """
+
+    direction: Direction | None = Field(
+        default=None, description="the faces look this way, to `within` degrees"
+    )
+    within: Annotated[Number, Field(gt=0.0, le=180.0)] = Field(
+        default=30.0,
+        description="largest angle between direction and normal",
+        json_schema_extra=DEGREES,
+    )
+    box: tuple[Vector, Vector] | None = Field(
+        default=None, description="mm, two corners of a box that the faces lie in, at rest"
+    )
+    roughness: Fraction | None = Field(
+        default=None, description="GGX alpha in place of the material's: ground, frosted or cut"
+    )
+    paint: Name | None = Field(
+        default=None, description="an opaque material above, instead of roughness"
+    )
+
+    @model_validator(mode="after")
+    def _says_which_faces_and_what(self) -> FaceFinish:
+        if self.direction is None and self.box is None:
+            raise MisfitError("it is not said which faces", (), "Give 'direction', 'box' or both")
+        if (self.roughness is None) == (self.paint is None):
+            raise MisfitError("faces have either a roughness or a paint", (), "Give one of the two")
+        if self.box is not None and any(a > b for a, b in zip(*self.box, strict=True)):
+            raise MisfitError(
+                "the first corner of the box must be the lower one", ("box",), "Swap the corners"
+            )
+        return self
+
+
 class Part(Model):
     """A solid or a surface of the sensor.
 
@@ -46,4 +94,7 @@ class Part(Model):
     material: Name | None = Field(default=None, description="one of the materials above")
     priority: Annotated[int, Field(strict=True, ge=-1000, le=1000)] = Field(
         default=0, description="where solids overlap, the higher one counts"
+    )
+    faces: dict[Name, FaceFinish] | None = Field(
+        default=None, description="frosted or painted faces of an elastomer or support, by name"
     )

@@ -16,6 +16,7 @@ from optisense.design.fields import MisfitError, Model, Name
 from optisense.design.kinds import KindModel
 from optisense.design.lights import LightGroup
 from optisense.design.materials import CoatingModel, Material, kinds_for
+from optisense.design.part_faces import check_finishes
 from optisense.design.parts import Part, Role
 from optisense.errors import DesignError
 from optisense.geometry import TriangleMesh
@@ -79,6 +80,7 @@ class SensorDesign(Model):
     def _references_hold(self) -> SensorDesign:
         for name, part in self.parts.items():
             self._check_material(name, part)
+            check_finishes(name, part, self.materials)
         if not any(part.role is Role.SENSING_SURFACE for part in self.parts.values()):
             raise MisfitError("no part is a sensing_surface", ("parts",), "Give one part this role")
         caged: dict[str, str] = {}

@@ -21,6 +21,9 @@ from .lamps import light_pose
 from .meshes import part_mesh
 from .properties import USUAL_COATING
 
+HAVE_FACES = ("elastomer", "support")
+"""Roles of parts whose faces can be frosted or painted."""
+
 
 def gather(scene: bpy.types.Scene) -> tuple[dict[str, Any], dict[str, Mesh]]:
     """The design of a scene: what `design.yaml` holds, and the parts at rest by name.
@@ -63,7 +66,7 @@ def gather_document(scene: bpy.types.Scene) -> dict[str, Any]:
     for cage in cages.values():
         cage["parts"] = [name for name in cage["parts"] if name in parts]
     document["cages"] = {name: cage for name, cage in cages.items() if cage["parts"]}
-    document["parts"] = {name: _part(name, part) for name, part in parts.items()}
+    document["parts"] = {name: _part(name, part, before["parts"]) for name, part in parts.items()}
     _own_files(document["parts"], parts)
     document["lights"] = _lights(scene, before["lights"])
     camera = camera_values(scene)
@@ -145,7 +148,8 @@ def material_values(
     return {"kind": material.kind_name, **material.gathered(before or {})}
 
 
-def _part(name: str, part: bpy.types.Object) -> dict[str, Any]:
+def _part(name: str, part: bpy.types.Object, before: dict[str, Any]) -> dict[str, Any]:
+    """A part; frosted and painted faces are as the design file had them."""
     own = part.optisense
     values: dict[str, Any] = {"role": own.role, "mesh": own.mesh_file}
     if name != own.key or not own.mesh_file:
@@ -153,6 +157,9 @@ def _part(name: str, part: bpy.types.Object) -> dict[str, Any]:
     if own.material and own.role != "sensing_surface":
         values["material"] = own.material
     values["priority"] = own.priority
+    faces = before.get(own.key, {}).get("faces")
+    if faces is not None and own.role in HAVE_FACES:
+        values["faces"] = faces
     return values
 
 

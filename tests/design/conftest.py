@@ -81,6 +81,13 @@ def full_data() -> dict[str, object]:
             "skin": {"role": "sensing_surface", "mesh": "meshes/skin.obj"},
             "gel": {
                 "role": "elastomer", "mesh": "meshes/gel.obj", "material": "gel", "priority": 2,
+                "faces": {
+                    "side": {
+                        "direction": [1, 0, 0], "within": 12.5, "roughness": 0.25,
+                        "box": [[5, -4, -2], [5, 4, 0]],
+                    },
+                    "end": {"direction": [0, 1, 0], "paint": "white"},
+                },
             },
             "wall": {"role": "blocker", "mesh": "meshes/deep/wall.obj", "material": "black"},
             "mirror": {"role": "mirror", "mesh": "meshes/mirror.obj", "material": "silver"},

@@ -51,6 +51,20 @@ def test_every_field_of_a_sensor_comes_back(sensor: str, scene: Any, tmp_path: P
         assert np.array_equal(meshes_after[name][1], faces), name
 
 
+def test_what_blender_does_not_show_of_a_design_comes_back(scene: Any, tmp_path: Path) -> None:
+    bpy.ops.optisense.new(sensor="gelsight-mini")
+    bpy.ops.optisense.save_as(filepath=str(tmp_path / "plain"))
+    file = tmp_path / "plain" / "design.yaml"
+    frost = "    faces: {end: {direction: [0, 1, 0], within: 10, roughness: 0.4}}\n"
+    text = file.read_text().replace("  guide:\n", "  guide:\n" + frost)
+    file.write_text(text + "dispersion: true\n")
+    bpy.ops.optisense.open(filepath=str(tmp_path / "plain"))
+    assert bpy.ops.optisense.save_as(filepath=str(tmp_path / "saved")) == {"FINISHED"}
+    before, after = (as_read(str(tmp_path / name))[0] for name in ("plain", "saved"))
+    assert before["parts"]["guide"]["faces"]["end"]["roughness"] == 0.4
+    assert after == before
+
+
 def test_meshes_keep_their_double_precision(scene: Any) -> None:
     bpy.ops.optisense.new(sensor="gelsight-svelte")
     _, meshes = gather(bpy.context.scene)

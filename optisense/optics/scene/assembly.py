@@ -21,6 +21,7 @@ from optisense.optics.scene.emitters import (
     EmitterShape,
     frame_of,
 )
+from optisense.optics.scene.finishes import MadeBefore, finishes_of, frosted
 from optisense.optics.scene.media import Media, same_faces
 from optisense.optics.scene.ray_scene import Piece
 from optisense.optics.scene.solids import Interface, Sheet, Solid
@@ -72,6 +73,7 @@ class Assembly:
 class Kept:
     """Shapes worked out from meshes, with the meshes, which are recognised by identity."""
 
+    finishes: MadeBefore = field(default_factory=MadeBefore)
     merged: list[tuple[TriangleMesh, TriangleMesh]] = field(default_factory=list)
     pieces: list[tuple[TriangleMesh, Piece]] = field(default_factory=list)
 
@@ -136,25 +138,29 @@ def assemble(design: SensorDesign, before: Assembly | None = None, bend: bool = 
             pieces.append(kept.piece(name, mesh, _refracting_sheet(medium, design), old))
         elif part.role is not Role.INDENTER:
             sheets.append(Sheet(name, mesh, part.role.value))
+    frosts, paints = finishes_of(design, meshes, sheets, kept.finishes, old.finishes)
+    covers = {sheet.name: design.parts[sheet.name].material for sheet in sheets}
+    covers |= {paint.sheet.name: paint.material for paint in paints}
+    sheets += [paint.sheet for paint in paints]
     if before is not None and before.media.holds_for(solids, sheets):
         media = before.media
     else:
         bent = before.media.bend(solids, sheets) if before is not None and bend else None
         media = Media(solids, sheets) if bent is None else bent
-    for face in media.interfaces:
-        name = "/".join(face.names) + "|" + face.outside
-        pieces.append(kept.piece(name, face.mesh, _interface_surface(face), old))
+    for whole in media.interfaces:
+        for frost, face in frosted(whole, frosts, solids, kept.finishes, old.finishes):
+            name = "/".join(face.names) + "|" + face.outside + (frost and f":{frost}")
+            pieces.append(kept.piece(name, face.mesh, _interface_surface(face), old))
     for sheet in sheets:
-        part = design.parts[sheet.name]
         before_it = _solid_before(sheet.mesh, solids)
         ior = 1.0 if before_it is None else before_it.ior
-        if part.role is Role.SENSING_SURFACE:
+        if sheet.kind == Role.SENSING_SURFACE.value:
             indices.append(ior)
             absorptions.append(CLEAR if before_it is None else before_it.absorption)
             surface = coating_surface(design.coating, ior, Region.SENSING)
             fine[len(pieces)] = kept.piece(sheet.name, meshes[sheet.name], surface, old)
         else:
-            surface = _opaque(design.materials.get(part.material or ""), ior)
+            surface = _opaque(design.materials.get(covers[sheet.name] or ""), ior)
         pieces.append(kept.piece(sheet.name, sheet.mesh, surface, old))
     sensing = [meshes[name] for name in design.parts_of(Role.SENSING_SURFACE)]
     emitters, areas = _emitters(design, solids)

@@ -1,0 +1,167 @@
+"""Frosted and painted faces of transparent solids.
+
+Paint is a sheet that lies on the solid, as the coating does. Frost divides interfaces: what of one
+lies on frosted faces is rough, and the rest stays as it is.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+from optisense.design import SensorDesign
+from optisense.design.part_faces import finished_faces
+from optisense.errors import DesignError
+from optisense.geometry import TriangleMesh
+from optisense.geometry.coincidence import cut, find_coincident
+from optisense.optics.scene.media import COINCIDENCE_TOLERANCE
+from optisense.optics.scene.solids import Interface, Sheet, Solid
+
+
+@dataclass(frozen=True)
+class Frost:
+    """Faces of a solid with a roughness of their own.
+
+    Attributes:
+        name: part and faces.
+        solid: the part.
+        mesh: the faces, mm.
+        roughness: GGX alpha.
+    """
+
+    name: str
+    solid: str
+    mesh: TriangleMesh
+    roughness: float
+
+
+@dataclass(frozen=True)
+class Paint:
+    """Opaque paint on faces of a solid.
+
+    Attributes:
+        sheet: the paint; its normals look into the solid.
+        solid: the part.
+        material: the paint's, in the design.
+    """
+
+    sheet: Sheet
+    solid: str
+    material: str
+
+
+@dataclass
+class MadeBefore:
+    """Shapes by what they were made of; meshes are recognised by identity."""
+
+    made: list[tuple[tuple[Any, ...], Any]] = field(default_factory=list)
+
+    def once(self, before: MadeBefore, key: tuple[Any, ...], make: Callable[[], Any]) -> Any:
+        """What ``make`` gives, or what it gave for the same key."""
+        known = next((value for old, value in before.made if old == key), None)
+        self.made.append((key, make() if known is None else known))
+        return self.made[-1][1]
+
+
+def finishes_of(
+    design: SensorDesign,
+    meshes: dict[str, TriangleMesh],
+    sheets: Sequence[Sheet],
+    kept: MadeBefore,
+    before: MadeBefore,
+) -> tuple[list[Frost], list[Paint]]:
+    """The frosted and the painted faces of a design.
+
+    Args:
+        design: the sensor.
+        meshes: its parts in their current shape.
+        sheets: the opaque parts, which cover paint and frost where they lie on the same faces.
+        kept: collects the shapes.
+        before: those of a similar design.
+
+    Raises:
+        DesignError: no triangle is as the design says, or a sheet covers all that are.
+    """
+    frosts: list[Frost] = []
+    paints: list[Paint] = []
+    for part, label, finish in (
+        (name, label, finish)
+        for name, each in design.parts.items()
+        for label, finish in (each.faces or {}).items()
+    ):
+        where = design.where("parts", part, "faces", label)
+        name = f"'{label}' of part '{part}'"
+        chosen = finished_faces(design.meshes[part], finish, name, where)
+        mesh = meshes[part]
+        covers = tuple(sheet.mesh for sheet in sheets)
+        key = (mesh, chosen.tobytes(), covers)
+
+        def bare(mesh: TriangleMesh = mesh, chosen: Any = chosen) -> TriangleMesh:
+            return _uncovered(mesh.with_faces(mesh.faces[chosen]).compacted(), sheets)
+
+        patch = kept.once(before, key, bare)
+        if not len(patch.faces):
+            raise DesignError(
+                f"the coating, or another opaque part, covers all of the faces {name}",
+                where=where,
+                hint="Name faces of the solid that are bare",
+            )
+        if finish.paint is None:
+            frosts.append(Frost(f"{part}.{label}", part, patch, float(finish.roughness or 0.0)))
+            continue
+        inward = kept.once(before, (patch, "flipped"), patch.flipped)
+        paints.append(Paint(Sheet(f"{part}.{label}", inward, "paint"), part, finish.paint))
+    return frosts, paints
+
+
+def _uncovered(patch: TriangleMesh, sheets: Sequence[Sheet]) -> TriangleMesh:
+    overlays = [
+        find_coincident(patch, sheet.mesh, COINCIDENCE_TOLERANCE, facing=False) for sheet in sheets
+    ]
+    covered = any(len(overlay.pairs) for overlay in overlays)
+    return cut(patch, overlays)[-1] if covered else patch
+
+
+def frosted(
+    interface: Interface,
+    frosts: Sequence[Frost],
+    solids: Sequence[Solid],
+    kept: MadeBefore,
+    before: MadeBefore,
+) -> Iterator[tuple[str, Interface]]:
+    """An interface in pieces: what lies on frosted faces, and the rest.
+
+    Where a frosted face touches another solid, the rougher of both counts.
+
+    Yields:
+        The name of the frost, empty for none, and the piece.
+    """
+    own = [frost for frost in frosts if frost.solid in interface.names]
+    if not own:
+        yield "", interface
+        return
+
+    def pieces() -> list[TriangleMesh]:
+        mesh = interface.mesh
+        overlays = [
+            find_coincident(mesh, frost.mesh, COINCIDENCE_TOLERANCE, facing=False) for frost in own
+        ]
+        return cut(mesh, overlays)
+
+    key = (interface.mesh, *(frost.mesh for frost in own))
+    *rough, rest = kept.once(before, key, pieces)
+    for frost, mesh in zip(own, rough, strict=True):
+        others = [
+            s.roughness for s in solids if s.name in interface.names and s.name != frost.solid
+        ]
+        if len(mesh.faces):
+            roughness = max([frost.roughness, *others])
+            yield frost.name, replace(interface, mesh=mesh, roughness=roughness)
+    if len(rest.faces):
+        yield (
+            "",
+            interface
+            if len(rest.faces) == len(interface.mesh.faces)
+            else replace(interface, mesh=rest),
+        )
