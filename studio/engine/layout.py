@@ -32,6 +32,14 @@ class SidebarPanel:
         return context.scene is not None and context.scene.optisense.is_open
 
 
+def labelled(layout: bpy.types.UILayout) -> bpy.types.UILayout:
+    """A column of values with their names on the left, and no dots for keyframes."""
+    column = layout.column()
+    column.use_property_split = True
+    column.use_property_decorate = False
+    return column
+
+
 def paragraph(
     layout: bpy.types.UILayout, text: str, icon: str = "NONE", *, boxed: bool = False
 ) -> None:

@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import bpy
 
 from . import session
+
+Check = Callable[[type[bpy.types.Operator], bpy.types.Context], bool]
+"""Whether an operator can be used; says why where it can't."""
 
 
 def has_design(operator: type[bpy.types.Operator], context: bpy.types.Context) -> bool:
@@ -23,11 +28,6 @@ def is_idle(operator: type[bpy.types.Operator], context: bpy.types.Context) -> b
     return True
 
 
-def may_ask(operator: type[bpy.types.Operator], context: bpy.types.Context) -> bool:
-    """There is a sensor, and the engine has nothing long to do."""
-    return has_design(operator, context) and is_idle(operator, context)
-
-
 def in_object_mode(operator: type[bpy.types.Operator], context: bpy.types.Context) -> bool:
     """Nothing is being edited."""
     if context.mode != "OBJECT":
@@ -36,50 +36,68 @@ def in_object_mode(operator: type[bpy.types.Operator], context: bpy.types.Contex
     return True
 
 
-def selected(
-    operator: type[bpy.types.Operator], context: bpy.types.Context, *kinds: str, what: str
-) -> list[bpy.types.Object]:
-    """The selected objects of some kinds; says what to select where there are none."""
-    found = [each for each in context.selected_objects if each.optisense.kind in kinds]
-    if not found:
-        operator.poll_message_set(f"Select {what} first")
-    return found
+def in_3d_view(operator: type[bpy.types.Operator], context: bpy.types.Context) -> bool:
+    """The button is in a 3D view."""
+    if context.area is None or context.area.type != "VIEW_3D":
+        operator.poll_message_set("Use it in a 3D view")
+        return False
+    return True
 
 
-def needs(operator: type[bpy.types.Operator], is_there: object, text: str) -> bool:
-    """Whether something is there; where it is not, the button says what to do."""
-    if not is_there:
-        operator.poll_message_set(text)
-    return bool(is_there)
+def needing(is_there: Callable[[bpy.types.Context], object], text: str) -> Check:
+    """A check whether something is there; where it is not, the button says what to do."""
+
+    def check(operator: type[bpy.types.Operator], context: bpy.types.Context) -> bool:
+        found = bool(is_there(context))
+        if not found:
+            operator.poll_message_set(text)
+        return found
+
+    return check
 
 
-class Designing:
+def selecting(*kinds: str, what: str) -> Check:
+    """A check whether an object of some kinds is selected."""
+    return needing(lambda context: picked(context, *kinds), f"Select {what} first")
+
+
+def picked(context: bpy.types.Context, *kinds: str) -> list[bpy.types.Object]:
+    """The selected objects of some kinds."""
+    return [each for each in context.selected_objects if each.optisense.kind in kinds]
+
+
+ASKING = (has_design, is_idle)
+
+
+class Checked:
+    """Operators whose buttons are grey until all of some checks hold."""
+
+    checks: tuple[Check, ...] = ()
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return all(check(cls, context) for check in cls.checks)
+
+
+class Designing(Checked):
     """Operators that need a sensor in the scene."""
 
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        return has_design(cls, context)
+    checks = (has_design,)
 
 
-class Arranging:
+class Arranging(Checked):
     """Operators that change the objects of a sensor."""
 
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        return has_design(cls, context) and in_object_mode(cls, context)
+    checks = (has_design, in_object_mode)
 
 
-class Asking:
+class Asking(Checked):
     """Operators that ask the engine about the scene's sensor."""
 
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        return may_ask(cls, context)
+    checks = ASKING
 
 
-class Replacing:
+class Replacing(Checked):
     """Operators that bring in what the engine reads."""
 
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        return is_idle(cls, context) and in_object_mode(cls, context)
+    checks = (is_idle, in_object_mode)

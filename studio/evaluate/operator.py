@@ -39,17 +39,13 @@ class OPTISENSE_OT_choose_objective(bpy.types.Operator):
         return {"FINISHED"}
 
 
-class OPTISENSE_OT_evaluate(Starting, bpy.types.Operator):
+class OPTISENSE_OT_evaluate(polls.Checked, Starting, bpy.types.Operator):
     """Score the sensor by the chosen objectives"""
 
     bl_idname = "optisense.evaluate"
     bl_label = "Evaluate"
 
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        return polls.may_ask(cls, context) and polls.needs(
-            cls, chosen(context), "Choose an objective first"
-        )
+    checks = (*polls.ASKING, polls.needing(lambda c: chosen(c), "Choose an objective first"))
 
     def start(self, context: bpy.types.Context, *, wait: bool) -> set[str]:
         return start_with_design(
@@ -93,7 +89,7 @@ def take(result: dict[str, Any]) -> None:
     session.redraw()
 
 
-class OPTISENSE_OT_show_figure(bpy.types.Operator):
+class OPTISENSE_OT_show_figure(polls.Checked, bpy.types.Operator):
     """Show the figure of this score in full, in an Image Editor"""
 
     bl_idname = "optisense.show_figure"
@@ -101,13 +97,16 @@ class OPTISENSE_OT_show_figure(bpy.types.Operator):
 
     objective: StringProperty(name="Objective", description="Whose figure; empty for the first")
 
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        scores = context.window_manager.optisense_evaluation.scores
-        if not any(figures.is_there(each.figure) for each in scores):
-            cls.poll_message_set("There is no figure yet: evaluate first")
-            return False
-        return editors.can_show(cls, context)
+    checks = (
+        polls.needing(
+            lambda c: any(
+                figures.is_there(each.figure)
+                for each in c.window_manager.optisense_evaluation.scores
+            ),
+            "There is no figure yet: evaluate first",
+        ),
+        editors.can_show,
+    )
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         scores = context.window_manager.optisense_evaluation.scores
@@ -145,16 +144,14 @@ class OPTISENSE_OT_show_rays(polls.Asking, bpy.types.Operator):
         )
 
 
-class OPTISENSE_OT_hide_rays(bpy.types.Operator):
+class OPTISENSE_OT_hide_rays(polls.Checked, bpy.types.Operator):
     """Remove the chief rays"""
 
     bl_idname = "optisense.hide_rays"
     bl_label = "Hide"
     bl_options = {"REGISTER", "UNDO"}
 
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        return polls.needs(cls, rays.drawn(context.scene), "No rays are shown")
+    checks = (polls.needing(lambda c: rays.drawn(c.scene), "No rays are shown"),)
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         rays.clear(context.scene)

@@ -12,7 +12,12 @@ from ..engine.operators import ChoosingFile, refuse, start, start_with_design
 from ..scene.paths import chosen, suggested
 
 
-class OPTISENSE_OT_report(ChoosingFile, bpy.types.Operator):
+def _can_report(context: bpy.types.Context) -> bool:
+    now = context.window_manager.optisense_picture
+    return bool(now.image) and not now.is_draft and session.running() is not None
+
+
+class OPTISENSE_OT_report(polls.Checked, ChoosingFile, bpy.types.Operator):
     """Write a page (HTML, one file) about the picture that was simulated last"""
 
     bl_idname = "optisense.report"
@@ -22,16 +27,7 @@ class OPTISENSE_OT_report(ChoosingFile, bpy.types.Operator):
     check_existing: BoolProperty(default=True, options={"HIDDEN"})
     filter_glob: StringProperty(default="*.html", options={"HIDDEN"})
 
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        if not polls.is_idle(cls, context):
-            return False
-        now = context.window_manager.optisense_picture
-        return polls.needs(
-            cls,
-            now.image and not now.is_draft and session.running() is not None,
-            "Simulate a whole picture first",
-        )
+    checks = (polls.is_idle, polls.needing(_can_report, "Simulate a whole picture first"))
 
     def suggested(self, context: bpy.types.Context) -> str:
         return suggested(context.scene, ".html")

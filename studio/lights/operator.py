@@ -108,11 +108,7 @@ class OPTISENSE_OT_add_light(polls.Arranging, ChoosingProperties, bpy.types.Oper
 
     def _poses(self, context: bpy.types.Context) -> list[dict[str, Any]]:
         middle = _middle(context.scene)
-        references = [
-            each
-            for each in context.selected_objects
-            if each.optisense.kind == "REFERENCE" and each.optisense.reference == "light"
-        ]
+        references = _references(context, "light")
         poses = []
         for reference in references:
             corners = np.array([reference.matrix_world @ v.co for v in reference.data.vertices])
@@ -131,6 +127,12 @@ class OPTISENSE_OT_add_light(polls.Arranging, ChoosingProperties, bpy.types.Oper
                 position = [round(value, 4) for value in place]
                 poses.append({"position": position, "direction": unit(way)})
         return poses
+
+
+def _references(context: bpy.types.Context, what: str) -> list[bpy.types.Object]:
+    """The selected references for lights or the camera."""
+    found = polls.picked(context, "REFERENCE")
+    return [each for each in found if each.optisense.reference == what]
 
 
 def _middle(scene: bpy.types.Scene) -> Vector:
@@ -176,11 +178,7 @@ class OPTISENSE_OT_add_camera(polls.Arranging, ChoosingProperties, bpy.types.Ope
             entry = session.ask_and_wait("entry", kind="camera", entry=self.model)["entry"]
         except EngineError as error:
             return refuse(self, error.text())
-        references = [
-            each
-            for each in context.selected_objects
-            if each.optisense.kind == "REFERENCE" and each.optisense.reference == "camera"
-        ]
+        references = _references(context, "camera")
         place = scene.cursor.location.copy()
         if references:
             box = (Vector(corner) for corner in references[0].bound_box)
@@ -236,7 +234,7 @@ class OPTISENSE_OT_set_model(polls.Designing, bpy.types.Operator):
         return {"FINISHED"}
 
 
-class OPTISENSE_OT_set_group(ChoosingProperties, bpy.types.Operator):
+class OPTISENSE_OT_set_group(polls.Checked, ChoosingProperties, bpy.types.Operator):
     """Move the selected lights to another group"""
 
     bl_idname = "optisense.set_group"
@@ -250,15 +248,11 @@ class OPTISENSE_OT_set_group(ChoosingProperties, bpy.types.Operator):
         name="Name of a new group", default="white", description="Letters, digits, - and _"
     )
 
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        return polls.has_design(cls, context) and bool(
-            polls.selected(cls, context, "LIGHT", what="lights")
-        )
+    checks = (polls.has_design, polls.selecting("LIGHT", what="lights"))
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         design = context.scene.optisense
-        lights = [each for each in context.selected_objects if each.optisense.kind == "LIGHT"]
+        lights = polls.picked(context, "LIGHT")
         if self.group in ("NEW", ""):
             old = design.light_groups.get(lights[0].optisense.group)
             values = {"model": "smd-3528", "colour": (1.0, 1.0, 1.0), "flux": 2.0}
@@ -277,18 +271,13 @@ class OPTISENSE_OT_set_group(ChoosingProperties, bpy.types.Operator):
         return {"FINISHED"}
 
 
-class OPTISENSE_OT_look_through(bpy.types.Operator):
+class OPTISENSE_OT_look_through(polls.Checked, bpy.types.Operator):
     """See the sensor through its own camera, as a pinhole in air"""
 
     bl_idname = "optisense.look_through"
     bl_label = "Look Through Camera"
 
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        if context.area is None or context.area.type != "VIEW_3D":
-            cls.poll_message_set("Use it in a 3D view")
-            return False
-        return polls.has_design(cls, context)
+    checks = (polls.in_3d_view, polls.has_design)
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         cameras = objects_of(context.scene, "CAMERA")

@@ -6,7 +6,7 @@ import json
 
 import bpy
 
-from ..engine.layout import SidebarPanel
+from ..engine.layout import SidebarPanel, labelled
 from ..scene.cameras import imaging
 from ..scene.collections import objects_of
 
@@ -50,9 +50,7 @@ def _group(layout: bpy.types.UILayout, group: bpy.types.PropertyGroup) -> None:
     row = layout.row()
     row.label(text=f"{group.model}")
     row.operator("optisense.set_model", text="Choose", icon="VIEWZOOM").group = group.name
-    column = layout.column()
-    column.use_property_split = True
-    column.use_property_decorate = False
+    column = labelled(layout)
     column.prop(group, "emitter")
     group.draw(column)
 
@@ -61,9 +59,7 @@ def _camera(layout: bpy.types.UILayout, camera: bpy.types.PropertyGroup) -> None
     row = layout.row()
     row.label(text=f"Camera: {camera.model}", icon="CAMERA_DATA")
     row.operator("optisense.look_through", text="", icon="HIDE_OFF")
-    column = layout.column()
-    column.use_property_split = True
-    column.use_property_decorate = False
+    column = labelled(layout)
     column.prop(camera, "projection")
     column.prop(camera, "fov", text="Field of view (°)")
     column.prop(camera, "pixels")

@@ -59,22 +59,43 @@ def _choice(context: bpy.types.Context) -> OPTISENSE_PG_material_choice:
     return context.window_manager.optisense_material
 
 
-def _chosen(operator: type[bpy.types.Operator], context: bpy.types.Context) -> bool:
-    if not _choice(context).entry:
-        operator.poll_message_set("The library is not loaded yet")
-        return False
-    return True
+_chosen = polls.needing(lambda c: _choice(c).entry, "The library is not loaded yet")
 
 
-class OPTISENSE_OT_preview_material(bpy.types.Operator):
+def _is_for_a_coating(context: bpy.types.Context) -> bool:
+    """The sensing surface is selected, or what is chosen is no coating."""
+    return _choice(context).kind != "coating" or any(_are_coated(context))
+
+
+def _is_for_a_material(context: bpy.types.Context) -> bool:
+    """Any other part is selected, or what is chosen is no material."""
+    return _choice(context).kind != "material" or not all(_are_coated(context))
+
+
+def _are_coated(context: bpy.types.Context) -> list[bool]:
+    parts = polls.picked(context, "PART")
+    return [each.optisense.role == "sensing_surface" for each in parts]
+
+
+def _part(context: bpy.types.Context) -> bpy.types.PropertyGroup | None:
+    """The active part."""
+    active = context.active_object
+    is_part = active is not None and active.optisense.kind == "PART"
+    return active.optisense if is_part else None
+
+
+def _is_made_of_something(context: bpy.types.Context) -> bool:
+    own = _part(context)
+    return own.role == "sensing_surface" or own.material in context.scene.optisense.materials
+
+
+class OPTISENSE_OT_preview_material(polls.Checked, bpy.types.Operator):
     """Draw the chosen material"""
 
     bl_idname = "optisense.preview_material"
     bl_label = "Preview Material"
 
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        return _chosen(cls, context) and polls.is_idle(cls, context)
+    checks = (_chosen, polls.is_idle)
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         choice = _choice(context)
@@ -90,47 +111,38 @@ class OPTISENSE_OT_preview_material(bpy.types.Operator):
         return start(self, title, "preview", drawn, kind=choice.kind, entry=entry, name="material")
 
 
-class OPTISENSE_OT_material_pictures(bpy.types.Operator):
+class OPTISENSE_OT_material_pictures(polls.Checked, bpy.types.Operator):
     """Draw everything of this kind in the library, to choose from pictures"""
 
     bl_idname = "optisense.material_pictures"
     bl_label = "Show Pictures"
 
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        if not _chosen(cls, context):
-            return False
-        return polls.needs(
-            cls, gallery.missing(_choice(context).kind), "All of them are drawn, or being drawn"
-        )
+    checks = (
+        _chosen,
+        polls.needing(
+            lambda c: gallery.missing(_choice(c).kind), "All of them are drawn, or being drawn"
+        ),
+    )
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         gallery.draw_missing(_choice(context).kind)
         return {"FINISHED"}
 
 
-class OPTISENSE_OT_apply_material(bpy.types.Operator):
+class OPTISENSE_OT_apply_material(polls.Checked, bpy.types.Operator):
     """Make the selected parts of the chosen material, or coat the sensing surface"""
 
     bl_idname = "optisense.apply_material"
     bl_label = "Apply to Selected"
     bl_options = {"REGISTER", "UNDO"}
 
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        if not (polls.has_design(cls, context) and _chosen(cls, context)):
-            return False
-        parts = polls.selected(cls, context, "PART", what="a part")
-        if not parts:
-            return False
-        surface = [each.optisense.role == "sensing_surface" for each in parts]
-        if _choice(context).kind == "coating" and not any(surface):
-            cls.poll_message_set("Select the sensing surface: coatings are for it only")
-            return False
-        if _choice(context).kind == "material" and all(surface):
-            cls.poll_message_set("The sensing surface takes a coating, not a material")
-            return False
-        return True
+    checks = (
+        polls.has_design,
+        _chosen,
+        polls.selecting("PART", what="a part"),
+        polls.needing(_is_for_a_coating, "Select the sensing surface: coatings are for it only"),
+        polls.needing(_is_for_a_material, "The sensing surface takes a coating, not a material"),
+    )
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         choice = _choice(context)
@@ -165,7 +177,7 @@ class OPTISENSE_OT_apply_material(bpy.types.Operator):
         return {"FINISHED"}
 
 
-class OPTISENSE_OT_keep_material(bpy.types.Operator):
+class OPTISENSE_OT_keep_material(polls.Checked, bpy.types.Operator):
     """Keep the material of the active part (or the coating) in the library, as your own"""
 
     bl_idname = "optisense.keep_material"
@@ -181,20 +193,11 @@ class OPTISENSE_OT_keep_material(bpy.types.Operator):
         description="A datasheet, a paper, a measurement",
     )  # fmt: skip
 
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        if not polls.may_ask(cls, context):
-            return False
-        active = context.active_object
-        if active is None or active.optisense.kind != "PART":
-            cls.poll_message_set("Select a part first")
-            return False
-        own = active.optisense
-        design = context.scene.optisense
-        if own.role != "sensing_surface" and own.material not in design.materials:
-            cls.poll_message_set("This part has no material")
-            return False
-        return True
+    checks = (
+        *polls.ASKING,
+        polls.needing(_part, "Select a part first"),
+        polls.needing(_is_made_of_something, "This part has no material"),
+    )
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         return context.window_manager.invoke_props_dialog(self, width=400)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import bpy
 
-from ..engine.layout import SidebarPanel, show_job, show_outcome
+from ..engine.layout import SidebarPanel, labelled, show_job, show_outcome
 from ..simulate.picture import file_icon
 from . import gallery
 from .operator import KEEPING
@@ -46,9 +46,7 @@ def _part(
     layout: bpy.types.UILayout, context: bpy.types.Context, own: bpy.types.PropertyGroup
 ) -> None:
     design = context.scene.optisense
-    column = layout.column()
-    column.use_property_split = True
-    column.use_property_decorate = False
+    column = labelled(layout)
     if own.role == "sensing_surface":
         layout.label(text=f"Coating: {design.coating.library or 'own'}")
         design.coating.draw(column)

@@ -62,16 +62,14 @@ class OPTISENSE_MT_vary(bpy.types.Menu):
             choice.label, choice.text = each.label, each.text
 
 
-class OPTISENSE_OT_vary_remove(bpy.types.Operator):
+class OPTISENSE_OT_vary_remove(polls.Checked, bpy.types.Operator):
     """Keep this as it is"""
 
     bl_idname = "optisense.vary_remove"
     bl_label = "Remove"
     bl_options = {"REGISTER", "UNDO"}
 
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        return polls.needs(cls, context.scene.optisense_search.vary, "Nothing varies yet")
+    checks = (polls.needing(lambda c: c.scene.optisense_search.vary, "Nothing varies yet"),)
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         search = context.scene.optisense_search
@@ -98,7 +96,7 @@ def wait_property() -> Any:
     )
 
 
-class OPTISENSE_OT_search(Starting, bpy.types.Operator):
+class OPTISENSE_OT_search(polls.Checked, Starting, bpy.types.Operator):
     """Search for a better sensor; every trial is kept in a folder"""
 
     bl_idname = "optisense.search"
@@ -106,19 +104,16 @@ class OPTISENSE_OT_search(Starting, bpy.types.Operator):
 
     wait: wait_property()
 
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        if not polls.may_ask(cls, context):
-            return False
-        search = context.scene.optisense_search
-        if not vary.texts_of(search.vary):
-            cls.poll_message_set("Choose what may vary first")
-            return False
-        return polls.needs(
-            cls,
-            search.study or context.scene.optisense.is_saved,
+    checks = (
+        *polls.ASKING,
+        polls.needing(
+            lambda c: vary.texts_of(c.scene.optisense_search.vary), "Choose what may vary first"
+        ),
+        polls.needing(
+            lambda c: c.scene.optisense_search.study or c.scene.optisense.is_saved,
             "Save the sensor first, or name a folder for the study",
-        )
+        ),
+    )
 
     def start(self, context: bpy.types.Context, *, wait: bool) -> set[str]:
         search = context.scene.optisense_search
@@ -154,16 +149,16 @@ class OPTISENSE_OT_search(Starting, bpy.types.Operator):
         )
 
 
-class _WithStudy:
+class _WithStudy(polls.Checked):
     """Operators that need a study that was begun."""
 
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        return polls.may_ask(cls, context) and polls.needs(
-            cls,
-            context.scene.optisense_search.study,
+    checks = (
+        *polls.ASKING,
+        polls.needing(
+            lambda c: c.scene.optisense_search.study,
             "There is no study yet: search first, or name its folder",
-        )
+        ),
+    )
 
 
 class OPTISENSE_OT_resume(_WithStudy, Starting, bpy.types.Operator):

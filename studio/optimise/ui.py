@@ -5,7 +5,7 @@ from __future__ import annotations
 import bpy
 
 from ..engine import catalogue
-from ..engine.layout import SidebarPanel, paragraph, show_job, show_outcome
+from ..engine.layout import SidebarPanel, labelled, paragraph, show_job, show_outcome
 from ..simulate.picture import icon
 from .following import CURVE, has_trials
 
@@ -33,9 +33,7 @@ class OPTISENSE_PT_optimise(SidebarPanel, bpy.types.Panel):
         menu.name = "OPTISENSE_MT_vary"
         row.operator("optisense.vary_remove", text="", icon="REMOVE")
         layout.template_list("OPTISENSE_UL_vary", "", search, "vary", search, "vary_index", rows=3)
-        column = layout.column()
-        column.use_property_split = True
-        column.use_property_decorate = False
+        column = labelled(layout)
         for what in ("objective", "method"):
             if catalogue.entries(f"{what}s"):
                 row = column.row(align=True)

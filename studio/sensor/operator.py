@@ -106,17 +106,16 @@ class _Saves:
         )
 
 
-class OPTISENSE_OT_save(_Saves, bpy.types.Operator):
+class OPTISENSE_OT_save(polls.Checked, _Saves, bpy.types.Operator):
     """Write the sensor to its folder"""
 
     bl_idname = "optisense.save"
     bl_label = "Save"
 
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        return polls.may_ask(cls, context) and polls.needs(
-            cls, context.scene.optisense.is_saved, "It has no folder yet: use Save As"
-        )
+    checks = (
+        *polls.ASKING,
+        polls.needing(lambda c: c.scene.optisense.is_saved, "It has no folder yet: use Save As"),
+    )
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         return self._save(context, context.scene.optisense.folder)
@@ -163,30 +162,26 @@ class OPTISENSE_OT_check(polls.Asking, bpy.types.Operator):
         return {"FINISHED"}  # the panels show what is wrong with the design
 
 
-class OPTISENSE_OT_start_engine(bpy.types.Operator):
+class OPTISENSE_OT_start_engine(polls.Checked, bpy.types.Operator):
     """Start the engine, which makes pictures, scores and searches"""
 
     bl_idname = "optisense.start_engine"
     bl_label = "Start the Engine"
 
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        return polls.needs(cls, session.running() is None, "It runs")
+    checks = (polls.needing(lambda c: session.running() is None, "It runs"),)
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         session.restart()
         return {"FINISHED"}
 
 
-class OPTISENSE_OT_cancel(bpy.types.Operator):
+class OPTISENSE_OT_cancel(polls.Checked, bpy.types.Operator):
     """Give up what the engine is working on"""
 
     bl_idname = "optisense.cancel"
     bl_label = "Cancel"
 
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        return polls.needs(cls, session.is_busy(), "Nothing is going on")
+    checks = (polls.needing(lambda c: session.is_busy(), "Nothing is going on"),)
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         session.cancel_job()

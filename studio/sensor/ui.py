@@ -5,7 +5,7 @@ from __future__ import annotations
 import bpy
 
 from ..engine import session
-from ..engine.layout import SidebarPanel, paragraph, show_job, show_messages
+from ..engine.layout import SidebarPanel, labelled, paragraph, show_job, show_messages
 from ..engine.preferences import HOW_TO_GET, engine_command
 
 
@@ -31,9 +31,7 @@ class OPTISENSE_PT_sensor(SidebarPanel, bpy.types.Panel):
         row.operator("optisense.save_as", icon="BLANK1")
         design = context.scene.optisense
         if design.is_open:
-            column = layout.column()
-            column.use_property_split = True
-            column.use_property_decorate = False
+            column = labelled(layout)
             column.prop(design, "title")
             column.prop(design, "description")
             if design.is_saved:

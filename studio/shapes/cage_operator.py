@@ -30,9 +30,7 @@ from ..scene.gather import free_name, part_names
 from ..scene.meshes import REST, part_mesh, remembered, show_vertices
 
 
-def _cage(
-    operator: type[bpy.types.Operator], context: bpy.types.Context
-) -> bpy.types.Object | None:
+def _cage(context: bpy.types.Context) -> bpy.types.Object | None:
     """The active cage, or the one around the active part."""
     active = context.active_object
     if active is not None and active.optisense.kind == "CAGE":
@@ -41,16 +39,27 @@ def _cage(
         for cage in objects_of(context.scene, "CAGE"):
             if active.optisense.key in cage_data(cage)["parts"]:
                 return cage
-    operator.poll_message_set("Select a cage, or a part that is in one")
     return None
 
 
-class _OfCage:
+_has_cage = polls.needing(_cage, "Select a cage, or a part that is in one")
+
+
+def _has_bounds(context: bpy.types.Context) -> bool:
+    values = cage_data(_cage(context))
+    return bool(values.get("c_min") and values.get("c_max"))
+
+
+def _are_free(context: bpy.types.Context) -> bool:
+    """No selected part is in a cage."""
+    caged = {n for c in objects_of(context.scene, "CAGE") for n in cage_data(c)["parts"]}
+    return not any(each.optisense.key in caged for each in polls.picked(context, "PART"))
+
+
+class _OfCage(polls.Checked):
     """Operators on a cage: the active one, or the one around the active part."""
 
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        return _cage(cls, context) is not None
+    checks = (_has_cage,)
 
 
 def _end_editing(cage: bpy.types.Object) -> None:
@@ -65,7 +74,7 @@ def _end_editing(cage: bpy.types.Object) -> None:
             bpy.ops.ed.undo_push(message="End Editing")
 
 
-class OPTISENSE_OT_new_cage(bpy.types.Operator):
+class OPTISENSE_OT_new_cage(polls.Checked, bpy.types.Operator):
     """Put a cage of control points around the selected parts"""
 
     bl_idname = "optisense.new_cage"
@@ -77,25 +86,19 @@ class OPTISENSE_OT_new_cage(bpy.types.Operator):
         description="Control points of the cage; more of them bend more finely",
     )  # fmt: skip
 
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        if not (polls.has_design(cls, context) and polls.in_object_mode(cls, context)):
-            return False
-        parts = polls.selected(cls, context, "PART", what="the parts to bend")
-        if not parts:
-            return False
-        caged = {n for c in objects_of(context.scene, "CAGE") for n in cage_data(c)["parts"]}
-        if any(each.optisense.key in caged for each in parts):
-            cls.poll_message_set("A selected part is in a cage already")
-            return False
-        return True
+    checks = (
+        polls.has_design,
+        polls.in_object_mode,
+        polls.selecting("PART", what="the parts to bend"),
+        polls.needing(_are_free, "A selected part is in a cage already"),
+    )
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         scene = context.scene
         if np.prod(self.resolution) > 20_000:
             return refuse(self, "More than 20,000 control points")
         named = {part: name for name, part in part_names(scene).items()}
-        parts = [each for each in context.selected_objects if each.optisense.kind == "PART"]
+        parts = polls.picked(context, "PART")
         corners = []
         for part in parts:
             part.optisense.key = named[part]
@@ -127,7 +130,7 @@ class OPTISENSE_OT_edit_shape(_OfCage, bpy.types.Operator):
     bl_options = {"REGISTER", "UNDO"}
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        cage = _cage(type(self), context)
+        cage = _cage(context)
         if cage.mode == "EDIT":
             bpy.ops.object.mode_set(mode="OBJECT")
             return {"FINISHED"}
@@ -156,7 +159,7 @@ class OPTISENSE_OT_set_bound(_OfCage, bpy.types.Operator):
     )  # fmt: skip
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        cage = _cage(type(self), context)
+        cage = _cage(context)
         _end_editing(cage)
         shown = shown_points(cage)
         try:
@@ -171,25 +174,17 @@ class OPTISENSE_OT_set_bound(_OfCage, bpy.types.Operator):
         return {"FINISHED"}
 
 
-class OPTISENSE_OT_blend(bpy.types.Operator):
+class OPTISENSE_OT_blend(polls.Checked, bpy.types.Operator):
     """Give the cage the shape (1 - A) C_min + A C_max, with the slider for A"""
 
     bl_idname = "optisense.blend"
     bl_label = "Blend C_min and C_max"
     bl_options = {"REGISTER", "UNDO"}
 
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        cage = _cage(cls, context)
-        if cage is None:
-            return False
-        values = cage_data(cage)
-        return polls.needs(
-            cls, (values.get("c_min") and values.get("c_max")), "Set C_min and C_max first"
-        )
+    checks = (_has_cage, polls.needing(_has_bounds, "Set C_min and C_max first"))
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        cage = _cage(type(self), context)
+        cage = _cage(context)
         _end_editing(cage)
         values, shown = cage_data(cage), shown_points(cage)
         lower, upper = as_array(values["c_min"]), as_array(values["c_max"])
@@ -207,7 +202,7 @@ class OPTISENSE_OT_rest_cage(_OfCage, bpy.types.Operator):
     bl_options = {"REGISTER", "UNDO"}
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        cage = _cage(type(self), context)
+        cage = _cage(context)
         _end_editing(cage)
         values = cage_data(cage)
         points = core.rest_points(values["box"], tuple(values["resolution"]))
@@ -222,19 +217,17 @@ class OPTISENSE_OT_rest_cage(_OfCage, bpy.types.Operator):
         return {"FINISHED"}
 
 
-class OPTISENSE_OT_remove_cage(bpy.types.Operator):
+class OPTISENSE_OT_remove_cage(polls.Checked, bpy.types.Operator):
     """Remove the cage; its parts go back to rest"""
 
     bl_idname = "optisense.remove_cage"
     bl_label = "Remove Cage"
     bl_options = {"REGISTER", "UNDO"}
 
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        return polls.in_object_mode(cls, context) and _cage(cls, context) is not None
+    checks = (polls.in_object_mode, _has_cage)
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        cage = _cage(type(self), context)
+        cage = _cage(context)
         for name in cage_data(cage)["parts"]:
             part = object_of(context.scene, "PART", name)
             rest = None if part is None else remembered(part.data, REST)

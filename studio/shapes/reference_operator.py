@@ -95,7 +95,7 @@ def _bring(scene: bpy.types.Scene, name: str, result: dict[str, Any]) -> None:
     select_only(item)
 
 
-class OPTISENSE_OT_set_reference(ChoosingProperties, bpy.types.Operator):
+class OPTISENSE_OT_set_reference(polls.Checked, ChoosingProperties, bpy.types.Operator):
     """Say what the selected meshes are for; all but camera and light references become parts"""
 
     bl_idname = "optisense.set_reference"
@@ -106,15 +106,17 @@ class OPTISENSE_OT_set_reference(ChoosingProperties, bpy.types.Operator):
         name="Reference", items=kinds.REFERENCES, description="What the selected meshes are for"
     )
 
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        if not (polls.has_design(cls, context) and polls.in_object_mode(cls, context)):
-            return False
-        return bool(_meshes(cls, context))
+    checks = (
+        polls.has_design,
+        polls.in_object_mode,
+        polls.needing(
+            lambda c: _meshes(c), "Select a mesh first that is no part of the sensor yet"
+        ),
+    )
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         scene = context.scene
-        items = _meshes(type(self), context)
+        items = _meshes(context)
         empty = [each.name for each in items if not each.data.polygons]
         if empty and self.reference not in PLACES:
             return refuse(self, f"There is no face in {', '.join(empty)}")
@@ -133,17 +135,10 @@ class OPTISENSE_OT_set_reference(ChoosingProperties, bpy.types.Operator):
         return {"FINISHED"}
 
 
-def _meshes(
-    operator: type[bpy.types.Operator], context: bpy.types.Context
-) -> list[bpy.types.Object]:
-    found = [
-        each
-        for each in context.selected_objects
-        if each.type == "MESH" and each.optisense.kind in ("NONE", "REFERENCE")
-    ]
-    if not found:
-        operator.poll_message_set("Select a mesh first that is no part of the sensor yet")
-    return found
+def _meshes(context: bpy.types.Context) -> list[bpy.types.Object]:
+    """The selected meshes that are no part of the sensor."""
+    found = polls.picked(context, "NONE", "REFERENCE")
+    return [each for each in found if each.type == "MESH"]
 
 
 def _into(scene: bpy.types.Scene, item: bpy.types.Object, name: str) -> None:
@@ -181,42 +176,33 @@ def _press(operator: bpy.types.Operator, scene: bpy.types.Scene, item: bpy.types
         contact.optisense.indenter = "mesh"
 
 
-class OPTISENSE_OT_remove_part(bpy.types.Operator):
+class OPTISENSE_OT_remove_part(polls.Checked, bpy.types.Operator):
     """Take the selected parts out of the sensor; their references stay"""
 
     bl_idname = "optisense.remove_part"
     bl_label = "Remove from Sensor"
     bl_options = {"REGISTER", "UNDO"}
 
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        return polls.in_object_mode(cls, context) and bool(
-            polls.selected(cls, context, "PART", what="a part")
-        )
+    checks = (polls.in_object_mode, polls.selecting("PART", what="a part"))
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        for each in list(context.selected_objects):
-            if each.optisense.kind == "PART":
-                bpy.data.objects.remove(each)
+        for each in polls.picked(context, "PART"):
+            bpy.data.objects.remove(each)
         return {"FINISHED"}
 
 
-class OPTISENSE_OT_flip(bpy.types.Operator):
+class OPTISENSE_OT_flip(polls.Checked, bpy.types.Operator):
     """Turn the selected surfaces around: a sensing surface must face into the sensor"""
 
     bl_idname = "optisense.flip"
     bl_label = "Flip Normals"
     bl_options = {"REGISTER", "UNDO"}
 
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        return polls.in_object_mode(cls, context) and bool(
-            polls.selected(cls, context, "PART", "REFERENCE", what="a part")
-        )
+    checks = (polls.in_object_mode, polls.selecting("PART", "REFERENCE", what="a part"))
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        for each in context.selected_objects:
-            if each.optisense.kind in ("PART", "REFERENCE") and each.type == "MESH":
+        for each in polls.picked(context, "PART", "REFERENCE"):
+            if each.type == "MESH":
                 each.data.flip_normals()
                 each.data.update()
         return {"FINISHED"}

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import bpy
 
-from ..engine.layout import SidebarPanel, paragraph, show_job, show_outcome
+from ..engine.layout import SidebarPanel, labelled, paragraph, show_job, show_outcome
 from .cage_operator import active_cage
 from .cage_warnings import warnings_of
 from .reference_operator import READING
@@ -44,9 +44,7 @@ class OPTISENSE_PT_shapes(SidebarPanel, bpy.types.Panel):
 
 def _part(layout: bpy.types.UILayout, part: bpy.types.Object) -> None:
     layout.label(text=part.optisense.key or part.name, icon="MESH_DATA")
-    column = layout.column()
-    column.use_property_split = True
-    column.use_property_decorate = False
+    column = labelled(layout)
     column.prop(part.optisense, "role")
     column.prop(part.optisense, "priority")
     row = layout.row(align=True)

@@ -50,18 +50,16 @@ class OPTISENSE_OT_simulate(polls.Asking, Starting, bpy.types.Operator):
         )
 
 
-class OPTISENSE_OT_show_picture(bpy.types.Operator):
+class OPTISENSE_OT_show_picture(polls.Checked, bpy.types.Operator):
     """Show the picture in an Image Editor"""
 
     bl_idname = "optisense.show_picture"
     bl_label = "Open in Image Editor"
 
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        if bpy.data.images.get(picture.IMAGE) is None:
-            cls.poll_message_set("Simulate first")
-            return False
-        return editors.can_show(cls, context)
+    checks = (
+        polls.needing(lambda c: bpy.data.images.get(picture.IMAGE), "Simulate first"),
+        editors.can_show,
+    )
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         editors.show(context, bpy.data.images[picture.IMAGE])
@@ -87,21 +85,14 @@ class OPTISENSE_OT_add_contact(polls.Arranging, bpy.types.Operator):
         return {"FINISHED"}
 
 
-class OPTISENSE_OT_place_contact(bpy.types.Operator):
+class OPTISENSE_OT_place_contact(polls.Checked, bpy.types.Operator):
     """Click on the sensing surface to press a ball there; Esc or right click ends"""
 
     bl_idname = "optisense.place_contact"
     bl_label = "Click to Place"
     bl_options = {"REGISTER", "UNDO"}
 
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        if not (polls.has_design(cls, context) and polls.in_object_mode(cls, context)):
-            return False
-        if context.area is None or context.area.type != "VIEW_3D":
-            cls.poll_message_set("Use it in a 3D view")
-            return False
-        return True
+    checks = (polls.has_design, polls.in_object_mode, polls.in_3d_view)
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         context.window_manager.modal_handler_add(self)
@@ -152,19 +143,13 @@ def _add(
     select_only(contact)
 
 
-class OPTISENSE_OT_nine_contacts(bpy.types.Operator):
+class OPTISENSE_OT_nine_contacts(polls.Checked, bpy.types.Operator):
     """Press nine balls where the camera sees them, as the active contact or as a new one"""
 
     bl_idname = "optisense.nine_contacts"
     bl_label = "Nine Places"
 
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        return (
-            polls.has_design(cls, context)
-            and polls.is_idle(cls, context)
-            and polls.in_object_mode(cls, context)
-        )
+    checks = (*polls.ASKING, polls.in_object_mode)
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         name, like = context.scene.name, self._like(context)
@@ -208,16 +193,14 @@ class OPTISENSE_OT_nine_contacts(bpy.types.Operator):
         return found | {"tilt": tuple(values.tilt)}
 
 
-class OPTISENSE_OT_clear_contacts(bpy.types.Operator):
+class OPTISENSE_OT_clear_contacts(polls.Checked, bpy.types.Operator):
     """Remove all contacts"""
 
     bl_idname = "optisense.clear_contacts"
     bl_label = "Remove All"
     bl_options = {"REGISTER", "UNDO"}
 
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        return polls.needs(cls, objects_of(context.scene, "CONTACT"), "There are no contacts")
+    checks = (polls.needing(lambda c: objects_of(c.scene, "CONTACT"), "There are no contacts"),)
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         for each in objects_of(context.scene, "CONTACT"):

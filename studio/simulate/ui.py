@@ -5,7 +5,7 @@ from __future__ import annotations
 import bpy
 
 from ..engine import session
-from ..engine.layout import SidebarPanel, show_job, show_outcome
+from ..engine.layout import SidebarPanel, labelled, show_job, show_outcome
 from ..scene.contacts import pressing
 from . import picture
 
@@ -27,11 +27,9 @@ class OPTISENSE_PT_simulate(SidebarPanel, bpy.types.Panel):
         row.operator("optisense.clear_contacts", icon="X")
         active = context.active_object
         if active is not None and active.optisense.kind == "CONTACT":
-            _contact(layout.box().column(), active.optisense)
+            _contact(labelled(layout.box()), active.optisense)
         settings = scene.optisense_simulation
-        column = layout.column()
-        column.use_property_split = True
-        column.use_property_decorate = False
+        column = labelled(layout)
         column.prop(settings, "size")
         column.prop(settings, "noise", text="Noise (%)")
         column.prop(settings, "auto_exposure")
@@ -60,8 +58,6 @@ class OPTISENSE_PT_simulate(SidebarPanel, bpy.types.Panel):
 
 
 def _contact(column: bpy.types.UILayout, values: bpy.types.PropertyGroup) -> None:
-    column.use_property_split = True
-    column.use_property_decorate = False
     column.prop(values, "indenter")
     if values.indenter in ("sphere", "cylinder"):
         column.prop(values, "radius", text="Radius (mm)")
