@@ -16,11 +16,17 @@ from optisense.errors import DesignError
 
 Arguments = ParamSpec("Arguments")
 
+Positive = float
+"""A dimension above 0; builders are refused others by `tells_of_dimensions`."""
+
+PositiveCount = int
+"""A number of things that is 1 or more."""
+
 
 def tells_of_dimensions(
     sensor: str,
 ) -> Callable[[Callable[Arguments, SensorDesign]], Callable[Arguments, SensorDesign]]:
-    """Let a builder refuse arguments of a wrong type, and values that no design can have.
+    """Let a builder refuse arguments of a wrong type or not above 0, and what no design can have.
 
     Args:
         sensor: its name, for messages.
@@ -33,16 +39,8 @@ def tells_of_dimensions(
         def build(*args: Arguments.args, **kwargs: Arguments.kwargs) -> SensorDesign:
             for name, value in signature.bind(*args, **kwargs).arguments.items():
                 kind = str(signature.parameters[name].annotation)
-                if value is None and kind.endswith(" | None"):
-                    continue
-                kind = kind.removesuffix(" | None")
-                whole, number = kind == "int", kind in ("int", "float")
-                if number and not isinstance(value, Integral if whole else Real):
-                    raise DesignError(
-                        f"{name} is {value!r}",
-                        where=sensor,
-                        hint=f"Give a {'whole ' if whole else ''}number",
-                    )
+                if value is not None or not kind.endswith(" | None"):
+                    _check(sensor, name, value, kind.removesuffix(" | None"))
             try:
                 return builder(*args, **kwargs)
             except ValidationError as error:
@@ -53,6 +51,20 @@ def tells_of_dimensions(
     return decorate
 
 
+def _check(sensor: str, name: str, value: Any, kind: str) -> None:
+    """Refuse what is no number, or not above 0, where the annotation of an argument asks for it."""
+    whole = kind in ("int", "PositiveCount")
+    if (whole or kind in ("float", "Positive")) and not isinstance(
+        value, Integral if whole else Real
+    ):
+        what = "whole number" if whole else "number"
+        raise DesignError(f"{name} is {value!r}", where=sensor, hint=f"Give a {what}")
+    if "Positive" in kind:
+        for each in value if isinstance(value, tuple | list) else (value,):
+            if not (isinstance(each, Real) and 0.0 < float(each) < math.inf):
+                raise DesignError(f"{name} is {value}", where=sensor, hint=f"Give a {name} above 0")
+
+
 def _refusal(error: ValidationError, sensor: str) -> DesignError:
     """What a part of the design refuses; it names its field, which is mostly the argument."""
     report = error.errors(include_url=False)[0]
@@ -60,17 +72,6 @@ def _refusal(error: ValidationError, sensor: str) -> DesignError:
     field = ".".join(str(step) for step in report["loc"])
     what = f"{field} is {report['input']!r}" if field else f"the {error.title.lower()} can't be"
     return DesignError(f"{what}: {told}", where=sensor, hint="Change that argument")
-
-
-def require_positive(sensor: str, **values: float) -> None:
-    """Each value must be a finite number above 0.
-
-    Raises:
-        DesignError: names the first argument that is not.
-    """
-    for name, value in values.items():
-        if not (math.isfinite(value) and value > 0.0):
-            raise DesignError(f"{name} is {value:g}", where=sensor, hint=f"Give a {name} above 0")
 
 
 def require(condition: bool, sensor: str, message: str, hint: str) -> None:

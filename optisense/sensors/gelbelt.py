@@ -27,7 +27,12 @@ from optisense.design import (
 )
 from optisense.geometry import TriangleMesh
 from optisense.sensors.belt_path import BeltHalf, Bend, Straight, mirrored_and_joined, trace
-from optisense.sensors.dimensions import describe_changes, require_positive, tells_of_dimensions
+from optisense.sensors.dimensions import (
+    Positive,
+    PositiveCount,
+    describe_changes,
+    tells_of_dimensions,
+)
 from optisense.sensors.gelbelt_checks import (
     LED_LENGTH,
     SENSOR,
@@ -72,28 +77,28 @@ WRAP = 90.0
 def gelbelt(
     *,
     light_design: int = 3,
-    window_size: tuple[float, float] = (50.0, 36.0),
-    window_thickness: float = 6.0,
-    gel_thickness: float = 3.0,
-    tape_thickness: float = 0.05,
+    window_size: tuple[Positive, Positive] = (50.0, 36.0),
+    window_thickness: Positive = 6.0,
+    gel_thickness: Positive = 3.0,
+    tape_thickness: Positive = 0.05,
     film_thickness: float = 0.02,
-    wheel_radius: float = 25.0,
-    wheel_distance: float = 90.0,
-    roller_radius: float = 1.0,
+    wheel_radius: Positive = 25.0,
+    wheel_distance: Positive = 90.0,
+    roller_radius: Positive = 1.0,
     deflection: float = 35.0,
-    incline: float = 25.0,
-    pupil_distance: float = 42.0,
+    incline: Positive = 25.0,
+    pupil_distance: Positive = 42.0,
     fov: float = 62.2,
     resolution: tuple[int, int] = (320, 240),
-    leds_per_group: int = 8,
-    led_pitch: float = 4.0,
-    led_gap: float = 0.2,
+    leds_per_group: PositiveCount = 8,
+    led_pitch: Positive = 4.0,
+    led_gap: Positive = 0.2,
     led_flux: tuple[float, float, float] | None = None,
-    green_distance: float = 2.5,
+    green_distance: Positive = 2.5,
     green_angle: float = 45.0,
     reflectance: float = 0.7,
     specularity: float = 0.2,
-    tessellation: float = 2.0,
+    tessellation: Positive = 2.0,
 ) -> SensorDesign:
     """A GelBelt.
 
@@ -132,24 +137,6 @@ def gelbelt(
         DesignError: dimensions that contradict one another; says which.
     """
     given = dict(locals())
-    require_positive(
-        SENSOR,
-        window_length=window_size[0],
-        window_width=window_size[1],
-        window_thickness=window_thickness,
-        gel_thickness=gel_thickness,
-        tape_thickness=tape_thickness,
-        wheel_radius=wheel_radius,
-        wheel_distance=wheel_distance,
-        roller_radius=roller_radius,
-        incline=incline,
-        pupil_distance=pupil_distance,
-        leds_per_group=leds_per_group,
-        led_pitch=led_pitch,
-        led_gap=led_gap,
-        green_distance=green_distance,
-        tessellation=tessellation,
-    )
     if led_flux is None:
         most = nominal_flux(LED, "green")
         led_flux = round(most / GREEN_LEAD, 3), most, round(most / GREEN_LEAD, 3)

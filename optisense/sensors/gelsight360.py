@@ -25,9 +25,10 @@ from optisense.design import (
 )
 from optisense.geometry import TriangleMesh
 from optisense.sensors.dimensions import (
+    Positive,
+    PositiveCount,
     describe_changes,
     require,
-    require_positive,
     tells_of_dimensions,
 )
 from optisense.sensors.led_boards import (
@@ -60,23 +61,23 @@ def gelsight360(
     base_ring: str = "B",
     tip_design: float = 5.0,
     resin_design: float = 0.0,
-    radius: float = 14.0,
-    height: float = 34.0,
-    gel_thickness: float = 3.0,
-    shell_thickness: float = 2.5,
-    edge_radius: float = 7.0,
-    cone_height: float = 12.0,
-    flattest: float = 0.1,
+    radius: Positive = 14.0,
+    height: Positive = 34.0,
+    gel_thickness: Positive = 3.0,
+    shell_thickness: Positive = 2.5,
+    edge_radius: Positive = 7.0,
+    cone_height: Positive = 12.0,
+    flattest: Positive = 0.1,
     board_bottom: float = 2.0,
-    board_height: float = 12.0,
-    board_thickness: float = 1.0,
-    leds_per_group: int = 4,
-    base_leds: int = 12,
+    board_height: Positive = 12.0,
+    board_thickness: Positive = 1.0,
+    leds_per_group: PositiveCount = 4,
+    base_leds: PositiveCount = 12,
     led_flux: float | None = None,
     fov: float = 128.0,
     resolution: tuple[int, int] = (320, 240),
     coating: str = "semi-specular",
-    tessellation: float = 1.0,
+    tessellation: Positive = 1.0,
 ) -> SensorDesign:
     """A GelSight360.
 
@@ -117,21 +118,6 @@ def gelsight360(
     """
     given = dict(locals())
     _check_colours(light_colours, base_ring)
-    require_positive(
-        SENSOR,
-        radius=radius,
-        height=height,
-        gel_thickness=gel_thickness,
-        shell_thickness=shell_thickness,
-        edge_radius=edge_radius,
-        cone_height=cone_height,
-        flattest=flattest,
-        board_height=board_height,
-        board_thickness=board_thickness,
-        leds_per_group=leds_per_group,
-        base_leds=base_leds,
-        tessellation=tessellation,
-    )
     for name, number in (("tip_design", tip_design), ("resin_design", resin_design)):
         require(
             0.0 <= number <= DESIGNS, SENSOR, f"{name} is {number:g}", "Give a number from 0 to 10"

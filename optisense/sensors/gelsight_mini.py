@@ -29,9 +29,10 @@ from optisense.design import (
 )
 from optisense.geometry import TriangleMesh
 from optisense.sensors.dimensions import (
+    Positive,
+    PositiveCount,
     describe_changes,
     require,
-    require_positive,
     tells_of_dimensions,
 )
 from optisense.sensors.led_flux import BALANCED, balanced_flux
@@ -50,21 +51,21 @@ WIDEST_FIELD = 150.0
 @tells_of_dimensions("gelsight-mini")
 def gelsight_mini(
     *,
-    gel_size: tuple[float, float] = (25.25, 20.75),
-    gel_thickness: float = 4.25,
-    tray_size: tuple[float, float] = (28.23, 23.73),
-    tray_thickness: float = 1.0,
-    guide_thickness: float = 4.0,
-    pupil_distance: float = 17.0,
+    gel_size: tuple[Positive, Positive] = (25.25, 20.75),
+    gel_thickness: Positive = 4.25,
+    tray_size: tuple[Positive, Positive] = (28.23, 23.73),
+    tray_thickness: Positive = 1.0,
+    guide_thickness: Positive = 4.0,
+    pupil_distance: Positive = 17.0,
     view_width: float = 18.6,
     fov: float | None = None,
     resolution: tuple[int, int] = (320, 240),
-    leds_per_group: int = 5,
-    led_pitch: float = 4.0,
-    led_gap: float = 0.2,
+    leds_per_group: PositiveCount = 5,
+    led_pitch: Positive = 4.0,
+    led_gap: Positive = 0.2,
     led_flux: float | None = None,
     coating: str = "diffuse-grey",
-    tessellation: float = 0.5,
+    tessellation: Positive = 0.5,
 ) -> SensorDesign:
     """A GelSight Mini with a flat gel.
 
@@ -90,21 +91,6 @@ def gelsight_mini(
         LibraryError: there is no such coating.
     """
     given = dict(locals())
-    require_positive(
-        NAME,
-        gel_length=gel_size[0],
-        gel_width=gel_size[1],
-        gel_thickness=gel_thickness,
-        tray_length=tray_size[0],
-        tray_width=tray_size[1],
-        tray_thickness=tray_thickness,
-        guide_thickness=guide_thickness,
-        pupil_distance=pupil_distance,
-        leds_per_group=leds_per_group,
-        led_pitch=led_pitch,
-        led_gap=led_gap,
-        tessellation=tessellation,
-    )
     _check(gel_size, tray_size, guide_thickness, pupil_distance, (leds_per_group, led_pitch))
     tray_top = -gel_thickness
     guide_top = tray_top - tray_thickness

@@ -30,9 +30,9 @@ from optisense.errors import DesignError
 from optisense.geometry import TriangleMesh
 from optisense.geometry.cage import cage_points
 from optisense.sensors.dimensions import (
+    Positive,
     describe_changes,
     require,
-    require_positive,
     tells_of_dimensions,
 )
 from optisense.sensors.led_flux import balanced_flux
@@ -70,27 +70,27 @@ def gelsight_svelte(
     *,
     palm_outline: Points = PALM_OUTLINE,
     back_outline: Points = BACK_OUTLINE,
-    gel_thickness: float = 3.5,
-    gel_width: float = 20.0,
+    gel_thickness: Positive = 3.5,
+    gel_width: Positive = 20.0,
     m1_ends: Points = ((5.8, 13.3), (10.4, 88.2)),
-    m1_sagitta: float = 5.5,
-    m1_width: float = 22.0,
+    m1_sagitta: Positive = 5.5,
+    m1_width: Positive = 22.0,
     m1_grid: tuple[int, int] = (168, 45),
-    clearance: float = 0.5,
+    clearance: Positive = 0.5,
     m2_bottom: tuple[float, float] = (16.7, -2.8),
     m2_tilt: float = 22.4,
-    m2_length: float | None = None,
-    m2_width: float = 18.0,
+    m2_length: Positive | None = None,
+    m2_width: Positive = 18.0,
     view: str = "m2",
-    fov: float | None = None,
+    fov: Positive | None = None,
     resolution: tuple[int, int] = (320, 240),
     leds_per_side: int = 8,
-    led_pitch: float = 8.0,
-    led_gap: float = 0.2,
+    led_pitch: Positive = 8.0,
+    led_gap: Positive = 0.2,
     led_flux: float | None = None,
     tip_leds: int = 0,
     coating: str = "diffuse-grey",
-    tessellation: float = 0.5,
+    tessellation: Positive = 0.5,
 ) -> SensorDesign:
     """A GelSight Svelte.
 
@@ -131,21 +131,7 @@ def gelsight_svelte(
         LibraryError: there is no such coating.
     """
     given = dict(locals())
-    optional = {name: v for name, v in (("m2_length", m2_length), ("fov", fov)) if v is not None}
     led_flux = balanced_flux(LED) if led_flux is None else led_flux
-    require_positive(
-        NAME,
-        gel_thickness=gel_thickness,
-        gel_width=gel_width,
-        m1_sagitta=m1_sagitta,
-        m1_width=m1_width,
-        clearance=clearance,
-        m2_width=m2_width,
-        led_pitch=led_pitch,
-        led_gap=led_gap,
-        tessellation=tessellation,
-        **optional,
-    )
     require(
         min(m1_grid) >= 2 and leds_per_side >= 1 and tip_leds >= 0,
         NAME,
