@@ -145,7 +145,7 @@ def _one_seed(
     per_light = max(1, min(PASS_PHOTONS, photons) // table.count)
     passes = max(1, round(photons / (per_light * table.count)))
     result = render_sppm(
-        model._scenes([ball()]).full,
+        model._scenes([ball()], [model.place(ball())]).full,
         Emission(table, model.guide(), per_light, seed),
         camera,
         passes,

@@ -26,10 +26,11 @@ def check(design: DesignArgument, contact: ContactOption = None) -> None:
     for problem in problems:
         output.print(f"odd: {problem}", markup=False, style="yellow")
     if contacts:
-        from optisense.cli.placing import place_contacts
         from optisense.optics import OpticalModel
 
-        place_contacts(OpticalModel(sensor), contacts)
+        model = OpticalModel(sensor)
+        for each in contacts:
+            model.place(each)
         word = "contact fits" if len(contacts) == 1 else "contacts fit"
         output.print(f"{len(contacts)} {word} on the sensing surface.")
     output.print("The design is in order.", style="green")

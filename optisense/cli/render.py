@@ -17,12 +17,10 @@ from optisense.cli.options import (
 )
 from optisense.cli.output_folder import take_folder
 from optisense.cli.progress import ProgressLine, about, progress_line
-from optisense.cli.sampling import expect_here
+from optisense.cli.sampling import BUILDING, LOADING, expect_here, loading_steps
 from optisense.commands.rendering import RenderOptions
 from optisense.quality import PICTURE_PHOTONS
 from optisense.time_left import TimedStep
-from optisense.usual_times import BUILDING as BUILDING_TIME
-from optisense.usual_times import LOADING as LOADING_TIME
 from optisense.usual_times import USUAL_PIXELS, UsualTimes
 
 if TYPE_CHECKING:
@@ -63,7 +61,6 @@ def render(
         sensor = load(design)
         take_folder(out)
 
-        from optisense.cli.placing import place_contacts
         from optisense.optics import OpticalModel
         from optisense.optics.imaging.tactile_image import REPORT_FILE
         from optisense.report import write_report
@@ -106,7 +103,6 @@ def render(
             image,
             contacts,
             exposure=options.exposure,
-            indenters=place_contacts(model, contacts),
             rays=CameraRays.of(model),
             real=real,
         )
@@ -117,7 +113,7 @@ def render(
         raise typer.Exit(EXIT_INTERRUPTED)
 
 
-LOADING, BUILDING, WRITING = "loading", "building the scene", "writing the report"
+WRITING = "writing the report"
 TRACING, SHADING = "tracing photons", "shading the picture"
 COMPARING = "comparing with a real sensor"
 
@@ -138,8 +134,7 @@ def _steps(
         tracing = max(1.0, options.seconds - 5.0)
     compiling = times.compiling() / 2.0
     return [
-        TimedStep(LOADING, 1, LOADING_TIME * times.thread_pace, gauges=False),
-        TimedStep(BUILDING, 1, BUILDING_TIME * times.thread_pace, gauges=False),
+        *loading_steps(),
         TimedStep("preparing the scene", 1, times.preparing()),
         TimedStep("tracing pilot photons", 1, times.pilot()),
         TimedStep(TRACING, 1, tracing + compiling),

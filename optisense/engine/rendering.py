@@ -149,13 +149,12 @@ def simulate(session: Session, fields: Simulate, job: Job) -> dict[str, Any]:
     image.settings["contacts"] = [_text(given) for given in fields.contacts]
     exposure = _exposure(image, fields.exposure)
     name = name_of(fields, job.id)
-    indenters = {} if fields.draft else _indenters(model, contacts)
-    hidden = unseen(indenters.values(), image.points, image.contact_mask) if indenters else []
+    placed = () if fields.draft else image.indenters.values()
+    hidden = unseen(placed, image.points, image.contact_mask)
     kept = KeptImage(
         image=image,
         design=design,
         contacts=contacts,
-        indenters=indenters,
         exposure=exposure,
         draft=fields.draft,
         rays=None if fields.draft else CameraRays.of(model),
@@ -209,7 +208,6 @@ def report(session: Session, fields: Report, job: Job) -> dict[str, Any]:
         kept.image,
         kept.contacts,
         exposure=kept.exposure,
-        indenters=kept.indenters,
         rays=kept.rays,
     )
     return {"file": str(path)}
@@ -336,11 +334,6 @@ def _checked_size(
 def _draft_size(design: SensorDesign) -> tuple[int, int]:
     width, height = design.camera.resolution
     return DRAFT_WIDTH, max(1, round(DRAFT_WIDTH * height / width))
-
-
-def _indenters(model: Any, contacts: list[Any]) -> dict[str, Any]:
-    """The indenters' meshes, for the report."""
-    return {f"contact {number}": model.place(each) for number, each in enumerate(contacts, 1)}
 
 
 def _size(image: TactileImage) -> list[int]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 from collections import OrderedDict
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -15,7 +15,7 @@ from optisense.engine.failures import ProtocolError
 from optisense.engine.files import Files
 from optisense.engine.jobs import PriorityGate
 from optisense.engine.protocol import Fields
-from optisense.geometry import Contact, TriangleMesh
+from optisense.geometry import Contact
 
 if TYPE_CHECKING:
     from optisense.optics import OpticalModel, TactileImage
@@ -34,7 +34,6 @@ class KeptImage:
         image: the layers of the image.
         design: the sensor.
         contacts: what presses into it.
-        indenters: the placed meshes of the contacts, by name.
         exposure: of the picture, a factor on the radiance.
         draft: whether it is a draft.
         rays: chief rays to draw in the report; None for a draft.
@@ -43,7 +42,6 @@ class KeptImage:
     image: TactileImage
     design: SensorDesign
     contacts: Sequence[Contact]
-    indenters: Mapping[str, TriangleMesh]
     exposure: float
     draft: bool
     rays: CameraRays | None = None

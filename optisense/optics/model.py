@@ -14,7 +14,7 @@ import drjit as dr
 import numpy as np
 
 from optisense.errors import RenderError
-from optisense.geometry import Contact
+from optisense.geometry import Contact, TriangleMesh
 from optisense.optics.backend.interrupts import lets_ctrl_c_through
 from optisense.optics.backend.stages import Stage, StageCallback, fraction_done
 from optisense.optics.backend.versions import versions
@@ -184,7 +184,8 @@ class OpticalModel(RayModel):
 
         on_stage(Stage.PREPARING, 0.0, 0, None)
         camera = self.camera(resolution)
-        scenes = self._scenes(contacts)
+        placed = [self.place(contact) for contact in contacts]
+        scenes = self._scenes(contacts, placed)
         rays = trace_chief_rays(scenes.full, camera)
         if not rays.hit.any():
             raise sees_nothing(rays)
@@ -229,6 +230,7 @@ class OpticalModel(RayModel):
             points=layers.points,
             interrupted=layers.interrupted,
             chain=self.picture_chain,
+            indenters=_named(contacts, placed),
         )
         image.settings = {
             "design": self.design.name,
@@ -284,6 +286,15 @@ class OpticalModel(RayModel):
             stop=stop,
         )
         return ImageLayers.from_sppm(result, rays, began)
+
+
+def _named(contacts: Sequence[Contact], placed: list[TriangleMesh]) -> dict[str, TriangleMesh]:
+    """What presses, by its kind and a number."""
+    named = {}
+    for number, (contact, mesh) in enumerate(zip(contacts, placed, strict=True), start=1):
+        kind = type(contact.indenter).__name__.removesuffix("Indenter").lower()
+        named[f"{kind} {number}"] = mesh
+    return named
 
 
 def _percent(noise: float) -> float | None:

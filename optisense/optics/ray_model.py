@@ -328,10 +328,10 @@ class RayModel:
                 errors.append(error)
         raise errors[0]
 
-    def _scenes(self, contacts: Sequence[Contact]) -> ContactScenes:
+    def _scenes(self, contacts: Sequence[Contact], placed: list[TriangleMesh]) -> ContactScenes:
+        """The scenes of one image; `placed` are the contacts' meshes."""
         if not contacts:
             return ContactScenes(self._watched, self._fixed, None, mi.Float())
-        placed = [self.place(contact) for contact in contacts]
         return ContactScenes(
             self._with_indenters(self._pieces, placed, robust=True),
             self._fixed,

@@ -49,6 +49,10 @@ class RenderedImage(Protocol):
         """How it was rendered; can be written as JSON."""
 
     @property
+    def indenters(self) -> Mapping[str, TriangleMesh]:
+        """What pressed in, in the design's frame (mm), by a name to show."""
+
+    @property
     def interrupted(self) -> bool:
         """Whether it was stopped before it was finished."""
 
@@ -63,7 +67,6 @@ def write_report(
     contacts: Sequence[Contact] = (),
     *,
     exposure: float | Literal["auto"] = "auto",
-    indenters: Mapping[str, TriangleMesh] | None = None,
     rays: CameraRays | None = None,
     real: RealComparison | None = None,
 ) -> Path:
@@ -75,7 +78,6 @@ def write_report(
         image: what its camera saw.
         contacts: what touched it.
         exposure: of the picture, as for `TactileImage.picture`.
-        indenters: the contacts' shapes in the design's frame (mm), drawn in the 3-D view.
         rays: chief rays of the camera (`CameraRays.of` a model), drawn there too.
         real: how far the sensor is from a real one (`compare_with_real`), if that is known.
 
@@ -85,9 +87,7 @@ def write_report(
     Raises:
         OutputError: the file can't be written.
     """
-    text = render_page(
-        design, image, contacts, exposure=exposure, indenters=indenters, rays=rays, real=real
-    )
+    text = render_page(design, image, contacts, exposure=exposure, rays=rays, real=real)
     write_text(Path(path), text)
     return Path(path)
 
@@ -98,7 +98,6 @@ def render_page(
     contacts: Sequence[Contact] = (),
     *,
     exposure: float | Literal["auto"] = "auto",
-    indenters: Mapping[str, TriangleMesh] | None = None,
     rays: CameraRays | None = None,
     real: RealComparison | None = None,
 ) -> str:
@@ -121,7 +120,7 @@ def render_page(
         real=None if real is None else _real(real),
         assumed=assumed,
         sourced=sourced,
-        scene=_json(scene_data(design, dict(indenters or {}), rays)),
+        scene=_json(scene_data(design, image.indenters, rays)),
         picture_script=Markup(template("picture.js")),
         viewer_script=Markup(template("viewer.js")),
     )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -27,7 +28,7 @@ MARKER_SIZE = 0.35
 
 
 def scene_data(
-    design: SensorDesign, indenters: dict[str, TriangleMesh], rays: CameraRays | None = None
+    design: SensorDesign, indenters: Mapping[str, TriangleMesh], rays: CameraRays | None = None
 ) -> dict[str, Any]:
     """The 3-D view's data, ready for JSON.
 

@@ -19,6 +19,7 @@ from numpy.typing import ArrayLike, NDArray
 from optisense.design.responses import PictureChain
 from optisense.design.responses.electronics import NoiseSeed
 from optisense.errors import RenderError
+from optisense.geometry import TriangleMesh
 from optisense.optics.camera.response import picture
 from optisense.writing import inside, remove_own_page, written_together
 
@@ -40,7 +41,8 @@ class TactileImage:
         that the coating is pushed in along the inward normal, 0 outside contacts. settings:
         what was asked and what was reached, ready for JSON. unit_layers: each group's layer for
         lights of 1 mW in every channel, from which others follow (see ``relight``). chain: of the
-        camera, from radiance to the picture.
+        camera, from radiance to the picture. indenters: what pressed in, by a name to show, in the
+        design's frame (mm).
     """
 
     layers: dict[str, NDArray[np.float32]]
@@ -51,6 +53,7 @@ class TactileImage:
     interrupted: bool = False
     unit_layers: dict[str, NDArray[np.float32]] = field(default_factory=dict)
     chain: PictureChain = field(default_factory=PictureChain)
+    indenters: dict[str, TriangleMesh] = field(default_factory=dict)
 
     def relight(self, flux: Mapping[str, ArrayLike]) -> TactileImage:
         """The same image under lights of other colours and powers; exact, with no new rendering.
