@@ -9,8 +9,10 @@ from typing import Any
 
 import numpy as np
 
+from optisense.errors import SearchError
 from optisense.search.evaluation.outcome import Outcome
 from optisense.search.methods.base import FloatArray, Method, Problem, values_to_maximise
+from optisense.search.space.search_space import BoundSpace
 
 Combination = tuple[int, ...]
 """The position of a level for each parameter."""
@@ -138,3 +140,22 @@ def changed(combination: Combination, members: Sequence[int], level: int) -> Com
     for member in members:
         other[member] = level
     return tuple(other)
+
+
+def levels_of(space: BoundSpace) -> list[tuple[float, ...]]:
+    """The values of each parameter.
+
+    Raises:
+        SearchError: a parameter has no steps.
+    """
+    found = []
+    for parameter in space.parameters:
+        levels = parameter.kind.levels
+        if levels is None:
+            raise SearchError(
+                "the number of steps is needed",
+                where=parameter.name,
+                hint=f"Write {parameter.asked}=LOW:HIGH:STEPS",
+            )
+        found.append(levels)
+    return found

@@ -24,7 +24,7 @@ from optisense.objectives.run import run_objective, split_settings
 from optisense.objectives.usual_score import UsualTrials
 from optisense.search.evaluation.evaluator import DesignEvaluator, Evaluator
 from optisense.search.methods.base import Problem
-from optisense.search.methods.combinations import Combinations, Stage
+from optisense.search.methods.combinations import Combinations, Stage, levels_of
 from optisense.search.space.search_space import BoundSpace
 
 if TYPE_CHECKING:
@@ -162,7 +162,6 @@ def _levels(space: BoundSpace) -> list[tuple[float, ...]]:
     Raises:
         SearchError: a parameter is no colour or power of a light group, or has no steps.
     """
-    found = []
     for parameter in space.parameters:
         paths = [target.path for target in parameter.targets]
         if not paths or not all(
@@ -173,12 +172,4 @@ def _levels(space: BoundSpace) -> list[tuple[float, ...]]:
                 where=parameter.name,
                 hint="Write --vary 'lights.*.colour=R,G,B' or lights.GROUP.flux=1:5:3",
             )
-        levels = parameter.kind.levels
-        if levels is None:
-            raise SearchError(
-                "the number of steps is needed",
-                where=parameter.name,
-                hint=f"Write {parameter.asked}=LOW:HIGH:STEPS",
-            )
-        found.append(levels)
-    return found
+    return levels_of(space)
