@@ -13,7 +13,7 @@ import traceback
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
 from contextvars import ContextVar
-from typing import ParamSpec, TypeVar
+from typing import TYPE_CHECKING, ParamSpec, TypeVar
 
 import typer
 from rich.console import Console, ConsoleOptions, RenderableType
@@ -22,6 +22,9 @@ from rich.segment import Segment
 from optisense.cli.from_options import with_options
 from optisense.errors import OptiSenseError, OutputError, SetupError
 from optisense.text import visible
+
+if TYPE_CHECKING:
+    from rich.table import Table
 
 EXIT_FAILURE = 1
 EXIT_BAD_INPUT = 2
@@ -64,6 +67,16 @@ def set_debug(debug: bool) -> None:
 def at_end(call: Callable[[], object]) -> None:
     """Call something when the command that runs ends, however it ends."""
     _ending.get().callback(call)
+
+
+def table_of(*heads: str, texts: int = 1) -> Table:
+    """A table without lines whose first columns hold texts and whose others hold numbers."""
+    from rich.table import Table
+
+    table = Table(box=None, pad_edge=False)
+    for number, head in enumerate(heads):
+        table.add_column(head, justify="left" if number < texts else "right")
+    return table
 
 
 def say_error(message: str, *, where: str | None = None, hint: str | None = None) -> None:

@@ -14,6 +14,7 @@ from optisense.cli.console import (
     ends_well,
     messages,
     output,
+    table_of,
 )
 from optisense.cli.options import (
     DesignArgument,
@@ -22,11 +23,10 @@ from optisense.cli.options import (
 )
 from optisense.cli.output_folder import take_folder
 from optisense.cli.progress import ProgressLine, progress_line
+from optisense.cli.sampling import BUILDING, LOADING, loading_steps
 from optisense.commands.scoring import EvaluateOptions
 from optisense.quality import SCORE_PHOTONS, photons_of
 from optisense.time_left import TimedStep
-from optisense.usual_times import BUILDING as BUILDING_TIME
-from optisense.usual_times import LOADING as LOADING_TIME
 from optisense.usual_times import UsualTimes
 from optisense.writing import remove_own_page, write_text
 
@@ -152,14 +152,8 @@ def _write(scored: Scored, folder: Path, objectives: list[Objective]) -> None:
 
 
 def _print_table(scored: Scored) -> None:
-    from rich.table import Table
-
-    table = Table(box=None, pad_edge=False)
-    table.add_column("objective")
-    table.add_column("score", justify="right")
-    if len(scored.runs) > 1:
-        table.add_column("spread", justify="right")
-    table.add_column("seconds", justify="right")
+    several = len(scored.runs) > 1
+    table = table_of("objective", "score", *(["spread"] if several else []), "seconds")
     table.add_column("")
     for name, score in scored.scores.items():
         if score.failure is not None:
@@ -167,7 +161,7 @@ def _print_table(scored: Scored) -> None:
         else:
             shown, note = f"{scored.mean(name):.4g}", scored.beside(name)
         row = [score.name, shown]
-        if len(scored.runs) > 1:
+        if several:
             spread = scored.spread(name)
             row.append("" if spread is None else f"± {spread:.2g}")
         table.add_row(*row, f"{score.seconds:.2f}", note)
@@ -177,7 +171,7 @@ def _print_table(scored: Scored) -> None:
             output.print(f"{score.name} failed: {score.failure}", markup=False)
 
 
-LOADING, BUILDING, SCORING = "loading", "building the scene", "scoring"
+SCORING = "scoring"
 
 
 USUAL_SCORING = 3.0
@@ -190,8 +184,7 @@ def _steps(seeds: int, photons: int) -> list[TimedStep]:
     times = UsualTimes.here()
     each = USUAL_SCORING * times.pace + times.tracing(photons)
     return [
-        TimedStep(LOADING, 1, LOADING_TIME * times.thread_pace, gauges=False),
-        TimedStep(BUILDING, 1, BUILDING_TIME * times.thread_pace, gauges=False),
+        *loading_steps(),
         TimedStep(SCORING, seeds * each, 1.0),
     ]
 

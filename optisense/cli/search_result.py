@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from optisense.cli.console import messages, output
+from optisense.cli.console import messages, output, table_of
 
 if TYPE_CHECKING:
     from optisense.search import SearchResult, Study, Trial
@@ -125,13 +125,8 @@ def _beside(study: Study, best: Trial, start: Trial | None) -> list[str]:
 
 def _print_front(result: SearchResult) -> None:
     """The trials that no other beats in all objectives."""
-    from rich.table import Table
-
     names = result.study.settings.names
-    table = Table(box=None, pad_edge=False)
-    table.add_column("trial", justify="right")
-    for name in names:
-        table.add_column(name, justify="right")
+    table = table_of("trial", *names, texts=0)
     for trial in result.front:
         table.add_row(str(trial.number), *(f"{trial.scores[name]:.4g}" for name in names))
     output.print("none of these is beaten in all objectives:")

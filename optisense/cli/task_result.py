@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
-from optisense.cli.console import output
+from optisense.cli.console import output, table_of
 
 if TYPE_CHECKING:
     from optisense.tasks import PerceptionResult, ReconstructionResult
@@ -13,12 +13,8 @@ if TYPE_CHECKING:
 
 def print_perception(results: Iterable[PerceptionResult]) -> None:
     """A row for each task."""
-    from rich.table import Table
-
-    table = Table(box=None, pad_edge=False)
-    table.add_column("task")
-    for heading in ("mean error", "among folds", "of guessing", "signal to noise", "samples"):
-        table.add_column(heading, justify="right")
+    heads = ("mean error", "among folds", "of guessing", "signal to noise", "samples")
+    table = table_of("task", *heads)
     for result in results:
         reading = result.reading
         table.add_row(
@@ -34,12 +30,8 @@ def print_perception(results: Iterable[PerceptionResult]) -> None:
 
 def print_reconstruction(result: ReconstructionResult) -> None:
     """A row for each object, and their mean."""
-    from rich.table import Table
-
-    table = Table(box=None, pad_edge=False)
-    table.add_column("object")
-    for heading in ("normals off by", "of reading nothing", "depth off by", "deepest", "read"):
-        table.add_column(heading, justify="right")
+    heads = ("normals off by", "of reading nothing", "depth off by", "deepest", "read")
+    table = table_of("object", *heads)
     for name, each in result.objects.items():
         values = each.to_dict()
         table.add_row(

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from optisense.cli import stopping
-from optisense.cli.console import EXIT_INTERRUPTED, ends_well, messages, output
+from optisense.cli.console import EXIT_INTERRUPTED, ends_well, messages, output, table_of
 from optisense.cli.options import (
     DesignArgument,
     VariantOption,
@@ -133,11 +133,7 @@ def _write(found: Tolerance, folder: Path, text: str, report: bool) -> None:
 
 def _print(found: Tolerance) -> None:
     """One table of percentiles, and one of shares for each objective."""
-    from rich.table import Table
-
-    table = Table(box=None, pad_edge=False)
-    for head in ("objective", "as designed", "P10", "P50", "P90", "spread", "noise"):
-        table.add_column(head, justify="left" if head == "objective" else "right")
+    table = table_of("objective", "as designed", "P10", "P50", "P90", "spread", "noise")
     for name, each in found.results.items():
         table.add_row(
             name,
@@ -154,13 +150,8 @@ def _print(found: Tolerance) -> None:
 
 
 def _print_shares(name: str, found: ScoreDistribution) -> None:
-    from rich.table import Table
-
-    table = Table(box=None, pad_edge=False)
-    table.add_column(f"which error matters for {name}")
-    table.add_column("share of the variance", justify="right")
-    table.add_column("standard error", justify="right")
-    table.add_column("90 % interval", justify="right")
+    shares = ("share of the variance", "standard error", "90 % interval")
+    table = table_of(f"which error matters for {name}", *shares)
     for source, share in found.shares.items():
         table.add_row(source, *_share(share))
     output.print(table)
