@@ -22,7 +22,7 @@ Constraint = Callable[[SensorDesign], bool | str | None]
 """False, or a text that says why, for a design that must not be."""
 
 
-class Meeting(NamedTuple):
+class CrossingParts(NamedTuple):
     """Two parts that cut through each other, and a place where they do, (3,) mm."""
 
     one: str
@@ -58,7 +58,7 @@ class PartsApart:
             f"({x:.2f}, {y:.2f}, {z:.2f}) mm"
         )
 
-    def meeting(self, design: SensorDesign) -> Meeting | None:
+    def meeting(self, design: SensorDesign) -> CrossingParts | None:
         """The first two parts that cut through each other and did not at the start, or None."""
         meshes = design.deformed_meshes()
         moved = {
@@ -71,7 +71,7 @@ class PartsApart:
                 continue
             place = _crossing(meshes[one], meshes[other])
             if place is not None:
-                return Meeting(one, other, place)
+                return CrossingParts(one, other, place)
         return None
 
     def _crossed_before(self, one: str, other: str) -> bool:
