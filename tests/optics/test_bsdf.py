@@ -69,6 +69,55 @@ def test_the_coating_is_mitsubas_blend_of_diffuse_and_rough_conductor(
     assert ours == pytest.approx(theirs, rel=0.01, abs=1e-6)
 
 
+DISC_ERROR = 0.03
+"""Of the peak: the disc's shape among half vectors is an ellipse, which is taken as a disc."""
+TAIL_ERROR = 0.02
+"""Far from the mirror direction, where a disc of light is as good as its middle."""
+
+
+def averaged_over_disc(
+    lobe: CoatingBsdf, light: mi.Vector3f, eye: mi.Vector3f, radius: float
+) -> np.ndarray:
+    """(n,) the mean of a lobe over a disc of light of this angular radius, by quadrature."""
+    rings, spokes, count = 40, 24, dr.width(light)
+    angle = radius * np.sqrt((np.arange(rings) + 0.5) / rings)
+    turn = 2 * np.pi * (np.arange(spokes) + 0.5) / spokes
+    angle, turn = (mi.Float(np.tile(each.ravel(), count)) for each in np.meshgrid(angle, turn))
+    again = dr.arange(mi.UInt32, count * rings * spokes) // (rings * spokes)
+    light, eye = (dr.gather(mi.Vector3f, dr.ravel(each), again) for each in (light, eye))
+    frame = mi.Frame3f(light)
+    aside = frame.s * dr.cos(turn) + frame.t * dr.sin(turn)
+    way = light * dr.cos(angle) + aside * dr.sin(angle)
+    values = np.asarray(evaluate_coating(lobe, mi.Vector3f(0, 0, 1), way, eye))[0]
+    return np.asarray(values.reshape(count, -1).mean(axis=1))
+
+
+@pytest.mark.parametrize("alpha", [0.05, 0.2, 0.5])
+@pytest.mark.parametrize("radius", [0.1, 0.3])
+def test_a_lobe_averaged_over_a_disc_of_light(alpha: float, radius: float) -> None:
+    tilt = np.linspace(-1.0, 1.0, 201)
+    across = mi.Float(np.sin(tilt))
+    light = mi.Vector3f(across, dr.zeros(mi.Float, 201), mi.Float(np.cos(tilt)))
+    eye = mi.Vector3f(0, 0, 1) + dr.zeros(mi.Vector3f, 201)
+    lobe = coating(1.0, alpha)
+    truth = averaged_over_disc(lobe, light, eye, radius)
+    lobe.light_radius2 = mi.Float(radius**2)
+    found = np.asarray(evaluate_coating(lobe, mi.Vector3f(0, 0, 1), light, eye))[0]
+    assert np.abs(found - truth).max() < DISC_ERROR * truth.max()
+    assert found.sum() == pytest.approx(truth.sum(), rel=DISC_ERROR)
+    far = np.abs(tilt) > 3 * radius
+    assert found[far] == pytest.approx(truth[far], rel=TAIL_ERROR + (radius / 0.9) ** 2)
+
+
+def test_a_disc_of_no_size_is_one_direction() -> None:
+    light, eye = ways(4000, 1), ways(4000, 2)
+    lobe = coating(1.0, 0.1)
+    sharp = np.asarray(evaluate_coating(lobe, mi.Vector3f(0, 0, 1), light, eye))
+    lobe.light_radius2 = mi.Float(0)
+    found = np.asarray(evaluate_coating(lobe, mi.Vector3f(0, 0, 1), light, eye))
+    assert found == pytest.approx(sharp, rel=1e-3, abs=1e-5)
+
+
 @pytest.mark.parametrize("cosine", [0.1, 0.6, 1.0])
 @pytest.mark.parametrize("alpha", [0.1, 0.5])
 def test_ggx_normals_follow_the_visible_distribution(cosine: float, alpha: float) -> None:

@@ -160,12 +160,9 @@ def broadened_coating(coating: CoatingBsdf, cosine: mi.Float) -> CoatingBsdf:
     """A coating as it reflects light that is spread about its mean direction.
 
     The diffuse lobe is linear in direction, so the mean cosine makes it exact. The metallic lobe is
-    blurred as by light from a disc: the half vector moves half as far as the light, which adds R^2
-    / 8
-    to alpha^2.
+    averaged over a disc of light.
     """
     reflectance = coating.reflectance * cosine
     if not coating.metallic:
         return replace(coating, reflectance=reflectance)
-    alpha = dr.sqrt(coating.alpha * coating.alpha + squared_radius(cosine) * 0.125)
-    return replace(coating, reflectance=reflectance, alpha=alpha)
+    return replace(coating, reflectance=reflectance, light_radius2=squared_radius(cosine))

@@ -20,6 +20,11 @@ FLOATS_PER_SURFACE = 16
 """Floats per surface in the table of optical data."""
 SMOOTH_ALPHA = 1e-3
 """GGX roughness below which a dielectric is treated as smooth."""
+MIN_DISC_COSINE = 0.1
+"""Lower bound on the cosine of the half vector with the light, by which a disc of light widens
+among half vectors; below it light and eye are nearly opposite each other."""
+MIN_DISC = 1e-9
+"""Lower bound on the squared radius of a disc of half vectors; it avoids a division by zero."""
 
 
 def surface_table(surfaces: list[Surface]) -> mi.Float:
@@ -54,7 +59,8 @@ class CoatingBsdf:
     """Opaque reflectance of hits: per-lane parameters of the blend.
 
     ``metallic`` is False where it is known that no surface has a metallic lobe, which then is not
-    compiled into kernels.
+    compiled into kernels. ``light_radius2`` is the squared angular radius (radians squared) of the
+    disc of light over which the metallic lobe is averaged; None for light of a single direction.
     """
 
     reflectance: mi.Color3f
@@ -63,6 +69,7 @@ class CoatingBsdf:
     specularity: mi.Float
     alpha: mi.Float
     metallic: bool = True
+    light_radius2: mi.Float | None = None
 
 
 def surface_kind(
@@ -156,6 +163,36 @@ def _ggx(cos_m: mi.Float, alpha: mi.Float) -> mi.Float:
     return a2 / (dr.pi * base * base)
 
 
+def _ggx_of_disc(
+    cos_m: mi.Float, cos_d: mi.Float, alpha: mi.Float, light_radius2: mi.Float
+) -> mi.Float:
+    """The GGX distribution averaged over the half vectors of a disc of light; exact but for the
+    shape of the disc.
+
+    With s the sine of the half vector with the normal, the distribution is
+    a^2 / (pi (a^2 + (1 - a^2) s^2)^2): seen along the normal, the stereographic image of an even
+    density on a sphere. As circles stay circles there, its integral over a disc of radius rho is
+    the area of a spherical cap, of half angle c with cos(c) = q / h,
+    q = a^2 + (1 - a^2) s^2 - rho^2, h^2 = q^2 + 4 a^2 rho^2. Peak, tail and integral are those of
+    the convolution, while a larger alpha would raise the tail.
+
+    Args:
+        cos_m: cosine of the half vector with the normal.
+        cos_d: cosine of the half vector with the light.
+        alpha: GGX roughness.
+        light_radius2: squared angular radius of the disc (radians squared).
+    """
+    a2 = alpha * alpha
+    # The solid angle of half vectors is that of the light over 4 cos_d; seen along the normal it
+    # shrinks by cos_m.
+    scale = (1 - a2) * cos_m / (4 * dr.maximum(cos_d, MIN_DISC_COSINE))
+    rho2 = dr.maximum(light_radius2 * scale, MIN_DISC)
+    q = a2 + (1 - a2) * dr.maximum(1 - cos_m * cos_m, 0) - rho2
+    h = dr.sqrt(q * q + 4 * a2 * rho2)
+    # Two forms of (1 - cos c) / (2 rho^2); each is free of cancellation on its side.
+    return dr.inv_pi * dr.select(q > 0, 2 * a2 / (h * (h + q)), (h - q) / (2 * rho2 * h))
+
+
 def _smith(cosine: mi.Float, alpha: mi.Float) -> mi.Float:
     tan2 = (1 - cosine * cosine) / dr.maximum(cosine * cosine, 1e-12)
     return 2 / (1 + dr.sqrt(1 + alpha * alpha * tan2))
@@ -188,12 +225,12 @@ def evaluate_coating(
         return diffuse
     half = dr.normalize(towards_light + towards_eye)
     cos_m = dr.dot(half, normal)
-    lobe = (
-        _ggx(cos_m, coating.alpha)
-        * _smith(cos_i, coating.alpha)
-        * _smith(cos_o, coating.alpha)
-        / (4 * cos_o)
-    )
+    if coating.light_radius2 is None:
+        density = _ggx(cos_m, coating.alpha)
+    else:
+        cos_h = dr.dot(half, towards_light)
+        density = _ggx_of_disc(cos_m, cos_h, coating.alpha, coating.light_radius2)
+    lobe = density * _smith(cos_i, coating.alpha) * _smith(cos_o, coating.alpha) / (4 * cos_o)
     metal = fresnel_metal(dr.abs(dr.dot(half, towards_light)), coating.metal_eta, coating.metal_k)
     shiny = dr.select(lit, metal * (coating.specularity * lobe), 0.0)
     return diffuse * (1 - coating.specularity) + shiny
