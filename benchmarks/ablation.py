@@ -98,9 +98,12 @@ def ablations() -> list[Ablation]:
     from optisense.optics.radiance_cache import (
         angular_variance,
         beams,
+        bin_sums,
         cache,
+        glossy_interreflection,
         interreflection,
         shading,
+        shading_points,
         smoothing,
         store,
     )
@@ -116,9 +119,9 @@ def ablations() -> list[Ablation]:
         return sequences.unit_float(mi.sample_tea_32(series ^ mi.UInt32(dimension), number)[0])
 
     def own_cell(
-        cells: Any, base: Any, active: Any, points: Any, number: Any
+        cells: Any, base: Any, active: Any, series: Any, number: Any
     ) -> tuple[Any, Any, Any]:
-        home, found = shading.cell_at(cells, base, active)
+        home, found = shading_points.cell_at(cells, base, active)
         return home, mi.Vector3f(0), found
 
     def no_interreflection(field: Any, *rest: Any) -> list[Any]:
@@ -155,19 +158,22 @@ def ablations() -> list[Ablation]:
         shading_only("more samples where grainy", Change(cached, "GRAIN_THRESHOLD", np.inf)),
         shading_only("more samples in small contacts", Change(cached, "MIN_CONTACT_SAMPLES", 0)),
         shading_only("several cells a sample", Change(shading, "CELLS_PER_SAMPLE", 1)),
-        shading_only("interpolation of cells", Change(shading, "_interpolating_cell", own_cell)),
+        shading_only("interpolation of cells", Change(shading, "interpolating_cell", own_cell)),
         shading_only("even spread of a pixel's samples",
-                     Change(shading, "in_series", random_in_series)),
+                     Change(bin_sums, "in_series", random_in_series),
+                     Change(shading_points, "in_series", random_in_series)),
         shading_only("interreflection in contacts",
-                     Change(shading, "interreflected", no_interreflection)),
+                     Change(shading, "interreflected", no_interreflection),
+                     Change(shading, "glossily_interreflected", no_interreflection)),
         shading_only("interreflection beyond one bounce",
-                     Change(interreflection, "MAX_BOUNCES", 1)),
+                     Change(interreflection, "MAX_BOUNCES", 1),
+                     Change(glossy_interreflection, "MAX_BOUNCES", 1)),
         shading_only("occluder horizon", Change(shading, "occluder_horizon", always_doubtful)),
         shading_only("light partly below the horizon",
-                     Change(shading, "cosine_half_width", lambda *rest: mi.Float(0))),
-        shading_only("variance of each direction", Change(shading, "angular_variance", isotropic)),
-        shading_only("lookup along the light's line", Change(shading, "_place", here)),
-        shading_only("lobes broadened by the light", Change(shading, "broadened_coating", sharp)),
+                     Change(bin_sums, "cosine_half_width", lambda *rest: mi.Float(0))),
+        shading_only("variance of each direction", Change(bin_sums, "angular_variance", isotropic)),
+        shading_only("lookup along the light's line", Change(bin_sums, "_place", here)),
+        shading_only("lobes broadened by the light", Change(bin_sums, "broadened_coating", sharp)),
         shading_only("coherent camera rays", Change(interact.Path, "is_coherent", coherent)),
         of_light("emission guiding", Change(emission_guide, "MIN_DENSITY", 1.0)),
         of_light("low-discrepancy photons", Change(photons, "sequence_4d", random_4d)),

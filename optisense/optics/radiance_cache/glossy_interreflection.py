@@ -1,0 +1,185 @@
+"""Interreflection of coatings with a metallic lobe, by the lobe of every place that is seen.
+
+As in `interreflection`, rays from points in and near a contact find the indenter or the skin
+beside it. The place that a ray meets is then shaded as any visible point is: each direction bin is
+looked up along its own line and reflected by the coating's lobes towards the point that sees it.
+From there rays go on, drawn from the same lobes.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import drjit as dr
+import mitsuba as mi
+
+from optisense.optics.backend.sequences import STEPS_2D, next_random, unit_float
+from optisense.optics.radiance_cache.angular_variance import occluder_horizon
+from optisense.optics.radiance_cache.bin_sums import sum_bins
+from optisense.optics.radiance_cache.cache import RadianceCache
+from optisense.optics.radiance_cache.shading_points import ShadingPoints, interpolating_cell
+from optisense.optics.scene.bsdf import coating_of, sample_coating
+from optisense.optics.scene.contact_scenes import ContactScenes
+from optisense.optics.scene.ray_scene import Ray, leave
+from optisense.optics.scene.surface_cells import plane_of
+from optisense.optics.transport.camera_paths import VisiblePoints
+
+DIRECTIONS = 4
+"""Directions per camera sample in which interreflected light is looked for. The lobes of the places
+seen are summed over all light, so that fewer directions will do than where one ray stands for the
+light of a place."""
+MAX_BOUNCES = 4
+"""Largest number of reflections inside a contact; of a metal ball's light, less than a thousandth
+goes on."""
+PLACE_SHADOW_RAYS = 4.0
+"""Shadow rays per light group of a place that is seen."""
+MIN_LANES = 2
+"""Fewest places that are shaded at once: Dr.Jit compiles other kernels for single ones."""
+
+
+@dataclass
+class _Seen:
+    """Places that rays have met.
+
+    Attributes:
+        points: the places, as visible points; their ``pixel`` is the number of the first point of
+            their path.
+        raised: which of them lie on an indenter.
+        near: the cell of the point that sees each.
+    """
+
+    points: VisiblePoints
+    raised: mi.Bool
+    near: mi.UInt32
+
+
+def glossily_interreflected(
+    field: RadianceCache, scenes: ContactScenes, at: ShadingPoints
+) -> list[mi.Color3f]:
+    """Radiance towards the camera that points reflect of interreflected light, one colour per
+    group.
+
+    Args:
+        field: the radiance cache.
+        scenes: the scenes of the image, with indenters.
+        at: the points.
+    """
+    lanes = dr.width(at.seen.pixel)
+    totals = [dr.zeros(mi.Float, 3 * lanes) for _ in range(field.groups)]
+    dr.eval(at)
+    lane = dr.arange(mi.UInt32, lanes * DIRECTIONS)
+    owner = lane // DIRECTIONS
+    table = scenes.full.table
+    first = dr.gather(VisiblePoints, at.seen, owner)
+    looking = ShadingPoints(
+        seen=first,
+        coating=coating_of(table, first.surface, first.valid),
+        start=first.point,  # not read: nothing is in the way of these points themselves
+        cell=dr.gather(mi.UInt32, at.cell, owner),
+        shift=mi.Vector3f(0),
+        active=dr.gather(mi.Bool, at.active, owner),
+        raised=dr.gather(mi.Bool, at.raised, owner),
+    )
+    looking.seen.pixel = owner
+    looking.seen.number = looking.seen.number * DIRECTIONS + lane % DIRECTIONS
+    looking.seen.weight = mi.Color3f(1 / DIRECTIONS)
+    for _ in range(MAX_BOUNCES):
+        seen = _places_seen(scenes, looking)
+        if seen is None:
+            break
+        looking = _shading_points(field, scenes, seen)
+        light = _light_of(field, scenes, looking)
+        for total, value in zip(totals, light, strict=True):
+            for k in range(3):
+                weighted = value[k] * looking.seen.weight[k]
+                dr.scatter_add(total, weighted, looking.seen.pixel * 3 + k, looking.active)
+        dr.eval(totals, looking)
+    index = dr.arange(mi.UInt32, lanes)
+    return [
+        mi.Color3f(*(dr.gather(mi.Float, total, index * 3 + k) for k in range(3)))
+        for total in totals
+    ]
+
+
+def _places_seen(scenes: ContactScenes, at: ShadingPoints) -> _Seen | None:
+    """The places that one ray from each point meets, drawn from its coating's lobes."""
+    assert scenes.indenters is not None
+    indenters, fixed, points = scenes.indenters, scenes.fixed, at.seen
+    u = unit_float(points.series + points.number * STEPS_2D[0])
+    v = unit_float(points.series * 277803737 + points.number * STEPS_2D[1])
+    state = (points.random ^ (points.number * 0x9E3779B9)) * 69069
+    way, weight = sample_coating(
+        at.coating, points.normal, -points.towards_eye, unit_float(state), mi.Point2f(u, v)
+    )
+    weight = weight * points.weight
+    start = leave(points.point, points.face_normal, way)
+    looks = at.active & (dr.dot(way, points.face_normal) > 0) & (dr.max(weight) > 0)
+    pressed = indenters.intersect(Ray(start, way, looks))
+    skin = fixed.intersect(Ray(start, way, looks & at.raised))
+    raised = pressed.valid & (~skin.valid | (pressed.distance < skin.distance))
+    # Light along a line that comes from the skin behind is in the field already.
+    behind = fixed.scene.ray_test(mi.Ray3f(start, -way), coherent=False, active=skin.valid)
+    valid = raised | (skin.valid & ~behind)
+    facing = dr.select(raised, pressed.normal, skin.normal)
+    shading = dr.select(raised, pressed.shading_normal, skin.shading_normal)
+    side = -dr.sign(dr.dot(way, facing))
+    random = next_random(state)
+    found = VisiblePoints(
+        valid=valid,
+        weight=weight,
+        point=dr.select(raised, pressed.point, skin.point),
+        normal=shading * side,
+        face_normal=facing * side,
+        towards_eye=-way,
+        surface=dr.select(raised, pressed.surface, skin.surface),
+        light=mi.UInt32(0),
+        pixel=points.pixel,
+        random=random,
+        series=next_random(random ^ points.series),
+        number=mi.UInt32(points.number),
+    )
+    seen = _Seen(found, raised, at.cell)
+    dr.eval(seen)
+    lanes = dr.compress(valid)
+    count = dr.width(lanes)
+    if count == 0:
+        return None
+    if count < MIN_LANES:
+        lanes = dr.repeat(lanes, MIN_LANES)
+    seen = dr.gather(_Seen, seen, lanes)
+    if count < MIN_LANES:
+        seen.points.valid &= dr.arange(mi.UInt32, MIN_LANES) == 0
+    return seen
+
+
+def _shading_points(field: RadianceCache, scenes: ContactScenes, seen: _Seen) -> ShadingPoints:
+    """Where places that are seen read the cache: below them, along the normal of the skin there."""
+    points = seen.points
+    upright, offset = plane_of(field.cells, seen.near, points.valid)
+    foot = points.point - upright * (dr.dot(upright, points.point) - offset)
+    base = dr.select(seen.raised, foot, points.point)
+    cell, shift, found = interpolating_cell(
+        field.cells, base, points.valid, points.series, points.number
+    )
+    return ShadingPoints(
+        seen=points,
+        coating=coating_of(scenes.full.table, points.surface, points.valid),
+        start=leave(points.point, points.face_normal, points.face_normal),
+        cell=dr.select(found, cell, seen.near),
+        shift=shift,
+        active=points.valid,
+        raised=seen.raised,
+    )
+
+
+def _light_of(field: RadianceCache, scenes: ContactScenes, at: ShadingPoints) -> list[mi.Color3f]:
+    """What places send to the points that see them, of the light that comes from afar."""
+    sky = occluder_horizon(
+        scenes.balls,
+        dr.opaque(mi.UInt32, dr.width(scenes.balls) // 4),
+        at.seen.point,
+        plane_of(field.cells, at.cell, at.active)[0],
+        at.raised & dr.opaque(mi.Bool, scenes.convex),
+    )
+    rays = dr.opaque(mi.Float, PLACE_SHADOW_RAYS)
+    return sum_bins(field.binned(), scenes, at, rays, sky)
