@@ -124,6 +124,9 @@ def ablations() -> list[Ablation]:
         home, found = shading_points.cell_at(cells, base, active)
         return home, mi.Vector3f(0), found
 
+    def no_overlap(place: Any, direction: Any, bins: Any) -> tuple[Any, Any]:
+        return mi.Float(0), mi.Float(0)
+
     def no_interreflection(field: Any, *rest: Any) -> list[Any]:
         return [mi.Color3f(0) for _ in range(field.groups)]
 
@@ -182,8 +185,7 @@ def ablations() -> list[Ablation]:
         of_light("kernels by the pilot photons", Change(smoothing, "varies_over", one_length)),
         of_light("narrow kernels out of view", Change(store, "SMOOTHED_MARGIN", 1e6)),
         of_light("sharpening", Change(smoothing, "MAX_SHARPENING", 0.0)),
-        of_light("overlapping bins",
-                 Change(cache, "OVERLAP", 0.0), Change(cache, "METAL_OVERLAP", 0.0)),
+        of_light("overlapping bins", Change(cache, "dither", no_overlap)),
         of_light("weak beams merged", Change(beams, "STRONG_SHARE", 0.0)),
         of_light("flat faces merged", Change(assembly, "_merged", every_facet)),
     ]  # fmt: skip

@@ -62,12 +62,12 @@ class DraftCacheStore(CacheStore):
         table: EmitterTable,
         seen: NDArray[np.floating],
         coloured: bool,
-        metallic: bool,
+        roughness: float | None,
         pilot: PilotScene,
         before: DraftCacheStore | None,
     ) -> None:
         """As of `CacheStore`; `before` is the store of the design before, if there is one."""
-        super().__init__(scene, opaque, table, seen, coloured, metallic, pilot)
+        super().__init__(scene, opaque, table, seen, coloured, roughness, pilot)
         self.seen = seen
         self._learned_on = opaque
         if before is None:
@@ -87,7 +87,7 @@ class DraftCacheStore(CacheStore):
     def light_only(self, groups: Collection[int] | None) -> None:
         """From now on trace the light of these groups alone, or of all (None)."""
         if groups != self.lit:
-            self.forget_light(self._coloured, self._metallic)
+            self.forget_light(self._coloured, self._roughness)
         self.lit = groups
 
 
@@ -203,7 +203,7 @@ class DraftModel(OpticalModel):
             self._emitter_table,
             seen,
             self._coloured,
-            self._metallic,
+            self._roughness,
             self._pilot_scene(),
             before,
         )

@@ -90,7 +90,7 @@ class OpticalModel(RayModel):
             self._emitter_table,
             rays.points[rays.hit],
             self._coloured,
-            self._metallic,
+            self._roughness,
             self._pilot_scene(),
         )
 
@@ -106,12 +106,12 @@ class OpticalModel(RayModel):
     def _recoat(self) -> None:
         super()._recoat()
         if "_store" in self.__dict__:
-            self._store.forget_light(self._coloured, self._metallic)
+            self._store.forget_light(self._coloured, self._roughness)
 
     def forget_light(self) -> None:
         """Drop the radiance caches (hundreds of MB); the next image traces its light anew."""
         if "_store" in self.__dict__:
-            self._store.forget_light(self._coloured, self._metallic)
+            self._store.forget_light(self._coloured, self._roughness)
             dr.flush_malloc_cache()
 
     def guide(self) -> EmissionGuide:

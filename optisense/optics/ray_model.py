@@ -144,10 +144,12 @@ class RayModel:
     def _refresh_surfaces(self) -> None:
         self._table = surface_table(self._surfaces)
         self._coloured = any(is_coloured(surface) for surface in self._surfaces)
-        self._metallic = any(
-            surface.kind is SurfaceKind.OPAQUE and surface.specularity > 0
+        metallic = [
+            surface.alpha
             for surface in self._surfaces
-        )
+            if surface.kind is SurfaceKind.OPAQUE and surface.specularity > 0
+        ]
+        self._roughness = min(metallic, default=None)
 
     def update(self, path: str, value: Any) -> None:
         """Change one value of the design by its dotted path, redoing only what depends on it.

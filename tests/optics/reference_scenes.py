@@ -90,12 +90,14 @@ class ReferenceScene:
         surfaces = [piece.surface for piece in self.pieces]
         opaque = [i for i, s in enumerate(surfaces) if s.kind is SurfaceKind.OPAQUE]
         rays = trace_chief_rays(scene, self.camera, np.zeros(len(scene.faces), dtype=np.int64))
+        lobes = [surfaces[i].alpha for i in opaque if surfaces[i].specularity > 0]
         store = CacheStore(
             scene,
             [self.pieces[i] for i in opaque],
             self.table(),
             rays.points[rays.hit],
             self._coloured(),
+            min(lobes, default=None),
         )
         light = store.field(
             seed, photons, None, None, 2 * photons, 0.0, lambda stage, part, traced, noise: None

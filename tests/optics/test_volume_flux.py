@@ -53,7 +53,7 @@ def skin() -> Piece:
 
 
 def store(scene: RayScene, lamp: Emitter, seen: NDArray[np.floating]) -> CacheStore:
-    return CacheStore(scene, [skin()], emitter_table([lamp], 1), seen, False, False)
+    return CacheStore(scene, [skin()], emitter_table([lamp], 1), seen, False)
 
 
 def irradiance(points: NDArray[np.floating], normals: NDArray[np.floating]) -> NDArray[np.float64]:

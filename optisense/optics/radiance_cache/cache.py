@@ -3,9 +3,9 @@
 The light that arrives at the sensing surface varies slowly from place to place. What varies within
 a tenth of a millimetre in a contact is the surface's tilt and what it hides. So photons are traced
 once per design, without contacts, and tallied where they land: each surface cell and direction bin
-(bins overlap, see `OVERLAP`) keeps the flux through a plane *across the light* (a photon's power
-over its cosine of incidence) and the mean direction. `shading` looks it up for visible points. The
-cost of an image then does not depend on the number of photons.
+(see `DirectionBins`) keeps the flux through a plane *across the light* (a photon's power over its
+cosine of incidence) and the mean direction. `shading` looks it up for visible points. The cost of
+an image then does not depend on the number of photons.
 """
 
 from __future__ import annotations
@@ -19,8 +19,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from optisense.optics.backend.arrays import floats, indices
-from optisense.optics.backend.sequences import unit_float
 from optisense.optics.radiance_cache.beams import Beams, collect_beams
+from optisense.optics.radiance_cache.direction_bins import (
+    DIFFUSE_BINS,
+    DirectionBins,
+    bin_centres,
+    direction_bin,
+    dither,
+)
 from optisense.optics.radiance_cache.irradiance import irradiance_table
 from optisense.optics.radiance_cache.smoothing import Kernels, smooth
 from optisense.optics.scene.surface_cells import SurfaceCells, bin_axis, cell_at
@@ -32,67 +38,8 @@ FloatArray = NDArray[np.floating]
 MIN_COSINE = 0.02
 """Lower bound on the cosine of incidence that a photon's power is divided by, so that an isolated
 grazing photon does not become a bright beam."""
-BANDS = 16
-"""Bands of equal area into which the sphere of directions is divided, about the mean normal of the
-surfaces."""
-SECTORS = 16
-"""Sectors of azimuth in each band."""
-BINS = BANDS * SECTORS
-"""Number of direction bins, all of equal solid angle."""
-OVERLAP = 1.0
-"""Half-width, in bins, of the triangular density by which directions are spread over neighbouring
-bins: each bin then holds what a quadratic B-spline weights. With sharp edges between bins, a point
-above the surface would count a lamp twice or not at all, depending on how near an edge the lamp
-lies; sums over overlapping bins hardly depend on where the edges lie."""
-METAL_OVERLAP = 0.4
-"""The half-width where a coating has a metallic lobe, which resolves directions: a compromise
-between the blur of the lobe's highlight and the errors of sharp edges."""
 EMPTY_BIN_SHARE = 1e-7
 """Share of all the light below which a direction bin counts as empty."""
-
-
-def direction_bin(
-    cells: SurfaceCells, direction: mi.Vector3f, bands_off: mi.Float, sectors_off: mi.Float
-) -> mi.UInt32:
-    """The equal-area bin (of `BINS`) of a unit direction, or one beside it.
-
-    Args:
-        cells: their frame is that of the bins.
-        direction: unit vectors.
-        bands_off: offset in bands.
-        sectors_off: offset in sectors.
-    """
-    x, y, z = (dr.dot(direction, bin_axis(cells, k)) for k in range(3))
-    place = (z + 1) * (BANDS / 2) + bands_off
-    # Beyond a pole: back from it.
-    place = dr.select(place > BANDS, 2 * BANDS - place, dr.abs(place))
-    band = dr.minimum(mi.UInt32(place), BANDS - 1)
-    turn = dr.atan2(y, x) * (1 / dr.two_pi) + sectors_off / SECTORS
-    turn -= dr.floor(turn)
-    return band * SECTORS + dr.minimum(mi.UInt32(turn * SECTORS), SECTORS - 1)
-
-
-def _dither(place: mi.Vector4f, direction: mi.Vector3f, reach: mi.Float) -> list[mi.Float]:
-    """Random offsets in bands and sectors, of a triangular density over -reach .. reach.
-
-    They are a hash of the landing, as landings come in no fixed order.
-    """
-    first, second, third = (
-        dr.reinterpret_array(mi.UInt32, value) for value in (place.x, place.y, direction.x)
-    )
-    both = mi.sample_tea_32(first ^ (third * 747796405), second)
-    return [reach * (unit_float(one) + unit_float(one * 277803737) - 1) for one in both]
-
-
-def bin_centres(cells: SurfaceCells, bins: NDArray[np.integer]) -> mi.Float:
-    """The middle direction of each bin, four floats each."""
-    z = (bins // SECTORS + 0.5) * (2 / BANDS) - 1
-    turn = (bins % SECTORS + 0.5) * (2 * np.pi / SECTORS)
-    flat = np.sqrt(1 - z * z)
-    local = np.stack([flat * np.cos(turn), flat * np.sin(turn), z], axis=1)
-    out = np.zeros((len(bins), 4), dtype=np.float32)
-    out[:, :3] = local @ cells.axes
-    return mi.Float(out.ravel())
 
 
 class Tables(NamedTuple):
@@ -189,6 +136,7 @@ class CacheTally:
         coloured: bool,
         metallic: bool = True,
         flux_layer: FluxLayer | None = None,
+        directions: DirectionBins = DIFFUSE_BINS,
     ) -> None:
         """Prepare empty tables.
 
@@ -196,11 +144,12 @@ class CacheTally:
             kernels: the cells and their smoothing.
             groups: number of light groups.
             coloured: whether powers are kept per colour channel.
-            metallic: whether a coating has a metallic lobe, which calls for less overlap of the
-            bins.
+            metallic: whether a coating has a metallic lobe.
             flux_layer: the layer in which the light above the surface is tallied; None for no
             layer.
+            directions: the direction bins.
         """
+        self.directions = directions
         self.flux_layer = flux_layer
         self.metallic = metallic
         self.kernels = kernels
@@ -209,7 +158,7 @@ class CacheTally:
         self.coloured = coloured
         self.passes = 0
         self.photons = 0
-        entries = cells.cells * BINS * groups * 4
+        entries = cells.cells * directions.count * groups * 4
         self.landed = self._tables(entries)
         self.above_surface = None if flux_layer is None else self._tables(entries)
         # What photons of even and of odd number bring; their difference tells the noise.
@@ -256,9 +205,10 @@ class CacheTally:
             cell, _, found = layer_cell_at(flux_layer, point, mi.Bool(True))
             across = dr.rcp(dr.maximum(travel.w, 1e-6))
         direction = mi.Vector3f(travel.x, travel.y, travel.z)
-        reach = dr.opaque(mi.Float, METAL_OVERLAP if self.metallic else OVERLAP)
-        bin_ = direction_bin(self.cells, -direction, *_dither(place, direction, reach))
-        entry = (cell * BINS + bin_) * self.groups + (bits & GROUP_MASK)
+        count = dr.opaque(mi.UInt32, self.directions.count)
+        beside = dither(place, direction, self.directions)
+        bin_ = direction_bin(self.cells, self.directions, -direction, *beside)
+        entry = (cell * count + bin_) * self.groups + (bits & GROUP_MASK)
         if self.coloured:
             power = dr.gather(mi.Vector4f, photons.power, index)
             for k in range(3):
@@ -301,12 +251,13 @@ class CacheTally:
 
     def smoothed(self) -> RadianceCache:
         """The radiance cache of the photons so far; only bins that hold light are kept."""
-        total = dr.zeros(mi.Float, BINS)
-        lanes = dr.arange(mi.UInt32, self.cells.cells * BINS * self.groups)
+        count = self.directions.count
+        total = dr.zeros(mi.Float, count)
+        lanes = dr.arange(mi.UInt32, self.cells.cells * count * self.groups)
         value = dr.gather(mi.Float, self.landed.moments, lanes * 4 + 3)
         if self.above_surface is not None:
             value += dr.gather(mi.Float, self.above_surface.moments, lanes * 4 + 3)
-        dr.scatter_add(total, value, (lanes // self.groups) % BINS)
+        dr.scatter_add(total, value, (lanes // self.groups) % dr.opaque(mi.UInt32, count))
         power = np.array(total)
         used = np.flatnonzero(power > EMPTY_BIN_SHARE * power.sum())
         used = used if len(used) else np.zeros(1, dtype=np.int64)
@@ -316,7 +267,7 @@ class CacheTally:
         factors = self.kernels.sharpening(landed, self.photons, self.metallic)
         rest = (
             bins,
-            dr.opaque(mi.UInt32, BINS),
+            dr.opaque(mi.UInt32, count),
             self.groups,
             floats(factors / self.passes),
         )
@@ -346,15 +297,15 @@ class CacheTally:
             colours=colours,
             coloured=self.coloured,
             metallic=self.metallic,
-            centres=bin_centres(self.cells, used),
+            centres=bin_centres(self.cells, self.directions, used),
             irradiance=table,
             beams=collect_beams(
                 moments,
                 colours,
                 self.coloured,
                 used,
-                BANDS,
-                SECTORS,
+                self.directions.across,
+                self.directions.across,
                 self.cells.cells * self.groups,
                 self.groups,
             ),

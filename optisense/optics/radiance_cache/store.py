@@ -14,7 +14,8 @@ from scipy.spatial import cKDTree
 
 from optisense.optics.backend.sequences import seed_of
 from optisense.optics.backend.stages import Stage, StageCallback
-from optisense.optics.radiance_cache.cache import BINS, CacheTally, RadianceCache
+from optisense.optics.radiance_cache.cache import CacheTally, RadianceCache
+from optisense.optics.radiance_cache.direction_bins import DIFFUSE_BINS, DirectionBins
 from optisense.optics.radiance_cache.pilot_photons import PilotPhotons
 from optisense.optics.radiance_cache.smoothing import Kernels
 from optisense.optics.scene.emitters import EmitterTable
@@ -42,6 +43,8 @@ PILOT_CELL_SIZE = 1.0
 """Side (mm) of the cells that tell whether a pilot photon lands where the camera looks."""
 MAX_TALLY_BYTES = 375e6
 """Memory (bytes) that the tally of one seed may take. Cells are made larger to stay below it."""
+MAX_FINE_TALLY_BYTES = 750e6
+"""The same with finer direction bins than those of diffuse coatings."""
 VIEW_MARGIN = 2.0
 """Margin (mm) around what the camera sees to which photons are sent: light that lands there would
 meet the flank of an indenter."""
@@ -93,7 +96,7 @@ class CacheStore:
         table: EmitterTable,
         seen: NDArray[np.floating],
         coloured: bool,
-        metallic: bool = True,
+        roughness: float | None = None,
         pilot: PilotScene | None = None,
     ) -> None:
         """Keep what the caches depend on; nothing is traced yet.
@@ -104,7 +107,7 @@ class CacheStore:
             table: the lights.
             seen: (n, 3) mm, points that the camera sees.
             coloured: whether surfaces are coloured.
-            metallic: whether a coating has a metallic lobe.
+            roughness: GGX alpha of the sharpest metallic lobe of a coating; None without metal.
             pilot: what pilot photons fly through; the scene itself if None.
         """
         self._pilot_scene = PilotScene(scene, coloured) if pilot is None else pilot
@@ -112,7 +115,7 @@ class CacheStore:
         self._scene = scene
         self._table = table
         self._coloured = coloured
-        self._metallic = metallic
+        self._roughness = roughness
         self._opaque = opaque
         self._guide: EmissionGuide | None = None
         self._pilot: PilotPhotons | None = None
@@ -122,16 +125,23 @@ class CacheStore:
         self._running: dict[tuple[int, int], _Running] = {}
         self._done: dict[tuple[int, int, int], RadianceCache] = {}
 
-    def forget_light(self, coloured: bool, metallic: bool = True) -> None:
+    def forget_light(self, coloured: bool, roughness: float | None = None) -> None:
         """Drop the caches, as surfaces reflect in another way now. The guide stays, and so do the
-        cells, unless other colours call for other sizes.
+        cells, unless other colours or lobes call for other sizes.
         """
-        if coloured != self._coloured:
-            self._cells = self._above = self._kernels = None
+        bins = self._directions
+        coloured_before = self._coloured
         self._coloured = coloured
-        self._metallic = metallic
+        self._roughness = roughness
+        if coloured != coloured_before or self._directions != bins:
+            self._cells = self._above = self._kernels = None
         self._running.clear()
         self._done.clear()
+
+    @property
+    def _directions(self) -> DirectionBins:
+        """The direction bins that the coating calls for."""
+        return DirectionBins.for_roughness(self._roughness)
 
     @property
     def _flux_layer(self) -> FluxLayer | None:
@@ -202,10 +212,12 @@ class CacheStore:
             points, triangles = self._opaque_mesh
             a, b, c = (points[triangles[:, k]] for k in range(3))
             area = np.linalg.norm(np.cross(b - a, c - a), axis=1).sum() / 2
-            entry = BINS * self._table.groups * (36 if self._coloured else 20)
+            directions = self._directions
+            entry = directions.count * self._table.groups * (36 if self._coloured else 20)
             if self._grazes:
                 entry *= 2
-            least = float(np.sqrt(1.3 * area * entry / MAX_TALLY_BYTES))
+            most = MAX_TALLY_BYTES if directions == DIFFUSE_BINS else MAX_FINE_TALLY_BYTES
+            least = float(np.sqrt(1.3 * area * entry / most))
             scale = self.cell_size / CELL_SIZE
             self._cells = build_cells(points, triangles, max(self.cell_size, scale * least))
         return self._cells
@@ -286,8 +298,9 @@ class CacheStore:
                     self.kernels,
                     self._table.groups,
                     self._coloured,
-                    self._metallic,
+                    self._roughness is not None,
                     self._flux_layer,
+                    self._directions,
                 ),
                 per_light,
             )

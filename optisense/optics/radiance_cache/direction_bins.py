@@ -1,0 +1,114 @@
+"""The bins of direction by which a radiance cache keeps light, and how fine they are."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+from numpy.typing import NDArray
+
+from optisense.optics.backend.sequences import unit_float
+from optisense.optics.scene.surface_cells import SurfaceCells, bin_axis
+
+
+@dataclass(frozen=True)
+class DirectionBins:
+    """Bins of equal solid angle: bands about the mean normal of the surfaces, each of as many
+    sectors of azimuth.
+
+    With sharp edges between bins, a point above the surface would count a lamp twice or not at all,
+    depending on how near an edge the lamp lies; sums over overlapping bins hardly depend on where
+    the edges lie.
+
+    Attributes:
+        across: number of bands, and of sectors in each; even.
+        overlap: half-width, in bins, of the triangular density by which directions are spread over
+            neighbouring bins. At 1 each bin holds what a quadratic B-spline weights.
+    """
+
+    across: int
+    overlap: float
+
+    @property
+    def count(self) -> int:
+        """Number of bins."""
+        return self.across * self.across
+
+    @classmethod
+    def for_roughness(cls, roughness: float | None) -> DirectionBins:
+        """The bins for coatings whose sharpest metallic lobe has this GGX alpha; None for diffuse
+        coatings.
+        """
+        if roughness is None or roughness >= BROAD_LOBE:
+            return DIFFUSE_BINS
+        return FINE_BINS if roughness >= NARROW_LOBE else FINEST_BINS
+
+
+DIFFUSE_BINS = DirectionBins(16, 1.0)
+"""The bins for diffuse coatings and broad lobes."""
+FINE_BINS = DirectionBins(24, 0.6)
+"""The bins for lobes that resolve the lamps."""
+FINEST_BINS = DirectionBins(32, 0.6)
+"""The bins for lobes that are narrower than most lamps."""
+BROAD_LOBE = 0.5
+"""GGX alpha from which on a lobe is so broad that the bins of diffuse coatings do."""
+NARROW_LOBE = 0.25
+"""GGX alpha below which the finest bins are needed: the error in a contact of GelSight Mini of
+alpha 0.05 is 6.9 % with them and 11.9 % with the next coarser ones; at 0.4 it is 1.4 and 1.6 %."""
+
+
+def direction_bin(
+    cells: SurfaceCells,
+    bins: DirectionBins,
+    direction: mi.Vector3f,
+    bands_off: mi.Float,
+    sectors_off: mi.Float,
+) -> mi.UInt32:
+    """The bin of a unit direction, or one beside it.
+
+    Args:
+        cells: their frame is that of the bins.
+        bins: the bins.
+        direction: unit vectors.
+        bands_off: offset in bands.
+        sectors_off: offset in sectors.
+    """
+    x, y, z = (dr.dot(direction, bin_axis(cells, k)) for k in range(3))
+    across = dr.opaque(mi.Float, float(bins.across))
+    last = mi.UInt32(across) - 1
+    place = (z + 1) * (across / 2) + bands_off
+    # Beyond a pole: back from it.
+    place = dr.select(place > across, 2 * across - place, dr.abs(place))
+    band = dr.minimum(mi.UInt32(place), last)
+    turn = dr.atan2(y, x) * (1 / dr.two_pi) + sectors_off / across
+    turn -= dr.floor(turn)
+    return band * mi.UInt32(across) + dr.minimum(mi.UInt32(turn * across), last)
+
+
+def dither(
+    place: mi.Vector4f, direction: mi.Vector3f, bins: DirectionBins
+) -> tuple[mi.Float, mi.Float]:
+    """Random offsets in bands and sectors, of a triangular density over the overlap of bins.
+
+    They are a hash of the landing, as landings come in no fixed order.
+    """
+    reach = dr.opaque(mi.Float, bins.overlap)
+    first, second, third = (
+        dr.reinterpret_array(mi.UInt32, value) for value in (place.x, place.y, direction.x)
+    )
+    both = mi.sample_tea_32(first ^ (third * 747796405), second)
+    one, other = (reach * (unit_float(each) + unit_float(each * 277803737) - 1) for each in both)
+    return one, other
+
+
+def bin_centres(cells: SurfaceCells, bins: DirectionBins, chosen: NDArray[np.integer]) -> mi.Float:
+    """The middle direction of each of the chosen bins, four floats each."""
+    z = (chosen // bins.across + 0.5) * (2 / bins.across) - 1
+    turn = (chosen % bins.across + 0.5) * (2 * np.pi / bins.across)
+    flat = np.sqrt(1 - z * z)
+    local = np.stack([flat * np.cos(turn), flat * np.sin(turn), z], axis=1)
+    out = np.zeros((len(chosen), 4), dtype=np.float32)
+    out[:, :3] = local @ cells.axes
+    return mi.Float(out.ravel())
