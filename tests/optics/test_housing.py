@@ -1,0 +1,109 @@
+"""Housings: a blocker reflects what its material says, and absorbs all light without one."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from optisense.design import SensorDesign
+from optisense.geometry import TriangleMesh
+from optisense.geometry.mesh import grid_faces
+from optisense.optics import OpticalModel
+from optisense.optics.scene.surfaces import Region
+from optisense.optics.transport.emission_guide import uniform_guide
+from optisense.optics.transport.photon_map import SURFACE_SHIFT
+from optisense.optics.transport.photons import Emission, trace_photons
+
+RADIUS = 10.0
+PORT = 40.0
+"""Degrees from the axis to which the sensing surface reaches on the sphere."""
+
+PHOTONS = 200_000
+LANDED = 0.01
+"""Relative, of sums over tens of thousands of landings; the sphere is a polyhedron."""
+
+
+def zone(first: float, last: float) -> TriangleMesh:
+    """The part of a sphere between two polar angles (degrees), facing inward."""
+    rows = max(4, round((last - first) / 2))
+    polar = np.radians(np.linspace(first, last, rows + 1))
+    turn = np.linspace(0.0, 2 * np.pi, 181)
+    p, t = np.meshgrid(polar, turn, indexing="ij")
+    points = RADIUS * np.stack([np.sin(p) * np.cos(t), np.sin(p) * np.sin(t), np.cos(p)], axis=-1)
+    mesh = TriangleMesh(points.reshape(-1, 3), grid_faces(rows + 1, len(turn))).welded()
+    inward = (mesh.face_vectors * mesh.triangles.mean(axis=1)).sum() < 0
+    return mesh if inward else mesh.flipped()
+
+
+def sphere(reflectance: float | None, coating: float = 0.0) -> SensorDesign:
+    """A sphere whose top is the sensing surface; a narrow lamp in its middle shines down."""
+    housing = {"role": "blocker", "mesh": "meshes/housing.obj"}
+    if reflectance is not None:
+        housing["material"] = "paint"
+    design = SensorDesign.model_validate(
+        {
+            "schema_version": 1,
+            "name": "integrating sphere",
+            "coating": {
+                "reflectance": [coating] * 3, "eta": [1.0] * 3, "k": [0.0] * 3, "specularity": 0.0,
+            },
+            "materials": {"paint": {"kind": "diffuse", "reflectance": [reflectance or 0.0] * 3}},
+            "parts": {
+                "skin": {"role": "sensing_surface", "mesh": "meshes/skin.obj"},
+                "housing": housing,
+            },
+            "lights": {
+                "white": {
+                    "model": "own", "colour": [1, 1, 1], "flux": 3.0,
+                    "emitter": {"kind": "spot", "beam": 5.0, "cutoff": 10.0},
+                    "lights": [{"position": [0, 0, 0], "direction": [0, 0, -1]}],
+                }
+            },
+            "camera": {
+                "model": "own", "projection": "perspective", "fov": 60, "resolution": [64, 48],
+                "position": [0, 0, -2], "direction": [0, 0, 1], "up": [0, 1, 0],
+            },
+        }
+    )  # fmt: skip
+    design.meshes.update(skin=zone(0.0, PORT), housing=zone(PORT, 180.0))
+    return design
+
+
+def landed(model: OpticalModel) -> float:
+    """The share of the lamp's light that lands on the sensing surface."""
+    emission = Emission(model._emitter_table, uniform_guide(1), PHOTONS, 1)
+    found = trace_photons(model.scene, emission, coloured=False)
+    place = np.asarray(found.place)[: 4 * found.count].reshape(-1, 4)
+    surface = place[:, 3].copy().view(np.uint32) >> SURFACE_SHIFT
+    skin = [k for k, p in enumerate(model._pieces) if p.surface.region is Region.SENSING]
+    return float(np.asarray(found.power)[: found.count][np.isin(surface, skin)].sum())
+
+
+SHARE = (1 - np.cos(np.radians(PORT))) / 2
+"""Of the sphere's area, the sensing surface's."""
+
+
+@pytest.mark.parametrize("reflectance", [0.2, 0.8, 0.95])
+def test_a_white_sphere_sends_its_light_out_of_the_port(reflectance: float) -> None:
+    """Every point of a sphere lights all others alike: r f / (1 - r (1 - f))."""
+    expected = reflectance * SHARE / (1 - reflectance * (1 - SHARE))
+    assert landed(OpticalModel(sphere(reflectance))) == pytest.approx(expected, rel=LANDED)
+
+
+def test_a_housing_without_a_material_absorbs_all_light() -> None:
+    assert landed(OpticalModel(sphere(None))) == 0.0
+
+
+@pytest.mark.parametrize("estimator", ["radiance-cache", "sppm"])
+def test_the_skin_in_a_white_sphere_is_evenly_bright(estimator: str) -> None:
+    """Irradiance F r / (A (1 - r (1 - f) - c f)) for a coating of reflectance c."""
+    wall, coating = 0.8, 0.5
+    image = OpticalModel(sphere(wall, coating)).render(
+        resolution=(64, 48), photons=1_000_000, estimator=estimator
+    )
+    area = 4 * np.pi * RADIUS**2
+    irradiance = 1.0 * wall / (area * (1 - wall * (1 - SHARE) - coating * SHARE))
+    expected = coating / np.pi * irradiance
+    middle = image.radiance[12:36, 16:48]
+    assert middle.mean() == pytest.approx(expected, rel=0.02)
+    assert middle.mean(axis=2).std() < 0.1 * expected
