@@ -10,6 +10,7 @@ from pydantic import Field, model_validator
 
 from optisense.design.emitters import LightModel
 from optisense.design.fields import Colour, Direction, Model, Name, NonNegative, Vector
+from optisense.design.spectrum import LightSpectra
 
 
 class Light(Model):
@@ -29,6 +30,9 @@ class LightGroup(Model):
         description="mW, radiant flux of each light, over all channels"
     )
     emitter: LightModel | None = Field(default=None, description="instead of the library's light")
+    spectrum: LightSpectra | None = Field(
+        default=None, description="of the red, green and blue dies; without, each has its channel"
+    )
     lights: Annotated[list[Light], Field(min_length=1)] = Field(
         description="position in mm, direction of any length"
     )
@@ -40,6 +44,11 @@ class LightGroup(Model):
         return self
 
     def channel_flux(self) -> NDArray[np.float64]:
-        """(3,) mW: the radiant flux of each light in R, G and B; they sum to `flux`."""
+        """(3,) mW: the radiant flux of each light in R, G and B; they sum to `flux`.
+
+        `colour` shares the flux among the dies, and `spectrum` the light of each die among R, G
+        and B.
+        """
         colour = np.array(self.colour)
-        return np.asarray(self.flux * colour / colour.sum())
+        dies = self.flux * colour / colour.sum()
+        return np.asarray(dies if self.spectrum is None else dies @ self.spectrum.spread())

@@ -80,6 +80,7 @@ class SensorDesign(Model):
     def _references_hold(self) -> SensorDesign:
         for name, part in self.parts.items():
             self._check_material(name, part)
+        for name, part in self.parts.items():
             check_finishes(name, part, self.materials)
         if not any(part.role is Role.SENSING_SURFACE for part in self.parts.values()):
             raise MisfitError("no part is a sensing_surface", ("parts",), "Give one part this role")

@@ -188,6 +188,8 @@ def _lights(scene: bpy.types.Scene, before: dict[str, Any]) -> dict[str, Any]:
         emitter = emitter_values(group, was.get("emitter"))
         if emitter is not None:
             values["emitter"] = emitter
+        if was.get("spectrum") is not None:
+            values["spectrum"] = was["spectrum"]
         groups[group.name] = {**values, "lights": poses}
     return groups
 

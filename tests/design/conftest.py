@@ -96,6 +96,10 @@ def full_data() -> dict[str, object]:
             "red": {"model": "smd-3528", "colour": [1, 0, 0.5], "flux": 12.5, "lights": [light]},
             "own-area": {
                 "model": "mine", "colour": [0, 1, 0], "flux": 1e-3, "lights": [light],
+                "spectrum": {
+                    "red": {"wavelength": 622, "half_width": 18}, "green": {"wavelength": 530},
+                    "blue": {"wavelength": 470, "half_width": 25},
+                },
                 "emitter": {
                     "kind": "area", "shape": "rectangle", "size": [2, 1], "lambertian": True
                 },

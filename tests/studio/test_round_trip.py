@@ -57,10 +57,13 @@ def test_what_blender_does_not_show_of_a_design_comes_back(scene: Any, tmp_path:
     file = tmp_path / "plain" / "design.yaml"
     frost = "    faces: {end: {direction: [0, 1, 0], within: 10, roughness: 0.4}}\n"
     text = file.read_text().replace("  guide:\n", "  guide:\n" + frost)
+    spectrum = "    spectrum: {red: {wavelength: 622, half_width: 18}}\n"
+    text = text.replace("  red:\n", "  red:\n" + spectrum)
     file.write_text(text + "dispersion: true\n")
     bpy.ops.optisense.open(filepath=str(tmp_path / "plain"))
     assert bpy.ops.optisense.save_as(filepath=str(tmp_path / "saved")) == {"FINISHED"}
     before, after = (as_read(str(tmp_path / name))[0] for name in ("plain", "saved"))
+    assert before["lights"]["red"]["spectrum"]["red"]["wavelength"] == 622
     assert before["parts"]["guide"]["faces"]["end"]["roughness"] == 0.4
     assert after == before
 
