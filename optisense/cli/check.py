@@ -37,7 +37,9 @@ def check(design: DesignArgument, contact: ContactOption = None) -> None:
 
 
 def _describe(design: SensorDesign) -> None:
-    """Print what the design is made of."""
+    """Print what the design is made of, and how much of it the camera sees."""
+    from optisense.design.camera_checks import view_shares
+
     output.print(design.name, style="bold", markup=False)
     if design.description:
         output.print(design.description, markup=False)
@@ -66,6 +68,13 @@ def _describe(design: SensorDesign) -> None:
         f"{camera.resolution[0]} x {camera.resolution[1]} pixels",
         markup=False,
     )
+    shares = view_shares(design, design.deformed_meshes())
+    if shares is not None:
+        output.print(
+            f"        seen straight: {100 * shares[0]:.0f} % of the sensing surface is in the "
+            f"picture, and fills {100 * shares[1]:.0f} % of it",
+            markup=False,
+        )
     assumed = sum(entry.status == "assumed" for entry in design.provenance.values())
     if assumed:
         output.print(f"{assumed} of its values are marked as assumed.", style="yellow")

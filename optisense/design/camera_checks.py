@@ -155,19 +155,12 @@ def view_problems(design: SensorDesign, meshes: dict[str, TriangleMesh]) -> list
     Args:
         meshes: the deformed meshes, mm.
     """
-    skins = [meshes[name] for name in design.parts_of(Role.SENSING_SURFACE) if name in meshes]
-    if not skins or design.parts_of(Role.MIRROR):
+    shares = view_shares(design, meshes)
+    if shares is None:
         return []
-    camera, position = design.camera, np.array(design.camera.position)
+    camera, (share, picture) = design.camera, shares
+    skins = [meshes[name] for name in design.parts_of(Role.SENSING_SURFACE) if name in meshes]
     areas = [skin.face_areas for skin in skins]
-    seen = [
-        float(area[in_picture(camera, skin.triangles.mean(axis=1))].sum())
-        for skin, area in zip(skins, areas, strict=True)
-    ]
-    rays = straight_rays(camera)
-    blockers = [meshes[name] for name in design.parts_of(Role.BLOCKER) if name in meshes]
-    nearest = _first(skins, position, rays)
-    picture = float((np.isfinite(nearest) & (nearest < _first(blockers, position, rays))).mean())
     where = design.where("camera", "direction")
     if picture == 0.0 and not any(in_picture(camera, skin.vertices).any() for skin in skins):
         return [
@@ -179,13 +172,39 @@ def view_problems(design: SensorDesign, meshes: dict[str, TriangleMesh]) -> list
                 severity="warning",
             )
         ]
-    share = sum(seen) / max(sum(float(area.sum()) for area in areas), 1e-300)
     fine = all(np.sqrt(area.max()) < 0.1 * np.sqrt(area.sum()) for area in areas)
     if picture < LEAST_PICTURE:
         return [_small(f"the sensing surface fills {100 * picture:.0f} % of the picture", where)]
     if fine and share < LEAST_SKIN:
         return [_small(f"{100 * share:.0f} % of the sensing surface is in the picture", where)]
     return []
+
+
+def view_shares(
+    design: SensorDesign, meshes: dict[str, TriangleMesh]
+) -> tuple[float, float] | None:
+    """How much of the sensing surface is in the picture, seen straight, and of the picture on it.
+
+    Args:
+        meshes: the deformed meshes, mm.
+
+    Returns:
+        The share of the surface's area, by whole triangles, and that of the picture; None where
+        there is no sensing surface, or a mirror.
+    """
+    skins = [meshes[name] for name in design.parts_of(Role.SENSING_SURFACE) if name in meshes]
+    if not skins or design.parts_of(Role.MIRROR):
+        return None
+    camera, position = design.camera, np.array(design.camera.position)
+    seen = [
+        float(skin.face_areas[in_picture(camera, skin.triangles.mean(axis=1))].sum())
+        for skin in skins
+    ]
+    rays = straight_rays(camera)
+    blockers = [meshes[name] for name in design.parts_of(Role.BLOCKER) if name in meshes]
+    nearest = _first(skins, position, rays)
+    picture = float((np.isfinite(nearest) & (nearest < _first(blockers, position, rays))).mean())
+    return sum(seen) / max(sum(float(skin.face_areas.sum()) for skin in skins), 1e-300), picture
 
 
 def _small(message: str, where: str) -> Diagnostic:

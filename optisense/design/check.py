@@ -11,6 +11,7 @@ from optisense.design.addressing import get_value
 from optisense.design.arrangement import overlaps
 from optisense.design.cage_checks import cage_problems, half_caged
 from optisense.design.camera_checks import lens_problems, place_problems, view_problems
+from optisense.design.focus_checks import focus_problems
 from optisense.design.lens_checks import fold_problems
 from optisense.design.limits import unit_slips
 from optisense.design.material_checks import index_problems
@@ -41,10 +42,10 @@ def check_design(
     Meshes that are empty, not closed or not finite, unit slips, missing meshes, unknown lights,
     lights or a camera inside something opaque, a camera inside a solid or too near to a part, a
     field of view that no lens has, a lens that shows things twice, a refractive index that no
-    transparent material has, a sensing surface that faces the wrong way, lies off the elastomer or
-    mostly out of the camera's view, what cages have folded or pushed together, cages that would
-    tear a sensing surface off its elastomer, solids that overlap with one priority, and provenance
-    of values that don't exist.
+    transparent material has, a sensing surface that faces the wrong way, lies off the elastomer,
+    is mostly out of the camera's view or out of its focus, what cages have folded or pushed
+    together, cages that would tear a sensing surface off its elastomer, solids that overlap with
+    one priority, and provenance of values that don't exist.
     (Fields, ranges and references between parts are checked as soon as a design is made.)
 
     Args:
@@ -75,6 +76,7 @@ def check_design(
             problems += _check_sensing_surfaces(design, meshes)
             problems += place_problems(design, meshes)
             problems += view_problems(design, meshes)
+            problems += focus_problems(design, meshes)
             bent = cage_problems(design, meshes)
             problems += bent
             problems += half_caged(design, meshes)

@@ -7,7 +7,8 @@ import pytest
 
 from optisense import sensors
 from optisense.design import Diagnostic, SensorDesign, check_design, set_value
-from optisense.design.camera_checks import camera_fault
+from optisense.design.camera_checks import camera_fault, view_shares
+from optisense.design.focus_checks import apparent_distances
 from optisense.geometry import TriangleMesh
 
 
@@ -92,3 +93,47 @@ def test_a_camera_in_a_cavity_of_the_gel_is_fine(mini: SensorDesign) -> None:
     design = design.copy()
     design.meshes["gel"] = TriangleMesh.joined([gel, hole])
     assert fault(design) is None
+
+
+class TestFocus:
+    def out_of_focus(self, design: SensorDesign, distance: float, number: float) -> list[str]:
+        """What is said of a lens of 3 mm that is focused at a distance."""
+        blur = {"kind": "defocus", "focal_length": 3.0, "f_number": number}
+        camera = design.camera.model_dump(mode="json") | {
+            "blur": blur | {"focus_distance": distance}
+        }
+        problems = check_design(set_value(design, "camera", camera))
+        assert all(each.severity == "warning" for each in problems)
+        return [each.message for each in problems if "out of focus" in each.message]
+
+    def test_layers_appear_as_thick_as_they_are_over_their_index(self, mini: SensorDesign) -> None:
+        """13 mm of air, 5 mm of acrylic and 4.25 mm of gel, for a flat field of focus."""
+        apart = apparent_distances(mini, mini.deformed_meshes())
+        assert len(apart) == 48
+        middle = 13.0 + 5.0 / 1.491 + 4.25 / 1.41
+        assert apart == pytest.approx(middle, rel=1e-6)
+
+    def test_what_is_out_of_focus_is_told_with_its_circle(self, mini: SensorDesign) -> None:
+        assert self.out_of_focus(mini, 19.4, 2.0) == []
+        (said,) = self.out_of_focus(mini, 14.0, 2.0)
+        middle = 13.0 + 5.0 / 1.491 + 4.25 / 1.41
+        scale = 320.0 / (2.0 * np.tan(np.radians(52.157 / 2.0)))
+        circle = 1.5 * abs(1.0 / middle - 1.0 / 14.0) * scale
+        assert f"up to {circle:.1f} pixels; it appears 19.4 mm away" in said
+        assert self.out_of_focus(mini, 14.0, 40.0) == []
+
+    def test_a_camera_without_depth_of_field_says_nothing(self, mini: SensorDesign) -> None:
+        camera = mini.camera.model_dump(mode="json") | {"blur": {"kind": "gaussian", "width": 9.0}}
+        assert check_design(set_value(mini, "camera", camera)) == []
+
+
+def test_the_shares_of_the_view_follow_the_lens(mini: SensorDesign) -> None:
+    """A pincushion magnifies the borders, so that less of the skin is in the picture."""
+    shares = []
+    for k1 in (0.0, 0.5):
+        lens = {"distortion": {"kind": "brown-conrady", "k1": k1}}
+        design = set_value(mini, "camera", mini.camera.model_dump(mode="json") | lens)
+        found = view_shares(design, design.deformed_meshes())
+        assert found is not None and found[1] == 1.0
+        shares.append(found[0])
+    assert shares[1] < 0.95 * shares[0]

@@ -161,7 +161,7 @@ class TestView:
         data = design.model_dump(mode="json")
         del data["parts"]["mirror"], data["cages"]["mirror"]
         data["camera"] |= {"projection": "perspective", "fov": 20.0}
-        del data["camera"]["distortion"]
+        del data["camera"]["distortion"], data["camera"]["blur"]
         made = SensorDesign.model_validate(data)
         made.meshes.update({n: m for n, m in design.meshes.items() if n != "mirror"})
         made.lights["own-ies"].emitter._folder = design.lights["own-ies"].emitter._folder  # type: ignore[union-attr]

@@ -1,0 +1,117 @@
+"""What a camera of a design sees out of focus, along straight rays."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from optisense.design.arrangement import straight_rays
+from optisense.design.lenses.defocus import DISC_DEVIATION
+from optisense.design.parts import TRANSPARENT_SOLIDS, Role
+from optisense.design.problems import Diagnostic
+from optisense.design.sensor_design import SensorDesign
+from optisense.geometry import TriangleMesh
+from optisense.geometry.containment import inside
+from optisense.geometry.rays import ray_hits
+
+FloatArray = NDArray[np.float64]
+
+SHARP = 2.0
+"""Pixels: the largest circle of confusion of what is called sharp. A disc that is two pixels wide
+has a standard deviation of half a pixel, little more than that of a pixel itself (0.29)."""
+
+
+def focus_problems(design: SensorDesign, meshes: dict[str, TriangleMesh]) -> list[Diagnostic]:
+    """A sensing surface that is out of focus, if the camera's blur depends on depth.
+
+    Gel and other solids on the way make things appear nearer: a layer appears as thick as it is
+    over its index. Rays are not bent here, so this is a warning. With mirrors it says nothing.
+
+    Args:
+        meshes: the deformed meshes, mm.
+    """
+    camera = design.camera
+    if camera.blur is None or not camera.blur.by_depth or design.parts_of(Role.MIRROR):
+        return []
+    distance = apparent_distances(design, meshes)
+    if not distance.size:
+        return []
+    deviation = camera.blur.deviation(camera, 1.0 / distance)
+    circle = deviation / DISC_DEVIATION * camera.resolution[0]
+    soft = circle > SHARP
+    if not soft.any():
+        return []
+    near, far = distance.min(), distance.max()
+    place = f"{near:.3g} mm" if far - near < 0.05 * near else f"{near:.3g} to {far:.3g} mm"
+    middle = 0.5 * (1.0 / near + 1.0 / far)
+    return [
+        Diagnostic(
+            f"{100 * soft.mean():.0f} % of the sensing surface in view is out of focus: circles of "
+            f"confusion of up to {circle.max():.1f} pixels; it appears {place} away",
+            design.where("camera", "blur"),
+            f"Focus {1.0 / middle:.3g} mm away (camera.blur.focus_distance), or give a larger "
+            "f-number",
+            severity="warning",
+        )
+    ]
+
+
+def apparent_distances(design: SensorDesign, meshes: dict[str, TriangleMesh]) -> FloatArray:
+    """How far away the sensing surface appears along straight rays spread over the picture.
+
+    Along the axis for perspective lenses, whose field of focus is flat, else along the ray.
+
+    Args:
+        meshes: the deformed meshes, mm.
+
+    Returns:
+        (k,) mm, of the rays that meet it before any blocker.
+    """
+    camera, origin = design.camera, np.array(design.camera.position)
+    rays = straight_rays(camera)
+    nearest = np.full(len(rays), np.inf)
+    blocked = nearest.copy()
+    for name in design.parts_of(Role.SENSING_SURFACE, Role.BLOCKER):
+        if name in meshes:
+            found = nearest if design.parts[name].role is Role.SENSING_SURFACE else blocked
+            hits = ray_hits(meshes[name], origin + 0 * rays, rays)
+            np.minimum.at(found, hits.ray, hits.distance)
+    seen = np.isfinite(nearest) & (nearest < blocked)
+    rays, nearest = rays[seen], nearest[seen]
+    if not len(rays):
+        return nearest
+    distance = _reduced(design, meshes, origin, rays, nearest)
+    if camera.projection == "perspective":
+        distance = distance * (rays @ camera.axes()[2])
+    return distance
+
+
+def _reduced(
+    design: SensorDesign,
+    meshes: dict[str, TriangleMesh],
+    origin: FloatArray,
+    rays: FloatArray,
+    length: FloatArray,
+) -> FloatArray:
+    """(k,) mm: the lengths of rays (k, 3), each piece over the index of what it is in."""
+    solids = [
+        (design.parts[name].priority, getattr(design.materials[material], "ior", 1.0), meshes[name])
+        for name in design.parts_of(*TRANSPARENT_SOLIDS)
+        if name in meshes and (material := design.parts[name].material) is not None
+    ]
+    solids.sort(key=lambda each: each[0])
+    crossings = [[0.0, float(end)] for end in length]
+    for _, _, mesh in solids:
+        hits = ray_hits(mesh, origin + 0 * rays, rays)
+        for ray, at in zip(hits.ray.tolist(), hits.distance.tolist(), strict=True):
+            if at < length[ray]:
+                crossings[ray].append(at)
+    total = np.zeros(len(rays))
+    for ray, places in enumerate(crossings):
+        ends = np.sort(places)
+        middles = origin + 0.5 * (ends[1:] + ends[:-1])[:, None] * rays[ray]
+        index = np.ones(len(middles))
+        for _, ior, mesh in solids:
+            index = np.where(inside(middles, mesh), ior, index)
+        total[ray] = (np.diff(ends) / index).sum()
+    return total
