@@ -22,8 +22,7 @@ def main() -> None:
     options = _options()
     console = Console()
     about = results.machine()
-    if about["busy"]:
-        console.print(f"[yellow]The load is {about['load_at_start']}: timings will be noisy.")
+    results.say_if_busy(console, about)
 
     def tell(text: str) -> None:
         console.print(f"[dim]{text}")

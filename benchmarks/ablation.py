@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from rich.console import Console
 from scipy.ndimage import uniform_filter
 
-from benchmarks.results import machine
+from benchmarks.results import machine, say_if_busy
 from optisense import OpticalModel, sensors
 from optisense.design import set_value
 from optisense.geometry import Contact, Sphere
@@ -202,8 +202,7 @@ def main() -> None:
     options = parser.parse_args()
     console = Console()
     about = machine()
-    if about["busy"]:
-        console.print(f"[yellow]The load is {about['load_at_start']}: timings will be noisy.")
+    say_if_busy(console, about)
     path = FOLDER / "ablation.json"
     for name in (options.sensor,) if options.sensor else SENSORS:
         for coating in COATINGS:

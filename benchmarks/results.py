@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import argparse
 import datetime
 import json
 import os
 import platform
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
@@ -38,6 +39,44 @@ NAMES = {
     "after_specularity_change": "After a change of specularity",
     "new_process": "New process, command to files",
 }
+
+
+def measure_parts(
+    name: str,
+    about: str | None,
+    measures: Mapping[str, Callable[[], Mapping[str, Any]]],
+    table: Callable[[dict[str, Any]], str],
+) -> None:
+    """The command line of a benchmark of several parts: measure, print and write.
+
+    Args:
+        name: of its files, NAME.json and NAME.md, in this folder.
+        about: what the command says of itself.
+        measures: what measures each part.
+        table: makes Markdown of what was found, by part.
+    """
+    parser = argparse.ArgumentParser(description=about)
+    parser.add_argument("--only", choices=measures, help="measure one part only")
+    parser.add_argument("--dry", action="store_true", help="print only, write no results")
+    options = parser.parse_args()
+    console = Console()
+    here = machine()
+    say_if_busy(console, here)
+    path = FOLDER / f"{name}.json"
+    found = json.loads(path.read_text(encoding="utf-8")) if path.is_file() else {}
+    for part in (options.only,) if options.only else measures:
+        console.print(f"[dim]{part}")
+        found[part] = {"machine": here, **measures[part]()}
+        console.print_json(json.dumps(found[part]))
+        if not options.dry:
+            path.write_text(json.dumps(found, indent=1) + "\n", encoding="utf-8")
+            path.with_suffix(".md").write_text(table(found), encoding="utf-8")
+
+
+def say_if_busy(console: Console, about: Mapping[str, Any]) -> None:
+    """Warn where the machine, as of `machine`, has other work."""
+    if about["busy"]:
+        console.print(f"[yellow]The load is {about['load_at_start']}: timings will be noisy.")
 
 
 def machine() -> dict[str, Any]:

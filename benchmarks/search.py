@@ -6,8 +6,6 @@ file. It needs a machine that does nothing else.
 
 from __future__ import annotations
 
-import argparse
-import json
 import resource
 import tempfile
 import time
@@ -16,19 +14,15 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from rich.console import Console
 
 import optisense
-from benchmarks.results import machine
+from benchmarks.results import measure_parts
 from benchmarks.workers import workers
 from optisense.design import SensorDesign
 from optisense.search import Around, Outcome, Plan, SearchSpace, Study, run_study
 from optisense.search.evaluation.evaluator import Evaluator
 from optisense.search.executors import ProcessPool, Runner, SerialRunner
 from optisense.search.study.loop import StudyRun
-
-FOLDER = Path(__file__).parent
-PARTS = ("overhead", "workers", "coatings", "gradient", "mirror")
 
 MIRROR = {
     "cages.M1.points.x": Around(8.0),
@@ -66,24 +60,8 @@ def nothing(design: SensorDesign) -> float:
 
 def main() -> None:
     """Measure, print and write."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--only", choices=PARTS, help="measure one part only")
-    parser.add_argument("--dry", action="store_true", help="print only, write no results")
-    options = parser.parse_args()
-    console = Console()
-    about = machine()
-    if about["busy"]:
-        console.print(f"[yellow]The load is {about['load_at_start']}: timings will be noisy.")
-    path = FOLDER / "search.json"
-    found = json.loads(path.read_text(encoding="utf-8")) if path.is_file() else {}
-    measures = dict(zip(PARTS, (overhead, workers, coatings, gradient, mirror), strict=True))
-    for part in (options.only,) if options.only else PARTS:
-        console.print(f"[dim]{part}")
-        found[part] = {"machine": about, **measures[part]()}
-        console.print_json(json.dumps(found[part]))
-        if not options.dry:
-            path.write_text(json.dumps(found, indent=1) + "\n", encoding="utf-8")
-            (FOLDER / "search.md").write_text(_table(found), encoding="utf-8")
+    parts = (overhead, workers, coatings, gradient, mirror)
+    measure_parts("search", __doc__, {each.__name__: each for each in parts}, _table)
 
 
 def overhead() -> dict[str, Any]:

@@ -7,23 +7,19 @@ seconds tell more than the others.
 
 from __future__ import annotations
 
-import argparse
-import json
 import sys
 import tempfile
-from pathlib import Path
+from functools import partial
 from typing import Any
 
 import numpy as np
-from rich.console import Console
 
-from benchmarks.results import machine
+from benchmarks.results import measure_parts
 from benchmarks.timing import Time, medians, run_child, timed
 from optisense import OpticalModel, sensors
 from optisense.geometry import Contact, Sphere
 from optisense.optics import TactileImage
 
-FOLDER = Path(__file__).parent
 NAMES = ("gelsight-mini", "gelbelt", "gelsight360", "gelsight-svelte")
 RESOLUTION = (320, 240)
 WANTED_NOISE = 0.03
@@ -43,23 +39,7 @@ TARGETS = {"load_and_check": 1.0, "image": 1.5, "first_image": 8.0}
 
 def main() -> None:
     """Measure, print and write."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--only", choices=NAMES, help="measure one sensor only")
-    parser.add_argument("--dry", action="store_true", help="print only, write no results")
-    options = parser.parse_args()
-    console = Console()
-    about = machine()
-    if about["busy"]:
-        console.print(f"[yellow]The load is {about['load_at_start']}: timings will be noisy.")
-    path = FOLDER / "sensors.json"
-    found = json.loads(path.read_text(encoding="utf-8")) if path.is_file() else {}
-    for name in (options.only,) if options.only else NAMES:
-        console.print(f"[dim]{name}")
-        found[name] = {"machine": about, **measure(name)}
-        console.print_json(json.dumps(found[name]))
-        if not options.dry:
-            path.write_text(json.dumps(found, indent=1) + "\n", encoding="utf-8")
-            (FOLDER / "sensors.md").write_text(table(found), encoding="utf-8")
+    measure_parts("sensors", __doc__, {name: partial(measure, name) for name in NAMES}, table)
 
 
 def measure(name: str) -> dict[str, Any]:
