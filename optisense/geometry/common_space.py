@@ -37,15 +37,28 @@ def common_space(first: TriangleMesh, second: TriangleMesh, thinnest: float) -> 
 def _found(first: TriangleMesh, second: TriangleMesh, thinnest: float) -> FloatArray | None:
     if find_meeting(first, second) is None:
         return None
-    for piece in (_manifold(first) ^ _manifold(second)).decompose():
+    return thick_place(as_manifold(first) ^ as_manifold(second), thinnest)
+
+
+def thick_place(common: Any, thinnest: float) -> FloatArray | None:
+    """The middle of a piece of a common space that is thicker than a contact.
+
+    Args:
+        common: of manifold3d.
+        thinnest: mm, twice the volume of a piece over its surface.
+
+    Returns:
+        (3,) mm; None where all pieces are thinner.
+    """
+    for piece in common.decompose():
         if 2.0 * piece.volume() > thinnest * piece.surface_area():
             box = np.array(piece.bounding_box(), dtype=np.float64)
             return 0.5 * (box[:3] + box[3:])
     return None
 
 
-def _manifold(mesh: TriangleMesh) -> Any:
-    """As manifold3d has it; empty where the mesh is no clean volume."""
+def as_manifold(mesh: TriangleMesh) -> Any:
+    """A mesh as manifold3d has it; empty, and its status says why, where it is no clean volume."""
     import manifold3d
 
     welded = mesh.welded()

@@ -26,6 +26,7 @@ from optisense.design.arrangement import EQUAL_INDEX
 from optisense.errors import DesignError, MeshError
 from optisense.geometry.anchors import Anchors, anchored
 from optisense.geometry.coincidence import Overlay, boxes_overlap, cut, find_coincident
+from optisense.geometry.common_space import as_manifold, thick_place
 from optisense.geometry.mesh import TriangleMesh
 from optisense.optics.scene.solids import AROUND, Interface, Sheet, Solid
 
@@ -268,7 +269,7 @@ def _disjoint(solids: list[Solid], tolerance: float) -> list[Solid]:
             continue
         # Where faces lie on one another a cut takes ten times as long; a little room parts them.
         smaller = _manifold(_grown(result[j], -CUT_CLEARANCE))
-        place = _overlap_place(_manifold(result[i]) ^ smaller, tolerance - CUT_CLEARANCE)
+        place = thick_place(_manifold(result[i]) ^ smaller, tolerance - CUT_CLEARANCE)
         if place is None:
             continue
         same_index = _alike(result[i], result[j])
@@ -304,21 +305,10 @@ def _grown(solid: Solid, room: float) -> Solid:
     return replace(solid, mesh=mesh.with_vertices(mesh.vertices + room * step))
 
 
-def _overlap_place(common: Any, tolerance: float) -> tuple[float, ...] | None:
-    """The middle of a common volume, or None when it is nowhere thicker than a contact."""
-    for part in common.decompose():
-        if 2.0 * part.volume() > tolerance * part.surface_area():
-            box = part.bounding_box()
-            return tuple(0.5 * (box[k] + box[k + 3]) for k in range(3))
-    return None
-
-
 def _manifold(solid: Solid) -> Any:
     import manifold3d
 
-    welded = solid.mesh.welded()
-    mesh = manifold3d.Mesh64(welded.vertices, welded.faces.astype(np.uint64))
-    result = manifold3d.Manifold(mesh)
+    result = as_manifold(solid.mesh)
     if result.status() != manifold3d.Error.NoError:
         raise MeshError(
             f"the solid is not a clean volume ({result.status().name}) and overlaps another part",
