@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -10,14 +11,12 @@ import typer
 
 from optisense.cli.console import EXIT_FAILURE, ends_well, messages, output
 from optisense.cli.options import DesignArgument, VariantOption, out_option
-from optisense.cli.output_folder import take_folder
 from optisense.cli.progress import progress_line
 from optisense.cli.sampling import (
-    BUILDING,
     LOADING,
-    expect_here,
     loading_steps,
     sample_steps,
+    sensor_to_press,
     shown_samples,
 )
 from optisense.commands.sampling import DatasetOptions
@@ -25,6 +24,7 @@ from optisense.time_left import TimedStep
 from optisense.usual_times import USUAL_PIXELS, UsualTimes
 
 if TYPE_CHECKING:
+    from optisense.design import SensorDesign
     from optisense.tasks import Dataset
 
 
@@ -52,27 +52,21 @@ def dataset(
     settings is left alone.
     """
 
-    def steps(times: UsualTimes, pixels: int = USUAL_PIXELS) -> list[TimedStep]:
+    def steps(times: UsualTimes, sensor: SensorDesign | None = None) -> list[TimedStep]:
+        pixels = USUAL_PIXELS
+        if sensor is not None:
+            pixels = math.prod(options.resolution or sensor.camera.resolution)
         work = SAMPLE_WORK * (0.5 + 0.5 * pixels / USUAL_PIXELS)
         return sample_steps(SAMPLES, options.photons, count, work, 0.2, times=times)
 
     try:
         with progress_line(*loading_steps(), *steps(UsualTimes.here())) as line:
             line.begin(LOADING)
-            from optisense.sensors import load
             from optisense.tasks import DatasetSettings, generate
 
             settings = DatasetSettings(**options.settings())
             settings.contacts.parsed()
-            sensor = load(design)
-            take_folder(out)
-
-            from optisense.optics import OpticalModel
-
-            line.begin(BUILDING)
-            width, height = options.resolution or sensor.camera.resolution
-            expect_here(line, sensor, lambda times: steps(times, width * height))
-            model = OpticalModel(sensor, variant)
+            model = sensor_to_press(line, design, out, variant, steps)
             show = shown_samples(line, model, SAMPLES, "reading the dataset")
             made = generate(model, out, count, settings, show)
     except KeyboardInterrupt:

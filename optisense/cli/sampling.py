@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from pathlib import Path
 from typing import TYPE_CHECKING
 
+from optisense.cli.output_folder import take_folder
 from optisense.cli.progress import ProgressLine
 from optisense.time_left import TimedStep
 from optisense.usual_times import BUILDING as BUILDING_TIME
@@ -60,6 +62,37 @@ def sample_steps(
         TimedStep(name, count, sample),
         TimedStep(_after(name), 1, after * usual.thread_pace, gauges=False),
     ]
+
+
+def sensor_to_press(
+    line: ProgressLine,
+    source: str,
+    out: Path | None,
+    variant: str,
+    steps: Callable[[UsualTimes, SensorDesign], list[TimedStep]],
+) -> OpticalModel:
+    """The sensor of a command: loaded, the folder of the results taken, its scene built.
+
+    Args:
+        line: has the steps of `loading_steps`.
+        source: names the design.
+        out: the folder, if there is one.
+        variant: of the renderer.
+        steps: makes the steps that follow for usual times and the design.
+
+    Raises:
+        OptiSenseError: the design can't be loaded or built, or the folder can't be taken.
+    """
+    from optisense.sensors import load
+
+    design = load(source)
+    if out is not None:
+        take_folder(out)
+    from optisense.optics import OpticalModel
+
+    line.begin(BUILDING)
+    expect_here(line, design, lambda times: steps(times, design))
+    return OpticalModel(design, variant)
 
 
 def expect_here(

@@ -10,29 +10,28 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from optisense import tasks
 from optisense.cli.console import ends_well, messages, output
 from optisense.cli.options import DesignArgument, VariantOption, out_option, parse_contacts
-from optisense.cli.output_folder import take_folder
 from optisense.cli.progress import progress_line
 from optisense.cli.sampling import (
-    BUILDING,
     LOADING,
-    expect_here,
     loading_steps,
     sample_steps,
+    sensor_to_press,
     shown_samples,
 )
 from optisense.cli.task_result import print_perception, print_reconstruction
 from optisense.commands.sampling import CylinderOptions, ReconstructionOptions, SampleOptions
 from optisense.time_left import TimedStep
 from optisense.usual_times import UsualTimes
+from optisense.writing import inside
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from optisense.tasks import (
-        PerceptionTask,
-    )
+    from optisense.design import SensorDesign
+    from optisense.tasks import PerceptionTask
 
 RESULT = "result.json"
 FIGURE = "figure.png"
@@ -91,9 +90,7 @@ def misalignment(
     """The angle between the sensor and a plane, from the mean colour in the middle."""
 
     def task() -> PerceptionTask:
-        from optisense.tasks import Misalignment
-
-        return Misalignment(range=angle, depth=depth, crop=crop)
+        return tasks.Misalignment(range=angle, depth=depth, crop=crop)
 
     _perceive(design, {"misalignment": task}, options, out, as_json, variant)
 
@@ -113,9 +110,7 @@ def cylinder_radius(
     least, most = options.radius
 
     def task() -> PerceptionTask:
-        from optisense.tasks import CylinderRadius
-
-        return CylinderRadius(least=least, most=most, depth=depth)
+        return tasks.CylinderRadius(least=least, most=most, depth=depth)
 
     _perceive(design, {"cylinder-radius": task}, options, out, as_json, variant)
 
@@ -131,19 +126,11 @@ def snr(
     variant: VariantOption = "auto",
 ) -> None:
     """The signal-to-noise ratio of both tasks' samples: how well colours tell, with no model."""
-
-    def angles() -> PerceptionTask:
-        from optisense.tasks import Misalignment
-
-        return Misalignment()
-
-    def radii() -> PerceptionTask:
-        from optisense.tasks import CylinderRadius
-
-        return CylinderRadius()
-
-    tasks = {"misalignment": angles, "cylinder-radius": radii}
-    _perceive(design, tasks, options, out, as_json, variant)
+    both: dict[str, Callable[[], PerceptionTask]] = {
+        "misalignment": lambda: tasks.Misalignment(),
+        "cylinder-radius": lambda: tasks.CylinderRadius(),
+    }
+    _perceive(design, both, options, out, as_json, variant)
 
 
 @task_app.command()
@@ -171,29 +158,20 @@ def reconstruction(
 
     count = options.presses + (len(contacts) if contacts is not None else USUAL_OBJECTS)
 
-    def steps(times: UsualTimes) -> list[TimedStep]:
+    def steps(times: UsualTimes, sensor: SensorDesign | None = None) -> list[TimedStep]:
         work, photons = PICTURE_WORK, options.photons
         return sample_steps(PICTURES, photons, count, work, FITTING_TIME, times=times)
 
     with progress_line(*loading_steps(LIBRARIES_TIME), *steps(UsualTimes.here())) as line:
         line.begin(LOADING)
-        from optisense.sensors import load
-        from optisense.tasks import ReconstructionSettings, reconstruct
-
-        settings = ReconstructionSettings(**options.model_dump())
-        sensor = load(design)
-        if out is not None:
-            take_folder(out)
-        from optisense.optics import OpticalModel
+        settings = tasks.ReconstructionSettings(**options.model_dump())
+        model = sensor_to_press(line, design, out, variant, steps)
+        show = shown_samples(line, model, PICTURES, "comparing")
+        result = tasks.reconstruct(model, settings, contacts, show)
+    if out is not None:
         from optisense.tasks.figures import draw_reconstruction
 
-        line.begin(BUILDING)
-        expect_here(line, sensor, steps)
-        model = OpticalModel(sensor, variant)
-        show = shown_samples(line, model, PICTURES, "comparing")
-        result = reconstruct(model, settings, contacts, show)
-    if out is not None:
-        _write(out, result.to_dict(), draw_reconstruction(result, sensor.camera.axes()))
+        _write(out, result.to_dict(), draw_reconstruction(result, model.design.camera.axes()))
     if as_json:
         _print_json(result.to_dict())
     else:
@@ -203,7 +181,7 @@ def reconstruction(
 
 def _perceive(
     design: str,
-    tasks: Mapping[str, Callable[[], PerceptionTask]],
+    wanted: Mapping[str, Callable[[], PerceptionTask]],
     options: SampleOptions,
     out: Path | None,
     as_json: bool,
@@ -211,9 +189,9 @@ def _perceive(
 ) -> None:
     """Run tasks, which are made by name, one after the other; several have a folder each."""
 
-    def steps(times: UsualTimes) -> list[TimedStep]:
+    def steps(times: UsualTimes, sensor: SensorDesign | None = None) -> list[TimedStep]:
         found: list[TimedStep] = []
-        for name in tasks:
+        for name in wanted:
             photons, count, again = options.photons, options.samples, bool(found)
             found += sample_steps(
                 name, photons, count, SAMPLE_WORK, READING_TIME, again=again, times=times
@@ -224,25 +202,15 @@ def _perceive(
     line_of_steps = progress_line(*loading_steps(LIBRARIES_TIME), *steps(UsualTimes.here()))
     with _keeping(out), line_of_steps as line:
         line.begin(LOADING)
-        from optisense.sensors import load
-        from optisense.tasks import SampleSettings, perceive
-        from optisense.writing import inside
-
-        settings = SampleSettings(**options.settings())
-        made = [make() for make in tasks.values()]
-        sensor = load(design)
-        if out is not None:
-            take_folder(out)
-        from optisense.optics import OpticalModel
+        settings = tasks.SampleSettings(**options.settings())
+        made = [make() for make in wanted.values()]
+        model = sensor_to_press(line, design, out, variant, steps)
         from optisense.tasks.figures import draw_perception
 
-        line.begin(BUILDING)
-        expect_here(line, sensor, steps)
-        model = OpticalModel(sensor, variant)
         for task in made:
-            folder = out if out is None or len(tasks) == 1 else inside(out, task.name)
+            folder = out if out is None or len(wanted) == 1 else inside(out, task.name)
             show = shown_samples(line, model, task.name, f"{task.name}: reading the samples")
-            results.append(perceive(task, model, settings, options.neighbours, folder, show))
+            results.append(tasks.perceive(task, model, settings, options.neighbours, folder, show))
             if folder is not None:
                 _write(folder, results[-1].to_dict(), draw_perception(results[-1]))
     if as_json:
