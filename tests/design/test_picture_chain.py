@@ -119,6 +119,15 @@ def test_a_part_of_a_picture_is_what_the_whole_has_there() -> None:
     assert FULL.spreads(light)
 
 
+def test_a_part_of_a_picture_is_blurred_as_it_is_in_the_whole() -> None:
+    light = np.random.default_rng(2).random((HEIGHT, WIDTH, 3)).astype(np.float32)
+    chain = PictureChain(focus=SoftFocus(np.linspace(0.0, 3.0 / WIDTH, 48).reshape(6, 8)))
+    whole, reach = chain.respond(light), chain.reach(WIDTH)
+    box = slice(26 - reach, 34 + reach), slice(36 - reach, 44 + reach)
+    part = chain.respond(light[box], PictureWindow.part(light.shape, box))
+    assert part[reach:-reach, reach:-reach] == pytest.approx(whole[26:34, 36:44], abs=1e-6)
+
+
 def test_black_that_is_subtracted_is_0_and_black_that_is_not_is_the_level() -> None:
     dark, bright = field(0.0, 0.0, 0.0), field(1.0, 1.0, 1.0)
     given = PictureChain(black_level=BlackLevel(level=0.0625))

@@ -10,6 +10,7 @@ import pytest
 from comparing import SCORE_ROUNDING, same_light
 
 import optisense as ots
+from optisense import library
 from optisense.design import SensorDesign, set_value
 from optisense.errors import ObjectiveError
 from optisense.objectives import Evaluation, Press, Settings, evaluate, find
@@ -50,6 +51,24 @@ def test_presses_are_those_of_a_rendering_under_these_lights(relighting: Relight
     for one, other in zip(relit.presses, rendered.presses, strict=True):
         assert (one.mask == other.mask).all()
         assert same_light(one.response, other.response)
+
+
+def test_presses_are_those_of_a_rendering_through_all_that_a_camera_does() -> None:
+    """Shading and noise belong to places of the picture, and blur reaches into what is cut."""
+    design = library.with_imaging(ots.load("gelsight-mini"), "pi-v2", focus_distance=24.0)
+    evaluation = Evaluation(OpticalModel(design), SMALL)
+    relighting = Relighting(Evaluation(evaluation.model, SMALL))
+    flux = relighting.flux_of(design)
+    assert relighting.exposure(flux) == pytest.approx(evaluation.exposure, rel=1e-5)
+    whole, cut = relighting.presses(flux, whole=True), relighting.presses(flux)
+    for seen, one, other in zip(evaluation.presses, whole, cut, strict=True):
+        assert np.abs(one.response[one.mask] - seen.response[seen.mask]).max() < 1e-3
+        assert np.abs(other.response[other.mask] - one.response[one.mask]).max() < 1e-3
+    calm = evaluation.model.picture_chain.without_noise().respond(
+        evaluation.untouched.radiance * np.float32(evaluation.exposure)
+    )
+    noise = evaluation.presses[0].response - calm
+    assert 0.01 < noise[~evaluation.presses[0].mask].std() < 0.1
 
 
 @pytest.mark.parametrize("exposure", ["auto", 500.0, 2500.0])

@@ -5,6 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from optisense.design.lenses import LensDistortion
+from optisense.design.lenses.brown_conrady import BrownConrady
+from optisense.design.lenses.kannala_brandt import KannalaBrandt
 from optisense.errors import RenderError
 from optisense.geometry import TriangleMesh
 from optisense.optics.backend.variant import use_variant
@@ -120,6 +123,31 @@ def test_a_shape_moved_a_little_changes_the_number_as_its_gradient_says(
     differences = (at(STEP) - at(-STEP)) / (2 * STEP)
     slope = float((gradient(rays()).parts[part] * move).sum())
     assert slope == pytest.approx(differences, rel=CLOSE, abs=CANCELS * rays().hit.sum())
+
+
+LENSES = [
+    (BrownConrady(k1=-0.15, k2=0.02), "k1", 0.004, 0.02),
+    (BrownConrady(k1=-0.15, p1=0.02), "p1", 0.004, 0.02),
+    (KannalaBrandt(k1=-0.05), "k1", 0.01, 0.02),
+]
+
+
+@pytest.mark.parametrize(("lens", "name", "step", "unit"), LENSES)
+def test_a_lens_bent_a_little_changes_the_number_as_its_gradient_says(
+    lens: LensDistortion, name: str, step: float, unit: float
+) -> None:
+    bent = {"equidistant": lens.projection == "equidistant"}
+
+    def at(change: float) -> float:
+        other = lens.model_copy(update={name: getattr(lens, name) + change})
+        return number(rays(**bent, distortion=other))
+
+    differences = (at(step) - at(-step)) / (2 * step)
+    found = rays(**bent, distortion=lens)
+    place = [field for field in type(lens).model_fields if field not in ("kind", "centre")]
+    slope = gradient(found).camera[13 + place.index(name)]
+    tolerance = CANCELS * found.hit.sum() * unit / step
+    assert slope == pytest.approx(differences, rel=0.03, abs=tolerance)
 
 
 @pytest.mark.parametrize(

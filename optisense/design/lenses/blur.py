@@ -77,10 +77,19 @@ def reach_of(deviation: float, width: int) -> int:
     return int(np.ceil(REACH * min(deviation, LARGEST) * width)) + 1
 
 
-def blurred(levels: FloatArray, deviation: FloatArray) -> FloatArray:
-    """Levels (h, w, 3) blurred by standard deviations in pixels, () or (h, w)."""
+def blurred(
+    levels: FloatArray, deviation: FloatArray, span: tuple[float, float] | None = None
+) -> FloatArray:
+    """Levels blurred by a width that may vary.
+
+    Args:
+        levels: (h, w, 3).
+        deviation: () or (h, w) standard deviation in pixels.
+        span: the least and the largest deviation in the whole picture where this is a part of it,
+            which is then blurred as it is in the whole.
+    """
     widths = np.asarray(deviation, dtype=np.float64)
-    low, high = float(widths.min()), float(widths.max())
+    low, high = span or (float(widths.min()), float(widths.max()))
     if high < LEAST_WIDTH:
         return levels
     if high - low < LEAST_WIDTH:

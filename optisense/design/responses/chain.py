@@ -68,6 +68,10 @@ class SoftFocus:
         at = np.meshgrid(down, across, indexing="ij")
         return window.width * map_coordinates(self.deviation, at, order=1, mode="nearest")
 
+    def span(self, width: int) -> tuple[float, float]:
+        """The least and the largest standard deviation, in pixels of a picture so many wide."""
+        return width * float(self.deviation.min()), width * self.largest
+
     @property
     def largest(self) -> float:
         """The largest standard deviation, a share of the picture's width."""
@@ -132,7 +136,7 @@ class PictureChain:
         """What fills the pixels of the sensor, before they overflow."""
         level: FloatArray = np.asarray(exposed, dtype=np.float32)
         if self.focus is not None:
-            level = blurred(level, self.focus.in_pixels(window))
+            level = blurred(level, self.focus.in_pixels(window), self.focus.span(window.width))
         if self.crosstalk is not None:
             level = mixed(level, self.crosstalk)
         return level if self.shading is None else level * self._transmission(window)
