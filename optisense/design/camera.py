@@ -108,6 +108,10 @@ class Camera(ImagingModel, Viewpoint):
         """Its response: the usual one where it names none."""
         return USUAL_RESPONSE if self.response is None else self.response
 
+    def view(self) -> dict[str, Any]:
+        """The numbers that its rays follow from, as plain values."""
+        return self.model_dump(include={*Viewpoint.model_fields, "distortion"} - {"model"})
+
     @property
     def angle_scale(self) -> float:
         """Widths of the picture a radian, in its middle."""

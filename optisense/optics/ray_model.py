@@ -184,7 +184,9 @@ class RayModel:
         if old.coating != design.coating:
             self._recoat()
         if old.camera != design.camera:
-            self._forget("surface", "_store", "picture_chain")
+            self._forget("picture_chain")
+        if old.camera.view() != design.camera.view():
+            self._forget("surface", "_store")
 
     def _recoat(self) -> None:
         coat = coating_surface(self.design.coating, self._parts.ior_before, Region.SENSING)

@@ -161,3 +161,22 @@ def test_pictures_are_noisy_by_their_seed_alone() -> None:
 @pytest.mark.parametrize("name", SENSORS.names())
 def test_the_built_in_sensors_have_plain_cameras(name: str) -> None:
     assert ots.load(f"builtin:{name}").camera.picture_chain().is_plain
+
+
+def test_light_is_kept_where_only_the_sensor_of_the_camera_changes() -> None:
+    design = mini()
+    camera = design.camera.model_dump(mode="json")
+    model = OpticalModel(design)
+    first = model.render((), (80, 60), photons=50_000)
+    store = model._store
+    sensor = {"noise": {"full_well": 900.0}, "tone_curve": {"kind": "gamma", "gamma": 2.0}}
+    model.set_design(ots.set_value(design, "camera", camera | sensor))
+    again = model.render((), (80, 60), photons=50_000)
+    assert model._store is store
+    assert np.allclose(again.radiance, first.radiance, rtol=1e-4)
+    assert again.chain.noise is not None
+    model.set_design(ots.set_value(design, "camera", camera | {"distortion": BARREL}))
+    assert model._store is not store
+    assert model.render((), (80, 60), photons=50_000).chain.is_plain
+    seen = model.chief_rays((80, 60)).points
+    assert np.abs(seen - OpticalModel(mini()).chief_rays((80, 60)).points).max() > 0.1

@@ -30,13 +30,13 @@ class Defocus(LensBlur):
 
     kind: Literal["defocus"] = "defocus"
     focal_length: Positive = Field(
-        description="of the lens", examples=[3.04], json_schema_extra=MILLIMETRES
+        description="mm, of the lens", examples=[3.04], json_schema_extra=MILLIMETRES
     )
     f_number: Positive = Field(
         description="focal length over the diameter of the entrance pupil", examples=[2.0]
     )
     focus_distance: Positive = Field(
-        description="from the entrance pupil to what is sharp, in air",
+        description="mm, from the entrance pupil to what is sharp, in air",
         examples=[25.0],
         json_schema_extra=MILLIMETRES,
     )
