@@ -59,6 +59,12 @@ RelativePath = Annotated[str, IN_FOLDER, Field(json_schema_extra={"format": "pat
 """A file inside the design folder."""
 
 
+def is_left_out(value: object) -> bool:
+    """Whether a field that later releases added says nothing: it is then not written, so that
+    designs without it stay what they were, down to their fingerprints."""
+    return value is None
+
+
 class Model(BaseModel):
     """Base of everything in a design file: unknown fields are refused, changes are checked."""
 

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
 from optisense.design.emitters import LightModel
-from optisense.design.fields import Colour, Direction, Model, Name, NonNegative, Vector
+from optisense.design.fields import Colour, Direction, Model, Name, NonNegative, Vector, is_left_out
 from optisense.design.spectrum import LightSpectra
 
 
@@ -31,7 +31,9 @@ class LightGroup(Model):
     )
     emitter: LightModel | None = Field(default=None, description="instead of the library's light")
     spectrum: LightSpectra | None = Field(
-        default=None, description="of the red, green and blue dies; without, each has its channel"
+        default=None,
+        exclude_if=is_left_out,
+        description="of the red, green and blue dies; without, each has its channel",
     )
     lights: Annotated[list[Light], Field(min_length=1)] = Field(
         description="position in mm, direction of any length"

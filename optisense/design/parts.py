@@ -17,6 +17,7 @@ from optisense.design.fields import (
     Number,
     RelativePath,
     Vector,
+    is_left_out,
 )
 
 
@@ -96,5 +97,7 @@ class Part(Model):
         default=0, description="where solids overlap, the higher one counts"
     )
     faces: dict[Name, FaceFinish] | None = Field(
-        default=None, description="frosted or painted faces of an elastomer or support, by name"
+        default=None,
+        exclude_if=is_left_out,
+        description="frosted or painted faces of an elastomer or support, by name",
     )

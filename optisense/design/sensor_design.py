@@ -12,7 +12,7 @@ from pydantic import Field, PrivateAttr, StringConstraints, model_validator
 
 from optisense.design.cage import Cage
 from optisense.design.camera import Camera
-from optisense.design.fields import MisfitError, Model, Name
+from optisense.design.fields import MisfitError, Model, Name, is_left_out
 from optisense.design.kinds import KindModel
 from optisense.design.lights import LightGroup
 from optisense.design.materials import CoatingModel, Material, kinds_for
@@ -66,7 +66,9 @@ class SensorDesign(Model):
         default_factory=dict, description="control points that deform parts"
     )
     dispersion: bool | None = Field(
-        default=None, description="whether R, G and B are refracted by indices of their own"
+        default=None,
+        exclude_if=is_left_out,
+        description="whether R, G and B are refracted by indices of their own",
     )
     provenance: dict[str, Provenance] = Field(
         default_factory=dict, description="where the numbers come from, by dotted path"

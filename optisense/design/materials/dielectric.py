@@ -15,6 +15,7 @@ from optisense.design.fields import (
     NonNegativeRGB,
     Number,
     Positive,
+    is_left_out,
 )
 from optisense.design.materials.base import RGB, Material, Medium
 from optisense.design.materials.optical_constants import (
@@ -73,18 +74,21 @@ class Dielectric(Material):
     roughness: Fraction = Field(default=0.0, description="GGX alpha of its surface, 0 is smooth")
     absorption: NonNegativeRGB | None = Field(
         default=None,
+        exclude_if=is_left_out,
         description="absorption coefficient at R, G, B",
         examples=[(0.0, 0.0, 0.0)],
         json_schema_extra=PER_MM,
     )
     extinction: NonNegativeRGB | None = Field(
         default=None,
+        exclude_if=is_left_out,
         title="Index, imaginary",
         description="imaginary part of the index at R, G, B, in place of absorption",
         examples=[(0.0, 0.0, 0.0)],
     )
     transmittance: Colour | None = Field(
         default=None,
+        exclude_if=is_left_out,
         title="Plate's transmittance",
         description="measured at R, G, B through a polished plate in air, its reflections "
         "included, in place of absorption",
@@ -92,6 +96,7 @@ class Dielectric(Material):
     )
     thickness: Positive | None = Field(
         default=None,
+        exclude_if=is_left_out,
         title="Plate's thickness",
         description="of that plate",
         examples=[3.0],
@@ -99,12 +104,14 @@ class Dielectric(Material):
     )
     sellmeier_b: tuple[Number, Number, Number] | None = Field(
         default=None,
+        exclude_if=is_left_out,
         title="Sellmeier B",
         description="coefficients B of n^2 = 1 + sum of B L^2 / (L^2 - C); 0 for unused terms",
         examples=[(1.0, 0.0, 0.0)],
     )
     sellmeier_c: tuple[Number, Number, Number] | None = Field(
         default=None,
+        exclude_if=is_left_out,
         title="Sellmeier C",
         description="coefficients C of the same terms",
         examples=[(0.01, 0.0, 0.0)],
@@ -112,6 +119,7 @@ class Dielectric(Material):
     )
     cauchy: tuple[Number, Number, Number] | None = Field(
         default=None,
+        exclude_if=is_left_out,
         description="A, B and C of n = A + B / L^2 + C / L^4, L in micrometres",
         examples=[(1.5, 0.004, 0.0)],
     )
