@@ -21,6 +21,7 @@ _HOMES = {
     "apply": "apply",
     "report": "report",
     "tolerance": "tolerance",
+    "ledger": "ledger",
     "export": "export",
     "studio": "studio",
     "engine": "engine",

@@ -122,7 +122,7 @@ class _Recording:
     crossings: Records
 
 
-def _launch(scene: RayScene, emission: Emission, lights: mi.UInt32) -> tuple[_Flight, mi.UInt32]:
+def launch(scene: RayScene, emission: Emission, lights: mi.UInt32) -> tuple[_Flight, mi.UInt32]:
     """Photons as they leave the lights, and the guide's cell of each.
 
     Where indices differ between channels, each photon is light of one channel, the channels in
@@ -224,7 +224,7 @@ def _trace(
         The guide's cell of each photon, or all ones if it never landed.
     """
     photons = emission.per_light * dr.width(lights)
-    flight, cell = _launch(scene, emission, lights)
+    flight, cell = launch(scene, emission, lights)
     arrived = dr.zeros(mi.UInt32, photons)
     stages = STAGES if photons > MIN_GATHERED_PHOTONS else ()
     limits = [*np.cumsum(stages, dtype=int).tolist(), MAX_DEPTH]

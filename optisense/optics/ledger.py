@@ -1,0 +1,179 @@
+"""The light ledger of a sensor: where the milliwatts of each light group go."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import mitsuba as mi
+import numpy as np
+from numpy.typing import NDArray
+
+from optisense.errors import RenderError
+from optisense.optics.scene.ray_scene import Piece
+from optisense.optics.scene.surface_cells import build_cells, cells_near
+from optisense.optics.scene.surfaces import Region, SurfaceKind
+from optisense.optics.transport.light_ledger import Fate, trace_ledger
+from optisense.optics.transport.photons import TargetCells
+
+if TYPE_CHECKING:
+    from optisense.optics.model import OpticalModel
+
+LEDGER_PHOTONS = 1_000_000
+"""Photons of a ledger: shares of a hundredth are then right to some per cent of themselves."""
+
+VIEW_CELL = 0.5
+"""mm: side of the cells of the sensing surface that tell whether the camera looks there."""
+
+IN_VIEW = 1.0
+"""mm: largest distance from the middle of a cell in view to the nearest point that a ray of a
+96 x 72 picture meets; on the largest sensor these are 0.9 mm apart."""
+
+GIVEN_UP = "given up after 64 surfaces"
+SEEN, UNSEEN = "coating in view", "coating out of view"
+FACETS = "lost between the facets of rough faces"
+
+
+@dataclass(frozen=True)
+class LedgerEntry:
+    """One line of a ledger.
+
+    Attributes:
+        group: the light group.
+        where: what the light meets in the end, in words.
+        power: mW, over all channels and lights of the group.
+        share: of the group's power, 0 to 1.
+        noise: standard deviation of the share.
+    """
+
+    group: str
+    where: str
+    power: float
+    share: float
+    noise: float
+
+
+@dataclass(frozen=True)
+class LightLedger:
+    """Where the light goes.
+
+    Attributes:
+        emitted: mW of each light group.
+        entries: its lines, the largest of each group first.
+        photons: that were followed.
+    """
+
+    emitted: dict[str, float]
+    entries: list[LedgerEntry]
+    photons: int
+
+    def places(self) -> list[str]:
+        """All that light meets in the end, what takes most of it first."""
+        total: dict[str, float] = {}
+        for entry in self.entries:
+            total[entry.where] = total.get(entry.where, 0.0) + entry.power
+        return sorted(total, key=lambda where: -total[where])
+
+    def share(self, group: str, where: str) -> float:
+        """Of a group's power; 0 where none of it goes."""
+        found = (e.share for e in self.entries if (e.group, e.where) == (group, where))
+        return next(found, 0.0)
+
+    def closing_sum(self, group: str) -> float:
+        """The sum of all shares of a group: 1 up to rounding."""
+        return sum(entry.share for entry in self.entries if entry.group == group)
+
+    def as_data(self) -> dict[str, Any]:
+        """As plain numbers and names, to be written as JSON."""
+        return {
+            "units": {"power": "mW"},
+            "photons": self.photons,
+            "emitted": self.emitted,
+            "entries": [vars(entry) for entry in self.entries],
+        }
+
+
+def light_ledger(model: OpticalModel, photons: int = LEDGER_PHOTONS, seed: int = 0) -> LightLedger:
+    """Follow photons from all lights, and sum up where their light goes.
+
+    No contact presses. What a photon loses at each place adds up to its power, so that the ledger
+    closes, whatever the noise of its lines.
+
+    Args:
+        model: the sensor.
+        photons: of all lights together.
+        seed: another one gives other photons.
+
+    Raises:
+        RenderError: there are too few photons.
+    """
+    lights = [group for group in model.design.lights.values() for _ in group.lights]
+    if photons < 100 * len(lights):
+        raise RenderError(
+            f"{photons} photons are too few for {len(lights)} lights",
+            hint=f"give at least {100 * len(lights)}",
+        )
+    pieces = model._pieces
+    bookings = trace_ledger(
+        model.scene, model._emitter_table, len(pieces), _view(model), photons, seed
+    )
+    entries: list[LedgerEntry] = []
+    emitted = {}
+    for number, (name, group) in enumerate(model.design.lights.items()):
+        emitted[name] = float(group.flux * len(group.lights))
+        flux = group.channel_flux()
+        lines: dict[str, NDArray[np.float64]] = {}
+        for surface, fate, where in _places(pieces):
+            power = bookings.power[:, number, :, surface, fate] @ flux
+            lines[where] = lines.get(where, 0.0) + power
+        lines[GIVEN_UP] = bookings.rest[:, number] @ flux
+        entries += sorted(_entries(name, lines, emitted[name]), key=lambda entry: -entry.power)
+    return LightLedger(emitted, entries, photons)
+
+
+def _entries(
+    group: str, lines: dict[str, NDArray[np.float64]], emitted: float
+) -> Iterator[LedgerEntry]:
+    for where, batches in lines.items():
+        power = float(batches.mean())
+        if power != 0.0:
+            noise = float(batches.std(ddof=1) / np.sqrt(len(batches)))
+            yield LedgerEntry(group, where, power, power / emitted, noise / emitted)
+
+
+def _view(model: OpticalModel) -> TargetCells:
+    """Where on the sensing surface the camera looks."""
+    mesh = model.sensing
+    cells = build_cells(mesh.vertices, mesh.faces, VIEW_CELL)
+    rays = model.chief_rays((96, 72))
+    points = rays.points[rays.hit].astype(np.float64)
+    near = cells_near(cells, points, IN_VIEW) if len(points) else np.zeros(cells.cells, dtype=bool)
+    return TargetCells(cells, mi.UInt32(near.astype(np.uint32)))
+
+
+def _places(pieces: list[Piece]) -> Iterator[tuple[int, Fate, str]]:
+    """What each row of the bookings stands for."""
+    for number, piece in enumerate(pieces):
+        solid, around, name = _names(piece)
+        yield number, Fate.SEEN, SEEN
+        yield number, Fate.ABSORBED, name
+        yield number, Fate.BEHIND, f"absorbed in {solid}"
+        yield number, Fate.BEFORE, f"absorbed in {around}"
+        yield number, Fate.ESCAPED, f"escaped from {solid}"
+    for fate in (Fate.SEEN, Fate.ABSORBED, Fate.BEHIND):
+        yield len(pieces), fate, GIVEN_UP
+    yield len(pieces), Fate.BEFORE, "absorbed around the lights"
+    yield len(pieces), Fate.ESCAPED, "escaped at once"
+
+
+def _names(piece: Piece) -> tuple[str, str, str]:
+    """Of a surface: the solid behind it, what is in front of it, and who absorbs at it."""
+    kind = piece.surface.kind
+    if kind is SurfaceKind.LIGHT:
+        return "a light", "front of a light", "absorbed by lights"
+    if kind is not SurfaceKind.DIELECTRIC:
+        seen = piece.surface.region is Region.SENSING
+        return piece.name, f"front of {piece.name}", UNSEEN if seen else f"absorbed by {piece.name}"
+    solids = piece.name.split("|")[0].split("/")
+    return solids[0], solids[1] if len(solids) > 1 else "air", FACETS

@@ -1,0 +1,122 @@
+"""The light ledger: it closes, and its lines are those that can be calculated."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+from test_housing import SHARE, sphere
+from typer.testing import CliRunner
+
+import optisense as ots
+from optisense.cli import app
+from optisense.design.materials import Absorber, Dielectric
+from optisense.errors import RenderError
+from optisense.optics import OpticalModel
+from optisense.optics.ledger import (
+    FACETS,
+    GIVEN_UP,
+    SEEN,
+    UNSEEN,
+    LightLedger,
+    light_ledger,
+)
+
+PHOTONS = 200_000
+
+CLOSES = 1e-5
+"""The sum of a group is 1 up to the rounding of single precision."""
+
+SENSORS = ("gelsight-mini", "gelbelt", "gelsight360", "gelsight-svelte")
+
+
+def ledger_of(design: ots.SensorDesign, photons: int = PHOTONS) -> LightLedger:
+    return light_ledger(OpticalModel(design), photons)
+
+
+@pytest.mark.parametrize("name", SENSORS)
+def test_it_closes_on_every_sensor(name: str) -> None:
+    design = ots.load(name)
+    found = ledger_of(design)
+    assert list(found.emitted) == list(design.lights)
+    for group, light in design.lights.items():
+        assert found.emitted[group] == pytest.approx(light.flux * len(light.lights))
+        assert found.closing_sum(group) == pytest.approx(1.0, abs=CLOSES)
+        assert all(entry.power >= -CLOSES for entry in found.entries)
+        assert found.share(group, SEEN) + found.share(group, UNSEEN) > 0.05
+        assert found.share(group, GIVEN_UP) < 0.001
+
+
+@pytest.mark.parametrize("reflectance", [0.3, 0.9])
+def test_a_white_sphere_shares_its_light_as_the_formula_says(reflectance: float) -> None:
+    """The port takes r f / (1 - r (1 - f)), and the wall the rest."""
+    found = ledger_of(sphere(reflectance))
+    port = reflectance * SHARE / (1 - reflectance * (1 - SHARE))
+    taken = found.share("white", SEEN) + found.share("white", UNSEEN)
+    assert taken == pytest.approx(port, rel=0.01)
+    assert found.share("white", "absorbed by housing") == pytest.approx(1 - port, rel=0.01)
+
+
+def test_noise_is_the_spread_of_other_seeds() -> None:
+    model, where = OpticalModel(sphere(0.8)), "absorbed by housing"
+    runs = [light_ledger(model, 5_000, seed) for seed in range(24)]
+    shares = np.array([run.share("white", where) for run in runs])
+    stated = np.mean([e.noise for run in runs for e in run.entries if e.where == where])
+    assert 0.6 * stated < shares.std(ddof=1) < 1.6 * stated
+
+
+def test_each_medium_has_its_line() -> None:
+    design = ots.load("gelsight-mini")
+    design.materials["acrylic"] = Dielectric(ior=1.491, absorption=(0.02, 0.02, 0.02))
+    design.materials["silicone-xp565"] = Dielectric(ior=1.41, absorption=(0.05, 0.05, 0.05))
+    found, clear = ledger_of(design), ledger_of(ots.load("gelsight-mini"))
+    for group in found.emitted:
+        lines = {w: found.share(group, w) for w in found.places() if w.startswith("absorbed in")}
+        assert set(lines) <= {"absorbed in gel", "absorbed in tray", "absorbed in guide"}
+        assert lines["absorbed in gel"] > 0.01 and max(lines.values()) < 0.5
+        assert found.share(group, SEEN) < clear.share(group, SEEN)
+        assert found.closing_sum(group) == pytest.approx(1.0, abs=CLOSES)
+
+
+def test_a_beam_through_an_absorbing_block_is_booked_by_beer_lambert() -> None:
+    """A lamp in air, a gel on a black skin: what the gel takes, and what its face sends back."""
+    design = sphere(None)
+    data = design.model_dump(mode="json")
+    data["materials"]["gel"] = {"kind": "dielectric", "ior": 1.5, "absorption": [0.1] * 3}
+    data["parts"]["gel"] = {"role": "elastomer", "mesh": "meshes/gel.obj", "material": "gel"}
+    data["lights"]["white"]["emitter"] = {"kind": "spot", "beam": 0.1, "cutoff": 0.2}
+    made = ots.SensorDesign.model_validate(data)
+    made.meshes.update(design.meshes)
+    made.meshes["gel"] = ots.geometry.TriangleMesh.box((-3, -3, -6), (3, 3, -2))
+    found = ledger_of(made)
+    reflected, left = 0.04, np.exp(-0.1 * 4.0)
+    once = (1 - reflected) * (1 - left) / (1 - reflected * left)
+    assert found.share("white", "absorbed in gel") == pytest.approx(once, rel=0.01)
+
+
+def test_rough_faces_and_paint_have_their_lines() -> None:
+    right, far = ({"direction": way, "within": 10} for way in ((1, 0, 0), (0, 1, 0)))
+    design = ots.load("gelsight-mini")
+    design.materials["black"] = Absorber()
+    faces = {"edge": {**right, "paint": "black"}, "end": {**far, "roughness": 0.4}}
+    found = ledger_of(ots.set_value(design, "parts.guide.faces", faces))
+    assert found.share("blue", "absorbed by guide.edge") > 0.02
+    assert 0.0 < found.share("red", FACETS) < 0.2
+
+
+def test_the_command_prints_a_table_that_closes_and_writes_json(tmp_path) -> None:  # type: ignore[no-untyped-def]
+    out = tmp_path / "ledger"
+    done = CliRunner().invoke(
+        app, ["ledger", "gelsight-mini", "--photons", "20000", "--out", str(out)]
+    )
+    assert done.exit_code == 0, done.output
+    sums = next(line for line in done.output.splitlines() if line.startswith("sum"))
+    assert sums.split()[1:] == ["100.00"] * 3
+    data = json.loads((out / "ledger.json").read_text())
+    assert sum(e["share"] for e in data["entries"]) == pytest.approx(3.0, abs=1e-4)
+
+
+def test_too_few_photons_are_refused() -> None:
+    with pytest.raises(RenderError, match="too few"):
+        ledger_of(ots.load("gelsight-mini"), 10)
