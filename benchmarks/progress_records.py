@@ -55,6 +55,7 @@ COMMANDS = {
     "evaluate, 5 seeds": ["evaluate", "gelsight-mini", "--seeds", "5", *FEW],
     "dataset, 20 samples": ["dataset", "gelsight-mini", "--count", "20", "--out", "OUT"],
     "dataset, 60 samples": ["dataset", "gelsight-mini", "--count", "60", "--out", "OUT"],
+    "dataset, 700 samples": ["dataset", "gelsight-mini", "--count", "700", "--out", "OUT"],
     "task misalignment": ["task", "misalignment", "gelsight-mini", "--samples", "60"],
     "search by coating": [
         *["search", "gelsight-mini", "--vary", "coating.specularity=0.1:0.5", "--budget", "9"],

@@ -86,7 +86,7 @@ class TimeLeft:
         self._done = self._first = done
         self._step_began = self._advanced = now
         self._ends: deque[tuple[float, float]] = deque([(now, done)])
-        self._own_seconds, self._own_count, self._has_own = 0.0, 0, False
+        self._own_seconds, self._own_count, self._has_own = 0.0, 0.0, False
 
     @property
     def elapsed(self) -> float:
@@ -124,12 +124,14 @@ class TimeLeft:
 
         Args:
             done: those done before `begin` included.
-            seconds: the last piece took by itself, where several workers are at work.
+            seconds: the pieces since the last call took by themselves, where several workers are
+                at work.
             worker: that did it. The first piece of each is not used for the estimate.
         """
         now = self._clock()
         if done <= self._done and seconds is None:
             return
+        pieces = done - self._done
         self._done, self._advanced = done, now
         if seconds is not None:
             if worker not in self._known_workers:
@@ -137,11 +139,13 @@ class TimeLeft:
                 if not self._has_own:  # the clock counts from here, too
                     self._ends = deque([(now, done)])
                 return
+            if pieces <= 0.0:
+                return
             if not self._has_own:
                 self._ends = deque([(now, done)])
             self._has_own = True
             self._own_seconds += seconds
-            self._own_count += 1
+            self._own_count += pieces
         elif self._steps[self._current].warm_up > self._ends[0][1] - self._first:
             self._ends = deque([(now, done)])
             return

@@ -19,10 +19,11 @@ from optisense.cli.options import (
     out_option,
 )
 from optisense.cli.search_result import print_result, summary
-from optisense.cli.searching import search_progress
+from optisense.cli.searching import expect_search, search_progress
 from optisense.commands.searching import SearchOptions
 
 if TYPE_CHECKING:
+    from optisense.cli.progress import ProgressLine
     from optisense.search import Study
 
 
@@ -80,11 +81,11 @@ def search(
     with ExitStack() as stack:
         # It may ask whether code is trusted, so it comes before the progress.
         study = _resumed(out, design, options.as_stored(), trust) if resume else None
-        with search_progress(workers if cluster is None else 0) as show:
+        with search_progress(workers if cluster is None else 0) as (line, show):
+            if study is None:
+                study = _begun(out, design, options, line)
             from optisense.search import run_study
 
-            if study is None:
-                study = _begun(out, design, options)
             stack.callback(study.close)
             result = run_study(
                 study,
@@ -94,6 +95,7 @@ def search(
                 variant=variant,
                 progress=show,
                 told=stopping.say,
+                time_left=line.time_left,
             )
         if as_json:
             print(json.dumps(summary(result), indent=2, allow_nan=False))
@@ -107,9 +109,8 @@ def search(
         raise typer.Exit(EXIT_INTERRUPTED)
 
 
-def _begun(out: Path, design: str | None, options: SearchOptions) -> Study:
+def _begun(out: Path, design: str | None, options: SearchOptions, line: ProgressLine) -> Study:
     """A new study of what was given."""
-    from optisense.search import Study
     from optisense.sensors import load
 
     if design is None:
@@ -117,7 +118,11 @@ def _begun(out: Path, design: str | None, options: SearchOptions) -> Study:
     for given, name in ((options.vary, "--vary"), (options.objectives, "--objective")):
         if not given:
             raise typer.BadParameter("must be given at least once", param_hint=name)
-    return Study.create(out, load(design), options.plan())
+    sensor = load(design)
+    expect_search(line, sensor, options)
+    from optisense.search import Study
+
+    return Study.create(out, sensor, options.plan())
 
 
 def _resumed(out: Path, design: str | None, wanted: dict[str, Any], trust: bool) -> Study:

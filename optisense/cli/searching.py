@@ -3,32 +3,99 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from typing import TYPE_CHECKING
+from dataclasses import fields
+from typing import TYPE_CHECKING, Any, NamedTuple
 
-from optisense.cli.progress import about, progress_line
+from optisense.cli.progress import ProgressLine, about, progress_line
+from optisense.time_left import TimedStep
+from optisense.usual_times import UsualTimes
 
 if TYPE_CHECKING:
+    from optisense.commands.searching import SearchOptions
+    from optisense.design import SensorDesign
+    from optisense.objectives.usual_score import UsualTrials
     from optisense.search import SearchProgress
+
+LOADING = "loading"
+
+LOADING_TIME, CMA_LIBRARIES = 0.7, 0.8
+"""Seconds to load the program and a design; and the library of CMA-ES, which loads those for plots
+and statistics."""
+
+
+RELIT = ("light-colours",)
+"""Methods whose trials take next to no time, since they render nothing."""
+
+USUAL_FRESH, FRESH_SEEDS = 9, 3
+"""Scores with fresh seeds, and these seeds, until the study tells other numbers: those of
+`optisense.search.study.stages`, which loads slowly."""
+
+
+class SearchLine(NamedTuple):
+    """The line of a search, and what shows its progress there."""
+
+    line: ProgressLine
+    show: Callable[[SearchProgress], None]
 
 
 @contextmanager
-def search_progress(workers: int) -> Iterator[Callable[[SearchProgress], None]]:
+def search_progress(workers: int) -> Iterator[SearchLine]:
     """Trials done and the time left, with the best score so far, failures and trials an hour.
 
     With one worker Ctrl-C waits for the trial at hand; others drop theirs at once.
     """
     last: list[SearchProgress] = []
     waits = (lambda line: _waits(last)) if workers == 1 else None
-    with progress_line(waits=waits) as line:
-        line.say("loading")
+    loading = TimedStep(LOADING, 1, LOADING_TIME * UsualTimes.here().thread_pace, gauges=False)
+    searching = (TimedStep(stage) for stage in ("start", "trials", "fresh seeds"))
+    with progress_line(loading, *searching, waits=waits) as line:
+        line.begin(LOADING)
 
         def show(progress: SearchProgress) -> None:
             last[:] = [progress]
             line.show(*what(progress), progress.seconds_left, notes(progress))
 
-        yield show
+        yield SearchLine(line, show)
+
+
+def expect_search(line: ProgressLine, design: SensorDesign, options: SearchOptions) -> None:
+    """Tell a time left before the study is made, which takes a while, from what is asked for.
+
+    What can't be known without the study (how many trials there will be where no budget is given)
+    or makes no sense is left to it.
+    """
+    expect = line.time_left.expect
+    if options.method in (None, "cma-es"):
+        expect(LOADING, seconds=(LOADING_TIME + CMA_LIBRARIES) * UsualTimes.here().thread_pace)
+    budget = 0 if options.method in RELIT else options.budget
+    if budget is None or not options.objectives:
+        return
+    trials = usual_trials(design, options.objectives, options.settings)
+    if trials is None:
+        return
+    expect("start", seconds=trials.first)
+    expect("trials", count=budget, seconds=trials.trial)
+    fresh = FRESH_SEEDS if options.method in RELIT else USUAL_FRESH
+    expect("fresh seeds", count=fresh, seconds=trials.fresh)
+
+
+def usual_trials(
+    design: SensorDesign, objectives: list[str], settings: Mapping[str, object]
+) -> UsualTrials | None:
+    """What trials of a design usually take; None where that can't be known from these words."""
+    from optisense.errors import OptiSenseError
+    from optisense.objectives.settings import Settings
+    from optisense.objectives.usual_score import UsualTrials, usual_score
+
+    shared = {field.name for field in fields(Settings)}
+    given: dict[str, Any] = {name: value for name, value in settings.items() if name in shared}
+    try:
+        usual = usual_score(design, objectives, Settings(**given))
+    except (OptiSenseError, TypeError, ValueError):  # told later, by what reads it in full
+        return None
+    return UsualTrials.of(usual, usual.building + usual.whole, usual.whole)
 
 
 def what(progress: SearchProgress) -> tuple[str, int | None, int | None]:

@@ -19,12 +19,19 @@ from optisense.cli.options import (
 )
 from optisense.cli.output_folder import take_folder
 from optisense.cli.progress import about, progress_line
+from optisense.cli.searching import usual_trials
 from optisense.commands.scoring import ToleranceOptions
+from optisense.time_left import TimedStep
+from optisense.usual_times import LOADING as LOADING_TIME
+from optisense.usual_times import UsualTimes
 from optisense.writing import remove_own_page, write_text
 
 if TYPE_CHECKING:
     from optisense.search.tolerance.analysis import ScoreDistribution, Tolerance
     from optisense.search.tolerance.sensitivity import Estimate
+
+LOADING, FIRST, SENSORS = "loading", "the design itself", "sensors"
+"""Steps; the last two are those of `optisense.search.tolerance.analysis`, which loads slowly."""
 
 JSON_FILE = "tolerance.json"
 REPORT_FILE = "tolerance.html"
@@ -55,14 +62,22 @@ def tolerance(
     settings = options.for_objectives()
 
     last: list[tuple[int, float]] = []
-    with progress_line(waits=(lambda line: _waits(last)) if workers == 1 else None) as line:
-        line.say("loading")
-        from optisense.search.space.text import parse_errors
-        from optisense.search.tolerance.analysis import tolerance as find_tolerance
+    loading = TimedStep(LOADING, 1, LOADING_TIME * UsualTimes.here().thread_pace, gauges=False)
+    scoring = TimedStep(FIRST), TimedStep(SENSORS)
+    waits = (lambda line: _waits(last)) if workers == 1 else None
+    with progress_line(loading, *scoring, waits=waits) as line:
+        line.begin(LOADING)
         from optisense.sensors import load
 
-        errors = parse_errors(options.errors) if options.errors else None
         sensor = load(design)
+        usual = usual_trials(sensor, options.objectives, settings)
+        if usual is not None:
+            line.time_left.expect(FIRST, seconds=usual.first)
+            line.time_left.expect(SENSORS, count=options.sensors, seconds=usual.trial)
+        from optisense.search.space.text import parse_errors
+        from optisense.search.tolerance.analysis import tolerance as find_tolerance
+
+        errors = parse_errors(options.errors) if options.errors else None
         if out is not None:
             take_folder(out)
 
@@ -81,6 +96,7 @@ def tolerance(
             variant=variant,
             progress=show,
             told=stopping.say,
+            time_left=line.time_left,
         )
     text = json.dumps(found.to_dict(), indent=2, allow_nan=False)
     if out is not None:

@@ -21,13 +21,13 @@ pixels. Less than a whole picture's, because only contacts are lit."""
 LARGE_IMAGE = 640 * 480
 """Pixels for which `IMAGE_PIXELS` is stated."""
 
-JUDGING = {"rgb2normal": 0.15, "normdiff": 0.22, "aoap": 0.05, "2to3pw": 0.02}
+JUDGING = {"rgb2normal": 0.15, "normdiff": 0.22, "aoap": 0.02, "2to3pw": 0.015}
 """Processor seconds of the built-in objectives beside rendering."""
 
 OWN_JUDGING = 0.2
 """Processor seconds that a user's objective is expected to take beside rendering."""
 
-REBUILDING = 0.06
+REBUILDING = 0.02
 """Seconds to make the scene of a design that differs from the last one: GelSight Svelte, another
 mirror."""
 

@@ -24,6 +24,7 @@ from optisense.search.study.loop import StudyRun
 from optisense.search.study.plan import Plan
 from optisense.search.study.progress import SearchProgressCallback, SearchResult
 from optisense.search.study.study import Study
+from optisense.time_left import TimeLeft
 
 
 def search(
@@ -129,6 +130,7 @@ def run_study(
     variant: str = "auto",
     progress: SearchProgressCallback | None = None,
     told: Callable[[], None] | None = None,
+    time_left: TimeLeft | None = None,
 ) -> SearchResult:
     """Run a study, or go on with one.
 
@@ -140,6 +142,8 @@ def run_study(
         variant: of the renderer, as of `search`.
         progress: called now and then.
         told: called when Ctrl-C waits for a trial in this process to finish.
+        time_left: of a command whose last steps are the stages of this search
+            (`optisense.search.study.stages`).
 
     Raises:
         OptiSenseError: as of `search`.
@@ -157,7 +161,7 @@ def run_study(
         return ProcessPool(evaluator, workers)
 
     try:
-        return StudyRun(study, make_runner, progress, limit, variant).go()
+        return StudyRun(study, make_runner, progress, limit, variant, time_left).go()
     except FolderInUseError:
         raise
     except OptiSenseError as error:

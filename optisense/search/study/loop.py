@@ -26,10 +26,18 @@ from optisense.search.study.progress import SearchProgress, SearchProgressCallba
 from optisense.search.study.rescoring import SEEDS as FRESH_SEEDS
 from optisense.search.study.rescoring import rescore
 from optisense.search.study.settings import package_versions
+from optisense.search.study.stages import (
+    FRESH,
+    START_STAGE,
+    TRIALS,
+    USUAL_FRESH,
+    expect_stages,
+    stages,
+)
 from optisense.search.study.store import START, Row
 from optisense.search.study.study import Study
 from optisense.search.study.trial import Trial
-from optisense.time_left import TimedStep, TimeLeft
+from optisense.time_left import TimeLeft
 
 ALL_FAIL = 20
 """A study whose first trials all fail stops after so many, ..."""
@@ -42,12 +50,6 @@ SAME_POINT = 1e-9
 
 TICK = 0.2
 """Seconds between looks at the clock while trials are worked out."""
-
-START_STAGE, TRIALS, FRESH = "start", "trials", "fresh seeds"
-
-USUAL_FRESH = 9
-"""Scores with fresh seeds that a search is expected to need: three for the start, for the best
-trial, and for one that might be better."""
 
 FRESH_SHARE = 0.8
 """The first score with a fresh seed takes as long as a trial, or so much of the first trial's time
@@ -68,6 +70,7 @@ class StudyRun:
         progress: SearchProgressCallback | None = None,
         limit: int | None = None,
         variant: str = "auto",
+        time_left: TimeLeft | None = None,
     ) -> None:
         """Get ready; nothing is scored yet.
 
@@ -77,6 +80,7 @@ class StudyRun:
             progress: called a few times a second.
             limit: how many trials there may be; the study's budget if None.
             variant: of the renderer.
+            time_left: of a command whose last steps are the stages of this search.
 
         Raises:
             OptiSenseError: the study can't be run here.
@@ -113,8 +117,10 @@ class StudyRun:
         self._best = self._start_score = math.nan
         self._told = time.monotonic()
         self._stage = START_STAGE
-        self._time_left = TimeLeft([])
+        self._time_left = time_left or TimeLeft(stages(self.limit, self._usual))
         self._fresh_done = self._fresh_count = 0
+        self._fresh_seeds: set[int] = set()
+        self._again = 1.0
         self._trials_an_hour = 0.0
         self._doing = ""
         self._pace = math.nan
@@ -132,7 +138,8 @@ class StudyRun:
         interrupted, ended = False, ""
         self._count_known()
         with self._make_runner(self._evaluator) as runner:
-            self._time_left = TimeLeft(self._steps(runner.workers), runner.workers)
+            self._time_left.workers = runner.workers
+            expect_stages(self._time_left, self.limit, self._usual, runner.workers)
             if isinstance(runner, SerialRunner):
                 runner.report_progress_to(self._trial_progress)
             try:
@@ -144,7 +151,7 @@ class StudyRun:
                 ended = self._search(runner)
                 self._report(now=True)
                 self._begin(FRESH)
-                rescore(study, lambda jobs, more: self._work_fresh(runner, jobs, more))
+                rescore(study, partial(self._work_fresh, runner))
             except KeyboardInterrupt:
                 interrupted, ended = True, "interrupted"
         study.store.set_fact("ended", ended)
@@ -154,21 +161,6 @@ class StudyRun:
         tie = None if several else tie_note(study.trials)
         notes = [*self._notes, *self.method.notes(), *([] if tie is None else [tie])]
         return SearchResult(study, interrupted, ended, tuple(notes))
-
-    def _steps(self, workers: int) -> list[TimedStep]:
-        """The stages, with what their scores usually take as far as the evaluator knows it."""
-        usual = self._usual
-        if usual is None:
-            return [
-                TimedStep(START_STAGE),
-                TimedStep(TRIALS, self.limit),
-                TimedStep(FRESH, USUAL_FRESH),
-            ]
-        return [
-            TimedStep(START_STAGE, 1, usual.first * workers),  # on a share of the processors
-            TimedStep(TRIALS, self.limit, usual.trial),
-            TimedStep(FRESH, USUAL_FRESH, usual.fresh),
-        ]
 
     def _search(self, runner: Runner) -> str:
         """All generations; returns why the search is over."""
@@ -233,12 +225,14 @@ class StudyRun:
         self._each(runner, jobs, finished)
 
     def _work_fresh(
-        self, runner: Runner, jobs: Sequence[tuple[Trial, int]], more: int
+        self, runner: Runner, jobs: Sequence[tuple[Trial, int]], more: int, later: float
     ) -> list[Outcome]:
-        """Score trials with other seeds; `more` such scores may follow."""
+        """Score trials with other seeds; `more` such scores may follow for these trials, and
+        `later` for others.
+        """
         found: dict[int, Outcome] = {}
         self._fresh_count = self._fresh_done + len(jobs) + more
-        self._expect_fresh_scores(self._fresh_count)
+        self._expect_fresh_scores(self._fresh_count + later)
         self._report(now=True)
 
         def finished(number: int, outcome: Outcome) -> None:
@@ -246,7 +240,9 @@ class StudyRun:
             self.study.store.finish_fresh(trial.number, seed, outcome)
             found[number] = outcome
             self._fresh_done += 1
-            self._time_left.advance(self._fresh_done, outcome.seconds, outcome.worker)
+            self._fresh_seeds.add(seed)
+            done = self._in_first_scores(self._fresh_done, len(self._fresh_seeds))
+            self._time_left.advance(done, outcome.seconds, outcome.worker)
             self._report(now=True)
 
         numbered = [(k, trial.vector, seed) for k, (trial, seed) in enumerate(jobs)]
@@ -352,17 +348,25 @@ class StudyRun:
             if pace > 0.0:
                 self._trials_an_hour = 3600.0 / pace
 
-    def _expect_fresh_scores(self, count: int) -> None:
-        """Expect so many scores with fresh seeds, the first one of each seed with its own light."""
-        seeds = min(count, FRESH_SEEDS)
+    def _expect_fresh_scores(self, count: float) -> None:
+        """Expect so many scores with fresh seeds, the first one of each seed with its own light.
+
+        Their time is counted in first scores; others are parts of one.
+        """
         if self._usual is not None:
             first, again = self._usual.fresh, self._usual.fresh_again
         else:
             again = self._pace
             first = max(again, FRESH_SHARE * self._first_seconds / self._time_left.workers)
-        each = (seeds * first + (count - seeds) * again) / count
-        known = each if math.isfinite(each) else None
-        self._time_left.expect(FRESH, count=count, seconds=known)
+        if self._stage != FRESH:  # what is done is counted in them, too
+            self._again = again / first if again < first else 1.0
+        whole = self._in_first_scores(count, min(count, FRESH_SEEDS))
+        known = first if math.isfinite(first) else None
+        self._time_left.expect(FRESH, count=whole, seconds=known)
+
+    def _in_first_scores(self, count: float, seeds: float) -> float:
+        """How many first scores of seeds take as long as so many scores with so many seeds."""
+        return seeds + (count - seeds) * self._again
 
     def _trial_progress(self, fraction: float, text: str) -> None:
         """Note the progress of the trial that this process is scoring."""

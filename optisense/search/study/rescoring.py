@@ -26,8 +26,9 @@ MOST = 5
 
 _FRESH = 0xF2E5
 
-Work = Callable[[Sequence[tuple[Trial, int]], int], list[Outcome]]
-"""Scores trials with seeds, and is told how many such scores may follow."""
+Work = Callable[[Sequence[tuple[Trial, int]], int, float], list[Outcome]]
+"""Scores trials with seeds, and is told how many such scores may follow for these trials, and how
+many are expected for others after them."""
 
 
 def fresh_seeds(seed: int, count: int = SEEDS) -> list[int]:
@@ -51,16 +52,32 @@ def rescore(study: Study, work: Work) -> None:
         if trial.score <= best:
             return  # even with its luck it is not better
         scored = [trial, *start] if number == 0 else [trial]
-        means = _score(scored, seeds, work)
+        rivals = others[number + 1 : MOST]
+        means = _score(scored, seeds, work, [each.score for each in rivals], best)
         if math.isfinite(means[0]):
             best = max(best, means[0])
 
 
-def _score(trials: Sequence[Trial], seeds: Sequence[int], work: Work) -> list[float]:
-    """The mean over fresh seeds of each trial; one seed suffices where it changes nothing."""
+def _score(
+    trials: Sequence[Trial],
+    seeds: Sequence[int],
+    work: Work,
+    rivals: Sequence[float] = (),
+    best: float = -math.inf,
+) -> list[float]:
+    """The mean over fresh seeds of each trial; one seed suffices where it changes nothing.
+
+    Args:
+        trials: to score.
+        seeds: to score them with.
+        work: scores them.
+        rivals: scores of the trials that may come next.
+        best: the largest mean over fresh seeds until now.
+    """
     first = [(trial, seeds[0]) for trial in trials if seeds[0] not in trial.fresh]
     rest = len(trials) * (len(seeds) - 1)
-    found = work(first, rest) if first else []
+    later = 0.5 * len(rivals[:1]) if best == -math.inf else _likely(rivals, best)
+    found = work(first, rest, len(seeds) * later) if first else []
     outcomes = dict(zip((t.number for t, _ in first), found, strict=True))
     fresh = {t.number: {**t.fresh} for t in trials}
     for number, outcome in outcomes.items():
@@ -72,7 +89,10 @@ def _score(trials: Sequence[Trial], seeds: Sequence[int], work: Work) -> list[fl
         if seed not in fresh[trial.number]
         and dict(fresh[trial.number][seeds[0]].scores) != dict(trial.scores)
     ]
-    for (trial, seed), outcome in zip(more, work(more, 0) if more else [], strict=True):
+    told = fresh[trials[0].number][seeds[0]].scores.get(trials[0].objective, math.nan)
+    later = _likely(rivals, max(best, told) if math.isfinite(told) else best)
+    outcomes_of_more = work(more, 0, len(seeds) * later) if more else []
+    for (trial, seed), outcome in zip(more, outcomes_of_more, strict=True):
         fresh[trial.number][seed] = outcome
     return [
         float(
@@ -80,6 +100,14 @@ def _score(trials: Sequence[Trial], seeds: Sequence[int], work: Work) -> list[fl
         )
         for trial in trials
     ]
+
+
+def _likely(rivals: Sequence[float], best: float) -> float:
+    """How many rivals are expected to be scored: about half of those with more than the best fresh
+    score, since each that is scored raises that as a rule.
+    """
+    above = sum(score > best for score in rivals)
+    return 0.5 * (above + 1) if above else 0.0
 
 
 def _spread_out(study: Study) -> list[Trial]:

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from optisense.design import SensorDesign
 from optisense.errors import SearchError
 from optisense.objectives.score import deviation_of
+from optisense.objectives.usual_score import UsualTrials
 from optisense.search.evaluation.evaluator import DesignEvaluator, Goal
 from optisense.search.evaluation.outcome import Outcome
 from optisense.search.evaluation.robust import HIGH, LOW, MIDDLE
@@ -52,6 +53,9 @@ POSITION, ANGLE, SPECULARITY, CAGE_POINT, INDEX = 0.1, 2.0, 0.05, 0.05, 0.005
 axis), of the specularity, of each coordinate of a control point (mm), of a refractive index.
 Assumptions for a sensor that is built by hand: LEDs soldered to a board that is glued in, a printed
 mould, silicone and resin of another batch."""
+
+FIRST, SENSORS_STEP = "the design itself", "sensors"
+"""Stages, for the time left: the first score, which compiles, and all others."""
 
 ToleranceCallback = Callable[[int, int, float, str], None]
 """Called with the number of finished scores, of all, the seconds left (NaN if unknown), and with
@@ -154,6 +158,7 @@ def tolerance(
     variant: str = "auto",
     progress: ToleranceCallback | None = None,
     told: Callable[[], None] | None = None,
+    time_left: TimeLeft | None = None,
 ) -> Tolerance:
     """Try sensors with manufacturing errors, all with the same seed of the light.
 
@@ -168,6 +173,7 @@ def tolerance(
         variant: of the renderer: "auto", "llvm" or "cuda".
         progress: called now and then.
         told: called when Ctrl-C waits for a sensor in this process to finish.
+        time_left: of a command whose last steps are those of `tolerance_steps`.
 
     Returns:
         Percentiles of the scores, and each source's share in their variance. Ctrl-C ends it
@@ -188,14 +194,20 @@ def tolerance(
     bound = making.bind(design)
     goals: list[Goal] = list(objective) if isinstance(objective, list | tuple) else [objective]  # type: ignore[list-item]
     evaluator = DesignEvaluator(bound.space, goals, settings, keeps=False, variant=variant)
-    count = 1 if len(making.sources) == 1 else 1 + len(making.sources)
-    rows = max(LEAST_ROWS, round(sensors / count))
+    count, rows = _columns(making), _rows(making, sensors)
     points = bound.points(paired_errors(bound, rows, seed))
     nominal = bound.points(np.zeros(bound.size))
     jobs = [(nominal, each) for each in (seed, *fresh_seeds(seed, NOISE_SEEDS))]
     jobs += [(point, seed) for point in points.reshape(-1, bound.size)]
     with _runner(evaluator, workers, told) as runner:
-        found, interrupted = _work(runner, jobs, progress or (lambda done, of, left, doing: None))
+        show = progress or (lambda done, of, left, doing: None)
+        usual = evaluator.usual_trials()
+        steps = tolerance_steps(len(jobs) - OWN_SCORES, usual, runner.workers)
+        left = time_left or TimeLeft(steps)
+        left.workers = runner.workers
+        for step in steps:
+            left.expect(step.name, step.count, step.seconds)
+        found, interrupted = _work(runner, jobs, show, left, usual)
     itself, again, tried = found[:1], found[1:OWN_SCORES], found[OWN_SCORES:]
     whole = len([each for each in tried if each is not None]) // count
     if itself[0] is None:
@@ -228,6 +240,31 @@ def tolerance(
     )
 
 
+def tolerance_steps(sensors: int, usual: UsualTrials | None, workers: int = 1) -> list[TimedStep]:
+    """The stages of a tolerance analysis with what they usually take, if that is known.
+
+    Args:
+        sensors: with errors.
+        usual: scores of the design, and of others.
+        workers: that share the processors.
+    """
+    rest = sensors + NOISE_SEEDS
+    if usual is None:
+        return [TimedStep(FIRST), TimedStep(SENSORS_STEP, rest)]
+    return [
+        TimedStep(FIRST, 1, usual.first * workers),
+        TimedStep(SENSORS_STEP, rest, usual.trial),
+    ]
+
+
+def _columns(errors: ManufacturingErrors) -> int:
+    return 1 if len(errors.sources) == 1 else 1 + len(errors.sources)
+
+
+def _rows(errors: ManufacturingErrors, sensors: int) -> int:
+    return max(LEAST_ROWS, round(sensors / _columns(errors)))
+
+
 def _score_distribution(
     name: str,
     repeats: Sequence[Outcome],
@@ -257,13 +294,16 @@ def _runner(evaluator: DesignEvaluator, workers: int, told: Callable[[], None] |
 
 
 def _work(
-    runner: Runner, jobs: Sequence[tuple[FloatArray, int]], progress: ToleranceCallback
+    runner: Runner,
+    jobs: Sequence[tuple[FloatArray, int]],
+    progress: ToleranceCallback,
+    time_left: TimeLeft,
+    usual: UsualTrials | None,
 ) -> tuple[list[Outcome | None], bool]:
     """The outcome of each job, None where Ctrl-C came first; and whether it came."""
     found: list[Outcome | None] = [None] * len(jobs)
     running: dict[Future[Outcome], int] = {}
-    time_left = TimeLeft([TimedStep("sensors", len(jobs))], runner.workers)
-    time_left.begin("sensors")
+    time_left.begin(FIRST)
     done = 0
 
     def collect() -> None:
@@ -273,14 +313,19 @@ def _work(
             outcome = future.result()
             found[running.pop(future)] = outcome
             done += 1
-            time_left.advance(done, outcome.seconds, outcome.worker)
+            time_left.advance(max(1, done - 1), outcome.seconds, outcome.worker)
+            if done == 1:
+                time_left.begin(SENSORS_STEP)
         progress(done, len(jobs), time_left.seconds_left, "")
 
-    progress(0, len(jobs), math.nan, "")
+    def part_of_score(part: float, doing: str) -> None:
+        if done == 0 and usual is not None:
+            time_left.advance(usual.done(part))
+        progress(done, len(jobs), time_left.seconds_left, doing)
+
+    progress(0, len(jobs), time_left.seconds_left, "")
     if isinstance(runner, SerialRunner):
-        runner.report_progress_to(
-            lambda part, doing: progress(done, len(jobs), time_left.seconds_left, doing)
-        )
+        runner.report_progress_to(part_of_score)
     try:
         for number, (point, seed) in enumerate(jobs):
             running[runner.submit(point, seed)] = number

@@ -1,0 +1,35 @@
+"""The stages of a search, with what they usually take, for its time left."""
+
+from __future__ import annotations
+
+from optisense.objectives.usual_score import UsualTrials
+from optisense.time_left import TimedStep, TimeLeft
+
+START_STAGE, TRIALS, FRESH = "start", "trials", "fresh seeds"
+
+USUAL_FRESH = 9
+"""Scores with fresh seeds that a search is expected to need: three for the start, for the best
+trial, and for one that might be better."""
+
+
+def stages(limit: int, usual: UsualTrials | None, workers: int = 1) -> list[TimedStep]:
+    """The stages of a search of so many trials, with what their scores usually take, if known."""
+    if usual is None:
+        return [
+            TimedStep(START_STAGE),
+            TimedStep(TRIALS, limit),
+            TimedStep(FRESH, USUAL_FRESH),
+        ]
+    return [
+        TimedStep(START_STAGE, 1, usual.first * workers),  # on a share of the processors
+        TimedStep(TRIALS, limit, usual.trial),
+        TimedStep(FRESH, USUAL_FRESH, usual.fresh),
+    ]
+
+
+def expect_stages(
+    time_left: TimeLeft, limit: int, usual: UsualTrials | None, workers: int = 1
+) -> None:
+    """Correct what is expected of the stages among the steps of a command that searches."""
+    for step in stages(limit, usual, workers):
+        time_left.expect(step.name, step.count, step.seconds)
