@@ -11,18 +11,29 @@ from optisense.lazy_names import load_on_first_use
 
 if TYPE_CHECKING:
     from optisense.optics.imaging.tactile_image import TactileImage
+    from optisense.optics.ledger import LightLedger, light_ledger
     from optisense.optics.model import OpticalModel, RenderProgress
     from optisense.optics.transport.chief_rays import ChiefRays, RayOutcome
 
 _HOMES = {
     "ChiefRays": ".transport.chief_rays",
+    "LightLedger": ".ledger",
     "OpticalModel": ".model",
     "RayOutcome": ".transport.chief_rays",
     "RenderProgress": ".model",
     "TactileImage": ".imaging.tactile_image",
+    "light_ledger": ".ledger",
 }
 
-__all__ = ["ChiefRays", "OpticalModel", "RayOutcome", "RenderProgress", "TactileImage"]
+__all__ = [
+    "ChiefRays",
+    "LightLedger",
+    "OpticalModel",
+    "RayOutcome",
+    "RenderProgress",
+    "TactileImage",
+    "light_ledger",
+]
 
 
 def _check_llvm() -> None:

@@ -37,7 +37,7 @@ def draw_material(figure: Figure, material: Material | CoatingModel) -> None:
     place = (0.49, 0.15, 0.47, 0.62)
     medium = medium_of(material)
     if medium is not None:
-        _reflectance_of_glass(figure.add_axes(place), material, medium)
+        _reflectance_of_glass(figure.add_axes(place), medium)
     elif material.reflection().is_metal and isinstance(material, Material):
         _reflectance_of_metal(figure.add_axes(place), material.reflection())
     else:
@@ -45,7 +45,7 @@ def draw_material(figure: Figure, material: Material | CoatingModel) -> None:
         figure.text(0.70, 0.85, _lobes(axes, material), fontsize=9, ha="center", va="top")
 
 
-def _reflectance_of_glass(axes: Axes, material: Any, glass: Medium) -> None:
+def _reflectance_of_glass(axes: Axes, glass: Medium) -> None:
     angle = np.linspace(0.0, 90.0, 361)
     cosine = np.cos(np.radians(angle))
     axes.plot(angle, 100 * fresnel_dielectric(cosine, glass.ior), color="0.15", label="from air")
@@ -61,9 +61,10 @@ def _reflectance_of_glass(axes: Axes, material: Any, glass: Medium) -> None:
             arrowprops={"arrowstyle": "-", "color": "0.5"},
         )
     facts = f"index {glass.ior:g}"
-    dispersion = getattr(material, "dispersion", None)
-    if dispersion is not None:
-        facts += "  (R, G, B: " + ", ".join(f"{n:.3f}" for n in dispersion) + ")"
+    if glass.indices is not None:
+        facts += "  (R, G, B: " + ", ".join(f"{n:.3f}" for n in glass.indices) + ")"
+    if max(glass.absorption) > 0.0:
+        facts += "\nabsorbs " + ", ".join(f"{a:.2g}" for a in glass.absorption) + " /mm of R, G, B"
     facts += f"\nroughness {glass.roughness:g}" + (" (smooth)" if glass.roughness == 0 else "")
     axes.set_title(facts, fontsize=9, loc="left")
     axes.set(xlim=(0, 90), ylim=(0, 103), ylabel="reflected by a smooth face (%)")

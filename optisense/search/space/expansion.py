@@ -26,7 +26,9 @@ from optisense.search.space.parameters import (
 )
 from optisense.search.space.variable_paths import find_variables
 
-RGB_FIELDS = ("colour", "reflectance", "eta", "k", "dispersion")
+RGB_FIELDS = (
+    "colour", "reflectance", "eta", "k", "dispersion", "absorption", "extinction", "transmittance",
+)  # fmt: skip
 
 SYMMETRY_TOLERANCE = 1e-4
 """A cage whose mirror images differ by more (of its box, or of a share) is not symmetric."""
