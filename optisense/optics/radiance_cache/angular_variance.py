@@ -38,10 +38,13 @@ class AngularVariance:
 
 
 def mean_direction(value: mi.Vector4f) -> tuple[mi.Vector3f, mi.Float]:
-    """The mean direction of a cache entry, and the mean cosine of its light with it."""
+    """The mean direction of a cache entry, and the mean cosine of its light with it.
+
+    Both are the same for an entry of opposite sign.
+    """
     mean = mi.Vector3f(value.x, value.y, value.z)
     length = dr.norm(mean)
-    return mean / length, dr.minimum(length / value.w, 1.0)
+    return mean * (dr.sign(value.w) / length), dr.minimum(length / dr.abs(value.w), 1.0)
 
 
 def isotropic_variance(towards: mi.Vector3f, cosine: mi.Float) -> AngularVariance:

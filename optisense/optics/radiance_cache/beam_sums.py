@@ -88,7 +88,7 @@ def sum_hidden(
         step = mi.Float(MIN_STEP)
         for g in range(groups):
             step = dr.select(group == g, steps[g], step)
-        share = dr.minimum(grey(reflected) / step, shadow_rays)
+        share = dr.minimum(dr.abs(grey(reflected)) / step, shadow_rays)
         before = dr.floor(running)
         running += share
         times = dr.floor(running) - before

@@ -135,20 +135,20 @@ def _collect(
             if dr.hint(write and coloured, mode="scalar"):
                 inks.append(dr.gather(mi.Vector4f, colours, entry, there))
                 ink += inks[i]
-        strong = whole.w > STRONG_SHARE * total
+        strong = dr.abs(whole.w) > STRONG_SHARE * total
         if dr.hint(not (write and coloured), mode="scalar"):
             inks = [mi.Vector4f(value.w) for value in values]
             ink = mi.Vector4f(whole.w)
-        chosen = [strong & (value.w > 0) for value in values]
-        chosen.append(~strong & (whole.w > 0))
+        chosen = [strong & (value.w != 0) for value in values]
+        chosen.append(~strong & (whole.w != 0))
         values.append(whole)
         inks.append(ink)
         for i in range(5):
             if dr.hint(write, mode="scalar"):
                 value = values[i]
                 length = dr.norm(mi.Vector3f(value.x, value.y, value.z))
-                scale = dr.rcp(dr.maximum(length, 1e-30))
-                cosine = dr.minimum(length / dr.maximum(value.w, 1e-30), 1.0)
+                scale = dr.sign(value.w) * dr.rcp(dr.maximum(length, 1e-30))
+                cosine = dr.minimum(length / dr.maximum(dr.abs(value.w), 1e-30), 1.0)
                 way = mi.Vector4f(value.x * scale, value.y * scale, value.z * scale, cosine)
                 dr.scatter(ways, way, slot, chosen[i])
                 tag = dr.reinterpret_array(mi.Float, mi.UInt32(group))

@@ -85,15 +85,19 @@ def sum_bins(
         for g in range(groups):
             entry = (there * bins + k) * groups + g
             value = dr.gather(mi.Vector4f, moments, entry, active)
+            counts = value.w != 0
             if upper is not None:
                 above_it = dr.gather(mi.Vector4f, upper[0], entry, active & raised)
+                # Light is not extrapolated to less than none.
+                negative = dr.minimum(value.w, above_it.w) < 0
                 value = dr.lerp(value, above_it, up)
-            if value.w > 0:
+                counts = (value.w > 0) | (negative & (value.w < 0))
+            if counts:
                 towards, cosine = mean_direction(value)
                 height = dr.gather(mi.Float, heights, entry)
                 if upper is not None:
                     height = dr.lerp(height, dr.gather(mi.Float, upper[1], entry, raised), up)
-                height = dr.maximum(height, 0) / value.w
+                height = dr.maximum(height / value.w, 0)
                 beam = angular_variance(axis, towards, cosine, height)
                 # On the undeformed surface the mean cosine is the sum's already.
                 half_width = dr.select(raised, cosine_half_width(beam, points.normal, upright), 0)
@@ -107,7 +111,7 @@ def sum_bins(
                 sine = dr.dot(upright, towards)
                 doubtful = sine - dr.sqrt(squared_radius(cosine)) < sky
                 weight = dr.select(doubtful, mi.Float(0), 1)
-                share = value.w * grey(reflected) / steps[g]
+                share = dr.abs(value.w) * grey(reflected) / steps[g]
                 before = dr.floor(running[g])
                 running[g] += dr.select(doubtful, share, 0)
                 times = dr.floor(running[g]) - before

@@ -28,7 +28,7 @@ from optisense.optics.radiance_cache.direction_bins import (
     dither,
 )
 from optisense.optics.radiance_cache.irradiance import irradiance_table
-from optisense.optics.radiance_cache.smoothing import Kernels, smooth
+from optisense.optics.radiance_cache.smoothing import Kernels, Smoothing, smooth
 from optisense.optics.scene.surface_cells import SurfaceCells, bin_axis, cell_at
 from optisense.optics.transport.photon_map import GROUP_MASK, HALF_SHIFT, PhotonMap
 from optisense.optics.transport.volume_flux import FluxLayer, layer_cell_at
@@ -233,8 +233,11 @@ class CacheTally:
         """
         if self.passes < 1:
             return float("inf")
-        matrix = self.kernels.smoothing(self.photons, self.metallic).matrix
-        means = [(matrix @ landed)[self.kernels.near] for landed in self._landed()]
+        kernel = self._smoothing()
+        means = [kernel.kernel.matrix @ landed for landed in self._landed()]
+        if kernel.correction is not None:
+            means = [kernel.correction.matrix @ light for light in means]
+        means = [light[self.kernels.near] for light in means]
         mean = (means[0] + means[1]) / 2
         # Half the difference of two halves has the deviation of their mean.
         spread = ((means[0] - means[1]) / 2) ** 2
@@ -243,6 +246,9 @@ class CacheTally:
         if not lit.any():
             return 0.0
         return float(np.sqrt((spread[:, lit] / scale[lit] ** 2).mean()))
+
+    def _smoothing(self) -> Smoothing:
+        return self.kernels.smoothing(self.photons, self.directions.corrected)
 
     def _landed(self) -> FloatArray:
         """(2, cells, groups) mW that landed on each cell, by photons of even and odd number."""
@@ -262,9 +268,11 @@ class CacheTally:
         used = np.flatnonzero(power > EMPTY_BIN_SHARE * power.sum())
         used = used if len(used) else np.zeros(1, dtype=np.int64)
         bins = indices(used)
-        kernel = self.kernels.smoothing(self.photons, self.metallic)
-        landed = self._landed().mean(axis=0)
-        factors = self.kernels.sharpening(landed, self.photons, self.metallic)
+        kernel = self._smoothing()
+        factors: FloatArray = np.ones((self.cells.cells, self.groups))
+        if kernel.correction is None:
+            landed = self._landed().mean(axis=0)
+            factors = self.kernels.sharpening(landed, self.photons)
         rest = (
             bins,
             dr.opaque(mi.UInt32, count),
@@ -277,8 +285,19 @@ class CacheTally:
             if self.coloured:
                 tables.append(colours)
                 kinds.append(mi.Vector4f)
-            sums = smooth(kernel, self.cells.cells, tables, kinds, *rest)
+            sums = smooth(kernel.kernel, self.cells.cells, tables, kinds, *rest)
             dr.eval(sums)  # together: the loop would run again for those that are asked for later
+            if kernel.correction is not None:
+                tables = [dr.ravel(each) for each in sums]
+                chosen = dr.opaque(mi.UInt32, len(used))
+                once = (
+                    indices(np.arange(len(used))),
+                    chosen,
+                    self.groups,
+                    floats(np.ones_like(factors)),
+                )
+                sums = smooth(kernel.correction, self.cells.cells, tables, kinds, *once)
+                dr.eval(sums)
             values = dr.ravel(sums[0])
             return Tables(values, sums[1], dr.ravel(sums[2]) if self.coloured else values)
 

@@ -42,10 +42,10 @@ def irradiance_table(moments: mi.Float, cells: int, bins: mi.UInt32, groups: int
     k = mi.UInt32(0)
     while k < bins:
         value = dr.gather(mi.Vector4f, moments, (cell * bins + k) * groups + group)
-        if value.w > 0:
+        if value.w != 0:
             flux = mi.Vector3f(value.x, value.y, value.z)
             mean += flux
-            basis = harmonics(dr.normalize(flux))
+            basis = harmonics(dr.normalize(flux) * dr.sign(value.w))
             for i in range(9):
                 sums[i] += value.w * basis[i]
         k += 1

@@ -15,7 +15,7 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import csr_matrix
+from scipy.sparse import csr_matrix, diags, identity
 from scipy.spatial import cKDTree
 
 from optisense.optics.backend.arrays import floats, indices
@@ -56,24 +56,41 @@ MAX_SHARPENING = 0.25
 
 
 @dataclass
-class Smoothing:
-    """Kernel-weighted sums among cells, as the rows of a sparse matrix.
+class WeightedSums:
+    """Weighted sums among cells, as the rows of a sparse matrix.
 
     Attributes:
         start: index of the first entry of each row.
         cell: the neighbour of each entry.
         weight: the weight of each entry.
         matrix: the same as a SciPy matrix.
-        blur: the matrix with the blur of the cells themselves added; without it where a coating has
-        a
-            metallic lobe, as the overlap of the bins makes up for it there.
     """
 
     start: mi.UInt32
     cell: mi.UInt32
     weight: mi.Float
     matrix: csr_matrix
+
+    @classmethod
+    def of(cls, matrix: csr_matrix) -> WeightedSums:
+        """The sums that a matrix makes."""
+        return cls(indices(matrix.indptr), indices(matrix.indices), floats(matrix.data), matrix)
+
+
+@dataclass
+class Smoothing:
+    """What is applied to tallied light.
+
+    Attributes:
+        kernel: from mW on cells to mW/mm^2.
+        blur: the kernel with the blur of the cells themselves added.
+        correction: from smoothed light to light without the blur of kernel and cells, in cells in
+            or near the camera's view; None where it is not made.
+    """
+
+    kernel: WeightedSums
     blur: csr_matrix
+    correction: WeightedSums | None
 
 
 class Kernels:
@@ -126,27 +143,33 @@ class Kernels:
         most = np.maximum(MAX_RADIUS_RATIO * self._length, least)
         return np.where(self.near, np.clip(best, least, most), MIN_RADIUS_CELLS_LIMIT * self._size)
 
-    def smoothing(self, photons: int, metallic: bool = False) -> Smoothing:
-        """The kernels for this number of emitted photons."""
-        key = photons, metallic
+    def smoothing(self, photons: int, corrected: bool = False) -> Smoothing:
+        """The kernels for this number of emitted photons.
+
+        Args:
+            photons: emitted.
+            corrected: whether the blur of each direction bin is undone by itself. With K the kernel
+                and B the blur, light L becomes 2 K L - B K L ("twicing", Stuetzle and Mittal 1979):
+                blur goes with the fourth power of the radius then. Noise is 1.2 times that of K.
+        """
+        key = photons, corrected
         if key not in self._known:
             radii = self.radii(photons)
             matrix = kernel_matrix(self.cells, radii)
-            self._known = {
-                key: Smoothing(
-                    start=indices(matrix.indptr),
-                    cell=indices(matrix.indices),
-                    weight=floats(matrix.data),
-                    matrix=matrix,
-                    blur=matrix if metallic else self._blur(radii),
-                )
-            }
+            blur = self._blur(radii)
+            twice = self._twice(blur) if corrected else None
+            self._known = {key: Smoothing(WeightedSums.of(matrix), blur, twice)}
         return self._known[key]
+
+    def _twice(self, blur: csr_matrix) -> WeightedSums:
+        near = diags(self.near.astype(np.float64))
+        again = near @ blur @ diags(self.cells.areas)
+        return WeightedSums.of((identity(self.cells.cells) + near - again).tocsr())
 
     def _blur(self, radii: FloatArray) -> csr_matrix:
         return kernel_matrix(self.cells, np.sqrt(radii**2 + CELL_BLUR * self._size**2))
 
-    def sharpening(self, landed: FloatArray, photons: int, metallic: bool = False) -> FloatArray:
+    def sharpening(self, landed: FloatArray, photons: int) -> FloatArray:
         """Factors (cells, groups) that undo most of the blur of the kernel and the cells.
 
         The kernel lowers peaks and fills hollows. Applied to its own result, it shows by how much,
@@ -156,10 +179,9 @@ class Kernels:
         Args:
             landed: (cells, groups) mW on each cell.
             photons: emitted photons.
-            metallic: whether a coating has a metallic lobe.
         """
-        kernel = self.smoothing(photons, metallic)
-        smooth = kernel.matrix @ landed
+        kernel = self.smoothing(photons)
+        smooth = kernel.kernel.matrix @ landed
         again = kernel.blur @ (smooth * self.cells.areas[:, None])
         sharpened = (again > 0) & self.near[:, None]
         factor = np.divide(smooth, again, out=np.ones_like(smooth), where=sharpened)
@@ -220,7 +242,7 @@ def kernel_matrix(cells: SurfaceCells, radii: FloatArray) -> csr_matrix:
 
 @dr.syntax
 def smooth(
-    kernel: Smoothing,
+    kernel: WeightedSums,
     cells: int,
     tables: list[mi.Float],
     kinds: list[Any],
@@ -253,7 +275,7 @@ def smooth(
     while j < end:
         other = dr.gather(mi.UInt32, kernel.cell, j) * (stride * groups) + slot
         # Most bins hold nothing: one look at the fourth float of the first table tells.
-        if dr.gather(mi.Float, tables[0], other * 4 + 3) > 0:
+        if dr.gather(mi.Float, tables[0], other * 4 + 3) != 0:
             weight = dr.gather(mi.Float, kernel.weight, j)
             for i in range(len(kinds)):
                 totals[i] += weight * dr.gather(kinds[i], tables[i], other)
