@@ -44,19 +44,25 @@ class DirectionBins:
         """The bins for coatings whose sharpest metallic lobe has this GGX alpha; None for diffuse
         coatings.
         """
-        if roughness is None or roughness >= BROAD_LOBE:
+        if roughness is None:
             return DIFFUSE_BINS
+        if roughness >= BROAD_LOBE:
+            return BROAD_LOBE_BINS
         return FINE_BINS if roughness >= NARROW_LOBE else FINEST_BINS
 
 
 DIFFUSE_BINS = DirectionBins(16, 1.0)
-"""The bins for diffuse coatings and broad lobes."""
+"""The bins for diffuse coatings."""
+BROAD_LOBE_BINS = DirectionBins(16, 0.6)
+"""The bins for broad metallic lobes. With the full overlap, the skin beside a contact of GelSight
+Mini of specularity 0.3 is 2.5 % off instead of 1.8 %; with 24 x 24 bins it is 1.3 %, for up to
+three times the time."""
 FINE_BINS = DirectionBins(24, 0.6, True)
 """The bins for lobes that resolve the lamps."""
 FINEST_BINS = DirectionBins(32, 0.6, True)
 """The bins for lobes that are narrower than most lamps."""
-BROAD_LOBE = 0.75
-"""GGX alpha from which on a lobe is so broad that the bins of diffuse coatings do."""
+BROAD_LOBE = 0.5
+"""GGX alpha from which on a lobe is so broad that coarse bins do."""
 NARROW_LOBE = 0.25
 """GGX alpha below which the finest bins are needed: the error in a contact of GelSight Mini of
 alpha 0.05 is 5 % with them and 9 % with the next coarser ones; at 0.4 it is 1.4 and 1.6 %."""

@@ -216,7 +216,8 @@ class CacheStore:
             entry = directions.count * self._table.groups * (36 if self._coloured else 20)
             if self._grazes:
                 entry *= 2
-            most = MAX_TALLY_BYTES if directions == DIFFUSE_BINS else MAX_FINE_TALLY_BYTES
+            fine = directions.count > DIFFUSE_BINS.count
+            most = MAX_FINE_TALLY_BYTES if fine else MAX_TALLY_BYTES
             least = float(np.sqrt(1.3 * area * entry / most))
             scale = self.cell_size / CELL_SIZE
             self._cells = build_cells(points, triangles, max(self.cell_size, scale * least))
