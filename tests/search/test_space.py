@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from optisense import library, sensors
 from optisense.design import SensorDesign, add_cage, get_value
 from optisense.design.cage import as_array
 from optisense.errors import DesignError, OptiSenseError, SearchError
@@ -318,3 +319,15 @@ def test_setting_81_numbers_at_once_is_quick(svelte: SensorDesign) -> None:
 def test_expand_tells_what_was_asked(mini: SensorDesign) -> None:
     _, found = expand(mini, "camera.position", Around(1.0))
     assert {parameter.asked for parameter in found} == {"camera.position"}
+
+
+def test_a_camera_from_the_library_brings_its_sensor_where_there_is_one() -> None:
+    """An ideal camera stays ideal; one with a sensor and a lens gets those of the other camera."""
+    space = SearchSpace({"camera.model": ["gelsight-mini", "pi-v1"]})
+    plain = sensors.gelsight_mini()
+    real = library.with_imaging(plain, "pi-v2", focus_distance=19.4)
+    changed = [space.bind(design).apply(np.array([1.0])).camera for design in (plain, real)]
+    assert [camera.model for camera in changed] == ["pi-v1", "pi-v1"]
+    assert changed[0].is_ideal
+    assert changed[1].noise == library.camera("pi-v1").noise
+    assert changed[1].blur is None
