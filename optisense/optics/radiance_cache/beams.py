@@ -17,10 +17,15 @@ from numpy.typing import NDArray
 
 from optisense.optics.backend.arrays import floats, indices
 from optisense.optics.radiance_cache.angular_variance import passes_near, squared_radius
+from optisense.optics.radiance_cache.direction_bins import DIFFUSE_BINS
 from optisense.optics.scene.surface_cells import SurfaceCells
 
 STRONG_SHARE = 0.03
 """Share of a group's light in a cell above which four neighbouring bins stay separate beams."""
+SPARSE_SHARE = 0.003
+"""Share of a group's light in a cell below which a beam may be that of a single photon, whose
+spread nothing tells. Where bins are fine, such beams are at least as wide as 16 bins:
+a photon near the mirror direction of a narrow lobe would be a bright blotch else."""
 NO_SLOT = 0xFFFFFFFF
 """Marks a direction bin that the cache does not hold."""
 READ_DISTANCE = 1.5
@@ -76,7 +81,11 @@ def collect_beams(
     lane = dr.arange(mi.UInt32, entries)
     total = _total(moments, sizes[1], groups, lane)
     zero = dr.zeros(mi.UInt32, entries)
-    count = _collect(*field, *sizes, groups, coloured, total, lane, zero, nowhere, nowhere, False)
+    # A disc of the solid angle of 16 bins has R^2 = 64 / bins, and a mean cosine of 1 - R^2 / 4.
+    fine = bands * sectors > DIFFUSE_BINS.count
+    widest = dr.opaque(mi.Float, 1 - 16 / (bands * sectors) if fine else 1.0)
+    rest = (groups, coloured, total, widest, lane)
+    count = _collect(*field, *sizes, *rest, zero, nowhere, nowhere, False)
     padded = dr.zeros(mi.UInt32, entries + 1)
     dr.scatter(padded, count, lane)
     starts = dr.prefix_sum(padded)
@@ -84,7 +93,7 @@ def collect_beams(
     beams = max(int(starts[entries]), 1)
     ways, fluxes = dr.zeros(mi.Float, 4 * beams), dr.zeros(mi.Float, 4 * beams)
     first = dr.gather(mi.UInt32, starts, lane)
-    _collect(*field, *sizes, groups, coloured, total, lane, first, ways, fluxes, True)
+    _collect(*field, *sizes, *rest, first, ways, fluxes, True)
     dr.eval(ways, fluxes)
     return Beams(starts, ways, fluxes)
 
@@ -110,13 +119,17 @@ def _collect(
     groups: int,
     coloured: bool,
     total: mi.Float,
+    sparse_cosine: mi.Float,
     lane: mi.UInt32,
     first: mi.UInt32,
     ways: mi.Float,
     fluxes: mi.Float,
     write: bool,
 ) -> mi.UInt32:
-    """Count the beams of each lane's cell and group, or write them from ``first`` on."""
+    """Count the beams of each lane's cell and group, or write them from ``first`` on.
+
+    ``sparse_cosine`` is the largest mean cosine of a beam of little light.
+    """
     cell, group = lane // groups, lane % groups
     slot = mi.UInt32(first)
     k = mi.UInt32(0)
@@ -149,6 +162,8 @@ def _collect(
                 length = dr.norm(mi.Vector3f(value.x, value.y, value.z))
                 scale = dr.sign(value.w) * dr.rcp(dr.maximum(length, 1e-30))
                 cosine = dr.minimum(length / dr.maximum(dr.abs(value.w), 1e-30), 1.0)
+                sparse = dr.abs(value.w) < SPARSE_SHARE * total
+                cosine = dr.select(sparse, dr.minimum(cosine, sparse_cosine), cosine)
                 way = mi.Vector4f(value.x * scale, value.y * scale, value.z * scale, cosine)
                 dr.scatter(ways, way, slot, chosen[i])
                 tag = dr.reinterpret_array(mi.Float, mi.UInt32(group))
