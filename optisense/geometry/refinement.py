@@ -1,0 +1,99 @@
+"""Smaller triangles where a mesh needs them, by bisection of the longest edges."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+
+MAX_PASSES = 40
+"""Passes after which refinement ends; each halves the area of the triangles that it cuts."""
+
+
+def refine(
+    vertices: FloatArray,
+    faces: IntArray,
+    corner_normals: FloatArray,
+    wanted: Callable[[FloatArray], FloatArray],
+    max_faces: int,
+) -> tuple[FloatArray, IntArray, FloatArray]:
+    """Bisect triangles until no edge is longer than wanted at its middle.
+
+    A triangle is cut through its longest edge first, and so is its neighbour across that edge
+    (Rivara 1984): no vertex ends up inside an edge of another triangle, and angles do not become
+    much smaller than they were.
+
+    Args:
+        vertices: (n, 3) mm; a place has one vertex, whatever faces meet there.
+        faces: (m, 3) rows of ``vertices``.
+        corner_normals: (m, 3, 3) shading normals of the corners of each face, not normalised again.
+        wanted: greatest edge length (k,) mm at places (k, 3).
+        max_faces: the refinement ends where the next pass could lead to more.
+
+    Returns:
+        The same three of the finer mesh. Vertices are only added.
+    """
+    for _ in range(MAX_PASSES):
+        ends = np.sort(faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
+        key, edge = np.unique(ends[:, 0] * len(vertices) + ends[:, 1], return_inverse=True)
+        edge = edge.reshape(-1, 3)
+        first, second = key // len(vertices), key % len(vertices)
+        middles = (vertices[first] + vertices[second]) / 2.0
+        length = np.linalg.norm(vertices[first] - vertices[second], axis=1)
+        cut = length > wanted(middles)
+        # Of edges of one length all triangles choose the same.
+        rank = np.empty(len(key), dtype=np.int64)
+        rank[np.lexsort((np.arange(len(key)), length))] = np.arange(len(key))
+        longest = np.argmax(rank[edge], axis=1)
+        longest_edge = edge[np.arange(len(edge)), longest]
+        while True:
+            more = cut[edge].any(axis=1) & ~cut[longest_edge]
+            if not more.any():
+                break
+            cut[longest_edge[more]] = True
+        if not cut.any() or len(faces) + 2 * int(cut.sum()) > max_faces:
+            break
+        added = np.cumsum(cut) - 1 + len(vertices)
+        vertices = np.concatenate([vertices, middles[cut]])
+        faces, corner_normals = _cut(faces, corner_normals, edge, longest, cut, added)
+    return vertices, faces, corner_normals
+
+
+def _cut(
+    faces: IntArray,
+    normals: FloatArray,
+    edge: IntArray,
+    longest: IntArray,
+    cut: NDArray[np.bool_],
+    added: IntArray,
+) -> tuple[IntArray, FloatArray]:
+    """Faces with their marked edges cut, the longest first."""
+    touched = cut[edge].any(axis=1)
+    order = (longest[touched, None] + np.arange(3)) % 3  # the longest edge leads from corner 0 to 1
+    rows = np.arange(int(touched.sum()))[:, None]
+    a, b, c = faces[touched][rows, order].T
+    na, nb, nc = np.moveaxis(normals[touched][rows, order], 1, 0)
+    ab, bc, ca = edge[touched][rows, order].T
+    m, nm = added[ab], (na + nb) / 2.0
+    kept = [(faces[~touched], normals[~touched])]
+    for x, y, other, nx, ny in ((b, c, bc, nb, nc), (c, a, ca, nc, na)):
+        twice = cut[other]
+        kept.append(_faces(~twice, (m, nm), (x, nx), (y, ny)))
+        middle = added[other], (nx + ny) / 2.0
+        kept.append(_faces(twice, (m, nm), (x, nx), middle))
+        kept.append(_faces(twice, (m, nm), middle, (y, ny)))
+    return np.concatenate([f for f, _ in kept]), np.concatenate([n for _, n in kept])
+
+
+def _faces(
+    chosen: NDArray[np.bool_], *corners: tuple[IntArray, FloatArray]
+) -> tuple[IntArray, FloatArray]:
+    """Faces and corner normals of three corners, where ``chosen``."""
+    return (
+        np.stack([vertex[chosen] for vertex, _ in corners], axis=1),
+        np.stack([normal[chosen] for _, normal in corners], axis=1),
+    )
