@@ -35,6 +35,8 @@ class Contact:
             the position in which the indenter's x axis runs along u.
         along: (3,) direction in the design's frame that the x axis runs along instead of u, as
             far as the surface allows.
+        force: N, along the inward normal, in place of a depth: the elastic gel then decides how
+            deep the indenter goes.
     """
 
     indenter: Indenter
@@ -43,6 +45,7 @@ class Contact:
     depth: float = 0.5
     rotation: float = 0.0
     along: tuple[float, float, float] | None = None
+    force: float | None = None
 
     def __post_init__(self) -> None:
         if self.at is not None and self.point is not None:
@@ -58,6 +61,10 @@ class Contact:
         if not (math.isfinite(self.depth) and self.depth > 0.0):
             raise ContactError(
                 f"the depth of a contact is {self.depth:g}", hint="give a depth above 0, in mm"
+            )
+        if self.force is not None and not (math.isfinite(self.force) and self.force > 0.0):
+            raise ContactError(
+                f"the force of a contact is {self.force:g}", hint="give a force above 0, in N"
             )
         if not math.isfinite(self.rotation):
             raise ContactError("the rotation of a contact is not finite", hint="give degrees")

@@ -1,6 +1,6 @@
 """Contacts written as text, for the command line.
 
-    contact  = indenter "@" place ":" depth [ ":" rotation ]
+    contact  = indenter "@" place ":" ( depth | force "N" ) [ ":" rotation ]
     indenter = "sphere:" radius
              | "cylinder:" radius [ "," length [ "," angle ] ]
              | "plane" [ ":" tilt_x "," tilt_y [ "," size ] ]
@@ -8,9 +8,9 @@
              | any other kind in `INDENTERS` and its numbers
     place    = u "," v  |  x "," y "," z
 
-Lengths are in mm, angles in degrees; two numbers are surface coordinates, three are a point in
-the frame of the design. Examples: `sphere:1.5@0,0:0.8`, `cylinder:2@1,-3:0.5:90`,
-`plane:0,5@0,0:0.3`, `mesh:screw.stl,1000@2,2:0.4`.
+Lengths are in mm, forces in newtons, angles in degrees; two numbers are surface coordinates, three
+are a point in the frame of the design. Examples: `sphere:1.5@0,0:0.8`, `cylinder:2@1,-3:0.5:90`,
+`plane:0,5@0,0:0.3`, `mesh:screw.stl,1000@2,2:0.4`, `sphere:3@0,0:2N`.
 """
 
 from __future__ import annotations
@@ -38,14 +38,14 @@ def parse_contact(text: str) -> Contact:
         if len(fields) not in (2, 3):
             raise ContactError("there is no depth after the place", hint=_FORM)
         coordinates = _numbers(fields[0], "the place", (2, 3))
-        depth = _numbers(fields[1], "the depth", (1,))[0]
+        depth, force = _depth_or_force(fields[1])
         rotation = _numbers(fields[2], "the rotation", (1,))[0] if len(fields) == 3 else 0.0
         indenter = parse_indenter(shape)
         if len(coordinates) == 3:
             x, y, z = coordinates
-            return Contact(indenter, point=(x, y, z), depth=depth, rotation=rotation)
+            return Contact(indenter, point=(x, y, z), depth=depth, rotation=rotation, force=force)
         u, v = coordinates
-        return Contact(indenter, at=(u, v), depth=depth, rotation=rotation)
+        return Contact(indenter, at=(u, v), depth=depth, rotation=rotation, force=force)
     except ContactError as error:
         raise ContactError(
             error.message, where=f"contact '{text}'", hint=error.hint or _FORM
@@ -64,6 +64,14 @@ def parse_indenter(text: str) -> Indenter:
     except ContactError as error:
         hint = error.hint or INDENTER_FORM
         raise ContactError(error.message, where=f"indenter '{text}'", hint=hint) from error
+
+
+def _depth_or_force(text: str) -> tuple[float, float | None]:
+    """The depth of a number without a unit; the usual depth and the force of one in N."""
+    word = text.strip()
+    if word[-1:] in ("N", "n") and word[:-1].strip()[-1:] in "0123456789.":
+        return Contact.depth, _numbers(word[:-1], "the force", (1,))[0]
+    return _numbers(text, "the depth", (1,))[0], None
 
 
 def _numbers(text: str, name: str, counts: tuple[int, ...]) -> list[float]:

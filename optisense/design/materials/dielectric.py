@@ -18,6 +18,7 @@ from optisense.design.fields import (
     is_left_out,
 )
 from optisense.design.materials.base import RGB, Material, Medium
+from optisense.design.materials.gel_elasticity import GelElasticity
 from optisense.design.materials.optical_constants import (
     CHANNEL_WAVELENGTHS,
     SODIUM_LINE,
@@ -31,7 +32,6 @@ from optisense.design.reflectance import fresnel_dielectric
 
 Index = Annotated[Number, Field(ge=1.0, le=4.0)]
 """A refractive index."""
-
 
 PER_MM: dict[str, Any] = {"unit": "1/mm"}
 
@@ -216,6 +216,10 @@ class Dielectric(Material):
             found = np.where(np.abs(found) < ROUNDING, 0.0, found)
         red, green, blue = found.tolist()
         return red, green, blue
+
+    elasticity: GelElasticity | None = Field(
+        default=None, description="how it yields, for elastomers"
+    )
 
     def medium(self) -> Medium:
         """Its index, the roughness of its surface, and what it absorbs."""

@@ -1,0 +1,27 @@
+"""How an elastomer yields."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from pydantic import Field
+
+from optisense.design.fields import Model, NonNegative, Number, Positive
+
+MAX_POISSON_RATIO = 0.4999
+"""Largest Poisson ratio of a material. At 0.5 it would be incompressible and its bulk modulus
+infinite; silicones are measured between 0.48 and 0.4999."""
+
+
+class GelElasticity(Model):
+    """How a gel yields: the constants of linear isotropic elasticity, and friction."""
+
+    youngs_modulus: Positive = Field(
+        description="Young's modulus", examples=[0.435], json_schema_extra={"unit": "MPa"}
+    )
+    poisson_ratio: Annotated[Number, Field(ge=0.0, le=MAX_POISSON_RATIO)] = Field(
+        default=0.49, description="Poisson ratio; near 0.5 for silicones"
+    )
+    friction: NonNegative = Field(
+        default=1.0, description="coefficient of friction of the coated skin"
+    )

@@ -1,0 +1,51 @@
+"""How the skin of a gel deforms under contacts, and the forces that it takes.
+
+The mechanics know nothing of light: from a design and its contacts they make the deformed skin.
+Names load on first use, as SciPy takes a while.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from optisense.lazy_names import load_on_first_use
+
+if TYPE_CHECKING:
+    from optisense.mechanics.deformed_mesh import SkinMesh, SkinState, skin_mesh
+    from optisense.mechanics.elasticity import Elasticity, youngs_modulus_of_shore_a
+    from optisense.mechanics.gel import Gel, elasticity_of
+    from optisense.mechanics.pressed_skin import Pressed, PressedSkin
+    from optisense.mechanics.skins import CONFORMING, ELASTIC, SKINS
+
+_HOMES = {
+    "CONFORMING": ".skins",
+    "ELASTIC": ".skins",
+    "SKINS": ".skins",
+    "Elasticity": ".elasticity",
+    "Gel": ".gel",
+    "Pressed": ".pressed_skin",
+    "PressedSkin": ".pressed_skin",
+    "SkinMesh": ".deformed_mesh",
+    "SkinState": ".deformed_mesh",
+    "elasticity_of": ".gel",
+    "skin_mesh": ".deformed_mesh",
+    "youngs_modulus_of_shore_a": ".elasticity",
+}
+
+__all__ = [
+    "CONFORMING",
+    "ELASTIC",
+    "SKINS",
+    "Elasticity",
+    "Gel",
+    "Pressed",
+    "PressedSkin",
+    "SkinMesh",
+    "SkinState",
+    "elasticity_of",
+    "skin_mesh",
+    "youngs_modulus_of_shore_a",
+]
+
+if not TYPE_CHECKING:  # type checkers would take any name for one of the package's
+    __getattr__, __dir__ = load_on_first_use(__name__, _HOMES)

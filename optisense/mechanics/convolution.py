@@ -1,0 +1,89 @@
+"""Displacements of a layer's surface on a regular grid, by fast Fourier transforms."""
+
+from __future__ import annotations
+
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import fft
+
+from optisense.mechanics.elasticity import Elasticity
+from optisense.mechanics.layer import Kernels, SquareLoad
+
+FloatArray = NDArray[np.float64]
+
+
+class GridResponse:
+    """The response of a bonded layer to loads that are uniform on each square of a grid.
+
+    The grid is not periodic: transforms are padded to twice its size.
+    """
+
+    def __init__(
+        self, shape: tuple[int, int], pitch: float, thickness: float, elasticity: Elasticity
+    ) -> None:
+        """Set the grid.
+
+        Args:
+            shape: (rows, columns); rows follow y and columns follow x.
+            pitch: mm, side of a square.
+            thickness: mm, of the layer.
+            elasticity: of the layer.
+        """
+        self.shape, self.pitch = shape, pitch
+        self._load = SquareLoad(
+            pitch, thickness, elasticity.shear_modulus, elasticity.poisson_ratio
+        )
+        # An odd number of offsets, -(n - 1) to n - 1, fits twice the size.
+        self._padded = fft.next_fast_len(2 * shape[0]), fft.next_fast_len(2 * shape[1], real=True)
+
+    @cached_property
+    def _offsets(self) -> tuple[FloatArray, FloatArray]:
+        rows, columns = (
+            fft.ifftshift(np.arange(size) - size // 2) * self.pitch for size in self._padded
+        )
+        return np.broadcast_to(columns, self._padded), np.broadcast_to(rows[:, None], self._padded)
+
+    @cached_property
+    def _pressure_kernel(self) -> NDArray[np.complex128]:
+        return np.asarray(fft.rfft2(self._load.pressed_in(*self._offsets)))
+
+    @cached_property
+    def _kernels(self) -> Kernels:
+        return Kernels(*(fft.rfft2(each) for each in self._load.kernels(*self._offsets)))
+
+    def normal(self, pressure: FloatArray) -> FloatArray:
+        """Normal displacement (mm), into the layer, by a pressure (MPa) on each square."""
+        return self._back(self._pressure_kernel * self._there(pressure))
+
+    def tangential(self, shear: FloatArray) -> FloatArray:
+        """(2, rows, columns) displacement (mm) along x and y by shear (MPa) along x and y."""
+        x, y = self._there(shear[0]), self._there(shear[1])
+        kernels = self._kernels
+        return np.stack(
+            [
+                self._back(kernels.xx * x + kernels.xy * y),
+                self._back(kernels.xy * x + kernels.yy * y),
+            ]
+        )
+
+    def displacement(self, pressure: FloatArray, shear: FloatArray | None = None) -> FloatArray:
+        """(3, rows, columns) displacement (mm) along x, y and into the layer."""
+        p = self._there(pressure)
+        kernels = self._kernels
+        x, y, z = kernels.xz * p, kernels.yz * p, kernels.zz * p
+        if shear is not None:
+            along_x, along_y = self._there(shear[0]), self._there(shear[1])
+            x += kernels.xx * along_x + kernels.xy * along_y
+            y += kernels.xy * along_x + kernels.yy * along_y
+            # Betti's theorem: what pressure moves sideways, shear moves inward, mirrored.
+            z -= kernels.xz * along_x + kernels.yz * along_y
+        return np.stack([self._back(each) for each in (x, y, z)])
+
+    def _there(self, load: FloatArray) -> NDArray[np.complex128]:
+        return np.asarray(fft.rfft2(load, self._padded))
+
+    def _back(self, spectrum: NDArray[np.complex128]) -> FloatArray:
+        rows, columns = self.shape
+        return np.asarray(fft.irfft2(spectrum, self._padded)[:rows, :columns])

@@ -1,0 +1,165 @@
+"""The mesh of a skin with indenters pressed in: fine where it bends, as it was elsewhere."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import IntEnum
+
+import numpy as np
+from numpy.typing import NDArray
+
+from optisense.geometry import TriangleMesh
+from optisense.geometry.refinement import refine
+from optisense.mechanics.pressed_skin import DECAY, Pressed, PressedSkin
+
+FloatArray = NDArray[np.float64]
+
+EDGE_IN_CONTACT = 2.0
+"""Greatest edge length in a contact, in distances of the points of its grid. Shading normals vary
+smoothly over triangles, so that their facets are not seen."""
+GROWTH = 0.2
+"""Increase of the greatest edge length with the distance from a contact: displacements change over
+lengths of about that distance."""
+LONGEST_EDGE = 0.25
+"""Greatest edge length where the skin is displaced at all, in thicknesses of the gel."""
+MAX_FACES = 600_000
+"""Most triangles of a deformed skin; more points of contacts than these can show are left out."""
+BENT_SHARE = 0.1
+"""Share of the greatest depth of a contact from which the skin around it counts as bent: such skin
+casts shadows, and is lit as indenters are."""
+
+
+class SkinState(IntEnum):
+    """What became of a triangle of the skin."""
+
+    RESTING = 0  # displaced by little or nothing
+    BENT = 1  # beside a contact, and displaced by much
+    TOUCHING = 2
+
+
+@dataclass(frozen=True, eq=False)
+class SkinMesh:
+    """A deformed sensing surface.
+
+    Attributes:
+        vertices: (n, 3) mm; faces share them.
+        faces: (m, 3) rows of ``vertices``, wound as those of the sensing surface.
+        corner_normals: (m, 3, 3) unit shading normals of the corners, into the gel.
+        state: (m,) of `SkinState`.
+    """
+
+    vertices: FloatArray
+    faces: NDArray[np.int64]
+    corner_normals: FloatArray
+    state: NDArray[np.uint8]
+
+    def part(self, *states: SkinState) -> TriangleMesh | None:
+        """The triangles in one of some states, with shading normals; None if there are none."""
+        chosen = np.isin(self.state, states)
+        if not chosen.any():
+            return None
+        corners = self.vertices[self.faces[chosen]].reshape(-1, 3)
+        count = 3 * int(chosen.sum())
+        normals = self.corner_normals[chosen].reshape(-1, 3)
+        return TriangleMesh(corners, np.arange(count, dtype=np.int32).reshape(-1, 3), normals)
+
+
+def skin_mesh(skin: TriangleMesh, pressed: PressedSkin) -> SkinMesh:
+    """The sensing surface with its displacement.
+
+    The border of the surface stays where it is, as it is joined to other parts.
+
+    Args:
+        skin: the undeformed sensing surface, faces wound to look into the gel.
+        pressed: what presses on it.
+    """
+    smooth = skin.vertex_normals()
+    assert smooth.normals is not None
+    normals = smooth.normals[smooth.faces]
+    whole = skin.welded()
+    if len(whole.faces) != len(normals):  # welding dropped faces without area
+        smooth = whole.vertex_normals()
+        assert smooth.normals is not None
+        normals = smooth.normals[smooth.faces]
+    faces = whole.faces.astype(np.int64)
+    near = _near(whole, pressed)
+    vertices, fine, fine_normals = refine(
+        whole.vertices, faces[near], normals[near], lambda p: _wanted(p, pressed), MAX_FACES
+    )
+    used = np.unique(fine)
+    inward = np.zeros_like(vertices)
+    np.add.at(inward, fine.ravel(), fine_normals.reshape(-1, 3))
+    inward[used] /= np.linalg.norm(inward[used], axis=1, keepdims=True)
+    moved = pressed.displaced(vertices[used], inward[used])
+    free = ~_on_border(fine, len(vertices))[used]
+    displacement = np.zeros_like(vertices)
+    displacement[used[free]] = moved.displacement[free]
+    tilt = np.zeros_like(vertices)
+    tilt[used] = moved.tilt
+    touching = np.zeros(len(vertices), dtype=bool)
+    touching[used] = moved.touching & free
+    bent = np.zeros(len(vertices), dtype=bool)
+    deepest = max(float(each.place.overlap.max()) for each in pressed.contacts)
+    bent[used] = free & (np.linalg.norm(moved.displacement, axis=1) > BENT_SHARE * deepest)
+    state = np.where(
+        touching[fine].all(axis=1),
+        SkinState.TOUCHING,
+        np.where(bent[fine].any(axis=1), SkinState.BENT, SkinState.RESTING),
+    )
+    fine_normals = fine_normals + tilt[fine]
+    all_normals = np.concatenate([normals[~near], fine_normals])
+    all_normals /= np.linalg.norm(all_normals, axis=2, keepdims=True)
+    resting = np.full(int((~near).sum()), SkinState.RESTING)
+    return SkinMesh(
+        vertices + displacement,
+        np.concatenate([faces[~near], fine]),
+        all_normals,
+        np.concatenate([resting, state]).astype(np.uint8),
+    )
+
+
+def _near(mesh: TriangleMesh, pressed: PressedSkin) -> NDArray[np.bool_]:
+    """Which faces may be displaced by a contact."""
+    near = np.zeros(len(mesh.faces), dtype=bool)
+    for contact in pressed.contacts:
+        place = contact.place
+        local = place.local(mesh.vertices)[mesh.faces]
+        reach = DECAY * place.thickness
+        low, high = local.min(axis=1), local.max(axis=1)
+        facing = mesh.face_normals @ place.axes[:, 2] < 0.0
+        near |= (
+            facing
+            & (high[:, 0] > place.x[0] - reach)
+            & (low[:, 0] < place.x[-1] + reach)
+            & (high[:, 1] > place.y[0] - reach)
+            & (low[:, 1] < place.y[-1] + reach)
+        )
+    return near
+
+
+def _wanted(points: FloatArray, pressed: PressedSkin) -> FloatArray:
+    """Greatest edge length (mm) at places of the skin."""
+    result = np.full(len(points), np.inf)
+    for contact in pressed.contacts:
+        place = contact.place
+        away = _distance(points, contact)
+        length = np.minimum(
+            EDGE_IN_CONTACT * place.pitch + GROWTH * away, LONGEST_EDGE * place.thickness
+        )
+        result = np.minimum(result, np.where(away < DECAY * place.thickness, length, np.inf))
+    return result
+
+
+def _distance(points: FloatArray, contact: Pressed) -> FloatArray:
+    """Distance (mm) of places from the touching points of a contact, in its tangent plane."""
+    local = contact.place.local(points)
+    return contact.field.distance(local[:, 0], local[:, 1])
+
+
+def _on_border(faces: NDArray[np.int64], count: int) -> NDArray[np.bool_]:
+    """(count,) which vertices lie on an edge that only one face has."""
+    ends = np.sort(faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
+    edges, times = np.unique(ends, axis=0, return_counts=True)
+    border = np.zeros(count, dtype=bool)
+    border[edges[times == 1].ravel()] = True
+    return border

@@ -1,0 +1,75 @@
+"""Elastic constants of a gel, and Young's modulus from its Shore hardness."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from optisense.design.materials.gel_elasticity import MAX_POISSON_RATIO
+from optisense.errors import ContactError
+
+
+@dataclass(frozen=True)
+class Elasticity:
+    """Linear isotropic elasticity of a gel, and its friction.
+
+    Attributes:
+        youngs_modulus: MPa, which is N/mm^2.
+        poisson_ratio: 0 to `MAX_POISSON_RATIO`.
+        friction: coefficient of Coulomb friction between the skin and what touches it.
+    """
+
+    youngs_modulus: float
+    poisson_ratio: float
+    friction: float = 1.0
+
+    def __post_init__(self) -> None:
+        """Check the constants.
+
+        Raises:
+            ContactError: one of them has no physical meaning.
+        """
+        if not (math.isfinite(self.youngs_modulus) and self.youngs_modulus > 0.0):
+            raise ContactError(
+                f"Young's modulus of a gel is {self.youngs_modulus:g} MPa",
+                hint="give a number above 0, in MPa",
+            )
+        if not 0.0 <= self.poisson_ratio <= MAX_POISSON_RATIO:
+            raise ContactError(
+                f"the Poisson ratio of a gel is {self.poisson_ratio:g}",
+                hint=f"give a number from 0 to {MAX_POISSON_RATIO:g}",
+            )
+        if not (math.isfinite(self.friction) and self.friction >= 0.0):
+            raise ContactError(
+                f"the friction coefficient of a gel is {self.friction:g}",
+                hint="give 0 or a number above it",
+            )
+
+    @property
+    def shear_modulus(self) -> float:
+        """MPa."""
+        return self.youngs_modulus / (2.0 * (1.0 + self.poisson_ratio))
+
+    @property
+    def plane_modulus(self) -> float:
+        """E / (1 - nu^2), MPa: the modulus of Hertz's contact with a rigid body."""
+        return self.youngs_modulus / (1.0 - self.poisson_ratio**2)
+
+
+def youngs_modulus_of_shore_a(hardness: float) -> float:
+    """Young's modulus (MPa) of a rubber from its Shore A hardness.
+
+    The relation is Gent's, "On the relation between indentation hardness and Young's modulus",
+    Rubber Chemistry and Technology 31 (1958): E = 0.0981 (56 + 7.62336 S) /
+    (0.137505 (254 - 2.54 S)). It was found for S between about 20 and 80; softer rubbers are an
+    extrapolation.
+
+    Raises:
+        ContactError: the hardness is not above 0 and below 100.
+    """
+    if not 0.0 < hardness < 100.0:
+        raise ContactError(
+            f"a Shore A hardness of {hardness:g} does not exist",
+            hint="give a number above 0 and below 100",
+        )
+    return 0.0981 * (56.0 + 7.62336 * hardness) / (0.137505 * (254.0 - 2.54 * hardness))

@@ -1,0 +1,170 @@
+"""The gel of a sensor, with contacts pressed into it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+from scipy.optimize import brentq
+
+from optisense.design import SensorDesign
+from optisense.design.materials import Dielectric
+from optisense.design.parts import Role
+from optisense.errors import ContactError
+from optisense.geometry import Contact, SensingSurface, TriangleMesh
+from optisense.geometry.contact import available_depth, locate
+from optisense.mechanics.deformed_mesh import SkinMesh, skin_mesh
+from optisense.mechanics.elasticity import Elasticity
+from optisense.mechanics.footprint import DOES_NOT_REACH, footprint
+from optisense.mechanics.pressed_skin import PressedSkin, press
+
+USUAL_GEL = Elasticity(youngs_modulus=0.435, poisson_ratio=0.49, friction=1.0)
+"""Elasticity of a gel whose material does not tell: that of the GelSight Mini's. Its modulus was
+fitted to measured forces (the FEATS project: Neo-Hooke, C10 = 0.0725 MPa, so E = 6 C10). The
+Poisson ratio and the friction are assumptions, usual for silicone and for a matt coating."""
+
+DEEPEST_SHARE = 0.7
+"""Share of the gel's thickness up to which a depth is looked for that takes a given force. At half
+of it, linear elasticity says little already."""
+LEAST_DEPTH = 1e-4
+"""mm; the least depth that is looked for, a fortieth of the wavelength of light in the gel."""
+LEAST_FORCE_SHARE = 1e-6
+"""Share of the wanted force that stands for none, in logarithms."""
+FORCE_TOLERANCE = 2e-4
+"""Relative error of the depth at which a wanted force counts as found: 0.03 % of the force."""
+
+USUAL_THICKNESS = 4.0
+"""mm; thickness of the gel in designs without an elastomer, about that of a GelSight Mini."""
+
+
+def elasticity_of(design: SensorDesign) -> Elasticity:
+    """The elastic constants of a design's first elastomer; `USUAL_GEL` where it gives none."""
+    for name in design.parts_of(Role.ELASTOMER):
+        material = design.materials.get(design.parts[name].material or "")
+        if isinstance(material, Dielectric) and material.elasticity is not None:
+            given = material.elasticity
+            return Elasticity(given.youngs_modulus, given.poisson_ratio, given.friction)
+    return USUAL_GEL
+
+
+class Gel:
+    """The gel of a sensor, into which contacts are pressed.
+
+    The last press is kept, and so are depths that were found for forces.
+    """
+
+    def __init__(
+        self,
+        surface: SensingSurface,
+        skin: TriangleMesh,
+        elastomers: Sequence[TriangleMesh],
+        elasticity: Elasticity,
+        place: Callable[[Contact], TriangleMesh],
+    ) -> None:
+        """Take a sensor's gel.
+
+        Args:
+            surface: the undeformed sensing surface.
+            skin: its mesh, with all its triangles.
+            elastomers: the gels under it; without any the gel is `USUAL_THICKNESS` thick.
+            elasticity: of the gel.
+            place: gives the mesh of an indenter where a contact presses it in, in the design's
+                frame.
+        """
+        self._surface, self._skin, self._elastomers = surface, skin, elastomers
+        self._elasticity, self._place = elasticity, place
+        self._last: tuple[tuple[Contact, ...], PressedSkin] | None = None
+        self._mesh: tuple[PressedSkin, SkinMesh] | None = None
+        self._depths: dict[Contact, Contact] = {}
+
+    def pressed(
+        self, contacts: Sequence[Contact], placed: Sequence[TriangleMesh] | None = None
+    ) -> PressedSkin:
+        """The skin under contacts.
+
+        Args:
+            contacts: what presses where.
+            placed: their meshes, if they are known.
+
+        Raises:
+            ContactError: an indenter does not reach the surface, no depth takes its force, or its
+                pressure is not found.
+        """
+        asked = tuple(contacts)
+        if self._last is None or self._last[0] != asked:
+            if placed is None:
+                placed = [self._place(contact) for contact in contacts]
+            places = [
+                footprint(
+                    mesh,
+                    self._surface.mesh,
+                    locate(contact, self._surface),
+                    self._thickness(contact),
+                )
+                for contact, mesh in zip(contacts, placed, strict=True)
+            ]
+            self._last = asked, press(places, self._elasticity)
+        return self._last[1]
+
+    def mesh(self, contacts: Sequence[Contact]) -> SkinMesh:
+        """The deformed sensing surface; raises as `pressed` does."""
+        pressed = self.pressed(contacts)
+        if self._mesh is None or self._mesh[0] is not pressed:
+            self._mesh = pressed, skin_mesh(self._skin, pressed)
+        return self._mesh[1]
+
+    def at_depth(self, contact: Contact) -> Contact:
+        """A contact with a force, as one with the depth that takes it when pressed alone.
+
+        Contacts without a force are given back as they are.
+
+        Raises:
+            ContactError: the gel is too thin to take the force.
+        """
+        if contact.force is None:
+            return contact
+        if contact not in self._depths:
+            self._depths[contact] = self._depth_found(contact, contact.force)
+        return self._depths[contact]
+
+    def _depth_found(self, contact: Contact, wanted: float) -> Contact:
+        limit = DEEPEST_SHARE * self._thickness(contact)
+
+        def at(depth: float) -> Contact:
+            return replace(contact, force=None, depth=depth)
+
+        def force(depth: float) -> float:
+            try:
+                return self.pressed([at(depth)]).contacts[0].force
+            except ContactError as error:
+                if error.message == DOES_NOT_REACH:
+                    return 0.0
+                raise
+
+        if (greatest := force(limit)) < wanted:
+            raise ContactError(
+                f"a force of {wanted:g} N would press an indenter deeper than "
+                f"{100 * DEEPEST_SHARE:.0f} % of the gel, which takes {greatest:.3g} N",
+                hint="press with less force",
+            )
+
+        # Forces of smooth indenters grow about as depth^1.5; the root is found in logarithms.
+        def excess(log_depth: float) -> float:
+            found = max(force(math.exp(log_depth)), LEAST_FORCE_SHARE * wanted)
+            return math.log(found / wanted)
+
+        low, high = math.log(LEAST_DEPTH), math.log(limit)
+        if excess(low) >= 0.0:
+            return at(LEAST_DEPTH)
+        return at(math.exp(float(brentq(excess, low, high, xtol=FORCE_TOLERANCE))))
+
+    def _thickness(self, contact: Contact) -> float:
+        """mm of gel under a contact."""
+        spot = locate(contact, self._surface)
+        for elastomer in self._elastomers:
+            try:
+                return available_depth(spot.point, spot.inward, elastomer)
+            except ContactError:
+                continue  # it lies under another one
+        return USUAL_THICKNESS

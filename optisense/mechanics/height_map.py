@@ -1,0 +1,99 @@
+"""Heights of meshes over a plane, on a regular grid."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from optisense.geometry import TriangleMesh
+
+FloatArray = NDArray[np.float64]
+
+LEAST_UPRIGHT = 0.05
+"""Smallest z of unit shading normals by which a triangle's heights are curved; steeper ones are
+taken as they are."""
+PIXELS_AT_ONCE = 4_000_000
+"""Pairs of a triangle and a grid point that are looked at together; they take about 200 MB."""
+
+
+def heights(mesh: TriangleMesh, x: FloatArray, y: FloatArray, highest: bool = False) -> FloatArray:
+    """The lowest (or highest) z of a mesh above each point of a regular grid.
+
+    Where the mesh has shading normals, heights follow a quadratic surface through each triangle:
+    half of the way from the triangle to the tangent planes of its corners, weighted by barycentric
+    coordinates. It is exact for paraboloids, and continuous across edges.
+
+    Args:
+        mesh: mm; z is the height. Its shading normals are used if it has any.
+        x, y: (columns,) and (rows,) mm, ascending at one pitch.
+        highest: give the highest instead.
+
+    Returns:
+        (rows, columns) mm; infinity (minus infinity for the highest) where no triangle is.
+    """
+    sign = -1.0 if highest else 1.0
+    result = np.full(len(x) * len(y), np.inf)
+    corners = mesh.triangles
+    pitch_x, pitch_y = x[1] - x[0], y[1] - y[0]
+    low, high = corners.min(axis=1), corners.max(axis=1)
+    first_x = np.ceil((low[:, 0] - x[0]) / pitch_x - 1e-9).clip(0, len(x)).astype(np.int64)
+    last_x = np.floor((high[:, 0] - x[0]) / pitch_x + 1e-9).clip(-1, len(x) - 1).astype(np.int64)
+    first_y = np.ceil((low[:, 1] - y[0]) / pitch_y - 1e-9).clip(0, len(y)).astype(np.int64)
+    last_y = np.floor((high[:, 1] - y[0]) / pitch_y + 1e-9).clip(-1, len(y) - 1).astype(np.int64)
+    wide = np.maximum(last_x - first_x + 1, 0)
+    count = wide * np.maximum(last_y - first_y + 1, 0)
+    edges = corners[:, 1:, :2] - corners[:, :1, :2]
+    area = edges[:, 0, 0] * edges[:, 1, 1] - edges[:, 0, 1] * edges[:, 1, 0]
+    kept = np.flatnonzero((count > 0) & (np.abs(area) > 0.0))
+    running = np.cumsum(count[kept])
+    begin = 0
+    while begin < len(kept):
+        done = running[begin - 1] if begin else 0
+        end = max(begin + 1, int(np.searchsorted(running, done + PIXELS_AT_ONCE, side="right")))
+        some = kept[begin:end]
+        face = np.repeat(some, count[some])
+        starts = np.cumsum(count[some]) - count[some]
+        number = np.arange(len(face)) - np.repeat(starts, count[some])
+        column = first_x[face] + number % wide[face]
+        row = first_y[face] + number // wide[face]
+        away_x, away_y = x[column] - corners[face, 0, 0], y[row] - corners[face, 0, 1]
+        e, f = edges[face, 0], edges[face, 1]
+        second = (away_x * f[:, 1] - away_y * f[:, 0]) / area[face]
+        third = (away_y * e[:, 0] - away_x * e[:, 1]) / area[face]
+        inside = (second >= -1e-9) & (third >= -1e-9) & (second + third <= 1.0 + 1e-9)
+        face, row, column = face[inside], row[inside], column[inside]
+        shares = second[inside], third[inside]
+        z = _on_triangles(mesh, corners, face, shares, x[column], y[row])
+        np.minimum.at(result, row * len(x) + column, sign * z)
+        begin = end
+    return sign * result.reshape(len(y), len(x))
+
+
+def _on_triangles(
+    mesh: TriangleMesh,
+    corners: FloatArray,
+    face: NDArray[np.int64],
+    shares: tuple[FloatArray, FloatArray],
+    x: FloatArray,
+    y: FloatArray,
+) -> FloatArray:
+    """Heights (n,) of points on faces, by the barycentric shares of the second and third corner."""
+    second, third = shares
+    all_three = 1.0 - second - third, second, third
+    flat = sum(share * corners[face, k, 2] for k, share in enumerate(all_three))
+    if mesh.normals is None:
+        return np.asarray(flat)
+    normals = mesh.normals[mesh.faces]
+    upright = np.abs(normals[:, :, 2]) > LEAST_UPRIGHT
+    curved = np.all(upright, axis=1)[face]
+    divisor = np.where(upright, normals[:, :, 2], 1.0)
+    slopes = -normals[:, :, :2] / divisor[:, :, None]
+    rise = sum(
+        share
+        * (
+            slopes[face, k, 0] * (x - corners[face, k, 0])
+            + slopes[face, k, 1] * (y - corners[face, k, 1])
+        )
+        for k, share in enumerate(all_three)
+    )
+    return np.asarray(flat + np.where(curved, 0.5 * rise, 0.0))

@@ -1,0 +1,128 @@
+"""Contacts pressed into a flat gel: shape of the skin, forces, neighbours."""
+
+import numpy as np
+import pytest
+
+from optisense.errors import ContactError
+from optisense.geometry import Contact, Cylinder, Plane, SensingSurface, Sphere, TriangleMesh
+from optisense.geometry.contact import place
+from optisense.mechanics import Elasticity, Gel, SkinState, skin_mesh
+
+GEL = Elasticity(0.435, 0.49)
+TOP = TriangleMesh.grid((20.0, 16.0)).flipped()  # looks into the gel below it
+BLOCK = TriangleMesh.box((-10.0, -8.0, -4.25), (10.0, 8.0, 0.0))
+SURFACE = SensingSurface(TOP, (0, 0, 0), (1, 0, 0), (0, 1, 0))
+
+
+def gel(placed=lambda contact: place(contact, SURFACE, BLOCK)):
+    return Gel(SURFACE, TOP, [BLOCK], GEL, placed)
+
+
+def press(*contacts):
+    return gel().pressed(contacts)
+
+
+@pytest.fixture(scope="module")
+def ball():
+    return press(Contact(Sphere(1.5), at=(0.0, 0.0), depth=0.8))
+
+
+def along_x(skin, x):
+    points = np.column_stack([x, np.zeros_like(x), np.zeros_like(x)])
+    moved = skin.displaced(points, np.tile([0.0, 0.0, -1.0], (len(x), 1)))
+    slope = np.degrees(np.arctan2(np.abs(moved.tilt[:, 0]), 1.0))
+    return -moved.displacement[:, 2], slope, moved.touching
+
+
+def test_a_ball_touches_less_than_it_overlaps_and_bends_the_skin_around(ball):
+    radius = np.sqrt(ball.contacts[0].area / np.pi)
+    assert radius == pytest.approx(1.084, rel=0.005)
+    assert ball.contacts[0].force == pytest.approx(1.4973 * GEL.plane_modulus, rel=2e-3)
+    # Slopes of the layer by a finite element model of the pad.
+    _, slope, touching = along_x(ball, np.array([0.0, 1.2, 1.5, 2.0, 3.0]) * radius)
+    assert slope[1:] == pytest.approx([21.5, 11.5, 5.0, 1.4], abs=1.0)
+    assert touching.tolist() == [True, False, False, False, False]
+
+
+def test_inside_the_contact_the_skin_has_the_shape_of_the_ball(ball):
+    x = np.linspace(-0.9, 0.9, 31)
+    depth, slope, _ = along_x(ball, x)
+    assert depth == pytest.approx(0.8 - 1.5 + np.sqrt(1.5**2 - x**2), abs=2e-5)
+    assert slope == pytest.approx(np.degrees(np.arcsin(np.abs(x) / 1.5)), abs=0.1)
+
+
+def test_beyond_a_thickness_the_skin_bulges(ball):
+    depth, _, _ = along_x(ball, np.array([5.0]))
+    assert -0.02 < depth[0] < -0.005
+
+
+def test_neighbours_lift_each_other():
+    alone = press(Contact(Sphere(1.5), at=(-2.5, 0.0), depth=0.5)).contacts[0].force
+    pair = press(
+        Contact(Sphere(1.5), at=(-2.5, 0.0), depth=0.5),
+        Contact(Sphere(1.5), at=(2.5, 0.0), depth=0.5),
+    )
+    left, right = (contact.force for contact in pair.contacts)
+    assert left == pytest.approx(right, rel=1e-3)
+    assert 1.005 < left / alone < 1.1
+    far = press(
+        Contact(Sphere(1.5), at=(-8.0, 0.0), depth=0.5),
+        Contact(Sphere(1.5), at=(8.0, 0.0), depth=0.5),
+    )
+    assert far.contacts[0].force == pytest.approx(alone, rel=5e-3)
+
+
+def test_a_flat_punch_and_a_cylinder_and_a_tilted_plate():
+    cylinder = press(Contact(Cylinder(2.0, 6.0), at=(0.0, 0.0), depth=0.4))
+    rows, columns = (cylinder.contacts[0].pressure > 0).nonzero()
+    place_of = cylinder.contacts[0].place
+    assert np.ptp(place_of.x[columns]) == pytest.approx(6.0, abs=0.1)
+    assert np.ptp(place_of.y[rows]) < 2 * np.sqrt(2 * 2.0 * 0.4)
+    tilted = press(Contact(Plane(0.0, 5.0, 6.0), at=(0.0, 0.0), depth=0.3))
+    assert tilted.contacts[0].force > 0.1
+
+
+def test_the_mesh_is_fine_in_contacts_and_joins_the_rest(ball):
+    mesh = skin_mesh(TOP, ball)
+    assert set(np.unique(mesh.state)) == {0, 1, 2}
+    touching = mesh.part(SkinState.TOUCHING)
+    assert touching.area == pytest.approx(np.pi * 1.084**2 * 1.17, rel=0.03)  # it is a bowl
+    whole = TriangleMesh(mesh.vertices, mesh.faces)
+    rim = (np.abs(mesh.vertices[:, 0]) == 10.0) | (np.abs(mesh.vertices[:, 1]) == 8.0)
+    assert np.all(mesh.vertices[rim, 2] == 0.0)
+    assert mesh.vertices[:, 2].min() == pytest.approx(-0.8, abs=2e-3)
+    # Normals agree with the facets but at the rim of the contact, where the slope jumps.
+    angle = np.einsum("fi,fci->fc", whole.face_normals, mesh.corner_normals).min(axis=1)
+    assert np.quantile(np.degrees(np.arccos(np.clip(angle, -1, 1))), 0.9) < 4.0
+    assert np.linalg.norm(mesh.corner_normals, axis=2) == pytest.approx(1.0)
+
+
+def test_a_contact_that_hangs_over_the_border_presses_on_what_is_there():
+    over = press(Contact(Sphere(1.5), at=(9.8, 0.0), depth=0.5))
+    inside = press(Contact(Sphere(1.5), at=(0.0, 0.0), depth=0.5))
+    assert 0.4 < over.contacts[0].force / inside.contacts[0].force < 0.9
+    x, _ = np.meshgrid(over.contacts[0].place.x, over.contacts[0].place.y)
+    touching = over.contacts[0].pressure > 0
+    points = over.contacts[0].place.origin[0] + x * over.contacts[0].place.axes[0, 0]
+    assert points[touching].max() <= 10.0 + 1e-9
+
+
+def test_an_indenter_that_does_not_reach_the_skin_is_told():
+    contact = Contact(Sphere(1.5), at=(0.0, 0.0), depth=0.8)
+    lifted = place(contact, SURFACE, BLOCK)
+    lifted = lifted.with_vertices(lifted.vertices + [0.0, 0.0, 2.0])
+    with pytest.raises(ContactError, match="does not reach the sensing surface"):
+        gel(lambda _: lifted).pressed([contact])
+
+
+def test_a_force_finds_its_depth():
+    pushed = Contact(Sphere(1.5), at=(0.0, 0.0), force=0.5)
+    found = gel().at_depth(pushed)
+    assert found.force is None
+    assert press(found).contacts[0].force == pytest.approx(0.5, rel=2e-3)
+
+
+def test_a_force_beyond_what_the_gel_takes_is_told():
+    pushed = Contact(Sphere(1.5), at=(0.0, 0.0), force=500.0)
+    with pytest.raises(ContactError, match="500 N would press an indenter deeper than 70 %"):
+        gel().at_depth(pushed)
