@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from optisense.design import SensorDesign, set_value
 from optisense.geometry import Contact, parse_contact
+from optisense.mechanics import CONFORMING
 from optisense.objectives import Evaluation, Score, Settings, evaluate
 from optisense.search.evaluation.models import ModelKeeper
 from optisense.sensors import SENSORS
@@ -161,7 +162,11 @@ def picture(inputs: Plain, folder: Path) -> Found:
     else:
         contacts = [_contact(text) for text in inputs["contacts"]]
     image = model.render(
-        contacts, tuple(inputs["resolution"]), inputs["photons"], seed=inputs["seed"]
+        contacts,
+        tuple(inputs["resolution"]),
+        inputs["photons"],
+        seed=inputs["seed"],
+        skin=CONFORMING,
     )
     if image.interrupted:
         raise KeyboardInterrupt

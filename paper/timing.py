@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from optisense.mechanics import CONFORMING
 from paper.evaluations import design_of
 from paper.unit import Found
 
@@ -41,7 +42,7 @@ def image_times(inputs: Mapping[str, Any], folder: Path) -> Found:
 
     def image(size: tuple[int, int], seed: int) -> tuple[TactileImage, NDArray[np.float64]]:
         clock, spent = time.perf_counter(), time.process_time()
-        made = model.render([contact], size, inputs["photons"], seed=seed)
+        made = model.render([contact], size, inputs["photons"], seed=seed, skin=CONFORMING)
         if made.interrupted:
             raise KeyboardInterrupt
         return made, np.array([time.perf_counter() - clock, time.process_time() - spent])

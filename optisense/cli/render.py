@@ -88,6 +88,7 @@ def render(
             noise=options.noise,
             seconds=options.seconds,
             seed=options.seed,
+            skin=options.skin,
             progress=report_progress,
         )
         line.begin(WRITING)

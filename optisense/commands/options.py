@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Callable, Collection
 from dataclasses import dataclass
 from typing import Annotated, Any, Literal
 
 from annotated_types import Ge, Le
-from pydantic import BaseModel, BeforeValidator, ConfigDict
+from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict
 
+from optisense.mechanics.skins import SKINS
 from optisense.quality import LEVELS, photons_of
 
 MAX_PIXELS = 100_000_000
@@ -117,6 +119,20 @@ def read_named(value: Any) -> Any:
     return found
 
 
+def one_of(names: Collection[str]) -> Callable[[str], str]:
+    """A validator that takes one of some names.
+
+    It raises a ValueError for any other.
+    """
+
+    def check(value: str) -> str:
+        if value not in names:
+            raise ValueError(f"'{value}' is none of " + ", ".join(names))
+        return value
+
+    return check
+
+
 Seed = Annotated[int, Ge(0), Le(MOST_SEED), Written("N")]
 
 Resolution = Annotated[
@@ -128,6 +144,12 @@ Photons = Annotated[int, BeforeValidator(photons_of), Written(f"N|{LEVELS}", is_
 Exposure = Annotated[
     float | Literal["auto"], BeforeValidator(read_exposure), Written("auto|VALUE", is_text=True)
 ]
+
+Skin = Annotated[str, AfterValidator(one_of(SKINS)), Written("|".join(SKINS))]
+SKIN_HELP = (
+    "How the skin follows what presses: as a gel does, or taking its shape where both overlap "
+    "and staying flat around it."
+)
 
 Range = Annotated[
     tuple[float, float], BeforeValidator(read_range), Written("LOW:HIGH", is_text=True)

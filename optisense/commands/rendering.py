@@ -7,7 +7,17 @@ from typing import Annotated
 from annotated_types import Ge, Le
 from pydantic import Field
 
-from optisense.commands.options import CommandOptions, Exposure, Photons, Resolution, Seed, Written
+from optisense.commands.options import (
+    SKIN_HELP,
+    CommandOptions,
+    Exposure,
+    Photons,
+    Resolution,
+    Seed,
+    Skin,
+    Written,
+)
+from optisense.mechanics.skins import ELASTIC
 from optisense.quality import PICTURE_PHOTONS, photons_of
 
 
@@ -32,6 +42,7 @@ class RenderOptions(CommandOptions):
         "auto",
         description="Brightness of the picture: a factor on the radiance, or found by itself.",
     )
+    skin: Skin = Field(ELASTIC, description=SKIN_HELP)
 
     def photons_to_trace(self, usual: str = "normal") -> int | None:
         """Those asked for, or of the usual level; None where another limit is given."""

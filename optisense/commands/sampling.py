@@ -8,14 +8,17 @@ from annotated_types import Ge, Le
 from pydantic import Field
 
 from optisense.commands.options import (
+    SKIN_HELP,
     CommandOptions,
     Exposure,
     Photons,
     Range,
     Resolution,
     Seed,
+    Skin,
     Written,
 )
+from optisense.mechanics.skins import ELASTIC
 from optisense.optics.estimators import ESTIMATORS, RADIANCE_CACHE
 from optisense.quality import SAMPLE_PHOTONS
 
@@ -39,6 +42,7 @@ class PictureOptions(CommandOptions):
     photons: Photons = Field(
         SAMPLE_PHOTONS, description="Photons of the light that all pictures share."
     )
+    skin: Skin = Field(ELASTIC, description=SKIN_HELP)
 
 
 class EstimatorOptions(PictureOptions):

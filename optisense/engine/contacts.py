@@ -40,6 +40,7 @@ class GivenContact(BaseModel):
     depth: float = 0.5
     rotation: float = 0.0
     along: tuple[float, float, float] | None = None
+    force: float | None = None
 
 
 AnyContact = str | GivenContact
@@ -61,6 +62,7 @@ def contact_of(given: AnyContact) -> Contact:
         depth=given.depth,
         rotation=given.rotation,
         along=given.along,
+        force=given.force,
     )
 
 
@@ -129,5 +131,6 @@ def plain_contact(contact: Contact, indenter: GivenIndenter) -> dict[str, Any]:
         depth=contact.depth,
         rotation=contact.rotation,
         along=contact.along,
+        force=contact.force,
     )
     return given.model_dump(exclude_none=True)

@@ -144,6 +144,7 @@ def simulate(session: Session, fields: Simulate, job: Job) -> dict[str, Any]:
             noise=fields.noise,
             seconds=fields.seconds,
             seed=fields.seed,
+            skin=fields.skin,
             progress=_progress_of(job),
         )
     image.settings["contacts"] = [_text(given) for given in fields.contacts]

@@ -116,7 +116,7 @@ class DraftModel(OpticalModel):
         """As of `OpticalModel`."""
         straight, old = self._straightened(design), self.design
         self._before = self.__dict__.get("_store", self._before)
-        kept = {name: self.__dict__.get(name) for name in ("surface", "_fixed")}
+        kept = {name: self.__dict__.get(name) for name in ("surface", "_gel", "_fixed")}
         super().set_design(straight)
         if not _all_but_lights_same(old, straight):
             self._seen = None

@@ -15,6 +15,7 @@ import numpy as np
 
 from optisense.errors import RenderError
 from optisense.geometry import Contact, TriangleMesh
+from optisense.mechanics import ELASTIC, SKINS
 from optisense.optics.backend.interrupts import lets_ctrl_c_through
 from optisense.optics.backend.stages import Stage, StageCallback, fraction_done
 from optisense.optics.backend.versions import versions
@@ -132,6 +133,7 @@ class OpticalModel(RayModel):
         only_contacts: bool = False,
         pixel_importance: PixelImportance | None = None,
         partial: bool = True,
+        skin: str = ELASTIC,
     ) -> TactileImage:
         """What the camera sees while ``contacts`` press in.
 
@@ -153,6 +155,9 @@ class OpticalModel(RayModel):
                 share (h, w), 0 to 1, of the camera samples that each pixel gets; each gets a few.
             partial: whether Ctrl-C after the first photons gives an image of those so far; else
                 it is raised at once.
+            skin: "elastic" deforms as a gel does, around contacts as well; "conforming" takes the
+                shape of the indenters where they overlap it and stays flat around them, as the
+                objectives of the OptiSense paper have it.
 
         Returns:
             The image; ``interrupted`` is set if Ctrl-C ended the tracing early.
@@ -166,6 +171,8 @@ class OpticalModel(RayModel):
             raise RenderError(
                 f"there is no estimator '{estimator}'", hint="Use " + " or ".join(ESTIMATORS)
             )
+        if skin not in SKINS:
+            raise RenderError(f"there is no skin '{skin}'", hint="Use " + " or ".join(SKINS))
         for name, value in (("noise", noise), ("seconds", seconds)):
             if value is not None and not value > 0:
                 raise RenderError(f"{name} is {value}", hint="give a number above 0")
@@ -185,7 +192,12 @@ class OpticalModel(RayModel):
         on_stage(Stage.PREPARING, 0.0, 0, None)
         camera = self.camera(resolution)
         placed = [self.place(contact) for contact in contacts]
-        scenes = self._scenes(contacts, placed)
+        pressed = None
+        if contacts and skin == ELASTIC:
+            pressed = self.pressed(contacts, placed)
+            scenes = self._elastic_scenes(contacts, placed)
+        else:
+            scenes = self._scenes(contacts, placed)
         rays = trace_chief_rays(scenes.full, camera)
         if not rays.hit.any():
             raise sees_nothing(rays)
@@ -231,6 +243,7 @@ class OpticalModel(RayModel):
             interrupted=layers.interrupted,
             chain=self.picture_chain,
             indenters=_named(contacts, placed),
+            pressed=pressed,
         )
         image.settings = {
             "design": self.design.name,
@@ -246,6 +259,8 @@ class OpticalModel(RayModel):
             "samples_per_pixel": layers.samples,
             "interrupted": layers.interrupted,
             "contacts": [repr(contact) for contact in contacts],
+            "skin": skin,
+            "presses": [] if pressed is None else pressed.in_numbers(),
             "seconds": {
                 "scene": round(built - began, 4),
                 "light": round(layers.light_seconds, 4),

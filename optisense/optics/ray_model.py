@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import drjit as dr
 import mitsuba as mi
@@ -27,12 +27,18 @@ from optisense.geometry import (
     nine_places,
 )
 from optisense.geometry.indenter_kinds import FACET_ERROR
+from optisense.mechanics import ELASTIC, Gel, PressedSkin, elasticity_of
 from optisense.optics.backend.interrupts import lets_ctrl_c_through
 from optisense.optics.camera.projection import RayCamera
-from optisense.optics.scene.assembly import Assembly, assemble, coating_surface, indenter_piece
+from optisense.optics.scene.assembly import Assembly, assemble, coating_surface
 from optisense.optics.scene.bsdf import surface_table
-from optisense.optics.scene.contact_scenes import ContactScenes
+from optisense.optics.scene.contact_scenes import (
+    ContactScenes,
+    SensorPieces,
+    bounding_ball,
+)
 from optisense.optics.scene.emitters import EmitterTable, emitter_table
+from optisense.optics.scene.fine_scene import FineScene, fine_scene
 from optisense.optics.scene.ray_scene import Piece, RayScene
 from optisense.optics.scene.surfaces import Region, Surface, SurfaceKind, is_coloured
 from optisense.optics.transport.apparent_distance import focused_chain
@@ -41,6 +47,7 @@ from optisense.optics.transport.chief_rays import (
     ChiefRays,
     pixel_areas,
     sees_nothing,
+    shares_by_mirrors,
     trace_chief_rays,
 )
 
@@ -82,9 +89,11 @@ class RayModel:
     def _assemble(self, before: Assembly | None = None) -> None:
         self._parts = assemble(self.design, before, self.bends_media)
         self._surfaces = [piece.surface for piece in self._parts.pieces]
-        self._surfaces.append(self._indenter_surface())
+        self._surfaces += self._pressed_surfaces()
         self._refresh_surfaces()
-        self._forget("surface", "scene", "_watched", "_fixed", "_fine", "_emitter_table", "_store")
+        self._forget(
+            "surface", "_gel", "scene", "_watched", "_fixed", "_fine", "_emitter_table", "_store"
+        )
         self._forget("picture_chain")
 
     @property
@@ -119,15 +128,13 @@ class RayModel:
 
     @cached_property
     def _fixed(self) -> RayScene:
-        opaque = [i for i, s in enumerate(self._surfaces[:-1]) if s.kind is SurfaceKind.OPAQUE]
+        opaque = [i for i, p in enumerate(self._pieces) if p.surface.kind is SurfaceKind.OPAQUE]
         return RayScene([self._pieces[i] for i in opaque], opaque, self._table)
 
     @cached_property
-    def _fine(self) -> _FineScene:
+    def _fine(self) -> FineScene:
         fine = self._parts.fine
-        pieces = [fine.get(i, piece) for i, piece in enumerate(self._pieces)]
-        scene = RayScene(pieces, table=self._table, robust=True)
-        return _FineScene(pieces, scene, _sensing_faces(pieces))
+        return fine_scene([fine.get(i, p) for i, p in enumerate(self._pieces)], self._table)
 
     @cached_property
     def _emitter_table(self) -> EmitterTable:
@@ -138,8 +145,12 @@ class RayModel:
         for name in names:
             self.__dict__.pop(name, None)
 
-    def _indenter_surface(self) -> Surface:
-        return coating_surface(self.design.coating, self._parts.ior_before, Region.INDENTER)
+    def _pressed_surfaces(self) -> list[Surface]:
+        """The coating where indenters touch it, and where it is bent beside them."""
+        return [
+            coating_surface(self.design.coating, self._parts.ior_before, region)
+            for region in (Region.INDENTER, Region.BENT)
+        ]
 
     def _refresh_surfaces(self) -> None:
         self._table = surface_table(self._surfaces)
@@ -186,13 +197,14 @@ class RayModel:
         if old.camera != design.camera:
             self._forget("picture_chain")
         if old.camera.view() != design.camera.view():
-            self._forget("surface", "_store")
+            self._forget("surface", "_gel", "_store")
 
     def _recoat(self) -> None:
         coat = coating_surface(self.design.coating, self._parts.ior_before, Region.SENSING)
         self._surfaces = [
-            coat if surface.region is Region.SENSING else surface for surface in self._surfaces[:-1]
-        ] + [self._indenter_surface()]
+            coat if surface.region is Region.SENSING else surface
+            for surface in self._surfaces[: len(self._pieces)]
+        ] + self._pressed_surfaces()
         self._refresh_surfaces()
         for name in ("scene", "_watched", "_fixed"):
             if name in self.__dict__:
@@ -245,15 +257,27 @@ class RayModel:
 
     @lets_ctrl_c_through
     def chief_rays(
-        self, resolution: tuple[int, int] | None = None, contacts: Sequence[Contact] = ()
+        self,
+        resolution: tuple[int, int] | None = None,
+        contacts: Sequence[Contact] = (),
+        skin: str = ELASTIC,
     ) -> ChiefRays:
-        """Where each pixel looks, by ideal refraction and reflection; (h, w, ...) arrays."""
-        if contacts:
-            placed = [self.place(contact) for contact in contacts]
-            scene = self._with_indenters(self._fine.pieces, placed, robust=True)
-        else:
-            scene = self._fine.scene
-        return trace_chief_rays(scene, self.camera(resolution), self._fine.sensing_faces)
+        """Where each pixel looks, by ideal refraction and reflection; (h, w, ...) arrays.
+
+        Args:
+            resolution: (width, height) pixels; the camera's own by default.
+            contacts: what presses in.
+            skin: "conforming" or "elastic", as in `OpticalModel.render`. On an elastic skin
+                triangles have no numbers.
+        """
+        camera = self.camera(resolution)
+        if not contacts:
+            return trace_chief_rays(self._fine.scene, camera, self._fine.sensing_faces)
+        if skin == ELASTIC:
+            return trace_chief_rays(self._elastic_scenes(contacts).full, camera)
+        placed = [self.place(contact) for contact in contacts]
+        scene = self._sensor_pieces(fine=True).with_indenters(placed, robust=True)
+        return trace_chief_rays(scene, camera, self._fine.sensing_faces)
 
     def views_by_mirrors(self, resolution: tuple[int, int]) -> dict[frozenset[str], float]:
         """By which mirrors the camera sees the sensing surface.
@@ -266,17 +290,12 @@ class RayModel:
             of the rays that arrive there; the empty set stands for those that no mirror reflects.
         """
         rays = self.chief_rays(resolution)
-        met, counts = np.unique(rays.mirrors[rays.hit], return_counts=True)
         mirrors = [
-            (piece.name, 1 << number % MIRROR_BITS)
+            (1 << number % MIRROR_BITS, piece.name)
             for number, piece in enumerate(self._pieces)
             if piece.surface.kind is SurfaceKind.MIRROR
         ]
-        shares: dict[frozenset[str], float] = {}
-        for bits, count in zip(met.tolist(), counts.tolist(), strict=True):
-            names = frozenset(name for name, bit in mirrors if bits & bit)
-            shares[names] = shares.get(names, 0.0) + count / int(counts.sum())
-        return shares
+        return shares_by_mirrors(rays, mirrors)
 
     def differentiable_rays(
         self,
@@ -320,8 +339,10 @@ class RayModel:
         """The part of an indenter that can touch, where a contact puts it in the design's frame.
 
         Raises:
-            ContactError: the contact is off the surface or deeper than the gel.
+            ContactError: the contact is off the surface or deeper than the gel, or no depth takes
+                its force.
         """
+        contact = self._gel.at_depth(contact)
         if not self.gels:
             return geometry.place(contact, self.surface, facet_error=self.facet_error)
         errors = []
@@ -332,18 +353,46 @@ class RayModel:
                 errors.append(error)
         raise errors[0]
 
+    @cached_property
+    def _gel(self) -> Gel:
+        elasticity = elasticity_of(self.design)
+        return Gel(self.surface, self.sensing, self.gels, elasticity, self.place)
+
+    def pressed(
+        self, contacts: Sequence[Contact], placed: Sequence[TriangleMesh] | None = None
+    ) -> PressedSkin:
+        """The elastic skin with contacts pressed in: its shape, pressures and forces.
+
+        Args:
+            contacts: what presses where.
+            placed: their meshes as `place` gives them, if they are known.
+
+        Raises:
+            ContactError: a contact is off the surface or deeper than the gel, or its pressure is
+                not found.
+        """
+        return self._gel.pressed(contacts, placed)
+
     def _scenes(self, contacts: Sequence[Contact], placed: list[TriangleMesh]) -> ContactScenes:
         """The scenes of one image; `placed` are the contacts' meshes."""
         if not contacts:
             return ContactScenes(self._watched, self._fixed, None, mi.Float())
+        balls = np.stack([bounding_ball(mesh.vertices) for mesh in placed])
         return ContactScenes(
-            self._with_indenters(self._pieces, placed, robust=True),
+            self._sensor_pieces().with_indenters(placed, robust=True),
             self._fixed,
             self._indenters(placed),
-            mi.Float(np.concatenate([_ball(mesh) for mesh in placed]).astype(np.float32)),
+            mi.Float(balls.ravel().astype(np.float32)),
             all(getattr(contact.indenter, "convex", False) for contact in contacts),
             self._gel_absorption(),
         )
+
+    def _elastic_scenes(
+        self, contacts: Sequence[Contact], placed: list[TriangleMesh] | None = None
+    ) -> ContactScenes:
+        pressed = self._gel.pressed(contacts, placed)
+        mesh = self._gel.mesh(contacts)
+        return self._sensor_pieces().with_skin(mesh, pressed, self._fixed, self._gel_absorption())
 
     def _gel_absorption(self) -> mi.Color3f | None:
         absorption = self._parts.absorption_before
@@ -351,25 +400,12 @@ class RayModel:
 
     def _indenters(self, placed: list[TriangleMesh]) -> RayScene:
         """Indenters alone."""
-        number = len(self._surfaces) - 1
-        pieces = [indenter_piece(mesh, self._surfaces[number]) for mesh in placed]
-        return RayScene(pieces, [number] * len(pieces), self._table)
+        return self._sensor_pieces().indenters(placed)
 
-    def _with_indenters(
-        self, fixed: list[Piece], placed: list[TriangleMesh], robust: bool = False
-    ) -> RayScene:
-        number = len(fixed)
-        pieces = [indenter_piece(mesh, self._surfaces[number]) for mesh in placed]
-        numbers = [*range(number), *[number] * len(pieces)]
-        return RayScene([*fixed, *pieces], numbers, self._table, robust)
-
-
-class _FineScene(NamedTuple):
-    """The sensor with every triangle of its sensing surface."""
-
-    pieces: list[Piece]
-    scene: RayScene
-    sensing_faces: np.ndarray
+    def _sensor_pieces(self, fine: bool = False) -> SensorPieces:
+        """The sensor's pieces; ``fine``: with every triangle of its sensing surface."""
+        pieces = self._fine.pieces if fine else self._pieces
+        return SensorPieces(pieces, self._surfaces, self._table)
 
 
 def _shapes(design: SensorDesign) -> tuple[Any, ...]:
@@ -378,21 +414,3 @@ def _shapes(design: SensorDesign) -> tuple[Any, ...]:
         name: (group.model, group.emitter, group.lights) for name, group in design.lights.items()
     }
     return design.parts, design.materials, design.cages, design.dispersion, lights
-
-
-def _ball(mesh: TriangleMesh) -> np.ndarray:
-    """(4,) centre and radius of a ball around a mesh."""
-    centre = mesh.bounds.mean(axis=0)
-    return np.append(centre, np.linalg.norm(mesh.vertices - centre, axis=1).max())
-
-
-def _sensing_faces(pieces: list[Piece]) -> np.ndarray:
-    out, start = [], 0
-    for piece in pieces:
-        count = len(piece.faces)
-        if piece.surface.region is Region.SENSING:
-            out.append(np.arange(start, start + count))
-            start += count
-        else:
-            out.append(np.full(count, -1, dtype=np.int64))
-    return np.concatenate(out)

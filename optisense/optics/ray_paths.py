@@ -56,7 +56,7 @@ def trace_paths(
     scene = model._fine.scene
     if contacts:
         placed = [model.place(contact) for contact in contacts]
-        scene = model._with_indenters(model._fine.pieces, placed)
+        scene = model._sensor_pieces(fine=True).with_indenters(placed)
     index = dr.arange(mi.UInt32, camera.width * camera.height)
     origin, direction = camera.rays(
         mi.Float(index % camera.width) + 0.5, mi.Float(index // camera.width) + 0.5

@@ -60,7 +60,7 @@ def contact_rows(contacts: Sequence[Contact]) -> list[dict[str, str]]:
         {
             "indenter": _indenter(contact.indenter),
             "place": _place(contact),
-            "depth": f"{contact.depth:g} mm",
+            "depth": f"{contact.depth:g} mm" if contact.force is None else f"{contact.force:g} N",
         }
         for contact in contacts
     ]

@@ -15,6 +15,7 @@ from scipy.ndimage import distance_transform_edt, gaussian_filter
 
 from optisense.errors import ContactError, TaskError
 from optisense.geometry import Contact, Sphere
+from optisense.mechanics import ELASTIC
 from optisense.quality import SAMPLE_PHOTONS
 from optisense.tasks.camera_noise import MEASURED_NOISE, add_camera_noise
 from optisense.tasks.colour_to_normal import METHODS, TiltReader, fit_reader, normals_of, tilts_of
@@ -60,6 +61,7 @@ class ReconstructionSettings:
         camera_noise: standard deviation in levels of 255, on all pictures.
         resolution: (width, height) pixels; 320 wide, in the camera's shape, if None.
         photons: of the light that all pictures share.
+        skin: "elastic" or "conforming"; see docs/mechanics.md.
     """
 
     method: str = "network"
@@ -70,6 +72,7 @@ class ReconstructionSettings:
     camera_noise: float = MEASURED_NOISE
     resolution: tuple[int, int] | None = None
     photons: int = SAMPLE_PHOTONS
+    skin: str = ELASTIC
 
     def __post_init__(self) -> None:
         if self.method not in METHODS:
@@ -179,6 +182,7 @@ class CalibratedSensor:
             photons=self._settings.photons,
             seed=self._settings.seed,
             partial=False,
+            skin=self._settings.skin,
         )
         return image
 

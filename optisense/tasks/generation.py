@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from optisense.design import SensorDesign, load_design
 from optisense.design.storage import files_of
@@ -18,6 +19,7 @@ from optisense.errors import ContactError, TaskError
 from optisense.folders import LOCK_FILE, FolderLock, held
 from optisense.geometry import Contact, Indenter
 from optisense.library import with_own_lights
+from optisense.mechanics import CONFORMING, ELASTIC
 from optisense.optics.estimators import RADIANCE_CACHE, current_name
 from optisense.quality import SAMPLE_PHOTONS
 from optisense.sensors import save_design
@@ -68,6 +70,7 @@ class DatasetSettings:
             clean, so that noise can be added when they are used.
         radiance: also write linear radiance as EXR.
         estimator: "radiance-cache" or "sppm"; see docs/simulation.md.
+        skin: "elastic" or "conforming"; see docs/mechanics.md.
     """
 
     contacts: ContactDraw = field(default_factory=ContactDraw)
@@ -78,6 +81,7 @@ class DatasetSettings:
     camera_noise: float = 0.0
     radiance: bool = False
     estimator: str = RADIANCE_CACHE
+    skin: str = ELASTIC
 
     def __post_init__(self) -> None:
         if not 0 <= self.camera_noise < 256:
@@ -193,13 +197,18 @@ class _Maker:
         Raises:
             ContactError: it can't be pressed in there.
         """
-        mask = self._model.chief_rays(self._resolution, [drawn.contact]).contact_mask
+        mask = self._touched(drawn.contact)
         if mask.sum() < LEAST_PIXELS:
             return _too_small(self._resolution)
         margin = self._settings.contacts.margin
         if drawn.indenter not in self._larger_than_view and not keeps_margin(mask, margin):
             return "the picture's edge cuts the contact, or is too near to it"
         return ""
+
+    def _touched(self, contact: Contact) -> NDArray[np.bool_]:
+        """(h, w) the pixels that see a contact."""
+        rays = self._model.chief_rays(self._resolution, [contact], self._settings.skin)
+        return rays.contact_mask
 
     def _fits(self, indenter: Indenter) -> bool:
         """Whether the view holds an indenter with its margin, pressed in the middle and upright.
@@ -210,7 +219,7 @@ class _Maker:
         x, y, z = self._places.middle.tolist()
         contact = Contact(indenter, point=(x, y, z), depth=draw.depth[1], rotation=draw.rotation[0])
         try:
-            mask = self._model.chief_rays(self._resolution, [contact]).contact_mask
+            mask = self._touched(contact)
         except ContactError:
             return True  # each draw tells why
         return keeps_margin(mask, draw.margin)
@@ -224,6 +233,7 @@ class _Maker:
             kept = before.get("settings") or {}  # release 0.1 had no margin, and another name
             kept.get("contacts", {}).setdefault("margin", 0.0)
             kept["estimator"] = current_name(kept.get("estimator"))
+            kept.setdefault("skin", CONFORMING)
             known = {key: before.get(key) for key in common}
             known["design"] = design_values(load_design(self._folder / DESIGN))
             now = common | {"design": design_values(with_own_lights(self._model.design))}
@@ -248,6 +258,7 @@ class _Maker:
             photons=self._settings.photons,
             seed=self._settings.seed,
             estimator=self._settings.estimator,
+            skin=self._settings.skin,
             partial=False,
         )
         asked = self._settings.exposure
@@ -297,6 +308,7 @@ class _Maker:
             photons=self._settings.photons,
             seed=self._settings.seed,
             estimator=self._settings.estimator,
+            skin=self._settings.skin,
             partial=False,
         )
         return image

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from optisense.errors import ContactError, TaskError
 from optisense.geometry import Contact, TriangleMesh
 from optisense.geometry.mesh import turn_about_x_and_y
+from optisense.mechanics import CONFORMING
 
 if TYPE_CHECKING:
     from optisense.optics import OpticalModel, TactileImage
@@ -96,7 +97,7 @@ class Misalignment:
         for angle_x in (-self.range, self.range):
             for angle_y in (-self.range, self.range):
                 contact = plane_contact(model, angle_x, angle_y, self.depth)
-                rays = model.chief_rays(RAYS, [contact])
+                rays = model.chief_rays(RAYS, [contact], CONFORMING)
                 self._ensure_covered(rays.hit & (rays.region == Region.INDENTER))
 
     def contact(

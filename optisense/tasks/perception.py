@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from optisense.errors import TaskError
 from optisense.folders import held
 from optisense.geometry import Contact
+from optisense.mechanics import CONFORMING, ELASTIC
 from optisense.objectives.score import json_ready
 from optisense.optics.estimators import RADIANCE_CACHE, current_name
 from optisense.quality import SAMPLE_PHOTONS
@@ -108,6 +109,7 @@ class SampleSettings:
         resolution: (width, height) pixels; what the task needs, in the camera's shape, if None.
         photons: of the light that all samples share.
         estimator: of the light, "radiance-cache" or "sppm".
+        skin: "elastic" or "conforming"; see docs/mechanics.md.
     """
 
     count: int = 200
@@ -116,6 +118,7 @@ class SampleSettings:
     resolution: tuple[int, int] | None = None
     photons: int = SAMPLE_PHOTONS
     estimator: str = RADIANCE_CACHE
+    skin: str = ELASTIC
 
 
 @dataclass(frozen=True)
@@ -269,6 +272,7 @@ class _Camera:
             photons=self._settings.photons,
             seed=self._settings.seed,
             estimator=self._settings.estimator,
+            skin=self._settings.skin,
             only_contacts=bool(contacts) and self._task.contact_only,
             partial=False,
         )
@@ -308,6 +312,7 @@ def _open_table(
         before = read_json(folder / SETTINGS)
         kept = before.get("samples") or {}
         kept["estimator"] = current_name(kept.get("estimator"))
+        kept.setdefault("skin", CONFORMING)
         refuse_differences("samples", folder, before, now)
     else:
         write_json(folder / SETTINGS, now, "the results", KEPT)

@@ -37,6 +37,11 @@ def pyramid(slope: float = 30.0, height: float = 2.0) -> TriangleMesh:
     return TriangleMesh(corners, flat.faces, np.repeat(flat.face_normals, 3, axis=0))
 
 
+RING_SLOPE = 2.0
+"""Degrees by which the skin beside a contact slopes at least where it counts as the ring: about
+what the camera's noise lets a reader tell."""
+
+
 def unseen_objects() -> dict[str, Contact]:
     """What is reconstructed by default: none of it is a ball of the radius that is fitted to."""
     return {
@@ -74,6 +79,12 @@ class Reconstruction:
         """Degrees, the mean over the contact."""
         return float(self.angles[self.mask].mean())
 
+    @cached_property
+    def ring(self) -> NDArray[np.bool_]:
+        """(h, w) the skin around the contact that slopes by `RING_SLOPE` or more."""
+        sloping = angles_between(self.untouched_normals, self.true_normals) >= RING_SLOPE
+        return sloping & ~self.mask
+
     @property
     def depth_error(self) -> float:
         """mm, the mean absolute difference over the contact."""
@@ -92,6 +103,8 @@ class Reconstruction:
             "deepest": float(self.true_depth[inside].max()),
             "deepest_read": float(self.depth[inside].max()),
             "contact_pixels": int(inside.sum()),
+            "ring_normal_error": float(self.angles[self.ring].mean()) if self.ring.any() else 0.0,
+            "ring_pixels": int(self.ring.sum()),
         }
 
 

@@ -183,8 +183,13 @@ def test_only_contacts_lights_what_the_whole_image_shows_there_and_nothing_else(
     assert same_light(only.radiance[mask], whole.radiance[mask])
 
 
-def test_ground_truth_of_a_ball_is_a_sphere() -> None:
-    image = render(model(), BALL)
+@pytest.mark.parametrize(
+    ("skin", "square_of_radius"),
+    # The elastic radius is that of ContactMechanics for the layer (tests/mechanics).
+    [("conforming", 1.5**2 - 0.7**2), ("elastic", 1.0835**2)],
+)
+def test_ground_truth_of_a_ball_is_a_sphere(skin: str, square_of_radius: float) -> None:
+    image = model().render([BALL], resolution=PIXELS, photons=PHOTONS, skin=skin)
     inside = image.contact_mask
     middle = np.array([0, 0, 1.5 - 0.8])
     away = image.points[inside] - middle
@@ -193,7 +198,20 @@ def test_ground_truth_of_a_ball_is_a_sphere() -> None:
     unit = away / np.linalg.norm(away, axis=1, keepdims=True)
     assert np.abs(np.abs((unit * image.normals[inside]).sum(axis=1)) - 1).max() < 0.01
     area = inside.sum() * (18.6 / PIXELS[0]) ** 2
-    assert area == pytest.approx(np.pi * (1.5**2 - 0.7**2), rel=0.1)
+    assert area == pytest.approx(np.pi * square_of_radius, rel=0.1)
+
+
+def test_an_unknown_skin_is_refused() -> None:
+    with pytest.raises(RenderError, match="no skin 'rubber'"):
+        model().render([BALL], resolution=PIXELS, photons=PHOTONS, skin="rubber")
+
+
+def test_run_settings_tell_the_force() -> None:
+    image = render(model(), BALL)
+    (press,) = image.settings["presses"]
+    assert press["force_n"] == pytest.approx(0.857, rel=0.01)
+    assert image.pressed is not None
+    assert image.pressed.contacts[0].force == pytest.approx(press["force_n"], abs=1e-5)
 
 
 def mirrored_means(image: TactileImage) -> np.ndarray:

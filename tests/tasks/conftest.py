@@ -49,11 +49,12 @@ class LambertianSensor:
         self,
         contacts: Sequence[Contact] = (),
         resolution: tuple[int, int] = (160, 120),
+        skin: str = "elastic",
         **ignored: object,
     ) -> TactileImage:
         """An image without noise."""
         self.pictures += 1
-        rays = self._model.chief_rays(resolution, contacts)
+        rays = self._model.chief_rays(resolution, contacts, skin)
         light = np.maximum(rays.normals @ LIGHTS.T, 0).astype(np.float32)
         return TactileImage(
             layers={"all": np.where(rays.hit[..., None], light, 0)},

@@ -68,15 +68,27 @@ def test_depth_normals_and_mask_describe_the_ball(made: Dataset) -> None:
     points = made.background()["points"]
     for sample in made:
         radius, depth = sample.labels["radius"], sample.labels["depth"]
-        assert (sample.depth[~sample.mask] == 0).all()
         assert (sample.depth[sample.mask] > 0).all()
         # On a flat gel (z = 0, out is +z) a ball's depth follows from its normal.
         height = -sample.normals[..., 2][sample.mask]
         expected = depth - radius * (1 - height)
         assert sample.depth[sample.mask] == pytest.approx(expected, abs=4e-3)
-        assert sample.normals[~sample.mask] == pytest.approx(
-            np.broadcast_to([0, 0, -1], points.shape)[~sample.mask], abs=1e-5
+        # Around it the skin is pulled in, and bulges a little farther away.
+        outside = np.nan_to_num(sample.depth[~sample.mask])
+        assert 0.1 * depth < outside.max() < depth
+        assert -0.05 < outside.min() < 0
+        far = np.linalg.norm(points - [sample.labels[k] for k in "xyz"], axis=2) > 5
+        assert sample.normals[far] == pytest.approx(
+            np.broadcast_to([0, 0, -1], points.shape)[far], abs=0.02
         )
+
+
+def test_a_conforming_skin_stays_flat_around_the_ball(mini: OpticalModel, tmp_path: Path) -> None:
+    sample = generate(mini, tmp_path / "flat", 1, replace(SETTINGS, skin="conforming"))[0]
+    assert (sample.depth[~sample.mask] == 0).all()
+    assert sample.normals[~sample.mask] == pytest.approx(
+        np.broadcast_to([0, 0, -1], sample.normals.shape)[~sample.mask], abs=1e-5
+    )
 
 
 def test_noise_of_the_camera_is_all_that_it_changes(

@@ -62,7 +62,7 @@ def test_the_spread_of_colours_over_a_cylinder_is_what_lambert_says(
 ) -> None:
     depth = 0.5
     contact = Contact(Cylinder(radius), at=(0, 0), depth=depth)
-    image = lambertian.render([contact], (320, 240))
+    image = lambertian.render([contact], (320, 240), skin="conforming")
     exposure = lambertian.render([], (320, 240)).auto_exposure()
     measured = CylinderRadius().measure(image.picture(exposure), image)
     # It lies along x: normals turn about x by the angle whose sine is y / radius.

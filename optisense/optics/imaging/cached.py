@@ -200,12 +200,13 @@ def render_cached(
     mask = region_image == Region.INDENTER
     near = np.zeros_like(mask)
     samples = [1]
-    if mask.any():
-        distance = ndimage.distance_transform_edt(~mask)
-        near = distance <= max(2.0, RIM_WIDTH * width)
+    bent = region_image == Region.BENT
+    if mask.any() or bent.any():
+        distance = ndimage.distance_transform_edt(~mask) if mask.any() else np.full(mask.shape, 2.0)
+        near = bent | (distance <= max(2.0, RIM_WIDTH * width))
         share = min(1.0, REFERENCE_WIDTH / width)
         inner, outer = (max(2, round(n * share)) for n in (CONTACT_SAMPLES, RIM_SAMPLES))
-        inner = max(inner, min(MAX_PIXEL_SAMPLES, MIN_CONTACT_SAMPLES // int(mask.sum())))
+        inner = max(inner, min(MAX_PIXEL_SAMPLES, MIN_CONTACT_SAMPLES // max(1, int(mask.sum()))))
         if draft:
             inner, outer = DRAFT_SAMPLES
         if only_contacts:

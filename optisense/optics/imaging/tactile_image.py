@@ -20,6 +20,7 @@ from optisense.design.responses import PictureChain
 from optisense.design.responses.electronics import NoiseSeed
 from optisense.errors import RenderError
 from optisense.geometry import TriangleMesh
+from optisense.mechanics import PressedSkin
 from optisense.optics.camera.response import picture
 from optisense.writing import inside, remove_own_page, written_together
 
@@ -42,7 +43,8 @@ class TactileImage:
         what was asked and what was reached, ready for JSON. unit_layers: each group's layer for
         lights of 1 mW in every channel, from which others follow (see ``relight``). chain: of the
         camera, from radiance to the picture. indenters: what pressed in, by a name to show, in the
-        design's frame (mm).
+        design's frame (mm). pressed: forces, pressures and displacements of an elastic skin with
+        contacts.
     """
 
     layers: dict[str, NDArray[np.float32]]
@@ -54,6 +56,7 @@ class TactileImage:
     unit_layers: dict[str, NDArray[np.float32]] = field(default_factory=dict)
     chain: PictureChain = field(default_factory=PictureChain)
     indenters: dict[str, TriangleMesh] = field(default_factory=dict)
+    pressed: PressedSkin | None = None
 
     def relight(self, flux: Mapping[str, ArrayLike]) -> TactileImage:
         """The same image under lights of other colours and powers; exact, with no new rendering.

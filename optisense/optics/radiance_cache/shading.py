@@ -65,7 +65,7 @@ def shade(
     active, base, raised = points.valid, points.point, mi.Bool(False)
     if thorough:
         region = surface_region(table, points.surface, points.valid)
-        raised = points.valid & (region == int(Region.INDENTER))
+        raised = points.valid & (region >= int(Region.INDENTER))
         # Behind an indenter, along the line of sight, lies the undeformed surface that the eye
         # would have met.
         onward = scenes.fixed.intersect(Ray(points.point, -points.towards_eye, raised))

@@ -5,8 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import mitsuba as mi
+import numpy as np
+from numpy.typing import NDArray
 
-from optisense.optics.scene.ray_scene import RayScene
+from optisense.geometry import TriangleMesh
+from optisense.mechanics import PressedSkin, SkinMesh, SkinState
+from optisense.optics.scene.assembly import indenter_piece
+from optisense.optics.scene.ray_scene import Piece, RayScene
+from optisense.optics.scene.surfaces import Region, Surface
 
 
 @dataclass
@@ -14,11 +20,11 @@ class ContactScenes:
     """Ray scenes of one image.
 
     Attributes:
-        full: everything, indenters included.
+        full: everything, indenters or the deformed skin included.
         fixed: the opaque surfaces without indenters.
-        indenters: the indenters alone; None without contacts.
-        balls: a bounding ball around each indenter; centre (3) and radius, four floats (mm) each.
-        convex: whether every indenter is convex, so that none can shadow itself.
+        indenters: the indenters alone, or the skin that they bend; None without contacts.
+        balls: a bounding ball around each of them; centre (3) and radius, four floats (mm) each.
+        convex: whether each of them is convex, so that none can shadow itself.
         absorption: coefficient of the gel before the sensing surface, per mm and channel; None
             where it is clear.
     """
@@ -29,3 +35,97 @@ class ContactScenes:
     balls: mi.Float
     convex: bool = False
     absorption: mi.Color3f | None = None
+
+
+@dataclass(frozen=True)
+class SensorPieces:
+    """The pieces of a sensor, to which contacts are added.
+
+    Attributes:
+        pieces: nothing pressed in.
+        surfaces: those of the pieces, then the coating where indenters touch it, and where it is
+            bent beside them.
+        table: of these surfaces.
+    """
+
+    pieces: list[Piece]
+    surfaces: list[Surface]
+    table: mi.Float
+
+    def with_indenters(self, placed: list[TriangleMesh], robust: bool = False) -> RayScene:
+        """The sensor and coated indenters; the surface that a ray meets first is the one seen."""
+        count = len(self.pieces)
+        pieces, numbers = self._indenters(placed)
+        return RayScene([*self.pieces, *pieces], [*range(count), *numbers], self.table, robust)
+
+    def indenters(self, placed: list[TriangleMesh]) -> RayScene:
+        """The indenters alone."""
+        return RayScene(*self._indenters(placed), self.table)
+
+    def _indenters(self, placed: list[TriangleMesh]) -> tuple[list[Piece], list[int]]:
+        number = len(self.pieces)
+        pieces = [indenter_piece(mesh, self.surfaces[number]) for mesh in placed]
+        return pieces, [number] * len(pieces)
+
+    def with_skin(
+        self,
+        mesh: SkinMesh,
+        pressed: PressedSkin,
+        fixed: RayScene,
+        absorption: mi.Color3f | None,
+    ) -> ContactScenes:
+        """The sensor with a deformed skin in the place of its sensing surface.
+
+        Args:
+            mesh: the deformed skin.
+            pressed: what deforms it.
+            fixed: the opaque surfaces with nothing pressed in.
+            absorption: of the gel, as in `ContactScenes`.
+        """
+        others = [i for i, p in enumerate(self.pieces) if p.surface.region is not Region.SENSING]
+        sensing = next(i for i, p in enumerate(self.pieces) if p.surface.region is Region.SENSING)
+        count = len(self.pieces)
+        numbers = {
+            SkinState.RESTING: sensing,
+            SkinState.TOUCHING: count,
+            SkinState.BENT: count + 1,
+        }
+        skin = {}
+        for state, number in numbers.items():
+            part = mesh.part(state)
+            if part is not None:
+                surface = self.surfaces[number]
+                skin[state] = Piece("skin", part.vertices, part.faces, surface, part.normals)
+        raised = [state for state in skin if state is not SkinState.RESTING]
+        balls = _balls(mesh.part(SkinState.TOUCHING, SkinState.BENT), pressed)
+        return ContactScenes(
+            RayScene(
+                [*(self.pieces[i] for i in others), *skin.values()],
+                [*others, *(numbers[state] for state in skin)],
+                self.table,
+                robust=True,
+            ),
+            fixed,
+            RayScene([skin[s] for s in raised], [numbers[s] for s in raised], self.table)
+            if raised
+            else None,
+            mi.Float(balls.ravel().astype(np.float32)),
+            absorption=absorption,
+        )
+
+
+def bounding_ball(points: NDArray[np.floating]) -> NDArray[np.float64]:
+    """(4,) centre and radius of a ball around points (n, 3)."""
+    centre = (points.min(axis=0) + points.max(axis=0)) / 2.0
+    return np.append(centre, np.linalg.norm(points - centre, axis=1).max())
+
+
+def _balls(raised: TriangleMesh | None, pressed: PressedSkin) -> NDArray[np.float64]:
+    """A ball around the raised skin that is nearest to each contact."""
+    if raised is None:
+        return np.zeros((0, 4))
+    points = raised.vertices
+    middles = np.stack([contact.place.origin for contact in pressed.contacts])
+    away = np.linalg.norm(points[:, None] - middles, axis=2)
+    nearest = away.argmin(axis=1)
+    return np.stack([bounding_ball(points[nearest == k]) for k in np.unique(nearest)])

@@ -25,7 +25,8 @@ class Region(IntEnum):
 
     OTHER = 0
     SENSING = 1
-    INDENTER = 2
+    INDENTER = 2  # touched by an indenter, whose shape the skin has there
+    BENT = 3  # skin beside a contact that is pushed in with it
 
 
 RGB = tuple[float, float, float]

@@ -232,6 +232,23 @@ def pixel_stretching(rays: ChiefRays) -> NDArray[np.float64]:
     return found
 
 
+def shares_by_mirrors(
+    rays: ChiefRays, mirrors: list[tuple[int, str]]
+) -> dict[frozenset[str], float]:
+    """The shares of the rays that arrive, by the set of mirrors that reflect them on their way.
+
+    Args:
+        rays: chief rays.
+        mirrors: bits of ``rays.mirrors``, and the mirror that each stands for.
+    """
+    met, counts = np.unique(rays.mirrors[rays.hit], return_counts=True)
+    shares: dict[frozenset[str], float] = {}
+    for bits, count in zip(met.tolist(), counts.tolist(), strict=True):
+        names = frozenset(name for bit, name in mirrors if bits & bit)
+        shares[names] = shares.get(names, 0.0) + count / int(counts.sum())
+    return shares
+
+
 def sees_nothing(rays: ChiefRays) -> RenderError:
     """The error to raise where no chief ray meets the sensing surface; says what became of them."""
     names = {outcome: outcome.name.lower().replace("_", " ") for outcome in RayOutcome}
