@@ -28,6 +28,7 @@ from benchmarks.results import machine, say_if_busy
 from optisense import OpticalModel, sensors
 from optisense.design import set_value
 from optisense.geometry import Contact, Sphere
+from optisense.mechanics import CONFORMING
 
 FOLDER = Path(__file__).parent
 CACHE = FOLDER / ".cache"
@@ -259,7 +260,7 @@ def judged(
         if light and seed == SEEDS[-1]:
             model._forget("_store")
         began = time.process_time()
-        image = model.render([ball], RESOLUTION, PHOTONS, seed=seed)
+        image = model.render([ball], RESOLUTION, PHOTONS, seed=seed, skin=CONFORMING)
         cpu["cpu_s_new_light"] = time.process_time() - began
         got = smooth(image.radiance)
         where = masks(image.contact_mask, truth)
@@ -268,13 +269,13 @@ def judged(
     kept = []
     for _ in range(RUNS):
         began = time.process_time()
-        model.render([ball], RESOLUTION, PHOTONS, seed=SEEDS[-1])
+        model.render([ball], RESOLUTION, PHOTONS, seed=SEEDS[-1], skin=CONFORMING)
         kept.append(time.process_time() - began)
     cpu["cpu_s_kept_light"] = min(kept)
     if not light:
         del cpu["cpu_s_new_light"]
     if light:  # the others read both of these lights
-        model.render([ball], RESOLUTION, PHOTONS, seed=SEEDS[0])
+        model.render([ball], RESOLUTION, PHOTONS, seed=SEEDS[0], skin=CONFORMING)
     means = [truth[mask].mean() for mask in where]
     square = np.maximum(np.mean(errors, axis=0) - noise, 0.0)
     relative = np.sqrt(square) / means
@@ -303,7 +304,9 @@ def reference(model: OpticalModel, ball: Contact, name: str) -> tuple[FloatArray
     path = CACHE / f"ablation-{name}-{REFERENCE_PHOTONS}.npz"
     if not path.is_file():
         images = [
-            model.render([ball], RESOLUTION, REFERENCE_PHOTONS, seed=seed, estimator="sppm")
+            model.render(
+                [ball], RESOLUTION, REFERENCE_PHOTONS, seed=seed, estimator="sppm", skin=CONFORMING
+            )
             for seed in REFERENCE_SEEDS
         ]
         seen = images[0].contact_mask

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import optisense
+from optisense.mechanics import CONFORMING
 from optisense.optics import OpticalModel
 
 FloatArray = NDArray[np.float32]
@@ -43,7 +44,7 @@ class Case:
         """(h, w): pixels whose middle sees the ball."""
         from optisense.optics.scene.surfaces import Region
 
-        rays = self.model.chief_rays(RESOLUTION, [ball()])
+        rays = self.model.chief_rays(RESOLUTION, [ball()], CONFORMING)
         seen: NDArray[np.bool_] = rays.hit & (rays.region == Region.INDENTER)
         return seen
 

@@ -17,6 +17,7 @@ from benchmarks.reference import CACHE, Reference
 from benchmarks.snapshots import Snapshot
 from optisense.design.colour import encode
 from optisense.design.responses import USUAL_RESPONSE
+from optisense.mechanics import CONFORMING
 
 MITSUBA = "Mitsuba path"
 BUDGET = 60.0
@@ -38,7 +39,7 @@ def compare_renderers(
     not held against a renderer; the scale is told. Time to the target is that of the last image
     times (error / target)^2: Monte Carlo noise falls so, bias does not, which favours the others.
     """
-    ours = case.model.render([ball()], resolution=RESOLUTION).radiance
+    ours = case.model.render([ball()], resolution=RESOLUTION, skin=CONFORMING).radiance
     rows: list[dict[str, Any]] = []
     pictures = {"OptiSense": ours}
     for name in [MITSUBA, *luxcore.ENGINES]:

@@ -18,6 +18,7 @@ from benchmarks.results import measure_parts
 from benchmarks.timing import Time, medians, run_child, timed
 from optisense import OpticalModel, sensors
 from optisense.geometry import Contact, Sphere
+from optisense.mechanics import CONFORMING
 from optisense.optics import TactileImage
 
 NAMES = ("gelsight-mini", "gelbelt", "gelsight360", "gelsight-svelte")
@@ -57,7 +58,7 @@ def measure(name: str) -> dict[str, Any]:
     images: list[TactileImage] = []
     fresh, kept = [], []
     for seed in range(10, 10 + RUNS):
-        settings = {"resolution": RESOLUTION, "photons": photons, "seed": seed}
+        settings = {"resolution": RESOLUTION, "photons": photons, "seed": seed, "skin": CONFORMING}
         fresh.append(timed(lambda s=settings: images.append(model.render([ball], **s))))  # type: ignore[misc]
         kept.append(timed(lambda s=settings: model.render([ball], **s)))  # type: ignore[misc]
     text = ",".join(f"{x:.4f}" for x in place)

@@ -21,6 +21,7 @@ from benchmarks.case import (
 from benchmarks.rays import photon_rates
 from benchmarks.reference import Reference
 from benchmarks.timing import Time, medians, run_child, timed
+from optisense.mechanics import CONFORMING
 from optisense.optics import OpticalModel, TactileImage
 
 RUNS = 7
@@ -71,7 +72,9 @@ def _render(
     place: tuple[float, float] = (0.0, 0.0),
     resolution: tuple[int, int] = RESOLUTION,
 ) -> TactileImage:
-    return model.render([ball(*place)], resolution=resolution, seed=seed, photons=PHOTONS)
+    return model.render(
+        [ball(*place)], resolution=resolution, seed=seed, photons=PHOTONS, skin=CONFORMING
+    )
 
 
 def _fresh_model(case: Case) -> None:
@@ -81,14 +84,16 @@ def _fresh_model(case: Case) -> None:
 
 def warm_images(case: Case, reference: Reference, photons: int = PHOTONS) -> dict[str, Any]:
     """Images of the case, each from photons of its own (another seed)."""
-    case.model.render([ball()], resolution=RESOLUTION, seed=99, photons=photons)
+    case.model.render([ball()], resolution=RESOLUTION, seed=99, photons=photons, skin=CONFORMING)
     times, errors, parts, ratios, image = [], [], [], [], None
     for seed in range(RUNS):
         images: list[Any] = []
         times.append(
             timed(
                 lambda seed=seed, images=images: images.append(  # type: ignore[misc]
-                    case.model.render([ball()], resolution=RESOLUTION, seed=seed, photons=photons)
+                    case.model.render(
+                        [ball()], resolution=RESOLUTION, seed=seed, photons=photons, skin=CONFORMING
+                    )
                 )
             )
         )

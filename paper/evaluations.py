@@ -193,6 +193,7 @@ def perception(inputs: Plain, folder: Path) -> Found:
             seed=inputs["seed"],
             resolution=tuple(resolution),
             photons=inputs["photons"],
+            skin=CONFORMING,
         )
         result = perceive(known[name](), model, settings, folder=folder / name)
         found[name] = {

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from scipy import fft
 
 from optisense.mechanics.elasticity import Elasticity
-from optisense.mechanics.layer import Kernels, SquareLoad
+from optisense.mechanics.layer import LoadKernels, SquareLoad
 
 FloatArray = NDArray[np.float64]
 
@@ -50,8 +50,8 @@ class GridResponse:
         return np.asarray(fft.rfft2(self._load.pressed_in(*self._offsets)))
 
     @cached_property
-    def _kernels(self) -> Kernels:
-        return Kernels(*(fft.rfft2(each) for each in self._load.kernels(*self._offsets)))
+    def _kernels(self) -> LoadKernels:
+        return LoadKernels(*(fft.rfft2(each) for each in self._load.kernels(*self._offsets)))
 
     def normal(self, pressure: FloatArray) -> FloatArray:
         """Normal displacement (mm), into the layer, by a pressure (MPa) on each square."""

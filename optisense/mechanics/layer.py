@@ -127,7 +127,7 @@ def _corrections(poisson_ratio: float) -> _Corrections:
     )
 
 
-class Kernels(NamedTuple):
+class LoadKernels(NamedTuple):
     """Displacements (mm) at points by unit loads (1 MPa) on a square around the origin.
 
     The normal displacement and the normal load point into the layer; x and y lie in its surface.
@@ -172,7 +172,7 @@ class SquareLoad:
         half_space *= (1.0 - self.poisson_ratio) / (2.0 * np.pi)
         return self._total(half_space + self._corrected("normal", x, y), x, y)
 
-    def kernels(self, x: FloatArray, y: FloatArray) -> Kernels:
+    def kernels(self, x: FloatArray, y: FloatArray) -> LoadKernels:
         """All displacements of points (arrays of one shape, mm) by loads of 1 MPa."""
         nu, inverse = self.poisson_ratio, 1.0 / (2.0 * np.pi)
         x_part, y_part = self._sum(_x_squared, x, y), self._sum(_y_squared, x, y)
@@ -193,7 +193,7 @@ class SquareLoad:
             inverse * (y_part + (1.0 - nu) * x_part) + isotropic - quadrupole * twice,
             inverse * nu * self._sum(_mixed, x, y) + quadrupole * 2.0 * cosine * sine,
         )
-        return Kernels(self.pressed_in(x, y), *(self._total(each, x, y) for each in sideways))
+        return LoadKernels(self.pressed_in(x, y), *(self._total(each, x, y) for each in sideways))
 
     def _sum(
         self, term: Callable[[FloatArray, FloatArray], FloatArray], x: FloatArray, y: FloatArray

@@ -15,6 +15,10 @@ if TYPE_CHECKING:
 
 FloatArray = NDArray[np.float64]
 
+UNMOVED = 1e-4
+"""mm; smaller displacements than these are rounding of single precision, and the tangent plane in
+place of a curved surface."""
+
 
 @dataclass(frozen=True)
 class UntouchedSurface:
@@ -64,11 +68,14 @@ class UntouchedSurface:
         return depth.reshape(np.shape(points)[:-1])
 
     def image_depth(self, image: TactileImage) -> NDArray[np.float32]:
-        """(h, w) mm that an image's coating is pushed in: 0 outside contacts, NaN where unseen."""
-        depth = np.where(np.isfinite(image.points).all(axis=2), 0.0, np.nan)
+        """(h, w) mm that an image's coating is pushed in, NaN where unseen.
+
+        It is 0 where the coating has not moved, and negative where an elastic skin bulges.
+        """
+        depth = self.depth(image.points)
+        depth[np.abs(depth) < UNMOVED] = 0.0
         inside = image.contact_mask
-        if inside.any():
-            depth[inside] = np.maximum(self.depth(image.points[inside]), 0.0)
+        depth[inside] = np.maximum(depth[inside], 0.0)
         return depth.astype(np.float32)
 
     def frames(self, right: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -124,6 +124,10 @@ class Dielectric(Material):
         examples=[(1.5, 0.004, 0.0)],
     )
 
+    elasticity: GelElasticity | None = Field(
+        default=None, description="how it yields, for elastomers", exclude_if=is_left_out
+    )
+
     @model_validator(mode="after")
     def _says_each_thing_once(self) -> Dielectric:
         ways = [name for name in ABSORPTIONS if getattr(self, name) is not None]
@@ -216,10 +220,6 @@ class Dielectric(Material):
             found = np.where(np.abs(found) < ROUNDING, 0.0, found)
         red, green, blue = found.tolist()
         return red, green, blue
-
-    elasticity: GelElasticity | None = Field(
-        default=None, description="how it yields, for elastomers"
-    )
 
     def medium(self) -> Medium:
         """Its index, the roughness of its surface, and what it absorbs."""
