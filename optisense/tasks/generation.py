@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Callable
 from contextlib import closing
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -226,10 +226,13 @@ class _Maker:
 
     def _exposure_of_all(self, lock: FolderLock) -> float:
         """Check or write what is common to all samples; returns the exposure."""
-        common = self._common()
         info_file = self._folder / INFO
-        if info_file.exists():
-            before = read_json(info_file)
+        before = read_json(info_file) if info_file.exists() else None
+        if before is not None and "skin" not in (before.get("settings") or {"skin": ""}):
+            # Release 0.1 knew the conforming skin only: the dataset goes on as it was begun.
+            self._settings = replace(self._settings, skin=CONFORMING)
+        common = self._common()
+        if before is not None:
             kept = before.get("settings") or {}  # release 0.1 had no margin, and another name
             kept.get("contacts", {}).setdefault("margin", 0.0)
             kept["estimator"] = current_name(kept.get("estimator"))
