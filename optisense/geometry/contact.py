@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -132,6 +133,28 @@ def place(
     pose[:3, :3] = _axes(spot.inward, surface, contact)
     pose[:3, 3] = spot.point + contact.depth * spot.inward
     return contact.indenter.mesh(reach, facet_error).transformed(pose)
+
+
+def place_on_gels(
+    contact: Contact,
+    surface: SensingSurface,
+    gels: Sequence[TriangleMesh],
+    facet_error: float = FACET_ERROR,
+) -> TriangleMesh:
+    """As `place`, on whichever of several elastomers lies under the contact.
+
+    Raises:
+        ContactError: as of `place`, for the first elastomer.
+    """
+    if not gels:
+        return place(contact, surface, facet_error=facet_error)
+    errors = []
+    for gel in gels:
+        try:
+            return place(contact, surface, gel, facet_error)
+        except ContactError as error:
+            errors.append(error)
+    raise errors[0]
 
 
 def available_depth(point: ArrayLike, inward: ArrayLike, gel: TriangleMesh) -> float:

@@ -14,10 +14,10 @@ from optisense.mechanics.pressed_skin import DECAY, Pressed, PressedSkin
 
 FloatArray = NDArray[np.float64]
 
-EDGE_IN_CONTACT = 2.0
+EDGE_IN_CONTACT = 1.5
 """Greatest edge length in a contact, in distances of the points of its grid. Shading normals vary
 smoothly over triangles, so that their facets are not seen."""
-GROWTH = 0.2
+GROWTH = 0.3
 """Increase of the greatest edge length with the distance from a contact: displacements change over
 lengths of about that distance."""
 LONGEST_EDGE = 0.25
@@ -102,7 +102,7 @@ def skin_mesh(skin: TriangleMesh, pressed: PressedSkin) -> SkinMesh:
     deepest = max(float(each.place.overlap.max()) for each in pressed.contacts)
     bent[used] = free & (np.linalg.norm(moved.displacement, axis=1) > BENT_SHARE * deepest)
     state = np.where(
-        touching[fine].all(axis=1),
+        touching[fine].sum(axis=1) >= 2,  # so that areas are neither too large nor too small
         SkinState.TOUCHING,
         np.where(bent[fine].any(axis=1), SkinState.BENT, SkinState.RESTING),
     )
@@ -159,7 +159,8 @@ def _distance(points: FloatArray, contact: Pressed) -> FloatArray:
 def _on_border(faces: NDArray[np.int64], count: int) -> NDArray[np.bool_]:
     """(count,) which vertices lie on an edge that only one face has."""
     ends = np.sort(faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
-    edges, times = np.unique(ends, axis=0, return_counts=True)
+    edges, times = np.unique(ends[:, 0] * count + ends[:, 1], return_counts=True)
     border = np.zeros(count, dtype=bool)
-    border[edges[times == 1].ravel()] = True
+    alone = edges[times == 1]
+    border[alone // count] = border[alone % count] = True
     return border

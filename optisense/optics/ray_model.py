@@ -11,13 +11,12 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from optisense import geometry
 from optisense.design import SensorDesign, set_value
 from optisense.design.lens_checks import fold_problems
 from optisense.design.problems import raise_problems
 from optisense.design.responses import PictureChain
 from optisense.design.sensor_design import refuse_no_design
-from optisense.errors import ContactError, OptiSenseError, RenderError
+from optisense.errors import OptiSenseError, RenderError
 from optisense.geometry import (
     Contact,
     Indenter,
@@ -26,6 +25,7 @@ from optisense.geometry import (
     TriangleMesh,
     nine_places,
 )
+from optisense.geometry.contact import place_on_gels
 from optisense.geometry.indenter_kinds import FACET_ERROR
 from optisense.mechanics import ELASTIC, Gel, PressedSkin, elasticity_of
 from optisense.optics.backend.interrupts import lets_ctrl_c_through
@@ -343,15 +343,7 @@ class RayModel:
                 its force.
         """
         contact = self._gel.at_depth(contact)
-        if not self.gels:
-            return geometry.place(contact, self.surface, facet_error=self.facet_error)
-        errors = []
-        for gel in self.gels:
-            try:
-                return geometry.place(contact, self.surface, gel, self.facet_error)
-            except ContactError as error:
-                errors.append(error)
-        raise errors[0]
+        return place_on_gels(contact, self.surface, self.gels, self.facet_error)
 
     @cached_property
     def _gel(self) -> Gel:

@@ -64,7 +64,10 @@ def full_data() -> dict[str, object]:
                 "kind": "dielectric", "ior": 1.41, "dispersion": [1.40, 1.41, 1.43],
                 "roughness": 0.125,
             },
-            "dyed": {"kind": "dielectric", "ior": 1.41, "absorption": [0.01, 0.02, 0.03]},
+            "dyed": {
+                "kind": "dielectric", "ior": 1.41, "absorption": [0.01, 0.02, 0.03],
+                "elasticity": {"youngs_modulus": 0.3, "poisson_ratio": 0.48, "friction": 0.5},
+            },
             "sellmeier": {
                 "kind": "dielectric", "ior": 1.43, "sellmeier_b": [1.0093, 0, 0],
                 "sellmeier_c": [0.013185, 0, 0], "extinction": [1e-6, 2e-6, 3e-6],

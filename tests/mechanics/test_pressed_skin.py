@@ -40,7 +40,7 @@ def test_a_ball_touches_less_than_it_overlaps_and_bends_the_skin_around(ball):
     assert ball.contacts[0].force == pytest.approx(1.4973 * GEL.plane_modulus, rel=2e-3)
     # Slopes of the layer by a finite element model of the pad.
     _, slope, touching = along_x(ball, np.array([0.0, 1.2, 1.5, 2.0, 3.0]) * radius)
-    assert slope[1:] == pytest.approx([21.5, 11.5, 5.0, 1.4], abs=1.0)
+    assert slope[1:] == pytest.approx([21.5, 11.5, 5.0, 1.4], abs=1.5)
     assert touching.tolist() == [True, False, False, False, False]
 
 
