@@ -210,9 +210,10 @@ class PressedSkin:
     elasticity: Elasticity
 
     def in_numbers(self) -> list[dict[str, float]]:
-        """Force (N), contact area (mm^2) and greatest pressure (MPa) of each contact, for JSON."""
+        """Depth (mm), force (N), area (mm^2), greatest pressure (MPa) of each contact, for JSON."""
         return [
             {
+                "depth_mm": round(float(contact.place.overlap.max()), 6),
                 "force_n": round(contact.force, 6),
                 "area_mm2": round(contact.area, 6),
                 "greatest_pressure_mpa": round(float(contact.pressure.max()), 6),

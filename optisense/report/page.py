@@ -115,7 +115,7 @@ def render_page(
         pictures=_pictures(design, image, exposure),
         cross_at=_place_to_look_at(image.contact_mask),
         groups=[_group(name, group) for name, group in design.lights.items()],
-        contacts=tables.contact_rows(contacts),
+        contacts=tables.contact_rows(contacts, image.settings.get("presses") or ()),
         settings=tables.setting_rows(image.settings),
         real=None if real is None else _real(real),
         assumed=assumed,

@@ -22,7 +22,7 @@ LABELS = {
 }
 """Settings whose name is not what a reader would call them."""
 
-ELSEWHERE = ("design", "contacts", "resolution", "interrupted")
+ELSEWHERE = ("design", "contacts", "presses", "resolution", "interrupted")
 """Settings that the page shows in another place."""
 
 
@@ -54,16 +54,31 @@ def setting_rows(settings: Mapping[str, Any], unit: str = "") -> list[Row]:
     return rows
 
 
-def contact_rows(contacts: Sequence[Contact]) -> list[dict[str, str]]:
-    """What touches the sensor, where, and how deep."""
-    return [
-        {
+def contact_rows(
+    contacts: Sequence[Contact], presses: Sequence[Mapping[str, float]] = ()
+) -> list[dict[str, str]]:
+    """What touches the sensor, where, how deep, and the force and area where they are known.
+
+    Args:
+        contacts: what touches.
+        presses: of each contact, `PressedSkin.in_numbers`; none where the skin is not elastic.
+    """
+    rows = []
+    for number, contact in enumerate(contacts):
+        row = {
             "indenter": _indenter(contact.indenter),
             "place": _place(contact),
-            "depth": f"{contact.depth:g} mm" if contact.force is None else f"{contact.force:g} N",
+            "depth": f"{contact.depth:g} mm" if contact.force is None else "",
+            "force": "" if contact.force is None else f"{contact.force:g} N",
+            "area": "",
         }
-        for contact in contacts
-    ]
+        if number < len(presses):
+            press = presses[number]
+            row["depth"] = row["depth"] or f"{press['depth_mm']:.2f} mm"
+            row["force"] = f"{press['force_n']:.2f} N"
+            row["area"] = f"{press['area_mm2']:.1f} mm²"
+        rows.append(row)
+    return rows
 
 
 def provenance_rows(design: SensorDesign) -> tuple[list[dict[str, str]], list[dict[str, str]]]:

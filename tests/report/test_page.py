@@ -14,6 +14,7 @@ from optisense.geometry import Contact, Sphere
 from optisense.optics import OpticalModel, TactileImage
 from optisense.report import write_report
 from optisense.report.page import render_page
+from optisense.report.tables import contact_rows
 from optisense.sensors import gelsight_mini
 
 BALL = Contact(Sphere(radius=1.5), at=(0.0, 0.0), depth=0.8)
@@ -77,3 +78,14 @@ def test_the_file_is_written_whole_or_not_at_all(image: TactileImage, tmp_path: 
     assert [file.name for file in tmp_path.iterdir()] == ["report.html"]
     with pytest.raises(OutputError, match="can't be written"):
         write_report(path / "report.html", gelsight_mini(), image, [BALL])
+
+
+def test_contacts_tell_depth_force_and_area() -> None:
+    pushed = Contact(Sphere(radius=3.0), at=(0.0, 0.0), force=2.0)
+    (alone,) = contact_rows([pushed])
+    assert (alone["depth"], alone["force"], alone["area"]) == ("", "2 N", "")
+    known = {"depth_mm": 0.9467, "force_n": 2.0004, "area_mm2": 10.74}
+    (row,) = contact_rows([pushed], [known])
+    assert (row["depth"], row["force"], row["area"]) == ("0.95 mm", "2.00 N", "10.7 mm²")
+    (flat,) = contact_rows([BALL])
+    assert (flat["depth"], flat["force"]) == ("0.8 mm", "")
