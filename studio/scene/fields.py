@@ -129,6 +129,14 @@ class OPTISENSE_PG_field(bpy.types.PropertyGroup):
             return json.loads(self.text)
         return self.text if self.holder == "choice" else getattr(self, self.holder)
 
+    @property
+    def is_default(self) -> bool:
+        """Whether it says what a file says that leaves it out."""
+        row = self.row
+        if row is None or row["required"] or row["absent"]:
+            return False
+        return bool(self.value == row["start"])
+
     def put(self, value: Any) -> None:
         """Hold another value of the same type."""
         if self.holder in ("choice", "data"):
@@ -221,6 +229,8 @@ class HasFields:
     def gathered(self, was: dict[str, Any]) -> dict[str, Any]:
         """The values as the design file holds them, each number as it was read unless changed.
 
+        What was left out, and is as it was then, stays left out.
+
         Args:
             was: the values that were read; they count where they are of the same kind.
         """
@@ -231,6 +241,8 @@ class HasFields:
             if not field.given:
                 continue
             value, before = field.value, was.get(field.name)
+            if was and before is None and field.is_default:
+                continue
             if field.holder == "number":
                 value = kept(before, value)
             elif field.holder in NUMBERS:
