@@ -1,6 +1,6 @@
 """Materials, coatings, lights and cameras that designs can name, each number with its source."""
 
-from optisense.design.materials import specularity_to_roughness
+from optisense.design.materials import flake_lobe, specularity_to_roughness
 from optisense.library import ies
 from optisense.library.adding import Added, add_file, add_ies, add_tuning, parse_colour
 from optisense.library.entries import AnyEntry, CameraModel, Entry, LightEntry, Source, TypicalLight
@@ -33,6 +33,7 @@ __all__ = [
     "coating",
     "emitter",
     "entry",
+    "flake_lobe",
     "ies",
     "is_own",
     "light",

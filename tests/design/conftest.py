@@ -58,6 +58,7 @@ def full_data() -> dict[str, object]:
             "eta": [1.43, 0.92, 0.69],
             "k": [7.5, 6.4, 5.6],
             "specularity": 0.25,
+            "scattering": "conductor",
         },
         "materials": {
             "gel": {

@@ -9,7 +9,14 @@ import numpy as np
 import pytest
 
 from optisense import sensors
-from optisense.design import SensorDesign, check_design, load_design, save_design
+from optisense.design import (
+    SensorDesign,
+    check_design,
+    get_value,
+    load_design,
+    save_design,
+    set_value,
+)
 from optisense.design.difference import fingerprint
 from optisense.design.fields import Colour, Fraction, RelativePath
 from optisense.design.materials import (
@@ -21,9 +28,11 @@ from optisense.design.materials import (
     Diffuse,
     Material,
     Reflection,
+    flake_lobe,
     kinds_for,
 )
 from optisense.design.parts import Role
+from optisense.design.reflectance import fresnel_metal, ggx_density, smith_shadowing
 from optisense.errors import DesignError
 
 SILVER: dict[str, Any] = {"eta": (0.15, 0.13, 0.14), "k": (3.9, 3.1, 2.4)}
@@ -114,6 +123,76 @@ def test_head_on_reflection_is_the_blend_of_both_lobes() -> None:
     n = 1.5  # Fresnel: the index alone tells what a clear face reflects
     glass = Reflection(specularity=1.0, eta=(n, n, n)).head_on()
     np.testing.assert_allclose(glass, ((n - 1) / (n + 1)) ** 2)
+
+
+READINGS = {  # share of the metal's lobe and its GGX alpha at a specularity of 0, 0.3 and 1
+    "blend": ((0.0, 1.0), (0.3, 0.7), (1.0, 0.05)),
+    "blend-fixed-roughness": ((0.0, 0.1), (0.3, 0.1), (1.0, 0.1)),
+    "conductor": ((1.0, 1.0), (1.0, 0.7), (1.0, 0.05)),
+}
+
+
+@pytest.mark.parametrize("scattering", READINGS)
+def test_each_reading_of_specularity_is_its_formula(scattering: Any) -> None:
+    white = (1.0, 1.0, 1.0)
+    for specularity, (share, alpha) in zip((0.0, 0.3, 1.0), READINGS[scattering], strict=True):
+        coating = Coating(
+            reflectance=white, specularity=specularity, scattering=scattering, **SILVER
+        )
+        surface = coating.reflection()
+        assert (surface.specularity, surface.roughness) == pytest.approx((share, alpha))
+        assert (
+            f"{100 * share:.0f} % metal flake of roughness {alpha:g}" in coating.consequences()[0]
+        )
+        assert SINGLE_BOUNCE < energy(surface) <= 1.0 + QUADRATURE
+        metal = fresnel_metal(1.0, SILVER["eta"], SILVER["k"])
+        np.testing.assert_allclose(surface.head_on(), 1.0 - share + share * metal)
+
+
+SINGLE_BOUNCE = 0.3
+"""A GGX surface of roughness 1 reflects at least so much of light from 45 degrees: Mitsuba's has
+0.36 without absorption, as it leaves out what meets a second facet."""
+
+QUADRATURE = 1e-3
+"""Error of the sum over the hemisphere, of a narrow lobe too."""
+
+
+def energy(surface: Reflection) -> float:
+    """Most of R, G, B light from 45 degrees that is scattered, by a sum over the hemisphere."""
+    tilt, turn = np.meshgrid(
+        (np.arange(400) + 0.5) * np.pi / 800, (np.arange(400) + 0.5) * np.pi / 200, indexing="ij"
+    )
+    incoming = np.array([np.sqrt(0.5), 0.0, np.sqrt(0.5)])
+    towards = np.stack([np.sin(tilt) * np.cos(turn), np.sin(tilt) * np.sin(turn), np.cos(tilt)], -1)
+    half = towards + incoming
+    half /= np.linalg.norm(half, axis=-1, keepdims=True)
+    alpha, share = surface.roughness, surface.specularity
+    metal = ggx_density(half[..., 2], alpha) / (4.0 * incoming[2])
+    metal *= smith_shadowing(incoming[2], alpha) * smith_shadowing(towards[..., 2], alpha)
+    fresnel = fresnel_metal((half @ incoming).ravel(), surface.eta, surface.k)
+    solid_angle = np.sin(tilt) * (np.pi / 800) * (np.pi / 200)
+    shiny = (fresnel * (metal * solid_angle).reshape(-1, 1)).sum(axis=0)
+    return float((share * shiny + (1.0 - share) * np.array(surface.reflectance)).max())
+
+
+def test_the_usual_reading_is_in_no_file_and_changes_no_design(tmp_path: Path) -> None:
+    design = sensors.load("builtin:gelsight-mini")
+    usual = fingerprint(design)
+    assert "scattering" not in design.model_dump(mode="json")["coating"]
+    assert get_value(design, "coating.scattering") == "blend"
+    other = set_value(design, "coating.scattering", "conductor")
+    assert fingerprint(other) != usual
+    assert other.coating.in_words() == "specularity 0 (conductor)"
+    assert fingerprint(set_value(other, "coating.scattering", "blend")) == usual
+    save_design(other, tmp_path)
+    assert load_design(tmp_path).coating == other.coating
+    file = tmp_path / "design.yaml"
+    file.write_text(file.read_text().replace("scattering: conductor", "scattering: conductro"))
+    with pytest.raises(DesignError, match=r"'coating\.scattering' = 'conductro'") as raised:
+        load_design(tmp_path)
+    assert raised.value.hint == "Did you mean 'conductor'?"
+    with pytest.raises(ValueError, match="it must be one of blend"):
+        flake_lobe(0.5, "mirror")  # type: ignore[arg-type]
 
 
 def test_an_index_in_a_medium_is_relative_to_it() -> None:

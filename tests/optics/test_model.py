@@ -6,7 +6,7 @@ from functools import cache
 
 import numpy as np
 import pytest
-from comparing import ROUNDING, same_light
+from comparing import ROUNDING, SCORE_ROUNDING, same_light
 
 from optisense import Contact, OpticalModel, SensorDesign, Sphere
 from optisense.design import set_value
@@ -52,6 +52,11 @@ def render(of: OpticalModel, *contacts: Contact, seed: int = 0) -> TactileImage:
 
 def same(a: TactileImage, b: TactileImage) -> bool:
     return all(same_light(layer, b.layers[name]) for name, layer in a.layers.items())
+
+
+def mean_layers(image: TactileImage) -> np.ndarray:
+    """(groups,) the mean light of each light group."""
+    return np.array([layer.mean(dtype=float) for layer in image.layers.values()])
 
 
 def test_layers_add_up_to_the_image() -> None:
@@ -132,6 +137,20 @@ def test_cells_do_not_depend_on_the_coating_before() -> None:
     before = used._store.cells.cells
     used.set_design(wanted)
     assert used._store.cells.cells == OpticalModel(wanted, "llvm")._store.cells.cells < before
+
+
+def test_the_reading_of_specularity_changes_a_model_as_it_makes_one() -> None:
+    design = set_value(build("gelsight-mini"), "coating.specularity", 0.3)
+    used = OpticalModel(design, "llvm")
+    pictures = [mean_layers(render(used, BALL))]
+    for scattering in ("blend-fixed-roughness", "conductor"):
+        wanted = set_value(design, "coating.scattering", scattering)
+        used.update("coating.scattering", scattering)
+        fresh = mean_layers(render(OpticalModel(wanted, "llvm"), BALL))
+        got = mean_layers(render(used, BALL))
+        np.testing.assert_allclose(got, fresh, rtol=SCORE_ROUNDING)
+        assert all(np.abs(got / each - 1.0).max() > 0.05 for each in pictures)
+        pictures.append(got)
 
 
 def test_a_model_that_became_another_design_sees_what_a_new_model_of_it_sees() -> None:

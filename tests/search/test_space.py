@@ -225,6 +225,16 @@ class TestChoices:
         assert design.camera.fov == library.camera("pi-v1").fov
         assert design.camera.position == mini.camera.position
 
+    def test_a_word_of_the_design(self, mini: SensorDesign) -> None:
+        laws = ["conductor", "blend", "blend-fixed-roughness"]
+        space = SearchSpace({"coating.scattering": laws, "coating.specularity": (0.0, 1.0)})
+        bound = space.bind(mini)
+        assert bound.start[0] == 1.0  # the design's own, which its file leaves out
+        surface = bound.apply([0, 0.25]).coating.reflection()
+        assert (surface.specularity, surface.roughness) == (1.0, 0.75)
+        with pytest.raises(OptiSenseError, match="mirror"):
+            SearchSpace({"coating.scattering": ["blend", "mirror"]}).bind(mini)
+
     def test_a_number_may_be_one_of_several(self, mini: SensorDesign) -> None:
         space = SearchSpace({"coating.specularity": Choice([0.1, 0.7])}).bind(mini)
         assert space.apply([1]).coating.specularity == 0.7

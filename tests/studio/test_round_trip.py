@@ -68,6 +68,17 @@ def test_what_blender_does_not_show_of_a_design_comes_back(scene: Any, tmp_path:
     assert after == before
 
 
+def test_the_reading_of_specularity_is_written_where_it_is_chosen(mini: Any) -> None:
+    coating = mini.optisense.coating
+    assert coating.value("scattering") == "blend"
+    assert "scattering" not in gather_document(mini)["coating"]
+    coating.put("scattering", "conductor")
+    assert gather_document(mini)["coating"]["scattering"] == "conductor"
+    assert session.ask_and_wait("check", design=handing.design(mini))["problems"] == []
+    coating.put("scattering", "blend")
+    assert "scattering" not in gather_document(mini)["coating"]
+
+
 def test_meshes_keep_their_double_precision(scene: Any) -> None:
     bpy.ops.optisense.new(sensor="gelsight-svelte")
     _, meshes = gather(bpy.context.scene)

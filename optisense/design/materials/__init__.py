@@ -11,7 +11,7 @@ from optisense.design.materials.base import (
     Reflection,
     kinds_for,
 )
-from optisense.design.materials.coating import Coating, specularity_to_roughness
+from optisense.design.materials.coating import Coating, flake_lobe, specularity_to_roughness
 from optisense.design.materials.conductor import Conductor
 from optisense.design.materials.dielectric import Dielectric
 from optisense.design.materials.diffuse import Diffuse
@@ -26,6 +26,7 @@ __all__ = [
     "Material",
     "Medium",
     "Reflection",
+    "flake_lobe",
     "kinds_for",
     "specularity_to_roughness",
 ]

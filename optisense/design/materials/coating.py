@@ -11,6 +11,17 @@ from optisense.design.materials.base import CoatingModel, Reflection
 
 SMALLEST_ROUGHNESS = 0.05
 """GGX alpha of a coating of specularity 1."""
+FIXED_ROUGHNESS = 0.1
+"""GGX alpha of the flake where specularity does not change it: that of Mitsuba's `roughconductor`
+where none is given (its documentation), as the paper names that model and no roughness."""
+
+Scattering = Literal["blend", "blend-fixed-roughness", "conductor"]
+"""What the specularity of a coating changes; see `flake_lobe`."""
+
+
+def _is_usual(scattering: object) -> bool:
+    """Whether it is not written, so that designs of earlier releases stay what they were."""
+    return scattering == "blend"
 
 
 class Coating(CoatingModel):
@@ -18,7 +29,8 @@ class Coating(CoatingModel):
 
     Seven numbers as in the OptiSense paper (section "Optical material"): reflectance of R, G, B,
     a complex index of R, G, B, and one specularity. How specularity turns into a scattering law
-    is written at `specularity_to_roughness`. A file need not name this kind.
+    is a choice, `scattering`, whose formulas are written at `flake_lobe`. A file need not name
+    this kind.
     """
 
     title: ClassVar[str] = "Paint with metal flake"
@@ -37,38 +49,79 @@ class Coating(CoatingModel):
         examples=[(0.0, 0.0, 0.0)],
     )
     specularity: Fraction = Field(description="0 is diffuse, 1 is mirror-like")
+    scattering: Scattering = Field(
+        default="blend",
+        exclude_if=_is_usual,
+        title="Scattering law",
+        description="what specularity changes: paint and flake in a blend; their shares alone; or "
+        "the roughness of a bare metal",
+    )
 
     def reflection(self) -> Reflection:
-        """A blend of paint and flake, by specularity."""
-        return Reflection(
-            self.reflectance,
-            self.specularity,
-            specularity_to_roughness(self.specularity),
-            self.eta,
-            self.k,
-        )
+        """A blend of paint and flake, or flake alone, by specularity."""
+        share, alpha = flake_lobe(self.specularity, self.scattering)
+        return Reflection(self.reflectance, share, alpha, self.eta, self.k)
 
     def in_words(self) -> str:
-        """Its specularity."""
-        return f"specularity {self.specularity:g}"
+        """Its specularity, and its scattering law where that is not the usual one."""
+        law = "" if _is_usual(self.scattering) else f" ({self.scattering})"
+        return f"specularity {self.specularity:g}{law}"
 
     def consequences(self) -> list[str]:
         """The shares of paint and flake."""
-        alpha = specularity_to_roughness(self.specularity)
+        share, alpha = flake_lobe(self.specularity, self.scattering)
         return [
-            f"{100 * (1 - self.specularity):.0f} % diffuse paint and "
-            f"{100 * self.specularity:.0f} % metal flake of roughness {alpha:.2g}"
+            f"{100 * (1 - share):.0f} % diffuse paint and "
+            f"{100 * share:.0f} % metal flake of roughness {alpha:.2g}"
         ]
+
+
+def flake_lobe(specularity: float, scattering: Scattering = "blend") -> tuple[float, float]:
+    """Share and roughness of the metal flake of a coating with this specularity.
+
+    The OptiSense paper varies one specularity s, from 0 to 1, of a rough conductor that also has a
+    reflectance, and does not say what s changes. With w the share of the metal's lobe (GGX of
+    roughness alpha; the coating's eta and k), and 1 - w that of a diffuse lobe of the coating's
+    reflectance, these are the readings that it allows:
+
+    | scattering | w | alpha |
+    |---|---|---|
+    | `blend` | s | max(0.05, 1 - s) |
+    | `blend-fixed-roughness` | s | 0.1 |
+    | `conductor` | 1 | max(0.05, 1 - s) |
+
+    With `conductor` there is no diffuse lobe, and the reflectance is not used. The weights add up
+    to 1, so that no reading reflects more light than arrives; a rough metal reflects less, as GGX
+    leaves out light that meets more than one facet (69 % of it straight on at alpha = 1).
+
+    Args:
+        specularity: 0 to 1.
+        scattering: the reading.
+
+    Returns:
+        The share of the metal's lobe, 0 to 1, and its GGX alpha.
+
+    Raises:
+        ValueError: specularity is not within 0..1, or there is no such reading.
+    """
+    alpha = specularity_to_roughness(specularity)
+    laws = {
+        "blend": (specularity, alpha),
+        "blend-fixed-roughness": (specularity, FIXED_ROUGHNESS),
+        "conductor": (1.0, alpha),
+    }
+    if scattering not in laws:
+        raise ValueError(f"scattering is {scattering!r}, it must be one of {', '.join(laws)}")
+    return laws[scattering]
 
 
 def specularity_to_roughness(specularity: float) -> float:
     """GGX alpha of the metal-flake lobe of a coating with this specularity (0..1).
 
     An assumption: the OptiSense paper varies one specularity of a rough conductor from 0 to 1
-    but does not say how it maps to a roughness. Here alpha = max(0.05, 1 - s), and the coating is
-    a blend: weight (1 - s) of a diffuse lobe with the coating's reflectance, plus weight s of a
-    rough conductor (GGX, this alpha, the coating's eta and k). So 0 is plain diffuse paint and 1
-    is nearly a mirror, and energy is conserved in between.
+    but does not say how it maps to a roughness. Here alpha = max(0.05, 1 - s), so that 0 is
+    diffuse and 1 is nearly a mirror. What the flake is blended with is told at
+    `optisense.design.materials.flake_lobe`.
 
     Raises:
         ValueError: specularity is not within 0..1.

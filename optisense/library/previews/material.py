@@ -140,7 +140,7 @@ def _lobes(axes: Any, material: Material | CoatingModel) -> str:
     axes.legend(frameon=False, fontsize=9, loc="lower center", bbox_to_anchor=(0.5, 0.155), ncols=2)
     facts = "scattered light for one ray at 45°"
     if coated:
-        facts += f", seen in silicone\nspecularity {surface.specularity:g}"
+        facts += f", seen in silicone\n{material.in_words()}"
         if surface.specularity > 0.0:
             facts += f", roughness of the flake {surface.roughness:.2g}"
     return facts
