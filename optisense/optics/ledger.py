@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from enum import StrEnum
 from typing import TYPE_CHECKING, Any
 
 import mitsuba as mi
@@ -30,8 +31,20 @@ IN_VIEW = 1.0
 """mm: largest distance from the middle of a cell in view to the nearest point that a ray of a
 96 x 72 picture meets; on the largest sensor these are 0.9 mm apart."""
 
+
+class LightEnd(StrEnum):
+    """In what way light ends."""
+
+    SEEN = "coating in view"
+    UNSEEN = "coating out of view"
+    PART = "absorbed by a part"
+    MEDIUM = "absorbed in a medium"
+    ESCAPED = "escaped"
+    LOST = "lost"
+
+
 GIVEN_UP = "given up after 64 surfaces"
-SEEN, UNSEEN = "coating in view", "coating out of view"
+SEEN, UNSEEN = LightEnd.SEEN.value, LightEnd.UNSEEN.value
 FACETS = "lost between the facets of rough faces"
 
 
@@ -42,6 +55,7 @@ class LedgerEntry:
     Attributes:
         group: the light group.
         where: what the light meets in the end, in words.
+        kind: in what way the light ends there.
         power: mW, over all channels and lights of the group.
         share: of the group's power, 0 to 1.
         noise: standard deviation of the share.
@@ -49,6 +63,7 @@ class LedgerEntry:
 
     group: str
     where: str
+    kind: LightEnd
     power: float
     share: float
     noise: float
@@ -75,6 +90,10 @@ class LightLedger:
             total[entry.where] = total.get(entry.where, 0.0) + entry.power
         return sorted(total, key=lambda where: -total[where])
 
+    def kinds(self) -> dict[str, LightEnd]:
+        """In what way light ends at each place."""
+        return {entry.where: entry.kind for entry in self.entries}
+
     def share(self, group: str, where: str) -> float:
         """Of a group's power; 0 where none of it goes."""
         found = (e.share for e in self.entries if (e.group, e.where) == (group, where))
@@ -94,7 +113,12 @@ class LightLedger:
         }
 
 
-def light_ledger(model: OpticalModel, photons: int = LEDGER_PHOTONS, seed: int = 0) -> LightLedger:
+def light_ledger(
+    model: OpticalModel,
+    photons: int = LEDGER_PHOTONS,
+    seed: int = 0,
+    seen: TargetCells | None = None,
+) -> LightLedger:
     """Follow photons from all lights, and sum up where their light goes.
 
     No contact presses. What a photon loses at each place adds up to its power, so that the ledger
@@ -104,6 +128,7 @@ def light_ledger(model: OpticalModel, photons: int = LEDGER_PHOTONS, seed: int =
         model: the sensor.
         photons: of all lights together.
         seed: another one gives other photons.
+        seen: `cells_in_view` of the model, if they are known.
 
     Raises:
         RenderError: there are too few photons.
@@ -115,34 +140,34 @@ def light_ledger(model: OpticalModel, photons: int = LEDGER_PHOTONS, seed: int =
             hint=f"give at least {100 * len(lights)}",
         )
     pieces = model._pieces
-    bookings = trace_ledger(
-        model.scene, model._emitter_table, len(pieces), _view(model), photons, seed
-    )
+    seen = cells_in_view(model) if seen is None else seen
+    bookings = trace_ledger(model.scene, model._emitter_table, len(pieces), seen, photons, seed)
     entries: list[LedgerEntry] = []
     emitted = {}
     for number, (name, group) in enumerate(model.design.lights.items()):
         emitted[name] = float(group.flux * len(group.lights))
         flux = group.channel_flux()
-        lines: dict[str, NDArray[np.float64]] = {}
-        for surface, fate, where in _places(pieces):
-            power = bookings.power[:, number, :, surface, fate] @ flux
-            lines[where] = lines.get(where, 0.0) + power
-        lines[GIVEN_UP] = bookings.rest[:, number] @ flux
+        lines: dict[tuple[str, LightEnd], NDArray[np.float64]] = {}
+        for place in places_of(pieces):
+            power = bookings.power[:, number, :, place.surface, place.fate] @ flux
+            line = (place.where, place.kind)
+            lines[line] = lines.get(line, 0.0) + power
+        lines[GIVEN_UP, LightEnd.LOST] += bookings.rest[:, number] @ flux
         entries += sorted(_entries(name, lines, emitted[name]), key=lambda entry: -entry.power)
     return LightLedger(emitted, entries, photons)
 
 
 def _entries(
-    group: str, lines: dict[str, NDArray[np.float64]], emitted: float
+    group: str, lines: dict[tuple[str, LightEnd], NDArray[np.float64]], emitted: float
 ) -> Iterator[LedgerEntry]:
-    for where, batches in lines.items():
+    for (where, kind), batches in lines.items():
         power = float(batches.mean())
         if power != 0.0:
             noise = float(batches.std(ddof=1) / np.sqrt(len(batches)))
-            yield LedgerEntry(group, where, power, power / emitted, noise / emitted)
+            yield LedgerEntry(group, where, kind, power, power / emitted, noise / emitted)
 
 
-def _view(model: OpticalModel) -> TargetCells:
+def cells_in_view(model: OpticalModel) -> TargetCells:
     """Where on the sensing surface the camera looks."""
     mesh = model.sensing
     cells = build_cells(mesh.vertices, mesh.faces, VIEW_CELL)
@@ -152,28 +177,47 @@ def _view(model: OpticalModel) -> TargetCells:
     return TargetCells(cells, mi.UInt32(near.astype(np.uint32)))
 
 
-def _places(pieces: list[Piece]) -> Iterator[tuple[int, Fate, str]]:
-    """What each row of the bookings stands for."""
+@dataclass(frozen=True)
+class LedgerPlace:
+    """What a row of the ledger's sums stands for.
+
+    Attributes:
+        surface: its number; the one after the last stands for the lights themselves.
+        fate: what happens to light there.
+        where: the same in words.
+        kind: in what way light ends there.
+    """
+
+    surface: int
+    fate: Fate
+    where: str
+    kind: LightEnd
+
+
+def places_of(pieces: list[Piece]) -> Iterator[LedgerPlace]:
+    """What all rows of the sums stand for; several of them may be the same place."""
     for number, piece in enumerate(pieces):
-        solid, around, name = _names(piece)
-        yield number, Fate.SEEN, SEEN
-        yield number, Fate.ABSORBED, name
-        yield number, Fate.BEHIND, f"absorbed in {solid}"
-        yield number, Fate.BEFORE, f"absorbed in {around}"
-        yield number, Fate.ESCAPED, f"escaped from {solid}"
+        solid, around, (name, kind) = _names(piece)
+        yield LedgerPlace(number, Fate.SEEN, SEEN, LightEnd.SEEN)
+        yield LedgerPlace(number, Fate.ABSORBED, name, kind)
+        yield LedgerPlace(number, Fate.BEHIND, f"absorbed in {solid}", LightEnd.MEDIUM)
+        yield LedgerPlace(number, Fate.BEFORE, f"absorbed in {around}", LightEnd.MEDIUM)
+        yield LedgerPlace(number, Fate.ESCAPED, f"escaped from {solid}", LightEnd.ESCAPED)
+    last = len(pieces)
     for fate in (Fate.SEEN, Fate.ABSORBED, Fate.BEHIND):
-        yield len(pieces), fate, GIVEN_UP
-    yield len(pieces), Fate.BEFORE, "absorbed around the lights"
-    yield len(pieces), Fate.ESCAPED, "escaped at once"
+        yield LedgerPlace(last, fate, GIVEN_UP, LightEnd.LOST)
+    yield LedgerPlace(last, Fate.BEFORE, "absorbed around the lights", LightEnd.MEDIUM)
+    yield LedgerPlace(last, Fate.ESCAPED, "escaped at once", LightEnd.ESCAPED)
 
 
-def _names(piece: Piece) -> tuple[str, str, str]:
+def _names(piece: Piece) -> tuple[str, str, tuple[str, LightEnd]]:
     """Of a surface: the solid behind it, what is in front of it, and who absorbs at it."""
     kind = piece.surface.kind
     if kind is SurfaceKind.LIGHT:
-        return "a light", "front of a light", "absorbed by lights"
+        return "a light", "front of a light", ("absorbed by lights", LightEnd.PART)
     if kind is not SurfaceKind.DIELECTRIC:
+        part = (f"absorbed by {piece.name}", LightEnd.PART)
         seen = piece.surface.region is Region.SENSING
-        return piece.name, f"front of {piece.name}", UNSEEN if seen else f"absorbed by {piece.name}"
+        return piece.name, f"front of {piece.name}", (UNSEEN, LightEnd.UNSEEN) if seen else part
     solids = piece.name.split("|")[0].split("/")
-    return solids[0], solids[1] if len(solids) > 1 else "air", FACETS
+    return solids[0], solids[1] if len(solids) > 1 else "air", (FACETS, LightEnd.LOST)

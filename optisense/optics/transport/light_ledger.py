@@ -22,7 +22,7 @@ from optisense.optics.scene.emitters import EmitterTable
 from optisense.optics.scene.ray_scene import Ray, RayScene
 from optisense.optics.scene.surface_cells import cell_at
 from optisense.optics.transport.emission_guide import uniform_guide
-from optisense.optics.transport.interact import LobeSample, Path, interact
+from optisense.optics.transport.interact import Interaction, LobeSample, Path, interact
 from optisense.optics.transport.photon_map import GROUP_MASK
 from optisense.optics.transport.photons import Emission, TargetCells, launch
 
@@ -85,6 +85,35 @@ class _Sums:
             dr.scatter_add(self.power, mi.Float64(what[k]), row * 3 + k, where)
 
 
+def _is_interface(step: Interaction) -> mi.Bool:
+    """Whether light meets a surface that tells which medium it is in."""
+    return step.hit.valid & step.goes_on & ~step.scattered
+
+
+def medium_before(
+    step: Interaction, bound: mi.UInt32, side: mi.UInt32
+) -> tuple[mi.UInt32, mi.UInt32]:
+    """The medium through which light has come to a surface.
+
+    Args:
+        step: what happens at the surface.
+        bound, side: the interface that told the medium so far, and the side of it, a `Fate`.
+
+    Returns:
+        The same two; the surface's own where it is an interface.
+    """
+    near_side = dr.select(step.side > 0, mi.UInt32(int(Fate.BEFORE)), int(Fate.BEHIND))
+    interface = _is_interface(step)
+    return dr.select(interface, step.hit.surface, bound), dr.select(interface, near_side, side)
+
+
+def medium_after(step: Interaction, side: mi.UInt32) -> mi.UInt32:
+    """The side of the interface on which light goes on, a `Fate`."""
+    ahead = dr.dot(step.lobe.direction, step.hit.normal) > 0
+    far_side = dr.select(ahead, mi.UInt32(int(Fate.BEFORE)), int(Fate.BEHIND))
+    return dr.select(_is_interface(step), far_side, side)
+
+
 @dr.syntax
 def _follow(
     scene: RayScene,
@@ -114,15 +143,10 @@ def _follow(
         step = interact(scene, ray, Path.PHOTON, sample)
         hit = step.hit
         if dr.hint(scene.absorbing, mode="scalar"):
-            interface = hit.valid & step.goes_on & ~step.scattered
-            near_side = dr.select(step.side > 0, mi.UInt32(int(Fate.BEFORE)), int(Fate.BEHIND))
-            bound = dr.select(interface, hit.surface, bound)
-            side = dr.select(interface, near_side, side)
+            bound, side = medium_before(step, bound, side)
             sums.book(line, bound, side, power * (1 - step.transmittance), hit.valid)
             power *= step.transmittance
-            ahead = dr.dot(step.lobe.direction, hit.normal) > 0
-            far_side = dr.select(ahead, mi.UInt32(int(Fate.BEFORE)), int(Fate.BEHIND))
-            side = dr.select(interface, far_side, side)
+            side = medium_after(step, side)
         escaped = ray.active & ~hit.valid
         sums.book(line, last, mi.UInt32(int(Fate.ESCAPED)), power, escaped)
         kept = dr.select(step.goes_on, power * step.lobe.weight, 0)

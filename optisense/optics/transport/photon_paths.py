@@ -1,0 +1,189 @@
+"""The ways of single photons from the lights to their ends, for drawing.
+
+Photons go as those of the light ledger, but they carry all their power to one end: what a photon of
+the ledger loses at a place is the probability that one of these ends there.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+from numpy.typing import NDArray
+
+from optisense.optics.backend.arrays import floats, indices
+from optisense.optics.backend.interrupts import lets_ctrl_c_through
+from optisense.optics.backend.sequences import seed_of
+from optisense.optics.scene.emitters import EmitterTable
+from optisense.optics.scene.ray_scene import Ray, RayScene
+from optisense.optics.scene.surface_cells import cell_at
+from optisense.optics.transport.emission_guide import uniform_guide
+from optisense.optics.transport.interact import MAX_DEPTH, LobeSample, Path, interact
+from optisense.optics.transport.light_ledger import Fate, medium_after, medium_before
+from optisense.optics.transport.photon_map import GROUP_MASK
+from optisense.optics.transport.photons import Emission, TargetCells, launch
+
+ESCAPE_LENGTH = 4.0
+"""Length (mm) of the last segment of a photon that escapes."""
+
+POINTS = MAX_DEPTH + 2
+"""Largest number of points of a way: the light, the surfaces, and where the photon ends."""
+
+
+@dataclass(frozen=True)
+class TracedPhotons:
+    """Photons and where they went.
+
+    Attributes:
+        points: (photons, `POINTS`, 3) float32, mm.
+        counts: (photons,) the points of each that count.
+        group: (photons,) the number of the light group.
+        power: (photons,) of each, relative to one another.
+        surface: (photons,) that tells where it ends, as in the ledger's sums.
+        fate: (photons,) of `Fate`.
+    """
+
+    points: NDArray[np.float32]
+    counts: NDArray[np.int64]
+    group: NDArray[np.int64]
+    power: NDArray[np.float64]
+    surface: NDArray[np.int64]
+    fate: NDArray[np.int64]
+
+
+@dataclass
+class _Course:
+    """What is written of photons under way.
+
+    Attributes:
+        points: coordinates, of `POINTS` points for each photon.
+        surfaces: the number of surfaces, those of the lights' own row not counted.
+    """
+
+    points: mi.Float
+    surfaces: int
+
+    def write(self, photon: mi.UInt32, place: mi.UInt32, point: mi.Point3f, where: mi.Bool) -> None:
+        """Keep a point of a photon; symbolic loops may call it."""
+        row = (photon * POINTS + place) * 3
+        for k in range(3):
+            dr.scatter(self.points, point[k], row + k, where)
+
+
+@dr.syntax
+def _follow(
+    scene: RayScene,
+    ray: Ray,
+    power: mi.Color3f,
+    weights: mi.Color3f,
+    photon: mi.UInt32,
+    course: _Course,
+    seen: TargetCells,
+    seed: mi.UInt32,
+) -> tuple[mi.UInt32, mi.UInt32, mi.UInt32]:
+    """Follow photons to their ends.
+
+    Returns:
+        The number of points of each, and the surface and the fate that tell where it ends.
+    """
+    rng = mi.PCG32()
+    first, second = mi.sample_tea_32(photon, seed)
+    rng.seed(mi.UInt64(first), mi.UInt64(second))
+    course.write(photon, mi.UInt32(0), ray.origin, mi.Bool(ray.active))
+    count = mi.UInt32(1)
+    # Photons that are given up keep these.
+    ending = mi.UInt32(course.surfaces)
+    fate = mi.UInt32(int(Fate.ABSORBED))
+    last = mi.UInt32(course.surfaces)
+    bound = mi.UInt32(course.surfaces)
+    side = mi.UInt32(int(Fate.BEFORE))
+    while ray.active:
+        sample = LobeSample(rng.next_float32(), mi.Point2f(rng.next_float32(), rng.next_float32()))
+        step = interact(scene, ray, Path.PHOTON, sample)
+        hit = step.hit
+        end = dr.select(hit.valid, hit.point, ray.origin + ESCAPE_LENGTH * ray.direction)
+        stopped = mi.Bool(False)
+        if dr.hint(scene.absorbing, mode="scalar"):
+            bound, side = medium_before(step, bound, side)
+            left = _part(power * step.transmittance, power, weights)
+            chance = rng.next_float32()
+            stopped = hit.valid & (chance >= left)
+            # Beer-Lambert: after the part ln(chance) / ln(left) of the way, `chance` is left.
+            depth = dr.log(dr.maximum(chance, 1e-6)) / dr.log(dr.clip(left, 1e-6, 1 - 1e-6))
+            inside = ray.origin + dr.clip(depth, 0, 1) * (hit.point - ray.origin)
+            end = dr.select(stopped, inside, end)
+            ending = dr.select(stopped, bound, ending)
+            fate = dr.select(stopped, side, fate)
+            power *= step.transmittance / dr.maximum(left, 1e-6)
+            side = medium_after(step, side)
+        kept = dr.select(step.goes_on, power * step.lobe.weight, 0)
+        goes = _part(kept, power, weights)
+        absorbed = hit.valid & ~stopped & (rng.next_float32() >= goes)
+        cell, near = cell_at(seen.cells, hit.point, step.sensed)
+        near &= dr.gather(mi.UInt32, seen.flags, cell, near) != 0
+        by_surface = dr.select(near, mi.UInt32(int(Fate.SEEN)), int(Fate.ABSORBED))
+        ending = dr.select(absorbed, hit.surface, ending)
+        fate = dr.select(absorbed, by_surface, fate)
+        ending = dr.select(hit.valid, ending, last)
+        fate = dr.select(hit.valid, fate, int(Fate.ESCAPED))
+        power = kept / dr.maximum(goes, 1e-6)
+        last = dr.select(step.goes_on, hit.surface, last)
+        course.write(photon, count, end, mi.Bool(True))
+        count += 1
+        ray = step.ray
+        ray.active &= ~(stopped | absorbed)
+    return count, ending, fate
+
+
+def _part(some: mi.Color3f, whole: mi.Color3f, weights: mi.Color3f) -> mi.Float:
+    """The part that some power is of the whole, over all channels; at most 1."""
+    return dr.minimum(dr.dot(some, weights) / dr.maximum(dr.dot(whole, weights), 1e-30), 1)
+
+
+@lets_ctrl_c_through
+def trace_photon_paths(
+    scene: RayScene,
+    table: EmitterTable,
+    flux: NDArray[np.float64],
+    seen: TargetCells,
+    per_light: int,
+    seed: int = 0,
+) -> TracedPhotons:
+    """Send single photons from all lights, and write down their ways.
+
+    Args:
+        scene: the sensor.
+        table: its lights.
+        flux: (groups, 3) mW in each channel, which decide how photons of all channels end.
+        seen: the cells of the sensing surface, and which of them the camera sees.
+        per_light: photons of each light.
+        seed: another one gives other photons.
+    """
+    emission = Emission(table, uniform_guide(table.count), per_light, seed_of(seed, 7))
+    flight, _ = launch(scene, emission, indices(np.arange(table.count)))
+    count = per_light * table.count
+    group = flight.group & GROUP_MASK
+    weights = dr.gather(mi.Color3f, floats(flux), group)
+    power = dr.dot(flight.throughput, weights)
+    course = _Course(dr.zeros(mi.Float, count * POINTS * 3), len(scene.pieces))
+    points, surface, fate = _follow(
+        scene,
+        flight.ray,
+        mi.Color3f(flight.throughput),
+        weights,
+        dr.arange(mi.UInt32, count),
+        course,
+        seen,
+        dr.opaque(mi.UInt32, seed_of(seed, 8)),
+    )
+    dr.eval(course.points, points, surface, fate, group, power)
+    return TracedPhotons(
+        points=np.asarray(course.points, dtype=np.float32).reshape(count, POINTS, 3),
+        counts=np.asarray(points, dtype=np.int64),
+        group=np.asarray(group, dtype=np.int64),
+        power=np.asarray(power, dtype=np.float64),
+        surface=np.asarray(surface, dtype=np.int64),
+        fate=np.asarray(fate, dtype=np.int64),
+    )
