@@ -18,7 +18,7 @@ from optisense.writing import write_text
 if TYPE_CHECKING:
     from optisense.optics.ledger import LightLedger
 
-JSON_FILE = "ledger.json"
+JSON_FILE, PAGE_FILE = "ledger.json", "ledger.html"
 
 LEAST_SHOWN = 5e-5
 """Share of a group's light below which the table says nothing: less than 0.01 %."""
@@ -29,7 +29,7 @@ def ledger(
     design: DesignArgument,
     *,
     options: LedgerOptions,
-    out: Annotated[Path | None, out_option("Folder for ledger.json.")] = None,
+    out: Annotated[Path | None, out_option("Folder for ledger.json and ledger.html.")] = None,
     as_json: Annotated[
         bool, typer.Option("--json", help="Print JSON with every line instead of a table.")
     ] = False,
@@ -48,19 +48,22 @@ def ledger(
             take_folder(out)
 
         from optisense.optics import OpticalModel
-        from optisense.optics.ledger import light_ledger
+        from optisense.report.light_section import LightSection, ledger_page
 
         line.say("following light")
-        found = light_ledger(OpticalModel(sensor, variant), options.photons, options.seed)
+        section = LightSection.of(OpticalModel(sensor, variant), options.photons, options.seed)
+        found = section.ledger
     text = json.dumps(found.as_data(), indent=2, allow_nan=False)
     if out is not None:
         write_text(out / JSON_FILE, text + "\n")
+        write_text(out / PAGE_FILE, ledger_page(sensor, section))
     if as_json:
         print(text)
         return
     _print(found)
     if out is not None:
-        output.print(f"written to {out / JSON_FILE}", markup=False)
+        output.print(f"numbers: {out / JSON_FILE}", markup=False)
+        output.print(f"page:    {out / PAGE_FILE}", markup=False)
 
 
 def _print(found: LightLedger) -> None:

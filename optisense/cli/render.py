@@ -65,6 +65,7 @@ def render(
         from optisense.optics.imaging.tactile_image import REPORT_FILE
         from optisense.report import write_report
         from optisense.report.camera_rays import CameraRays
+        from optisense.report.light_section import LightSection
         from optisense.report.real_sensor import has_real_picture
 
         interrupt.raise_if_requested()
@@ -98,6 +99,10 @@ def render(
         if has_real_picture(sensor) and not image.interrupted and not interrupt.requested:
             line.say(COMPARING)
             real = _beside_real(model, image, interrupt)
+        light = None
+        if not image.interrupted and not interrupt.requested:
+            line.say(FOLLOWING)
+            light = LightSection.of(model, seed=options.seed)
         write_report(
             out / REPORT_FILE,
             sensor,
@@ -106,6 +111,7 @@ def render(
             exposure=options.exposure,
             rays=CameraRays.of(model),
             real=real,
+            light=light,
         )
     _say_what_came(image, out)
     if image.interrupted:
@@ -117,6 +123,7 @@ def render(
 WRITING = "writing the report"
 TRACING, SHADING = "tracing photons", "shading the picture"
 COMPARING = "comparing with a real sensor"
+FOLLOWING = "following the light of each group"
 
 NOISE_PHOTONS = 4_000_000
 """Photons that a noise target is expected to take, before the noise is known."""

@@ -4,7 +4,11 @@ from __future__ import annotations
 
 import base64
 import io
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -40,3 +44,20 @@ def figure_uri(figure: Figure) -> str:
     buffer = io.BytesIO()
     figure.savefig(buffer, format="png", dpi=DOTS_PER_INCH)
     return "data:image/png;base64," + base64.b64encode(buffer.getvalue()).decode("ascii")
+
+
+def swatch_of(colour: Sequence[float]) -> str:
+    """The colour of a light as CSS, its brightest channel full.
+
+    Args:
+        colour: (3,) of the light, of any scale.
+    """
+    brightest = max(*colour, 1e-9)
+    red, green, blue = (round(255 * value / brightest) for value in colour)
+    return f"rgb({red}, {green}, {blue})"
+
+
+def encoded(values: NDArray[Any], dtype: Any) -> str:
+    """An array for a page's script: little-endian numbers as base64 text."""
+    little_endian = np.ascontiguousarray(values, dtype=np.dtype(dtype).newbyteorder("<"))
+    return base64.b64encode(little_endian.tobytes()).decode("ascii")

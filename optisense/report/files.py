@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import json
 from importlib.resources import files
 from typing import Any
 
-from jinja2 import DictLoader, Environment, StrictUndefined
+from jinja2 import Environment, FunctionLoader, StrictUndefined
 from markupsafe import Markup
 
 from optisense import __version__
@@ -25,7 +26,7 @@ def page(name: str, **values: Any) -> str:
         values: that it shows; what is no `Markup` is escaped.
     """
     environment = Environment(
-        loader=DictLoader({name: template(f"{name}.html.j2")}),
+        loader=FunctionLoader(lambda each: template(f"{each}.html.j2")),
         autoescape=True,
         finalize=shown_in_html,
         undefined=StrictUndefined,
@@ -35,3 +36,14 @@ def page(name: str, **values: Any) -> str:
     return environment.get_template(name).render(
         version=__version__, css=Markup(template("report.css")), **values
     )
+
+
+def script(name: str) -> Markup:
+    """A script of the package's templates, to stand in a page."""
+    return Markup(template(name))
+
+
+def as_json(value: Any) -> Markup:
+    """JSON that can't end the script element it stands in."""
+    text = json.dumps(value, separators=(",", ":"), allow_nan=False)
+    return Markup(text.replace("<", "\\u003c"))

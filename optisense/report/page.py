@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from functools import partial
@@ -10,7 +9,6 @@ from pathlib import Path
 from typing import Any, Literal, Protocol
 
 import numpy as np
-from markupsafe import Markup
 from numpy.typing import NDArray
 
 from optisense.design import LightGroup, SensorDesign
@@ -18,7 +16,9 @@ from optisense.design.responses import PictureChain
 from optisense.geometry import Contact, TriangleMesh
 from optisense.report import tables
 from optisense.report.camera_rays import CameraRays
-from optisense.report.files import page, template
+from optisense.report.drawing import swatch_of
+from optisense.report.files import as_json, page, script
+from optisense.report.light_section import LightSection
 from optisense.report.pictures import data_uri, mask_overlay, normal_colours
 from optisense.report.real_sensor import RealComparison
 from optisense.report.scene_view import scene_data
@@ -69,6 +69,7 @@ def write_report(
     exposure: float | Literal["auto"] = "auto",
     rays: CameraRays | None = None,
     real: RealComparison | None = None,
+    light: LightSection | None = None,
 ) -> Path:
     """Write a render as one self-contained HTML page.
 
@@ -80,6 +81,7 @@ def write_report(
         exposure: of the picture, as for `TactileImage.picture`.
         rays: chief rays of the camera (`CameraRays.of` a model), drawn there too.
         real: how far the sensor is from a real one (`compare_with_real`), if that is known.
+        light: where the sensor's light goes (`LightSection.of` a model), drawn there too.
 
     Returns:
         The path.
@@ -87,7 +89,9 @@ def write_report(
     Raises:
         OutputError: the file can't be written.
     """
-    text = render_page(design, image, contacts, exposure=exposure, rays=rays, real=real)
+    text = render_page(
+        design, image, contacts, exposure=exposure, rays=rays, real=real, light=light
+    )
     write_text(Path(path), text)
     return Path(path)
 
@@ -100,6 +104,7 @@ def render_page(
     exposure: float | Literal["auto"] = "auto",
     rays: CameraRays | None = None,
     real: RealComparison | None = None,
+    light: LightSection | None = None,
 ) -> str:
     """The page of `write_report` as text."""
     height, width = image.contact_mask.shape
@@ -120,9 +125,12 @@ def render_page(
         real=None if real is None else _real(real),
         assumed=assumed,
         sourced=sourced,
-        scene=_json(scene_data(design, image.indenters, rays)),
-        picture_script=Markup(template("picture.js")),
-        viewer_script=Markup(template("viewer.js")),
+        light=None if light is None else light.values(design),
+        scene=as_json(
+            scene_data(design, image.indenters, rays, () if light is None else light.ways())
+        ),
+        picture_script=script("picture.js"),
+        viewer_script=script("viewer.js"),
     )
 
 
@@ -181,18 +189,10 @@ def _real(found: RealComparison) -> dict[str, Any]:
 
 
 def _group(name: str, group: LightGroup) -> dict[str, Any]:
-    brightest = max(*group.colour, 1e-9)
-    red, green, blue = (round(255 * value / brightest) for value in group.colour)
     return {
         "name": name,
-        "swatch": f"rgb({red}, {green}, {blue})",
+        "swatch": swatch_of(group.colour),
         "model": group.model,
         "count": len(group.lights),
         "flux": f"{group.flux:g} mW",
     }
-
-
-def _json(value: Any) -> Markup:
-    """JSON that can't end the script element it stands in."""
-    text = json.dumps(value, separators=(",", ":"), allow_nan=False)
-    return Markup(text.replace("<", "\\u003c"))

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import base64
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from optisense.design import LightGroup, SensorDesign
 from optisense.design.looks import ROLE_LOOKS
@@ -15,6 +13,7 @@ from optisense.design.projection import directions
 from optisense.errors import OptiSenseError
 from optisense.geometry import TriangleMesh
 from optisense.report.camera_rays import CameraRays
+from optisense.report.drawing import encoded
 from optisense.report.edges import feature_edges
 
 CREASE = 35.0
@@ -28,7 +27,10 @@ MARKER_SIZE = 0.35
 
 
 def scene_data(
-    design: SensorDesign, indenters: Mapping[str, TriangleMesh], rays: CameraRays | None = None
+    design: SensorDesign,
+    indenters: Mapping[str, TriangleMesh],
+    rays: CameraRays | None = None,
+    ways: Sequence[Mapping[str, Any]] = (),
 ) -> dict[str, Any]:
     """The 3-D view's data, ready for JSON.
 
@@ -36,12 +38,13 @@ def scene_data(
         design: the sensor.
         indenters: what touches it, in the design's frame.
         rays: chief rays of the camera, if they are to be drawn.
+        ways: of photons, as of a `LightSection`.
 
     Returns:
         ``parts`` (name, role, colour, alpha, meshes), ``lights`` (groups with discs and
         directions), ``camera`` (pose and frustum), ``rays`` (pairs of ends of those that reach
         the sensing surface, ``seen``, and of others, ``lost``; empty where there are none),
-        ``centre`` (3,) and ``size`` in mm.
+        ``ways``, ``centre`` (3,) and ``size`` in mm.
     """
     meshes = design.deformed_meshes()
     parts = [_part(name, design.parts[name].role.value, mesh) for name, mesh in meshes.items()]
@@ -56,7 +59,8 @@ def scene_data(
         "camera": _camera(design, meshes),
         "rays": {}
         if rays is None
-        else {name: _encoded(ends, np.float32) for name, ends in rays.segments().items()},
+        else {name: encoded(ends, np.float32) for name, ends in rays.segments().items()},
+        "ways": list(ways),
         "centre": _rounded((low + high) / 2),
         "size": float(np.linalg.norm(high - low)),
     }
@@ -74,10 +78,10 @@ def _part(name: str, role: str, mesh: TriangleMesh) -> dict[str, Any] | None:
         "role": role,
         "colour": colour,
         "alpha": alpha,
-        "points": _encoded(smooth.vertices, np.float32),
-        "normals": _encoded(np.round(normals * 127), np.int8),
-        "faces": _encoded(smooth.faces, np.uint32),
-        "edges": _encoded(feature_edges(mesh, CREASE), np.float32),
+        "points": encoded(smooth.vertices, np.float32),
+        "normals": encoded(np.round(normals * 127), np.int8),
+        "faces": encoded(smooth.faces, np.uint32),
+        "edges": encoded(feature_edges(mesh, CREASE), np.float32),
     }
 
 
@@ -133,11 +137,6 @@ def _camera(design: SensorDesign, meshes: dict[str, TriangleMesh]) -> dict[str, 
         "up": _rounded(up),
         "forward": _rounded(forward),
     }
-
-
-def _encoded(values: NDArray[Any], dtype: Any) -> str:
-    little_endian = np.ascontiguousarray(values, dtype=np.dtype(dtype).newbyteorder("<"))
-    return base64.b64encode(little_endian.tobytes()).decode("ascii")
 
 
 def _rounded(values: Any) -> list[float]:

@@ -1,8 +1,8 @@
-// A small 3-D view of the design: orbit, pan, zoom, cut, and a legend that hides parts.
-(function () {
+// A small 3-D view of the design: orbit, pan, zoom, cut, and a legend that hides parts. A page may
+// have two: one with the camera's rays, and one, `data-ways`, with the ways of photons.
+function view3d(root, data) {
   "use strict";
-  const data = JSON.parse(document.getElementById("scene-data").textContent);
-  const stage = document.getElementById("stage");
+  const stage = root.querySelector(".stage"), withWays = root.hasAttribute("data-ways");
   const canvas = stage.querySelector("canvas");
   const gl = canvas.getContext("webgl2", { antialias: true, alpha: true });
   if (!gl) {
@@ -116,7 +116,8 @@
   });
   for (const group of data.lights) things.push(lightThing(group));
   things.push(cameraThing(data.camera));
-  for (const [name, label, hex, alpha] of [["seen", "chief rays", "#7a3fb8", 0.8],
+  for (const way of withWays ? data.ways : []) things.push(wayThing(way));
+  for (const [name, label, hex, alpha] of withWays ? [] : [["seen", "chief rays", "#7a3fb8", 0.8],
     ["lost", "rays that miss the skin", "#8d97a3", 0.55]]) {
     const ends = data.rays[name] ? decode(data.rays[name], Float32Array) : [];
     if (ends.length) things.push(rayThing(label, hex, alpha, ends));
@@ -129,6 +130,20 @@
       faint: [...rgb(hex).map((x) => 0.4 + 0.6 * x), 0.45 * alpha],
       solid: shape(new Float32Array(0), new Int8Array(0), new Uint32Array(0)),
     };
+  }
+
+  // The photons that end at one place; `choose` takes those of a light group, or of all.
+  function wayThing(way) {
+    const shapes = {}, every = [];
+    for (const [group, text] of Object.entries(way.groups)) {
+      const ends = decode(text, Float32Array);
+      shapes[group] = shape(ends);
+      for (const value of ends) every.push(value);
+    }
+    const thing = rayThing(way.label, way.colour, 0.9, new Float32Array(every));
+    const all = thing.lines, none = { vao: all.vao, count: 0 };
+    thing.choose = (group) => { thing.lines = group === "" ? all : shapes[group] || none; };
+    return thing;
   }
 
   function lightThing(group) {
@@ -192,7 +207,7 @@
   }
 
   // --- legend ---------------------------------------------------------------------------------
-  const legend = document.getElementById("legend");
+  const legend = root.querySelector(".legend");
   for (const thing of things) {
     const label = document.createElement("label");
     const box = document.createElement("input");
@@ -205,6 +220,15 @@
     note.textContent = " " + thing.note;
     label.append(box, swatch, thing.label, note);
     legend.append(label);
+  }
+
+  const groupChoice = root.querySelector(".light-group");
+  function chooseGroup() {
+    for (const thing of things) if (thing.choose) thing.choose(groupChoice.value);
+  }
+  if (groupChoice) {
+    groupChoice.addEventListener("change", () => { chooseGroup(); draw(); });
+    chooseGroup();
   }
 
   // --- the viewer's own camera -------------------------------------------------------------------
@@ -242,7 +266,7 @@
     return { view, projection, eye };
   }
 
-  const cutAxis = document.getElementById("cut-axis"), cutAt = document.getElementById("cut-at");
+  const cutAxis = root.querySelector(".cut-axis"), cutAt = root.querySelector(".cut-at");
   function cutPlane() {
     const axis = Number(cutAxis.value);
     if (axis < 0) return [0, 0, 0, 1];
@@ -262,7 +286,7 @@
   function draw() {
     if (!pending) { pending = true; requestAnimationFrame(() => { pending = false; paint(); }); }
   }
-  const arrows = document.querySelectorAll("#axes line"), letters = document.querySelectorAll("#axes text");
+  const arrows = root.querySelectorAll(".axes line"), letters = root.querySelectorAll(".axes text");
   function turnAxes() {
     const { right, up } = axes();
     for (let i = 0; i < 3; i++) {
@@ -370,8 +394,13 @@
   function zoom(factor) {
     distance = Math.max(data.size * 0.15, Math.min(data.size * 8, distance * factor));
   }
-  for (const button of document.querySelectorAll("[data-view]"))
+  for (const button of root.querySelectorAll("[data-view]"))
     button.addEventListener("click", () => reset(button.dataset.view));
   new ResizeObserver(() => draw()).observe(canvas);
   reset("corner");
+}
+
+(function () {
+  const data = JSON.parse(document.getElementById("scene-data").textContent);
+  for (const root of document.querySelectorAll(".view")) view3d(root, data);
 })();

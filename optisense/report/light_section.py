@@ -1,0 +1,199 @@
+"""Where the light goes, as a section of a page: bars, a table, and ways of photons in 3-D."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from optisense.design import SensorDesign
+from optisense.quality import photons_of
+from optisense.report.drawing import encoded, swatch_of
+from optisense.report.files import as_json, page, script
+from optisense.report.scene_view import scene_data
+
+if TYPE_CHECKING:
+    from optisense.optics import OpticalModel
+    from optisense.optics.ledger import LightLedger
+    from optisense.optics.light_paths import PhotonPath
+
+REPORT_PHOTONS = photons_of("draft")
+"""Photons of the ledger in the report of a render: the noise of a line is then 0.3 % of the group's
+light, which no bar shows, and they take about 2 % of the time of a render."""
+
+PHOTONS_PER_LIGHT = 100
+"""Photons of each light that a ledger has at least."""
+
+LEAST_DRAWN = 0.005
+"""Share of a group's light below which a place is drawn together with others."""
+
+LEAST_TOLD = 0.0005
+"""Share that the table tells as a number: 0.1 % when rounded."""
+
+LEAST_LABELLED = 0.09
+"""Share of a bar that has room for its number, on a telephone's screen of 390 pixels too."""
+
+OTHER = "other places"
+OTHER_COLOUR = "#9aa5b1"
+
+COLOURS: Mapping[str, Sequence[str]] = {
+    "coating in view": ("#0f7a41",),
+    "coating out of view": ("#6fc07a",),
+    "absorbed by a part": ("#4b3f8f", "#7b68c0", "#a797dc", "#cbbff0"),
+    "absorbed in a medium": ("#8f4a24", "#bf7a4a", "#deb08c"),
+    "escaped": ("#c96a00", "#ef9a2e", "#f6c06f", "#f3d9a4"),
+    "lost": ("#66727f",),
+}
+"""A hue for each way in which light ends, and its shades for the places, the largest first. No hue
+is one of a usual light group."""
+
+
+@dataclass(frozen=True)
+class LightSection:
+    """What the section shows.
+
+    Attributes:
+        ledger: where the light of each group goes.
+        paths: typical photons of each group.
+    """
+
+    ledger: LightLedger
+    paths: Mapping[str, Sequence[PhotonPath]]
+
+    @staticmethod
+    def of(model: OpticalModel, photons: int | None = None, seed: int = 0) -> LightSection:
+        """Follow the light of a model.
+
+        Args:
+            model: the sensor.
+            photons: of the ledger; as many as suit a drawing if left out.
+            seed: another one gives other photons.
+
+        Raises:
+            RenderError: there are too few photons.
+        """
+        from optisense.optics.ledger import cells_in_view, light_ledger
+        from optisense.optics.light_paths import photon_paths
+
+        lights = sum(len(group.lights) for group in model.design.lights.values())
+        number = max(REPORT_PHOTONS, PHOTONS_PER_LIGHT * lights) if photons is None else photons
+        seen = cells_in_view(model)
+        ledger = light_ledger(model, number, seed, seen)
+        return LightSection(ledger, photon_paths(model, seed=seed, seen=seen))
+
+    @cached_property
+    def colours(self) -> dict[str, str]:
+        """Of each place that is drawn on its own, what takes most light first."""
+        kinds, used = self.ledger.kinds(), dict.fromkeys(COLOURS, 0)
+        found = {}
+        for where in self.ledger.places():
+            if max(self._shares(where)) >= LEAST_DRAWN:
+                shades, number = COLOURS[kinds[where]], used[kinds[where]]
+                found[where] = shades[min(number, len(shades) - 1)]
+                used[kinds[where]] += 1
+        return found
+
+    def values(self, design: SensorDesign) -> dict[str, Any]:
+        """What the template ``light`` shows."""
+        groups = list(self.ledger.emitted)
+        noise = max((entry.noise for entry in self.ledger.entries), default=0.0)
+        return {
+            "groups": groups,
+            "bars": [self._bar(group, design) for group in groups],
+            "rows": self._rows(),
+            "photons": f"{self.ledger.photons:,}",
+            "noise": f"{100 * noise:.1g}",
+            "drawn": max(len(paths) for paths in self.paths.values()) if self.paths else 0,
+        }
+
+    def ways(self) -> list[dict[str, Any]]:
+        """For the 3-D view: of each place its name and colour, and by light group the segments of
+        the photons that end there, pairs of ends in mm as text.
+        """
+        found: dict[str, dict[str, list[Any]]] = {}
+        for group, paths in self.paths.items():
+            for path in paths:
+                where = path.where if path.where in self.colours else OTHER
+                pairs = np.repeat(path.points, 2, axis=0)[1:-1]
+                found.setdefault(where, {}).setdefault(group, []).append(pairs)
+        order = [where for where in (*self.colours, OTHER) if where in found]
+        return [
+            {
+                "label": where,
+                "colour": self.colours.get(where, OTHER_COLOUR),
+                "groups": {
+                    group: encoded(np.concatenate(pieces), np.float32)
+                    for group, pieces in found[where].items()
+                },
+            }
+            for where in order
+        ]
+
+    def _shares(self, where: str) -> list[float]:
+        return [self.ledger.share(group, where) for group in self.ledger.emitted]
+
+    def _others(self, group: str) -> float:
+        """The share of all places that are not drawn on their own."""
+        entries = [entry for entry in self.ledger.entries if entry.group == group]
+        return sum(entry.share for entry in entries if entry.where not in self.colours)
+
+    def _bar(self, group: str, design: SensorDesign) -> dict[str, Any]:
+        pieces, start = [], 0.0
+        for where, colour in (*self.colours.items(), (OTHER, OTHER_COLOUR)):
+            others = where == OTHER
+            share = self._others(group) if others else self.ledger.share(group, where)
+            if share > 0.0:
+                pieces.append(_piece(where, colour, start, share))
+                start += share
+        return {
+            "name": group,
+            "swatch": swatch_of(design.lights[group].colour),
+            "emitted": f"{self.ledger.emitted[group]:.3g} mW",
+            "pieces": pieces,
+        }
+
+    def _rows(self) -> list[tuple[str, str, list[str]]]:
+        rows = [
+            (where, colour, [_percent(share) for share in self._shares(where)])
+            for where, colour in self.colours.items()
+        ]
+        others = [self._others(group) for group in self.ledger.emitted]
+        if max(others, default=0.0) >= LEAST_TOLD:
+            rows.append((OTHER, OTHER_COLOUR, [_percent(share) for share in others]))
+        return rows
+
+
+def ledger_page(design: SensorDesign, section: LightSection) -> str:
+    """The page of ``optisense ledger`` as text."""
+    return page(
+        "ledger",
+        title=design.name,
+        description=design.description,
+        light=section.values(design),
+        scene=as_json(scene_data(design, {}, ways=section.ways())),
+        viewer_script=script("viewer.js"),
+    )
+
+
+def _piece(where: str, colour: str, start: float, share: float) -> dict[str, str]:
+    red, green, blue = (int(colour[at : at + 2], 16) for at in (1, 3, 5))
+    dark = 0.299 * red + 0.587 * green + 0.114 * blue < 150  # luma of ITU-R BT.601, 0 to 255
+    return {
+        "where": where,
+        "colour": colour,
+        "ink": "#ffffff" if dark else "#1c232b",
+        "x": f"{100 * start:.3f}%",
+        "width": f"{100 * share:.3f}%",
+        "middle": f"{100 * (start + share / 2):.3f}%",
+        "label": f"{100 * share:.0f} %" if share >= LEAST_LABELLED else "",
+        "told": f"{where}: {_percent(share)}",
+    }
+
+
+def _percent(share: float) -> str:
+    if share < LEAST_TOLD:
+        return "0" if share <= 0.0 else "< 0.1 %"
+    return f"{100 * share:.1f} %"
