@@ -18,7 +18,6 @@ from optisense.design.material_checks import index_problems
 from optisense.design.problems import Diagnostic
 from optisense.errors import ObjectiveError, OptiSenseError
 from optisense.geometry import Contact, Sphere
-from optisense.mechanics import CONFORMING
 from optisense.objectives.exposure import exposure_for
 from optisense.objectives.frames import frame_of, nearest_press
 from optisense.objectives.press import Press
@@ -366,7 +365,7 @@ class Evaluation:
             only_contacts=bool(contacts),
             pixel_importance=pixel_importance,
             partial=False,
-            skin=CONFORMING,  # the definition of the paper's objectives
+            skin=self.settings.skin,
         )
         return image
 

@@ -8,6 +8,7 @@ from typing import Any, Literal
 
 from optisense.design.camera_checks import LEAST_PICTURE, LEAST_SKIN
 from optisense.errors import ObjectiveError
+from optisense.mechanics.skins import CONFORMING, SKINS
 from optisense.quality import LEVELS, photons_of
 
 BALL_RADIUS = 1.5
@@ -58,6 +59,8 @@ class Settings:
         least_skin: share of the sensing surface's area that the camera must see, 0 to 1, or there
             is no score.
         least_picture: share of the pixels that must see the sensing surface, 0 to 1.
+        skin: "conforming", as the OptiSense paper defines its objectives, or "elastic"; see
+            docs/mechanics.md.
     """
 
     resolution: tuple[int, int] | None = None
@@ -71,6 +74,7 @@ class Settings:
     exposure: float | Literal["auto"] = "auto"
     least_skin: float = LEAST_SKIN
     least_picture: float = LEAST_PICTURE
+    skin: str = CONFORMING
 
     def __post_init__(self) -> None:
         for name in ("resolution", "ray_resolution"):
@@ -103,6 +107,10 @@ class Settings:
                 raise ObjectiveError(
                     f"the setting '{name}' is {share!r}", hint="Give a share from 0 to 1"
                 )
+        if self.skin not in SKINS:
+            raise ObjectiveError(
+                f"there is no skin {self.skin!r}", hint="Use " + " or ".join(SKINS)
+            )
         if self.places is not None:
             object.__setattr__(self, "places", _pairs(self.places))
 

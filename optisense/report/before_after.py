@@ -97,7 +97,7 @@ def look(
     """
     from optisense.optics import OpticalModel
 
-    taken = ("radius", "depth", "ray_resolution")
+    taken = ("radius", "depth", "ray_resolution", "skin")
     shared = Settings(**{key: value for key, value in (settings or {}).items() if key in taken})
     found: dict[str, Any] = {}
     try:
@@ -107,7 +107,7 @@ def look(
         if pictures:
             contacts = model.nine_contacts(Sphere(shared.radius), shared.depth)
             found["pressed"] = shared.radius, shared.depth
-            found["picture"], found["balls"] = _picture(model, contacts, photons, seed)
+            found["picture"], found["balls"] = _picture(model, contacts, photons, seed, shared.skin)
     except SetupError:
         raise
     except OptiSenseError as error:
@@ -141,11 +141,11 @@ def ray_figures(evaluation: Evaluation) -> RayFigures:
 
 
 def _picture(
-    model: OpticalModel, contacts: list[Contact], photons: int, seed: int
+    model: OpticalModel, contacts: list[Contact], photons: int, seed: int, skin: str
 ) -> tuple[NDArray[np.uint8], tuple[Ball, ...]]:
     width, height = model.design.camera.resolution
     size = ACROSS, max(1, round(ACROSS * height / width))
-    image = model.render(contacts, resolution=size, photons=photons, seed=seed)
+    image = model.render(contacts, resolution=size, photons=photons, seed=seed, skin=skin)
     if image.interrupted:
         raise KeyboardInterrupt
     places = np.array([contact.point for contact in contacts], dtype=np.float64)

@@ -51,7 +51,7 @@ def test_the_plane_passes_at_its_depth_below_the_middle(mini: OpticalModel) -> N
         fitted, *_ = np.linalg.lstsq(
             np.column_stack([points[:, :2], np.ones(len(points))]), points[:, 2], rcond=None
         )
-        assert fitted[2] == pytest.approx(-0.8, abs=1e-4)
+        assert fitted[2] == pytest.approx(-0.8, abs=5e-4)
         normal = turned(*angles)
         assert fitted[:2] == pytest.approx(-normal[:2] / normal[2], abs=1e-4)
 

@@ -25,6 +25,8 @@ RICHTMYER_STEPS = [round((prime**0.5 % 1) * 2**32) for prime in (2, 3, 5, 7)]
 """Fractional parts of the square roots of primes (Richtmyer's sequence), in units of 2^-32. No
 simple fraction is near them, so that a few elements are spread evenly in each dimension alone, too;
 the first of `STEPS` is nearly 6/7."""
+GOLDEN_BITS = 0x9E3779B9
+"""2^32 over the golden ratio: multiples of it are far apart, as bits for members of a list."""
 HASH_ROUNDS = 8
 """Rounds of the hash that shifts a Richtmyer sequence. With the usual four, similar bits give
 similar shifts."""

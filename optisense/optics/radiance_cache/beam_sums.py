@@ -5,7 +5,7 @@ from __future__ import annotations
 import drjit as dr
 import mitsuba as mi
 
-from optisense.optics.backend.sequences import next_random, unit_float
+from optisense.optics.backend.sequences import GOLDEN_BITS, next_random, unit_float
 from optisense.optics.radiance_cache.angular_variance import (
     broadened_coating,
     isotropic_variance,
@@ -76,8 +76,8 @@ def sum_hidden(
     groups = len(totals)
     hidden = [mi.Color3f(0) for _ in range(groups)]
     steps = [dr.maximum(grey(total) / shadow_rays, MIN_STEP) for total in totals]
-    state = next_random(at.seen.random)
-    running = unit_float(state)
+    random = next_random(at.seen.random)
+    running = unit_float(random)
     j = dr.gather(mi.UInt32, beams.starts, at.cell * groups, at.active)
     end = dr.gather(mi.UInt32, beams.starts, (at.cell + 1) * groups, at.active)
     while j < end:
@@ -93,6 +93,8 @@ def sum_hidden(
         running += share
         times = dr.floor(running) - before
         weight = dr.rcp(dr.select(share < 1, share, times))
+        # A beam's own bits: a ray that rounding adds or drops leaves the others as they are.
+        state = random + j * GOLDEN_BITS
         while times > 0:
             state = next_random(state)
             blocked = indenters.ray_test(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import drjit as dr
 import mitsuba as mi
 
-from optisense.optics.backend.sequences import in_series, next_random
+from optisense.optics.backend.sequences import GOLDEN_BITS, in_series, next_random
 from optisense.optics.radiance_cache.angular_variance import (
     angular_variance,
     broadened_coating,
@@ -61,7 +61,6 @@ def sum_bins(
     assert scenes.indenters is not None
     indenters, active, raised = scenes.indenters.scene, at.active, at.raised
     totals = [mi.Color3f(0) for _ in range(groups)]
-    state = mi.UInt32(points.random)
     steps = []
     running = []
     for g in range(groups):
@@ -116,7 +115,9 @@ def sum_bins(
                 running[g] += dr.select(doubtful, share, 0)
                 times = dr.floor(running[g]) - before
                 if times > 0:
-                    state = next_random(state)
+                    # A bin's own bits: a ray that rounding adds or drops leaves the others as
+                    # they are.
+                    state = next_random(points.random + (k * groups + g) * GOLDEN_BITS)
                     way = mirrored_above(sample_direction(beam, state), points.face_normal)
                     blocked = indenters.ray_test(
                         mi.Ray3f(at.start, way),
