@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from comparing import same_pictures
+from scipy.ndimage import binary_erosion
 
 from optisense import OpticalModel, SensorDesign, library, load
 from optisense.design import LightGroup
@@ -70,9 +71,10 @@ def test_depth_normals_and_mask_describe_the_ball(made: Dataset) -> None:
         radius, depth = sample.labels["radius"], sample.labels["depth"]
         assert (sample.depth[sample.mask] > 0).all()
         # On a flat gel (z = 0, out is +z) a ball's depth follows from its normal.
-        height = -sample.normals[..., 2][sample.mask]
+        inside = binary_erosion(sample.mask)  # at the rim the slope jumps
+        height = -sample.normals[..., 2][inside]
         expected = depth - radius * (1 - height)
-        assert sample.depth[sample.mask] == pytest.approx(expected, abs=4e-3)
+        assert sample.depth[inside] == pytest.approx(expected, abs=4e-3)
         # Around it the skin is pulled in, and bulges a little farther away.
         outside = np.nan_to_num(sample.depth[~sample.mask])
         assert 0.1 * depth < outside.max() < depth

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.ndimage import binary_erosion
 
 from optisense import OpticalModel
 from optisense.errors import ContactError, TaskError
@@ -43,8 +44,9 @@ def test_true_depth_and_normals_are_those_of_the_ball(lambertian: Any) -> None:
         lambertian, ReconstructionSettings(**(LAMBERTIAN | {"presses": 2})), ball
     ).objects["ball"]
     assert each.true_depth.max() == pytest.approx(0.6, abs=2e-3)
-    height = -each.true_normals[..., 2][each.mask]
-    assert each.true_depth[each.mask] == pytest.approx(0.6 - 3 * (1 - height), abs=4e-3)
+    inside = binary_erosion(each.mask)  # at the rim the slope jumps
+    height = -each.true_normals[..., 2][inside]
+    assert each.true_depth[inside] == pytest.approx(0.6 - 3 * (1 - height), abs=4e-3)
 
 
 def test_camera_noise_makes_it_worse(lambertian: Any) -> None:
