@@ -1,24 +1,28 @@
-"""Make the pictures of docs/sensors.md anew.
+"""Make the pictures of docs/sensors.md, and of coatings in docs/design-file.md, anew.
 
-python scripts/sensor_pictures.py [sections] [gelbelt] [gelsight360] [gelsight-svelte]
+python scripts/sensor_pictures.py [sections] [gelbelt] [gelsight360] [gelsight-svelte] [coatings]
 """
 
 from __future__ import annotations
 
 import sys
 from pathlib import Path
+from typing import get_args
 
 import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.image import imsave
 
-from optisense import OpticalModel, sensors
-from optisense.design import SensorDesign
+from optisense import Contact, OpticalModel, Sphere, sensors
+from optisense.design import SensorDesign, set_value
+from optisense.design.materials.coating import Scattering
 from optisense.design.section_drawing import section_svg
 
 OUT = Path(__file__).parent.parent / "docs" / "images"
 DRAWN = ("gelsight-mini", "gelbelt", "gelsight360", "gelsight-svelte")
 PHOTONS = 2_000_000
+SPECULARITY = 0.6
+"""At which the readings of a coating's specularity are shown."""
 
 
 def sections() -> None:
@@ -36,8 +40,9 @@ def tactile(design: SensorDesign) -> np.ndarray:
     return image.picture()
 
 
-def side_by_side(name: str, panels: dict[str, np.ndarray]) -> None:
-    figure = Figure(figsize=(4.0 * len(panels), 3.4), facecolor="white")
+def side_by_side(name: str, panels: dict[str, np.ndarray], width: float = 4.0) -> None:
+    """Write pictures by their titles, each so many inches wide."""
+    figure = Figure(figsize=(width * len(panels), 0.85 * width), facecolor="white")
     axes = np.atleast_1d(figure.subplots(1, len(panels)))
     for axis, (title, picture) in zip(axes, panels.items(), strict=True):
         axis.imshow(picture)
@@ -71,6 +76,18 @@ def svelte() -> None:
     side_by_side("gelsight-svelte", panels)
 
 
+def coatings() -> None:
+    """One contact of GelSight Mini under each reading of a specularity."""
+    model = OpticalModel(set_value(sensors.gelsight_mini(), "coating.specularity", SPECULARITY))
+    panels = {}
+    for scattering in get_args(Scattering):
+        model.update("coating.scattering", scattering)
+        ball = Contact(Sphere(radius=4.0), at=(0.0, 0.0), depth=1.0)
+        image = model.render([ball], resolution=(320, 240), photons=PHOTONS)
+        panels[scattering] = image.picture()
+    side_by_side("coating-scattering", panels, width=2.6)
+
+
 if __name__ == "__main__":
     OUT.mkdir(parents=True, exist_ok=True)
     makers = {
@@ -78,6 +95,7 @@ if __name__ == "__main__":
         "gelbelt": gelbelt,
         "gelsight360": gelsight360,
         "gelsight-svelte": svelte,
+        "coatings": coatings,
     }
     for wanted in sys.argv[1:] or list(makers):
         makers[wanted]()
