@@ -8,6 +8,7 @@ from rich.table import Table
 
 from optisense.cli.console import ends_well, output
 from optisense.cli.options import ContactOption, DesignArgument, parse_contacts
+from optisense.errors import SetupError
 
 if TYPE_CHECKING:
     from optisense.design import SensorDesign
@@ -25,6 +26,8 @@ def check(design: DesignArgument, contact: ContactOption = None) -> None:
     _describe(sensor)
     for problem in problems:
         output.print(f"odd: {problem}", markup=False, style="yellow")
+    if any(part.role == "mirror" for part in sensor.parts.values()):
+        _tell_views(sensor)
     if contacts:
         from optisense.optics import OpticalModel
 
@@ -34,6 +37,23 @@ def check(design: DesignArgument, contact: ContactOption = None) -> None:
         word = "contact fits" if len(contacts) == 1 else "contacts fit"
         output.print(f"{len(contacts)} {word} on the sensing surface.")
     output.print("The design is in order.", style="green")
+
+
+def _tell_views(design: SensorDesign) -> None:
+    """Trace chief rays, and print by which mirrors they go and which mirrors are not used."""
+    try:
+        from optisense.optics import OpticalModel
+        from optisense.optics.mirror_checks import CHECK_RAYS, mirror_problems, views_in_words
+
+        views = OpticalModel(design).views_by_mirrors(CHECK_RAYS)
+    except SetupError as error:  # the rest of the check needs no renderer
+        output.print(f"Its mirrors are not checked: {error}", markup=False, style="yellow")
+        return
+    if views:
+        told = f"Of what the camera sees of the sensing surface: {views_in_words(views)}."
+        output.print(told, markup=False)
+    for problem in mirror_problems(design, views):
+        output.print(f"odd: {problem}", markup=False, style="yellow")
 
 
 def _describe(design: SensorDesign) -> None:

@@ -214,12 +214,16 @@ def indenter_piece(mesh: TriangleMesh, coating: Surface) -> Piece:
     return Piece("indenter", mesh.vertices, mesh.faces, surface, mesh.normals)
 
 
+def is_mirror(reflection: Reflection) -> bool:
+    """Whether a surface is a metal so smooth that it counts as a mirror, which shows images."""
+    return reflection.is_metal and reflection.roughness < SMOOTH_METAL
+
+
 def _opaque(material: Material | None, ior: float) -> Surface:
     reflection = Reflection() if material is None else material.reflection()
     if reflection.is_black:
         return Surface(SurfaceKind.ABSORBER)
-    smooth = reflection.is_metal and reflection.roughness < SMOOTH_METAL
-    kind = SurfaceKind.MIRROR if smooth else SurfaceKind.OPAQUE
+    kind = SurfaceKind.MIRROR if is_mirror(reflection) else SurfaceKind.OPAQUE
     return _reflecting(kind, reflection.seen_in(ior), Region.OTHER)
 
 

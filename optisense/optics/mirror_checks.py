@@ -1,0 +1,68 @@
+"""Whether the camera looks by the mirrors of its design."""
+
+from __future__ import annotations
+
+from optisense.design import SensorDesign
+from optisense.design.parts import Role
+from optisense.design.problems import Diagnostic
+from optisense.optics.scene.assembly import is_mirror
+
+CHECK_RAYS = (96, 72)
+"""Width and height of the chief rays of a check; a column of the picture is 0.01 of them."""
+
+LEAST_BY_MIRROR = 0.1
+"""Share of the chief rays that reach the sensing surface by which a mirror counts as used. All of
+GelSight Svelte's go by both of its mirrors; a camera that looks past them sees 0.006 by them."""
+
+
+def mirror_problems(design: SensorDesign, views: dict[frozenset[str], float]) -> list[Diagnostic]:
+    """Warnings about mirrors by which the camera sees next to nothing of the sensing surface.
+
+    A part counts as a mirror where its role says so and its metal is smooth; a rough or white one
+    shows the camera no image.
+
+    Args:
+        design: with or without mirrors.
+        views: by which mirrors the camera sees the sensing surface, from
+            `RayModel.views_by_mirrors` with `CHECK_RAYS`.
+
+    Returns:
+        A warning for each unused mirror, or one for all where the camera sees nothing of the
+        sensing surface.
+    """
+    mirrors = [
+        name
+        for name, part in design.parts.items()
+        if part.role is Role.MIRROR
+        and part.material is not None
+        and is_mirror(design.materials[part.material].reflection())
+    ]
+    if mirrors and not views:
+        return [
+            Diagnostic(
+                "the camera sees nothing of the sensing surface, by mirrors or straight",
+                design.where("camera"),
+                "Check the camera's position and direction, and what is in its way",
+                "warning",
+            )
+        ]
+    problems = []
+    for name in mirrors:
+        share = sum(part for way, part in views.items() if name in way)
+        if share < LEAST_BY_MIRROR:
+            message = (
+                f"the mirror '{name}' shows the camera {100 * share:.0f} % of what it sees of the "
+                "sensing surface"
+            )
+            hint = "Check where both are; it is right where the mirror only turns light"
+            problems.append(Diagnostic(message, design.where("parts", name), hint, "warning"))
+    return problems
+
+
+def views_in_words(views: dict[frozenset[str], float]) -> str:
+    """The ways by which the camera sees the sensing surface, the most used one first."""
+    told = []
+    for way, share in sorted(views.items(), key=lambda each: -each[1]):
+        names = " and ".join(f"'{name}'" for name in sorted(way))
+        told.append(f"{100 * share:.0f} % {'by ' + names if names else 'straight'}")
+    return ", ".join(told)

@@ -1,0 +1,57 @@
+"""What `optisense check` says of cameras that look by mirrors, or past them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+import optisense as ots
+from optisense import optics, sensors
+from optisense.cli import app
+from optisense.errors import SetupError
+from optisense.search import SearchSpace
+
+
+def checked(design: str) -> tuple[str, list[str]]:
+    """All that is printed, and what of it is odd, in one line each."""
+    result = CliRunner().invoke(app, ["check", design])
+    assert result.exit_code == 0, result.output
+    text = " ".join(result.output.split())
+    return text, text.split("odd: ")[1:]
+
+
+@pytest.mark.parametrize(
+    ("path", "value", "said"),
+    [
+        ("camera.turn.y", -40.0, ["'M1' shows the camera 0 %", "'M2' shows the camera 0 %"]),
+        ("camera.direction.z", 1.1832, ["'M1' shows the camera 1 %", "'M2' shows the camera 1 %"]),
+        ("camera.turn.y", 170.0, ["sees nothing of the sensing surface"]),
+    ],
+)
+def test_mirrors_that_the_camera_looks_past_are_told(
+    path: str, value: float, said: list[str], tmp_path: Path
+) -> None:
+    space = SearchSpace({path: (-200.0, 200.0)})
+    moved = space.bind(sensors.load("gelsight-svelte"), tried=False).apply(np.array([value]))
+    ots.save_design(moved, tmp_path / "design")
+    _, odd = checked(str(tmp_path / "design"))
+    assert len(odd) == len(said)
+    assert all(each in told for each, told in zip(said, odd, strict=True))
+
+
+def test_mirrors_that_are_used_are_told_with_their_shares() -> None:
+    text, odd = checked("gelsight-svelte")
+    assert "100 % by 'M1' and 'M2'" in text and odd == []
+    assert " by " not in checked("gelsight-mini")[0].split("camera")[-1]
+
+
+def test_a_machine_that_can_not_trace_rays_checks_the_rest(monkeypatch: pytest.MonkeyPatch) -> None:
+    def missing(*_: object) -> None:
+        raise SetupError("libLLVM is missing")
+
+    monkeypatch.setattr(optics, "OpticalModel", missing, raising=False)
+    text, odd = checked("gelsight-svelte")
+    assert "mirrors are not checked: libLLVM is missing" in text and odd == []
