@@ -40,15 +40,22 @@ class DisplacementField:
     Between grid points it is a cubic spline, so that slopes are smooth.
     """
 
-    def __init__(self, place: Footprint, pressure: FloatArray, elasticity: Elasticity) -> None:
+    def __init__(
+        self,
+        place: Footprint,
+        overlap: FloatArray,
+        pressure: FloatArray,
+        elasticity: Elasticity,
+    ) -> None:
         """Sum what a pressure does.
 
         Args:
             place: the grid of the pressure.
+            overlap: (rows, columns) mm, of the place, less what other contacts displace.
             pressure: (rows, columns) MPa.
             elasticity: of the gel.
         """
-        self.place = place
+        self.place, self._overlap = place, overlap
         pitch, thickness = place.pitch, place.thickness
         rows, columns = place.overlap.shape
         ring = int(np.ceil(RING * min(rows, columns)))
@@ -57,7 +64,7 @@ class DisplacementField:
         fine = response.normal(np.pad(pressure, ring))
         inside = slice(ring, ring + rows), slice(ring, ring + columns)
         touching = pressure > 0.0
-        fine[inside][touching] = place.overlap[touching]
+        fine[inside][touching] = overlap[touching]
         x0, y0 = place.x[0] - ring * pitch, place.y[0] - ring * pitch
         self._fine = _Spline(fine, x0, y0, pitch)
         self._touching = touching
@@ -94,7 +101,7 @@ class DisplacementField:
     @cached_property
     def _indenter_slopes(self) -> tuple[FloatArray, FloatArray]:
         """(rows, columns) each: slopes of the overlap by x and by y."""
-        by_row, by_column = np.gradient(self.place.overlap, self.place.pitch)
+        by_row, by_column = np.gradient(self._overlap, self.place.pitch)
         return np.asarray(by_column), np.asarray(by_row)
 
     def touching(self, x: FloatArray, y: FloatArray) -> NDArray[np.bool_]:
@@ -268,7 +275,7 @@ def press(places: Sequence[Footprint], elasticity: Elasticity) -> PressedSkin:
                 change = max(change, SETTLED)
             overlaps[i] = overlap
             solved = _solve(place, overlap, elasticity, before)
-            field = DisplacementField(place, solved.pressure, elasticity)
+            field = DisplacementField(place, overlap, solved.pressure, elasticity)
             contacts[i] = Pressed(place, solved.pressure, field)
         if change < SETTLED:
             break

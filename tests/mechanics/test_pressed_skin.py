@@ -72,6 +72,21 @@ def test_neighbours_lift_each_other():
     assert far.contacts[0].force == pytest.approx(alone, rel=5e-3)
 
 
+def test_the_skin_has_the_shape_of_a_ball_beside_another_too():
+    pair = press(
+        Contact(Sphere(1.5), at=(-2.0, 0.0), depth=0.6),
+        Contact(Sphere(1.5), at=(2.0, 0.0), depth=0.6),
+    )
+    x = -2.0 + np.linspace(-0.8, 0.8, 31)
+    depth, _, touching = along_x(pair, x)
+    assert touching.all()
+    assert depth == pytest.approx(0.6 - 1.5 + np.sqrt(1.5**2 - (x + 2.0) ** 2), abs=3e-4)
+    # No step at the rim: the skin goes on from the ball without a jump.
+    x = np.linspace(-2.0, 0.0, 4001)
+    depth, _, _ = along_x(pair, x)
+    assert np.abs(np.diff(depth)).max() < 1e-3
+
+
 def test_a_flat_punch_and_a_cylinder_and_a_tilted_plate():
     cylinder = press(Contact(Cylinder(2.0, 6.0), at=(0.0, 0.0), depth=0.4))
     rows, columns = (cylinder.contacts[0].pressure > 0).nonzero()
