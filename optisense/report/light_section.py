@@ -110,8 +110,8 @@ class LightSection:
         }
 
     def ways(self) -> list[dict[str, Any]]:
-        """For the 3-D view: of each place its name and colour, and by light group the segments of
-        the photons that end there, pairs of ends in mm as text.
+        """For the 3-D view: of each place its name and colour, and by light group how many photons
+        end there and the segments of their ways, pairs of ends in mm as text.
         """
         found: dict[str, dict[str, list[Any]]] = {}
         for group, paths in self.paths.items():
@@ -124,6 +124,7 @@ class LightSection:
             {
                 "label": where,
                 "colour": self.colours.get(where, OTHER_COLOUR),
+                "photons": {group: len(pieces) for group, pieces in found[where].items()},
                 "groups": {
                     group: encoded(np.concatenate(pieces), np.float32)
                     for group, pieces in found[where].items()

@@ -63,6 +63,7 @@ def test_ways_are_the_segments_of_all_photons_by_place_and_group(section: LightS
         counted = Counter(path.where if path.where in section.colours else OTHER for path in paths)
         assert {where for where, way in ways.items() if group in way["groups"]} == set(counted)
         for where in counted:
+            assert ways[where]["photons"][group] == counted[where]
             ends = np.frombuffer(base64.b64decode(ways[where]["groups"][group]), "<f4")
             own = [p for p in paths if (p.where if p.where in section.colours else OTHER) == where]
             assert len(ends) == 6 * sum(len(path.points) - 1 for path in own)

@@ -102,14 +102,19 @@ function view3d(root, data) {
   }
 
   // --- what there is to draw -----------------------------------------------------------------
-  const things = data.parts.map((part) => {
+  // Beside ways of photons solids are paler, so that the colours of the ways stay what they are, and
+  // nothing is pressed in.
+  const paleness = withWays ? 0.4 : 1;
+  const parts = data.parts.filter((part) => !withWays || part.role !== "indenter");
+  const things = parts.map((part) => {
     const points = decode(part.points, Float32Array);
     let middle = [0, 0, 0];
     for (let i = 0; i < points.length; i += 3)
       middle = add(middle, [points[i], points[i + 1], points[i + 2]], 3 / points.length);
     return {
       key: "part " + part.name, label: part.name, note: part.role.replace("_", " "),
-      swatch: part.colour, colour: [...rgb(part.colour), part.alpha], middle, shown: true, cut: true,
+      swatch: part.colour, colour: [...rgb(part.colour), paleness * part.alpha], middle, shown: true,
+      cut: true,
       solid: shape(points, decode(part.normals, Int8Array), decode(part.faces, Uint32Array)),
       lines: shape(decode(part.edges, Float32Array)), glow: 0,
     };
@@ -140,9 +145,14 @@ function view3d(root, data) {
       shapes[group] = shape(ends);
       for (const value of ends) every.push(value);
     }
-    const thing = rayThing(way.label, way.colour, 0.9, new Float32Array(every));
+    const thing = rayThing(way.label, way.colour, 1.0, new Float32Array(every));
+    thing.faint = [...rgb(way.colour), 0.6];  // not paled: the colour tells where the photon ends
     const all = thing.lines, none = { vao: all.vao, count: 0 };
-    thing.choose = (group) => { thing.lines = group === "" ? all : shapes[group] || none; };
+    const total = Object.values(way.photons).reduce((sum, each) => sum + each, 0);
+    thing.choose = (group) => {
+      thing.lines = group === "" ? all : shapes[group] || none;
+      thing.noteShown.textContent = ` ${group === "" ? total : way.photons[group] || 0} photons`;
+    };
     return thing;
   }
 
@@ -218,6 +228,7 @@ function view3d(root, data) {
     swatch.style.marginLeft = "5px";
     const note = document.createElement("small");
     note.textContent = " " + thing.note;
+    thing.noteShown = note;
     label.append(box, swatch, thing.label, note);
     legend.append(label);
   }
