@@ -76,5 +76,5 @@ def _print(found: LightLedger) -> None:
     table.add_row("sum", *(f"{100 * found.closing_sum(group):.2f}" for group in groups))
     table.add_row("emitted (mW)", *(f"{found.emitted[group]:.4g}" for group in groups))
     output.print(table)
-    worst = max(entry.noise for entry in found.entries)
+    worst = max((entry.noise for entry in found.entries), default=0.0)
     output.print(f"noise of a line: at most {100 * worst:.2g} %", style="dim")

@@ -120,3 +120,16 @@ def test_the_command_prints_a_table_that_closes_and_writes_json(tmp_path) -> Non
 def test_too_few_photons_are_refused() -> None:
     with pytest.raises(RenderError, match="too few"):
         ledger_of(ots.load("gelsight-mini"), 10)
+
+
+def test_a_design_whose_lights_are_off_has_an_empty_ledger(tmp_path) -> None:  # type: ignore[no-untyped-def]
+    design = ots.load("gelsight-mini")
+    for group in design.lights:
+        design = ots.set_value(design, f"lights.{group}.flux", 0.0)
+    ots.save_design(design, tmp_path / "dark")
+    out = tmp_path / "out"
+    few = ["--photons", "3000", "--out", str(out)]
+    done = CliRunner().invoke(app, ["ledger", str(tmp_path / "dark"), *few])
+    assert done.exit_code == 0, done.output
+    assert json.loads((out / "ledger.json").read_text())["entries"] == []
+    assert "<rect" not in (out / "ledger.html").read_text(encoding="utf-8")
