@@ -28,6 +28,7 @@ from benchmarks.results import measure_parts
 from optisense import OpticalModel, sensors
 from optisense.design import SensorDesign, set_value
 from optisense.geometry import Contact, Sphere
+from optisense.mechanics import CONFORMING
 from optisense.optics import TactileImage
 from optisense.optics.mitsuba_export import mitsuba_scene
 from optisense.optics.scene import assembly
@@ -254,9 +255,11 @@ def measure(case: PatchCase, photons: int = PHOTONS) -> dict[str, Any]:
     """All numbers of a case."""
     model = OpticalModel(case.design())
     contact = case.contact(model)
-    images = [model.render([contact], RESOLUTION, photons, seed=seed) for seed in SEEDS]
+    images = [
+        model.render([contact], RESOLUTION, photons, seed=seed, skin=CONFORMING) for seed in SEEDS
+    ]
     began = time.process_time()
-    model.render([contact], RESOLUTION, photons, seed=SEEDS[-1])
+    model.render([contact], RESOLUTION, photons, seed=SEEDS[-1], skin=CONFORMING)
     kept = time.process_time() - began
     radiance = np.mean([image.radiance for image in images], axis=0, dtype=np.float64)
     patches = Patches.of(images[0])

@@ -6,8 +6,6 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
-from scipy.optimize import brentq
-
 from optisense.design import SensorDesign
 from optisense.design.materials import Dielectric
 from optisense.design.parts import Role
@@ -153,6 +151,8 @@ class Gel:
         def excess(log_depth: float) -> float:
             found = max(force(math.exp(log_depth)), LEAST_FORCE_SHARE * wanted)
             return math.log(found / wanted)
+
+        from scipy.optimize import brentq  # takes a quarter of a second to load
 
         low, high = math.log(LEAST_DEPTH), math.log(limit)
         if excess(low) >= 0.0:

@@ -12,12 +12,14 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.interpolate import CubicSpline
 from scipy.special import j0, j1
+
+if TYPE_CHECKING:
+    from scipy.interpolate import CubicSpline
 
 FloatArray = NDArray[np.float64]
 
@@ -100,6 +102,8 @@ class _Corrections(NamedTuple):
 
 @lru_cache(maxsize=32)
 def _corrections(poisson_ratio: float) -> _Corrections:
+    from scipy.interpolate import CubicSpline  # takes a while to load
+
     nodes, weights = np.polynomial.legendre.leggauss(PANEL_POINTS)
     panel = MAX_WAVE_NUMBER / PANELS
     q = (panel * (np.arange(PANELS)[:, None] + 0.5 * (nodes + 1.0))).ravel()

@@ -95,10 +95,10 @@ def test_beams_that_pass_no_indenter_hide_nothing(
     mini: OpticalModel, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Shadow rays of all beams, and many more of them, show the same shadows."""
-    near = mini.render([BALL], **SIZE)
+    near = mini.render([BALL], **SIZE, skin="conforming")
     monkeypatch.setattr(beams, "READ_DISTANCE", 1000.0)
     monkeypatch.setattr(shading, "SHADOW_RAYS", 500.0)
-    every = mini.render([BALL], **SIZE)
+    every = mini.render([BALL], **SIZE, skin="conforming")
     untouched = mini.render(**SIZE).radiance
     shadowed = ~near.contact_mask & (every.radiance < 0.97 * untouched).any(axis=2)
     assert shadowed.sum() > 200
@@ -113,9 +113,9 @@ def test_beams_that_pass_no_indenter_hide_nothing(
 
 def test_a_ball_does_not_shade_itself(mini: OpticalModel, monkeypatch: pytest.MonkeyPatch) -> None:
     """Rays that look whether it does find that it does not."""
-    taken_for_granted = mini.render([BALL], **SIZE)
+    taken_for_granted = mini.render([BALL], **SIZE, skin="conforming")
     monkeypatch.setattr(Sphere, "convex", False)
-    tested = mini.render([BALL], **SIZE)
+    tested = mini.render([BALL], **SIZE, skin="conforming")
     mask = tested.contact_mask
     one, other = taken_for_granted.radiance[mask], tested.radiance[mask]
     assert one.mean(axis=0) == pytest.approx(other.mean(axis=0), rel=0.002)

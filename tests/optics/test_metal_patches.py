@@ -25,7 +25,7 @@ many photons; without the lobes of the places seen half of the light is missing 
 def test_metal_in_a_contact_is_as_bright_as_path_traced(specularity: float) -> None:
     case = PatchCase("gelsight-mini", specularity)
     model = OpticalModel(case.design(), "llvm")
-    image = model.render([case.contact(model)], RESOLUTION, PHOTONS, seed=1)
+    image = model.render([case.contact(model)], RESOLUTION, PHOTONS, seed=1, skin="conforming")
     patches = Patches.of(image)
     for where, limits in (("contact", CONTACT), ("rim", RIM)):
         truth = np.array(PATH[where][f"{specularity:g}"])
