@@ -65,7 +65,8 @@ def test_a_command_does_not_wait_for_the_others() -> None:
     [
         (["check", "gelsight-mini"], {"drjit", "mitsuba", "scipy.spatial", "jinja2"}),
         (
-            ["render", "gelsight-mini", "--resolution=40x30", "--photons=20000", "--out=here"],
+            # Beside a GelSight Mini's picture the report presses a ball, as a real one was pressed.
+            ["render", "gelbelt", "--resolution=40x30", "--photons=20000", "--out=here"],
             {"scipy.optimize", "scipy.stats", "optisense.objectives", "optisense.report.scores"},
         ),
     ],
