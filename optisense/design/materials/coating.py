@@ -84,11 +84,9 @@ def flake_lobe(specularity: float, scattering: Scattering = "blend") -> tuple[fl
     roughness alpha; the coating's eta and k), and 1 - w that of a diffuse lobe of the coating's
     reflectance, these are the readings that it allows:
 
-    | scattering | w | alpha |
-    |---|---|---|
-    | `blend` | s | max(0.05, 1 - s) |
-    | `blend-fixed-roughness` | s | 0.1 |
-    | `conductor` | 1 | max(0.05, 1 - s) |
+    - `blend`: w = s, alpha = max(0.05, 1 - s)
+    - `blend-fixed-roughness`: w = s, alpha = 0.1
+    - `conductor`: w = 1, alpha = max(0.05, 1 - s)
 
     With `conductor` there is no diffuse lobe, and the reflectance is not used. The weights add up
     to 1, so that no reading reflects more light than arrives; a rough metal reflects less, as GGX
