@@ -41,8 +41,8 @@ def test_a_material_of_the_library_is_put_on_the_gel(bench: Bench) -> None:
 
 
 def test_one_number_is_changed_and_it_is_kept_as_ones_own(bench: Bench) -> None:
-    bench.enter("ior", str(INDEX))
-    bench.until(f"abs(scene().optisense.materials[{GEL}].ior - {INDEX}) < 1e-6")
+    bench.enter("number", str(INDEX))  # the first one: the refractive index
+    bench.until(f"abs(scene().optisense.materials[{GEL}].fields['ior'].number - {INDEX}) < 1e-6")
     x, y = bench.find("optisense.keep_material")
     bench.desktop.click(x, y)
     bench.see("1")
