@@ -57,17 +57,6 @@ class GridResponse:
         """Normal displacement (mm), into the layer, by a pressure (MPa) on each square."""
         return self._back(self._pressure_kernel * self._there(pressure))
 
-    def tangential(self, shear: FloatArray) -> FloatArray:
-        """(2, rows, columns) displacement (mm) along x and y by shear (MPa) along x and y."""
-        x, y = self._there(shear[0]), self._there(shear[1])
-        kernels = self._kernels
-        return np.stack(
-            [
-                self._back(kernels.xx * x + kernels.xy * y),
-                self._back(kernels.xy * x + kernels.yy * y),
-            ]
-        )
-
     def displacement(self, pressure: FloatArray, shear: FloatArray | None = None) -> FloatArray:
         """(3, rows, columns) displacement (mm) along x, y and into the layer."""
         p = self._there(pressure)

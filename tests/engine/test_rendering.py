@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from comparing import same_light
+from comparing import TURNED_BESIDE_CONTACT, same_light
 
 from optisense import sensors
 from optisense.optics import OpticalModel
@@ -65,7 +65,7 @@ def test_relighting_equals_rendering_anew(engine: Any, first: dict[str, Any]) ->
     design = {"from": "gelsight-mini", "set": values}
     again = engine.ask("simulate", design=design, files=["radiance"], **SMALL)
     one, other = load(relit["files"]["radiance"]), load(again["files"]["radiance"])
-    assert same_light(one, other)
+    assert same_light(one, other, TURNED_BESIDE_CONTACT)
     assert relit["exposure"] == first["exposure"]
     assert engine.refused("relight", image="first", lights={"rde": {}})["hint"]
     assert engine.refused("relight", image="never")["where"] == "image"
@@ -96,7 +96,7 @@ def test_a_moved_light_changes_the_picture(engine: Any, first: dict[str, Any]) -
 def test_the_same_request_gives_the_same_image(engine: Any, first: dict[str, Any]) -> None:
     again = engine.ask("simulate", design="gelsight-mini", files=["radiance"], **SMALL)
     one, other = (load(each["files"]["radiance"]) for each in (first, again))
-    assert same_light(one, other)
+    assert same_light(one, other, TURNED_BESIDE_CONTACT)
 
 
 def test_a_long_render_tells_how_far_it_is_and_is_cancelled(engine: Any) -> None:
