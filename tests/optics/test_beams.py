@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from comparing import TURNED_BESIDE_CONTACT, same_light
 
-from optisense import OpticalModel
+from optisense import Contact, OpticalModel, Sphere
 from optisense.optics.radiance_cache import beams
+from optisense.optics.transport.photon_map import GROUP_MASK
 from optisense.sensors import build
 
 MEAN = 0.001
@@ -45,7 +47,7 @@ def test_no_light_is_lost_in_merging() -> None:
     ways = np.asarray(field.beams.ways).reshape(-1, 4)
     fluxes = np.asarray(field.beams.fluxes).reshape(-1, 4)
     entry = np.repeat(np.arange(len(starts) - 1), np.diff(starts))
-    groups = np.ascontiguousarray(fluxes[:, 3]).view(np.uint32)
+    groups = np.ascontiguousarray(fluxes[:, 3]).view(np.uint32) & GROUP_MASK
     np.testing.assert_array_equal(groups, entry % field.groups)
     flux = np.bincount(entry, fluxes[:, 0], len(starts) - 1)
     np.testing.assert_allclose(flux, moments[..., 3].sum(axis=1).ravel(), rtol=1e-4)
@@ -54,6 +56,20 @@ def test_no_light_is_lost_in_merging() -> None:
         np.testing.assert_allclose(
             vector, moments[..., k].sum(axis=1).ravel(), rtol=1e-3, atol=1e-4 * flux.max()
         )
+
+
+def test_one_more_beam_leaves_the_shadow_rays_of_the_others_as_they_are(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Rounding decides of some beams whether they pass near an indenter."""
+    model = OpticalModel(build("gelsight-mini"), "llvm")
+    beside = Contact(Sphere(radius=1.5), at=(0.0, 0.0), depth=0.8)
+    images = []
+    for reach in (beams.READ_DISTANCE, beams.READ_DISTANCE + 1e-3):
+        monkeypatch.setattr(beams, "READ_DISTANCE", reach)
+        images.append(model.render([beside], resolution=(80, 60), photons=200_000).layers)
+    for group, layer in images[0].items():
+        assert same_light(images[1][group], layer, TURNED_BESIDE_CONTACT)
 
 
 def field_of(model: OpticalModel):  # type: ignore[no-untyped-def]

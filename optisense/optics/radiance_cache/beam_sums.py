@@ -15,6 +15,7 @@ from optisense.optics.radiance_cache.beams import Beams
 from optisense.optics.radiance_cache.irradiance import vector
 from optisense.optics.radiance_cache.shading_points import ShadingPoints
 from optisense.optics.scene.bsdf import albedo_of, evaluate_coating, grey
+from optisense.optics.transport.photon_map import GROUP_MASK
 
 MIN_STEP = 1e-20
 """Lower bound on the step of the systematic sampling; it avoids a division by zero without
@@ -32,7 +33,8 @@ def sum_beams(
     j = dr.gather(mi.UInt32, beams.starts, at.cell * groups, at.active)
     end = dr.gather(mi.UInt32, beams.starts, (at.cell + 1) * groups, at.active)
     while j < end:
-        towards, cosine, flux, group = beam_at(beams, j)
+        towards, cosine, flux, tag = beam_at(beams, j)
+        group = tag & GROUP_MASK
         reflected = flux * evaluate_coating(
             broadened_coating(at.coating, cosine), at.seen.normal, towards, at.seen.towards_eye
         )
@@ -81,7 +83,8 @@ def sum_hidden(
     j = dr.gather(mi.UInt32, beams.starts, at.cell * groups, at.active)
     end = dr.gather(mi.UInt32, beams.starts, (at.cell + 1) * groups, at.active)
     while j < end:
-        towards, cosine, flux, group = beam_at(beams, j)
+        towards, cosine, flux, tag = beam_at(beams, j)
+        group = tag & GROUP_MASK
         reflected = flux * evaluate_coating(
             broadened_coating(at.coating, cosine), at.seen.normal, towards, at.seen.towards_eye
         )
@@ -93,8 +96,8 @@ def sum_hidden(
         running += share
         times = dr.floor(running) - before
         weight = dr.rcp(dr.select(share < 1, share, times))
-        # A beam's own bits: a ray that rounding adds or drops leaves the others as they are.
-        state = random + j * GOLDEN_BITS
+        # A beam's own bits: a beam that rounding adds or drops leaves the others' rays as they are.
+        state = random + tag * GOLDEN_BITS
         while times > 0:
             state = next_random(state)
             blocked = indenters.ray_test(
@@ -111,7 +114,9 @@ def sum_hidden(
 
 
 def beam_at(beams: Beams, number: mi.UInt32) -> tuple[mi.Vector3f, mi.Float, mi.Color3f, mi.UInt32]:
-    """Direction towards the light, mean cosine, flux density and light group of beams."""
+    """Direction towards the light, mean cosine and flux density of beams, and the bits of their
+    light group and number.
+    """
     way = dr.gather(mi.Vector4f, beams.ways, number)
     flux = dr.gather(mi.Vector4f, beams.fluxes, number)
     towards = mi.Vector3f(way.x, way.y, way.z)

@@ -26,6 +26,9 @@ SPARSE_SHARE = 0.003
 """Share of a group's light in a cell below which a beam may be that of a single photon, whose
 spread nothing tells. Where bins are fine, such beams are at least as wide as 16 bins:
 a photon near the mirror direction of a narrow lobe would be a bright blotch else."""
+NUMBER_SHIFT = 8
+"""The bits of a beam's light group, of which there are at most 256; those above are the beam's
+number."""
 NO_SLOT = 0xFFFFFFFF
 """Marks a direction bin that the cache does not hold."""
 READ_DISTANCE = 1.5
@@ -40,8 +43,9 @@ class Beams:
         starts: index of the first beam of each cell and group, and the total number at the end.
         ways: four floats per beam: the unit direction towards the light, and the mean cosine with
         it.
-        fluxes: four floats per beam: the flux density across it (mW/mm^2) in R, G, B, and the light
-            group as bits.
+        fluxes: four floats per beam: the flux density across it (mW/mm^2) in R, G, B, and as bits
+            the light group and the beam's number (see `NUMBER_SHIFT`). The number follows from the
+            direction bins of the beam alone, not from how many other beams there are.
     """
 
     starts: mi.UInt32
@@ -74,8 +78,9 @@ def collect_beams(
     corner = (block // (sectors // 2)) * 2 * sectors + (block % (sectors // 2)) * 2
     four = slots[corner[:, None] + np.array([0, 1, sectors, sectors + 1])]
     # Blocks without any light are not looked at.
-    four = four[(four != NO_SLOT).any(axis=1)]
-    field = (moments, colours, indices(four))
+    lit = (four != NO_SLOT).any(axis=1)
+    four = four[lit]
+    field = (moments, colours, indices(four), indices(block[lit]))
     sizes = (dr.opaque(mi.UInt32, len(four)), dr.opaque(mi.UInt32, len(used)))
     nowhere = dr.zeros(mi.Float, 4)
     lane = dr.arange(mi.UInt32, entries)
@@ -114,6 +119,7 @@ def _collect(
     moments: mi.Float,
     colours: mi.Float,
     four: mi.UInt32,
+    names: mi.UInt32,
     blocks: mi.UInt32,
     used: mi.UInt32,
     groups: int,
@@ -128,7 +134,8 @@ def _collect(
 ) -> mi.UInt32:
     """Count the beams of each lane's cell and group, or write them from ``first`` on.
 
-    ``sparse_cosine`` is the largest mean cosine of a beam of little light.
+    ``names`` are the numbers of the blocks of four bins; ``sparse_cosine`` is the largest mean
+    cosine of a beam of little light.
     """
     cell, group = lane // groups, lane % groups
     slot = mi.UInt32(first)
@@ -166,7 +173,8 @@ def _collect(
                 cosine = dr.select(sparse, dr.minimum(cosine, sparse_cosine), cosine)
                 way = mi.Vector4f(value.x * scale, value.y * scale, value.z * scale, cosine)
                 dr.scatter(ways, way, slot, chosen[i])
-                tag = dr.reinterpret_array(mi.Float, mi.UInt32(group))
+                number = dr.gather(mi.UInt32, names, k) * 5 + i
+                tag = dr.reinterpret_array(mi.Float, group | (number << NUMBER_SHIFT))
                 flux = mi.Vector4f(inks[i].x, inks[i].y, inks[i].z, tag)
                 dr.scatter(fluxes, flux, slot, chosen[i])
             slot += dr.select(chosen[i], mi.UInt32(1), mi.UInt32(0))

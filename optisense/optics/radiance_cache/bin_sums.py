@@ -115,9 +115,12 @@ def sum_bins(
                 running[g] += dr.select(doubtful, share, 0)
                 times = dr.floor(running[g]) - before
                 if times > 0:
-                    # A bin's own bits: a ray that rounding adds or drops leaves the others as
-                    # they are.
-                    state = next_random(points.random + (k * groups + g) * GOLDEN_BITS)
+                    # A bin's own bits: a ray or a bin that rounding adds or drops leaves the
+                    # others as they are.
+                    number = dr.reinterpret_array(
+                        mi.UInt32, dr.gather(mi.Float, light.centres, k * 4 + 3)
+                    )
+                    state = next_random(points.random + (number * groups + g) * GOLDEN_BITS)
                     way = mirrored_above(sample_direction(beam, state), points.face_normal)
                     blocked = indenters.ray_test(
                         mi.Ray3f(at.start, way),

@@ -67,7 +67,7 @@ class RadianceCache:
             the same array as ``moments``.
         coloured: whether surfaces are coloured.
         metallic: whether a coating has a metallic lobe.
-        centres: the middle direction of each bin, four floats each.
+        centres: the middle direction of each bin, and its number as bits; four floats each.
         irradiance: the table of `irradiance.irradiance_table`.
         beams: the same light in short lists of beams.
         photons: emitted photons.

@@ -113,11 +113,12 @@ def dither(
 
 
 def bin_centres(cells: SurfaceCells, bins: DirectionBins, chosen: NDArray[np.integer]) -> mi.Float:
-    """The middle direction of each of the chosen bins, four floats each."""
+    """The middle direction of each of the chosen bins, and its number as bits; four floats each."""
     z = (chosen // bins.across + 0.5) * (2 / bins.across) - 1
     turn = (chosen % bins.across + 0.5) * (2 * np.pi / bins.across)
     flat = np.sqrt(1 - z * z)
     local = np.stack([flat * np.cos(turn), flat * np.sin(turn), z], axis=1)
     out = np.zeros((len(chosen), 4), dtype=np.float32)
     out[:, :3] = local @ cells.axes
+    out[:, 3] = chosen.astype(np.uint32).view(np.float32)
     return mi.Float(out.ravel())
