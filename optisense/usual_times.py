@@ -12,10 +12,10 @@ import time
 from dataclasses import dataclass
 
 LOADING = 1.0
-"""Seconds to load the program and a design."""
+"""Seconds that loading the program and a design takes."""
 
 BUILDING = 0.3
-"""Seconds to build the scene of a design."""
+"""Seconds that building the scene of a design takes."""
 
 PREPARING = 0.15
 """Processor seconds to place contacts and trace chief rays for the first image, compiling too."""
@@ -24,7 +24,7 @@ PILOT = 0.25
 """Processor seconds to trace the pilot photons, compiling too."""
 
 MILLION_PHOTONS = 0.62
-"""Processor seconds to trace so many."""
+"""Processor seconds that tracing a million photons takes, compiled already."""
 
 SMOOTHING = 0.25
 """Processor seconds to smooth the radiance cache."""
@@ -36,10 +36,10 @@ PICTURE, PICTURE_PIXELS = 0.2, 0.15
 """Processor seconds to shade a picture: in any case, and for each `USUAL_PIXELS`."""
 
 USUAL_PIXELS = 320 * 240
-"""Pixels for which times are stated."""
+"""Number of pixels of an image for which times are stated."""
 
 USUAL_AREA = 524.0
-"""mm2 of the sensing surface of GelSight Mini."""
+"""Area in mm2 of the sensing surface of GelSight Mini, for which times are stated."""
 
 LARGEST_FACTOR = 3.0
 """Larger surfaces take longer to light, up to so much: GelSight Svelte (1,478 mm2), GelSight360

@@ -108,7 +108,7 @@ def experiment(
 
 
 MOST_WORKERS = 8
-"""Unless the user says otherwise: each takes two gigabytes."""
+"""Largest number of workers unless the user says otherwise, as each takes two gigabytes."""
 
 
 @contextmanager

@@ -27,6 +27,7 @@ if TYPE_CHECKING:
 
 RESULT, PICTURE, TEXT = "result.json", "picture.png", "text.md"
 DOTS_PER_INCH = 80
+"""Resolution of the experiments' figures, which keeps each below 100 kB."""
 
 Values = dict[str, Any]
 Pictures = dict[str, NDArray[np.uint8]]

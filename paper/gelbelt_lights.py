@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 SENSOR = "gelbelt"
 DESIGNS = ("1", "2", "3")
 MOST_SPECULAR = 0.3
-"""The paper: less than this is best."""
+"""Specularity below which the paper finds the best coating."""
 
 DARK = 0.1
 """A light design that brings less than this share of the best one's light to the belt fails."""

@@ -30,10 +30,10 @@ if TYPE_CHECKING:
 
 SENSOR = "gelsight360"
 ANY_JUMP = 1e9
-"""Of 2to3PW: no triangle is left out."""
+"""Largest jump between neighbouring rays for 2to3PW, so large that no triangle is left out."""
 
 FINER = 6
-"""Rows more in each grid of chief rays."""
+"""Number of rows by which each grid of chief rays is finer than the one before."""
 
 GROUPS = [f"lg{number}" for number in range(1, 9)]
 

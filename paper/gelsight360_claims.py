@@ -17,7 +17,10 @@ PAPER = {
 """The paper's table, the original first."""
 
 PAPERS_TIP, PAPERS_TIP_SCORE = 6, 0.071
+"""The tip, of 0 (flat) to 10 (conical), that the paper finds best, and its 2to3PW."""
 PAPERS_RESIN, PAPERS_RESIN_SCORE = 4, -8.81
+"""The resin, of 0 (even shell) to 10 (almost flat inside), that the paper finds best, and its
+score by NormDiff."""
 
 LITTLE_NOISE = "noise of 3 %"
 """A way to look at NormDiff, nearer to what a camera has."""

@@ -26,7 +26,7 @@ FIRST, BEST = 0.236, 0.635
 """AOAP in the paper, before and after."""
 
 NEAR = 0.05
-"""AOAP values that differ by less count as alike."""
+"""Difference of AOAP values below which they count as alike."""
 
 LESS = 0.8
 """Distortion counts as reduced where what it adds to a round shape falls to this share."""

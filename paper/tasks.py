@@ -26,7 +26,7 @@ SHINY = 0.6
 """Coatings from this specularity on are compared with those below."""
 
 PAPERS_ERROR = 0.5
-"""Degrees: the paper's smallest error of the angle."""
+"""The paper's smallest mean absolute error of the angle, in degrees."""
 
 FOLLOWS = 0.5
 """A mean rank correlation from here on counts as the same trend."""

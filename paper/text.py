@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from paper.experiment import Experiment
 
 MOST_GAPS = 6
-"""Gaps that are told one by one."""
+"""Number of gaps that the text tells one by one; the rest is counted."""
 
 
 def chapter(experiment: Experiment, result: Mapping[str, Any], picture: str) -> str:

@@ -27,8 +27,11 @@ if TYPE_CHECKING:
     from rich.table import Table
 
 EXIT_FAILURE = 1
+"""Exit code of a command that could not do its work although its input was right."""
 EXIT_BAD_INPUT = 2
+"""Exit code of a command whose input is wrong, as shells and Click use it for wrong usage."""
 EXIT_INTERRUPTED = 130
+"""Exit code after Ctrl-C: 128 and the number of SIGINT, as shells count."""
 
 
 class PlainConsole(Console):

@@ -16,6 +16,8 @@ if TYPE_CHECKING:
 
 KINDS = ("material", "coating", "light", "camera")
 PIPED_WIDTH = 240
+"""Characters in a line of a table that is piped to another program. No cell of the library's tables
+is wrapped at this width, so that every entry stays on one line."""
 
 KindOption = Annotated[
     str | None,

@@ -20,7 +20,8 @@ LOG_EVERY = 30.0
 """Least seconds between lines where standard error is no terminal."""
 
 REFRESHES = 4
-"""A second, of the live line."""
+"""Times per second that the live progress line is drawn again; more would not be seen and takes
+processor time."""
 
 MOST_BAR, LEAST_BAR = 30, 8
 """Columns of the bar; it is left out where less than the least would remain."""

@@ -129,7 +129,7 @@ NOISE_PHOTONS = 4_000_000
 """Photons that a noise target is expected to take, before the noise is known."""
 
 WRITING_TIME = 0.8
-"""Seconds to write the files and the report."""
+"""Seconds that writing the files and the report takes, measured on GelSight Mini at 320x240."""
 
 
 def _steps(

@@ -20,7 +20,7 @@ from typing import NoReturn
 from optisense.cli.console import EXIT_INTERRUPTED, messages
 
 EXIT_TERMINATED = 143
-"""128 and the number of SIGTERM, as shells count."""
+"""Exit code after SIGTERM: 128 and the number of the signal, as shells count."""
 
 SILENCE = 1.0
 """Seconds after Ctrl-C in which a command may end without having to say what it waits for."""

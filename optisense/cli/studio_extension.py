@@ -17,7 +17,7 @@ from optisense.writing import written_whole
 
 MANIFEST = "blender_manifest.toml"
 OLDEST = (4, 2)
-"""Extensions came with Blender 4.2."""
+"""The oldest version of Blender that the studio runs in: the first one that has extensions."""
 
 NOT_THERE = "should have been installed but not found"
 """What Blender says when it has installed nothing after all."""

@@ -60,7 +60,7 @@ LIBRARIES_TIME = 1.0
 """Seconds that the libraries of the tasks take to load."""
 
 USUAL_OBJECTS = 3
-"""Unseen objects of a reconstruction where none is named."""
+"""Number of unseen objects that a reconstruction task presses where none is named."""
 
 READING_TIME, FITTING_TIME = 1.0, 3.0
 """Seconds that usually follow the samples of the tasks, and the pictures of a reconstruction."""

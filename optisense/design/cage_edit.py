@@ -26,6 +26,8 @@ THINNEST = 0.5
 """mm: a box over a flat part is made at least this thick."""
 
 SAME_SHARE = 1e-9
+"""Length of a box along an axis, relative to its largest length, below which it counts as flat
+along this axis; a margin for rounding."""
 
 
 def add_cage(

@@ -32,6 +32,8 @@ PROBE = 0.05
 """mm: how far beside the sensing surface its medium is looked up."""
 
 PROBES = 64
+"""Number of faces, spread over the sensing surface, beside which its medium is looked up; all faces
+of a sound surface have the same one."""
 
 
 def check_design(

@@ -17,7 +17,11 @@ from optisense.errors import LibraryError
 FloatArray = NDArray[np.float64]
 
 MAX_VALUES = 4_000_000
+"""Largest number of candela values of one IES file. A table of one value per quarter degree over
+the sphere has a million."""
 MAX_FILE_BYTES = 64 * 1024 * 1024
+"""Largest size of an IES file in bytes. Published files have some 10 kB; the bound keeps a wrong
+file from being read into memory."""
 
 
 @dataclass(frozen=True)

@@ -15,6 +15,8 @@ from optisense.errors import DesignError
 from optisense.near import near_match, suggestion
 
 MAX_SHOWN = 8
+"""Number of problems that one message lists; the rest is counted, so that a message fits a
+terminal."""
 
 Path = tuple[str | int, ...]
 Lines = dict[Path, int]

@@ -17,7 +17,8 @@ FOLD_PLACES = 13
 borders and the corners, where lenses fold first, are among them."""
 
 FOLD_STEPS = 24
-"""Steps from the axis to each of these places."""
+"""Number of steps from the optical axis to each of the places at which a lens is tried for
+folding."""
 
 UNDISTORTED_TO = 1e-9
 """Distance on the image plane to which a place that a lens shows is found again; a lens that folds

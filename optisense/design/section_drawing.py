@@ -22,8 +22,9 @@ WIDTH, LABELS, MARGIN, LINE = 440.0, 190.0, 24.0, 17.0
 """Pixels: of the drawing and the labels beside it, around both, and between labels."""
 
 TALLEST = 520.0
+"""Largest height of the drawing in pixels, so that it fits a screen below the page's heading."""
 DOT = 3.2
-"""Pixels, radius of a light."""
+"""Radius in pixels of the dot that stands for a light."""
 
 INK = "#1c232b"
 RAY, LOST_RAY = "#7a3fb8", "#8d97a3"

@@ -24,6 +24,8 @@ from optisense.near import suggestion
 from optisense.text import to_html
 
 SCHEMA_VERSION = 1
+"""Version of the design file's format; it is raised when a file of an older version has to be
+converted."""
 
 MATERIAL_REQUIRED = frozenset({Role.ELASTOMER, Role.SUPPORT, Role.INTERFACE, Role.MIRROR})
 

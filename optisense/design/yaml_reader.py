@@ -16,7 +16,11 @@ import yaml
 from optisense.errors import DesignError, OptiSenseError
 
 MAX_BYTES = 32 * 1024 * 1024
+"""Largest size of a YAML file in bytes; the bound keeps a wrong file from being read into
+memory."""
 MAX_DEPTH = 50
+"""Largest depth of nested lists and mappings in a YAML file; a deeper file would exhaust Python's
+stack."""
 
 _LOADER: Any = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 _INTEGER = re.compile(r"[-+]?\d{1,300}$")

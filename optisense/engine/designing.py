@@ -34,7 +34,8 @@ from optisense.near import suggestion
 from optisense.sensors.registry import SENSORS
 
 SAME_PLACE = 1e-6
-"""mm: rounding in a cage at rest."""
+"""Distance in mm within which a cage's point counts as being in its place at rest; a margin for
+rounding."""
 
 Resolution = tuple[int, int, int]
 Place = tuple[float, float, float]

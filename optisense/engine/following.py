@@ -22,7 +22,7 @@ LOOK_EVERY = 0.25
 """Seconds between looks at the study; longer where a look itself takes long."""
 
 LOOKING_SHARE = 0.05
-"""Of the time at most."""
+"""Largest share of the time that looking at a study may take; longer looks are made less often."""
 
 MOST_AT_ONCE = 20
 """Trials told one by one in a look; of more, only the best one and the last."""

@@ -13,7 +13,7 @@ from optisense.engine.failures import Cancelled
 from optisense.engine.protocol import RequestId
 
 EVENTS_EVERY = 0.1
-"""Seconds between two progress events of a request."""
+"""Seconds between two progress events of a request; a person does not follow more."""
 
 LONGEST_WAIT = 3.0
 """Seconds that a render waits for short work at each of its safe points."""

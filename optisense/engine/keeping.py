@@ -19,7 +19,7 @@ from optisense.library.own_parts import write_own
 from optisense.library.reading import files_of, make_entry
 
 BALL_PIXELS = 160
-"""Width and height of a ball alone."""
+"""Width and height in pixels of the picture of a single ball."""
 
 
 class OfKind(Fields):

@@ -19,11 +19,13 @@ from optisense.design.problems import design_error
 from optisense.engine.failures import ProtocolError
 
 PROTOCOL = 1
+"""Version of the protocol; see the module's description for when it is raised."""
 
 MOST_OF_A_LINE = 64 * 1024 * 1024
 """Bytes of a request; one that is longer is a mistake and not read into memory."""
 
 LONGEST_ID = 64
+"""Largest number of characters of a request's id. Every answer repeats the id; a UUID has 36."""
 
 RequestId = int | str
 

@@ -33,6 +33,7 @@ if TYPE_CHECKING:
     from optisense.optics import RenderProgress, TactileImage
 
 DRAFT_WIDTH = 160
+"""Width in pixels of a draft, which has a quarter of the pixels of a usual image."""
 
 MOST_PIXELS = 20_000_000
 """Of an image; more is a slip, and would take all memory."""

@@ -22,6 +22,8 @@ LOG_FILE = "search.log"
 """What the process says besides its result; for finding out why it died."""
 
 LAST_WORDS = 2000
+"""Number of bytes at the end of the process's output that are told when it died; a Python error
+with its cause fits."""
 
 
 class SearchProcess:

@@ -23,7 +23,10 @@ if TYPE_CHECKING:
     from optisense.report.camera_rays import CameraRays
 
 MOST_IMAGES = 6
+"""Number of images that are kept for one design, to compare with and to relight; one of 640x480
+with three light groups takes some 30 MB."""
 DRAFTS = 1
+"""Number of drafts that are kept for one design; only the last one is shown."""
 
 
 @dataclass(frozen=True)

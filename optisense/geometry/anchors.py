@@ -11,12 +11,12 @@ from scipy.spatial import cKDTree
 from optisense.geometry.mesh import FloatArray, TriangleMesh
 
 _SAME = 1e-9
-"""mm: a vertex."""
+"""Distance in mm within which a point is the vertex itself; a margin for rounding."""
 _NEAREST, _LARGEST = 64, 256
 """Faces that are looked at for each point: those with the nearest middles, and the largest of all,
 whose middles may be far from points on them."""
 _SLACK = 1e-4
-"""Weight of a corner that may be missing: rounding."""
+"""Barycentric weight below which a corner of a face may be left out; a margin for rounding."""
 
 
 @dataclass(frozen=True)

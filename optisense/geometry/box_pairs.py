@@ -16,7 +16,7 @@ _FEW = 64
 """A level of so few boxes has no next one."""
 
 _AT_ONCE = 100_000
-"""Pairs that are looked into together, to bound memory."""
+"""Number of pairs of boxes that are looked into together, which bounds the memory of the arrays."""
 
 _DENSE = 1_000_000
 """Up to so many pairs are compared one by one at once; to group them takes longer."""

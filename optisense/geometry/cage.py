@@ -35,6 +35,8 @@ KEPT_WEIGHTS = 32_000_000
 """So many weights are kept in all (256 MB); the ones not used for longest go first."""
 
 _VALUES_AT_ONCE = 4_000_000
+"""Number of products of basis functions that are made together, which bounds the memory of the
+arrays to 32 MB."""
 
 _digests: weakref.WeakKeyDictionary[TriangleMesh, bytes] = weakref.WeakKeyDictionary()
 _kept: OrderedDict[tuple[bytes, bytes, Resolution], FloatArray] = OrderedDict()

@@ -12,7 +12,7 @@ from optisense.geometry.cage import FloatArray, Resolution, cage_weights, deform
 from optisense.geometry.mesh import TriangleMesh
 
 LOOKED_AT = 64
-"""The longest edges of a mesh, which deviate most."""
+"""Number of edges whose deviation is measured: the longest ones of a mesh, which deviate most."""
 
 _longest: weakref.WeakKeyDictionary[TriangleMesh, NDArray[np.int32]] = weakref.WeakKeyDictionary()
 

@@ -21,8 +21,11 @@ from optisense.geometry.mesh import FloatArray, TriangleMesh
 PARALLEL = float(np.cos(np.radians(10.0)))
 """Faces of two tessellations of one curved surface differ by a few degrees at most."""
 
-_GRID = 1e-7  # mm: rounding of cut polygons, so that neighbouring cuts close
-_THINNEST = 1e-4  # mm: leftovers thinner than this are rounding, not shape
+_GRID = 1e-7
+"""Grid in mm to which cut polygons are rounded, so that neighbouring cuts close; far below any
+dimension of a part."""
+_THINNEST = 1e-4
+"""Thickness in mm below which what is left over of a face is rounding and not shape."""
 
 Pairs = NDArray[np.int64]
 

@@ -13,7 +13,7 @@ from optisense.geometry.mesh import TriangleMesh
 SAME_DIRECTION = 1e-10
 """Faces whose normals' cosine differs by less from 1 may be coplanar."""
 SAME_PLANE = 1e-6
-"""Planes closer than this (mm) are one."""
+"""Distance in mm below which two parallel planes are one; a margin for rounding."""
 STRAIGHT = 1e-6
 """A corner whose sides' directions differ by less (sine) is no corner."""
 

@@ -14,6 +14,7 @@ TOUCH = 1e-4
 """mm: faces that reach through one another by less only touch."""
 
 _PAIRS_AT_ONCE = 500_000
+"""Number of pairs of faces that are intersected together, which bounds the memory of the arrays."""
 
 
 class Crossings(NamedTuple):

@@ -18,10 +18,12 @@ from optisense.geometry.mesh import FloatArray, TriangleMesh
 from optisense.geometry.patches import Faces, mean_normal, middle, patches, smoothly_joined
 
 EXACT = 0.001
-"""mm: faces nearer than this touch already."""
+"""Distance in mm below which two faces touch already and nothing is moved; the gaps that CAD
+programs leave by intent are wider."""
 
 FLAT = 0.05
-"""Degrees: neighbouring faces of a flat patch bend less."""
+"""Angle in degrees by which neighbouring faces of a flat patch may bend, which leaves room for the
+rounding of mesh files."""
 
 IN_PLANE = 0.001
 """mm: vertices of a flat patch lie in its plane to this."""

@@ -24,6 +24,8 @@ CREASE = 40.0
 _BOX_SIDES = (  # (axis across the side, the two axes in it, which end of the axis)
     (2, 0, 1, 1), (2, 1, 0, 0), (0, 1, 2, 1), (0, 2, 1, 0), (1, 2, 0, 1), (1, 0, 2, 0),
 )  # fmt: skip
+"""The six sides of a box: the axis across the side, the two axes in it, and at which end of the
+axis it lies."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,7 +10,10 @@ from optisense.errors import ContactError
 FloatArray = NDArray[np.float64]
 
 _ROUNDS = 200
-_STILL = 1e-4  # of the size of the surface: the places no longer move
+"""Largest number of rounds of the clustering, which usually comes to rest much sooner."""
+_STILL = 1e-4
+"""Movement of the places in one round, relative to the size of the surface, below which they count
+as being at rest."""
 
 
 def nine_places(points: ArrayLike, weights: ArrayLike | None = None) -> NDArray[np.int64]:

@@ -10,6 +10,8 @@ from numpy.typing import ArrayLike, NDArray
 from optisense.geometry.mesh import TriangleMesh
 
 _PAIRS_AT_ONCE = 2_000_000
+"""Number of pairs of ray and face that are tested together, which bounds the memory of the
+arrays."""
 
 
 class RayHits(NamedTuple):

@@ -13,7 +13,9 @@ from optisense.geometry.mesh import TriangleMesh
 
 FloatArray = NDArray[np.float64]
 
-_ARRIVED = 1e-9  # mm
+_ARRIVED = 1e-9
+"""Distance in mm left to go below which a walk over the surface has arrived; a margin for
+rounding."""
 
 
 class SurfacePoint(NamedTuple):

@@ -27,7 +27,8 @@ COARSE_POINTS = 20
 """Points of the coarse grid for one thickness; it shows bulges, which are as wide as the gel is
 thick."""
 MAX_COARSE = 400
-"""Most points of the coarse grid along a side."""
+"""Largest number of points of the coarse grid along a side, which bounds the time of its
+transform."""
 SETTLED = 1e-4
 """Change of the displacements that contacts cause each other (mm) at which they are settled."""
 MAX_SWEEPS = 8

@@ -44,10 +44,12 @@ CELL = 3.0
 """Degrees between neighbouring normals at which the confusion is looked up."""
 
 RING = 10_000
-"""More normals than a ring has, to number them."""
+"""Factor by which the number of a ring of normals counts in the number of a normal; no ring holds
+as many."""
 
 LEAST_PIXELS = 50
-"""Indented pixels of a press."""
+"""Number of indented pixels below which a press has no score: fewer tell normals apart by
+chance."""
 
 MOST_WEIGHT = 100.0
 """Largest weight of a range in the sum; at this weight the other range hardly counts."""

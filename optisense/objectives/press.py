@@ -20,7 +20,7 @@ MOST_CLIPPED = 0.25
 """A press with a larger part of its pixels overexposed can't be judged."""
 
 CLIPPED = 254.5 / 255
-"""A channel from here on is stored as 255."""
+"""Value from which on a channel is stored as 255 of 255 levels and counts as saturated."""
 
 DARK = 1.5 / 255
 """A pixel whose brightest channel is no brighter is black."""

@@ -20,7 +20,8 @@ if TYPE_CHECKING:
     from optisense.objectives.evaluation import Evaluation
 
 DIRECTIONS = 8
-"""Cardinal and ordinal (the paper)."""
+"""Number of lines through the middle of a ball: the OptiSense paper takes the cardinal and ordinal
+directions."""
 
 COLOURS = "picture"
 """What a robot reads."""

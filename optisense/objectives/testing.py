@@ -26,7 +26,10 @@ if TYPE_CHECKING:
     from optisense.optics import OpticalModel
 
 PIXELS = (160, 120)
+"""Resolution of the images that the contract tests score, which keeps a test of an objective to a
+few seconds."""
 PHOTONS = 300_000
+"""Number of photons of these images, for the same reason."""
 
 
 @cache

@@ -12,14 +12,14 @@ from optisense.quality import SCORE_PHOTONS, photons_of
 from optisense.usual_times import LOADING, UsualTimes
 
 USUAL_PLACES = 9
-"""Presses where the settings name no places."""
+"""Number of presses of a score whose settings name no places, as the OptiSense paper has it."""
 
 IMAGE, IMAGE_PIXELS = 0.1, 0.14
 """Processor seconds of a press, or of the untouched sensor: in any case, and for each 640 x 480
 pixels. Less than a whole picture's, because only contacts are lit."""
 
 LARGE_IMAGE = 640 * 480
-"""Pixels for which `IMAGE_PIXELS` is stated."""
+"""Number of pixels of an image for which `IMAGE_PIXELS` is stated."""
 
 JUDGING = {"rgb2normal": 0.15, "normdiff": 0.22, "aoap": 0.02, "2to3pw": 0.015}
 """Processor seconds of the built-in objectives beside rendering."""

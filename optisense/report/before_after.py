@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from optisense.optics import OpticalModel
 
 ACROSS = 320
-"""Pixels across a picture."""
+"""Width in pixels of each of the two pictures that are compared."""
 
 STRETCHED = 90.0
 """Percentile of the pixels' stretching that stands for the worst tenth."""

@@ -27,7 +27,7 @@ PICTURE = "gelsight-mini-ball.png"
 """A picture of a real GelSight Mini, 320 x 240; `real/NOTICE.md` says where it is from."""
 
 BALL_RADIUS = 4.75
-"""mm, of the ball in the picture (its publishers)."""
+"""Radius in mm of the ball in the picture, as its publishers state it."""
 
 BALL_PLACE = 261.8, 147.5
 """Column and row of the ball's middle in the picture, found in it to about 2.5 pixels."""

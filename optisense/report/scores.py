@@ -21,6 +21,7 @@ from optisense.report.files import page
 from optisense.writing import write_text
 
 DOTS_PER_INCH = 110
+"""Resolution of figures, at which they are as wide as the page's text on a usual screen."""
 
 Table = tuple[list[str], list[list[str]]]
 """Column heads and rows."""

@@ -25,11 +25,13 @@ MOST_PANELS = 12
 """Parameters that are drawn: those that go most with the score."""
 
 COLUMNS = 4
+"""Number of panels beside one another in a figure; their labels stay readable at the page's
+width."""
 MOST_NUMBERED = 8
 """Trials of a front that have their number beside them."""
 
 LONGEST = 34
-"""Letters of a parameter's name in a small panel."""
+"""Number of letters of a parameter's name that fit above a small panel."""
 
 
 @dataclass(frozen=True)

@@ -16,13 +16,13 @@ from optisense.search.study.study import Study, beside
 from optisense.search.study.trial import Trial
 
 MOST_TRIALS = 200
-"""Trials in the table: the best ones."""
+"""Number of trials in the table, the best ones; a page with thousands would load slowly."""
 
 MOST_CHANGES = 40
 """Parameters in the list of changes, the largest change first."""
 
 MOST_CAUSES = 10
-"""Causes of failure in the table: the commonest ones."""
+"""Number of causes of failure in the table, the commonest ones; the others are counted together."""
 
 WORSE = 0.02
 """A figure of the rays that got worse by a smaller part of itself is as good as before."""

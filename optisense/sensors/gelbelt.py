@@ -58,11 +58,13 @@ LED = "smd-3528"
 RED, GREEN, BLUE = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
 ALONG_X, ALONG_Y = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0)
 TAPE_INDEX = 1.49
+"""Refractive index of the clear tape; its provenance is in `gelbelt_sources`."""
 
 ROLLER_CLEARANCE = 1.0
-"""mm between the window and the small roller."""
+"""Distance in mm between the window and the small roller; its provenance is in
+`gelbelt_sources`."""
 WHEEL_GAP = 0.02
-"""mm of air between belt and wheels, at least."""
+"""Smallest distance in mm of air between belt and wheels, so that they do not touch optically."""
 BESIDE_WINDOW = 0.5
 """mm from the edge of the window to where green light is aimed in light design 2."""
 BEHIND_ROLLER = 2.0

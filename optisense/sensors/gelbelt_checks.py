@@ -12,11 +12,11 @@ from optisense.sensors.dimensions import require
 SENSOR = "gelbelt"
 
 LED_WINDOW = 2.4
-"""mm, diameter of the emitting window of an LED."""
+"""Diameter in mm of the emitting window of an SMD 3528 LED, as the library has it."""
 LED_LENGTH = 3.5
 """mm, of the body of an LED along its row."""
 CAMERA_DEPTH = 9.0
-"""mm of camera behind its pupil."""
+"""Length in mm of the camera module behind its pupil, which must not reach into a part."""
 LEAST_FILM = 0.005
 """mm; films thinner than this are contacts to a simulation of rays."""
 

@@ -13,12 +13,13 @@ from optisense.geometry import TriangleMesh
 
 COLOURS = {"R": (1.0, 0.0, 0.0), "G": (0.0, 1.0, 0.0), "B": (0.0, 0.0, 1.0)}
 BOARDS = 4
+"""Number of LED boards around the sensor's axis."""
 
 LED_MODEL = "smd-0805"
 LED = (1.25, 2.0)
 """mm, width (along the radius) and length of the emitting window."""
 LED_HEIGHT = 0.8
-"""mm, how far an LED stands off its board."""
+"""Height in mm by which an LED of the package 0805 stands off its board."""
 WINDOW_GAP = 0.01
 """mm between an LED's body and the window in front of it: wide enough not to count as contact."""
 WALL_MARGIN = 0.15

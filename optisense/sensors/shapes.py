@@ -24,7 +24,8 @@ ON_AXIS = 1e-12
 """mm: a profile point nearer to the axis is a pole."""
 
 TWIST = 0.31
-"""Of a segment, by which turned shapes are rotated."""
+"""Angle by which turned shapes are rotated, in segments. No vertex then lies exactly on a plane of
+symmetry, where rays of regular grids would meet edges."""
 
 ASIDE = 0.01
 """Of the radius of the ring next to it, by which a pole is moved off the axis."""

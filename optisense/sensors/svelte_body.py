@@ -17,7 +17,7 @@ LED_HEIGHT = 1.9
 """mm behind an LED's window: the height of its package."""
 
 BEHIND_M2 = 1.0
-"""mm between M2 and the body behind it."""
+"""Distance in mm between mirror M2 and the body behind it; no light passes there."""
 
 BESIDE_MIRROR = 0.5
 """mm between the edges of the mirrors and the side walls."""

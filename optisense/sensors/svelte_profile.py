@@ -22,6 +22,7 @@ SAGITTA_STEP = 0.1
 """mm: the bent mirror is tried against the skin in steps of this sagitta, then by halving."""
 
 PROFILE_SAMPLES = 200
+"""Number of points along the mirror's profile, which keep the polygon within 1 um of the curve."""
 
 LONGEST_M2 = 24.3
 """mm: the length of M2 as measured in the animation of the sensor."""

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from optisense.sensors.shapes import arc
 
 FEWEST = 6
-"""Pieces of a rounded edge or nose, however small."""
+"""Smallest number of pieces of a rounded edge or nose, so that small ones still look round."""
 
 
 @dataclass(frozen=True)

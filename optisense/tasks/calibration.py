@@ -32,20 +32,26 @@ WIDTH = 320
 """Pixels across the pictures, as GelSight's own software has."""
 
 MOST_SAMPLES = 20_000
-"""Pixels that a reader is fitted to."""
+"""Largest number of pixels that a reader is fitted to, drawn from all presses, which bounds the
+time of the fit."""
 
 ATTEMPTS = 50
-"""Presses tried for each that is wanted."""
+"""Number of presses that are tried for each one that is wanted, as some miss the surface or the
+view."""
 
 LEAST_PIXELS = 20
-"""Of a contact that counts as seen."""
+"""Number of pixels from which on a contact counts as seen."""
 
 QUIET = 3.0
+"""Difference in levels of 255 from the untouched picture below which nothing is read, in each
+channel: small errors over a wide, flat surface would add up."""
 QUIET_BLUR = 1.5
-"""Where a picture, blurred by QUIET_BLUR pixels, differs from the untouched one by less than QUIET
-levels in each channel, nothing is read: small errors over a wide, flat surface would add up."""
+"""Standard deviation in pixels of the Gaussian that a picture is blurred with before it is compared
+with the untouched one."""
 
-_PLACE, _CAMERA, _SAMPLES, _SENSOR = 5, 6, 7, 10  # what a seed is for
+_PLACE, _CAMERA, _SAMPLES, _SENSOR = 5, 6, 7, 10
+"""Numbers that are mixed into a seed, one for each thing that is drawn, so that none depends on
+another. No two modules of this package share one."""
 
 
 @dataclass(frozen=True)

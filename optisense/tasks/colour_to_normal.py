@@ -32,7 +32,11 @@ LAYERS = (32, 32)
 on presses kept aside they read worse."""
 
 EPOCHS = 30
+"""Number of passes over the samples in the fit of the network, which ends there by intent: more of
+them learn the presses by heart."""
 WEIGHT_PENALTY = 0.03
+"""Weight of the squared weights in the loss of the network (scikit-learn's `alpha`), for the same
+reason."""
 
 METHODS = ("network", "table")
 

@@ -16,6 +16,8 @@ from optisense.errors import TaskError
 from optisense.tasks.records import read_json, read_rows
 
 SCHEMA_VERSION = 1
+"""Version of the format of a dataset's folder; it is raised when an older program cannot read
+it."""
 
 INFO = "dataset.json"
 LABELS = "metadata.csv"

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 DOT = "#1f6fb2"
 LINE = "#c0392b"
 WORST_ANGLE = 30.0
-"""Degrees, where the colours of a normal error end."""
+"""Angle in degrees at which the colours of a normal's error end."""
 
 FloatArray = NDArray[np.float64]
 

@@ -50,9 +50,11 @@ stays clear of a GelSight Mini's edge in one draw of six, so that one sample in 
 that is thrown away costs chief rays and no rendering."""
 
 LEAST_PIXELS = 4
-"""A contact that shows fewer pixels counts as unseen."""
+"""Number of pixels below which a contact counts as unseen."""
 
-_CONTACT, _CAMERA, _SENSOR = 1, 2, 8  # what a seed is for
+_CONTACT, _CAMERA, _SENSOR = 1, 2, 8
+"""Numbers that are mixed into a seed, one for each thing that is drawn, so that none depends on
+another. No two modules of this package share one."""
 
 
 @dataclass(frozen=True)

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from optisense.optics import OpticalModel, TactileImage
 
 THICKNESS = 2.0
-"""mm of the plate."""
+"""Thickness in mm of the plate; only its face touches the skin."""
 
 RAYS = 32, 24
 """Of the camera, that tell how far it sees and what a plane covers."""
@@ -27,7 +27,8 @@ MARGIN = 0.5
 """mm that the plate reaches beyond the outermost of these rays."""
 
 LEAST_SHARE = 0.9
-"""Of the crop, that must show the plane."""
+"""Share of the cropped picture that must show the plate; less would tell the angle by the plate's
+border."""
 
 
 @dataclass(frozen=True)

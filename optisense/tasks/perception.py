@@ -39,7 +39,9 @@ ByteArray = NDArray[np.uint8]
 SETTINGS = "task.json"
 SAMPLES = "samples.csv"
 
-_CONTACT, _CAMERA, _SENSOR = 3, 4, 9  # what a seed is for
+_CONTACT, _CAMERA, _SENSOR = 3, 4, 9
+"""Numbers that are mixed into a seed, one for each thing that is drawn, so that none depends on
+another. No two modules of this package share one."""
 
 
 class PerceptionTask(Protocol):

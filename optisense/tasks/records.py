@@ -21,7 +21,7 @@ from optisense.writing import written_whole
 KEPT = "Free space on this disk or choose another folder; finished samples are kept"
 
 MOST_SHOWN = 5
-"""Differences between settings that a message lists."""
+"""Number of differences between settings that a message lists; the rest is counted."""
 
 
 def write_whole(path: Path, writer: Callable[[Path], object]) -> None:

@@ -12,7 +12,10 @@ from sklearn.model_selection import KFold
 from optisense.errors import TaskError
 
 TREES = 100
+"""Number of trees of a forest, which is scikit-learn's default; the OptiSense paper does not state
+its own."""
 FOLDS = 5
+"""Number of folds of the cross-validation, which is scikit-learn's default."""
 
 FloatArray = NDArray[np.float64]
 

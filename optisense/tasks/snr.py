@@ -16,7 +16,8 @@ from sklearn.neighbors import NearestNeighbors
 from optisense.errors import TaskError
 
 NEIGHBOURS = 5
-"""k; the paper does not state its own."""
+"""Number k of nearest neighbours, which is scikit-learn's default; the OptiSense paper does not
+state its own."""
 
 
 def signal_to_noise(features: ArrayLike, targets: ArrayLike, neighbours: int = NEIGHBOURS) -> float:

@@ -22,7 +22,7 @@ SAME_PLANE = 0.01
 """mm: LEDs whose windows are this close to one plane, and face one way, share a board."""
 
 SAME_DIRECTION = 1e-3
-"""Radians between directions that count as one."""
+"""Angle in radians below which two directions count as one; a margin for rounding."""
 
 
 @dataclass(frozen=True)

@@ -23,13 +23,17 @@ from pathlib import Path
 from typing import Any
 
 PROTOCOL = 1
+"""Version of the protocol that this client speaks; see docs/engine.md."""
 CLIENT = "optisense-blender 0.1.0"
 SHUTDOWN_SECONDS = 2.0
+"""Seconds that the engine may take to end by itself before it is killed."""
 GREETING_SECONDS = 30.0
-"""An engine says hello before it loads anything large."""
+"""Seconds that the engine may take to say hello, which it does before it loads anything large."""
 ELSEWHERE = "Set the engine's path in the preferences of the extension"
 LOG_LINES = 40
+"""Number of lines of the engine's messages that are kept, to be shown when it dies."""
 PIECE = 1 << 16
+"""Number of bytes that are written to the engine at once; a pipe of Linux holds as many."""
 
 Answer = Callable[[dict[str, Any]], None]
 

@@ -15,7 +15,7 @@ TRIAL, BEST = (0.55, 0.75, 0.95, 1.0), (0.95, 0.55, 0.15, 1.0)
 """Colours of the curve: each trial, and the line of the best so far."""
 
 FEW = 60
-"""Trials up to which their dots are large."""
+"""Number of trials up to which their dots in the curve are large."""
 
 REACH = 2.0
 """mm to either side that a pose may move, until the user says otherwise."""

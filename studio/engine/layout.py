@@ -14,7 +14,7 @@ CHARACTERS = 46
 """About what fits in a line of the sidebar, where that can't be measured."""
 
 FONT_SIZE = 11.0
-"""Of labels, in points; Blender's themes come with it."""
+"""Size in points of labels in Blender's own themes."""
 
 EDGES, ICON, BOX = 56.0, 21.0, 14.0
 """Pixels of the sidebar that a line of text can't have: its tabs and edges, an icon, a box."""

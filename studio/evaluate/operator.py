@@ -15,6 +15,7 @@ from ..simulate import editors
 from . import figures, rays
 
 RAYS = (16, 12)
+"""Grid of the chief rays that are drawn (columns, rows); more hide the sensor."""
 
 
 class OPTISENSE_OT_choose_objective(bpy.types.Operator):

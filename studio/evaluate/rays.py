@@ -12,6 +12,7 @@ from ..scene.collections import collection, objects_of
 
 NAME = "Chief rays"
 THICKNESS = 0.02
+"""Radius in mm of the lines of chief rays."""
 COLOURS = {
     "hit": ("green", (0.05, 0.55, 0.2, 1.0)),
     "escaped": ("red", (0.9, 0.1, 0.1, 1.0)),

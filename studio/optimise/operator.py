@@ -21,7 +21,7 @@ from .suggesting import suggestions
 
 TITLE = "Searching"
 WIDEST = 72
-"""Characters of an entry of the menu Vary."""
+"""Number of characters of an entry of the menu Vary; longer ones do not fit beside the sidebar."""
 
 
 class OPTISENSE_OT_vary(polls.Designing, bpy.types.Operator):

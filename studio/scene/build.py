@@ -18,6 +18,7 @@ from .meshes import new_mesh
 from .properties import USUAL_COATING
 
 MILLIMETRE = 0.001
+"""Metres in a millimetre, which is the length of a unit of the scene."""
 
 
 def build(

@@ -18,6 +18,7 @@ from .collections import CAGES, collection, next_order, object_of, objects_of
 from .meshes import REST, remembered, show_vertices, shown_vertices
 
 MOST_KEPT = 32
+"""Number of cages whose weights are kept, so that bending one again needs no new ones."""
 _weights: dict[tuple[bytes, bytes, tuple[int, int, int]], NDArray[np.float32]] = {}
 
 when_bent: list[Callable[[], None]] = []

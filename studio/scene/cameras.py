@@ -26,7 +26,8 @@ FACTS = ("pixel_size", "focal_length", "f_number")
 """What the library says of a camera that is no part of designs."""
 
 WIDEST_DRAWN = 170.0
-"""Degrees; Blender's pinhole cameras see less than 180."""
+"""Largest field of view in degrees that a frustum is drawn with, as Blender's pinhole cameras see
+less than 180."""
 
 
 def add_camera(scene: bpy.types.Scene, values: dict[str, Any]) -> bpy.types.Object:

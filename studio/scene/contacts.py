@@ -18,6 +18,7 @@ from .meshes import mesh_of
 from .paths import absolute
 
 COLOUR = (0.48, 0.37, 0.07, 1.0)
+"""Colour of contacts in the 3-D view (red, green, blue, alpha, 0 to 1); no part has it."""
 
 file_meshes: dict[str, Mesh] = {}
 """Meshes of indenter files, by path, in the files' own units; those that are known."""

@@ -18,7 +18,7 @@ ARROW = 2.0
 """Length (mm) of the line that shows where a light shines."""
 
 MOST_POSES = 4096
-"""How many poses of lights are kept."""
+"""Number of poses of lights that are kept, so that a drawn lamp need not be made again."""
 
 USUAL_HALF_ANGLE = 60.0
 """Degrees: that of a flat LED, for a lamp of which nothing is known yet."""

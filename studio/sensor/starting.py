@@ -15,6 +15,7 @@ from .opening import open_source, picture_is_old
 from .warming import warm_up
 
 SOON = 0.5
+"""Seconds after Blender's start at which the extension begins its work, when the window stands."""
 ENVIRONMENT = "OPTISENSE_OPEN"
 """Names the design that `optisense studio DESIGN` was asked to open."""
 

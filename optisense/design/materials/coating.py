@@ -10,7 +10,8 @@ from optisense.design.fields import Colour, Fraction, Name, NonNegativeRGB, Posi
 from optisense.design.materials.base import CoatingModel, Reflection
 
 SMALLEST_ROUGHNESS = 0.05
-"""GGX alpha of a coating of specularity 1."""
+"""GGX alpha of a coating of specularity 1. Smaller values describe polished mirrors, which no
+sprayed or rubbed coating is."""
 FIXED_ROUGHNESS = 0.1
 """GGX alpha of the flake where specularity does not change it: that of Mitsuba's `roughconductor`
 where none is given (its documentation), as the paper names that model and no roughness."""

@@ -24,12 +24,13 @@ from optisense.library.previews.studio import Studio, coloured_studio, white_stu
 FloatArray = NDArray[np.float64]
 
 SMOOTH = 1e-3
-"""Below this roughness a face is a plain mirror."""
+"""GGX alpha below which a face is drawn as a plain mirror; its lobe is narrower than a pixel."""
 
 SHARP = 0.25
 """Below this roughness lamps are found by sampled rays, above it they are points."""
 
 SAMPLES_SMOOTH, SAMPLES_ROUGH = 6, 20
+"""Number of rays per pixel at smooth and at rough faces, where they scatter more."""
 
 STEPS = np.array([0.7548776662466927, 0.5698402909980532])
 """Added again and again, modulo 1, these fill the unit square evenly (Roberts, R2 sequence)."""

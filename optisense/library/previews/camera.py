@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 FloatArray = NDArray[np.float64]
 
 DISTANCES = (40.0, 20.0, 10.0)
-"""mm in front of the pupil."""
+"""Distances in mm in front of the pupil at which the preview draws the camera's field."""
 
 STEEPEST = 80.0
 """Degrees from the axis up to which a footprint is drawn."""

@@ -16,9 +16,10 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 DOTS_PER_INCH = 110
+"""Resolution of the pictures, at which their letters are easy to read on a usual screen."""
 
 LONGEST = 130
-"""Characters of a description that fit across the picture."""
+"""Number of characters of a description that fit across the picture."""
 
 
 def draw(name: str, entry: AnyEntry) -> Figure:

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 FloatArray = NDArray[np.float64]
 
 LEGEND_COLOURS = 4
+"""Largest number of colours that the legend names; more do not fit beside the curves."""
 
 
 def equivalent_solid_angle(emitter: LightModel) -> float:

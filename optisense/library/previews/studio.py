@@ -10,8 +10,11 @@ from numpy.typing import NDArray
 FloatArray = NDArray[np.float64]
 
 FLOOR = -1.0
+"""Height of the chequered floor, in radii of the ball, whose middle is at 0."""
 SQUARE = 0.6
+"""Side of a square of the floor in radii of the ball; about three squares are seen below it."""
 DARK, BRIGHT = 0.16, 0.62
+"""Reflectance of the dark and of the bright squares of the floor."""
 
 
 @dataclass(frozen=True)

@@ -24,7 +24,8 @@ from optisense.optics.transport.camera_paths import film_samples, find_visible_p
 from optisense.optics.transport.photons import Emission, trace_photons
 
 FIRST_RADIUS = 0.3
-"""Gather radius (mm) of the first pass."""
+"""Gather radius in mm of the first pass. It shrinks with each pass, so that it decides how soon an
+image is smooth and not what it converges to."""
 
 
 @dataclass

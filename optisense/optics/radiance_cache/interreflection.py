@@ -24,7 +24,8 @@ from optisense.optics.scene.surface_cells import SurfaceCells, cell_at
 DIRECTIONS = 8
 """Directions per camera sample in which interreflected light is looked for."""
 MAX_BOUNCES = 8
-"""Largest number of reflections inside a contact."""
+"""Largest number of reflections inside a contact. Even a coating of reflectance 0.7 keeps at most 6
+% of the light after so many."""
 
 
 @dr.syntax

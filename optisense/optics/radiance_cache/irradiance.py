@@ -9,8 +9,9 @@ from __future__ import annotations
 import drjit as dr
 import mitsuba as mi
 
-# Clamped-cosine convolution of bands 0, 1, 2 (Ramamoorthi and Hanrahan 2001, eq. 8).
 BAND_0, BAND_1, BAND_2 = 3.141593, 2.094395, 0.785398
+"""Factors by which convolution with a clamped cosine scales spherical harmonics of bands 0 to 2:
+pi, 2 pi / 3 and pi / 4 (Ramamoorthi and Hanrahan 2001, equation 8)."""
 
 
 def harmonics(n: mi.Vector3f) -> tuple[mi.Float, ...]:

@@ -27,7 +27,8 @@ REFERENCE_RADIUS = 1.6
 """Kernel radius (mm) at `REFERENCE_DENSITY` and `REFERENCE_LENGTH`: the one that minimises the sum
 of squared blur and squared noise."""
 REFERENCE_DENSITY = 1000.0
-"""Density of landed photons (1/mm^2) that `REFERENCE_RADIUS` refers to."""
+"""Density of landed photons (1/mm^2) that `REFERENCE_RADIUS` refers to; a million photons give
+GelSight Mini's 524 mm^2 about as much."""
 REFERENCE_LENGTH = 10.0
 """Length (mm) over which light varies that `REFERENCE_RADIUS` refers to: that under a lamp at this
 distance."""
@@ -41,7 +42,8 @@ MAX_RADIUS_RATIO = 0.3
 """Largest radius as a fraction of the length over which light varies. The blur that remains after
 sharpening is below 1 % (see `Kernels.sharpening`)."""
 MIN_RADIUS_CELLS = 1.5
-"""Smallest radius, in cell sides, for few photons."""
+"""Smallest radius, in cell sides, for few photons: the kernel then holds the cell, its neighbours
+and the diagonal ones."""
 MIN_RADIUS_CELLS_LIMIT = 1.25
 """Smallest radius, in cell sides, for any number of photons: the kernel then holds the cell and its
 direct neighbours."""

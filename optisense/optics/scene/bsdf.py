@@ -17,7 +17,8 @@ import numpy as np
 from optisense.optics.scene.surfaces import CLEAR, Surface, SurfaceKind
 
 FLOATS_PER_SURFACE = 16
-"""Floats per surface in the table of optical data."""
+"""Number of floats of a surface in the table of optical data; four gathers of four floats read
+it."""
 SMOOTH_ALPHA = 1e-3
 """GGX roughness below which a dielectric is treated as smooth."""
 MIN_DISC_COSINE = 0.1

@@ -27,7 +27,7 @@ POLAR_CELLS = 512
 AZIMUTH_CELLS = 128
 """Azimuthal cells of each polar cell, all of equal power."""
 FLOATS_PER_EMITTER = 20
-"""Floats per light in the emitter table."""
+"""Number of floats of a light in the emitter table; five gathers of four floats read it."""
 
 
 class EmitterShape(IntEnum):

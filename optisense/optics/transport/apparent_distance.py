@@ -31,7 +31,8 @@ PUPIL_SHIFT = 0.02
 points (some 1e-6 mm)."""
 
 FILM_SHIFT = 0.1
-"""Pixels by which rays are turned."""
+"""Distance in pixels by which rays are turned: small against a pixel, large against the rounding of
+directions."""
 
 LARGEST = 10.0
 """1/mm: nothing appears nearer than a tenth of a millimetre; larger values come from rays that meet

@@ -27,7 +27,7 @@ from optisense.optics.transport.photon_map import GROUP_MASK
 from optisense.optics.transport.photons import Emission, TargetCells, launch
 
 PASS_PHOTONS = 1_000_000
-"""Photons of one pass."""
+"""Number of photons of one pass, between which progress is told and Ctrl-C obeyed."""
 
 BATCHES = 16
 """Independent parts of the photons, whose spread gives the noise of the sums."""

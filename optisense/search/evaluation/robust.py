@@ -23,6 +23,7 @@ from optisense.search.space.manufacturing import (
 FloatArray = NDArray[np.float64]
 
 LOW, MIDDLE, HIGH = 0.1, 0.5, 0.9
+"""Quantiles of the scores of made sensors that a robust score can be taken from."""
 
 
 class RobustEvaluator:

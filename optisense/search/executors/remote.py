@@ -20,6 +20,8 @@ from optisense.search.evaluation.outcome import Outcome
 from optisense.search.executors.base import Runner, packed
 
 CONNECT_SECONDS = 10.0
+"""Seconds that a Dask scheduler may take to answer; one in the same network answers within a
+second."""
 WORKER_SECONDS = 60.0
 """A cluster without any worker is waited for so long."""
 

@@ -20,6 +20,7 @@ from optisense.search.evaluation.outcome import Outcome
 from optisense.search.methods.base import FloatArray, Method, Problem, values_to_maximise
 
 MOST_POPULATION = 100_000
+"""Largest population; a generation of so many takes days, and a larger number is a slip."""
 
 LEAST_DIMENSIONS = 2
 """Dimensions that pycma needs at least; a search over fewer parameters adds idle ones."""

@@ -45,6 +45,8 @@ from optisense.search.methods.jacobian import moving_parts
 from optisense.search.space.search_space import BoundSpace
 
 USUAL_BUDGET = 40
+"""Number of trials where none is given. A trial gives the score and all its slopes, so that an
+ascent needs tens of them and not hundreds."""
 
 CONVERGED = 1e-4
 """An ascent ends with a step that gains less than this, or this part of scores above 1. Smaller

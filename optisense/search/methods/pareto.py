@@ -27,6 +27,7 @@ MUTATION_SPREAD = 20.0
 """Distribution index of the mutation (both as is usual with NSGA-II)."""
 
 CROSSOVER_CHANCE = 0.9
+"""Probability that two parents are crossed, as Deb et al. (2002) use it for NSGA-II."""
 
 
 class Pareto(Method):

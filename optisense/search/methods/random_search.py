@@ -10,6 +10,8 @@ from optisense.search.evaluation.outcome import Outcome
 from optisense.search.methods.base import FloatArray, Method, Problem
 
 GENERATION = 64
+"""Number of points that are drawn together, which keeps all workers busy; a power of two, as
+Sobol's sequence is balanced after those."""
 
 
 class Random(Method):

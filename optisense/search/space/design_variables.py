@@ -11,6 +11,7 @@ from optisense.design import SensorDesign
 from optisense.design.camera import ImagingModel
 
 LONGEST_NAME = 64
+"""Largest number of letters of a name that is made from a path; longer ones do not fit tables."""
 
 
 @dataclass(frozen=True)

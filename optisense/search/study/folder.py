@@ -18,7 +18,7 @@ SQLITE_ENDINGS = ("", "-wal", "-shm", "-journal")
 """What SQLite adds to the name of a store for the files that it keeps beside it."""
 
 MOST_SHOWN = 8
-"""Differences that an error lists."""
+"""Number of differences between settings that an error lists; the rest is counted."""
 
 
 def begin(folder: Path, design: SensorDesign) -> FolderLock:

@@ -19,12 +19,16 @@ from optisense.search.study.study import Study
 from optisense.search.study.trial import Trial
 
 SEEDS = 3
-"""Fresh seeds for each."""
+"""Number of fresh seeds with which each trial is scored again; their scatter tells how well the
+mean is known."""
 
 MOST = 5
-"""At most so many trials are scored again."""
+"""Largest number of trials that are scored again, which bounds the time that a search takes at its
+end."""
 
 _FRESH = 0xF2E5
+"""A number that is mixed into a study's seed, so that fresh seeds have nothing in common with those
+of its trials."""
 
 Work = Callable[[Sequence[tuple[Trial, int]], int, float], list[Outcome]]
 """Scores trials with seeds, and is told how many such scores may follow for these trials, and how

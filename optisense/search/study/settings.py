@@ -16,6 +16,7 @@ from optisense.errors import SearchError
 from optisense.writing import write_text
 
 STUDY_VERSION = 1
+"""Version of the format of `STUDY_FILE`; it is raised when an older program cannot read it."""
 STUDY_FILE = "study.json"
 
 LIBRARIES = ("optisense", "cma", "numpy", "scipy", "mitsuba")

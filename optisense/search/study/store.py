@@ -28,9 +28,10 @@ from optisense.search.study.reader import Reader
 FloatArray = NDArray[np.float64]
 
 STORE_VERSION = 1
+"""Version of the tables of trials; it is raised when an older program cannot read them."""
 
 START = -1
-"""The generation of the start, which is scored first."""
+"""Number of the generation of the start, which is scored before the first one, 0."""
 
 _TABLES = """
 create table facts (name text primary key, value text not null) without rowid;

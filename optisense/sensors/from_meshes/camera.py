@@ -28,6 +28,8 @@ CLEARANCE = 1.0
 """mm that a camera placed by itself keeps from the parts behind which it stands."""
 
 LARGEST_STEP_BACK = 200.0
+"""Largest distance in mm that a camera placed by itself steps back in search of a view; no tactile
+sensor is longer."""
 
 
 def make_camera(

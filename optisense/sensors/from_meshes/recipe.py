@@ -39,7 +39,7 @@ Turn = Annotated[Number, Field(ge=-720.0, le=720.0)]
 Pixels = Annotated[Count, Field(le=65_536)]
 
 MOST_LIGHTS = 10_000
-"""In a group; more are a slip."""
+"""Largest number of lights in a group; a larger one is a slip, for instance a pitch in metres."""
 
 Lights = Annotated[Count, Field(le=MOST_LIGHTS)]
 

@@ -26,7 +26,10 @@ MOSTLY = 0.95
 """A sensing surface lies on an elastomer when so much of its area does."""
 
 PROBE = 0.05
+"""Distance in mm beside the skin at which it is asked which part lies there; gels are thicker and
+rounding is smaller."""
 PROBES = 64
+"""Number of faces of the skin, spread over it, that are asked."""
 
 
 @dataclass
