@@ -21,7 +21,7 @@ from optisense.geometry import Contact, Sphere
 from optisense.mechanics import CONFORMING
 from optisense.optics import TactileImage
 
-NAMES = ("gelsight-mini", "gelbelt", "gelsight360", "gelsight-svelte")
+NAMES = ("digit", "gelsight-mini", "gelbelt", "gelsight360", "gelsight-svelte")
 RESOLUTION = (320, 240)
 WANTED_NOISE = 0.03
 """Of the light in the contact."""

@@ -1,6 +1,7 @@
 """Make the pictures of docs/sensors.md, and of coatings in docs/design-file.md, anew.
 
-python scripts/sensor_pictures.py [sections] [gelbelt] [gelsight360] [gelsight-svelte] [coatings]
+python scripts/sensor_pictures.py [sections] [digit] [gelbelt] [gelsight360] [gelsight-svelte]
+    [coatings]
 """
 
 from __future__ import annotations
@@ -19,8 +20,10 @@ from optisense.design.materials.coating import Scattering
 from optisense.design.section_drawing import section_svg
 
 OUT = Path(__file__).parent.parent / "docs" / "images"
-DRAWN = ("gelsight-mini", "gelbelt", "gelsight360", "gelsight-svelte")
+DRAWN = ("digit", "gelsight-mini", "gelbelt", "gelsight360", "gelsight-svelte")
 PHOTONS = 2_000_000
+TALL = (240, 320)
+"""Pixels of DIGIT's picture."""
 SPECULARITY = 0.6
 """At which the readings of a coating's specularity are shown."""
 
@@ -33,10 +36,10 @@ def sections() -> None:
         print(path)
 
 
-def tactile(design: SensorDesign) -> np.ndarray:
+def tactile(design: SensorDesign, resolution: tuple[int, int] = (320, 240)) -> np.ndarray:
     """(h, w, 3) uint8: nine balls pressed in, as the camera sees them."""
     model = OpticalModel(design)
-    image = model.render(model.nine_contacts(), resolution=(320, 240), photons=PHOTONS)
+    image = model.render(model.nine_contacts(), resolution=resolution, photons=PHOTONS)
     return image.picture()
 
 
@@ -51,6 +54,34 @@ def side_by_side(name: str, panels: dict[str, np.ndarray], width: float = 4.0) -
     figure.tight_layout()
     figure.savefig(OUT / f"{name}.png", dpi=100, bbox_inches="tight")
     print(OUT / f"{name}.png")
+
+
+def digit() -> None:
+    """By the height of its LEDs and the finish of the edge that they shine into."""
+    usual = sensors.digit()
+    panels: dict[str, np.ndarray] = {}
+    for height, title, picture in (
+        (1.5, "untouched", untouched(usual)),
+        (4.6, "nine balls", tactile(usual, TALL)),
+    ):
+        panels[title] = picture
+        for roughness, finish in ((0.0, "polished"), (0.3, "matt"), (1.0, "rough")):
+            title = f"{height:g} mm, {finish}"
+            design = sensors.digit(led_height=height, edge_roughness=roughness)
+            panels[title] = untouched(design)
+    figure = Figure(figsize=(10.0, 7.0), facecolor="white")
+    for axis, (title, picture) in zip(figure.subplots(2, 4).flat, panels.items(), strict=True):
+        axis.imshow(picture)
+        axis.set_title(title, fontsize=11)
+        axis.set_axis_off()
+    figure.tight_layout()
+    figure.savefig(OUT / "digit.png", dpi=80, bbox_inches="tight")
+    print(OUT / "digit.png")
+
+
+def untouched(design: SensorDesign) -> np.ndarray:
+    """(h, w, 3) uint8: what the camera of a DIGIT sees with nothing pressed in."""
+    return OpticalModel(design).render([], resolution=TALL, photons=PHOTONS).picture()
 
 
 def gelbelt() -> None:
@@ -92,6 +123,7 @@ if __name__ == "__main__":
     OUT.mkdir(parents=True, exist_ok=True)
     makers = {
         "sections": sections,
+        "digit": digit,
         "gelbelt": gelbelt,
         "gelsight360": gelsight360,
         "gelsight-svelte": svelte,

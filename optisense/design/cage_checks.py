@@ -16,7 +16,7 @@ from optisense.geometry.cage import cage_points, cage_weights
 from optisense.geometry.coarseness import chord_error
 from optisense.geometry.containment import inside
 from optisense.geometry.folds import find_fold
-from optisense.geometry.meeting import CONTACT, find_meeting, resting_on, touching
+from optisense.geometry.meeting import CONTACT, find_meeting, near_surface, resting_on, touching
 
 AT_REST = 1e-9
 """mm: a control point that is off its place by less has not moved."""
@@ -123,8 +123,7 @@ def half_caged(design: SensorDesign, meshes: Meshes) -> list[Diagnostic]:
                 inner = [name for name in (surface, solid) if name in cage.parts]
                 if len(inner) != 1 or _has_moved(cage):
                     continue
-                rows = resting_on(design.meshes[surface], design.meshes[solid])
-                if len(rows) == 0:
+                if not _coats(design.meshes[surface], design.meshes[solid]):
                     continue
                 (outer,) = {surface, solid} - {*inner}
                 problems.append(
@@ -137,6 +136,15 @@ def half_caged(design: SensorDesign, meshes: Meshes) -> list[Diagnostic]:
                     )
                 )
     return problems
+
+
+def _coats(surface: TriangleMesh, solid: TriangleMesh) -> bool:
+    """Whether a surface lies on a solid with whole faces, not with its rim alone."""
+    rests = np.zeros(len(surface.vertices), dtype=bool)
+    rests[resting_on(surface, solid)] = True
+    flat = rests[surface.faces].any(axis=1)
+    middles = surface.triangles[flat].mean(axis=1)
+    return bool(np.isfinite(near_surface(middles, solid)).any())
 
 
 def _moved_cages(design: SensorDesign) -> dict[str, Cage]:

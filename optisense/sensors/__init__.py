@@ -1,5 +1,6 @@
 """Built-in sensors: functions that build a SensorDesign from a few dimensions."""
 
+from optisense.sensors.digit import digit
 from optisense.sensors.gelbelt import gelbelt
 from optisense.sensors.gelsight360 import gelsight360
 from optisense.sensors.gelsight_mini import (
@@ -14,6 +15,7 @@ __all__ = [
     "SENSORS",
     "build",
     "check",
+    "digit",
     "gelbelt",
     "gelsight360",
     "gelsight_mini",

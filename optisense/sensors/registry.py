@@ -17,6 +17,7 @@ SENSORS: Registry[Callable[[], SensorDesign]] = Registry(
     "optisense.sensors",
     DesignError,
     {
+        "digit": "optisense.sensors.digit:digit",
         "gelbelt": "optisense.sensors.gelbelt:gelbelt",
         "gelsight360": "optisense.sensors.gelsight360:gelsight360",
         "gelsight-mini": "optisense.sensors.gelsight_mini:gelsight_mini",

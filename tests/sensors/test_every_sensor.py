@@ -95,4 +95,5 @@ def test_every_indenter_shows(
     pressed = image.contact_mask
     assert pressed.sum() > 15
     change = np.abs(image.radiance - untouched.radiance).max(axis=2)
-    assert np.median(change[pressed]) > 5.0 * np.median(change[~pressed])
+    # A plate shows by its rim: its flat face looks as the skin did.
+    assert np.quantile(change[pressed], 0.9) > 5.0 * np.median(change[~pressed])

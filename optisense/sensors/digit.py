@@ -1,0 +1,401 @@
+"""DIGIT: a domed gel on a thick acrylic window, lit through the window's edge by three LEDs.
+
+Frame: the origin is the top of the gel, over the middle of its outline; +z runs out of the sensor,
+the half-round end points to +y and the straight end to -y. Outline, thicknesses, places of the LEDs
+along the edge, and camera are those of the published design; how high the LEDs stand, how the
+edge of the acrylic scatters and what the gel is made of is not published and marked as assumed.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from optisense import library
+from optisense.design import (
+    Cage,
+    Camera,
+    FaceFinish,
+    Light,
+    LightGroup,
+    Part,
+    Provenance,
+    Role,
+    SensorDesign,
+    Status,
+)
+from optisense.geometry import TriangleMesh
+from optisense.sensors.dimensions import Positive, describe_changes, require, tells_of_dimensions
+from optisense.sensors.half_round import FloatArray, HalfRound, stacked
+from optisense.sensors.led_flux import BALANCED, balanced_flux
+
+NAME = "digit"
+GEL, WINDOW, HOUSING = "silicone-solaris", "acrylic", "black-plastic"
+LED = "everlight-19-337"
+CAMERA = "ovm7692"
+
+CORNERS = (1.3, 0.5)
+"""mm, radius of the corners at the straight end of gel and acrylic."""
+
+HALF_OVERHANG = 0.05
+"""mm by which the gel is wider than the acrylic, on each side."""
+
+OPENING_GAP = 0.09
+"""mm between the gel and the opening of the housing: 18.58 mm for a gel of 18.4."""
+
+CAVITY = (1.25, 2.5)
+"""mm of room around the acrylic, for the strip with the LEDs: at its sides and round end, and so
+much more at its straight end (a cavity of 20.8 x 30 mm)."""
+
+HOUSING_WALL = 1.5
+"""mm, thickness of wall and floor of the housing."""
+
+BEHIND_PUPIL = 2.0
+"""mm from the camera's pupil to the floor of the housing."""
+
+EDGE_STEPS = 6
+"""Rings that the rounded edge of the gel is cut into: about 13 degrees each."""
+
+SIDES = {
+    "edge_right": (1.0, 0.0, 0.0),
+    "edge_left": (-1.0, 0.0, 0.0),
+    "edge_round": (0.0, 1.0, 0.0),
+    "edge_straight": (0.0, -1.0, 0.0),
+}
+"""Faces of the acrylic's edge, and the direction about which each of them looks."""
+
+
+@tells_of_dimensions(NAME)
+def digit(
+    *,
+    gel_width: Positive = 18.4,
+    straight_length: Positive = 15.85,
+    gel_thickness: Positive = 4.07,
+    wall_height: Positive = 1.35,
+    dome_rise: Positive = 1.94,
+    edge_inset: Positive = 0.6,
+    window_thickness: Positive = 6.15,
+    edge_roughness: float = 0.6,
+    led_height: float = 4.6,
+    led_pitch: Positive = 34.0,
+    led_gap: Positive = 0.2,
+    led_flux: float | None = None,
+    pupil_distance: Positive = 21.7,
+    fov: float = 46.83,
+    resolution: tuple[int, int] = (240, 320),
+    coating: str = "diffuse-grey",
+    tessellation: Positive = 0.6,
+) -> SensorDesign:
+    """A DIGIT.
+
+    Args:
+        gel_width: mm; the half-round end has half of it as its radius, and the acrylic is 0.1 mm
+            narrower.
+        straight_length: mm, from the straight end to the centre of the half round.
+        gel_thickness: mm, in the middle of the gel.
+        wall_height: mm, of the vertical wall around the gel.
+        dome_rise: mm, how much higher the middle of the gel is than the upper end of its rounded
+            edge.
+        edge_inset: mm, how far the rounded edge reaches inward.
+        window_thickness: mm, of the acrylic.
+        edge_roughness: GGX alpha of the acrylic's edge; 0 for a polished one.
+        led_height: mm, of the middle of the LEDs over the acrylic's lower face.
+        led_pitch: mm along the acrylic's edge from the blue LED, in the middle of the straight
+            end, to the red and the green one.
+        led_gap: mm of air between an LED's window and the acrylic's edge.
+        led_flux: mW, radiant, of each LED; None takes what its weakest colour gives (library).
+        pupil_distance: mm, from the top of the gel to the camera's entrance pupil.
+        fov: degrees, across the image width (46.83 across 240 of 240 x 320 pixels are 60 along
+            the 320).
+        resolution: pixels, width and height.
+        coating: a coating of the library.
+        tessellation: mm, about the edge length of the largest triangles.
+
+    Raises:
+        DesignError: dimensions that contradict one another; says which.
+        LibraryError: there is no such coating.
+    """
+    given = dict(locals())
+    centre = 0.5 * (straight_length - 0.5 * gel_width)
+    outline = HalfRound(gel_width, straight_length, CORNERS[0], centre)
+    edge = HalfRound(gel_width - 2.0 * HALF_OVERHANG, straight_length, CORNERS[1], centre)
+    _check(outline, gel_thickness, wall_height + dome_rise, edge_inset)
+    window_top = -gel_thickness
+    window_bottom = window_top - window_thickness
+    _check_lights(edge, window_thickness, led_height, led_pitch, edge_roughness)
+    require(
+        pupil_distance > gel_thickness + window_thickness,
+        NAME,
+        f"the camera's pupil, {pupil_distance:g} mm under the top of the gel, is inside the "
+        f"acrylic, which ends {-window_bottom:g} mm under it",
+        "Make pupil_distance larger, or window_thickness or gel_thickness smaller",
+    )
+    flux = balanced_flux(LED) if led_flux is None else led_flux
+    lamp_z = window_bottom + led_height
+    # The camera looks along +z with +y up, so the picture's right is -x.
+    places = {"red": led_pitch, "green": -led_pitch, "blue": 0.0}
+    colours = {"red": (1.0, 0.0, 0.0), "green": (0.0, 1.0, 0.0), "blue": (0.0, 0.0, 1.0)}
+    design = SensorDesign(
+        name=NAME,
+        description="DIGIT, domed gel",
+        coating=library.coating(coating),
+        materials={name: library.material(name) for name in (GEL, WINDOW, HOUSING)},
+        parts={
+            "skin": Part(role=Role.SENSING_SURFACE, mesh="meshes/skin.obj"),
+            "gel": Part(role=Role.ELASTOMER, mesh="meshes/gel.obj", material=GEL),
+            "acrylic": Part(
+                role=Role.SUPPORT,
+                mesh="meshes/acrylic.obj",
+                material=WINDOW,
+                faces=_frosted(edge_roughness),
+            ),
+            "housing": Part(role=Role.BLOCKER, mesh="meshes/housing.obj", material=HOUSING),
+        },
+        lights={
+            name: _led(edge, places[name], led_gap, lamp_z, colours[name], flux) for name in places
+        },
+        camera=Camera(
+            model=CAMERA,
+            fov=fov,
+            resolution=resolution,
+            position=(0.0, 0.0, -pupil_distance),
+            direction=(0.0, 0.0, 1.0),
+            up=(0.0, 1.0, 0.0),
+        ),
+        provenance=_provenance(bool(edge_roughness)),
+    )
+    gel = _gel(outline, (gel_thickness, wall_height, dome_rise, edge_inset), tessellation)
+    design.meshes.update(
+        skin=_coated(gel),
+        gel=gel,
+        acrylic=_prism(edge, window_bottom, window_top, tessellation),
+        housing=_housing(
+            outline, edge, (window_top, window_top + wall_height, -pupil_distance), tessellation
+        ),
+    )
+    design.cages = {"skin": Cage.around(["skin", "gel"], gel.bounds)}
+    describe_changes(design, digit, given)
+    return design
+
+
+def _check(outline: HalfRound, thickness: float, curved: float, inset: float) -> None:
+    """All lengths in mm; `curved` is the height of wall and dome together."""
+    require(
+        outline.straight > outline.radius + CORNERS[0],
+        NAME,
+        f"straight_length {outline.straight:g} mm leaves no straight side: the half round takes "
+        f"{outline.radius:g} mm of it",
+        "Make straight_length larger or gel_width smaller",
+    )
+    require(
+        curved < thickness,
+        NAME,
+        f"wall_height and dome_rise are together {curved:g} mm, the gel is only "
+        f"{thickness:g} mm thick",
+        "Make gel_thickness larger, or wall_height or dome_rise smaller",
+    )
+    require(
+        inset < 0.5 * outline.radius,
+        NAME,
+        f"edge_inset {inset:g} mm leaves no dome on a gel {outline.width:g} mm wide",
+        "Make edge_inset smaller",
+    )
+
+
+def _check_lights(
+    edge: HalfRound, thickness: float, height: float, pitch: float, roughness: float
+) -> None:
+    """All lengths in mm."""
+    require(
+        0.0 < height < thickness,
+        NAME,
+        f"led_height {height:g} mm is not on the acrylic's edge, {thickness:g} mm high",
+        f"Give a height between 0 and {thickness:g} mm",
+    )
+    require(
+        pitch <= edge.half_way,
+        NAME,
+        f"led_pitch {pitch:g} mm passes the middle of the half round, which is "
+        f"{edge.half_way:.4g} mm from the blue LED",
+        "Make led_pitch smaller",
+    )
+    require(
+        0.0 <= roughness <= 1.0,
+        NAME,
+        f"edge_roughness is {roughness:g}",
+        "Give a GGX alpha from 0 (polished) to 1",
+    )
+
+
+def _frosted(roughness: float) -> dict[str, FaceFinish] | None:
+    """The finish of the acrylic's edge, None where it is polished."""
+    if roughness == 0.0:
+        return None
+    return {
+        name: FaceFinish(direction=direction, within=50.0, roughness=roughness)
+        for name, direction in SIDES.items()
+    }
+
+
+def _led(
+    edge: HalfRound,
+    along: float,
+    gap: float,
+    z: float,
+    colour: tuple[float, float, float],
+    flux: float,
+) -> LightGroup:
+    """An LED that shines into the edge, `along` mm from the middle of its straight end."""
+    (x, y), (nx, ny) = edge.at(along)
+    light = Light(
+        position=(x + gap * nx, y + gap * ny, z), direction=(-nx, -ny, 0.0), up=(0.0, 0.0, 1.0)
+    )
+    return LightGroup(model=LED, colour=colour, flux=flux, lights=[light])
+
+
+def _ring(points: FloatArray, z: float | FloatArray) -> FloatArray:
+    return np.column_stack([points, np.broadcast_to(z, len(points))])
+
+
+def _prism(outline: HalfRound, bottom: float, top: float, tessellation: float) -> TriangleMesh:
+    points = outline.points(tessellation)
+    return stacked([_ring(points, bottom), _ring(points, top)])
+
+
+def _gel(
+    outline: HalfRound, heights: tuple[float, float, float, float], tessellation: float
+) -> TriangleMesh:
+    """A plate with a vertical wall, a rounded edge and a dome, its top at z = 0.
+
+    The dome rises with the square of the way from its rim to the middle. The rounded edge is a
+    parabola that leaves the wall upright and meets the dome at the dome's own slope.
+
+    Args:
+        heights: mm, of the whole gel, its wall, its dome, and how far the edge reaches inward.
+    """
+    thickness, wall, rise, inset = heights
+    rim_z = -rise
+    wall_z = wall - thickness
+    foot, rim = outline.points(tessellation), outline.inset(inset).like(outline, tessellation)
+    reach = np.linalg.norm(rim, axis=1)
+    slope = 2.0 * rise / reach * np.linalg.norm(foot - rim, axis=1)
+    steep = np.maximum(rim_z - slope, 0.5 * (wall_z + rim_z))
+    rings = [_ring(foot, -thickness), _ring(foot, wall_z)]
+    for t in np.linspace(0.0, 1.0, EDGE_STEPS + 1)[1:-1]:
+        out, bend, end = (1.0 - t) ** 2, 2.0 * t * (1.0 - t), t * t
+        rings.append(
+            _ring((out + bend) * foot + end * rim, out * wall_z + bend * steep + end * rim_z)
+        )
+    rings.append(_ring(rim, rim_z))
+    count = max(4, math.ceil(reach.mean() / tessellation))
+    for share in np.linspace(1.0, 0.0, count + 1)[1:-1]:
+        corners = max(12, math.ceil(share * len(rim)))
+        rings.append(_ring(share * _resampled(rim, corners), -rise * share * share))
+    mesh = stacked(rings)
+    mesh.vertices[-1, 2] = 0.0  # the top
+    return mesh
+
+
+def _resampled(polygon: FloatArray, count: int) -> FloatArray:
+    """(count, 2) points spread over the sides of a closed polygon by their numbers."""
+    where = np.arange(count) * (len(polygon) / count)
+    closed = np.concatenate([polygon, polygon[:1]])
+    steps = np.arange(len(closed))
+    return np.column_stack([np.interp(where, steps, closed[:, axis]) for axis in (0, 1)])
+
+
+def _coated(gel: TriangleMesh) -> TriangleMesh:
+    """All faces of the gel but its flat underside, on the same vertices, looking into the gel."""
+    bottom = gel.bounds[0, 2]
+    coated = ~(gel.triangles[:, :, 2] == bottom).all(axis=1)
+    used, faces = np.unique(gel.faces[coated], return_inverse=True)
+    inward = faces.astype(np.int32).reshape(-1, 3)[:, ::-1]
+    return TriangleMesh(gel.vertices[used], inward)
+
+
+def _housing(
+    gel: HalfRound, edge: HalfRound, levels: tuple[float, float, float], tessellation: float
+) -> TriangleMesh:
+    """A tub with an opening for the gel in its roof, closed behind the camera.
+
+    Args:
+        levels: mm, z of the roof's underside, of its top, and of the camera's pupil.
+    """
+    roof, top, pupil = levels
+    floor = pupil - BEHIND_PUPIL
+
+    def around(inner: HalfRound, aside: float, end: float) -> HalfRound:
+        return HalfRound(
+            inner.width + 2.0 * aside, inner.straight + aside + end, inner.corner + aside,
+            inner.centre,
+        )  # fmt: skip
+
+    opening = around(gel, OPENING_GAP, 0.0)
+    cavity = around(edge, *CAVITY)
+    outside = around(cavity, HOUSING_WALL, 0.0)
+    hole, room, wall = (each.like(cavity, tessellation) for each in (opening, cavity, outside))
+    return stacked(
+        [
+            _ring(room, floor),
+            _ring(room, roof),
+            _ring(hole, roof),
+            _ring(hole, top),
+            _ring(wall, top),
+            _ring(wall, floor - HOUSING_WALL),
+        ]
+    ).flipped()
+
+
+def _provenance(frosted: bool) -> dict[str, Provenance]:
+    assumed, sourced, derived = Status.ASSUMED, Status.SOURCED, Status.DERIVED
+    cad = "measured in the published CAD of DIGIT (facebookresearch/digit-design)"
+    row = (
+        f"34 mm apart along the acrylic's edge, {cad}; 1.55 mm under the gel, 0.2 mm from the edge "
+        "and facing it are assumed. Published pictures are blue at the straight end, red left, "
+        "green right, each brightest near its LED: lower LEDs, or a smoother edge, show less of it"
+    )
+    table: dict[str, tuple[Status, str]] = {
+        "coating": (assumed, "grey, opaque and diffuse"),
+        "coating.reflectance": (assumed, "as other grey coatings of the library"),
+        "materials.silicone-solaris": (assumed, "the gel's silicone is not published"),
+        "materials.acrylic.ior": (sourced, "PMMA, Sultanova 2009 at 589 nm"),
+        "materials.black-plastic": (assumed, "the housing is printed in black"),
+        "parts.gel": (
+            sourced,
+            f"outline, wall, height and dome {cad}; the dome is drawn as a paraboloid between "
+            "its published rim and height, the edge as a parabola 0.6 mm wide and 0.78 mm high",
+        ),
+        "parts.skin": (assumed, "dome, rounded edge and wall of the gel are coated"),
+        "parts.acrylic": (sourced, f"outline and thickness {cad}"),
+        "parts.housing": (
+            derived,
+            f"opening of 18.58 x 25.19 mm and cavity of 20.8 x 30 mm {cad}; its height, its walls "
+            "and where the acrylic lies in it are assumed",
+        ),
+        "lights.red": (derived, row),
+        "lights.green": (derived, row),
+        "lights.blue": (derived, row),
+        "lights.red.flux": (derived, BALANCED),
+        "lights.green.flux": (assumed, "as red"),
+        "lights.blue.flux": (assumed, "as red"),
+        "camera.position": (
+            sourced,
+            "pupil 21.7 mm under the top of the gel (configuration of the simulator TACTO; a "
+            "community calibration has 22); under the middle of the outline is assumed",
+        ),
+        "camera.fov": (
+            derived,
+            "46.83 degrees across 240 pixels are TACTO's 60 along 320; a community calibration has "
+            "45 along 320",
+        ),
+        "camera.resolution": (sourced, "240 x 320, at which DIGIT is used"),
+    }
+    if frosted:
+        for name in SIDES:
+            table[f"parts.acrylic.faces.{name}"] = (
+                assumed,
+                "cut by a laser and not polished; with a polished edge the picture is brightest "
+                "far from each LED, unlike published ones",
+            )
+    return {path: Provenance(status=s, source=text) for path, (s, text) in table.items()}
