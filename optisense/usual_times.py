@@ -98,7 +98,7 @@ class UsualTimes:
 
     @staticmethod
     def here(area: float = USUAL_AREA, groups: int = USUAL_GROUPS) -> UsualTimes:
-        """On this machine, as busy as it is now.
+        """The usual times of this machine, as busy as it is now.
 
         Args:
             area: of the sensing surfaces, mm2.
@@ -121,7 +121,7 @@ class UsualTimes:
         return self.pace * PILOT
 
     def tracing(self, photons: float) -> float:
-        """So many photons."""
+        """Seconds to trace so many photons."""
         return self.pace * self.light * MILLION_PHOTONS * photons / 1e6
 
     def smoothing(self) -> float:

@@ -27,7 +27,7 @@ class Claim:
 
     @property
     def verdict(self) -> str:
-        """In words."""
+        """The verdict in words."""
         return OPEN if self.holds is None else AGREES if self.holds else DISAGREES
 
     def to_plain(self) -> dict[str, Any]:
@@ -45,7 +45,7 @@ class Table:
     rows: Sequence[Sequence[str]]
 
     def markdown(self) -> str:
-        """As a Markdown table under its title."""
+        """The claims as a Markdown table under its title."""
         lines = [self.title + ":", ""] if self.title else []
         lines.append(_cells(self.heads))
         lines.append(_cells(["---"] * len(self.heads)))

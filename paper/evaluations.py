@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 Plain = Mapping[str, Any]
 
 NINE = "nine balls"
-"""As contacts: the balls that objectives press."""
+"""Name of the contacts that are the balls which objectives press."""
 
 _keepers: dict[tuple[Any, ...], tuple[SensorDesign, ModelKeeper]] = {}
 _current: dict[tuple[Any, ...], tuple[str, OpticalModel]] = {}

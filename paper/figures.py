@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 COLOURS = (BLUE, RED, AMBER, GREY, "#3c8d5a", "#6c4ab0", "#222222", "#b06a9a")
-"""Of lines, in this order."""
+"""Colours of lines, in this order."""
 
 
 def line(

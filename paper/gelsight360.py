@@ -241,7 +241,7 @@ def every_colouring(record: Record) -> Values:
 
 
 def notes(numbers: Values) -> list[str]:
-    """From how many pixels on a contact counts."""
+    """Notes on how many pixels a contact needs in order to count."""
     least = numbers["least_pixels"]
     return [
         "The camera sees the far wall at a grazing angle, and few pixels of a ball there: a "

@@ -81,7 +81,7 @@ def _grid(length: float, width: float, columns: int, rows: int) -> tuple[np.ndar
 
 
 def _indenter(points: np.ndarray) -> MeshIndenter:
-    """Of a grid of points (a, b, 3), seen from below; facets keep their own normals."""
+    """An indenter of a grid of points (a, b, 3), seen from below; facets keep their normals."""
     faces = grid_faces(*points.shape[:2])
     mesh = TriangleMesh(points.reshape(-1, 3), faces)
     if mesh.face_normals[:, 2].sum() > 0.0:

@@ -27,7 +27,7 @@ EXPERIMENTS: dict[str, Experiment] = {
         robustness,
     )
 }
-"""In the order of the page."""
+"""The experiments, in the order of the page."""
 
 ALL = "all"
 

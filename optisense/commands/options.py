@@ -15,7 +15,7 @@ from optisense.mechanics.skins import SKINS
 from optisense.quality import LEVELS, photons_of
 
 MAX_PIXELS = 100_000_000
-"""Of a picture; more is a slip, and would take all memory."""
+"""Largest number of pixels of a picture; more is a slip, and would take all memory."""
 
 MOST_SEED = 2**32 - 1
 """The largest seed of NumPy's older generators and of Mitsuba's samplers: 32 bits."""

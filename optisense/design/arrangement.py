@@ -20,7 +20,7 @@ EQUAL_INDEX = 1e-6
 """Solids whose refractive indices differ by less are one to the light."""
 
 SAMPLES = (8, 6)
-"""So many places across and down the picture are tried for the sensing surface."""
+"""Number of places across and down the picture at which the sensing surface is looked for."""
 
 
 def overlaps(design: SensorDesign, meshes: dict[str, TriangleMesh]) -> list[Diagnostic]:

@@ -15,13 +15,13 @@ NAMED_COLOURS = {
 
 
 def srgb_curve(linear: NDArray[np.floating]) -> NDArray[np.float64]:
-    """From linear values, 0 to 1, to encoded ones, 0 to 1, before rounding."""
+    """Encode linear values, 0 to 1, as values of 0 to 1, before rounding."""
     linear = np.clip(np.asarray(linear, dtype=float), 0.0, 1.0)
     return np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
 
 
 def encode(linear: NDArray[np.floating]) -> NDArray[np.uint8]:
-    """From linear values, 0 to 1, to encoded ones of 8 bits; in single precision, for speed."""
+    """Encode linear values, 0 to 1, with 8 bits; in single precision, for speed."""
     linear = np.clip(np.asarray(linear, dtype=np.float32), 0.0, 1.0)
     curved = np.power(linear, np.float32(1 / 2.4))
     curved *= np.float32(255 * 1.055)
@@ -32,6 +32,6 @@ def encode(linear: NDArray[np.floating]) -> NDArray[np.uint8]:
 
 
 def decode(picture: NDArray[np.uint8]) -> NDArray[np.float64]:
-    """From encoded values of 8 bits to linear ones, 0 to 1."""
+    """Decode values of 8 bits to linear ones, 0 to 1."""
     encoded = picture.astype(np.float64) / 255.0
     return np.where(encoded <= 0.04045, encoded / 12.92, ((encoded + 0.055) / 1.055) ** 2.4)

@@ -47,7 +47,7 @@ class KindModel(Model):
     def __get_pydantic_core_schema__(
         cls, source: Any, handler: GetCoreSchemaHandler, /
     ) -> CoreSchema:
-        """Of a noun: any of its kinds, those included that are registered later."""
+        """The schema of a noun takes any of its kinds, those included that are registered later."""
         if "kinds" not in cls.__dict__:
             return handler(source)
         return core_schema.no_info_plain_validator_function(
@@ -58,7 +58,7 @@ class KindModel(Model):
     def __get_pydantic_json_schema__(
         cls, schema: CoreSchema, handler: GetJsonSchemaHandler, /
     ) -> dict[str, Any]:
-        """Of a noun: one of the schemas of its kinds."""
+        """The schema of a noun is one of the schemas of its kinds."""
         if "kinds" not in cls.__dict__:
             return handler(schema)
         kinds = [cls.kinds.find(name) for name in cls.kinds.names()]

@@ -1,4 +1,4 @@
-"""From what pydantic reports to messages for the person who wrote the design file."""
+"""Messages for the person who wrote a design file, made of what pydantic reports."""
 
 from __future__ import annotations
 

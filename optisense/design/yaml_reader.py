@@ -65,7 +65,7 @@ def read_yaml(
 def parse_yaml(
     text: str, source: str, error: type[OptiSenseError] = DesignError
 ) -> tuple[dict[str, Any], Lines]:
-    """As `read_yaml`, from text; `source` names it in errors."""
+    """Read YAML text as `read_yaml` reads a file; `source` names it in errors."""
     try:
         return _Reader(text, source, error).read()
     except yaml.MarkedYAMLError as found:

@@ -36,7 +36,7 @@ DRAFT_WIDTH = 160
 """Width in pixels of a draft, which has a quarter of the pixels of a usual image."""
 
 MOST_PIXELS = 20_000_000
-"""Of an image; more is a slip, and would take all memory."""
+"""Largest number of pixels of an image; more is a slip, and would take all memory."""
 
 LEVELS = (np.arange(256) / 255.0).astype(np.float32)
 """What the 256 levels of a picture are from 0 to 1."""

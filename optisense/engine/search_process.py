@@ -16,7 +16,8 @@ from optisense.errors import OptiSenseError, SearchError
 from optisense.folders import holder_of
 
 PROCESS_FILE = "process.json"
-"""In the study's folder while one of these processes runs it: how to end it."""
+"""File in the study's folder while one of these processes runs it; it tells how to end the
+process."""
 
 LOG_FILE = "search.log"
 """What the process says besides its result; for finding out why it died."""

@@ -141,7 +141,7 @@ def _along_a_curve(points: FloatArray) -> NDArray[np.uint64]:
 
 
 def _descend(first: _Boxes, second: _Boxes, same: bool) -> tuple[IntArray, IntArray]:
-    """From the outermost boxes down, only into pairs that meet.
+    """Descend from the outermost boxes, only into pairs that meet.
 
     Args:
         same: both are one lot: each pair is wanted once, and none of a box with itself.

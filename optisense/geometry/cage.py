@@ -32,7 +32,7 @@ MOST_KEPT_WEIGHTS = 4_000_000
 """Weights of more vertices times control points are not kept but worked out anew (32 MB)."""
 
 KEPT_WEIGHTS = 32_000_000
-"""So many weights are kept in all (256 MB); the ones not used for longest go first."""
+"""Number of weights that are kept in all (256 MB); the ones not used for longest go first."""
 
 _VALUES_AT_ONCE = 4_000_000
 """Number of products of basis functions that are made together, which bounds the memory of the

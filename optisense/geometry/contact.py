@@ -141,7 +141,7 @@ def place_on_gels(
     gels: Sequence[TriangleMesh],
     facet_error: float = FACET_ERROR,
 ) -> TriangleMesh:
-    """As `place`, on whichever of several elastomers lies under the contact.
+    """Place a contact as `place` does, on whichever of several elastomers lies under it.
 
     Raises:
         ContactError: as of `place`, for the first elastomer.

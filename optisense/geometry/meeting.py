@@ -17,10 +17,11 @@ CONTACT = 0.002
 """mm: parts that reach into one another by less only touch; parts nearer than this touch."""
 
 ROUNDS = 4
-"""So often the faces that may meet are narrowed down by the box around those of the other part."""
+"""Number of times that the faces that may meet are narrowed down by the box around those of the
+other part."""
 
 MOST_PROBED = 4000
-"""So many vertices, spread over all, are looked at for contact."""
+"""Number of vertices, spread over all, that are looked at for contact."""
 
 _boxes: weakref.WeakKeyDictionary[TriangleMesh, tuple[FloatArray, FloatArray]]
 _boxes = weakref.WeakKeyDictionary()

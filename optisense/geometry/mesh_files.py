@@ -67,7 +67,9 @@ def obj_text(mesh: TriangleMesh, name: str | None = None) -> str:
 
 
 def _refuse_cut_off_stl(data: bytes, path: Path) -> None:
-    """Of a binary file the length is known: 84 bytes and 50 a triangle. A text ends in endsolid."""
+    """Refuse an STL file that is cut off: a binary one has 84 bytes and 50 for each triangle, and a
+    text ends in endsolid.
+    """
     ended = b"endsolid" in data.lower()
     text = data.lstrip()[:5].lower() == b"solid" and (ended or b"facet" in data[:2000].lower())
     if text:

@@ -1,4 +1,4 @@
-"""From the text of an entry to the entry; what is wrong is told with file and line."""
+"""Reading entries of the library; what is wrong is told with file and line."""
 
 from __future__ import annotations
 

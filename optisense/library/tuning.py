@@ -37,7 +37,8 @@ ROUNDING = 5
 """Decimals that are kept of what is worked out: the files have up to 5."""
 
 LEAST_DETERMINANT = 1e-3
-"""Of a colour matrix that can be undone; those of real cameras have some 2 to 10."""
+"""Smallest determinant of a colour matrix that can be inverted; those of real cameras have some 2
+to 10."""
 
 NO_TUNING = "Name a tuning file of libcamera for the Raspberry Pi, such as imx219.json"
 

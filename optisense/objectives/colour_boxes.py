@@ -19,8 +19,8 @@ BLOCK = 128
 """Points of a block; any number gives the same result."""
 
 ONE_BLOCK = 600
-"""So few points are one block: comparing all their pairs is then faster than sorting them out
-(2 ms instead of 3 ms for 450 points)."""
+"""Number of points up to which they are one block: comparing all their pairs is then faster than
+sorting them out (2 ms instead of 3 ms for 450 points)."""
 
 SECTORS = 12
 """Extreme azimuths of a block are kept for each of so many sectors of the circle."""

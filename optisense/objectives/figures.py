@@ -32,7 +32,7 @@ def draw_failure(score: Score) -> Figure:
 
 
 def draw_parts(score: Score) -> Figure:
-    """For objectives that draw nothing themselves: a bar for each number among the parts."""
+    """Draw a bar for each number among the parts, for objectives that draw nothing themselves."""
     numbers = {"value": score.value} | {
         key: float(value)
         for key, value in score.parts.items()

@@ -83,7 +83,7 @@ class Relighting:
 
     @cached_property
     def chief_rays(self) -> ChiefRays:
-        """Of the untouched sensor; light does not change them."""
+        """Chief rays of the untouched sensor; light does not change them."""
         return Evaluation(self.model, self.settings).chief_rays
 
     def flux_of(self, design: SensorDesign) -> NDArray[np.float64]:
@@ -228,7 +228,7 @@ class _Relit(Evaluation):
 
     @property
     def chief_rays(self) -> ChiefRays:
-        """Of the untouched sensor; light does not change them."""
+        """Chief rays of the untouched sensor; light does not change them."""
         return self._relighting.chief_rays
 
     @property

@@ -27,7 +27,7 @@ COLOURS = "picture"
 """What a robot reads."""
 
 LEAST_PIXELS = 8
-"""On a line; a straight fit through fewer says little."""
+"""Smallest number of pixels on a line; a straight fit through fewer says little."""
 
 MOST_LEAST_PIXELS = 10_000
 """Largest number of pixels that a line or press may be asked to have; none has as many."""

@@ -94,7 +94,7 @@ SMOOTH: dict[str, Callable[..., Slopes]] = {
     "aoap": smooth_aoap,
     "2to3pw": smooth_projection_warping,
 }
-"""By the name of the objective. Settings of the objective that count here are keyword arguments."""
+"""Smoothed objectives by name. Settings of the objective that count here are keyword arguments."""
 
 
 class _PixelTriangles:

@@ -113,7 +113,9 @@ class UsualTrials:
 
     @staticmethod
     def of(usual: UsualScore, trial: float, fresh_again: float) -> UsualTrials:
-        """Of trials that take so many seconds. Without light no score depends on a seed."""
+        """The usual score of trials that take so many seconds. Without light no score depends on a
+        seed.
+        """
         first = usual.loading + usual.first
         if usual.light == 0.0:
             return UsualTrials(usual, first, trial, 0.0, 0.0)

@@ -66,7 +66,9 @@ class DraftCacheStore(CacheStore):
         pilot: PilotScene,
         before: DraftCacheStore | None,
     ) -> None:
-        """As of `CacheStore`; `before` is the store of the design before, if there is one."""
+        """Keep what `CacheStore` keeps; `before` is the store of the design before, if there is
+        one.
+        """
         super().__init__(scene, opaque, table, seen, coloured, roughness, pilot)
         self.seen = seen
         self._learned_on = opaque
@@ -85,7 +87,7 @@ class DraftCacheStore(CacheStore):
         return known and _apart(opaque, self._learned_on) < GUIDE_TOLERANCE
 
     def light_only(self, groups: Collection[int] | None) -> None:
-        """From now on trace the light of these groups alone, or of all (None)."""
+        """Trace the light of these groups alone from now on, or of all (None)."""
         if groups != self.lit:
             self.forget_light(self._coloured, self._roughness)
         self.lit = groups

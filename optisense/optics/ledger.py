@@ -33,7 +33,7 @@ IN_VIEW = 1.0
 
 
 class LightEnd(StrEnum):
-    """In what way light ends."""
+    """The way in which light ends."""
 
     SEEN = "coating in view"
     UNSEEN = "coating out of view"
@@ -91,11 +91,11 @@ class LightLedger:
         return sorted(total, key=lambda where: -total[where])
 
     def kinds(self) -> dict[str, LightEnd]:
-        """In what way light ends at each place."""
+        """The way in which light ends at each place."""
         return {entry.where: entry.kind for entry in self.entries}
 
     def share(self, group: str, where: str) -> float:
-        """Of a group's power; 0 where none of it goes."""
+        """Share of a group's power; 0 where none of it goes."""
         found = (e.share for e in self.entries if (e.group, e.where) == (group, where))
         return next(found, 0.0)
 
@@ -104,7 +104,7 @@ class LightLedger:
         return sum(entry.share for entry in self.entries if entry.group == group)
 
     def as_data(self) -> dict[str, Any]:
-        """As plain numbers and names, to be written as JSON."""
+        """The ledger as plain numbers and names, to be written as JSON."""
         return {
             "units": {"power": "mW"},
             "photons": self.photons,
@@ -211,7 +211,7 @@ def places_of(pieces: list[Piece]) -> Iterator[LedgerPlace]:
 
 
 def _names(piece: Piece) -> tuple[str, str, tuple[str, LightEnd]]:
-    """Of a surface: the solid behind it, what is in front of it, and who absorbs at it."""
+    """Names of a surface: the solid behind it, what is in front of it, and who absorbs at it."""
     kind = piece.surface.kind
     if kind is SurfaceKind.LIGHT:
         return "a light", "front of a light", ("absorbed by lights", LightEnd.PART)

@@ -226,7 +226,7 @@ def _point(emitter: Emitter, power: NDArray[np.floating]) -> dict[str, Any]:
 
 
 def _pose(emitter: Emitter, half: NDArray[np.floating]) -> Any:
-    """From the light's own frame (shining along +z, half sizes 1) to the scene."""
+    """Transformation from the light's own frame (shining along +z, half sizes 1) to the scene."""
     frame = emitter.frame
     matrix = np.eye(4)
     matrix[:3, 0], matrix[:3, 1], matrix[:3, 2] = frame[0] * half[0], frame[1] * half[1], frame[2]

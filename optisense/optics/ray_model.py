@@ -280,7 +280,7 @@ class RayModel:
         return trace_chief_rays(scene, camera, self._fine.sensing_faces)
 
     def views_by_mirrors(self, resolution: tuple[int, int]) -> dict[frozenset[str], float]:
-        """By which mirrors the camera sees the sensing surface.
+        """Share of the view that the camera has by each set of mirrors.
 
         Args:
             resolution: (width, height) of the chief rays.

@@ -86,7 +86,7 @@ class LightSection:
 
     @cached_property
     def colours(self) -> dict[str, str]:
-        """Of each place that is drawn on its own, what takes most light first."""
+        """Colours of the places that are drawn on their own, what takes most light first."""
         kinds, used = self.ledger.kinds(), dict.fromkeys(COLOURS, 0)
         found = {}
         for where in self.ledger.places():

@@ -28,7 +28,7 @@ TWIST = 0.31
 symmetry, where rays of regular grids would meet edges."""
 
 ASIDE = 0.01
-"""Of the radius of the ring next to it, by which a pole is moved off the axis."""
+"""Fraction of the radius of the ring next to it by which a pole is moved off the axis."""
 
 
 def revolve(profile: ArrayLike, segments: int) -> TriangleMesh:

@@ -117,7 +117,9 @@ class CurvedMirror:
 
     @staticmethod
     def from_arc(lower: ArrayLike, upper: ArrayLike, sagitta: float) -> CurvedMirror:
-        """From the ends of an arc (2,) mm and how far (mm) its middle lies behind the chord."""
+        """The mirror of an arc by its ends (2,) mm and how far (mm) its middle lies behind the
+        chord.
+        """
         first, last = np.asarray(lower, dtype=float), np.asarray(upper, dtype=float)
         along = (last - first) / np.linalg.norm(last - first)
         forward = np.array([along[1], -along[0]])

@@ -1,4 +1,4 @@
-"""From a colour to the tilt of the surface: the table and the network that users fit to real
+"""Readers of the surface's tilt from colours: the table and the network that users fit to real
 sensors, fitted here to simulated ball presses.
 
 Both map the difference of a picture from that of the untouched sensor to the *tilt*: the two

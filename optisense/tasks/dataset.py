@@ -50,7 +50,7 @@ COLUMNS = (
     "arrays",
     "radiance",
 )
-"""Of `LABELS`; the first is what common loaders of picture folders look for."""
+"""Columns of `LABELS`; the first is what common loaders of picture folders look for."""
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""From surface normals to depth: a Poisson equation, solved by least squares."""
+"""Depth from surface normals: a Poisson equation, solved by least squares."""
 
 from __future__ import annotations
 

@@ -21,7 +21,7 @@ THICKNESS = 2.0
 """Thickness in mm of the plate; only its face touches the skin."""
 
 RAYS = 32, 24
-"""Of the camera, that tell how far it sees and what a plane covers."""
+"""Grid of chief rays (columns, rows) that tell how far the camera sees and what a plane covers."""
 
 MARGIN = 0.5
 """mm that the plate reaches beyond the outermost of these rays."""

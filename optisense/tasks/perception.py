@@ -49,12 +49,12 @@ class PerceptionTask(Protocol):
 
     @property
     def name(self) -> str:
-        """As on the command line."""
+        """The task's name as on the command line."""
         ...
 
     @property
     def unit(self) -> str:
-        """Of the targets."""
+        """The unit of the targets."""
         ...
 
     @property

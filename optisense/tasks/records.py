@@ -169,7 +169,7 @@ _NOTHING = object()
 
 
 def _plain(value: object) -> object:
-    """As JSON would give it back, so that tuples equal lists."""
+    """A value as JSON would give it back, so that tuples equal lists."""
     return value if value is _NOTHING else json.loads(json.dumps(value))
 
 

@@ -35,7 +35,7 @@ class UntouchedSurface:
 
     @classmethod
     def of(cls, rays: ChiefRays) -> UntouchedSurface:
-        """From chief rays without contacts."""
+        """What chief rays without contacts tell."""
         return cls(
             points=rays.points.astype(np.float64),
             normals=rays.normals.astype(np.float64),

@@ -350,7 +350,7 @@ class Engine:
         self._fail_all(self.end)
 
     def _write(self) -> None:
-        """As much of the requests as the pipe takes now."""
+        """Write as much of the requests as the pipe takes now."""
         try:
             while self._unsent:
                 taken = self._pipe.write(self._unsent[:PIECE])

@@ -17,7 +17,7 @@ def refuse(operator: bpy.types.Operator, text: str) -> set[str]:
 
 
 def fail(operator: bpy.types.Operator, error: EngineError) -> set[str]:
-    """As `refuse`, with the error on the panels too."""
+    """Refuse as `refuse` does, with the error on the panels too."""
     session.say(error)
     return refuse(operator, error.text())
 
@@ -45,7 +45,7 @@ def start(
 def start_with_design(
     operator: bpy.types.Operator, context: bpy.types.Context, *args: Any, **fields: Any
 ) -> set[str]:
-    """As `start`, with the scene's design among the fields of the request."""
+    """Start as `start` does, with the scene's design among the fields of the request."""
     try:
         design = handing.design(context.scene)
     except EngineError as error:

@@ -19,7 +19,7 @@ CURVE_SIZE = (220, 150)
 """Width and height in pixels of the picture of a search's curve, as wide as the sidebar."""
 GHOSTS = "Best so far"
 COLOUR = (0.1, 0.85, 0.95, 0.4)
-"""Of ghosts; no light, no part and no outline has it."""
+"""Colour of ghosts; no light, no part and no outline has it."""
 
 SAME_PLACE = 1e-3
 """mm: what is nearer to its place in the scene is not drawn."""

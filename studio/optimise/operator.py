@@ -87,7 +87,7 @@ def _is_taken(folder: Path) -> bool:
 
 
 def wait_property() -> Any:
-    """For scripts."""
+    """A property by which scripts wait until the search is over."""
     return BoolProperty(
         name="Wait",
         description="Return when the search is over; a click never waits",

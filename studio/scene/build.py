@@ -1,4 +1,4 @@
-"""From a design to a scene."""
+"""The scene of a design."""
 
 from __future__ import annotations
 

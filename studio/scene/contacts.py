@@ -124,7 +124,9 @@ def absolute_file(values: bpy.types.PropertyGroup) -> str:
 
 
 def _add_file_mesh(shape: bmesh.types.BMesh, mesh: Mesh, scale: float, depth: float) -> None:
-    """As the engine presses it: the middle of its lowest points at the contact's place."""
+    """Add the mesh of a file as the engine presses it: the middle of its lowest points at the
+    contact's place.
+    """
     points = np.asarray(mesh.vertices) * scale
     bottom = points[:, 2].min()
     lowest = points[points[:, 2] <= bottom + 1e-6 * np.ptp(points, axis=0).max()]

@@ -1,4 +1,4 @@
-"""From a scene back to the design, each number as it was read unless it was changed."""
+"""The design of a scene, each number as it was read unless it was changed."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""From a design folder that the engine wrote to a scene."""
+"""The scene of a design folder that the engine wrote."""
 
 from __future__ import annotations
 

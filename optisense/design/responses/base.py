@@ -21,7 +21,7 @@ the brightest channel."""
 
 
 class CameraResponse(KindModel):
-    """From linear radiance to the picture that a camera stores; each kind is a subclass.
+    """Turns linear radiance into the picture that a camera stores; each kind is a subclass.
 
     Radiance times the exposure is the exposed level, at which 1 is full. `respond` makes of it what
     the sensor reads (linear, 0 to 1), and `curve` what is stored (0 to 1).

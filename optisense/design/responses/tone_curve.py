@@ -16,7 +16,7 @@ FloatArray = NDArray[np.floating]
 
 
 class ToneCurve(KindModel):
-    """From linear levels, 0 to 1, to stored ones, 0 to 1; each kind is a subclass."""
+    """Turns linear levels, 0 to 1, into stored ones, 0 to 1; each kind is a subclass."""
 
     kinds: ClassVar[Registry[Any]] = Registry(
         "kind of tone curve",

@@ -1,4 +1,4 @@
-"""From linear radiance to the picture that a camera would store, by its chain."""
+"""The picture that a camera would store of linear radiance, by its chain."""
 
 from __future__ import annotations
 

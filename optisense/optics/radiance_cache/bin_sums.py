@@ -143,7 +143,7 @@ def sum_bins(
 
 
 def _spared(scenes: ContactScenes, rise: mi.Float, sine: mi.Float) -> mi.Color3f:
-    """By what factor light is stronger on an indenter, as it has come a shorter way through gel.
+    """Factor by which light is stronger on an indenter, as it has come a shorter way through gel.
 
     Args:
         scenes: the scenes, in a gel that absorbs.

@@ -1,4 +1,4 @@
-"""From a sensor design to the surfaces, emitters and camera that light meets."""
+"""The surfaces, emitters and camera of a sensor design, as light meets them."""
 
 from __future__ import annotations
 

@@ -175,7 +175,7 @@ class RayScene:
 
     @cached_property
     def patches(self) -> mi.UInt32:
-        """For each triangle, the number of the smooth patch that it belongs to (see `Piece`)."""
+        """The number of the smooth patch that each triangle belongs to (see `Piece`)."""
         numbers, start = [], 0
         for piece in self.pieces:
             numbers.append(piece.patches + start)

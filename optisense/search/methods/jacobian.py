@@ -19,7 +19,7 @@ from optisense.search.space.search_space import BoundSpace
 FloatArray = NDArray[np.float64]
 
 STEP = 1e-4
-"""Of a parameter's range: differences are taken so far to either side."""
+"""Distance to either side at which differences are taken, as a fraction of a parameter's range."""
 
 LINEAR = 1e-6
 """mm. Shapes that are predicted to this, along a random way, follow the coordinates linearly."""

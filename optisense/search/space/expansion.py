@@ -1,4 +1,4 @@
-"""From what a user asks to vary to single parameters: paths looked up, bulk forms spread out."""
+"""Single parameters of what a user asks to vary: paths are looked up, bulk forms spread out."""
 
 from __future__ import annotations
 

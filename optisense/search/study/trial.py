@@ -45,12 +45,12 @@ class Trial:
 
     @property
     def scores(self) -> Mapping[str, float]:
-        """By objective; NaN where it failed."""
+        """Score by each objective; NaN where it failed."""
         return self.outcome.scores
 
     @property
     def score(self) -> float:
-        """Of the first objective, with the seed of the study."""
+        """Score by the first objective, with the seed of the study."""
         return self.outcome.scores.get(self.objective, math.nan)
 
     @property
@@ -81,7 +81,7 @@ class Trial:
 
     @property
     def fair_score(self) -> float:
-        """Of the first objective, by fresh seeds where they were scored.
+        """Score by the first objective, by fresh seeds where they were scored.
 
         The score by the study's seed, by which a trial was chosen, is too high on average.
         """

@@ -1,4 +1,4 @@
-"""From a recipe to a design: read the files, settle contacts, place lights and camera."""
+"""The design of a recipe: its files are read, contacts settled, lights and camera placed."""
 
 from __future__ import annotations
 
@@ -144,7 +144,7 @@ class _Builder(RecipeState):
         return result
 
     def _refuse_bad(self, name: str, sheet: TriangleMesh) -> None:
-        """As solids are checked when they are read."""
+        """Refuse a bad solid, as when it is read from a file."""
         try:
             refuse_bad_sheet(sheet, name)
         except MeshError as error:

@@ -64,7 +64,7 @@ WORDS: tuple[tuple[Use, tuple[str, ...]], ...] = (
 """Words in the names of parts, the ones that count first in front."""
 
 LIGHT, CAMERA = "smd-3528", "pi-v2"
-"""Of the library, where nothing is said."""
+"""Entries of the library that are taken where nothing is said."""
 
 LED_PITCH = 4.5
 """mm between guessed LEDs; a 3528 is 3.5 mm long."""

@@ -175,7 +175,7 @@ def _on_curve(
     rows: FloatArray,
     where: str,
 ) -> list[tuple[FloatArray, FloatArray]]:
-    """As on a flat surface, but with distances that run along the surface."""
+    """Place lights as on a flat surface, but with distances that run along the surface."""
     surface = SensingSurface(mesh.with_faces(mesh.faces[patch]).compacted(), centre, along, across)
     spots = []
     for v in rows:
