@@ -15,7 +15,7 @@ from optisense.folders import is_empty
 
 if TYPE_CHECKING:
     from optisense.sensors.from_meshes import Recipe
-    from optisense.sensors.from_meshes.recipe import Units
+    from optisense.sensors.from_meshes.recipe_parts import Units
 
 UNITS = ("mm", "cm", "m", "inch", "um")
 

@@ -33,7 +33,8 @@ from optisense.sensors.from_meshes.building import USUAL_MATERIAL
 from optisense.sensors.from_meshes.directions import SIDES
 from optisense.sensors.from_meshes.files import largest_dimension, likely_units
 from optisense.sensors.from_meshes.guessing import CadBody, Use
-from optisense.sensors.from_meshes.recipe import MM_PER, PartChoice, Recipe, ShapeReference, Units
+from optisense.sensors.from_meshes.recipe import Recipe
+from optisense.sensors.from_meshes.recipe_parts import MM_PER, PartChoice, ShapeReference, Units
 from optisense.sensors.from_meshes.surfaces import chosen as chosen_faces
 
 Parts = dict[str, PartChoice]

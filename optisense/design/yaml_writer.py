@@ -38,7 +38,7 @@ def _model(model: BaseModel, indent: str) -> Iterator[str]:
     for name, field in type(model).model_fields.items():
         value = getattr(model, name)
         if value is not None and not field.exclude:
-            yield from _entry(name, value, indent, field.description)
+            yield from _entry(field.alias or name, value, indent, field.description)
 
 
 def _entry(key: str, value: Any, indent: str, comment: str | None) -> Iterator[str]:

@@ -27,6 +27,7 @@ from optisense.geometry import TriangleMesh
 from optisense.geometry.repair import refuse_bad_sheet, repaired
 from optisense.geometry.step import SUFFIXES
 from optisense.sensors.from_meshes.files import refuse_odd_units
+from optisense.sensors.from_meshes.moving import laid_on, resting_order
 from optisense.sensors.from_meshes.posing import check_places, place_camera, place_lights
 from optisense.sensors.from_meshes.recipe import Recipe, read_recipe
 from optisense.sensors.from_meshes.recipe_state import RecipeState
@@ -106,15 +107,19 @@ class _Builder(RecipeState):
 
     def _read_parts(self) -> None:
         """Every part that has a file of its own, mended."""
-        sized: dict[str, TriangleMesh] = {}
-        for name, part in self.recipe.parts.items():
-            if part.file is None:
-                continue
-            where = self.label(name)
-            mesh = self.load(part, where)
-            if not part.file.lower().endswith(SUFFIXES):
-                sized[where] = mesh
-            self.meshes[name] = mesh
+        parts = self.recipe.parts
+        for name, part in parts.items():
+            if part.file is not None:
+                self.meshes[name] = self.load(part, self.label(name))
+        for name in resting_order(parts):
+            below = parts[name].on
+            assert below is not None  # else it would not rest
+            self.meshes[name] = laid_on(self.meshes[name], self.meshes[below], parts[name])
+        sized = {
+            self.label(name): mesh
+            for name, mesh in self.meshes.items()
+            if not (parts[name].file or "").lower().endswith(SUFFIXES)
+        }
         gels = {self.label(name) for name in self.of(Role.ELASTOMER)}
         self.notes += refuse_odd_units(sized, self.recipe.units, gels)
         for name, mesh in self.meshes.items():
@@ -127,6 +132,10 @@ class _Builder(RecipeState):
             self.notes += [f"{name}: {note}" for note in notes]
             self.meshes[name] = mended if part.towards is None else self._chosen(name, mended)
             source = f"CAD file {part.file}" + (f", body {part.solid}" if part.solid else "")
+            if part.on is not None:
+                source += f", laid on {part.on}"
+            elif part.mirror or part.turn or part.move:
+                source += ", moved as the recipe says"
             self.provenance[f"parts.{name}"] = Provenance(status=Status.SOURCED, source=source)
 
     def _pick_faces(self) -> None:

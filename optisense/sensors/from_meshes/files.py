@@ -14,7 +14,7 @@ from optisense.geometry.mesh_files import FORMATS, load_mesh
 from optisense.geometry.step import SUFFIXES as STEP_FORMATS
 from optisense.geometry.step import read_step
 from optisense.near import near_match
-from optisense.sensors.from_meshes.recipe import MM_PER, ShapeReference
+from optisense.sensors.from_meshes.recipe_parts import MM_PER, ShapeReference
 
 ALL_FORMATS = (*FORMATS, *STEP_FORMATS)
 
@@ -26,6 +26,10 @@ ODD_PART = 200.0
 
 SMALL_PART = 15.0
 """A part so many times smaller or larger than the others may be."""
+
+
+COMMON_UNITS = tuple(unit for unit in MM_PER if unit != "mil")
+"""Units that are guessed; boards are drawn in mils, but hardly any shape is exported in them."""
 
 
 @dataclass(frozen=True)
@@ -152,7 +156,7 @@ def largest_dimension(meshes: Iterable[TriangleMesh]) -> float:
 
 def likely_units(size: float) -> list[str]:
     """The units in which a sensor whose largest dimension is the number `size` has a fair size."""
-    return [unit for unit, scale in MM_PER.items() if SMALLEST <= size * scale <= LARGEST]
+    return [unit for unit in COMMON_UNITS if SMALLEST <= size * MM_PER[unit] <= LARGEST]
 
 
 def refuse_odd_units(
@@ -210,7 +214,9 @@ def _odd_parts(meshes: dict[str, TriangleMesh], scale: float, gels: Collection[s
         ratio = max(size / typical, typical / size)
         if ratio <= SMALL_PART:
             continue
-        others = [u for u in MM_PER if 0.1 < size / scale * MM_PER[u] / typical < 10.0]
+        others = [
+            u for u in MM_PER if u != "mil" and 0.1 < size / scale * MM_PER[u] / typical < 10.0
+        ]
         unit = f"units: {others[-1] if ratio <= ODD_PART else others[0]}" if others else "units:"
         if ratio > ODD_PART or (where in gels and size < SMALLEST):
             raise MeshError(

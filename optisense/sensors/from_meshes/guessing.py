@@ -26,17 +26,9 @@ from optisense.sensors.from_meshes.files import (
     largest_dimension,
     likely_units,
 )
-from optisense.sensors.from_meshes.recipe import (
-    MM_PER,
-    CameraChoice,
-    LightChoice,
-    LightRow,
-    Over,
-    PartChoice,
-    Recipe,
-    ShapeReference,
-    Units,
-)
+from optisense.sensors.from_meshes.recipe import CameraChoice, Recipe
+from optisense.sensors.from_meshes.recipe_lights import LightChoice, LightRow, Over
+from optisense.sensors.from_meshes.recipe_parts import MM_PER, PartChoice, ShapeReference, Units
 from optisense.sensors.from_meshes.surfaces import WITHIN
 
 Use = Role | Literal["lights", "camera", "nothing"]
@@ -119,20 +111,24 @@ def find_bodies(source: Path) -> list[CadBody]:
         )
     reader, found, taken = CadFiles(folder), [], set[str]()
     for file in files:
-        for body in reader.bodies(file.name):
-            name = _fresh(_as_name(body.name or file.stem), taken)
+        bodies = reader.bodies(file.name)
+        for body in bodies:
+            name, use = body.name or file.stem, guess_use(body.name or file.stem)
+            if use is None and len(bodies) == 1:  # "Part-1" in "Gel.step"
+                name, use = file.stem, guess_use(file.stem)
+            name = _fresh(_as_name(name), taken)
             taken.add(name)
-            found.append(CadBody(name, file.name, body, guess_use(name)))
+            found.append(CadBody(name, file.name, body, use or Role.BLOCKER))
     return found
 
 
-def guess_use(name: str) -> Use:
-    """What a body probably is, by the words in its name; a blocker where they say nothing."""
+def guess_use(name: str) -> Use | None:
+    """What a body probably is, by the words in its name; None where they say nothing."""
     words = set(re.split(r"[^a-z]+", re.sub(r"([a-z])([A-Z])", r"\1 \2", name).lower()))
     for use, signs in WORDS:
         if words & set(signs):
             return use
-    return Role.BLOCKER
+    return None
 
 
 def guess_units(found: Iterable[CadBody]) -> Units | None:

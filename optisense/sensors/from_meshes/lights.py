@@ -11,7 +11,7 @@ from optisense.errors import ContactError, DesignError
 from optisense.geometry import SensingSurface, TriangleMesh
 from optisense.geometry.patches import Faces, mean_normal, middle
 from optisense.sensors.from_meshes.directions import Direction, axis_of, vector
-from optisense.sensors.from_meshes.recipe import LightRow, Over, Ring
+from optisense.sensors.from_meshes.recipe_lights import LightRow, Over, Ring
 
 FloatArray = NDArray[np.float64]
 
@@ -29,17 +29,8 @@ def row(choice: LightRow, bounds: FloatArray) -> list[Light]:
         bounds: (2, 3) mm, lower and upper corner.
     """
     across, sign = axis_of(choice.side)
-    others = [axis for axis in range(3) if axis != across]
+    along = axis_along(choice, bounds)
     size = bounds[1] - bounds[0]
-    if choice.along is not None and "xyz".index(choice.along) != across:
-        along = "xyz".index(choice.along)
-    elif choice.along is None:
-        along = others[0] if size[others[0]] >= size[others[1]] else others[1]
-    else:
-        raise DesignError(
-            f"a row at side {choice.side} can't run along {choice.along}",
-            hint="Along one of " + ", ".join("xyz"[axis] for axis in others),
-        )
     third = 3 - across - along
     offsets = evenly(choice.count, choice.pitch, size[along])
     places = np.tile(bounds.mean(axis=0), (choice.count, 1))
@@ -50,6 +41,26 @@ def row(choice: LightRow, bounds: FloatArray) -> list[Light]:
     into = -sign * np.eye(3)[across]
     way = into if choice.direction is None else vector(choice.direction)
     return [light(place, way, np.eye(3)[third]) for place in places]
+
+
+def axis_along(choice: LightRow, bounds: FloatArray) -> int:
+    """0, 1 or 2: the axis along which a row runs at its side of a box (2, 3).
+
+    Raises:
+        DesignError: it is told to run into its own side.
+    """
+    across, _ = axis_of(choice.side)
+    others = [axis for axis in range(3) if axis != across]
+    size = bounds[1] - bounds[0]
+    if choice.along is None:
+        return others[0] if size[others[0]] >= size[others[1]] else others[1]
+    along = "xyz".index(choice.along)
+    if along == across:
+        raise DesignError(
+            f"a row at side {choice.side} can't run along {choice.along}",
+            hint="Along one of " + ", ".join("xyz"[axis] for axis in others),
+        )
+    return along
 
 
 def ring(choice: Ring, bounds: FloatArray) -> list[Light]:

@@ -15,8 +15,11 @@ from optisense.geometry import TriangleMesh
 from optisense.geometry.containment import inside
 from optisense.geometry.patches import middle
 from optisense.sensors.from_meshes import lights as placing
+from optisense.sensors.from_meshes import strips
 from optisense.sensors.from_meshes.camera import make_camera, share_seen
-from optisense.sensors.from_meshes.recipe import LightChoice, ShapeReference
+from optisense.sensors.from_meshes.pick_and_place import read_pick_and_place
+from optisense.sensors.from_meshes.recipe_lights import LightChoice, LightRow
+from optisense.sensors.from_meshes.recipe_parts import ShapeReference
 from optisense.sensors.from_meshes.recipe_state import RecipeState
 from optisense.sensors.from_meshes.surfaces import chosen, pick
 from optisense.sensors.from_meshes.touching import refuse_contact_with_lamps
@@ -43,6 +46,15 @@ def place_lights(bench: RecipeState, name: str, choice: LightChoice) -> LightGro
             mesh = bench.reference(choice.over, f"lights {name}")
             found = pick(mesh, choice.over, f"lights {name}")
             lights = placing.over(choice.over, mesh, found, f"lights {name}")
+        elif choice.along is not None:
+            lights = strips.along(choice.along, bench.meshes[choice.along.edge_of])
+        elif choice.table is not None:
+            file = bench.recipe.folder / choice.table.file
+            table = read_pick_and_place(file, choice.table.units)
+            lights = strips.from_table(choice.table, table)
+            bench.provenance[f"lights.{name}.lights"] = Provenance(
+                status=Status.SOURCED, source=f"pick-and-place file {choice.table.file}"
+            )
         else:
             lights = choice.at or []
     except DesignError as error:
@@ -64,15 +76,16 @@ def place_lights(bench: RecipeState, name: str, choice: LightChoice) -> LightGro
         raise design_error(error, {}, where=where, model=LightGroup) from None
     _note_crowded(bench, name, group)
     if choice.row is not None:
-        _note_beyond(bench, name, group, choice.row.part)
+        _note_beyond(bench, name, group, choice.row)
     return group
 
 
-def _note_beyond(bench: RecipeState, name: str, group: LightGroup, part: str) -> None:
+def _note_beyond(bench: RecipeState, name: str, group: LightGroup, row: LightRow) -> None:
     """Tell a row that is longer than the side it stands at."""
+    part = row.part
     low, high = bench.meshes[part].bounds
     places = np.array([light.position for light in group.lights])
-    along = int(np.ptp(places, axis=0).argmax())
+    along = placing.axis_along(row, bench.meshes[part].bounds)
     beyond = int(((places[:, along] < low[along]) | (places[:, along] > high[along])).sum())
     if beyond:
         bench.notes.append(

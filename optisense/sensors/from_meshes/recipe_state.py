@@ -8,7 +8,9 @@ from optisense.errors import LibraryError, MeshError
 from optisense.geometry import TriangleMesh
 from optisense.geometry.repair import repaired
 from optisense.sensors.from_meshes.files import CadFiles
-from optisense.sensors.from_meshes.recipe import Recipe, ShapeReference
+from optisense.sensors.from_meshes.moving import posed
+from optisense.sensors.from_meshes.recipe import Recipe
+from optisense.sensors.from_meshes.recipe_parts import ShapeReference
 
 
 class RecipeState:
@@ -30,9 +32,9 @@ class RecipeState:
         self.notes: list[str] = []
 
     def load(self, shape: ShapeReference, where: str) -> TriangleMesh:
-        """The mesh of a file, mm; an error also says which shape it is for."""
+        """The mesh of a file in its place, mm; an error also says which shape it is for."""
         try:
-            return self.files.load(shape, self.recipe.units or "mm", where)
+            return posed(self.files.load(shape, self.recipe.units or "mm", where), shape)
         except MeshError as error:
             place = f"{where}: {error.where}" if error.where else where
             raise MeshError(error.message, where=place, hint=error.hint) from None

@@ -6,7 +6,9 @@ import os
 from pathlib import Path
 
 from optisense.design.yaml_writer import to_yaml
-from optisense.sensors.from_meshes.recipe import Recipe, ShapeReference
+from optisense.sensors.from_meshes.recipe import Recipe
+from optisense.sensors.from_meshes.recipe_lights import FromTable
+from optisense.sensors.from_meshes.recipe_parts import ShapeReference
 from optisense.writing import write_text
 
 RECIPE_FILE = "recipe.yaml"
@@ -25,15 +27,16 @@ def save_recipe(recipe: Recipe, path: str | Path) -> None:
     """
     path = Path(path)
     moved = recipe.model_copy(deep=True)
-    for shape in _shapes(moved):
+    for shape in _with_files(moved):
         if shape.file is not None:
             shape.file = _from(recipe.folder / shape.file, path.parent)
     write_text(path, to_yaml(moved, HEAD), "the recipe")
 
 
-def _shapes(recipe: Recipe) -> list[ShapeReference]:
-    """All shapes of a recipe, which may come from files."""
-    shapes: list[ShapeReference] = list(recipe.parts.values())
+def _with_files(recipe: Recipe) -> list[ShapeReference | FromTable]:
+    """All that a recipe may take from files."""
+    shapes: list[ShapeReference | FromTable] = list(recipe.parts.values())
+    shapes += [group.table for group in recipe.lights.values() if group.table is not None]
     shapes += [group.over for group in recipe.lights.values() if group.over is not None]
     if isinstance(recipe.camera.at, ShapeReference):
         shapes.append(recipe.camera.at)

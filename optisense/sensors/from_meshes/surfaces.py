@@ -14,7 +14,7 @@ from optisense.geometry.patches import (
     smoothly_joined,
 )
 from optisense.sensors.from_meshes.directions import said, vector
-from optisense.sensors.from_meshes.recipe import ShapeReference
+from optisense.sensors.from_meshes.recipe_parts import ShapeReference
 
 WITHIN = 30.0
 """Degrees that faces may look aside where the recipe gives none."""

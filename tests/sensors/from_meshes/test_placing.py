@@ -13,7 +13,8 @@ from optisense.errors import DesignError
 from optisense.geometry import TriangleMesh
 from optisense.sensors.from_meshes.camera import make_camera
 from optisense.sensors.from_meshes.lights import over, ring, row
-from optisense.sensors.from_meshes.recipe import CameraChoice, LightRow, Over, Ring
+from optisense.sensors.from_meshes.recipe import CameraChoice
+from optisense.sensors.from_meshes.recipe_lights import LightRow, Over, Ring
 from optisense.sensors.from_meshes.surfaces import pick
 
 BOUNDS = np.array([[-12.0, -10.0, -3.0], [12.0, 10.0, 1.0]])

@@ -1,0 +1,119 @@
+"""Parts that were drawn in frames of their own, put into that of the sensor."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from optisense.errors import DesignError
+from optisense.geometry import TriangleMesh
+from optisense.sensors.from_meshes.directions import axis_of
+from optisense.sensors.from_meshes.recipe_parts import PartChoice, ShapeReference
+
+FloatArray = NDArray[np.float64]
+
+IN_PLANE = 1e-3
+"""mm: vertices so near to the outermost plane of a part are on its flat face there."""
+
+
+def posed(mesh: TriangleMesh, shape: ShapeReference) -> TriangleMesh:
+    """A file's mesh, mirrored, turned and moved as the recipe says, in this order.
+
+    A part that lies on another one is moved from there; see `laid_on`.
+    """
+    if shape.mirror is not None:
+        flip = np.ones(3)
+        flip["xyz".index(shape.mirror)] = -1.0
+        mesh = TriangleMesh(mesh.vertices * flip, mesh.faces[:, ::-1])
+    if shape.turn is not None:
+        mesh = mesh.with_vertices(mesh.vertices @ rotation(shape.turn).T)
+    if shape.move is not None and getattr(shape, "on", None) is None:
+        mesh = mesh.with_vertices(mesh.vertices + np.array(shape.move))
+    return mesh
+
+
+def rotation(degrees: tuple[float, float, float]) -> FloatArray:
+    """(3, 3): a turn about x, then about y, then about z, of a frame that stands still.
+
+    Quarter turns are exact, so that flat faces stay in the planes of the axes.
+    """
+    result = np.eye(3)
+    for axis, angle in enumerate(degrees):
+        cosine, sine = np.cos(np.radians(angle)), np.sin(np.radians(angle))
+        if angle % 90.0 == 0.0:
+            cosine, sine = np.round(cosine), np.round(sine)
+        turn = np.eye(3)
+        i, j = (axis + 1) % 3, (axis + 2) % 3
+        turn[i, i] = turn[j, j] = cosine
+        turn[i, j], turn[j, i] = -sine, sine
+        result = turn @ result
+    return result
+
+
+def resting_order(parts: Mapping[str, PartChoice]) -> list[str]:
+    """The parts that lie on others, each after the one it lies on.
+
+    Raises:
+        DesignError: two lie on one another, or a part lies on faces of another.
+    """
+    order: list[str] = []
+    for name in (each for each, part in parts.items() if part.on is not None):
+        chain = [name]
+        while (below := parts[chain[-1]].on) is not None:
+            if below in chain:
+                raise DesignError(
+                    f"parts {' and '.join(sorted(set(chain)))} lie on one another in a circle"
+                    if below != name or len(chain) > 1
+                    else f"part '{name}' lies on itself",
+                    where=f"parts.{name}.on",
+                    hint="Let one of them have its own place, by its file or by move",
+                )
+            chain.append(below)
+        if parts[chain[1]].file is None:
+            raise DesignError(
+                f"part '{name}' lies on '{chain[1]}', which is only faces of another part",
+                where=f"parts.{name}.on",
+                hint="Name the part that has the file",
+            )
+        order += [each for each in reversed(chain) if parts[each].on and each not in order]
+    return order
+
+
+def laid_on(mesh: TriangleMesh, below: TriangleMesh, part: PartChoice) -> TriangleMesh:
+    """A part moved onto the side of another one.
+
+    Its flat face there (or what is outermost) meets that of the other part, `gap` mm off. Across,
+    the middles of the two faces agree, or their ends where `flush` names a side. `move` counts
+    from there.
+
+    Args:
+        mesh: mm; mirrored and turned.
+        below: mm.
+        part: says how.
+    """
+    axis, sign = axis_of(part.side or "+z")
+    own, other = _end(mesh, axis, -sign), _end(below, axis, sign)
+    shift = other.mean(axis=0) - own.mean(axis=0)
+    shift[axis] += sign * (part.gap or 0.0)
+    for side in part.flush or ():
+        across, way = axis_of(side)
+        shift[across] = (other - own)[1 if way > 0 else 0, across]
+    shift += np.zeros(3) if part.move is None else np.array(part.move)
+    return mesh.with_vertices(mesh.vertices + shift)
+
+
+def _end(mesh: TriangleMesh, axis: int, sign: float) -> FloatArray:
+    """(2, 3) mm: the box around what is outermost along an axis; along it, both are the end.
+
+    It is the box of the whole part where the end is no face but a point or an edge.
+    """
+    low, high = mesh.bounds
+    end = high[axis] if sign > 0 else low[axis]
+    near = mesh.vertices[np.abs(mesh.vertices[:, axis] - end) <= IN_PLANE]
+    box = np.array([near.min(axis=0), near.max(axis=0)])
+    if (np.delete(np.ptp(box, axis=0), axis) <= IN_PLANE).any():
+        box = np.array([low, high])
+    box[:, axis] = end
+    return box

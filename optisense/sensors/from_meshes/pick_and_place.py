@@ -1,0 +1,151 @@
+"""Reading where parts are on a board: pick-and-place files of KiCad, Altium, EasyEDA and others.
+
+Columns are found by their names, so that it does not matter which program wrote the file. Lengths
+are in mm here.
+"""
+
+from __future__ import annotations
+
+import csv
+import re
+from dataclasses import dataclass
+from pathlib import Path
+
+from optisense.errors import DesignError
+from optisense.sensors.from_meshes.recipe_parts import MM_PER, Units
+
+NAMES = {
+    "designator": ("designator", "ref", "refdes", "reference", "partdesignator"),
+    "x": ("posx", "midx", "centerx", "centrex", "locationx", "x", "refx"),
+    "y": ("posy", "midy", "centery", "centrey", "locationy", "y", "refy"),
+    "rotation": ("rotation", "rot", "angle", "orientation"),
+    "side": ("side", "layer", "tb", "boardside"),
+}
+"""Names of columns in lower case, without units and signs; the first that a file has counts."""
+
+NEEDED = ("designator", "x", "y")
+
+_UNIT = re.compile(r"\b(mm|mils?|inch(?:es)?|in|thou)\b", re.IGNORECASE)
+_NUMBER = re.compile(r"([-+]?\d*\.?\d+(?:[eE][-+]?\d+)?)\s*(mm|mils?|inch|in)?$", re.IGNORECASE)
+_SAYS_UNIT = re.compile(r"unit", re.IGNORECASE)
+
+
+@dataclass(frozen=True)
+class BoardPart:
+    """A part on a board.
+
+    Attributes:
+        designator: its name, such as D1.
+        x, y: mm, in the file's frame.
+        rotation: degrees, anticlockwise.
+        bottom: whether it is on the board's lower side.
+    """
+
+    designator: str
+    x: float
+    y: float
+    rotation: float
+    bottom: bool
+
+
+def read_pick_and_place(path: Path, units: Units | None = None) -> dict[str, BoardPart]:
+    """The parts of a pick-and-place file, by designator.
+
+    Args:
+        path: a table with commas, semicolons, tabs or blanks, as UTF-8 or UTF-16.
+        units: of its lengths, where it does not say.
+
+    Raises:
+        DesignError: it is missing, has no such columns, does not say its unit, or a line holds no
+            numbers; says the line.
+    """
+    lines = _lines(path)
+    for number, line in enumerate(lines):
+        for delimiter in (",", ";", "\t", None):
+            head = _cells(line.lstrip("#"), delimiter)
+            columns = {key: _column(head, key) for key in NAMES}
+            if all(columns[key] is not None for key in NEEDED):
+                rows = [(n, _cells(text, delimiter))
+                        for n, text in enumerate(lines[number + 1 :], start=number + 2)
+                        if text.strip() and not text.lstrip().startswith("#")]  # fmt: skip
+                unit = _unit(head, columns, lines[: number + 1]) or units
+                return _placed(path, rows, columns, unit)
+    raise DesignError(
+        "this is no pick-and-place file: no line names a designator, x and y",
+        where=str(path),
+        hint="Export it as CSV, with columns such as Designator, Mid X, Mid Y, Rotation and Layer",
+    )
+
+
+def _lines(path: Path) -> list[str]:
+    if not path.is_file():
+        raise DesignError("there is no such file", where=str(path), hint="Check the path")
+    data = path.read_bytes()
+    coding = "utf-16" if data[:2] in (b"\xff\xfe", b"\xfe\xff") else "utf-8-sig"
+    try:
+        return data.decode(coding).splitlines()
+    except UnicodeDecodeError:
+        return data.decode("latin-1").splitlines()
+
+
+def _cells(line: str, delimiter: str | None) -> list[str]:
+    """The cells of a line; without a delimiter, blanks part them."""
+    if delimiter is None:
+        found = re.findall(r'"[^"]*"|\S+', line)
+        return [cell.strip('"') for cell in found]
+    return [cell.strip() for cell in next(csv.reader([line], delimiter=delimiter), [])]
+
+
+def _column(head: list[str], key: str) -> int | None:
+    plain = [re.sub(r"\(.*?\)|_?(?:mm|mil)$|[^a-z]", "", cell.lower().strip()) for cell in head]
+    return next((plain.index(name) for name in NAMES[key] if name in plain), None)
+
+
+def _unit(head: list[str], columns: dict[str, int | None], before: list[str]) -> str | None:
+    """The unit that the head of the x column, or a line above that speaks of units, names."""
+    x = columns["x"]
+    assert x is not None  # a file without it is refused
+    told = [head[x].replace("_", " ")] + [line for line in before if _SAYS_UNIT.search(line)]
+    found = [match[1] for text in told if (match := _UNIT.search(text))]
+    return found[0] if found else None
+
+
+def _placed(
+    path: Path, rows: list[tuple[int, list[str]]], columns: dict[str, int | None], unit: str | None
+) -> dict[str, BoardPart]:
+    parts: dict[str, BoardPart] = {}
+    for number, cells in rows:
+
+        def cell(key: str, cells: list[str] = cells) -> str:
+            column = columns[key]
+            return "" if column is None or column >= len(cells) else cells[column]
+
+        name = cell("designator")
+        if not name:
+            continue
+        x, y = (_length(cell(key), unit, path, number) for key in ("x", "y"))
+        turn = _NUMBER.match(cell("rotation"))
+        parts[name] = BoardPart(
+            name, x, y, float(turn[1]) if turn else 0.0, cell("side").lower().startswith("b")
+        )
+    if not parts:
+        raise DesignError("the pick-and-place file has no parts", where=str(path))
+    return parts
+
+
+def _length(text: str, unit: str | None, path: Path, number: int) -> float:
+    """mm."""
+    match = _NUMBER.match(text)
+    if match is None:
+        raise DesignError(
+            f"'{text[:40]}' is no length", where=f"{path}:{number}", hint="Export the file again"
+        )
+    given = (match[2] or unit or "").lower()
+    if not given:
+        raise DesignError(
+            "the file does not say the unit of its lengths",
+            where=str(path),
+            hint="Say it beside the file: units: mm, or units: mil",
+        )
+    known = {"mils": "mil", "thou": "mil", "in": "inch", "inches": "inch"}
+    return float(match[1]) * MM_PER[known.get(given, given)]

@@ -1,0 +1,105 @@
+"""What a recipe says of shapes and parts: their files, how they are put into place, their roles."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import Field, model_validator
+
+from optisense.design import Role
+from optisense.design.fields import Model, Name, Number, Vector
+from optisense.sensors.from_meshes.directions import Side, Way
+
+Units = Literal["mm", "cm", "m", "inch", "um", "mil"]
+MM_PER: dict[str, float] = {
+    "mm": 1.0,
+    "cm": 10.0,
+    "m": 1000.0,
+    "inch": 25.4,
+    "um": 0.001,
+    "mil": 0.0254,
+}
+"""Millimetres in each unit that CAD tools export."""
+
+
+Angle = Annotated[Number, Field(ge=0.0, le=180.0)]
+
+Turn = Annotated[Number, Field(ge=-720.0, le=720.0)]
+Turns = tuple[Turn, Turn, Turn]
+
+
+class ShapeReference(Model):
+    """A shape: a file, or faces of another part."""
+
+    file: str | None = Field(default=None, description="OBJ, STL, PLY or STEP")
+    solid: str | None = Field(default=None, description="which body of a STEP file")
+    units: Units | None = Field(default=None, description="of this file, if not as the others")
+    faces_of: Name | None = Field(default=None, description="the part whose faces these are")
+    towards: Way | None = Field(default=None, description="only the faces that look there")
+    within: Angle | None = Field(default=None, description="degrees, how far they may look aside")
+    tangent: bool | None = Field(
+        default=None, description="and those that go on from them without a sharp edge"
+    )
+    patches: Literal["largest", "all"] | None = Field(
+        default=None, description="of several separate patches: largest; all"
+    )
+
+    mirror: Literal["x", "y", "z"] | None = Field(
+        default=None, description="turn the file's shape over, left to right along this axis"
+    )
+    turn: Turns | None = Field(
+        default=None, description="degrees about x, then y, then z of the file's frame"
+    )
+    move: Vector | None = Field(default=None, description="mm, x y z, after mirror and turn")
+
+    @model_validator(mode="after")
+    def _one_source(self) -> ShapeReference:
+        if (self.file is None) == (self.faces_of is None):
+            raise ValueError("give either a file, or faces_of another part")
+        if self.faces_of is not None and (self.solid is not None or self.units is not None):
+            raise ValueError("solid and units go with a file, not with faces_of")
+        if self.faces_of is not None:
+            for name in ("mirror", "turn", "move"):
+                if getattr(self, name) is not None:
+                    raise ValueError(f"{name} goes with a file; faces move with their part")
+        if self.faces_of is not None and self.towards is None:
+            raise ValueError("faces_of needs towards: where do the faces look? (+z, -x, ...)")
+        for name in ("within", "tangent", "patches"):
+            if getattr(self, name) is not None and self.towards is None:
+                raise ValueError(f"{name} goes with towards, which is missing")
+        return self
+
+
+class PartChoice(ShapeReference):
+    """A part of the sensor."""
+
+    role: Role = Field(description="; ".join(role.value for role in Role))
+    material: Name | None = Field(default=None, description="of the library")
+    priority: Annotated[int, Field(strict=True, ge=-1000, le=1000)] | None = Field(
+        default=None, description="where solids overlap, the higher one counts"
+    )
+    on: Name | None = Field(
+        default=None, description="lies on this part with its own flat face, in the middle"
+    )
+    side: Side | None = Field(default=None, description="the side of that part; +z if left out")
+    flush: list[Side] | None = Field(
+        default=None, description="sides that end where those of that part end, not in the middle"
+    )
+    gap: Number | None = Field(default=None, description="mm between the two; 0 if left out")
+
+    @model_validator(mode="after")
+    def _lies_on_something(self) -> PartChoice:
+        if self.on is None:
+            for name in ("side", "flush", "gap"):
+                if getattr(self, name) is not None:
+                    raise ValueError(f"{name} goes with on, which is missing")
+        elif self.faces_of is not None:
+            raise ValueError("on goes with a file; faces lie where their part lies")
+        axes = [side[-1] for side in self.flush or []]
+        lies_along = (self.side or "+z")[-1]
+        for axis in axes:
+            if axis == lies_along:
+                raise ValueError(f"flush can't name {axis}, along which the part lies on the other")
+            if axes.count(axis) > 1:
+                raise ValueError(f"flush names both sides along {axis}; give one of them")
+        return self
