@@ -14,6 +14,7 @@ from .evaluate import prop as evaluate_prop
 from .evaluate import ui as evaluate_ui
 from .export import operator as export_operator
 from .export import ui as export_ui
+from .lights import choosing as light_choosing
 from .lights import operator as light_operator
 from .lights import ui as light_ui
 from .lights import windows
@@ -26,11 +27,11 @@ from .optimise import prop as optimise_prop
 from .optimise import ui as optimise_ui
 from .scene import cages, fields, object_properties, old_files, properties
 from .sensor import operator as sensor_operator
-from .sensor import starting
+from .sensor import starting, workspace
 from .sensor import ui as sensor_ui
 from .shapes import cage_operator, cage_warnings, reference_operator
 from .shapes import ui as shape_ui
-from .simulate import drafts, indenters, picture, relight
+from .simulate import drafts, editors, indenters, picture, relight
 from .simulate import operator as simulate_operator
 from .simulate import prop as simulate_prop
 from .simulate import ui as simulate_ui
@@ -45,6 +46,7 @@ MODULES = (
     object_properties,
     cages,
     picture,
+    editors,
     simulate_prop,
     relight,
     drafts,
@@ -53,11 +55,13 @@ MODULES = (
     optimise_prop,
     following,
     sensor_operator,
+    workspace,
     reference_operator,
     cage_operator,
     cage_warnings,
     gallery,
     material_operator,
+    light_choosing,
     light_operator,
     windows,
     simulate_operator,

@@ -16,6 +16,9 @@ CHARACTERS = 46
 FONT_SIZE = 11.0
 """Size in points of labels in Blender's own themes."""
 
+_told: set[str] = set()
+"""Titles of the jobs whose outcome is told beside the button that began them."""
+
 EDGES, ICON, BOX = 56.0, 21.0, 14.0
 """Pixels of the sidebar that a line of text can't have: its tabs and edges, an icon, a box."""
 
@@ -91,14 +94,18 @@ def show_job(layout: bpy.types.UILayout, *titles: str) -> bool:
     """The progress of the job, where it is one of these, and a button to cancel it; whether it is.
 
     It stands in place of the button that began the job: Blender would leave that button grey after
-    the job for as long as the mouse rests on it.
+    the job for as long as the mouse rests on it. It is a property that can't be edited: Blender
+    takes a layout's progress bar that the mouse rests on for the next label or picture, once it
+    is gone, and draws that as a full bar.
     """
     now = session.state()
     if now.busy not in titles:
         return False
     row = layout.row(align=True)
     text = "Cancelling ..." if now.cancelling else now.progress or f"{now.busy} ..."
-    row.progress(factor=now.fraction, text=text)
+    bar = row.row(align=True)
+    bar.enabled = False
+    bar.prop(now, "per_cent", text=text, slider=True)
     row.operator("optisense.cancel", text="", icon="CANCEL")
     return True
 
@@ -106,9 +113,16 @@ def show_job(layout: bpy.types.UILayout, *titles: str) -> bool:
 def show_outcome(layout: bpy.types.UILayout, *titles: str) -> None:
     """What there is to tell of the job that was over last, where it is one of these.
 
-    The panel Sensor tells everything, but may be out of sight when a button further down is used.
+    The panel Sensor tells everything else.
     """
+    _told.update(titles)
     if not session.state().busy and session.state().about in titles:
+        show_messages(layout)
+
+
+def show_other_outcomes(layout: bpy.types.UILayout) -> None:
+    """What there is to tell that no other panel tells beside the button that was pressed."""
+    if session.state().about not in _told:
         show_messages(layout)
 
 

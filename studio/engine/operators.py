@@ -16,10 +16,17 @@ def refuse(operator: bpy.types.Operator, text: str) -> set[str]:
     return {"CANCELLED"}
 
 
-def fail(operator: bpy.types.Operator, error: EngineError) -> set[str]:
-    """Refuse as `refuse` does, with the error on the panels too."""
+def fail(operator: bpy.types.Operator, error: EngineError, title: str = "") -> set[str]:
+    """Refuse as `refuse` does, with the error on the panel that tells of the job `title`."""
+    session.state().about = title
     session.say(error)
-    return refuse(operator, error.text())
+    return told(operator, error.text())
+
+
+def told(operator: bpy.types.Operator, text: str) -> set[str]:
+    """Refuse as `refuse` does, where a panel shows the error: Blender opens no window with it."""
+    operator.report({"ERROR" if bpy.app.background else "WARNING"}, text)
+    return {"CANCELLED"}
 
 
 def start(
@@ -39,7 +46,7 @@ def start(
     wait = bpy.app.background if wait is None else wait
     if session.start_job(title, what, on_result, wait=wait, **fields):
         return {"FINISHED"}
-    return refuse(operator, session.state().problem)
+    return told(operator, session.state().problem)
 
 
 def start_with_design(
@@ -49,7 +56,7 @@ def start_with_design(
     try:
         design = handing.design(context.scene)
     except EngineError as error:
-        return fail(operator, error)
+        return fail(operator, error, args[0])
     return start(operator, *args, design=design, **fields)
 
 

@@ -43,6 +43,10 @@ class OPTISENSE_PG_session(bpy.types.PropertyGroup):
         description="The long job that the messages are about", options={"SKIP_SAVE"}
     )
     fraction: FloatProperty(options={"SKIP_SAVE"})
+    per_cent: FloatProperty(
+        name="Progress", description="How much is done", subtype="PERCENTAGE", min=0.0, max=100.0,
+        precision=0, get=lambda self: 100.0 * self.fraction, options={"SKIP_SAVE"},
+    )  # fmt: skip
     progress: StringProperty(options={"SKIP_SAVE"})
     cancelling: BoolProperty(options={"SKIP_SAVE"})
     problem: StringProperty(options={"SKIP_SAVE"})
@@ -311,8 +315,19 @@ def _tick() -> float | None:
     return BRISK if _engine.waiting else TICK
 
 
+@bpy.app.handlers.persistent
+def _undone(*_: Any) -> None:
+    """What went wrong last was wrong with a scene that is another one now."""
+    now = state()
+    now.problem = now.hint = ""
+
+
 PROPERTIES = {"WindowManager": {"optisense": OPTISENSE_PG_session}}
-HOOKS = ((bpy.app.handlers.load_pre, _loading),)
+HOOKS = (
+    (bpy.app.handlers.load_pre, _loading),
+    (bpy.app.handlers.undo_post, _undone),
+    (bpy.app.handlers.redo_post, _undone),
+)
 
 
 def unregister() -> None:

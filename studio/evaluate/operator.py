@@ -7,8 +7,9 @@ from typing import Any
 import bpy
 from bpy.props import StringProperty
 
+from ..core.engine import EngineError
 from ..core.numbers import shown_number
-from ..engine import catalogue, polls, session
+from ..engine import catalogue, handing, polls, session
 from ..engine.operators import Starting, refuse, start_with_design
 from ..scene.paths import objective
 from ..simulate import editors
@@ -122,6 +123,27 @@ class OPTISENSE_OT_show_figure(polls.Checked, bpy.types.Operator):
             return refuse(self, f"The figure can't be read; evaluate again ({error})")
         editors.show(context, shown[chosen[0].name])
         return {"FINISHED"}
+
+
+def draw_again(scene: bpy.types.Scene) -> None:
+    """Trace the chief rays of the sensor that took the place of the one before; nobody waits."""
+    name = scene.name
+
+    def traced(result: dict[str, Any]) -> None:
+        scene = bpy.data.scenes.get(name)
+        if scene is not None:
+            bpy.context.window_manager.optisense_evaluation.rays = rays.show(scene, result)
+
+    try:
+        design = handing.design(scene)
+    except EngineError:  # the buttons say that
+        return
+    request = session.ask(
+        "chief_rays", traced, lambda _: None, design=design, resolution=list(RAYS)
+    )
+    running = session.running()
+    if bpy.app.background and request is not None and running is not None:
+        running.wait(request)
 
 
 class OPTISENSE_OT_show_rays(polls.Asking, bpy.types.Operator):

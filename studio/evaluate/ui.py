@@ -17,6 +17,7 @@ class OPTISENSE_PT_evaluate(SidebarPanel, bpy.types.Panel):
     bl_idname = "OPTISENSE_PT_evaluate"
     bl_label = "Evaluate"
     bl_order = 6
+    bl_options = {"DEFAULT_CLOSED"}
 
     def draw(self, context: bpy.types.Context) -> None:
         layout = self.layout
@@ -40,7 +41,7 @@ class OPTISENSE_PT_evaluate(SidebarPanel, bpy.types.Panel):
             row.operator("optisense.evaluate", icon="CHECKMARK")
         show_outcome(layout, "Evaluating", "Tracing rays")
         if values.scores and values.is_before:
-            layout.label(text="Of the sensor before", icon="INFO")
+            layout.label(text="Scores of the sensor that was open before", icon="INFO")
         for score in values.scores:
             _score(layout.box(), score)
         row = layout.row(align=True)

@@ -20,12 +20,13 @@ from ..core.engine import EngineError
 from ..core.pose import unit
 from ..core.rows import row_on_face
 from ..engine import catalogue, polls, session
+from ..engine.layout import labelled
 from ..engine.operators import ChoosingProperties, refuse
 from ..scene.build import add_light_group
 from ..scene.cameras import add_camera, imaging
 from ..scene.collections import objects_of, select_only
 from ..scene.gather import free_name
-from ..scene.lamps import add_light, lamp_colour, redraw
+from ..scene.lamps import add_light, lamp_colour, redraw, window
 from .windows import ask_for_windows
 
 
@@ -46,6 +47,31 @@ def _groups(operator: Any, context: bpy.types.Context | None) -> catalogue.Items
 
 
 _group_items: catalogue.Items = []
+
+USUAL_LAMP = "smd-3528"
+"""The lamp that a new group begins with: a common, small LED."""
+
+USUAL_PITCH, GAP = 4.0, 0.5
+"""mm: between lamps whose size is not known, and left free between lamps whose size is; boards are
+placed by machines, which need less."""
+
+WAYS = {
+    "PLUS_X": (1.0, 0.0, 0.0),
+    "MINUS_X": (-1.0, 0.0, 0.0),
+    "PLUS_Y": (0.0, 1.0, 0.0),
+    "MINUS_Y": (0.0, -1.0, 0.0),
+    "PLUS_Z": (0.0, 0.0, 1.0),
+    "MINUS_Z": (0.0, 0.0, -1.0),
+}
+
+AIMS = [
+    ("SURFACE", "Sensing surface", "At the middle of the sensing surface"),
+    *(
+        (name, f"{'+' if name[0] == 'P' else '-'}{name[-1].lower()}", "Along this axis")
+        for name in WAYS
+    ),
+]
+"""Where lights may look."""
 
 SOLID = 1e-3
 """The faces of a closed surface look to all sides: their sum is less than this share of all."""
@@ -82,14 +108,50 @@ class OPTISENSE_OT_add_light(polls.Arranging, ChoosingProperties, bpy.types.Oper
         name="Count", min=1, max=1000, default=1, description="How many lights, in a row"
     )
     pitch: FloatProperty(
-        name="Pitch (mm)", description="mm, between the middles of neighbours in the row",
-        min=0.01, default=4.0,
+        name="Pitch (mm)", description="mm, between the middles of neighbours in the row; 0 leaves "
+        f"{GAP:g} mm between lamps of this size",
+        min=0.0, default=0.0,
     )  # fmt: skip
+    place: FloatVectorProperty(
+        name="Place (mm)", size=3, precision=3,
+        description="mm, of the middle of the row where no light reference is selected",
+    )  # fmt: skip
+    aim: EnumProperty(
+        name="Aim", items=AIMS, default="SURFACE",
+        description="Which way the lights shine where no light reference is selected",
+    )  # fmt: skip
+
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        models = [name for name, _, _ in _light_models(self, context)]
+        if not self.properties.is_property_set("model") and USUAL_LAMP in models:
+            self.model = USUAL_LAMP
+        self.place = context.scene.cursor.location
+        return context.window_manager.invoke_props_dialog(self, width=360)
+
+    def draw(self, context: bpy.types.Context) -> None:
+        column = labelled(self.layout)
+        column.prop(self, "group")
+        group = context.scene.optisense.light_groups.get(self.group)
+        if group is None:
+            for name in ("name", "model", "colour", "flux"):
+                column.prop(self, name)
+        else:
+            column.label(text=f"{group.model}, {group.flux:g} mW, as the others of the group")
+        column.prop(self, "count")
+        column.prop(self, "pitch")
+        references = _references(context, "light")
+        if references:
+            names = ", ".join(each.name for each in references)
+            column.label(text=f"On the reference {names}", icon="PINNED")
+        else:
+            column.prop(self, "place")
+            column.prop(self, "aim")
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         scene = context.scene
         design = scene.optisense
-        poses = self._poses(context)
+        pitch = self.pitch or self._fitting_pitch(context)
+        poses = self._poses(context, pitch)
         if not poses:
             return refuse(self, "The light reference is an empty mesh")
         if self.group in ("NEW", ""):
@@ -106,7 +168,20 @@ class OPTISENSE_OT_add_light(polls.Arranging, ChoosingProperties, bpy.types.Oper
         ask_for_windows(scene)
         return {"FINISHED"}
 
-    def _poses(self, context: bpy.types.Context) -> list[dict[str, Any]]:
+    def _fitting_pitch(self, context: bpy.types.Context) -> float:
+        """mm: the larger side of the lamp's window, and a gap."""
+        group = context.scene.optisense.light_groups.get(self.group)
+        if self.count == 1:
+            return USUAL_PITCH
+        if group is not None:
+            return max(window(group)[1]) + GAP
+        try:
+            found = session.ask_and_wait("lamp", entry=self.model)["window"]["size"]
+        except EngineError:
+            return USUAL_PITCH
+        return max(found or (0.0,)) + GAP
+
+    def _poses(self, context: bpy.types.Context, pitch: float) -> list[dict[str, Any]]:
         middle = _middle(context.scene)
         references = _references(context, "light")
         poses = []
@@ -115,14 +190,15 @@ class OPTISENSE_OT_add_light(polls.Arranging, ChoosingProperties, bpy.types.Oper
             if not len(corners):
                 continue
             normal = _normal(reference, corners, middle)
-            poses += row_on_face(corners, normal, np.array(middle), self.count, self.pitch)
+            poses += row_on_face(corners, normal, np.array(middle), self.count, pitch)
         if not references:
-            start = context.scene.cursor.location
-            way = middle - start
+            given = self.properties.is_property_set("place")
+            start = Vector(self.place) if given else context.scene.cursor.location
+            way = middle - start if self.aim == "SURFACE" else Vector(WAYS[self.aim])
             way = way.normalized() if way.length > 1e-6 else Vector((0.0, 0.0, 1.0))
             across = way.orthogonal().normalized()
             for number in range(self.count):
-                shift = (number - (self.count - 1) / 2) * self.pitch
+                shift = (number - (self.count - 1) / 2) * pitch
                 place = start + across * shift
                 position = [round(value, 4) for value in place]
                 poses.append({"position": position, "direction": unit(way)})
@@ -192,7 +268,7 @@ class OPTISENSE_OT_add_camera(polls.Arranging, ChoosingProperties, bpy.types.Ope
         scale = min(1.0, 320 / width)
         for each in objects_of(scene, "CAMERA"):
             bpy.data.objects.remove(each)
-        add_camera(
+        camera = add_camera(
             scene,
             {
                 "model": self.model,
@@ -205,6 +281,7 @@ class OPTISENSE_OT_add_camera(polls.Arranging, ChoosingProperties, bpy.types.Ope
                 **(imaging(entry["value"]) if self.imaging else {}),
             },
         )
+        select_only(camera)
         return {"FINISHED"}
 
 
@@ -249,6 +326,23 @@ class OPTISENSE_OT_set_group(polls.Checked, ChoosingProperties, bpy.types.Operat
     )
 
     checks = (polls.has_design, polls.selecting("LIGHT", what="lights"))
+
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        """Offer another group than the one that all of them are in."""
+        names = [group.name for group in context.scene.optisense.light_groups]
+        now = {each.optisense.group for each in polls.picked(context, "LIGHT")}
+        others = [name for name in names if {name} != now]
+        self.group = others[0] if others else "NEW"
+        return context.window_manager.invoke_props_dialog(self)
+
+    def draw(self, context: bpy.types.Context) -> None:
+        column = labelled(self.layout)
+        now = sorted({each.optisense.group for each in polls.picked(context, "LIGHT")})
+        count = len(polls.picked(context, "LIGHT"))
+        column.label(text=f"{count} light{'s' * (count != 1)} of {', '.join(now)}")
+        column.prop(self, "group")
+        if self.group in ("NEW", ""):
+            column.prop(self, "name")
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         design = context.scene.optisense

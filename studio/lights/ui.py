@@ -25,6 +25,7 @@ class OPTISENSE_PT_lights(SidebarPanel, bpy.types.Panel):
     bl_idname = "OPTISENSE_PT_lights"
     bl_label = "Lights and Camera"
     bl_order = 4
+    bl_options = {"DEFAULT_CLOSED"}
 
     def draw(self, context: bpy.types.Context) -> None:
         layout = self.layout
@@ -61,7 +62,7 @@ def _camera(layout: bpy.types.UILayout, camera: bpy.types.PropertyGroup) -> None
     row.operator("optisense.look_through", text="", icon="HIDE_OFF")
     column = labelled(layout)
     column.prop(camera, "projection")
-    column.prop(camera, "fov", text="Field of view (°)")
+    column.prop(camera, "fov", text="Horizontal view (°)")
     column.prop(camera, "pixels")
     given = imaging(json.loads(camera.data)) if camera.data else {}
     if given:

@@ -225,7 +225,7 @@ class OPTISENSE_OT_keep_material(polls.Checked, bpy.types.Operator):
                 source=self.source,
             )
         except EngineError as error:
-            return fail(self, error)
+            return fail(self, error, KEEPING)
         begun = gallery.is_begun(kind)
         gallery.forget(kind, name)
 

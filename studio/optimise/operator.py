@@ -13,6 +13,8 @@ from ..core import vary
 from ..core.engine import EngineError
 from ..engine import handing, polls, session
 from ..engine.operators import ChoosingFile, Starting, fail, refuse, start
+from ..evaluate import rays
+from ..evaluate.operator import draw_again
 from ..scene.paths import chosen, objective
 from ..sensor.opening import new_stage, open_stage
 from . import following
@@ -126,7 +128,7 @@ class OPTISENSE_OT_search(polls.Checked, Starting, bpy.types.Operator):
         try:
             design = handing.design(context.scene)
         except EngineError as error:
-            return fail(self, error)
+            return fail(self, error, TITLE)
         following.begin()
         fields: dict[str, Any] = {"budget": search.budget} if search.budget else {}
         return start(
@@ -211,14 +213,19 @@ class OPTISENSE_OT_apply_best(_WithStudy, bpy.types.Operator):
         try:
             stage = new_stage()
         except EngineError as error:
-            return fail(self, error)
+            return fail(self, error, "Applying")
 
         def applied(_: dict[str, Any]) -> None:
             scene = bpy.data.scenes.get(name)
             if scene is not None:
                 following.clear_ghosts(scene)
                 open_stage(
-                    scene, stage, wait=wait, folder=folder if saved else "", keep_others=True
+                    scene,
+                    stage,
+                    wait=wait,
+                    folder=folder if saved else "",
+                    keep_others=True,
+                    then=draw_again if rays.drawn(scene) else None,
                 )
 
         return start(

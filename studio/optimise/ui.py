@@ -23,6 +23,7 @@ class OPTISENSE_PT_optimise(SidebarPanel, bpy.types.Panel):
     bl_idname = "OPTISENSE_PT_optimise"
     bl_label = "Optimise"
     bl_order = 7
+    bl_options = {"DEFAULT_CLOSED"}
 
     def draw(self, context: bpy.types.Context) -> None:
         layout = self.layout

@@ -45,6 +45,7 @@ def add_camera(scene: bpy.types.Scene, values: dict[str, Any]) -> bpy.types.Obje
     camera.lock_scale = (True, True, True)
     camera.data.display_size = DRAWN_SIZE
     camera.data.clip_start = 0.01
+    camera.show_in_front = True  # a housing would hide it
     collection(scene, OPTICAL_SYSTEM).objects.link(camera)
     show(camera)
     scene.camera = camera

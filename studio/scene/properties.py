@@ -106,6 +106,15 @@ class OPTISENSE_PG_light_group(HasFields, bpy.types.PropertyGroup):
             each(self.id_data, self)
 
 
+def _select_group(design: bpy.types.PropertyGroup, context: bpy.types.Context) -> None:
+    for each in when_group_chosen:
+        each(design.id_data, design.light_group_index)
+
+
+when_group_chosen: list[Callable[[bpy.types.Scene, int], None]] = []
+"""Called with the index of a light group that is chosen in the list."""
+
+
 class OPTISENSE_PG_design(bpy.types.PropertyGroup):
     """The design of a scene."""
 
@@ -119,7 +128,10 @@ class OPTISENSE_PG_design(bpy.types.PropertyGroup):
     coating: PointerProperty(type=OPTISENSE_PG_coating)
     materials: CollectionProperty(type=OPTISENSE_PG_material)
     light_groups: CollectionProperty(type=OPTISENSE_PG_light_group)
-    light_group_index: IntProperty(options={"HIDDEN"})
+    light_group_index: IntProperty(
+        name="Light group", description="A click on a group selects its lights",
+        options={"HIDDEN"}, update=_select_group,
+    )  # fmt: skip
 
     @property
     def is_open(self) -> bool:

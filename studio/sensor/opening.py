@@ -13,6 +13,7 @@ from ..core import mesh_file
 from ..engine import handing, session
 from ..lights.windows import ask_for_windows
 from ..scene.build import build
+from ..scene.remembering import looks_of, restore
 from ..scene.startup import clear_startup
 from ..scene.views import show_design
 from .warming import warm_up
@@ -76,7 +77,8 @@ def open_stage(
         stage: the folder.
         wait: until it is there.
         folder: the user's own folder of it; empty where it is not saved.
-        keep_others: the contacts and references of the sensor before stay.
+        keep_others: the contacts and references of the sensor before stay, and so do the view and
+            what is selected and hidden.
         then: called when it is open.
     """
     name = scene.name
@@ -90,10 +92,14 @@ def open_stage(
         clear_startup(scene)
         picture_is_old()
         meshes = {key: mesh_file.read(stage / part["mesh"]) for key, part in parts}
+        before = looks_of(scene) if keep_others else None
         build(scene, document, meshes, keep_others=keep_others)
         scene.optisense.folder = folder or str(stage)
         scene.optisense.is_saved = bool(folder)
-        show_design(scene)
+        if before is None:
+            show_design(scene)
+        else:
+            restore(scene, before)
         ask_for_windows(scene)
         if not bpy.app.background:  # scripts say themselves what they want
             warm_up(scene)

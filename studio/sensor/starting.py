@@ -11,6 +11,8 @@ import bpy
 from ..core.engine import EngineError
 from ..engine import session
 from ..engine.preferences import engine_command
+from ..scene.startup import clear_startup
+from . import workspace
 from .opening import open_source, picture_is_old
 from .warming import warm_up
 
@@ -20,13 +22,20 @@ ENVIRONMENT = "OPTISENSE_OPEN"
 """Names the design that `optisense studio DESIGN` was asked to open."""
 
 
+_hidden = False
+"""Whether the greeting was switched off here."""
+
+
 def _start() -> None:
+    _splash(True)
     if not engine_command():
         return
     source = os.environ.pop(ENVIRONMENT, "")
     try:
         session.engine()
         if source:
+            clear_startup(bpy.context.scene)
+            workspace.show(bpy.context)
             folder = source if Path(source).is_dir() else ""
             open_source(bpy.context.scene, source, folder, wait=False)
         elif bpy.context.scene.optisense.is_open:
@@ -44,11 +53,25 @@ def _loaded(*_: Any) -> None:
         warm_up(scene)
 
 
+def _splash(is_shown: bool) -> None:
+    """Hide Blender's greeting while a design is on its way, or let the next start have it again."""
+    global _hidden
+    preferences = bpy.context.preferences
+    if _hidden == (not is_shown):
+        return
+    changed = preferences.is_dirty
+    preferences.view.show_splash = is_shown
+    preferences.is_dirty = changed
+    _hidden = not is_shown
+
+
 HOOKS = ((bpy.app.handlers.load_post, _loaded),)
 
 
 def register() -> None:
     if not bpy.app.background:
+        if os.environ.get(ENVIRONMENT) and bpy.context.preferences.view.show_splash:
+            _splash(False)
         bpy.app.timers.register(_start, first_interval=SOON)
 
 

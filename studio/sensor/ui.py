@@ -5,7 +5,7 @@ from __future__ import annotations
 import bpy
 
 from ..engine import session
-from ..engine.layout import SidebarPanel, labelled, paragraph, show_job, show_messages
+from ..engine.layout import TAB, SidebarPanel, labelled, paragraph, show_job, show_other_outcomes
 from ..engine.preferences import HOW_TO_GET, engine_command
 
 
@@ -38,5 +38,7 @@ class OPTISENSE_PT_sensor(SidebarPanel, bpy.types.Panel):
                 paragraph(layout, design.folder, "FILE_FOLDER")
             if not show_job(layout, "Checking"):
                 layout.operator("optisense.check", icon="CHECKMARK")
+        if context.workspace is not None and context.workspace.name != TAB:
+            layout.operator("optisense.workspace", icon="WORKSPACE")
         show_job(layout, "Opening the sensor", "Saving")
-        show_messages(layout)
+        show_other_outcomes(layout)

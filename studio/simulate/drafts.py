@@ -10,6 +10,7 @@ import bpy
 from ..core.engine import EngineError, Request
 from ..engine import handing, session
 from . import requests
+from .exposing import exposure
 
 NAME = "draft"
 NONE = "No draft: "
@@ -71,6 +72,7 @@ def _ask() -> None:
                 design=design,
                 contacts=contacts,
                 draft=True,
+                exposure=exposure(scene),
                 files=["pixels"],
                 name=NAME,
             )

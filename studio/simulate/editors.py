@@ -4,6 +4,11 @@ from __future__ import annotations
 
 import bpy
 
+from . import picture
+
+SOON = 0.05
+"""Seconds after which Blender has handled what it was told."""
+
 WAIT = 0.2
 """Seconds until an area that was made or changed has its size."""
 
@@ -40,6 +45,16 @@ def _new_editor(context: bpy.types.Context) -> bpy.types.Area:
     return editor
 
 
+def _fit_soon(name: str) -> None:
+    """The same a moment later, where the image has its size; an empty editor shows it first."""
+    if not bpy.app.background:
+        for window in bpy.context.window_manager.windows:
+            for area in window.screen.areas:
+                if area.type == "IMAGE_EDITOR" and area.spaces.active.image is None:
+                    area.spaces.active.image = bpy.data.images[name]
+        bpy.app.timers.register(lambda: _fit(name), first_interval=0.0)
+
+
 def _fit(name: str) -> None:
     """Show the whole picture in every Image Editor that shows it."""
     image = bpy.data.images.get(name)
@@ -49,3 +64,6 @@ def _fit(name: str) -> None:
                 region = next(each for each in area.regions if each.type == "WINDOW")
                 with bpy.context.temp_override(window=window, area=area, region=region):
                     bpy.ops.image.view_all(fit_view=True)
+
+
+HOOKS = ((picture.when_resized, _fit_soon),)

@@ -39,7 +39,7 @@ class OPTISENSE_OT_simulate(polls.Asking, Starting, bpy.types.Operator):
         try:
             fields = requests.fields(context.scene)
         except EngineError as error:
-            return fail(self, error)
+            return fail(self, error, "Simulating")
         return start(
             self,
             "Simulating",

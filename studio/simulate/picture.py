@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 import bpy
@@ -14,19 +15,48 @@ IMAGE = "OptiSense picture"
 _previews: bpy.utils.previews.ImagePreviewCollection | None = None
 
 
-def show(pixels: NDArray[np.float32]) -> bpy.types.Image:
-    """Show a picture (h, w, 4), row 0 at the bottom, 0 to 1, in place of the one before."""
+when_resized: list[Callable[[str], None]] = []
+"""Called with the name of an image that is new, or has another size than before."""
+
+
+def show(pixels: NDArray[np.float32], size: tuple[int, int] | None = None) -> bpy.types.Image:
+    """Show a picture (h, w, 4), row 0 at the bottom, 0 to 1, in place of the one before.
+
+    Args:
+        pixels: the picture.
+        size: width and height of the image that Image Editors show, to which a smaller picture is
+            enlarged: a draft then takes the same place as the picture before. None is its own.
+    """
+    if size is not None:
+        pixels = enlarged(pixels, size)
     height, width = pixels.shape[:2]
     image = bpy.data.images.get(IMAGE)
     if image is None:
         image = bpy.data.images.new(IMAGE, width, height)
+        for each in when_resized:
+            each(IMAGE)
     elif tuple(image.size) != (width, height):
         image.scale(width, height)
+        for each in when_resized:
+            each(IMAGE)
     flat = np.ascontiguousarray(pixels, dtype=np.float32).ravel()
     image.pixels.foreach_set(flat)
     image.update()
     show_icon(IMAGE, pixels)
     return image
+
+
+def enlarged(pixels: NDArray[np.float32], size: tuple[int, int]) -> NDArray[np.float32]:
+    """(height, width, 4) of a picture, each pixel as often as needed for a width and height.
+
+    A picture that is as large already, or larger, stays as it is.
+    """
+    height, width = pixels.shape[:2]
+    if width >= size[0] or height >= size[1]:
+        return pixels
+    rows = np.arange(size[1]) * height // size[1]
+    columns = np.arange(size[0]) * width // size[0]
+    return pixels[rows[:, None], columns]
 
 
 def show_icon(name: str, pixels: NDArray[np.float32]) -> None:

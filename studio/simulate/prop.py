@@ -11,10 +11,12 @@ from bpy.props import (
     StringProperty,
 )
 
+from .exposing import exposure_changed
+
 SIZES = [
-    ("160", "160 pixels wide", "A quick look"),
-    ("320", "320 pixels wide", ""),
-    ("640", "640 pixels wide", ""),
+    ("160", "160 pixels", "Of the longer side: a quick look"),
+    ("320", "320 pixels", "Of the longer side"),
+    ("640", "640 pixels", "Of the longer side"),
     ("CAMERA", "As the camera", "The camera's own resolution"),
 ]
 
@@ -38,11 +40,14 @@ class OPTISENSE_PG_simulation(bpy.types.PropertyGroup):
     )  # fmt: skip
     auto_exposure: BoolProperty(
         name="Automatic exposure", default=True,
-        description="As bright as fits into the picture; off keeps pictures comparable",
+        description="As bright as fits into the picture; off keeps it as it is, so that pictures "
+        "can be compared",
+        update=exposure_changed,
     )  # fmt: skip
     exposure: FloatProperty(
         name="Exposure", min=1e-6, max=1e9, default=30.0,
         description="Factor from radiance to the brightness of the picture",
+        update=exposure_changed,
     )  # fmt: skip
     seed: IntProperty(
         name="Seed", min=0, max=2**31 - 1,

@@ -12,6 +12,7 @@ from ..core.numbers import short
 from ..engine import session
 from ..scene.properties import when_relit
 from . import picture
+from .exposing import exposure, keep_exposure, shown_size, when_exposed
 
 NAME = "relit"
 AGAIN = "Simulate again to see these lights"
@@ -74,13 +75,16 @@ def _ask() -> None:
         on_error=_refused,
         image=image,
         lights=_shown,
+        exposure=exposure(bpy.context.scene),
         files=["pixels"],
         name=NAME,
     )
 
 
 def _take(result: dict[str, Any]) -> None:
-    picture.show(np.load(result["files"]["pixels"]))
+    scene = bpy.context.scene
+    picture.show(np.load(result["files"]["pixels"]), shown_size(scene))
+    keep_exposure(scene, result["exposure"])
     bpy.context.window_manager.optisense_picture.is_relit = True
     session.redraw()
 
@@ -116,6 +120,7 @@ HOOKS = (
     (session.when_started, _forget),
     (session.when_leaving, _leave),
     (when_relit, wanted),
+    (when_exposed, wanted),
     (bpy.app.handlers.undo_post, _undone),
     (bpy.app.handlers.redo_post, _undone),
 )

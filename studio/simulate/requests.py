@@ -8,22 +8,12 @@ import bpy
 import numpy as np
 
 from ..engine import handing, session
-from ..scene.collections import objects_of
 from ..scene.contacts import pressing
 from ..scene.offending import select
 from . import picture, relight
+from .exposing import exposure, keep_exposure, resolution, shown_size
 
 LATEST = "picture"
-
-
-def resolution(scene: bpy.types.Scene) -> list[int] | None:
-    """Width and height to simulate; None is the camera's own."""
-    size = scene.optisense_simulation.size
-    cameras = objects_of(scene, "CAMERA")
-    if size == "CAMERA" or not cameras:
-        return None
-    width, height = cameras[0].optisense.pixels
-    return [int(size), max(1, round(int(size) * height / width))]
 
 
 def fields(scene: bpy.types.Scene) -> dict[str, Any]:
@@ -38,7 +28,7 @@ def fields(scene: bpy.types.Scene) -> dict[str, Any]:
         "contacts": handing.contacts(scene),
         "noise": round(settings.noise, 3),
         "seed": settings.seed,
-        "exposure": "auto" if settings.auto_exposure else settings.exposure,
+        "exposure": exposure(scene),
         "files": ["picture", "pixels"],
         "name": LATEST,
     }
@@ -50,8 +40,9 @@ def fields(scene: bpy.types.Scene) -> dict[str, Any]:
 
 def take(result: dict[str, Any], *, draft: bool) -> None:
     """Show the engine's answer."""
-    pixels = np.load(result["files"]["pixels"])
-    picture.show(pixels)
+    scene = bpy.context.scene
+    picture.show(np.load(result["files"]["pixels"]), shown_size(scene) if draft else None)
+    keep_exposure(scene, result["exposure"])
     now = bpy.context.window_manager.optisense_picture
     now.image = result["image"]
     relight.shown(result["lights"])

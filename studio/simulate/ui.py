@@ -25,22 +25,17 @@ class OPTISENSE_PT_simulate(SidebarPanel, bpy.types.Panel):
         row = column.row(align=True)
         row.operator("optisense.nine_contacts", icon="GRID")
         row.operator("optisense.clear_contacts", icon="X")
-        active = context.active_object
-        if active is not None and active.optisense.kind == "CONTACT":
-            _contact(labelled(layout.box()), active.optisense)
         settings = scene.optisense_simulation
-        column = labelled(layout)
-        column.prop(settings, "size")
-        column.prop(settings, "noise", text="Noise (%)")
-        column.prop(settings, "auto_exposure")
-        if not settings.auto_exposure:
-            column.prop(settings, "exposure")
-        column.prop(settings, "draft")
+        layout.prop(settings, "draft")
         row = layout.row()
         row.scale_y = 1.4
         if not show_job(row, "Simulating", "Finding nine places"):
             row.operator("optisense.simulate", icon="RENDER_STILL")
         show_outcome(layout, "Simulating", "Finding nine places")
+        active = context.active_object
+        if active is not None and active.optisense.kind == "CONTACT":
+            _contact(labelled(layout.box()), active.optisense)
+        _settings(labelled(layout), settings)
         now = context.window_manager.optisense_picture
         if not now.shown:
             count = len(pressing(scene))
@@ -50,11 +45,22 @@ class OPTISENSE_PT_simulate(SidebarPanel, bpy.types.Panel):
         if icon:
             layout.template_icon(icon_value=icon, scale=11.0)
         if now.is_before:
-            layout.label(text="Of the sensor before", icon="INFO")
+            layout.label(text="Picture of the sensor that was open before", icon="INFO")
         kind = "Draft, " if now.is_draft else "Relit, " if now.is_relit else ""
         layout.label(text=kind + now.summary)
         layout.operator("optisense.show_picture", icon="IMAGE_DATA")
         _light_levels(layout, scene)
+
+
+def _settings(column: bpy.types.UILayout, settings: bpy.types.PropertyGroup) -> None:
+    """How pictures are made; always as high, so that nothing below moves."""
+    column.prop(settings, "size")
+    column.prop(settings, "noise", text="Noise (%)")
+    row = column.row(align=True, heading="Exposure")
+    row.prop(settings, "auto_exposure", text="Automatic")
+    factor = row.row()
+    factor.enabled = not settings.auto_exposure
+    factor.prop(settings, "exposure", text="")
 
 
 def _contact(column: bpy.types.UILayout, values: bpy.types.PropertyGroup) -> None:

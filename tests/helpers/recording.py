@@ -41,10 +41,11 @@ class Recording:
 
         return Values()
 
-    def prop(self, data: Any, name: str, icon: str = "NONE", **_: Any) -> None:
+    def prop(self, data: Any, name: str, text: str = "", icon: str = "NONE", **_: Any) -> None:
         assert icon in ICONS, icon
         assert name in data.bl_rna.properties, f"{data} has no {name}"
         self.properties.append(name)
+        self.texts += [text] if text else []
 
     def prop_search(self, data: Any, name: str, where: Any, items: str, **_: Any) -> None:
         self.prop(data, name)
@@ -70,10 +71,6 @@ class Recording:
     def template_icon_view(self, data: Any, name: str, **_: Any) -> None:
         self.prop(data, name)
         self.texts.append("<pictures>")
-
-    def progress(self, factor: float = 0.0, text: str = "", **_: Any) -> None:
-        assert 0.0 <= factor <= 1.0
-        self.texts.append(text)
 
 
 def draw(panel: type) -> Recording | None:

@@ -84,7 +84,7 @@ def scene(_extension: None) -> Any:
 
     bpy.ops.wm.read_homefile(use_empty=True)
     now = session.state()
-    now.problem = now.hint = now.note = now.busy = ""
+    now.problem = now.hint = now.note = now.busy = now.about = ""
     bpy.context.window_manager.optisense_picture.shown = False
     return bpy.context.scene
 

@@ -331,7 +331,10 @@ def test_scores_rays_a_search_and_its_best_design(
     assert contacts[0].constraints[0].target == mini.objects["skin"]  # that of the new design
     best = gather_document(mini)["cages"]["skin"]["points"][14]["z"]
     assert f"{best:.4g}" == found.values.rpartition("= ")[2]
-    assert not [each for each in mini.objects if each.optisense.kind == "SHOWN"]
+    # Rays are drawn anew, through the new design; the ghost is the design now.
+    shown = [each.optisense.key for each in mini.objects if each.optisense.kind == "SHOWN"]
+    assert shown and all(each.startswith("ray ") for each in shown)
+    assert "hit" in manager.optisense_evaluation.rays
     kept = bpy.ops.optisense.keep_variant(filepath=str(tmp_path / "variant"))
     assert kept == {"FINISHED"} and (tmp_path / "variant" / "design.yaml").is_file()
     assert bpy.ops.optisense.resume() == {"FINISHED"}

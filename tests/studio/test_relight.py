@@ -25,6 +25,9 @@ def test_undo_relights_the_picture(mini: Any) -> None:
     assert bpy.ops.optisense.simulate() == {"FINISHED"}
     bpy.ops.ed.undo_push(message="Simulate")
     before = shown()
+    mini.optisense_simulation.auto_exposure = False
+    assert np.array_equal(shown(), before)
+    bpy.ops.ed.undo_push(message="Exposure")
     bpy.context.scene.optisense.light_groups[0].flux = 20.0
     brighter = shown()
     assert brighter.mean() > before.mean()

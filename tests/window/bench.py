@@ -140,6 +140,7 @@ class Bench(Sidebar):
         x, y = self.find("optisense.open", across=0.25)
         self.choose((x, y - 22), names.index(name))
         self.until("scene().optisense.is_open and not state().busy")
+        self.open_all()
 
     def photograph(self, name: str) -> None:
         """Keep a picture of this step for the documentation, where that is wanted."""

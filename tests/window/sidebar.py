@@ -19,6 +19,9 @@ BESIDE = 5
 HEAD = 28
 """Pixels from the head of a closed panel to the next one."""
 
+PANELS = 8
+"""Of the tab, where a sensor is open."""
+
 SCROLLED_TO = "region('VIEW_3D', 'UI').view2d.region_to_view(0, 0)[1]"
 """How far the sidebar is scrolled."""
 
@@ -114,6 +117,17 @@ class Sidebar(ABC):
 
     def only(self, panel: int) -> None:
         """Open one panel and close all others, by clicks on their heads; the first is 0."""
+        x, y = self._close_all()
+        self._on_head(x, y + HEAD * panel)
+
+    def open_all(self) -> None:
+        """Open all panels, the last one first: those above it stay where they are."""
+        x, y = self._close_all()
+        for panel in reversed(range(PANELS)):
+            self._on_head(x, y + HEAD * panel)
+
+    def _close_all(self) -> tuple[float, float]:
+        """Close all panels; where the head of the first is."""
         left, top, width, _ = self.sidebar()
         x, y = left + width / 2, top + HEAD / 2
         for _ in range(TRIES):
@@ -125,7 +139,7 @@ class Sidebar(ABC):
                 break
         else:
             raise AssertionError("the panels can't be closed")
-        self._on_head(x, y + HEAD * panel)
+        return x, y
 
     def _on_head(self, x: float, y: float, held: str = "") -> None:
         """Click on the head of a panel, while a key is down if one is named."""

@@ -6,6 +6,7 @@ OPTISENSE_WINDOW_PICTURES names.
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 import yaml
 
@@ -14,8 +15,8 @@ from .bench import Bench
 MOVED = 1.5
 """mm, how far a light is moved."""
 
-REPORT = 7
-"""The panel's place in the sidebar; the first is 0."""
+LIGHTS, SIMULATE, REPORT = 3, 4, 7
+"""Places of panels in the sidebar; the first is 0."""
 
 VARY = 'wm.call_menu(name="OPTISENSE_MT_vary")'
 """The button *Vary*."""
@@ -31,6 +32,9 @@ LAST_PICTURE = (222, 114)
 
 EDITOR_FITS = "area('IMAGE_EDITOR').spaces.active.zoom[0] != 1.0"
 """An Image Editor has been told to show its picture whole."""
+
+SELECTED = (71, 114, 179)
+"""The colour of what is pressed or full in Blender's theme."""
 
 CORNERS_ACROSS = (
     "on_screen(each.matrix_world @ Vector(corner))[0]"
@@ -106,6 +110,11 @@ def test_a_picture_appears(bench: Bench) -> None:
         "[sum(list(bpy.data.images['OptiSense picture'].pixels)[c::4]) for c in range(3)]"
     )
     assert min(red, green, blue) > 0.05 * width * height
+    bench.drawn()  # the mouse still rests on the button
+    left, top, across, height = bench.sidebar()
+    panels = np.asarray(bench.desktop.shown().crop((left, top, left + across, top + height)))
+    blue = (abs(panels.astype(int) - SELECTED) < 12).all(axis=2)
+    assert blue.mean() < 0.05, "the panel shows the picture, and not a full bar"
     bench.bring("optisense.show_picture", 0.95)
     bench.photograph("3-picture")
 
@@ -210,3 +219,30 @@ def test_a_report_and_files_for_the_workshop_are_written(bench: Bench) -> None:
     bench.until("'files in' in state().note")
     written = bench.home / "gelsight-mini-workshop"
     assert {"gel.stl", "skin.stl"} <= {each.name for each in written.rglob("*.stl")}
+
+
+def test_a_click_on_a_group_selects_its_lights(bench: Bench) -> None:
+    bench.only(LIGHTS)
+    _, y = bench.find("flux", across=0.85)  # of the first group; its name is further left
+    left, _, width, _ = bench.sidebar()
+    bench.desktop.click(left + 0.2 * width, y + 22)
+    chosen = "[each.optisense.group for each in scene().objects if each.select_get()]"
+    second = bench.see("scene().optisense.light_groups[1].name")
+    bench.until(f"set({chosen}) == {{{second!r}}}")
+    assert len(bench.see(chosen)) == 5
+
+
+def test_the_workspace_shows_the_picture_whole(bench: Bench) -> None:
+    bench.only(0)
+    bench.press("optisense.workspace")
+    bench.until("window().workspace.name == 'OptiSense'")
+    bench.until("sorted(a.type for a in window().screen.areas) == ['IMAGE_EDITOR', 'VIEW_3D']")
+    bench.until("region('VIEW_3D', 'UI').active_panel_category == 'OptiSense'")
+    editor = "area('IMAGE_EDITOR').spaces.active"
+    bench.until(f"{editor}.image is not None")
+    bench.only(SIMULATE)
+    bench.press("optisense.simulate")
+    bench.until("state().busy == 'Simulating' or not manager.optisense_picture.is_before")
+    bench.rest()
+    bench.until("area('IMAGE_EDITOR').spaces.active.zoom[0] != 1.0")
+    bench.photograph("workspace")

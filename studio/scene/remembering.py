@@ -1,0 +1,62 @@
+"""What is selected and hidden, by what it is in the design, so that it can be so again."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import bpy
+
+from .collections import objects_of
+
+Name = tuple[str, str, int]
+"""What an object is: its kind, its name or that of its group, and its number among those."""
+
+KINDS = ("PART", "LIGHT", "CAMERA", "CAGE", "CONTACT", "REFERENCE")
+
+
+@dataclass
+class Looks:
+    """What was selected, active and hidden."""
+
+    selected: set[Name] = field(default_factory=set)
+    hidden: set[Name] = field(default_factory=set)
+    active: Name | None = None
+
+
+def looks_of(scene: bpy.types.Scene) -> Looks:
+    """How the objects of a scene's design are shown."""
+    layer, found = bpy.context.view_layer, Looks()
+    for name, item in _named(scene).items():
+        if item.name not in layer.objects:
+            continue
+        if item.select_get():
+            found.selected.add(name)
+        if item.hide_get():
+            found.hidden.add(name)
+        if item == layer.objects.active:
+            found.active = name
+    return found
+
+
+def restore(scene: bpy.types.Scene, looks: Looks) -> None:
+    """Show the objects of a scene's design as those before were."""
+    layer = bpy.context.view_layer
+    layer.update()  # it does not know new objects before
+    for name, item in _named(scene).items():
+        if item.name not in layer.objects:
+            continue
+        item.hide_set(name in looks.hidden)
+        item.select_set(name in looks.selected)
+        if name == looks.active:
+            layer.objects.active = item
+
+
+def _named(scene: bpy.types.Scene) -> dict[Name, bpy.types.Object]:
+    found: dict[Name, bpy.types.Object] = {}
+    counts: dict[tuple[str, str], int] = {}
+    for item in objects_of(scene, *KINDS):
+        own = item.optisense
+        key = (own.kind, own.group if own.kind == "LIGHT" else own.key)
+        counts[key] = counts.get(key, -1) + 1
+        found[(*key, counts[key])] = item
+    return found
