@@ -37,6 +37,7 @@ class Item:
         part: the maker's order number, "" where unknown.
         package: mm, width x length x height of a light, "" where unknown.
         note: what to mind.
+        designators: of lights, as in the tables of places; such as D1-D5.
     """
 
     kind: str
@@ -49,6 +50,7 @@ class Item:
     part: str = ""
     package: str = ""
     note: str = ""
+    designators: str = ""
 
 
 @dataclass(frozen=True)
@@ -69,13 +71,13 @@ class Bill:
         writer = csv.writer(text)
         writer.writerow(
             ("kind", "name", "quantity", "unit", "used for", "description", "maker", "part",
-             "package_mm", "note")
+             "package_mm", "note", "designators")
         )  # fmt: skip
         for item in self.items:
             writer.writerow(
                 (item.kind, item.name, f"{item.quantity:.4g}", item.unit, cell(item.used_for),
                  cell(item.description), cell(item.maker), cell(item.part), cell(item.package),
-                 cell(item.note))
+                 cell(item.note), cell(item.designators))
             )  # fmt: skip
         return text.getvalue()
 
@@ -113,8 +115,10 @@ def bill_of_materials(design: SensorDesign) -> Bill:
 
 
 def _lights(design: SensorDesign) -> list[Item]:
-    items = []
+    items: list[Item] = []
+    count = 0
     for name, group in design.lights.items():
+        first, count = count + 1, count + len(group.lights)
         entry, colour = light_entry(group), typical_colour(group)
         description = entry.description if entry is not None else "described in the design"
         if entry is None and group.emitter is not None:
@@ -141,6 +145,7 @@ def _lights(design: SensorDesign) -> list[Item]:
                 part=(colour[1].part or "") if colour is not None else "",
                 package=" x ".join(f"{length:g}" for length in package) if package else "",
                 note=note,
+                designators=f"D{first}" if first == count else f"D{first}-D{count}",
             )
         )
     return items
@@ -221,6 +226,7 @@ def _table(items: Sequence[Item]) -> list[str]:
     columns = {
         "name": [item.name for item in items],
         "quantity": [f"{item.quantity:.3g} {item.unit}" for item in items],
+        "designators": [item.designators for item in items],
         "for": [item.used_for for item in items],
         "what it is": [item.description for item in items],
         "maker": [item.maker for item in items],

@@ -9,6 +9,7 @@ from pathlib import Path
 
 from optisense.design import SensorDesign
 from optisense.errors import DesignError
+from optisense.workshop.assembly_files import assembly_files
 from optisense.workshop.bill_of_materials import bill_of_materials
 from optisense.workshop.formats import FORMATS, ShapeFormat
 from optisense.workshop.placement import placement_csv, placements
@@ -24,7 +25,7 @@ Writer = Callable[[Path], object]
 def export(
     design: SensorDesign, folder: str | Path, formats: Sequence[str] = ("stl",)
 ) -> list[Path]:
-    """Write the deformed parts, where the LEDs go, and the bill of materials.
+    """Write the deformed parts, where the LEDs go, files for each board, and the bill of materials.
 
     Nothing appears under its own name before everything is written.
 
@@ -46,8 +47,10 @@ def export(
     for name in dict.fromkeys(formats):
         writers.update(_shape_writers(name, design.name, made))
     bill = bill_of_materials(design)
+    placed = placements(design)
     for file, text in (
-        (PLACEMENT_FILE, placement_csv(placements(design))),
+        (PLACEMENT_FILE, placement_csv(placed)),
+        *assembly_files(design, placed).items(),
         (BILL_FILES[0], bill.csv()),
         (BILL_FILES[1], bill.markdown()),
     ):

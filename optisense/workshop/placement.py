@@ -15,14 +15,9 @@ from optisense import library
 from optisense.design import Light, LightGroup, SensorDesign
 from optisense.errors import LibraryError
 from optisense.library import LightEntry, TypicalLight
+from optisense.workshop.boards import axes_at_rest, boards_of
 
 FloatArray = NDArray[np.float64]
-
-SAME_PLANE = 0.01
-"""mm: LEDs whose windows are this close to one plane, and face one way, share a board."""
-
-SAME_DIRECTION = 1e-3
-"""Angle in radians below which two directions count as one; a margin for rounding."""
 
 
 @dataclass(frozen=True)
@@ -39,9 +34,10 @@ class Placement:
         rotation: degrees, counter-clockwise seen from in front of the LED, from the rest position
             to its own `up`. At rest the height of the window points along +z as far as it can,
             or along +x where the LED shines along z.
-        board: LEDs of one number lie in one plane and face one way.
-        on_board: mm, x and y on the board seen from in front: y is up at rest, the origin is
-            where the origin of the design falls on it, straight along the normal.
+        board: LEDs of one number lie in one plane, or back to back on the two sides of one board.
+        layer: "top", or "bottom" for LEDs that look away from the board's first one.
+        on_board: mm, x and y on the board seen from in front of its top: y is up at rest, the
+            origin is where the origin of the design falls on it, straight along the normal.
         colour: R, G, B, as in the design.
         flux: mW, radiant.
     """
@@ -54,6 +50,7 @@ class Placement:
     direction: tuple[float, float, float]
     rotation: float
     board: int
+    layer: str
     on_board: tuple[float, float]
     colour: tuple[float, float, float]
     flux: float
@@ -61,39 +58,30 @@ class Placement:
 
 def placements(design: SensorDesign) -> list[Placement]:
     """All LEDs of a design, in its order."""
-    boards: list[tuple[FloatArray, float]] = []
+    leds = [(name, group, each) for name, group in design.lights.items() for each in group.lights]
+    boards = boards_of([light for _, _, light in leds])
     found: list[Placement] = []
-    for name, group in design.lights.items():
-        part = part_number(group)
-        for light in group.lights:
-            right, up, forward = axes_at_rest(light)
-            position = np.array(light.position)
-            found.append(
-                Placement(
-                    designator=f"D{len(found) + 1}",
-                    group=name,
-                    model=group.model,
-                    part=part,
-                    position=light.position,
-                    direction=_triple(forward),
-                    rotation=_rotation(light, right, up),
-                    board=_board(forward, float(position @ forward), boards),
-                    on_board=(float(position @ right), float(position @ up)),
-                    colour=group.colour,
-                    flux=group.flux,
-                )
+    for number, (name, group, light) in enumerate(leds):
+        right, up, forward = axes_at_rest(light)
+        place = boards[number]
+        position = np.array(light.position)
+        found.append(
+            Placement(
+                designator=f"D{number + 1}",
+                group=name,
+                model=group.model,
+                part=part_number(group),
+                position=light.position,
+                direction=_triple(forward),
+                rotation=_rotation(light, right, up),
+                board=place.board,
+                layer="bottom" if place.bottom else "top",
+                on_board=(float(position @ place.right), float(position @ place.up)),
+                colour=group.colour,
+                flux=group.flux,
             )
+        )
     return found
-
-
-def axes_at_rest(light: Light) -> FloatArray:
-    """(3, 3) rows: right and up of the window seen from in front, and where the light shines."""
-    forward = np.array(light.direction) / np.linalg.norm(light.direction)
-    right = np.cross((0.0, 0.0, 1.0), forward)
-    if np.linalg.norm(right) < 1e-6:
-        right = np.cross((1.0, 0.0, 0.0), forward)
-    right /= np.linalg.norm(right)
-    return np.array([right, np.cross(forward, right), forward])
 
 
 def part_number(group: LightGroup) -> str:
@@ -126,7 +114,7 @@ def light_entry(group: LightGroup) -> LightEntry | None:
 
 COLUMNS = (
     "designator", "x_mm", "y_mm", "z_mm", "direction_x", "direction_y", "direction_z",
-    "rotation_deg", "board", "board_x_mm", "board_y_mm", "model", "part", "group",
+    "rotation_deg", "board", "layer", "board_x_mm", "board_y_mm", "model", "part", "group",
     "colour_r", "colour_g", "colour_b", "flux_mW",
 )  # fmt: skip
 
@@ -140,11 +128,12 @@ def placement_csv(placed: Sequence[Placement]) -> str:
         writer.writerow(
             [
                 led.designator,
-                *(_digits(value, 4) for value in led.position),
-                *(_digits(value, 6) for value in led.direction),
-                _digits(led.rotation, 3),
+                *(digits(value, 4) for value in led.position),
+                *(digits(value, 6) for value in led.direction),
+                digits(led.rotation, 3),
                 led.board,
-                *(_digits(value, 4) for value in led.on_board),
+                led.layer,
+                *(digits(value, 4) for value in led.on_board),
                 led.model,
                 led.part,
                 led.group,
@@ -166,21 +155,11 @@ def _rotation(light: Light, right: FloatArray, up: FloatArray) -> float:
     return 180.0 if angle <= -180.0 + 1e-9 else angle + 0.0
 
 
-def _board(forward: FloatArray, height: float, boards: list[tuple[FloatArray, float]]) -> int:
-    """The number of the board of this normal and distance from the origin; a new one if none."""
-    for number, (normal, distance) in enumerate(boards, start=1):
-        turned = np.linalg.norm(np.cross(normal, forward)) > SAME_DIRECTION
-        if not turned and normal @ forward > 0.0 and abs(distance - height) <= SAME_PLANE:
-            return number
-    boards.append((forward, height))
-    return len(boards)
-
-
 def _triple(vector: FloatArray) -> tuple[float, float, float]:
     return float(vector[0]), float(vector[1]), float(vector[2])
 
 
-def _digits(value: float, digits: int) -> str:
+def digits(value: float, places: int) -> str:
     """Fixed digits, without a minus before zero."""
-    text = f"{value:.{digits}f}"
+    text = f"{value:.{places}f}"
     return text.removeprefix("-") if float(text) == 0.0 else text

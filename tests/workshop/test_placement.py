@@ -10,7 +10,8 @@ import pytest
 
 from optisense.design import Light, LightGroup, SensorDesign
 from optisense.workshop import placements
-from optisense.workshop.placement import axes_at_rest, placement_csv
+from optisense.workshop.boards import axes_at_rest
+from optisense.workshop.placement import placement_csv
 
 DIRECTIONS = [
     (1, 0, 0),

@@ -1,0 +1,130 @@
+"""Which LEDs share a circuit board, and on which of its sides they are."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.cluster.hierarchy import fcluster, linkage
+
+from optisense.design import Light
+
+FloatArray = NDArray[np.float64]
+
+SAME_PLANE = 0.01
+"""mm: LEDs whose windows are this close to one plane, and face one way, may share a board."""
+
+SAME_DIRECTION = 1e-3
+"""Radians between directions that count as one."""
+
+FARTHEST = 15.0
+"""mm: LEDs of one plane that are farther from all others of it have a board of their own; rows of
+LEDs in such sensors have a pitch of 2 to 8 mm."""
+
+THICKEST = 6.0
+"""mm between the windows of LEDs back to back on one board: twice the highest LEDs of the library
+(1.9 mm) and a board of 1.6 mm are 5.4."""
+
+
+@dataclass(frozen=True)
+class OnBoard:
+    """Where an LED is.
+
+    Attributes:
+        board: from 1 on, in the order of the LEDs.
+        bottom: whether it is on the other side than the board's first LED.
+        right, up: (3,) unit vectors of the board's x and y, the same for both of its sides.
+    """
+
+    board: int
+    bottom: bool
+    right: FloatArray
+    up: FloatArray
+
+
+@dataclass
+class _Side:
+    """LEDs of one plane that are near one another."""
+
+    members: list[int]
+    frame: FloatArray
+    height: float
+    box: FloatArray
+
+
+def boards_of(lights: Sequence[Light]) -> list[OnBoard]:
+    """The board of each LED."""
+    sides = [side for plane in _planes(lights) for side in _split(lights, plane)]
+    sides.sort(key=lambda side: side.members[0])
+    found: dict[int, OnBoard] = {}
+    number = 0
+    taken: set[int] = set()
+    for index, side in enumerate(sides):
+        if index in taken:
+            continue
+        number += 1
+        right, up, _ = side.frame
+        back = next((k for k in range(index + 1, len(sides))
+                     if k not in taken and _back_to_back(side, sides[k])), None)  # fmt: skip
+        for member in side.members:
+            found[member] = OnBoard(number, False, right, up)
+        if back is not None:
+            taken.add(back)
+            for member in sides[back].members:
+                found[member] = OnBoard(number, True, right, up)
+    return [found[index] for index in range(len(lights))]
+
+
+def axes_at_rest(light: Light) -> FloatArray:
+    """(3, 3) rows: right and up of the window seen from in front, and where the light shines."""
+    forward = np.array(light.direction) / np.linalg.norm(light.direction)
+    right = np.cross((0.0, 0.0, 1.0), forward)
+    if np.linalg.norm(right) < 1e-6:
+        right = np.cross((1.0, 0.0, 0.0), forward)
+    right /= np.linalg.norm(right)
+    return np.array([right, np.cross(forward, right), forward])
+
+
+def _planes(lights: Sequence[Light]) -> list[list[int]]:
+    """The LEDs that face one way and lie in one plane."""
+    planes: list[tuple[FloatArray, float, list[int]]] = []
+    for index, light in enumerate(lights):
+        forward = axes_at_rest(light)[2]
+        height = float(np.array(light.position) @ forward)
+        for normal, distance, members in planes:
+            turned = np.linalg.norm(np.cross(normal, forward)) > SAME_DIRECTION
+            if not turned and normal @ forward > 0.0 and abs(distance - height) <= SAME_PLANE:
+                members.append(index)
+                break
+        else:
+            planes.append((forward, height, [index]))
+    return [members for _, _, members in planes]
+
+
+def _split(lights: Sequence[Light], plane: list[int]) -> list[_Side]:
+    """A plane's LEDs by the boards they can be on."""
+    frame = axes_at_rest(lights[plane[0]])
+    places = np.array([lights[index].position for index in plane])
+    labels = np.ones(1, dtype=np.int64)
+    if len(plane) > 1:
+        labels = fcluster(linkage(places, "single"), FARTHEST, "distance")
+    sides = []
+    for label in dict.fromkeys(labels.tolist()):
+        chosen = np.flatnonzero(labels == label)
+        box = np.array([places[chosen].min(axis=0), places[chosen].max(axis=0)])
+        height = float(places[chosen[0]] @ frame[2])
+        sides.append(_Side([plane[k] for k in chosen], frame, height, box))
+    return sides
+
+
+def _back_to_back(one: _Side, other: _Side) -> bool:
+    """Whether LEDs look away from one another, a board's thickness apart."""
+    normal = one.frame[2]
+    if normal @ other.frame[2] > -1.0 + SAME_DIRECTION**2:
+        return False
+    between = one.height + other.height
+    gap = np.maximum(one.box[0], other.box[0]) - np.minimum(one.box[1], other.box[1])
+    gap -= np.abs(normal) * gap  # they may be apart along the normal
+    return bool(0.0 < between <= THICKEST and (gap <= SAME_PLANE).all())
