@@ -18,6 +18,7 @@ from .lights import choosing as light_choosing
 from .lights import operator as light_operator
 from .lights import ui as light_ui
 from .lights import windows
+from .looks import drawing, section
 from .materials import gallery
 from .materials import operator as material_operator
 from .materials import ui as material_ui
@@ -30,6 +31,7 @@ from .sensor import operator as sensor_operator
 from .sensor import starting, workspace
 from .sensor import ui as sensor_ui
 from .shapes import cage_operator, cage_warnings, reference_operator
+from .shapes import choosing as cage_choosing
 from .shapes import ui as shape_ui
 from .simulate import drafts, editors, indenters, picture, relight
 from .simulate import operator as simulate_operator
@@ -57,11 +59,14 @@ MODULES = (
     sensor_operator,
     workspace,
     reference_operator,
+    cage_choosing,
     cage_operator,
     cage_warnings,
     gallery,
     material_operator,
     light_choosing,
+    section,
+    drawing,
     light_operator,
     windows,
     simulate_operator,

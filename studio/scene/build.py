@@ -98,8 +98,6 @@ def add_part(
     own.priority = values.get("priority", 0)
     own.mesh_file = values["mesh"]
     part.color = kinds.LOOKS[own.role]
-    if own.role in ("elastomer", "support", "interface"):
-        part.display_type = "WIRE" if len(mesh.faces) < 200 else "TEXTURED"
     collection(scene, OPTICAL_SYSTEM).objects.link(part)
     return part
 

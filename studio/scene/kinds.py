@@ -50,12 +50,13 @@ INDENTERS: Items = [
 ]
 
 LOOKS: dict[str, tuple[float, float, float, float]] = {
-    "sensing_surface": (0.25, 0.32, 0.38, 0.55),
-    "elastomer": (0.89, 0.38, 0.13, 0.28),
-    "support": (0.16, 0.47, 0.81, 0.24),
-    "mirror": (0.62, 0.68, 0.77, 0.75),
-    "blocker": (0.04, 0.05, 0.06, 1.0),
+    "sensing_surface": (0.55, 0.57, 0.6, 0.5),
+    "elastomer": (0.95, 0.62, 0.35, 0.16),
+    "support": (0.45, 0.75, 0.95, 0.16),
+    "mirror": (0.85, 0.88, 0.93, 0.9),
+    "blocker": (0.06, 0.07, 0.09, 0.22),
     "interface": (0.47, 0.38, 0.92, 0.3),
     "indenter": (0.48, 0.37, 0.07, 1.0),
 }
-"""Colour and opacity of each role, linear, as drawn elsewhere in OptiSense Studio."""
+"""Colour and opacity of each role, linear: gel and acrylic are glassy and housings fade, so that
+lights and what they shine at are seen."""

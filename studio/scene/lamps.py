@@ -1,4 +1,4 @@
-"""Lights in the viewport: the emitting window in its real size, and where it shines."""
+"""Lights in the viewport: the emitting window in its real size."""
 
 from __future__ import annotations
 
@@ -13,9 +13,6 @@ from mathutils import Matrix
 
 from ..core.pose import matrix_of, pose_of
 from .collections import OPTICAL_SYSTEM, collection, next_order, objects_of
-
-ARROW = 2.0
-"""Length (mm) of the line that shows where a light shines."""
 
 MOST_POSES = 4096
 """Number of poses of lights that are kept, so that a drawn lamp need not be made again."""
@@ -99,13 +96,13 @@ def _mesh(group: bpy.types.PropertyGroup) -> bpy.types.Mesh:
     mesh = next((m for m in bpy.data.meshes if m.name == name and m.library is None), None)
     mesh = mesh or bpy.data.meshes.new(name)
     mesh.clear_geometry()
-    mesh.from_pydata(*lamp_drawing(*window(group)))
+    mesh.from_pydata(*lamp_drawing(*window(group)[:2]))
     mesh.update()
     return mesh
 
 
 def lamp_drawing(
-    shape: str, size: tuple[float, float], angle: float
+    shape: str, size: tuple[float, float]
 ) -> tuple[list[tuple[float, ...]], list[tuple[int, int]], list[list[int]]]:
     """Vertices (mm), edges and faces of a lamp that shines along -z, its height along y."""
     width, height = size[0] / 2, size[1] / 2
@@ -114,14 +111,4 @@ def lamp_drawing(
     else:
         turns = [math.tau * step / 24 for step in range(24)]
         rim = [(width * math.cos(turn), height * math.sin(turn)) for turn in turns]
-    vertices: list[tuple[float, ...]] = [(x, y, 0.0) for x, y in rim]
-    faces = [list(range(len(rim)))[::-1]]
-    start = len(vertices)
-    tip = -max(ARROW, 1.5 * max(size))
-    spread = abs(tip) * 0.3 * math.tan(math.radians(min(angle, 75.0)) / 2)
-    vertices += [(0.0, 0.0, 0.0), (0.0, 0.0, tip)]
-    edges = [(start, start + 1)]
-    for x, y in ((1, 0), (-1, 0), (0, 1), (0, -1)):
-        vertices.append((x * spread, y * spread, tip * 0.7))
-        edges.append((start + 1, len(vertices) - 1))
-    return vertices, edges, faces
+    return [(x, y, 0.0) for x, y in rim], [], [list(range(len(rim)))[::-1]]

@@ -21,6 +21,10 @@ def show_design(scene: bpy.types.Scene) -> None:
             space.shading.show_backface_culling = False
             # Parts touch: outlines would be drawn wherever two faces at one place alternate.
             space.shading.show_object_outline = False
+            space.shading.light = "STUDIO"
+            space.shading.show_specular_highlight = True
+            space.overlay.show_axis_x = space.overlay.show_axis_y = False
+            space.overlay.show_floor = space.overlay.show_cursor = False
             space.clip_start, space.clip_end = 0.1, 10_000.0
             region = next(each for each in area.regions if each.type == "WINDOW")
             with bpy.context.temp_override(window=window, area=area, region=region):

@@ -38,7 +38,16 @@ class OPTISENSE_PT_sensor(SidebarPanel, bpy.types.Panel):
                 paragraph(layout, design.folder, "FILE_FOLDER")
             if not show_job(layout, "Checking"):
                 layout.operator("optisense.check", icon="CHECKMARK")
+            _looks(layout.row(align=True), context.scene.optisense_looks)
         if context.workspace is not None and context.workspace.name != TAB:
             layout.operator("optisense.workspace", icon="WORKSPACE")
         show_job(layout, "Opening the sensor", "Saving")
         show_other_outcomes(layout)
+
+
+def _looks(row: bpy.types.UILayout, looks: bpy.types.PropertyGroup) -> None:
+    row.prop(looks, "cut", icon="MOD_BOOLEAN")
+    where = row.row(align=True)
+    where.enabled = looks.cut
+    where.prop(looks, "axis", text="")
+    where.prop(looks, "share", text="", slider=True)

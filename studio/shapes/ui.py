@@ -5,6 +5,7 @@ from __future__ import annotations
 import bpy
 
 from ..engine.layout import SidebarPanel, labelled, paragraph, show_job, show_outcome
+from ..scene.collections import objects_of
 from .cage_operator import active_cage
 from .cage_warnings import warnings_of
 from .reference_operator import READING
@@ -38,6 +39,13 @@ class OPTISENSE_PT_shapes(SidebarPanel, bpy.types.Panel):
             text="End Editing" if editing else "Edit Shape",
             icon="EDITMODE_HLT",
         )
+        for cage in objects_of(context.scene, "CAGE"):
+            row = column.row()
+            key = cage.optisense.key
+            row.operator(
+                "optisense.select_cage", text=key, icon="RESTRICT_SELECT_OFF",
+                depress=cage == active,
+            ).cage = key  # fmt: skip
         found = active_cage(context)
         if found is not None:
             _cage(box, *found)

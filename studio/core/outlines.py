@@ -1,0 +1,98 @@
+"""Lines and triangles that a sensor is drawn with, as arrays."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+CREASE = 30.0
+"""Degrees between two faces from which the edge between them is drawn: those of a cylinder of 13
+sides or more are not."""
+
+BEAM_STEPS = 24
+"""Sides of a beam that is drawn as a cone: it looks round."""
+
+
+def feature_edges(
+    corners: ArrayLike, starts: ArrayLike, normals: ArrayLike, edges: int
+) -> NDArray[np.int64]:
+    """Return which edges of a mesh are creases or borders.
+
+    Args:
+        corners: (m,) the edge at each corner of the faces, one face after the other.
+        starts: (n,) where in `corners` each face begins.
+        normals: (n, 3) of the faces.
+        edges: the number of edges.
+
+    Returns:
+        (k,) indices of the edges whose faces meet at more than `CREASE`, or which have one face.
+    """
+    at, begins = np.asarray(corners), np.asarray(starts)
+    faces = np.searchsorted(begins, np.arange(len(at)), side="right") - 1
+    count = np.bincount(at, minlength=edges)
+    order = np.argsort(at, kind="stable")
+    first = np.concatenate([[0], np.cumsum(count)[:-1]])
+    shared = np.flatnonzero(count == 2)
+    one, other = faces[order[first[shared]]], faces[order[first[shared] + 1]]
+    way = np.asarray(normals, dtype=np.float64)
+    bent = (way[one] * way[other]).sum(axis=1) < math.cos(math.radians(CREASE))
+    return np.sort(np.concatenate([shared[bent], np.flatnonzero((count == 1) | (count > 2))]))
+
+
+def beam(
+    shape: str, size: tuple[float, float], half_angle: float, length: float
+) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """Return the sides of a lamp's beam along -z, and how much of its light is left there.
+
+    Args:
+        shape: of the lamp's window, `disc` or `rectangle`.
+        size: mm, width and height of the window.
+        half_angle: degrees, by which the beam widens.
+        length: mm.
+
+    Returns:
+        (3 n, 3) mm, the corners of triangles, and (3 n,) 1 at the window and 0 at the end.
+    """
+    width, height = size[0] / 2, size[1] / 2
+    if shape == "rectangle":
+        rim = np.array([(-width, -height), (width, -height), (width, height), (-width, height)])
+    else:
+        turns = np.linspace(0.0, math.tau, BEAM_STEPS, endpoint=False)
+        rim = np.stack([width * np.cos(turns), width * np.sin(turns)], axis=1)
+    wider = length * math.tan(math.radians(half_angle))
+    reach = np.linalg.norm(rim, axis=1, keepdims=True)
+    end = rim * (1.0 + wider / np.maximum(reach, 1e-9))
+    near = np.column_stack([rim, np.zeros(len(rim))])
+    far = np.column_stack([end, np.full(len(rim), -length)])
+    after = np.roll(np.arange(len(rim)), -1)
+    corners = np.stack([near, near[after], far, far, near[after], far[after]], axis=1)
+    left = np.tile([1.0, 1.0, 0.0, 0.0, 1.0, 0.0], len(rim))
+    return corners.reshape(-1, 3).astype(np.float32), left.astype(np.float32)
+
+
+def window(shape: str, size: tuple[float, float]) -> NDArray[np.float32]:
+    """(3 n, 3) mm, the corners of triangles that fill a lamp's window."""
+    corners, _ = beam(shape, size, 0.0, 1.0)
+    rim = corners.reshape(-1, 6, 3)[:, :2]
+    middle = np.zeros((len(rim), 1, 3), dtype=np.float32)
+    return np.concatenate([rim, middle], axis=1).reshape(-1, 3)
+
+
+def nearness(points: ArrayLike, seen: ArrayLike, reach: float) -> NDArray[np.float32]:
+    """(n,) 1 where a point (n, 3) is nearer than `reach` to one of those seen (m, 3), else 0."""
+    from_points = np.asarray(points, dtype=np.float32)
+    to = np.asarray(seen, dtype=np.float32)
+    if not len(to):
+        return np.zeros(len(from_points), dtype=np.float32)
+    found = np.empty(len(from_points), dtype=np.float32)
+    for start in range(0, len(from_points), PIECE):
+        piece = from_points[start : start + PIECE]
+        apart = ((piece[:, None] - to[None]) ** 2).sum(axis=2).min(axis=1)
+        found[start : start + PIECE] = apart < reach * reach
+    return found
+
+
+PIECE = 1024
+"""Points that are compared with all others at once: some megabytes."""

@@ -1,0 +1,189 @@
+"""Outlines of parts, lit lamps and their beams, drawn over the objects of a 3D view."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import bpy
+import numpy as np
+from mathutils import Matrix, Vector
+from numpy.typing import NDArray
+
+from ..core import outlines
+from ..scene.collections import objects_of
+from ..scene.lamps import lamp_colour, window
+from .section import plane
+
+LINE = (0.02, 0.02, 0.03)
+"""The colour of outlines."""
+
+BEAM, WIDEST_BEAM = 3.0, 25.0
+"""mm and degrees: how long and how wide the beam of a lamp is drawn at most; a wider one would hide
+the sensor."""
+
+BEAM_OPACITY, OUTLINE_OPACITY = 0.25, 0.55
+"""Of a beam where it leaves the lamp, and of an outline; 1 hides what is behind."""
+
+WINDOW_OPACITY = 0.8
+"""Of a lit window of a lamp: what stands before it is still seen."""
+
+MOST_FACES = 200_000
+"""Faces of a part above which it is drawn without outlines: they would take longer than a frame."""
+
+_edges: dict[str, tuple[tuple[int, int, int], NDArray[np.int64]]] = {}
+"""By part: how many vertices, edges and faces it had, and which edges are its outline."""
+
+_handle: Any = None
+
+when_drawing: list[Callable[[bpy.types.Scene], None]] = []
+"""Called to draw more in a 3D view."""
+
+
+def outline(part: bpy.types.Object) -> NDArray[np.float32]:
+    """(2 n, 3) mm: the ends of the edges to draw of a part, where they are in the world."""
+    mesh = part.data
+    size = (len(mesh.vertices), len(mesh.edges), len(mesh.polygons))
+    if size[2] == 0 or size[2] > MOST_FACES:
+        return np.empty((0, 3), dtype=np.float32)
+    kept = _edges.get(part.name)
+    if kept is None or kept[0] != size:
+        kept = _edges[part.name] = (size, _feature_edges(mesh))
+    ends = np.empty(2 * size[1], dtype=np.int32)
+    mesh.edges.foreach_get("vertices", ends)
+    places = np.empty(3 * size[0], dtype=np.float32)
+    mesh.vertices.foreach_get("co", places)
+    chosen = places.reshape(-1, 3)[ends.reshape(-1, 2)[kept[1]].ravel()]
+    return in_world(chosen, part.matrix_world)
+
+
+def _feature_edges(mesh: bpy.types.Mesh) -> NDArray[np.int64]:
+    corners = np.empty(len(mesh.loops), dtype=np.int32)
+    mesh.loops.foreach_get("edge_index", corners)
+    starts = np.empty(len(mesh.polygons), dtype=np.int32)
+    mesh.polygons.foreach_get("loop_start", starts)
+    normals = np.empty(3 * len(mesh.polygons), dtype=np.float32)
+    mesh.polygons.foreach_get("normal", normals)
+    return outlines.feature_edges(corners, starts, normals.reshape(-1, 3), len(mesh.edges))
+
+
+def in_world(points: NDArray[np.float32], matrix: Matrix) -> NDArray[np.float32]:
+    """(n, 3) points of an object in the world."""
+    world = np.array(matrix, dtype=np.float32)
+    return points @ world[:3, :3].T + world[:3, 3]
+
+
+def _draw() -> None:
+    scene = bpy.context.scene
+    space = bpy.context.space_data
+    if scene is None or not scene.optisense.is_open or not space.overlay.show_overlays:
+        return
+    import gpu
+
+    gpu.state.depth_test_set("LESS_EQUAL")
+    gpu.state.blend_set("ALPHA")
+    try:
+        for part in objects_of(scene, "PART"):
+            if part.visible_get() and part.mode != "EDIT":
+                draw_lines(cut_lines(scene, outline(part)), (*LINE, OUTLINE_OPACITY))
+        gpu.state.depth_mask_set(False)
+        _draw_lamps(scene)
+        for each in when_drawing:
+            each(scene)
+    finally:
+        gpu.state.depth_mask_set(True)
+        gpu.state.depth_test_set("NONE")
+        gpu.state.blend_set("NONE")
+
+
+def _draw_lamps(scene: bpy.types.Scene) -> None:
+    """Lit windows and beams: all of a group at once."""
+    import gpu
+
+    found = plane(scene)
+    cut = None if found is None else (Vector(found[:3]), found[3])
+    for group in scene.optisense.light_groups:
+        lamps = [
+            each
+            for each in objects_of(scene, "LIGHT")
+            if each.optisense.group == group.name
+            and each.visible_get()
+            and (cut is None or cut[0].dot(each.matrix_world.translation) + cut[1] > 0.0)
+        ]
+        if not lamps or group.flux <= 0.0:
+            continue
+        shape, size, angle = window(group)
+        sides, left = outlines.beam(shape, size, min(angle, WIDEST_BEAM), BEAM)
+        face = outlines.window(shape, size)
+        red, green, blue, _ = lamp_colour(group)
+        gpu.state.depth_test_set("NONE")  # lamps stand in housings
+        places = np.concatenate([in_world(face, each.matrix_world) for each in lamps])
+        draw_faces(places, np.tile((red, green, blue, WINDOW_OPACITY), (len(places), 1)))
+        places = np.concatenate([in_world(sides, each.matrix_world) for each in lamps])
+        colours = np.empty((len(places), 4), dtype=np.float32)
+        colours[:] = (red, green, blue, BEAM_OPACITY)
+        colours[:, 3] *= np.tile(left, len(lamps))
+        draw_faces(places, colours)
+        gpu.state.depth_test_set("LESS_EQUAL")
+
+
+def draw_lines(ends: NDArray[np.float32], colour: tuple[float, ...], *, width: float = 1.2) -> None:
+    """Draw lines between pairs of points (2 n, 3), `width` pixels wide."""
+    if not len(ends):
+        return
+    import gpu
+    from gpu_extras.batch import batch_for_shader
+
+    shader = gpu.shader.from_builtin("POLYLINE_UNIFORM_COLOR")
+    batch = batch_for_shader(shader, "LINES", {"pos": ends.astype(np.float32)})
+    shader.bind()
+    shader.uniform_float("viewportSize", gpu.state.viewport_get()[2:])
+    shader.uniform_float("lineWidth", width)
+    shader.uniform_float("color", colour)
+    batch.draw(shader)
+
+
+def draw_faces(corners: NDArray[np.float32], colours: NDArray[np.float32]) -> None:
+    """Draw triangles of corners (3 n, 3) in colours (3 n, 4), unlit."""
+    if not len(corners):
+        return
+    import gpu
+    from gpu_extras.batch import batch_for_shader
+
+    shader = gpu.shader.from_builtin("SMOOTH_COLOR")
+    content = {"pos": corners.astype(np.float32), "color": colours.astype(np.float32)}
+    batch = batch_for_shader(shader, "TRIS", content)
+    shader.bind()
+    batch.draw(shader)
+
+
+def cut_lines(scene: bpy.types.Scene, ends: NDArray[np.float32]) -> NDArray[np.float32]:
+    """(2 m, 3): the lines that the section plane of a scene leaves whole."""
+    found = plane(scene)
+    if found is None or not len(ends):
+        return ends
+    normal, offset = np.array(found[:3]), found[3]
+    kept = (ends @ normal + offset > 0.0).reshape(-1, 2).all(axis=1)
+    return ends.reshape(-1, 2, 3)[kept].reshape(-1, 3)
+
+
+@bpy.app.handlers.persistent
+def _forget(*_: Any) -> None:
+    _edges.clear()
+
+
+HOOKS = ((bpy.app.handlers.load_post, _forget),)
+
+
+def register() -> None:
+    global _handle
+    if not bpy.app.background:
+        _handle = bpy.types.SpaceView3D.draw_handler_add(_draw, (), "WINDOW", "POST_VIEW")
+
+
+def unregister() -> None:
+    global _handle
+    if _handle is not None:
+        bpy.types.SpaceView3D.draw_handler_remove(_handle, "WINDOW")
+    _handle = None
+    _edges.clear()

@@ -1,0 +1,113 @@
+"""A plane that cuts the sensor open in 3D views, moved by one slider."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import bpy
+from bpy.props import BoolProperty, EnumProperty, FloatProperty
+from mathutils import Vector
+
+from ..scene.collections import objects_of
+
+AXES = [
+    ("X", "x", "Across x"),
+    ("Y", "y", "Across y"),
+    ("Z", "z", "Across z"),
+]
+
+NOWHERE = (0.0, 0.0, 0.0, 1.0)
+"""A plane of Blender's that cuts nothing off: x, y and z do not count, and 1 is above 0."""
+
+MARGIN = 1e-3
+"""mm: at the slider's ends the plane lies so far beyond the sensor, and cuts nothing or all off."""
+
+
+def _changed(values: bpy.types.PropertyGroup, context: bpy.types.Context) -> None:
+    show(context.scene)
+
+
+class OPTISENSE_PG_looks(bpy.types.PropertyGroup):
+    """How a sensor is drawn."""
+
+    cut: BoolProperty(
+        name="Section", description="Cut the sensor open in 3D views", update=_changed
+    )
+    axis: EnumProperty(
+        name="Axis", items=AXES, default="Y", description="Which way the cut looks",
+        update=_changed,
+    )  # fmt: skip
+    share: FloatProperty(
+        name="Section", subtype="FACTOR", min=0.0, max=1.0, default=0.5, precision=2,
+        description="Where the cut is: 0 leaves the whole sensor, 1 nothing of it",
+        update=_changed,
+    )  # fmt: skip
+
+
+def bounds(scene: bpy.types.Scene) -> tuple[Vector, Vector] | None:
+    """The lowest and highest x, y, z of the parts, mm; None where there is none."""
+    corners = [
+        each.matrix_world @ Vector(corner)
+        for each in objects_of(scene, "PART")
+        for corner in each.bound_box
+    ]
+    if not corners:
+        return None
+    low, high = (
+        Vector([pick(corner[axis] for corner in corners) for axis in range(3)])
+        for pick in (min, max)
+    )
+    return low, high
+
+
+def plane(scene: bpy.types.Scene) -> tuple[float, float, float, float] | None:
+    """The section as (a, b, c, d): shown is where a x + b y + c z + d > 0; None without one."""
+    looks = scene.optisense_looks
+    found = bounds(scene) if looks.cut else None
+    if found is None:
+        return None
+    axis = "XYZ".index(looks.axis)
+    low, high = found[0][axis] - MARGIN, found[1][axis] + MARGIN
+    normal = [0.0, 0.0, 0.0]
+    normal[axis] = 1.0
+    return normal[0], normal[1], normal[2], -(low + looks.share * (high - low))
+
+
+def show(scene: bpy.types.Scene) -> None:
+    """Cut, or no longer, in all 3D views of a scene."""
+    found = plane(scene)
+    for window in bpy.context.window_manager.windows:
+        if window.scene != scene:
+            continue
+        for area in window.screen.areas:
+            if area.type == "VIEW_3D":
+                view = area.spaces.active.region_3d
+                if found is not None and not view.use_clip_planes:
+                    _prepare(window, area)
+                planes = [found or NOWHERE] + [NOWHERE] * 5
+                view.clip_planes = [list(each) for each in planes]
+                view.use_clip_planes = found is not None
+                area.tag_redraw()
+
+
+def _prepare(window: bpy.types.Window, area: bpy.types.Area) -> None:
+    """Let a view cut: Blender wants its own tool for that used once, here around all of the view.
+
+    Without, the planes are kept and nothing is cut off.
+    """
+    region = next(each for each in area.regions if each.type == "WINDOW")
+    with bpy.context.temp_override(window=window, area=area, region=region):
+        bpy.ops.view3d.clip_border(xmin=0, xmax=region.width, ymin=0, ymax=region.height)
+
+
+@bpy.app.handlers.persistent
+def _again(*_: Any) -> None:
+    show(bpy.context.scene)
+
+
+PROPERTIES = {"Scene": {"optisense_looks": OPTISENSE_PG_looks}}
+HOOKS = (
+    (bpy.app.handlers.load_post, _again),
+    (bpy.app.handlers.undo_post, _again),
+    (bpy.app.handlers.redo_post, _again),
+)
