@@ -27,7 +27,7 @@ LOCK := --universal --python-version 3.11 --generate-hashes --no-emit-index-url 
 
 .PHONY: help setup demo test quick-test lint types import-rules docs docs-as-typed pytest pytest-long pytest-rest bare-pytest quick-pytest \
     studio-tests test-blender studio-window-test package-test extension setup-blender \
-    format bench lock clean
+    format bench fuzz lock clean
 
 help:
 	@echo "make demo     press a ball into a GelSight Mini and write the picture and a report"
@@ -40,6 +40,7 @@ help:
 	@echo "make docs     build the documentation as a site, and check its links: site/index.html"
 	@echo "make docs-as-typed  type all commands of README and docs as shown, also the long ones (hours)"
 	@echo "make bench    measure speed and accuracy (minutes)"
+	@echo "make fuzz     look for malformed input that is not refused in words (an hour)"
 	@echo "make setup    only the set-up: .venv and the libLLVM the renderer needs"
 	@echo "make format   let ruff tidy the code"
 	@echo "make lock     resolve the dependencies anew into requirements.lock"
@@ -148,6 +149,11 @@ package-test: extension
 format: setup
 	$(BIN)/ruff check --fix .
 	$(BIN)/ruff format .
+
+# Malformed files, texts and requests of every kind, for FUZZ_MINUTES; what was found is kept.
+FUZZ_MINUTES := 60
+fuzz: setup
+	$(BIN)/python -m tests.fuzz --minutes $(FUZZ_MINUTES) --keep fuzz-found
 
 bench: setup
 	$(BIN)/python -m benchmarks

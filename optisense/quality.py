@@ -6,6 +6,8 @@ photons and falls with the square root of their number; docs/performance.md has 
 
 from __future__ import annotations
 
+import math
+
 PHOTONS = {"draft": 60_000, "normal": 1_000_000, "fine": 5_000_000}
 """Photons of each quality level.
 
@@ -27,6 +29,9 @@ SCORE_PHOTONS = PHOTONS["fine"]
 SAMPLE_PHOTONS = PHOTONS["fine"]
 """The default of what is made of many pictures: datasets, perception tasks, calibrations."""
 
+MOST_PHOTONS = 10_000_000_000
+"""Photons of an image: days of work, so more are a slip."""
+
 LEVELS = "|".join(PHOTONS)
 """The levels, as help texts list them."""
 
@@ -35,7 +40,8 @@ def photons_of(quality: int | float | str) -> int:
     """The number of photons of a level, or a number as it is.
 
     Args:
-        quality: a level, or a whole number above 0, also as text or as a float such as 2e6.
+        quality: a level, or a whole number from 1 to `MOST_PHOTONS`, also as text or as a float
+            such as 2e6.
 
     Raises:
         ValueError: it is neither.
@@ -43,9 +49,11 @@ def photons_of(quality: int | float | str) -> int:
     if isinstance(quality, str) and quality.strip().lower() in PHOTONS:
         return PHOTONS[quality.strip().lower()]
     try:
-        number = float(quality)
-        if not isinstance(quality, bool) and number.is_integer() and number > 0:
-            return int(number)
-    except (ValueError, OverflowError):
-        pass
+        number = math.nan if isinstance(quality, bool) else float(quality)
+    except (TypeError, ValueError, OverflowError):
+        number = math.nan
+    if MOST_PHOTONS < number < math.inf:
+        raise ValueError(f"photons are {number:g}, more than {MOST_PHOTONS:,}")
+    if number.is_integer() and number > 0:
+        return int(number)
     raise ValueError(f"photons are {quality!r}, neither a whole number above 0 nor {LEVELS}")

@@ -31,6 +31,15 @@ def visible(text: str) -> str:
     return "".join(_shown(letter) for letter in text)
 
 
+MOST_QUOTED = 80
+"""Characters of a value that a message quotes."""
+
+
+def brief(text: str, most: int = MOST_QUOTED) -> str:
+    """Text that a message quotes, cut off where it is long."""
+    return text if len(text) <= most else text[: most - 3] + "..."
+
+
 def one_line(text: str) -> str:
     """The same with single spaces for all white space."""
     return visible(" ".join(text.split()))

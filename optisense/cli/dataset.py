@@ -19,6 +19,7 @@ from optisense.cli.sampling import (
     sensor_to_press,
     shown_samples,
 )
+from optisense.commands.options import MOST_THINGS
 from optisense.commands.sampling import DatasetOptions
 from optisense.time_left import TimedStep
 from optisense.usual_times import USUAL_PIXELS, UsualTimes
@@ -40,10 +41,19 @@ def dataset(
     design: DesignArgument,
     out: Annotated[Path, out_option("Folder of the dataset; a new one, or one to go on.")],
     count: Annotated[
-        int, typer.Option("--count", "-n", min=1, metavar="N", help="Samples in all.")
+        int,
+        typer.Option("--count", "-n", min=1, max=MOST_THINGS, metavar="N", help="Samples in all."),
     ] = 100,
     *,
     options: DatasetOptions,
+    mend: Annotated[
+        bool,
+        typer.Option(
+            "--mend",
+            help="Read all samples that are there, and make those again whose files are missing or "
+            "damaged.",
+        ),
+    ] = False,
     variant: VariantOption = "auto",
 ) -> None:
     """Make a dataset of random contacts: pictures, depth, normals, masks and labels.
@@ -68,7 +78,7 @@ def dataset(
             settings.contacts.parsed()
             model = sensor_to_press(line, design, out, variant, steps)
             show = shown_samples(line, model, SAMPLES, "reading the dataset")
-            made = generate(model, out, count, settings, show)
+            made = generate(model, out, count, settings, show, mend=mend)
     except KeyboardInterrupt:
         from optisense.tasks.dataset import LABELS, Dataset
 

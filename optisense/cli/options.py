@@ -51,7 +51,9 @@ VariantOption = Annotated[
     ),
 ]
 
-WorkersOption = Annotated[int, typer.Option(min=1, metavar="N", help="Processes on this machine.")]
+WorkersOption = Annotated[
+    int, typer.Option(min=1, max=1024, metavar="N", help="Processes on this machine.")
+]
 
 
 def out_option(text: str, metavar: str = "DIR") -> Any:

@@ -14,8 +14,17 @@ from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict
 from optisense.mechanics.skins import SKINS
 from optisense.quality import LEVELS, photons_of
 
-MAX_PIXELS = 100_000_000
+MOST_PIXELS = 20_000_000
 """Largest number of pixels of a picture; more is a slip, and would take all memory."""
+
+LONGEST_RENDER = 7 * 24 * 3600.0
+"""Longest time in seconds that a picture may be asked to take: a week, so more is a slip."""
+
+MOST_THINGS = 10_000_000
+"""Largest number of samples, trials or sensors that may be asked for; they would take years."""
+
+EXPOSURES = (1e-9, 1e9)
+"""Least and largest factor on the radiance; those of the built-in sensors are from 10 to 1000."""
 
 MOST_SEED = 2**32 - 1
 """The largest seed of NumPy's older generators and of Mitsuba's samplers: 32 bits."""
@@ -52,12 +61,12 @@ def read_resolution(value: Any) -> Any:
     """
     if not isinstance(value, str):
         return value
-    match = re.fullmatch(r"\s*(\d{1,6})\s*[xX×]\s*(\d{1,6})\s*", value)
+    match = re.fullmatch(r"\s*([0-9]{1,6})\s*[xX×]\s*([0-9]{1,6})\s*", value)
     if match is None:
         raise ValueError(f"'{value}' is not WIDTHxHEIGHT, such as 320x240")
     width, height = int(match[1]), int(match[2])
-    if width < 1 or height < 1 or width * height > MAX_PIXELS:
-        raise ValueError(f"'{value}' is not between 1x1 and {MAX_PIXELS:,} pixels")
+    if width < 1 or height < 1 or width * height > MOST_PIXELS:
+        raise ValueError(f"'{value}' is not between 1x1 and {MOST_PIXELS:,} pixels")
     return width, height
 
 
@@ -73,8 +82,10 @@ def read_exposure(value: Any) -> float | Literal["auto"]:
         number = float(value)
     except (TypeError, ValueError):
         number = math.nan
-    if not 0.0 < number < math.inf:
-        raise ValueError(f"'{value}' is neither 'auto' nor a number above 0")
+    if not EXPOSURES[0] <= number <= EXPOSURES[1]:
+        raise ValueError(
+            f"'{value}' is neither 'auto' nor a number from {EXPOSURES[0]:g} to {EXPOSURES[1]:g}"
+        )
     return number
 
 
@@ -88,7 +99,10 @@ def read_range(value: Any) -> Any:
         return value
     low, _, high = value.partition(":")
     try:
-        return float(low), float(high or low)
+        found = float(low), float(high or low)
+        if not all(map(math.isfinite, found)):
+            raise ValueError
+        return found
     except ValueError:
         raise ValueError(f"'{value}' is not LOW:HIGH, such as 0.3:1") from None
 

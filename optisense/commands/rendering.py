@@ -8,6 +8,7 @@ from annotated_types import Ge, Le
 from pydantic import Field
 
 from optisense.commands.options import (
+    LONGEST_RENDER,
     SKIN_HELP,
     CommandOptions,
     Exposure,
@@ -34,7 +35,7 @@ class RenderOptions(CommandOptions):
     noise: Annotated[float, Ge(0.01), Le(100.0), Written("PERCENT")] | None = Field(
         None, description="Stop when the noise has come down to this."
     )
-    seconds: Annotated[float, Ge(0.01), Written("S")] | None = Field(
+    seconds: Annotated[float, Ge(0.01), Le(LONGEST_RENDER), Written("S")] | None = Field(
         None, description="Stop after this time."
     )
     seed: Seed = Field(0, description="The same seed gives the same picture.")

@@ -8,6 +8,7 @@ from annotated_types import Ge, Le
 from pydantic import Field
 
 from optisense.commands.options import (
+    MOST_THINGS,
     SKIN_HELP,
     CommandOptions,
     Exposure,
@@ -56,10 +57,10 @@ class EstimatorOptions(PictureOptions):
 class SampleOptions(EstimatorOptions):
     """The samples of a perception task."""
 
-    samples: Annotated[int, Ge(10), Written("N", ("--samples", "-n"))] = Field(
+    samples: Annotated[int, Ge(10), Le(MOST_THINGS), Written("N", ("--samples", "-n"))] = Field(
         200, description="Random contacts."
     )
-    neighbours: Annotated[int, Ge(2), Written("K")] = Field(
+    neighbours: Annotated[int, Ge(2), Le(MOST_THINGS), Written("K")] = Field(
         5, description="Neighbours of the signal-to-noise ratio."
     )
 
@@ -121,7 +122,7 @@ class ReconstructionOptions(PictureOptions):
     method: Annotated[str, Written("network|table")] = Field(
         "network", description="What colours are read with."
     )
-    presses: Annotated[int, Ge(1), Written("N")] = Field(
+    presses: Annotated[int, Ge(1), Le(MOST_THINGS), Written("N")] = Field(
         40, description="Balls that it is fitted to."
     )
     radius: Annotated[float, Ge(0.01), Written("MM")] = Field(

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from typing import Annotated, Any
 
-from annotated_types import Ge
+from annotated_types import Ge, Le
 from pydantic import Field
 
 from optisense.commands.options import (
+    MOST_THINGS,
     CommandOptions,
     NamedValues,
     Photons,
@@ -53,7 +54,7 @@ class EvaluateOptions(ScoreOptions):
         "your own as FILE.py:FUNCTION. May be given several times.",
     )
     seed: Seed = Field(0, description="The same seed gives the same scores.")
-    seeds: Annotated[int, Ge(1), Written("N")] = Field(
+    seeds: Annotated[int, Ge(1), Le(MOST_THINGS), Written("N")] = Field(
         1, description="Score with so many seeds, and tell the spread."
     )
 
@@ -72,7 +73,7 @@ class ToleranceOptions(ScoreOptions):
         "unit); PATH=+-LIMIT for any error up to a limit. lights.position and lights.angle mean "
         "each light by itself. May be given several times.",
     )
-    sensors: Annotated[int, Ge(8), Written("N")] = Field(
+    sensors: Annotated[int, Ge(8), Le(MOST_THINGS), Written("N")] = Field(
         120, description="About how many manufactured sensors to try."
     )
     seed: Seed = Field(0, description="The same seed gives the same sensors.")

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Annotated, Any
 
-from annotated_types import Ge
+from annotated_types import Ge, Le
 from pydantic import Field
 
-from optisense.commands.options import CommandOptions, NamedValues, Seed, Written
+from optisense.commands.options import MOST_THINGS, CommandOptions, NamedValues, Seed, Written
 from optisense.commands.scoring import ScoreOptions
 
 if TYPE_CHECKING:
@@ -34,7 +34,7 @@ class SearchOptions(CommandOptions):
     method: Annotated[str, Written("NAME", usual="cma-es")] | None = Field(
         None, description="How to search; --methods lists them."
     )
-    budget: Annotated[int, Ge(1), Written("N")] | None = Field(
+    budget: Annotated[int, Ge(1), Le(MOST_THINGS), Written("N")] | None = Field(
         None,
         description="Trials in all; the method's own idea when left out. With --resume, trials "
         "including those that are finished.",
@@ -65,7 +65,7 @@ class SearchOptions(CommandOptions):
         description="A manufacturing error (standard deviation). With one or more, what nine of "
         "ten manufactured sensors reach is maximised.",
     )
-    samples: Annotated[int, Ge(2), Written("N", usual="8")] | None = Field(
+    samples: Annotated[int, Ge(2), Le(MOST_THINGS), Written("N", usual="8")] | None = Field(
         None, description="Manufactured sensors a trial, with --error."
     )
 

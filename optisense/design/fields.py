@@ -6,7 +6,13 @@ from typing import Annotated, Any
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 
-Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
+LARGEST_NUMBER = 1e12
+"""Of a number in a design, to either side of 0, whatever its unit. None that means something comes
+near, and the cube of it is still far from the largest number of a computer."""
+
+Number = Annotated[
+    float, Field(strict=True, allow_inf_nan=False, ge=-LARGEST_NUMBER, le=LARGEST_NUMBER)
+]
 """A finite number; text, true and false are refused."""
 
 Fraction = Annotated[Number, Field(ge=0.0, le=1.0)]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import inspect
-import os
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, ClassVar, Self
@@ -14,6 +13,8 @@ from pydantic_core import CoreSchema, PydanticKnownError, core_schema
 from optisense.design.fields import IN_FOLDER, Model
 from optisense.errors import DesignError, LibraryError
 from optisense.registry import Registry
+from optisense.text import brief
+from optisense.untrusted_files import MOST_IES, inside, read_bytes
 
 
 class KindModel(Model):
@@ -121,10 +122,13 @@ class KindModel(Model):
                 f"the file '{file}' of the {self.kinds.noun} '{self.kind}' has no folder",
                 hint="Load the design or the library entry that names it from its folder",
             )
-        folder = Path(os.path.realpath(self._folder))
-        path = Path(os.path.realpath(folder / file))
-        if not path.is_relative_to(folder):
-            raise LibraryError(f"the file '{file}' lies outside its folder", where=str(folder))
+        path = inside(self._folder, file)
+        if path is None:
+            raise LibraryError(
+                f"the file '{brief(file)}' lies outside its folder",
+                where=str(self._folder),
+                hint="Copy the file into the folder and name it there",
+            )
         return path
 
     def contents(self) -> dict[str, bytes]:
@@ -133,18 +137,10 @@ class KindModel(Model):
         Raises:
             LibraryError: one can't be read.
         """
-        found = {}
-        for field, file in self.files().items():
-            path = self.path(field)
-            try:
-                found[file] = path.read_bytes()
-            except OSError as error:
-                raise LibraryError(
-                    f"can't read the file: {error.strerror or error}",
-                    where=str(path),
-                    hint="Check the path",
-                ) from error
-        return found
+        return {
+            file: read_bytes(self.path(field), MOST_IES, LibraryError)
+            for field, file in self.files().items()
+        }
 
     @property
     def folder(self) -> Path | None:

@@ -13,10 +13,14 @@ from optisense.design.kinds import KindModel
 from optisense.design.sensor_design import SensorDesign, dotted
 from optisense.errors import DesignError
 from optisense.near import near_match, suggestion
+from optisense.text import brief
 
 MAX_SHOWN = 8
 """Number of problems that one message lists; the rest is counted, so that a message fits a
 terminal."""
+
+MAX_EXAMINED = 100
+"""Problems of one file that are put into words; a damaged file may have hundreds of thousands."""
 
 Path = tuple[str | int, ...]
 Lines = dict[Path, int]
@@ -43,18 +47,25 @@ class Diagnostic:
         return f"{text}. {self.hint}" if self.hint else text
 
 
-def raise_problems(problems: list[Diagnostic], source: str) -> None:
-    """Raise one DesignError for all problems of severity "error"; none, and it returns."""
+def raise_problems(problems: list[Diagnostic], source: str, unseen: int = 0) -> None:
+    """Raise one DesignError for all problems of severity "error"; none, and it returns.
+
+    Args:
+        problems: what is wrong.
+        source: the file, or what else has the problems.
+        unseen: how many more there are.
+    """
     errors = [problem for problem in problems if problem.severity == "error"]
     if not errors:
         return
-    if len(errors) == 1:
+    if len(errors) == 1 and not unseen:
         only = errors[0]
         raise DesignError(only.message, where=only.where, hint=only.hint)
     shown = "\n".join(f"  {problem}" for problem in errors[:MAX_SHOWN])
-    more = len(errors) - MAX_SHOWN
+    count = len(errors) + unseen
+    more = count - min(len(errors), MAX_SHOWN)
     shown += f"\n  and {more} more" if more > 0 else ""
-    raise DesignError(f"{source} has {len(errors)} problems:\n{shown}")
+    raise DesignError(f"{source} has {count} problems:\n{shown}")
 
 
 def design_error(
@@ -75,7 +86,7 @@ def design_error(
     """
     problems = _problems(error, data, where, lines or {}, model)
     try:
-        raise_problems(problems, where)
+        raise_problems(problems, where, unseen=max(error.error_count() - MAX_EXAMINED, 0))
     except DesignError as found:
         return found
     raise AssertionError("pydantic reported no problem")  # it always reports one
@@ -84,7 +95,7 @@ def design_error(
 def _problems(
     error: ValidationError, data: Any, where: str, lines: Lines, model: type[BaseModel]
 ) -> list[Diagnostic]:
-    reports = error.errors(include_url=False)
+    reports = error.errors(include_url=False)[:MAX_EXAMINED]
     found: list[Diagnostic] = []
     explained: set[Path] = set()  # missing fields that a misspelt one stands for
     for report in reports:
@@ -115,7 +126,7 @@ def _problems(
             path = (*path, "kind")
             known = str(context.get("expected_tags", "")).replace("'", "").split(", ")
             tag = str(context.get("tag", ""))
-            message = f"unknown kind '{tag}' at '{dotted(path)}'" if tag else (
+            message = f"unknown kind '{brief(tag)}' at '{dotted(path)}'" if tag else (
                 f"'{dotted(path)}' is missing"
             )  # fmt: skip
             hint = suggestion(tag, known) if known[0] else None
@@ -128,7 +139,8 @@ def _problems(
             continue
         text = str(cause) if cause is not None else _sentence(report["msg"])
         given = report.get("input")
-        shown = f" = {given!r}" if isinstance(given, str | int | float | bool | None) else ""
+        plain = isinstance(given, str | int | float | bool | None)
+        shown = f" = {brief(repr(given))}" if plain else ""
         hint = None
         if kind in ("enum", "literal_error") and isinstance(given, str):
             words = str(context.get("expected", "")).replace(" or ", ", ").replace("'", "")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +17,9 @@ from optisense.errors import DesignError, MeshError
 from optisense.folders import begun, held
 from optisense.geometry import TriangleMesh
 from optisense.near import near_match
+from optisense.text import brief
+from optisense.untrusted_files import inside as inside_folder
+from optisense.untrusted_files import is_file, is_folder
 from optisense.writing import inside, written_together
 
 DESIGN_FILE = "design.yaml"
@@ -34,8 +36,8 @@ def load_design(path: str | Path) -> SensorDesign:
             is not closed though it is an elastomer or a support.
     """
     path = Path(path)
-    file = path / DESIGN_FILE if path.is_dir() else path
-    if not file.is_file():
+    file = path / DESIGN_FILE if is_folder(path) else path
+    if not is_file(file):
         raise DesignError(
             "there is no sensor design here",
             where=str(file),
@@ -123,22 +125,28 @@ def _check_version(data: dict[str, Any], lines: Lines, source: str) -> None:
 
 def _inside(folder: Path, relative: str, where: str) -> Path:
     """The file at a path that must not leave the folder, links followed."""
-    path = Path(os.path.realpath(folder / relative))  # a link to itself stays as it is
-    if not path.is_relative_to(os.path.realpath(folder)):
+    path = inside_folder(folder, relative)
+    if path is None:
         raise DesignError(
-            f"'{relative}' leads out of the design folder",
+            f"'{brief(relative)}' leads out of the design folder",
             where=where,
             hint="Copy the file into the folder and name it there",
         )
-    if not path.is_file():
-        siblings = path.parent.iterdir() if path.parent.is_dir() else ()
-        near = near_match(path.name, [sibling.name for sibling in siblings])
+    if not is_file(path):
         raise DesignError(
-            f"there is no file '{relative}' in the design folder",
+            f"there is no file '{brief(relative)}' in the design folder",
             where=where,
-            hint=f"Did you mean '{near}'?" if near else "Add the file or correct its path",
+            hint=_hint_of_siblings(path),
         )
     return path
+
+
+def _hint_of_siblings(path: Path) -> str:
+    try:
+        near = near_match(path.name, [sibling.name for sibling in path.parent.iterdir()])
+    except OSError:
+        near = None
+    return f"Did you mean '{near}'?" if near else "Add the file or correct its path"
 
 
 def _load_mesh(path: Path, name: str, design: SensorDesign) -> TriangleMesh:

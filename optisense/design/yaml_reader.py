@@ -1,7 +1,8 @@
 """Reading YAML that strangers wrote: plain data with the line of each value, and nothing more.
 
 Only YAML's events are used, never its object construction; anchors, aliases and tags are
-refused, so no input can run code or grow in memory.
+refused, so no input can run code or grow in memory. What is read is bounded: the bytes of the file,
+the number of its values, and how deeply they are nested.
 """
 
 from __future__ import annotations
@@ -14,13 +15,16 @@ from typing import Any
 import yaml
 
 from optisense.errors import DesignError, OptiSenseError
+from optisense.text import brief
+from optisense.untrusted_files import COPY_AGAIN, MOST_TEXT, read_text
 
-MAX_BYTES = 32 * 1024 * 1024
-"""Largest size of a YAML file in bytes; the bound keeps a wrong file from being read into
-memory."""
 MAX_DEPTH = 50
 """Largest depth of nested lists and mappings in a YAML file; a deeper file would exhaust Python's
 stack."""
+
+MAX_VALUES = 300_000
+"""Largest number of values in a YAML file, which take two seconds to read; a design with cages of
+20 x 20 x 20 control points and their limits has 100,000."""
 
 _LOADER: Any = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 _INTEGER = re.compile(r"[-+]?\d{1,300}$")
@@ -49,17 +53,7 @@ def read_yaml(
     Raises:
         error: the file is missing, too large, or not plain YAML; says the line.
     """
-    try:
-        if path.stat().st_size > MAX_BYTES:
-            raise error(f"larger than {MAX_BYTES // 2**20} MiB", where=str(path))
-        text = path.read_text(encoding="utf-8")
-    except OSError as found:
-        raise error(
-            f"can't be read: {found.strerror or found}", where=str(path), hint="Check the path"
-        ) from found
-    except UnicodeDecodeError as found:
-        raise error("is not UTF-8 text", where=str(path)) from found
-    return parse_yaml(text, str(path), error)
+    return parse_yaml(read_text(path, MOST_TEXT, error), str(path), error)
 
 
 def parse_yaml(
@@ -76,7 +70,7 @@ def parse_yaml(
             hint="Check indentation, colons and brackets there",
         ) from None
     except yaml.YAMLError as found:  # characters that YAML does not allow
-        raise error(f"not valid YAML: {found}", where=source) from None
+        raise error(f"not valid YAML: {found}", where=source, hint=COPY_AGAIN) from None
 
 
 class _Reader:
@@ -106,10 +100,12 @@ class _Reader:
         if isinstance(event, yaml.AliasEvent) or event.anchor is not None:
             self._fail(event, "anchors (&) and aliases (*) are not read")
         if event.tag not in (None, "!"):
-            self._fail(event, f"tags are not read: {event.tag}")
+            self._fail(event, f"tags are not read: {brief(event.tag)}")
         if len(path) > MAX_DEPTH:
             self._fail(event, f"nested deeper than {MAX_DEPTH} levels")
         self._lines.setdefault(path, event.start_mark.line + 1)
+        if len(self._lines) > MAX_VALUES:
+            self._fail(event, f"holds more than {MAX_VALUES:,} values", "Is this the right file?")
         if isinstance(event, yaml.ScalarEvent):
             plain = event.implicit[0]
             return _scalar(event.value) if plain else event.value
@@ -128,14 +124,15 @@ class _Reader:
             if key.anchor is not None or key.tag not in (None, "!"):
                 self._fail(key, "anchors and tags are not read")
             if key.value in result:
-                self._fail(key, f"'{key.value}' is there twice")
+                self._fail(key, f"'{brief(key.value)}' is there twice")
             inside = (*path, key.value)
             self._lines[inside] = key.start_mark.line + 1
             result[key.value] = self._value(next(self._events), inside)
         return result
 
-    def _fail(self, event: Any, message: str) -> None:
-        raise self._error(message, where=f"{self._source}:{event.start_mark.line + 1}")
+    def _fail(self, event: Any, message: str, hint: str | None = None) -> None:
+        where = f"{self._source}:{event.start_mark.line + 1}"
+        raise self._error(message, where=where, hint=hint)
 
 
 def _scalar(text: str) -> Any:

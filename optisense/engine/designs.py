@@ -22,6 +22,9 @@ from optisense.geometry import TriangleMesh
 from optisense.library import names
 from optisense.near import near_match
 from optisense.sensors import load
+from optisense.text import brief
+from optisense.untrusted_files import inside as inside_folder
+from optisense.untrusted_files import is_file, is_folder, read_array
 
 MOST_MESHES = 200
 """Mesh files that are kept; the one not asked for longest goes first."""
@@ -131,10 +134,7 @@ class Designs:
         key = tuple(_stamp(Path(path)) for path in paths)
         mesh = self._meshes.pop(key, None)
         if mesh is None:
-            if isinstance(given, str):
-                mesh = TriangleMesh.load(given)
-            else:
-                mesh = TriangleMesh(_array(given.vertices), _array(given.faces))
+            mesh = TriangleMesh.load(given) if isinstance(given, str) else _mesh_of_arrays(given)
         self._meshes[key] = mesh
         while len(self._meshes) > MOST_MESHES:
             del self._meshes[next(iter(self._meshes))]
@@ -146,7 +146,7 @@ class Designs:
             if name not in self._built:
                 self._built[name] = load(name if name.startswith("builtin:") else f"builtin:{name}")
             return self._built[name]
-        file = path / DESIGN_FILE if path.is_dir() else path
+        file = path / DESIGN_FILE if is_folder(path) else path
         kept = self._folders.get(name)
         if kept is not None and _stamps(kept[1], file) == kept[0]:
             return kept[1]
@@ -229,17 +229,31 @@ def _stamp(path: Path) -> Stamp:
     """What tells whether a file has changed."""
     try:
         found = path.stat()
-    except OSError:
+    except (OSError, ValueError):
         return str(path), -1, -1
     return str(path), found.st_mtime_ns, found.st_size
 
 
 def _array(path: str) -> Any:
     """What a NumPy file holds; nothing in it is run."""
-    try:
-        return np.load(path, allow_pickle=False)
-    except (OSError, ValueError, EOFError) as error:
-        raise MeshError(f"can't read the array: {error}", where=path) from None
+    return read_array(Path(path), MeshError)
+
+
+def _mesh_of_arrays(given: MeshFile) -> TriangleMesh:
+    """The mesh of two NumPy files.
+
+    Raises:
+        MeshError: they are not (n, 3) numbers and (m, 3) whole numbers.
+    """
+    vertices, faces = _array(given.vertices), _array(given.faces)
+    for array, path, kinds in ((vertices, given.vertices, "fiu"), (faces, given.faces, "iu")):
+        if array.ndim != 2 or array.shape[1] != 3 or array.dtype.kind not in kinds:
+            raise MeshError(
+                f"the array is of {array.dtype} and has the shape {array.shape}",
+                where=path,
+                hint="Give vertices as (n, 3) float32 and faces as (m, 3) int32",
+            )
+    return TriangleMesh(vertices, faces)
 
 
 def _inside(folder: Path | None, relative: str, where: str) -> Path:
@@ -248,10 +262,10 @@ def _inside(folder: Path | None, relative: str, where: str) -> Path:
         raise DesignError(
             f"'{relative}' is in no folder", where=where, hint="Name the design's folder"
         )
-    path = Path(os.path.realpath(folder / relative))
-    if not path.is_relative_to(os.path.realpath(folder)):
-        raise DesignError(f"'{relative}' leads out of the design folder", where=where)
-    if not path.is_file():
-        raise DesignError(f"there is no file '{relative}' in the design folder", where=where,
+    path = inside_folder(folder, relative)
+    if path is None:
+        raise DesignError(f"'{brief(relative)}' leads out of the design folder", where=where)
+    if not is_file(path):
+        raise DesignError(f"there is no file '{brief(relative)}' in the design folder", where=where,
                           hint=f"The folder is {folder}")  # fmt: skip
     return path

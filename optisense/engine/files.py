@@ -11,7 +11,12 @@ from numpy.typing import NDArray
 
 from optisense.errors import OutputError
 from optisense.geometry import TriangleMesh
+from optisense.text import brief
+from optisense.untrusted_files import is_folder
 from optisense.writing import written_whole
+
+LONGEST_NAME = 150
+"""Bytes that files of a request may begin with; file systems take names of 255 bytes."""
 
 
 class Files:
@@ -23,13 +28,19 @@ class Files:
         Raises:
             OutputError: there is no such folder, or the name is not that of a file.
         """
-        if not folder.is_dir():
+        if not is_folder(folder):
             raise OutputError(
                 "there is no such folder", where=str(folder), hint="Make it before it is named"
             )
-        if not name or name != Path(name).name or name in (".", ".."):
+        if name != Path(name).name or name in ("", ".", "..") or not name.isprintable():
             raise OutputError(
-                f"'{name}' can't begin the name of a file", hint="Use letters, digits, '-' and '_'"
+                f"'{brief(name)}' can't begin the name of a file",
+                hint="Use letters, digits, '-' and '_'",
+            )
+        if len(name.encode("utf-8", "replace")) > LONGEST_NAME:
+            raise OutputError(
+                f"'{brief(name)}' is too long for the name of a file",
+                hint=f"Use at most {LONGEST_NAME} bytes",
             )
         self.folder = folder
         self.name = name

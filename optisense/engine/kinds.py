@@ -9,6 +9,7 @@ from pydantic import TypeAdapter, ValidationError
 
 from optisense import library
 from optisense.design.emitters import LightModel
+from optisense.design.fields import LARGEST_NUMBER
 from optisense.design.kinds import KindModel
 from optisense.design.lenses import LensBlur, LensDistortion, LensShading
 from optisense.design.materials import CoatingModel, Material, kinds_for
@@ -143,4 +144,5 @@ def field_row(name: str, schema: dict[str, Any], *, required: bool) -> dict[str,
 
 
 def _bounds(schema: dict[str, Any]) -> dict[str, Any]:
-    return {ours: schema[theirs] for theirs, ours in BOUNDS.items() if theirs in schema}
+    given = {ours: schema[theirs] for theirs, ours in BOUNDS.items() if theirs in schema}
+    return {ours: value for ours, value in given.items() if abs(value) < LARGEST_NUMBER}

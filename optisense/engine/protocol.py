@@ -17,6 +17,7 @@ from pydantic import BaseModel, ConfigDict, ValidationError
 
 from optisense.design.problems import design_error
 from optisense.engine.failures import ProtocolError
+from optisense.untrusted_files import as_text, parse_json
 
 PROTOCOL = 1
 """Version of the protocol; see the module's description for when it is raised."""
@@ -59,11 +60,12 @@ def read_request(line: bytes) -> Request:
             "the line is too long", hint="Send large data by files, named in the request"
         )
     try:
-        data = json.loads(line.decode("utf-8"), parse_constant=_not_a_number)
-    except (ValueError, RecursionError) as error:
-        raise ProtocolError(
-            f"the line is not JSON: {error}", hint="Write one JSON object on each line"
-        ) from None
+        text = as_text(line, "request", ProtocolError, "the line")
+        data = parse_json(text, "request", ProtocolError, "the line")
+        if "\\u0000" in text:  # no name of a file, nor any other text here, has it
+            raise ProtocolError("a text has the character NUL")
+    except ProtocolError as error:
+        raise ProtocolError(error.message, hint="Write one JSON object on each line") from None
     if not isinstance(data, dict):
         raise ProtocolError("the line is not a JSON object", hint='Write {"id": 1, "do": "hello"}')
     number = data.pop("id", None)
@@ -137,7 +139,3 @@ def _plain(value: Any) -> Any:
     if isinstance(value, BaseModel):
         return _plain(value.model_dump(mode="json"))
     return str(value)
-
-
-def _not_a_number(word: str) -> float:
-    raise ValueError(f"{word} is not JSON")

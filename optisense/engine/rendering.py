@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
+from optisense.commands.options import MOST_PIXELS
 from optisense.commands.rendering import RenderOptions
 from optisense.design import LightGroup, SensorDesign
 from optisense.engine.contacts import (
@@ -34,9 +35,6 @@ if TYPE_CHECKING:
 
 DRAFT_WIDTH = 160
 """Width in pixels of a draft, which has a quarter of the pixels of a usual image."""
-
-MOST_PIXELS = 20_000_000
-"""Largest number of pixels of an image; more is a slip, and would take all memory."""
 
 LEVELS = (np.arange(256) / 255.0).astype(np.float32)
 """What the 256 levels of a picture are from 0 to 1."""

@@ -31,6 +31,7 @@ from optisense.engine.protocol import (
 from optisense.engine.requests import Kind, Lane
 from optisense.engine.session import Session
 from optisense.errors import OptiSenseError, OutputError
+from optisense.untrusted_files import is_folder
 
 FAREWELL = 3.0
 """Seconds that `shutdown` waits for what is being worked on."""
@@ -155,7 +156,7 @@ class Engine:
                 hint="Use auto, llvm or cuda",
             )  # fmt: skip
         folder = Path(fields.folder)
-        if not folder.is_absolute() or not folder.is_dir():
+        if not folder.is_absolute() or not is_folder(folder):
             error = OutputError(
                 "there is no such folder", where=fields.folder, hint="Make it first; give it whole"
             )

@@ -26,7 +26,13 @@ FACET_ERROR = 4e-4
 """Facets stay this close (mm) to the exact shape: well below what a camera resolves."""
 
 ABOVE_ZERO = 5e-324
-"""The smallest number above 0, as a lower limit of lengths."""
+"""The smallest number above 0, as a lower limit of factors."""
+
+SMALLEST = 1e-3
+"""mm, the least length of an indenter: no camera sees the contact of a ball of this radius."""
+
+LARGEST = 1e4
+"""mm, the largest length of an indenter: to any sensor, a ball of this radius is flat."""
 
 
 class Indenter(Protocol):
@@ -73,7 +79,7 @@ class Quantity:
         if math.isfinite(value) and self.low <= value <= self.high:
             return
         if self.low == ABOVE_ZERO:
-            hint = f"Give a length above 0, in {self.unit}" if self.unit else "Give one above 0"
+            hint = "Give one above 0"
         elif math.isfinite(self.low) and math.isfinite(self.high):
             hint = f"Keep it from {self.low:g} to {self.high:g} {self.unit}".rstrip()
         else:

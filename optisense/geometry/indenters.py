@@ -20,6 +20,8 @@ from optisense.errors import ContactError
 from optisense.geometry.indenter_kinds import (
     ABOVE_ZERO,
     FACET_ERROR,
+    LARGEST,
+    SMALLEST,
     IndenterKind,
     Quantity,
     quantity,
@@ -40,7 +42,7 @@ class Sphere(IndenterKind):
     help: ClassVar[str] = "A ball."
     convex: ClassVar[bool] = True
 
-    radius: float = quantity("mm", "The radius of the ball.", low=ABOVE_ZERO)
+    radius: float = quantity("mm", "The radius of the ball.", low=SMALLEST, high=LARGEST)
 
     def tilted(self, tilt_x: float, tilt_y: float) -> Sphere:
         """The same ball."""
@@ -97,8 +99,8 @@ class Cylinder(IndenterKind):
     help: ClassVar[str] = "A cylinder that lies on its side."
     convex: ClassVar[bool] = True
 
-    radius: float = quantity("mm", "The radius of the cylinder.", low=ABOVE_ZERO)
-    length: float = quantity("mm", "The length along its axis.", 40.0, low=ABOVE_ZERO)
+    radius: float = quantity("mm", "The radius of the cylinder.", low=SMALLEST, high=LARGEST)
+    length: float = quantity("mm", "The length along its axis.", 40.0, low=SMALLEST, high=LARGEST)
     angle: float = quantity("degrees", "From the surface's u axis to the cylinder's axis.", 0.0)
 
     def mesh(self, reach: float, facet_error: float = FACET_ERROR) -> TriangleMesh:
@@ -146,7 +148,7 @@ class Plane(IndenterKind):
 
     tilt_x: float = quantity("degrees", "The turn about the u axis.", 0.0, low=-89.9, high=89.9)
     tilt_y: float = quantity("degrees", "The turn about the v axis.", 0.0, low=-89.9, high=89.9)
-    size: float = quantity("mm", "The side of the plate.", 8.0, low=ABOVE_ZERO)
+    size: float = quantity("mm", "The side of the plate.", 8.0, low=SMALLEST, high=LARGEST)
 
     def tilted(self, tilt_x: float, tilt_y: float) -> Plane:
         """The plate tilted more; its middle stays above the contact place."""
@@ -227,6 +229,11 @@ class MeshIndenter(IndenterKind):
             mesh = mesh.welded().vertex_normals()
         mesh = _lowest_at_zero(mesh.transformed(np.eye(3) * self.scale))
         size = np.ptp(mesh.bounds, axis=0).max()
+        if not SMALLEST <= size <= LARGEST:
+            raise ContactError(
+                f"an indenter of the mesh '{name}' is {size:g} mm large",
+                hint=f"Scale it to {SMALLEST:g} to {LARGEST:g} mm: mesh:FILE,SCALE",
+            )
         lowest = mesh.vertices[mesh.vertices[:, 2] <= 1e-6 * size]
         x, y = 0.5 * (lowest.min(axis=0) + lowest.max(axis=0))[:2]
         return _moved(mesh, (-x, -y, 0.0))

@@ -13,6 +13,11 @@ if TYPE_CHECKING:
     from optisense.geometry.mesh import TriangleMesh
 
 
+LEAST_VOLUME = 1e-12
+"""Of a solid, as a share of the cube of its largest dimension: a sheet of glass of 20 mm that is as
+thin as a wavelength of light has 1e-5."""
+
+
 def validate(mesh: TriangleMesh, name: str, closed: bool) -> TriangleMesh:
     """See `TriangleMesh.validate`."""
     if len(mesh.faces) == 0:
@@ -54,6 +59,13 @@ def _closed_and_outward(mesh: TriangleMesh, name: str) -> TriangleMesh:
             f"one of them near ({x:.3f}, {y:.3f}, {z:.3f}) mm",
             where=f"part {name}",
             hint="fill the hole in your modelling program and export again",
+        )
+    size = float(np.ptp(mesh.bounds, axis=0).max())
+    if abs(mesh.volume) <= LEAST_VOLUME * size**3:
+        raise MeshError(
+            "the solid encloses no volume: its faces lie upon one another, or in a plane",
+            where=f"part {name}",
+            hint="export the solid again, with thickness",
         )
     return mesh if mesh.volume >= 0.0 else mesh.flipped()
 

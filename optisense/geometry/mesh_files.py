@@ -14,8 +14,18 @@ from numpy.typing import NDArray
 
 from optisense.errors import MeshError
 from optisense.geometry.mesh import TriangleMesh
+from optisense.untrusted_files import MOST_MESH, read_bytes
 
 FORMATS = (".obj", ".stl", ".ply")
+
+FARTHEST = 1e9
+"""Of a coordinate in a file, whatever its unit: a kilometre in micrometres."""
+
+MOST_TWICE = 1000
+"""Faces that may be there more than once. Some programs write a few; rays meet each of them."""
+
+MOST_CORNERS = 10_000
+"""Corners of one face; CAD programs write faces of a few hundred."""
 
 
 def load_mesh(path: Path) -> TriangleMesh:
@@ -27,14 +37,7 @@ def load_mesh(path: Path) -> TriangleMesh:
             where=str(path),
             hint="use one of " + ", ".join(FORMATS),
         )
-    try:
-        data = path.read_bytes()
-    except OSError as error:
-        raise MeshError(
-            f"cannot read the mesh file: {error.strerror or error}",
-            where=str(path),
-            hint="check the path",
-        ) from error
+    data = read_bytes(path, MOST_MESH, MeshError, "the mesh file")
     if suffix == ".obj":
         mesh = _parse_plain_obj(data) or _parse_obj(data, path)
     else:
@@ -45,7 +48,36 @@ def load_mesh(path: Path) -> TriangleMesh:
         raise MeshError(
             "the mesh file has no triangles", where=str(path), hint="export a surface, not points"
         )
+    far = np.abs(mesh.vertices).max(axis=1, initial=0.0)
+    if (far[np.isfinite(far)] > FARTHEST).any():
+        number = int(np.flatnonzero((far > FARTHEST) & np.isfinite(far))[0])
+        raise MeshError(
+            f"vertex {number + 1} is {far[number]:g} away from the origin",
+            where=str(path),
+            hint="check the unit of the file, or export it again",
+        )
+    twice = _faces_twice(mesh)
+    if twice > MOST_TWICE:
+        raise MeshError(
+            f"{twice:,} faces of the mesh are there more than once",
+            where=str(path),
+            hint="merge duplicate faces in your modelling program and export again",
+        )
     return mesh
+
+
+def _faces_twice(mesh: TriangleMesh) -> int:
+    """How many faces there are besides the first ones of the same corners, wound the same way."""
+    if len(mesh.faces) <= MOST_TWICE:
+        return 0
+    corners = mesh.faces.astype(np.uint64)
+    first = np.argmin(corners, axis=1)  # a face may begin with any of its corners
+    a, b, c = (np.take_along_axis(corners, (first[:, None] + k) % 3, 1)[:, 0] for k in range(3))
+    # Sums of products with large odd numbers differ for different corners, but for a chance of
+    # 1e-6 among a million faces.
+    keys = a * np.uint64(0x9E3779B97F4A7C15) + b * np.uint64(0xC2B2AE3D27D4EB4F)
+    keys += c * np.uint64(0x165667B19E3779F9)
+    return len(keys) - len(np.unique(keys))
 
 
 def obj_text(mesh: TriangleMesh, name: str | None = None) -> str:
@@ -166,6 +198,8 @@ def _parse_obj(data: bytes, path: Path) -> TriangleMesh:
                 own_normals &= all(vertex == normal for vertex, normal in corners)
                 if len(corners) < 3:
                     raise ValueError("a face needs three corners")
+                if len(corners) > MOST_CORNERS:
+                    raise ValueError(f"a face of {len(corners):,} corners is not read")
                 polygons.append([vertex for vertex, _ in corners])
             else:
                 values = [float(word) for word in words[1:4]]

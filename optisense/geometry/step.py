@@ -17,6 +17,7 @@ import numpy as np
 from optisense.errors import MeshError, SetupError
 from optisense.geometry.mesh import TriangleMesh
 from optisense.geometry.welding import merged_vertices
+from optisense.untrusted_files import MOST_STEP, check_size
 
 SUFFIXES = (".step", ".stp")
 
@@ -86,8 +87,7 @@ def read_step(path: str | Path) -> list[StepBody]:
         from OCP.XCAFDoc import XCAFDoc_DocumentTool
     except ImportError as error:
         raise no_step(error, "reading", "export STL files from the CAD tool", path) from error
-    if not path.is_file():
-        raise MeshError("there is no such file", where=str(path), hint="check the path")
+    check_size(path, MOST_STEP, MeshError, "the STEP file")
     quiet()
     reader = STEPCAFControl_Reader()
     reader.SetNameMode(True)

@@ -22,6 +22,7 @@ from optisense.library.own_parts import WHERE_TO_STORE, own_folder, write_own
 from optisense.library.reading import KINDS, Kind, files_of, kind_of, make_entry, read_entry
 from optisense.library.tuning import DAYLIGHT, read_tuning
 from optisense.near import suggestion
+from optisense.untrusted_files import MOST_IES, read_bytes
 
 NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,63}")
 
@@ -123,7 +124,7 @@ def add_ies(
     file = Path(file)
     name = file.stem if name is None else name
     check_new_name(name)
-    data = _bytes_of(file)
+    data = read_bytes(file, MOST_IES, LibraryError, "the IES file")
     parse_ies(data.decode("latin-1"), str(file))
     given = Source(status=status, source=source, date=date)
     sources = {
@@ -250,17 +251,6 @@ def parse_colour(text: str) -> tuple[str, Colour]:
             f"'{text}' is no colour", hint="Each value is from 0 to 1, and not all are 0"
         )
     return "own", (red, green, blue)
-
-
-def _bytes_of(file: Path) -> bytes:
-    try:
-        return file.read_bytes()
-    except OSError as error:
-        raise LibraryError(
-            f"can't read the IES file: {error.strerror or error}",
-            where=str(file),
-            hint="Check the path",
-        ) from error
 
 
 def _about(ies: bytes) -> str:

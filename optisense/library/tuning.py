@@ -6,7 +6,6 @@ The files of the Raspberry Pi's cameras are JSON; `src/ipa/rpi/vc4/data` of libc
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from optisense.errors import LibraryError
+from optisense.untrusted_files import read_json
 
 FloatArray = NDArray[np.float64]
 
@@ -83,10 +83,11 @@ def read_tuning(file: str | Path, temperature: float = DAYLIGHT) -> Tuning:
         if name not in algorithms:
             continue
         try:
-            values |= read(algorithms[name], temperature)
+            with np.errstate(over="raise", divide="raise", invalid="raise"):
+                values |= read(algorithms[name], temperature)
         except LibraryError as error:
             raise LibraryError(error.message, where=f"{path}: rpi.{name}", hint=NO_TUNING) from None
-        except (KeyError, TypeError, ValueError, IndexError) as error:
+        except (KeyError, TypeError, ValueError, IndexError, ArithmeticError) as error:
             raise LibraryError(
                 f"'rpi.{name}' is not as in a tuning file ({type(error).__name__}: {error})",
                 where=str(path),
@@ -99,7 +100,11 @@ def read_tuning(file: str | Path, temperature: float = DAYLIGHT) -> Tuning:
             hint=NO_TUNING,
         )
     try:
-        _add_crosstalk(values, derived)
+        with np.errstate(over="raise", divide="raise", invalid="raise"):
+            _add_crosstalk(values, derived)
+    except (ArithmeticError, np.linalg.LinAlgError) as error:
+        message = f"the colours can't be undone ({error})"
+        raise LibraryError(message, where=f"{path}: rpi.ccm", hint=NO_TUNING) from None
     except LibraryError as error:
         raise LibraryError(error.message, where=f"{path}: rpi.ccm", hint=NO_TUNING) from None
     return Tuning(values, derived)
@@ -108,25 +113,9 @@ def read_tuning(file: str | Path, temperature: float = DAYLIGHT) -> Tuning:
 def _algorithms(path: Path) -> dict[str, Any]:
     """The sections of a tuning file, by name without its 'rpi.'."""
     try:
-        with path.open("rb") as stream:
-            data = stream.read(LARGEST_FILE + 1)
-    except OSError as error:
-        raise LibraryError(
-            f"can't read the tuning file: {error.strerror or error}",
-            where=str(path),
-            hint="Check the path",
-        ) from error
-    if len(data) > LARGEST_FILE:
-        raise LibraryError("the file is too large for a tuning file", where=str(path))
-    try:
-        content = json.loads(data.decode("utf-8"), parse_constant=_no_number)
-    except (UnicodeDecodeError, ValueError, RecursionError) as error:
-        line = f":{error.lineno}" if isinstance(error, json.JSONDecodeError) else ""
-        raise LibraryError(
-            f"this is no tuning file: it is no JSON ({error})",
-            where=f"{path}{line}",
-            hint=NO_TUNING,
-        ) from None
+        content = read_json(path, LibraryError, LARGEST_FILE, "the tuning file")
+    except LibraryError as error:
+        raise LibraryError(error.message, where=error.where, hint=NO_TUNING) from None
     found: dict[str, Any] = {}
     if isinstance(content, dict):
         listed = content.get("algorithms")
@@ -145,10 +134,6 @@ def _algorithms(path: Path) -> dict[str, Any]:
             hint=NO_TUNING,
         )
     return found
-
-
-def _no_number(text: str) -> float:
-    raise ValueError(f"{text} is no number")
 
 
 def _black_level(section: dict[str, Any], temperature: float) -> dict[str, Any]:

@@ -29,6 +29,8 @@ NO_OVERLAP = -1e3
 """mm; the overlap where there is no skin or no indenter: a gap that nothing closes."""
 DOES_NOT_REACH = "an indenter does not reach the sensing surface"
 """What is said where nothing overlaps."""
+LEAST_POINTS = 4
+"""Grid points along a side: an overlap finer than the grid still has a point to each side."""
 SEARCH_POINTS = 96
 """Grid points along a side when the extent of the overlap is looked for."""
 
@@ -103,7 +105,8 @@ def footprint(
     x, y = (
         (a + b) / 2 + pitch * (np.arange(n) - (n - 1) / 2)
         for (a, b), n in (
-            (span, math.ceil(size / pitch)) for span, size in zip(spans, sizes, strict=True)
+            (span, max(math.ceil(size / pitch), LEAST_POINTS))
+            for span, size in zip(spans, sizes, strict=True)
         )
     )
     return Footprint(spot.point, axes, x, y, _overlap(body, plane, x, y), thickness)

@@ -9,7 +9,7 @@ from typing import Any, Literal
 from optisense.design.camera_checks import LEAST_PICTURE, LEAST_SKIN
 from optisense.errors import ObjectiveError
 from optisense.mechanics.skins import CONFORMING, SKINS
-from optisense.quality import LEVELS, photons_of
+from optisense.quality import LEVELS, MOST_PHOTONS, photons_of
 
 BALL_RADIUS = 1.5
 """mm, of the ball that presses (the OptiSense paper, "RGB2Normal")."""
@@ -33,9 +33,6 @@ scores: on the built-in sensors they differ by less than 0.02 from those of 640.
 MOST_PIXELS = 16_384
 """Pixels along a side of an image: what the renderer holds in memory, and more than any camera has
 that fits into a sensor."""
-
-MOST_PHOTONS = 10_000_000_000
-"""Photons of an image: days of work, so more are a slip."""
 
 MOST_RADIUS = 1000.0
 """mm, of the ball that presses: larger than any sensor, to which it is flat."""

@@ -96,8 +96,11 @@ def compare_with_real(
     photons: int = MOST_PHOTONS,
     seed: int = 0,
     progress: Callable[[RenderProgress], None] | None = None,
-) -> RealComparison:
+) -> RealComparison | None:
     """Press the ball of the real picture into a model, at the same place and as wide.
+
+    Returns:
+        The comparison; None where too few photons were traced to see anything by.
 
     Args:
         model: of the sensor that `has_real_picture`.
@@ -125,6 +128,8 @@ def compare_with_real(
         raise KeyboardInterrupt
     seen = np.asarray(image.radiance, dtype=np.float64)
     linear = decode(real)
+    if not np.median(seen) > 0.0:  # too few photons to see anything by
+        return None
     exposure = float(np.median(linear) / np.median(seen))
     drawn = image.picture(exposure)
     rows, columns = np.mgrid[:height, :width] + 0.5

@@ -2,18 +2,31 @@
 
 from __future__ import annotations
 
-import os
-from collections.abc import Iterator
+import io
+import warnings
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from optisense.errors import TaskError
-from optisense.tasks.records import read_json, read_rows
+from optisense.tasks.records import read_object, read_rows
+from optisense.text import brief
+from optisense.untrusted_files import (
+    COPY_AGAIN,
+    MOST_PICTURE,
+    check_arrays,
+    first_problem,
+    inside,
+    is_file,
+    read_arrays,
+    read_bytes,
+)
 
 SCHEMA_VERSION = 1
 """Version of the format of a dataset's folder; it is raised when an older program cannot read
@@ -52,6 +65,109 @@ COLUMNS = (
 )
 """Columns of `LABELS`; the first is what common loaders of picture folders look for."""
 
+MAKE_AGAIN = "Copy the file again, or make it again: optisense dataset with --mend"
+
+ArrayKinds = Mapping[str, tuple[str, int | None]]
+
+SAMPLE_ARRAYS: ArrayKinds = {"depth": ("f", None), "normals": ("f", 3), "mask": ("b", None)}
+BACKGROUND_ARRAYS: ArrayKinds = {"image": ("u", 3), "points": ("f", 3), "normals": ("f", 3)}
+"""Arrays of the files by name: what their type may be (as of NumPy's `dtype.kind`), and the numbers
+of a pixel."""
+
+FiniteNumber = Annotated[float, Field(allow_inf_nan=False)]
+
+
+class _KeptContacts(BaseModel):
+    """What contacts are drawn from; compared with what is asked for, so values may be any."""
+
+    model_config = ConfigDict(extra="allow")
+
+    indenters: list[str] = Field(min_length=1)
+
+
+class _KeptSettings(BaseModel):
+    """The settings of a dataset; compared with what is asked for, so other values may be any."""
+
+    model_config = ConfigDict(extra="allow")
+
+    contacts: _KeptContacts
+    resolution: tuple[Annotated[int, Field(ge=1)], Annotated[int, Field(ge=1)]]
+    estimator: str
+
+
+class _Info(BaseModel):
+    """What `INFO` must hold; what more it holds is for people."""
+
+    model_config = ConfigDict(extra="allow", strict=False)
+
+    schema_version: Literal[1]
+    design_name: str
+    made_with: dict[str, str]
+    settings: _KeptSettings
+    mesh_files: dict[str, str] = Field(default_factory=dict)
+    meshes: dict[str, str]
+    exposure: Annotated[FiniteNumber, Field(gt=0.0)]
+
+
+def read_info(folder: Path) -> dict[str, Any]:
+    """What `dataset.json` says.
+
+    Raises:
+        TaskError: it is missing, damaged, or of another release; says what is wrong.
+    """
+    path = folder / INFO
+    info = read_object(path)
+    if info.get("schema_version") != SCHEMA_VERSION:
+        raise TaskError(
+            f"schema_version {brief(repr(info.get('schema_version')))} can't be read; this release "
+            f"reads {SCHEMA_VERSION}",
+            where=str(path),
+            hint="Update OptiSense Studio, or copy the file again",
+        )
+    try:
+        _Info.model_validate(info)
+    except ValidationError as error:
+        raise TaskError(first_problem(error), where=str(path), hint=COPY_AGAIN) from None
+    return info
+
+
+def read_labels(folder: Path) -> list[dict[str, Any]]:
+    """The rows of `LABELS`, numbers as numbers; empty where there is no such file yet.
+
+    Raises:
+        TaskError: the table or one of its rows can't be read; says the line.
+    """
+    path = folder / LABELS
+    rows = read_rows(path) if path.exists() else []
+    labels = [_typed(row, f"{path}:{line}") for line, row in enumerate(rows, start=2)]
+    seen: set[int] = set()
+    for line, row in enumerate(labels, start=2):
+        if row["index"] in seen or row["index"] < 0:
+            raise TaskError(
+                f"sample {row['index']} is there twice" if row["index"] >= 0 else "no such sample",
+                where=f"{path}:{line}",
+                hint="Delete the line",
+            )
+        seen.add(row["index"])
+    return labels
+
+
+def read_failures(folder: Path) -> list[dict[str, str]]:
+    """The rows of `FAILURES`; empty where there is no such file yet.
+
+    Raises:
+        TaskError: the table or one of its rows can't be read; says the line.
+    """
+    path = folder / FAILURES
+    rows = read_rows(path) if path.exists() else []
+    for line, row in enumerate(rows, start=2):
+        if not (row.get("index") or "").isdecimal() or row.get("reason") is None:
+            raise TaskError("a row can't be read", where=f"{path}:{line}", hint=ROW_AGAIN)
+    return rows
+
+
+ROW_AGAIN = "Delete the line; the command that made the dataset then makes the sample again"
+
 
 @dataclass(frozen=True)
 class Sample:
@@ -87,34 +203,45 @@ class Dataset:
         """Open a dataset, finished or not.
 
         Raises:
-            TaskError: the folder holds no dataset, or one of another release.
+            TaskError: the folder holds no dataset, or one of another release, or its tables can't
+                be read.
         """
         folder = Path(folder)
-        if not (folder / INFO).is_file():
+        if not is_file(folder / INFO):
             raise TaskError(
                 "there is no dataset here",
                 where=str(folder),
                 hint=f"Name a folder that holds a {INFO}",
             )
-        info = read_json(folder / INFO)
-        if info.get("schema_version") != SCHEMA_VERSION:
-            raise TaskError(
-                f"schema_version {info.get('schema_version')!r} can't be read; this release "
-                f"reads {SCHEMA_VERSION}",
-                where=str(folder / INFO),
-            )
-        labels = [_typed(row, folder / LABELS) for row in read_rows(folder / LABELS)]
-        failures = folder / FAILURES
-        return cls(folder, info, labels, read_rows(failures) if failures.exists() else [])
+        return cls(folder, read_info(folder), read_labels(folder), read_failures(folder))
 
     def __len__(self) -> int:
         return len(self.labels)
 
     def __getitem__(self, number: int) -> Sample:
+        """Read a sample.
+
+        Raises:
+            TaskError: one of its files is missing or damaged; says which sample and which file.
+        """
         labels = self.labels[number]
-        arrays = self._arrays(labels["arrays"])
+        try:
+            arrays = self._arrays(labels["arrays"], SAMPLE_ARRAYS)
+            picture = self._existing(labels["file_name"])
+            image = read_picture(picture)
+            height, width = arrays["mask"].shape
+            if image.shape != (height, width, 3):
+                raise TaskError(
+                    f"the picture has {image.shape[1]} x {image.shape[0]} pixels, not "
+                    f"{width} x {height}",
+                    where=str(picture),
+                )
+        except TaskError as error:
+            message = f"sample {labels['index']}: {error.message}"
+            hint = error.hint if error.hint not in (None, COPY_AGAIN) else MAKE_AGAIN
+            raise TaskError(message, where=error.where, hint=hint) from error
         return Sample(
-            image=read_picture(self._existing(labels["file_name"])),
+            image=image,
             depth=arrays["depth"],
             normals=arrays["normals"],
             mask=arrays["mask"],
@@ -125,32 +252,35 @@ class Dataset:
         return (self[number] for number in range(len(self)))
 
     def background(self) -> dict[str, NDArray[Any]]:
-        """The untouched sensor: image (uint8, without camera noise), points (mm), normals."""
-        return self._arrays(BACKGROUND)
+        """The untouched sensor: image (uint8, without camera noise), points (mm), normals.
+
+        Raises:
+            TaskError: its file is missing or damaged.
+        """
+        return self._arrays(BACKGROUND, BACKGROUND_ARRAYS)
 
     def _existing(self, name: str) -> Path:
-        path = Path(os.path.realpath(self.folder / name.split("\0")[0]))
-        if "\0" in name or not path.is_relative_to(os.path.realpath(self.folder)):
+        path = inside(self.folder, name)
+        if path is None:
             raise TaskError(
-                f"'{name}' leads out of the dataset's folder",
+                f"'{brief(name)}' leads out of the dataset's folder",
                 where=str(self.folder / LABELS),
                 hint="A stranger may have made it so: copy files that you trust into the folder",
             )
-        if not path.is_file():
+        if not is_file(path):
             raise TaskError(
-                f"the dataset lacks the file '{name}'",
+                f"the dataset lacks the file '{brief(name)}'",
                 where=str(self.folder),
-                hint="Copy the folder again, or make the dataset anew",
+                hint=MAKE_AGAIN,
             )
         return path
 
-    def _arrays(self, name: str) -> dict[str, NDArray[Any]]:
+    def _arrays(self, name: str, kinds: ArrayKinds) -> dict[str, NDArray[Any]]:
         path = self._existing(name)
-        try:
-            with np.load(path, allow_pickle=False) as file:
-                return dict(file)
-        except (OSError, ValueError, EOFError) as error:
-            raise TaskError(f"can't read the arrays: {error}", where=str(path)) from error
+        arrays = read_arrays(path, TaskError)
+        width, height = self.info["settings"]["resolution"]
+        check_arrays(arrays, kinds, (height, width), path, TaskError)
+        return arrays
 
 
 def read_picture(path: Path) -> NDArray[np.uint8]:
@@ -159,11 +289,18 @@ def read_picture(path: Path) -> NDArray[np.uint8]:
     Raises:
         TaskError: it can't be read.
     """
+    data = read_bytes(path, MOST_PICTURE, TaskError, "the picture")
     try:
-        with Image.open(path) as picture:
-            return np.asarray(picture.convert("RGB"), dtype=np.uint8)
-    except OSError as error:  # also for files that are no picture
-        raise TaskError(f"can't read the picture: {error}", where=str(path)) from error
+        with warnings.catch_warnings():
+            warnings.simplefilter("error", Image.DecompressionBombWarning)
+            with Image.open(io.BytesIO(data), formats=("PNG", "JPEG")) as picture:
+                return np.asarray(picture.convert("RGB"), dtype=np.uint8)
+    except Exception as error:  # Pillow raises many kinds on malformed files
+        raise TaskError(
+            f"can't read the picture: the file is cut off or damaged ({error})",
+            where=str(path),
+            hint=COPY_AGAIN,
+        ) from None
 
 
 def write_picture(path: Path, picture: NDArray[np.uint8]) -> None:
@@ -171,11 +308,11 @@ def write_picture(path: Path, picture: NDArray[np.uint8]) -> None:
     Image.fromarray(picture).save(path, format="PNG")
 
 
-def _typed(row: dict[str, str], path: Path) -> dict[str, Any]:
+def _typed(row: dict[str, str], where: str) -> dict[str, Any]:
     try:
         result: dict[str, Any] = {name: row[name] for name in TEXT_COLUMNS}
         result |= {name: int(row[name]) for name in WHOLE_COLUMNS}
         result |= {n: float(row[n]) if row[n] else float("nan") for n in NUMBER_COLUMNS}
     except (KeyError, TypeError, ValueError) as error:
-        raise TaskError(f"a row can't be read: {error}", where=str(path)) from error
+        raise TaskError(f"a row can't be read: {error}", where=where, hint=ROW_AGAIN) from error
     return {name: result[name] for name in COLUMNS}

@@ -34,10 +34,13 @@ from optisense.tasks.dataset import (
     NUMBER_COLUMNS,
     SCHEMA_VERSION,
     Dataset,
+    read_failures,
+    read_info,
+    read_labels,
     write_picture,
 )
 from optisense.tasks.draws import ContactDraw, DrawnContact, Places, keeps_margin
-from optisense.tasks.records import CsvTable, read_json, refuse_differences, write_whole
+from optisense.tasks.records import CsvTable, refuse_differences, write_whole
 from optisense.tasks.untouched import UntouchedSurface
 from optisense.writing import inside, write_json, written_whole
 
@@ -98,6 +101,8 @@ def generate(
     count: int,
     settings: DatasetSettings | None = None,
     progress: Callable[[int, int], None] | None = None,
+    *,
+    mend: bool = False,
 ) -> Dataset:
     """Make a dataset of `count` samples, or continue one until it has that many.
 
@@ -107,6 +112,8 @@ def generate(
         count: samples in all.
         settings: the defaults when None.
         progress: called with the number of samples done and `count`, first with those found.
+        mend: whether to read all samples that are there, and to make those again whose files are
+            missing or damaged; they become what they were.
 
     Returns:
         The dataset. Contacts that could not be made are among its failures.
@@ -122,7 +129,8 @@ def generate(
         raise TaskError(f"{count} samples are asked for", hint="Ask for 1 or more")
     chosen = settings or DatasetSettings()
     with held(folder) as lock, closing(_Maker(model, Path(folder), chosen, lock)) as maker:
-        missing = [index for index in range(count) if index not in maker.done()]
+        whole = maker.mended() if mend else maker.done()
+        missing = [index for index in range(count) if index not in whole]
         for number, index in enumerate(missing):
             if progress is not None:
                 progress(count - len(missing) + number, count)
@@ -163,11 +171,27 @@ class _Maker:
         }
         self._labels = CsvTable(folder / LABELS, COLUMNS)
         self._failures = CsvTable(folder / FAILURES, ("index", "reason"))
+        self._labelled = {row["index"] for row in read_labels(folder)}
+        self._failed = {int(row["index"]) for row in read_failures(folder)}
 
     def done(self) -> set[int]:
         """The indices that need no more work."""
-        rows = (*self._labels.rows, *self._failures.rows)
-        return {int(row["index"]) for row in rows}
+        return self._labelled | self._failed
+
+    def mended(self) -> set[int]:
+        """The same without those of samples whose files are damaged; the background is mended."""
+        dataset = Dataset.load(self._folder)
+        try:
+            dataset.background()
+        except TaskError:
+            self._write_background(self._untouched_image(), self._exposure)
+        damaged = set()
+        for number, labels in enumerate(dataset.labels):
+            try:
+                dataset[number]
+            except TaskError:
+                damaged.add(labels["index"])
+        return self.done() - damaged
 
     def close(self) -> None:
         """Close the tables."""
@@ -229,15 +253,15 @@ class _Maker:
     def _exposure_of_all(self, lock: FolderLock) -> float:
         """Check or write what is common to all samples; returns the exposure."""
         info_file = self._folder / INFO
-        before = read_json(info_file) if info_file.exists() else None
-        if before is not None and "skin" not in (before.get("settings") or {"skin": ""}):
+        before = read_info(self._folder) if info_file.exists() else None
+        if before is not None and "skin" not in before["settings"]:
             # Release 0.1 knew the conforming skin only: the dataset goes on as it was begun.
             self._settings = replace(self._settings, skin=CONFORMING)
         common = self._common()
         if before is not None:
-            kept = before.get("settings") or {}  # release 0.1 had no margin, and another name
-            kept.get("contacts", {}).setdefault("margin", 0.0)
-            kept["estimator"] = current_name(kept.get("estimator"))
+            kept = before["settings"]  # release 0.1 had no margin, and another name
+            kept["contacts"].setdefault("margin", 0.0)
+            kept["estimator"] = current_name(kept["estimator"])
             kept.setdefault("skin", CONFORMING)
             known = {key: before.get(key) for key in common}
             known["design"] = design_values(load_design(self._folder / DESIGN))
@@ -258,24 +282,11 @@ class _Maker:
 
     def _begin(self, common: dict[str, Any]) -> float:
         """Write what is common to all samples; returns the exposure."""
-        image = self._model.render(
-            resolution=self._resolution,
-            photons=self._settings.photons,
-            seed=self._settings.seed,
-            estimator=self._settings.estimator,
-            skin=self._settings.skin,
-            partial=False,
-        )
+        image = self._untouched_image()
         asked = self._settings.exposure
         exposure = float(image.auto_exposure() if asked == "auto" else asked)
         save_design(self._model.design, self._folder / DESIGN)
-        arrays = {
-            "image": image.without_noise().picture(exposure),
-            "points": image.points,
-            "normals": image.normals,
-        }
-        with written_whole(self._folder / BACKGROUND, "the dataset") as temporary:
-            _save_arrays(arrays, temporary)
+        self._write_background(image, exposure)
         info = {
             "schema_version": SCHEMA_VERSION,
             **common,
@@ -286,6 +297,25 @@ class _Maker:
         }
         write_json(self._folder / INFO, info, "the dataset")  # last: now it is a dataset
         return exposure
+
+    def _untouched_image(self) -> TactileImage:
+        return self._model.render(
+            resolution=self._resolution,
+            photons=self._settings.photons,
+            seed=self._settings.seed,
+            estimator=self._settings.estimator,
+            skin=self._settings.skin,
+            partial=False,
+        )
+
+    def _write_background(self, image: TactileImage, exposure: float) -> None:
+        arrays = {
+            "image": image.without_noise().picture(exposure),
+            "points": image.points,
+            "normals": image.normals,
+        }
+        with written_whole(self._folder / BACKGROUND, "the dataset") as temporary:
+            _save_arrays(arrays, temporary)
 
     def _common(self) -> dict[str, Any]:
         """What all samples share and a continued dataset must agree with."""
@@ -333,6 +363,8 @@ class _Maker:
         write_whole(inside(self._folder, f"arrays/{name}.npz"), partial(_save_arrays, arrays))
         if settings.radiance:
             write_whole(inside(self._folder, f"radiance/{name}.exr"), image.save_radiance)
+        if index in self._labelled:  # it is made again as it was
+            return
         width, height = self._resolution
         contact = drawn.contact
         assert contact.point is not None

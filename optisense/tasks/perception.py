@@ -7,7 +7,7 @@ quantity from them. Each task module says what is pressed and which numbers are 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -25,9 +25,10 @@ from optisense.optics.estimators import RADIANCE_CACHE, current_name
 from optisense.quality import SAMPLE_PHOTONS
 from optisense.tasks.camera_noise import MEASURED_NOISE, add_camera_noise
 from optisense.tasks.generation import design_values, mesh_digests
-from optisense.tasks.records import KEPT, CsvTable, read_json, refuse_differences
+from optisense.tasks.records import KEPT, CsvTable, read_object, refuse_differences
 from optisense.tasks.regression import FOLDS, ForestReading, read_by_forest
 from optisense.tasks.snr import NEIGHBOURS, signal_to_noise
+from optisense.untrusted_files import COPY_AGAIN
 from optisense.writing import write_json
 
 if TYPE_CHECKING:
@@ -228,7 +229,7 @@ def collect(
             kept.enter_context(held(folder))
             table = _open_table(folder, task, model, settings, names)
             kept.callback(table.close)
-        rows = [] if table is None else [_numbers(row, names) for row in table.rows]
+        rows = [] if table is None else _kept_numbers(table, names)
         camera = None
         for index in range(len(rows), settings.count):
             if progress is not None:
@@ -311,8 +312,10 @@ def _open_table(
         "meshes": mesh_digests(model.design),
     }
     if (folder / SETTINGS).exists():
-        before = read_json(folder / SETTINGS)
-        kept = before.get("samples") or {}
+        before = read_object(folder / SETTINGS)
+        kept = before.get("samples")
+        if not isinstance(kept, dict):
+            raise TaskError("'samples' is no object", where=str(folder / SETTINGS), hint=COPY_AGAIN)
         kept["estimator"] = current_name(kept.get("estimator"))
         kept.setdefault("skin", CONFORMING)
         refuse_differences("samples", folder, before, now)
@@ -321,8 +324,16 @@ def _open_table(
     return CsvTable(folder / SAMPLES, names)
 
 
-def _numbers(row: Mapping[str, str], names: Sequence[str]) -> list[float]:
-    try:
-        return [float(row[name]) for name in names]
-    except (TypeError, ValueError) as error:
-        raise TaskError(f"a kept sample can't be read: {error}") from error
+def _kept_numbers(table: CsvTable, names: Sequence[str]) -> list[list[float]]:
+    """The numbers of the samples that a table has."""
+    found = []
+    for line, row in enumerate(table.rows, start=2):
+        try:
+            found.append([float(row[name]) for name in names])
+        except (TypeError, ValueError) as error:
+            raise TaskError(
+                f"a kept sample can't be read: {error}",
+                where=f"{table.path}:{line}",
+                hint="Delete this line and those after it; the next run makes the samples again",
+            ) from error
+    return found

@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from optisense.errors import OutputError, TaskError
+from optisense.untrusted_files import COPY_AGAIN, MOST_TABLE, read_json, read_text
 from optisense.writing import written_whole
 
 KEPT = "Free space on this disk or choose another folder; finished samples are kept"
@@ -34,20 +35,15 @@ def write_whole(path: Path, writer: Callable[[Path], object]) -> None:
         writer(temporary)
 
 
-def read_json(path: Path) -> dict[str, Any]:
+def read_object(path: Path) -> dict[str, Any]:
     """Read a JSON file that holds an object.
 
     Raises:
         TaskError: it is missing or no such file.
     """
-    try:
-        values = json.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise TaskError(f"can't read it: {error.strerror}", where=str(path)) from error
-    except ValueError as error:
-        raise TaskError(f"this is not JSON: {error}", where=str(path)) from error
+    values = read_json(path, TaskError)
     if not isinstance(values, dict):
-        raise TaskError("this JSON file holds no object", where=str(path))
+        raise TaskError("this JSON file holds no object", where=str(path), hint=COPY_AGAIN)
     return values
 
 
@@ -114,11 +110,13 @@ def read_rows(path: Path) -> list[dict[str, str]]:
     Raises:
         TaskError: it can't be read.
     """
+    text = read_text(path, MOST_TABLE, TaskError, "the table")
+    reader = csv.DictReader(io.StringIO(text, newline=""))
     try:
-        with path.open(encoding="utf-8", newline="") as file:
-            return list(csv.DictReader(file))
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
-        raise TaskError(f"can't read the table: {error}", where=str(path)) from error
+        return list(reader)
+    except csv.Error as error:
+        where = f"{path}:{reader.line_num}"
+        raise TaskError(f"can't read the table: {error}", where=where, hint=COPY_AGAIN) from error
 
 
 def differences(before: Mapping[str, Any], now: Mapping[str, Any], prefix: str = "") -> list[str]:

@@ -80,7 +80,7 @@ def test_metres_and_far_lights(design: SensorDesign) -> None:
 
 
 def test_a_control_point_far_away(design: SensorDesign) -> None:
-    far = set_value(design, "cages.skin.points[3].z", 1e300)
+    far = set_value(design, "cages.skin.points[3].z", 1e11)
     assert "control point" in only(check_design(far)).message
 
 

@@ -110,7 +110,7 @@ def test_what_is_no_step_file_is_told(tmp_path: Path, capfd: pytest.CaptureFixtu
     file.write_text("solid ascii\nendsolid\n")
     with pytest.raises(MeshError, match="not a STEP file"):
         read_step(file)
-    with pytest.raises(MeshError, match="no such file"):
+    with pytest.raises(MeshError, match="No such file"):
         read_step(tmp_path / "missing.step")
     assert capfd.readouterr().out == ""
 

@@ -91,9 +91,9 @@ def without(key: str, **changes: Any) -> dict[str, Any]:
 @pytest.mark.parametrize(
     ("content", "says"),
     [
-        ("", "no JSON"),
-        ("{", "no JSON"),
-        ("[" * 100_000, "no JSON"),
+        ("", "not JSON"),
+        ("{", "not JSON"),
+        ("[" * 100_000, "nested too deeply"),
         ("[1, 2]", "no section whose name begins with 'rpi.'"),
         ('{"black_level": 3}', "no section"),
         ('{"rpi.black_level": {"black_level": NaN}}', "NaN is no number"),

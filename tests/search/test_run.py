@@ -333,7 +333,7 @@ class TestFolder:
         with pytest.raises(SearchError, match="not a study's store"):
             Study.open(folder)
         (folder / "study.json").write_text("{")
-        with pytest.raises(SearchError, match="can't be read"):
+        with pytest.raises(SearchError, match="not JSON"):
             Study.open(folder)
 
     def test_two_processes_do_not_run_one_study(self, folder: Path, goals: ModuleType) -> None:

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from optisense.errors import TaskError
-from optisense.tasks.records import CsvTable, differences, read_json, refuse_differences
+from optisense.tasks.records import CsvTable, differences, read_object, refuse_differences
 
 COLUMNS = ("name", "value")
 ROWS = [{"name": 'a, "quoted" word', "value": 0.1}, {"name": "b", "value": 1 / 3}]
@@ -73,4 +73,4 @@ def test_differences_name_the_path_and_both_values() -> None:
 def test_json_that_is_none_is_told(tmp_path: Path) -> None:
     (tmp_path / "a.json").write_text("{")
     with pytest.raises(TaskError, match="not JSON"):
-        read_json(tmp_path / "a.json")
+        read_object(tmp_path / "a.json")

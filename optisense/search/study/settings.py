@@ -6,13 +6,16 @@ import hashlib
 import json
 from dataclasses import asdict, dataclass, field, fields
 from datetime import UTC, datetime
+from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, ClassVar
 
-from pydantic import TypeAdapter, ValidationError
+from pydantic import ConfigDict, Field, TypeAdapter, ValidationError
 
 from optisense.errors import SearchError
+from optisense.text import brief
+from optisense.untrusted_files import COPY_AGAIN, first_problem, is_file, read_json
 from optisense.writing import write_text
 
 STUDY_VERSION = 1
@@ -21,6 +24,12 @@ STUDY_FILE = "study.json"
 
 LIBRARIES = ("optisense", "cma", "numpy", "scipy", "mitsuba")
 """Packages that a study's numbers depend on."""
+
+MOST_NAMES = 100
+"""Objectives, or rules, of a study; a search by more than a few finds no front."""
+
+Names = Annotated[list[str], Field(max_length=MOST_NAMES)]
+Whole = Annotated[int, Field(ge=0, le=2**53)]
 
 
 @dataclass(frozen=True)
@@ -46,23 +55,28 @@ class StudySettings:
         samples: manufactured sensors a trial.
         begun: when, UTC.
         versions: of the packages that it was begun with.
+
+    As it is read from a file, its values must have these types, and what is not told here is
+    refused; parameters, errors of making and options are checked by what they are for.
     """
+
+    __pydantic_config__: ClassVar[ConfigDict] = ConfigDict(strict=True, extra="forbid")
 
     design: str
     fingerprint: str
     space: dict[str, Any]
-    objectives: list[str]
-    names: list[str]
+    objectives: Annotated[Names, Field(min_length=1)]
+    names: Annotated[Names, Field(min_length=1)]
     method: str
     options: dict[str, Any]
-    budget: int
-    seed: int
+    budget: Whole
+    seed: Whole
     settings: dict[str, Any] = field(default_factory=dict)
     apart: bool = True
-    rules: list[str] = field(default_factory=list)
+    rules: Names = field(default_factory=list)
     files: dict[str, str] = field(default_factory=dict)
     errors: dict[str, Any] | None = None
-    samples: int = 0
+    samples: Whole = 0
     begun: str = field(default_factory=lambda: datetime.now(UTC).isoformat(timespec="seconds"))
     versions: dict[str, str] = field(default_factory=lambda: package_versions())
 
@@ -98,32 +112,47 @@ class StudySettings:
             SearchError: there is no study, it can't be read, or a newer release wrote it.
         """
         path = folder / STUDY_FILE
-        if not path.is_file():
+        if not is_file(path):
             raise SearchError(
                 "there is no study here", where=str(folder), hint="Name the folder given as --out"
             )
+        data = read_json(path, SearchError)
+        if not isinstance(data, dict):
+            raise SearchError("the study is no JSON object", where=str(path), hint=COPY_AGAIN)
+        found = data.pop("study_version", None)
+        if found != STUDY_VERSION or isinstance(found, bool):
+            newer = isinstance(found, int) and found > STUDY_VERSION
+            raise SearchError(
+                f"the study has version {brief(repr(found))}; this release reads {STUDY_VERSION}",
+                where=str(path),
+                hint="A newer release wrote it: update OptiSense Studio" if newer else COPY_AGAIN,
+            )
+        missing = {name for name in _fields() if name not in data}
+        if missing:
+            names = ", ".join(sorted(missing))
+            raise SearchError(f"{names} is missing", where=str(path), hint=COPY_AGAIN)
         try:
-            data = json.loads(path.read_text(encoding="utf-8"))
-            found = data.pop("study_version")
-            if found != STUDY_VERSION:
-                newer = isinstance(found, int) and found > STUDY_VERSION
-                raise SearchError(
-                    f"the study has version {found!r}; this release reads {STUDY_VERSION}",
-                    where=str(path),
-                    hint="A newer release wrote it: update OptiSense Studio" if newer else None,
-                )
-            missing = {each.name for each in fields(StudySettings)} - set(data)
-            if missing:
-                raise SearchError(f"{', '.join(sorted(missing))} is missing", where=str(path))
-            found_settings = StudySettings(**data)  # refuses unknown names
-            TypeAdapter(StudySettings).validate_python(data)
-            return found_settings
+            settings = _schema().validate_json(json.dumps(data))  # the values as JSON has them
         except ValidationError as error:
-            first = error.errors()[0]
-            place = ".".join(str(each) for each in first["loc"])
-            raise SearchError(f"'{place}' is wrong: {first['msg']}", where=str(path)) from None
-        except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
-            raise SearchError(f"the study can't be read: {error}", where=str(path)) from error
+            raise SearchError(first_problem(error), where=str(path), hint=COPY_AGAIN) from None
+        if len(set(settings.names)) != len(settings.objectives):
+            raise SearchError(
+                f"'names' has {len(set(settings.names))} names for {len(settings.objectives)} "
+                "objectives",
+                where=str(path),
+                hint=COPY_AGAIN,
+            )
+        return settings
+
+
+@cache
+def _schema() -> TypeAdapter[StudySettings]:
+    """What study.json must hold besides its version."""
+    return TypeAdapter(StudySettings)
+
+
+def _fields() -> list[str]:
+    return [each.name for each in fields(StudySettings)]
 
 
 def package_versions() -> dict[str, str]:

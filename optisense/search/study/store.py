@@ -24,6 +24,7 @@ from numpy.typing import NDArray
 from optisense.errors import OptiSenseError, OutputError, SearchError
 from optisense.search.evaluation.outcome import Outcome
 from optisense.search.study.reader import Reader
+from optisense.untrusted_files import MOST_STORE, check_size
 
 FloatArray = NDArray[np.float64]
 
@@ -58,6 +59,12 @@ create table fresh_scores (
     primary key (number, seed)
 ) without rowid;
 """
+
+_STRANGE = (
+    "select type from sqlite_master where type not in ('table', 'index') "
+    "or tbl_name not in ('facts', 'trials', 'fresh_scores') or sql like '%generated%' limit 1"
+)
+"""What a store does not have."""
 
 
 @dataclass(frozen=True)
@@ -114,9 +121,11 @@ class Store:
             SearchError: the file is no store, or one of a newer version.
             OutputError: it can't be read.
         """
+        check_size(path, MOST_STORE, SearchError, "the study's store")
         store = Store(path, objectives)
         with store._read() as db:
             version = db.execute("pragma user_version").fetchone()[0]
+            strange = db.execute(_STRANGE).fetchone()
         if version != STORE_VERSION:
             newer = version > STORE_VERSION
             raise SearchError(
@@ -124,6 +133,9 @@ class Store:
                 where=str(path),
                 hint="A newer release wrote it: update OptiSense Studio" if newer else None,
             )
+        if strange is not None:
+            # Such as a view in the place of a table, which may compute for ever.
+            raise damaged("the store", path, f"it has a {strange[0]} that is none of a study's")
         return store
 
     def write(self) -> None:
@@ -258,7 +270,8 @@ class Store:
             rows = db.execute("select number, seed, scores, failure from fresh_scores").fetchall()
         for number, seed, scores, failure in rows:
             with self._readable(f"a fresh score of trial {number}"):
-                found.setdefault(number, {})[seed] = Outcome(self._unpacked(scores), failure)
+                why = None if failure is None else str(failure)
+                found.setdefault(number, {})[int(seed)] = Outcome(self._unpacked(scores), why)
         return found
 
     def check_points(self, size: int) -> None:
@@ -305,6 +318,8 @@ class Store:
                     worker=str(row[10] or ""),
                 )
             point = np.frombuffer(vector, "<f8").copy()
+            if not np.isfinite(point).all():
+                raise ValueError("its point has numbers that are not finite")
             finished = None if row[11] is None else float(row[11])
             return Row(number, int(generation), int(place), point, outcome, finished)
 
@@ -313,8 +328,8 @@ class Store:
         """Values that are not what this class writes as an error that says where they are."""
         try:
             yield
-        except (ValueError, TypeError, RecursionError) as error:
-            raise damaged(what, self.path, str(error)) from error
+        except (ValueError, TypeError, RecursionError, MemoryError, OverflowError) as error:
+            raise damaged(what, self.path, str(error) or type(error).__name__) from error
 
     def _packed(self, scores: Mapping[str, float]) -> bytes:
         values = [scores.get(name, math.nan) for name in self.objectives]
@@ -362,13 +377,16 @@ def _told(path: Path | None) -> Iterator[None]:
     """SQLite's errors, and those of its files, as ours."""
     try:
         yield
-    except (sqlite3.Error, OSError) as error:
+    except (sqlite3.Error, OSError, MemoryError, UnicodeDecodeError) as error:
         raise _error(error, path) from error
 
 
 def _error(error: Exception, path: Path | None) -> OptiSenseError:
     where = None if path is None else str(path)
     text = str(error)
+    if isinstance(error, MemoryError | UnicodeDecodeError):
+        # SQLite says so of a file whose pages make no sense, too.
+        return damaged("the study's store", path, text or "its pages make no sense")
     if "full" in text:
         return OutputError("the disk is full", where=where, hint="Free some space on it")
     if any(sign in text for sign in ("not a database", "malformed", "no such table")):

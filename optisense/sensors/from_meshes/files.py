@@ -15,6 +15,8 @@ from optisense.geometry.step import SUFFIXES as STEP_FORMATS
 from optisense.geometry.step import read_step
 from optisense.near import near_match
 from optisense.sensors.from_meshes.recipe_parts import MM_PER, ShapeReference
+from optisense.text import brief
+from optisense.untrusted_files import is_file, is_folder
 
 ALL_FORMATS = (*FORMATS, *STEP_FORMATS)
 
@@ -104,12 +106,12 @@ class CadFiles:
         return body.mesh.with_vertices(scale * body.mesh.vertices) if scale != 1.0 else body.mesh
 
     def _check_exists(self, path: Path, file: str) -> None:
-        if path.is_file():
+        if is_file(path):
             return
-        siblings = path.parent.iterdir() if path.parent.is_dir() else ()
+        siblings = path.parent.iterdir() if is_folder(path.parent) else ()
         near = near_match(path.name, [sibling.name for sibling in siblings])
         hint = f"Did you mean '{near}'?" if near else "Correct the path; it starts from the recipe"
-        raise MeshError(f"there is no file '{file}'", where=str(path), hint=hint)
+        raise MeshError(f"there is no file '{brief(file)}'", where=str(path), hint=hint)
 
 
 def _mesh(path: Path) -> TriangleMesh:

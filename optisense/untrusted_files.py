@@ -1,0 +1,348 @@
+"""Reading files that strangers may have made: the one door for designs, meshes, studies and more.
+
+A file is read in this order: it must be a regular file and no larger than a stated bound, which is
+known before anything is read; then it is parsed, with finite numbers only; then its values are
+checked against a schema. Paths that a file names must stay inside its folder, links followed.
+Whatever fails at any of these steps is an `OptiSenseError` of the caller's class, which names the
+file, the place in it, and what to do.
+"""
+
+from __future__ import annotations
+
+import io
+import json
+import math
+import os
+import stat
+import zipfile
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import ValidationError
+
+from optisense.errors import OptiSenseError
+from optisense.text import brief
+
+MEBIBYTE = 2**20
+"""Number of bytes of a mebibyte, in which the bounds below are given."""
+
+MOST_MESH = 128 * MEBIBYTE
+"""Bytes of a mesh file. A binary STL file of this size has 2.7 million triangles, more than a
+sensor is simulated with; the largest mesh of the built-in sensors has 4 MiB."""
+
+MOST_STEP = 64 * MEBIBYTE
+"""Bytes of a STEP file: the CAD models of sensors have up to some 20 MiB."""
+
+MOST_IES = 16 * MEBIBYTE
+"""Bytes of an IES file: a lamp that was measured at every half degree has 2 MiB."""
+
+MOST_TEXT = 16 * MEBIBYTE
+"""Bytes of a file of YAML: a design whose cages have 8000 control points has 1 MiB."""
+
+MOST_JSON = 16 * MEBIBYTE
+"""Bytes of a file of JSON: a study that varies a thousand parameters has 1 MiB."""
+
+MOST_TABLE = 512 * MEBIBYTE
+"""Bytes of a CSV table: a dataset of a million samples has 300 MiB."""
+
+MOST_ARRAYS = 2048 * MEBIBYTE
+"""Bytes of the arrays of one file, unpacked: depth, normals and mask of a picture of 100 million
+pixels have 1.7 GB."""
+
+MOST_PICTURE = 512 * MEBIBYTE
+"""Bytes of a PNG file: a picture of 100 million pixels, the largest that is made, has less."""
+
+MOST_STORE = 1024 * MEBIBYTE
+"""Bytes of a study's store: a trial has some 2 KiB, so this is half a million of them."""
+
+LARGEST_INTEGER = 2**63 - 1
+"""Of whole numbers in JSON: the largest that NumPy and SQLite can hold."""
+
+COPY_AGAIN = "Check that this is the right file, and copy or make it again"
+
+Error = type[OptiSenseError]
+
+
+def read_bytes(path: Path, most: int, error: Error, what: str = "the file") -> bytes:
+    """The content of a regular file that is not too large.
+
+    Args:
+        path: of the file.
+        most: bytes it may have; one that has more is refused before it is read.
+        error: class of what is raised.
+        what: how messages call it, such as "the mesh file".
+
+    Raises:
+        error: the file is missing, no regular file, too large, or can't be read.
+    """
+    try:
+        # A pipe without a writer would wait for one.
+        descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
+        with open(descriptor, "rb") as file:  # noqa: PTH123 - it is open already
+            found = os.fstat(descriptor)
+            if not stat.S_ISREG(found.st_mode):
+                kind = "a folder" if stat.S_ISDIR(found.st_mode) else "no regular file"
+                raise error(f"{what} is {kind}", where=str(path), hint="Name a file")
+            _refuse_size(found.st_size, most, path, error, what)
+            content = file.read(most + 1)
+    except (OSError, ValueError) as failed:
+        reason = failed.strerror if isinstance(failed, OSError) else None
+        raise error(
+            f"can't read {what}: {reason or failed}", where=str(path), hint="Check the path"
+        ) from None
+    except MemoryError:
+        raise error(f"{what} does not fit into memory", where=str(path), hint=COPY_AGAIN) from None
+    _refuse_size(len(content), most, path, error, what)  # it may have grown meanwhile
+    return content
+
+
+def check_size(path: Path, most: int, error: Error, what: str = "the file") -> None:
+    """Check that a file which another library reads is a regular file and not too large.
+
+    Raises:
+        error: it is missing, no regular file, or too large.
+    """
+    try:
+        found = path.stat()
+    except (OSError, ValueError) as failed:
+        reason = failed.strerror if isinstance(failed, OSError) else None
+        raise error(
+            f"can't read {what}: {reason or failed}", where=str(path), hint="Check the path"
+        ) from None
+    if not stat.S_ISREG(found.st_mode):
+        raise error(f"{what} is no regular file", where=str(path), hint="Name a file")
+    _refuse_size(found.st_size, most, path, error, what)
+
+
+def read_text(path: Path, most: int, error: Error, what: str = "the file") -> str:
+    """The content of a file of UTF-8 text; a mark of the byte order at its start is dropped.
+
+    Raises:
+        error: as `read_bytes`, or it is not UTF-8.
+    """
+    return as_text(read_bytes(path, most, error, what), str(path), error, what)
+
+
+def as_text(data: bytes, source: str, error: Error, what: str = "the file") -> str:
+    """Bytes as UTF-8 text.
+
+    Raises:
+        error: they are none; says the line.
+    """
+    try:
+        return data.decode("utf-8-sig")
+    except UnicodeDecodeError as found:
+        line = data[: found.start].count(b"\n") + 1
+        raise error(
+            f"{what} is not UTF-8 text", where=f"{source}:{line}", hint=COPY_AGAIN
+        ) from None
+
+
+def read_json(path: Path, error: Error, most: int = MOST_JSON, what: str = "the file") -> Any:
+    """The values in a JSON file; all its numbers are finite.
+
+    Raises:
+        error: as `read_text` and `parse_json`.
+    """
+    return parse_json(read_text(path, most, error, what), str(path), error, what)
+
+
+def parse_json(text: str, source: str, error: Error, what: str = "the file") -> Any:
+    """The values in a JSON text; all its numbers are finite.
+
+    Args:
+        text: JSON, where NaN and Infinity are refused, as are numbers too large for a float or
+            for an integer of 64 bits, and keys that are there twice.
+        source: names it in messages.
+        error: class of what is raised.
+        what: how messages call it.
+
+    Raises:
+        error: it is no such text; says the line where that is known.
+    """
+    try:
+        return json.loads(
+            text,
+            parse_constant=_refused_constant,
+            parse_float=_finite,
+            parse_int=_integer,
+            object_pairs_hook=_object,
+        )
+    except json.JSONDecodeError as found:
+        raise error(
+            f"{what} is not JSON: {found.msg}",
+            where=f"{source}:{found.lineno}",
+            hint=COPY_AGAIN,
+        ) from None
+    except RecursionError:
+        raise error(f"{what} is nested too deeply", where=source, hint=COPY_AGAIN) from None
+    except (ValueError, MemoryError) as found:
+        raise error(f"{what} is not JSON: {found}", where=source, hint=COPY_AGAIN) from None
+
+
+def inside(folder: Path, relative: str) -> Path | None:
+    """The path of a file that a file of the folder names; None where it leads out of the folder.
+
+    Links are followed, and one that leads back to itself stays as it is.
+    """
+    if "\0" in relative:
+        return None
+    try:
+        path = Path(os.path.realpath(folder / relative))
+    except (OSError, ValueError):
+        return None
+    return path if path.is_relative_to(os.path.realpath(folder)) else None
+
+
+def is_file(path: Path) -> bool:
+    """Whether there is a regular file; False too where a path can't be one at all."""
+    try:
+        return path.is_file()
+    except (OSError, ValueError):
+        return False
+
+
+def is_folder(path: Path) -> bool:
+    """Whether there is a folder; False too where a path can't be one at all."""
+    try:
+        return path.is_dir()
+    except (OSError, ValueError):
+        return False
+
+
+def read_arrays(
+    path: Path, error: Error, most: int = MOST_ARRAYS, what: str = "the arrays"
+) -> dict[str, NDArray[Any]]:
+    """The arrays of an NPZ file by name; nothing in it is run.
+
+    Args:
+        path: of the file.
+        error: class of what is raised.
+        most: bytes of all arrays together, unpacked.
+        what: how messages call them.
+
+    Raises:
+        error: the file is missing, cut off, changed, or too large once it is unpacked.
+    """
+    data = read_bytes(path, most, error, what)
+    try:
+        with zipfile.ZipFile(io.BytesIO(data)) as archive:
+            unpacked = sum(member.file_size for member in archive.infolist())
+        _refuse_size(unpacked, most, path, error, what)
+        with np.load(io.BytesIO(data), allow_pickle=False) as file:
+            return {name: file[name] for name in file.files}
+    except OptiSenseError:
+        raise
+    except Exception as found:  # zipfile, zlib and NumPy raise many kinds on malformed files
+        raise _damaged(path, error, what, found) from None
+
+
+def read_array(path: Path, error: Error, most: int = MOST_ARRAYS) -> NDArray[Any]:
+    """The array of an NPY file; nothing in it is run.
+
+    Raises:
+        error: the file is missing, cut off or changed.
+    """
+    data = read_bytes(path, most, error, "the array")
+    try:
+        return np.lib.format.read_array(io.BytesIO(data), allow_pickle=False)
+    except Exception as found:  # NumPy raises many kinds on malformed files
+        raise _damaged(path, error, "the array", found) from None
+
+
+def check_arrays(
+    arrays: Mapping[str, NDArray[Any]],
+    kinds: Mapping[str, tuple[str, int | None]],
+    size: tuple[int, int],
+    path: Path,
+    error: Error,
+) -> None:
+    """Check that arrays of a picture are there, of the right type, and all of one size.
+
+    Args:
+        arrays: by name.
+        kinds: of each that must be there: what its type may be, as of NumPy's `dtype.kind`, and
+            the numbers of a pixel (None for one without an axis of its own).
+        size: height and width.
+        path: of their file, for messages.
+        error: class of what is raised.
+
+    Raises:
+        error: one is missing, or of another type or shape.
+    """
+    for name, (types, channels) in kinds.items():
+        if name not in arrays:
+            raise error(f"the array '{name}' is missing", where=str(path), hint=COPY_AGAIN)
+        array = arrays[name]
+        wanted = (*size, *(() if channels is None else (channels,)))
+        if array.dtype.kind not in types or array.shape != wanted:
+            raise error(
+                f"the array '{name}' is of {array.dtype} and has the shape {array.shape}, not "
+                f"{wanted}",
+                where=str(path),
+                hint=COPY_AGAIN,
+            )
+
+
+def first_problem(error: ValidationError) -> str:
+    """What is wrong first with values that a pydantic model refuses, with its place among them."""
+    report = error.errors(include_url=False, include_context=False)[0]
+    place = ".".join(brief(str(step)) for step in report["loc"])
+    if report["type"] == "missing":
+        return f"'{place}' is missing"
+    if report["type"] == "extra_forbidden":
+        return f"'{place}' is not known"
+    given = report.get("input")
+    plain = isinstance(given, str | int | float | bool | None)
+    shown = f" = {brief(repr(given))}" if plain else ""
+    text = report["msg"].removeprefix("Value error, ").replace("Input should be", "should be")
+    more = f" (and {error.error_count() - 1} more)" if error.error_count() > 1 else ""
+    return f"'{place}'{shown}: {text}{more}"
+
+
+def _damaged(path: Path, error: Error, what: str, found: Exception) -> OptiSenseError:
+    return error(
+        f"can't read {what}: the file is cut off or damaged ({found or type(found).__name__})",
+        where=str(path),
+        hint=COPY_AGAIN,
+    )
+
+
+def _refuse_size(size: int, most: int, path: Path, error: Error, what: str) -> None:
+    if size > most:
+        raise error(
+            f"{what} has {size / MEBIBYTE:,.0f} MiB; at most {most // MEBIBYTE:,} MiB are read",
+            where=str(path),
+            hint="Check that this is the right file",
+        )
+
+
+def _refused_constant(word: str) -> float:
+    raise ValueError(f"{word} is no number in JSON")
+
+
+def _finite(text: str) -> float:
+    value = float(text)
+    if not math.isfinite(value):
+        raise ValueError(f"the number {text[:40]} is too large")
+    return value
+
+
+def _integer(text: str) -> int:
+    # Python refuses by itself to read some thousand digits.
+    value = int(text)
+    if abs(value) > LARGEST_INTEGER:
+        raise ValueError(f"the whole number {text[:40]} is too large")
+    return value
+
+
+def _object(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    found = dict(pairs)
+    if len(found) < len(pairs):
+        names = [name for name, _ in pairs]
+        twice = next(name for name in found if names.count(name) > 1)
+        raise ValueError(f"'{twice[:40]}' is there twice")
+    return found

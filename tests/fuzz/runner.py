@@ -1,0 +1,181 @@
+"""``python -m tests.fuzz --minutes 60``: malformed input of every kind, for as long as asked.
+
+Each kind has a process of its own, which is ended where one case takes too long or too much
+memory. The table that is printed at the end counts, for each kind, the cases, how many were read
+as they are, refused in words, and what went wrong; cases that went wrong are kept under --keep.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import multiprocessing
+import os
+import resource
+import shutil
+import signal
+import sys
+import tempfile
+import time
+import traceback
+import warnings
+from collections import Counter
+from multiprocessing.connection import Connection
+from pathlib import Path
+
+from .cases import Case, keep_case, read_case, write_case
+
+CASE_TIME = 30.0
+"""Seconds for one case; the slowest that is right takes a few."""
+
+ENGINE_TIME = 90.0
+"""The same for requests to the engine, which compiles kernels for the first of them."""
+
+MEMORY = 6 * 2**30
+"""Bytes of address space that a process may have; an ordinary one has some 2 GiB."""
+
+Found = tuple[str, str, Case]
+"""Kind of input, what went wrong, and with which files."""
+
+
+def one_case(kind: str, case: Case, folder: Path) -> str:
+    """What came of a case: read, refused, or what went wrong and where."""
+    import importlib
+
+    from optisense.errors import OptiSenseError
+
+    from .kinds import KINDS
+
+    importlib.import_module("tests.fuzz.engine_kind")
+    from .engine_kind import RefusedError
+
+    write_case(case, folder)
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("error", RuntimeWarning)  # NumPy's, which a user would see
+            KINDS[kind].read(folder)
+    except (OptiSenseError, RefusedError):
+        return "refused"
+    except Exception as error:
+        frames = [frame for frame in traceback.extract_tb(error.__traceback__)
+                  if "optisense/" in frame.filename]  # fmt: skip
+        place = f"{Path(frames[-1].filename).name}:{frames[-1].name}" if frames else ""
+        text = str(error).split("\n")[0] if not frames else ""
+        return f"{type(error).__name__} {place or text[:60]}"
+    return "read"
+
+
+def _work(kind: str, seed: int, end: float, channel: Connection, folder: Path) -> None:
+    """Make cases and try them until the time is over; runs in a process of its own."""
+    from hypothesis import HealthCheck, Phase, given, settings
+    from hypothesis import seed as seeded
+
+    from .engine_kind import ENGINE
+    from .kinds import KINDS
+
+    sys.stderr = open(os.devnull, "w")  # noqa: SIM115, PTH123
+    os.chdir(folder.parent)
+    resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
+
+    class Over(BaseException):
+        pass
+
+    def run(seed_now: int) -> None:
+        @seeded(seed_now)
+        @settings(max_examples=500, deadline=None, database=None, phases=[Phase.generate],
+                  suppress_health_check=list(HealthCheck))  # fmt: skip
+        @given(KINDS[kind].cases)
+        def attempt(case: Case) -> None:
+            if time.time() > end:
+                raise Over
+            write_case(case, folder)
+            channel.send(("begun", None))
+            outcome = one_case(kind, case, folder)
+            channel.send((outcome, case if outcome not in ("read", "refused") else None))
+
+        attempt()
+
+    try:
+        while time.time() < end:
+            run(seed)
+            seed += 1
+    except Over:
+        pass
+    except BaseException:
+        channel.send(("failed", {"": traceback.format_exc().encode()}))
+    finally:
+        ENGINE.end()
+    channel.send(("over", None))
+
+
+def fuzz(kind: str, seconds: float, seed: int) -> tuple[Counter[str], dict[str, Case]]:
+    """Try cases of a kind for a time; how often each outcome was, and a case of each fault."""
+    counts: Counter[str] = Counter()
+    faults: dict[str, Case] = {}
+    end = time.time() + seconds
+    limit = ENGINE_TIME if kind == "engine" else CASE_TIME
+    while time.time() < end:
+        home = Path(tempfile.mkdtemp(prefix="optisense-fuzz-"))
+        ours, theirs = multiprocessing.get_context("spawn").Pipe(duplex=False)
+        child = multiprocessing.get_context("spawn").Process(
+            target=_work, args=(kind, seed, end, theirs, home / "case")
+        )
+        child.start()
+        theirs.close()
+        over, began = False, time.time() + 60.0  # it imports first
+        try:
+            while not over:
+                if not ours.poll(max(began + limit - time.time(), 0.0)):
+                    raise TimeoutError
+                outcome, case = ours.recv()
+                began = time.time()
+                over = outcome == "over"
+                if outcome == "failed":
+                    raise RuntimeError(case[""].decode())
+                if outcome not in ("begun", "over"):
+                    counts[outcome] += 1
+                    if case is not None:
+                        faults.setdefault(outcome, case)
+        except (TimeoutError, EOFError) as error:
+            what = "takes too long" if isinstance(error, TimeoutError) else "the process has ended"
+            if not (home / "case").exists():
+                raise RuntimeError("the fuzzer's own process has failed") from None
+            counts[what] += 1
+            faults.setdefault(what, read_case(home / "case"))
+        finally:
+            if child.is_alive() and not over:
+                os.kill(child.pid or 0, signal.SIGKILL)
+            child.join()
+            shutil.rmtree(home, ignore_errors=True)
+        seed += 100_000
+    return counts, faults
+
+
+def main() -> int:
+    """Run from the command line; 1 where something went wrong."""
+    from . import engine_kind  # noqa: F401
+    from .kinds import KINDS
+
+    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0] if __doc__ else "")
+    parser.add_argument("--minutes", type=float, default=60.0, help="in all")
+    parser.add_argument("--seed", type=int, default=int(time.time()))
+    parser.add_argument("--kind", action="append", choices=sorted(KINDS), help="only these")
+    parser.add_argument("--keep", type=Path, default=Path("fuzz-found"), help="where cases go")
+    parser.add_argument("--json", type=Path, help="write the counts here, too")
+    given = parser.parse_args()
+    names = given.kind or list(KINDS)
+    total = sum(KINDS[name].weight for name in names)
+    rows = {}
+    print(f"{'kind':<14}{'cases':>9}{'read':>9}{'refused':>9}{'wrong':>7}", flush=True)
+    for name in names:
+        seconds = given.minutes * 60.0 * KINDS[name].weight / total
+        counts, faults = fuzz(name, seconds, given.seed)
+        rows[name] = dict(counts)
+        wrong = {what: number for what, number in counts.items() if what not in ("read", "refused")}
+        print(f"{name:<14}{sum(counts.values()):>9}{counts['read']:>9}{counts['refused']:>9}"
+              f"{sum(wrong.values()):>7}", flush=True)  # fmt: skip
+        for what, number in sorted(wrong.items(), key=lambda each: -each[1]):
+            print(f"    {number:>6}  {what}  {keep_case(name, faults[what], given.keep)}")
+    if given.json:
+        given.json.write_text(json.dumps(rows, indent=1) + "\n")
+    return int(any(set(each) - {"read", "refused"} for each in rows.values()))
