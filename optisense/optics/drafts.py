@@ -53,6 +53,7 @@ class DraftCacheStore(CacheStore):
     """Radiance caches in coarse cells, which takes over what it may from the store before it."""
 
     cell_size = DRAFT_CELL_SCALE * CELL_SIZE
+    tells_curved = False
     uses_pilot = False  # half of the light's time, for some per cent on flanks of contacts
 
     def __init__(

@@ -48,6 +48,7 @@ def render_sppm(
     *,
     coloured: bool,
     radius: float = FIRST_RADIUS,
+    samples: int = 1,
     stop: Callable[[int], bool] | None = None,
 ) -> SppmResult:
     """Average several passes.
@@ -59,6 +60,8 @@ def render_sppm(
         passes: number of passes.
         coloured: whether surfaces are coloured.
         radius: gather radius (mm) of the first pass.
+        samples: camera samples of each pixel in a pass. With discs much smaller than a pixel, one
+            sample leaves most photons of the pixel out.
         stop: called with the number of passes done; tracing ends early if it returns True.
     """
     table, seed = emission.table, emission.seed
@@ -68,24 +71,25 @@ def render_sppm(
     areas = [emitter.area for emitter in table.emitters]
     done = emitted = 0
     for number in range(passes):
-        sample = dr.opaque(mi.UInt32, number + 1)
-        film = film_samples(pixel, width, sample, seed)
         sent = replace(emission, first=number * emission.per_light)
         photons = trace_photons(scene, sent, coloured=coloured)
         reach = radius * (number + 1) ** (-1 / 6)
         grid = build_grid(photons, *scene.bounds, reach)
         image = Film(width * height, table.groups)
-        image.count(pixel)
-        ways = [
-            find_visible_points(scene, camera, pixel, sample, film, seed, channel=channel)
-            for channel in scene.channels
-        ]
-        for points in (end for pair in ways for end in pair if end is not None):
-            light = gather_pairwise(
-                grid, scene.table, points, dr.opaque(mi.Float, reach), table.groups
-            )
-            image.add(points, light)
-            image.add_light(points, table.emitters, areas)
+        for each in range(samples):
+            sample = dr.opaque(mi.UInt32, number * samples + each + 1)
+            film = film_samples(pixel, width, sample, seed)
+            image.count(pixel)
+            ways = [
+                find_visible_points(scene, camera, pixel, sample, film, seed, channel=channel)
+                for channel in scene.channels
+            ]
+            for points in (end for pair in ways for end in pair if end is not None):
+                light = gather_pairwise(
+                    grid, scene.table, points, dr.opaque(mi.Float, reach), table.groups
+                )
+                image.add(points, light)
+                image.add_light(points, table.emitters, areas)
         halves[number % 2] += image.layers(width, height)
         done, emitted = number + 1, emitted + photons.emitted
         if stop is not None and stop(done):

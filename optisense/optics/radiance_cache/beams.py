@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from optisense.optics.backend.arrays import floats, indices
 from optisense.optics.radiance_cache.angular_variance import passes_near, squared_radius
-from optisense.optics.radiance_cache.direction_bins import DIFFUSE_BINS
+from optisense.optics.radiance_cache.direction_bins import FINE_BINS
 from optisense.optics.scene.surface_cells import SurfaceCells
 
 STRONG_SHARE = 0.03
@@ -87,7 +87,7 @@ def collect_beams(
     total = _total(moments, sizes[1], groups, lane)
     zero = dr.zeros(mi.UInt32, entries)
     # A disc of the solid angle of 16 bins has R^2 = 64 / bins, and a mean cosine of 1 - R^2 / 4.
-    fine = bands * sectors > DIFFUSE_BINS.count
+    fine = bands * sectors >= FINE_BINS.count
     widest = dr.opaque(mi.Float, 1 - 16 / (bands * sectors) if fine else 1.0)
     rest = (groups, coloured, total, widest, lane)
     count = _collect(*field, *sizes, *rest, zero, nowhere, nowhere, False)

@@ -39,20 +39,34 @@ class DirectionBins:
         """Number of bins."""
         return self.across * self.across
 
+    @property
+    def fine(self) -> bool:
+        """Whether they are those of narrow lobes."""
+        return self.across >= FINE_BINS.across
+
     @classmethod
-    def for_roughness(cls, roughness: float | None) -> DirectionBins:
-        """The bins for coatings whose sharpest metallic lobe has this GGX alpha; None for diffuse
-        coatings.
+    def for_coating(cls, roughness: float | None, curved: bool = False) -> DirectionBins:
+        """The bins for coatings.
+
+        Args:
+            roughness: GGX alpha of the sharpest metallic lobe; None for diffuse coatings.
+            curved: whether the coated surfaces are curved, and light does not graze them (where it
+                does, the volume flux tells how it varies).
         """
-        if roughness is None:
-            return DIFFUSE_BINS
-        if roughness >= BROAD_LOBE:
-            return BROAD_LOBE_BINS
+        if roughness is None or roughness >= BROAD_LOBE:
+            if curved:
+                return CURVED_BINS
+            return DIFFUSE_BINS if roughness is None else BROAD_LOBE_BINS
         return FINE_BINS if roughness >= NARROW_LOBE else FINEST_BINS
 
 
 DIFFUSE_BINS = DirectionBins(16, 1.0)
 """The bins for diffuse coatings."""
+CURVED_BINS = DirectionBins(18, 0.6, True)
+"""The bins for diffuse coatings and broad lobes on curved surfaces, in front of which light varies
+faster. In a contact of the diffuse spherical GelSight Mini the RMS error over patches is 3.1 % with
+`DIFFUSE_BINS`, 2.0 % where their blur is undone bin by bin, and 1.3 % with these. The light takes a
+quarter longer, and images in light that is there as long as before."""
 BROAD_LOBE_BINS = DirectionBins(16, 0.6)
 """The bins for broad metallic lobes. With the full overlap, the skin beside a contact of GelSight
 Mini of specularity 0.3 is 2.5 % off instead of 1.8 %; with 24 x 24 bins it is 1.3 %, for up to

@@ -15,7 +15,7 @@ from scipy.spatial import cKDTree
 from optisense.optics.backend.sequences import seed_of
 from optisense.optics.backend.stages import Stage, StageCallback
 from optisense.optics.radiance_cache.cache import CacheTally, RadianceCache
-from optisense.optics.radiance_cache.direction_bins import DIFFUSE_BINS, DirectionBins
+from optisense.optics.radiance_cache.direction_bins import DirectionBins
 from optisense.optics.radiance_cache.pilot_photons import PilotPhotons
 from optisense.optics.radiance_cache.smoothing import Kernels
 from optisense.optics.scene.emitters import EmitterTable
@@ -83,6 +83,8 @@ class CacheStore:
     """Traces photons pass by pass, and keeps the tallies and the caches that they give."""
 
     cell_size = CELL_SIZE
+    tells_curved = True
+    """Whether curved surfaces get direction bins of their own."""
     uses_pilot = True
     """Whether the photons that teach the guide also tell how light falls: indenters are then lit
     from a field above the surface where it grazes, and kernels are narrower where it varies."""
@@ -141,7 +143,12 @@ class CacheStore:
     @property
     def _directions(self) -> DirectionBins:
         """The direction bins that the coating calls for."""
-        return DirectionBins.for_roughness(self._roughness)
+        return DirectionBins.for_coating(self._roughness, self._curved and not self._grazes)
+
+    @cached_property
+    def _curved(self) -> bool:
+        """Whether surfaces are curved, and get direction bins of their own."""
+        return self.tells_curved and any(piece.normals is not None for piece in self._opaque)
 
     @property
     def _flux_layer(self) -> FluxLayer | None:
@@ -216,8 +223,7 @@ class CacheStore:
             entry = directions.count * self._table.groups * (36 if self._coloured else 20)
             if self._grazes:
                 entry *= 2
-            fine = directions.count > DIFFUSE_BINS.count
-            most = MAX_FINE_TALLY_BYTES if fine else MAX_TALLY_BYTES
+            most = MAX_FINE_TALLY_BYTES if directions.fine else MAX_TALLY_BYTES
             least = float(np.sqrt(1.3 * area * entry / most))
             scale = self.cell_size / CELL_SIZE
             self._cells = build_cells(points, triangles, max(self.cell_size, scale * least))
