@@ -17,6 +17,7 @@ from optisense.writing import write_text
 
 if TYPE_CHECKING:
     from optisense.optics.ledger import LightLedger
+    from optisense.optics.place_light import PlaceLight
 
 JSON_FILE, PAGE_FILE = "ledger.json", "ledger.html"
 
@@ -30,6 +31,15 @@ def ledger(
     *,
     options: LedgerOptions,
     out: Annotated[Path | None, out_option("Folder for ledger.json and ledger.html.")] = None,
+    at: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="U,V",
+            help="Also tell why it is bright or dark at this place of the skin, mm from the "
+            "camera's axis to the right and to the top. May be given several times.",
+            show_default=False,
+        ),
+    ] = None,
     as_json: Annotated[
         bool, typer.Option("--json", help="Print JSON with every line instead of a table.")
     ] = False,
@@ -37,11 +47,16 @@ def ledger(
 ) -> None:
     """Tell where the light of each group goes: to the skin, into which part, or out of which.
 
-    In per cent of the power of each group, nothing pressed in. The lines add up to 100 %.
+    In per cent of the power of each group, nothing pressed in. The lines add up to 100 %. With --at
+    it also tells why it is dark, or bright, at a place: which groups light it, on which ways and
+    from where.
     """
     with progress_line() as line:
         line.say("loading")
+        from optisense.geometry import parse_place
         from optisense.sensors import load
+
+        places = [parse_place(text) for text in at or []]
 
         sensor = load(design)
         if out is not None:
@@ -51,9 +66,13 @@ def ledger(
         from optisense.report.light_section import LightSection, ledger_page
 
         line.say("following light")
-        section = LightSection.of(OpticalModel(sensor, variant), options.photons, options.seed)
+        model = OpticalModel(sensor, variant)
+        section = LightSection.of(model, options.photons, options.seed, places)
         found = section.ledger
-    text = json.dumps(found.as_data(), indent=2, allow_nan=False)
+    data = found.as_data()
+    if places:
+        data["places"] = [place.as_data() for place in section.places]
+    text = json.dumps(data, indent=2, allow_nan=False)
     if out is not None:
         write_text(out / JSON_FILE, text + "\n")
         write_text(out / PAGE_FILE, ledger_page(sensor, section))
@@ -61,6 +80,8 @@ def ledger(
         print(text)
         return
     _print(found)
+    for place in section.places:
+        _print_place(place)
     if out is not None:
         output.print(f"numbers: {out / JSON_FILE}", markup=False)
         output.print(f"page:    {out / PAGE_FILE}", markup=False)
@@ -78,3 +99,28 @@ def _print(found: LightLedger) -> None:
     output.print(table)
     worst = max((entry.noise for entry in found.entries), default=0.0)
     output.print(f"noise of a line: at most {100 * worst:.2g} %", style="dim")
+
+
+def _print_place(place: PlaceLight) -> None:
+    title = "light at ({}) mm".format(", ".join(f"{part:g}" for part in place.at))
+    if not place.groups:
+        output.print(f"\n{title}: no light group shines")
+        return
+    output.print()
+    groups = list(place.groups.values())
+    table = table_of(title, *place.groups)
+    table.add_row("irradiance (mW/mm²)", *(f"{each.irradiance:.3g}" for each in groups))
+    table.add_row("of the mean in view", *(f"{each.of_mean:.2f}" for each in groups))
+    for words in groups[0].ways:
+        shares = [each.ways[words] for each in groups]
+        if max(shares) >= LEAST_SHOWN:
+            table.add_row(f"{words} (%)", *(f"{100 * share:.1f}" for share in shares))
+    table.add_row("off the normal (degrees)", *(f"{each.mean_angle:.0f}" for each in groups))
+    table.add_row("mostly from (degrees)", *(f"{each.main_azimuth:.0f}" for each in groups))
+    output.print(table)
+    worst = max(each.noise for each in groups)
+    output.print(
+        f"noise of the irradiance: at most {100 * worst:.2g} %; directions from 0 = right of the "
+        "picture, 90 = top",
+        style="dim",
+    )

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
+from optisense.commands.ledger import LedgerOptions
 from optisense.commands.options import MOST_PIXELS
 from optisense.commands.rendering import RenderOptions
 from optisense.design import LightGroup, SensorDesign
@@ -35,6 +36,9 @@ if TYPE_CHECKING:
 
 DRAFT_WIDTH = 160
 """Width in pixels of a draft, which has a quarter of the pixels of a usual image."""
+
+MOST_PLACES = 100
+"""Places of one ledger; each takes as long as the ledger."""
 
 LEVELS = (np.arange(256) / 255.0).astype(np.float32)
 """What the 256 levels of a picture are from 0 to 1."""
@@ -85,6 +89,14 @@ class Report(Fields):
 
     image: str
     file: str
+
+
+class Ledger(OfDesign, LedgerOptions):
+    """See docs/engine.md."""
+
+    at: list[tuple[float, float] | tuple[float, float, float]] = Field(
+        default_factory=list, max_length=MOST_PLACES
+    )
 
 
 class ChiefRayGrid(OfDesign):
@@ -196,12 +208,17 @@ def relight(session: Session, fields: Relight, job: Job) -> dict[str, Any]:
     }
 
 
-@handles("report", Report, Lane.QUICK)
+@handles("report", Report, Lane.RENDER)
 def report(session: Session, fields: Report, job: Job) -> dict[str, Any]:
     """The HTML page of an image."""
     from optisense.report import write_report
+    from optisense.report.light_section import LightSection
 
     kept = session.images.find(fields.image)
+    light = None
+    if not kept.draft:
+        job.progress(0.0, "following light")
+        light = LightSection.of(session.renderer.model(kept.design))
     path = write_report(
         Path(fields.file),
         kept.design,
@@ -209,8 +226,29 @@ def report(session: Session, fields: Report, job: Job) -> dict[str, Any]:
         kept.contacts,
         exposure=kept.exposure,
         rays=kept.rays,
+        light=light,
     )
     return {"file": str(path)}
+
+
+@handles("ledger", Ledger, Lane.RENDER)
+def ledger(session: Session, fields: Ledger, job: Job) -> dict[str, Any]:
+    """Where the light of each group goes, and why it is bright or dark at places of the skin."""
+    from optisense.optics import light_at, light_ledger
+    from optisense.optics.ledger import cells_in_view
+
+    design = design_of(session, fields, job)
+    session.designs.must_be_sound(design)
+    job.progress(0.0, "building the sensor")
+    model = session.renderer.model(design)
+    job.progress(0.2, "following light")
+    seen = cells_in_view(model)
+    found = light_ledger(model, fields.photons, fields.seed, seen).as_data()
+    places = []
+    for number, place in enumerate(fields.at):
+        job.progress(0.3 + 0.7 * number / len(fields.at), "following light to places")
+        places.append(light_at(model, place, fields.photons, fields.seed, seen).as_data())
+    return {"ledger": found, "places": places}
 
 
 @handles("chief_rays", ChiefRayGrid, Lane.RENDER)

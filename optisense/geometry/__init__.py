@@ -2,7 +2,7 @@
 
 from optisense.geometry.cage import cage_points, cage_weights, deform
 from optisense.geometry.contact import Contact, available_depth, locate, place
-from optisense.geometry.contact_text import parse_contact
+from optisense.geometry.contact_text import parse_contact, parse_place
 from optisense.geometry.indenter_kinds import (
     INDENTERS,
     Indenter,
@@ -36,6 +36,7 @@ __all__ = [
     "locate",
     "nine_places",
     "parse_contact",
+    "parse_place",
     "place",
     "quantity",
     "ray_hits",

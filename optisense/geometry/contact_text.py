@@ -52,6 +52,23 @@ def parse_contact(text: str) -> Contact:
         ) from error
 
 
+def parse_place(text: str) -> tuple[float, float] | tuple[float, float, float]:
+    """Read a place such as `3,-2`, in mm; the module says what it may be.
+
+    Raises:
+        ContactError: the text is neither two nor three numbers.
+    """
+    try:
+        numbers = _numbers(text, "a place", (2, 3))
+    except ContactError as error:
+        raise ContactError(
+            error.message, where=f"place '{text}'", hint="Write it as U,V in mm, for example 3,-2"
+        ) from error
+    if len(numbers) == 2:
+        return numbers[0], numbers[1]
+    return numbers[0], numbers[1], numbers[2]
+
+
 def parse_indenter(text: str) -> Indenter:
     """Read an indenter, such as `sphere:1.5`.
 

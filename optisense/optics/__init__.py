@@ -13,15 +13,18 @@ if TYPE_CHECKING:
     from optisense.optics.imaging.tactile_image import TactileImage
     from optisense.optics.ledger import LightLedger, light_ledger
     from optisense.optics.model import OpticalModel, RenderProgress
+    from optisense.optics.place_light import PlaceLight, light_at
     from optisense.optics.transport.chief_rays import ChiefRays, RayOutcome
 
 _HOMES = {
     "ChiefRays": ".transport.chief_rays",
     "LightLedger": ".ledger",
     "OpticalModel": ".model",
+    "PlaceLight": ".place_light",
     "RayOutcome": ".transport.chief_rays",
     "RenderProgress": ".model",
     "TactileImage": ".imaging.tactile_image",
+    "light_at": ".place_light",
     "light_ledger": ".ledger",
 }
 
@@ -29,9 +32,11 @@ __all__ = [
     "ChiefRays",
     "LightLedger",
     "OpticalModel",
+    "PlaceLight",
     "RayOutcome",
     "RenderProgress",
     "TactileImage",
+    "light_at",
     "light_ledger",
 ]
 

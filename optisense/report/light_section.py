@@ -13,12 +13,14 @@ from optisense.design import SensorDesign
 from optisense.quality import photons_of
 from optisense.report.drawing import encoded, swatch_of
 from optisense.report.files import as_json, page, script
+from optisense.report.place_section import places_values
 from optisense.report.scene_view import scene_data
 
 if TYPE_CHECKING:
     from optisense.optics import OpticalModel
     from optisense.optics.ledger import LightLedger
     from optisense.optics.light_paths import PhotonPath
+    from optisense.optics.place_light import Place, PlaceLight
 
 REPORT_PHOTONS = photons_of("draft")
 """Photons of the ledger in the report of a render: the noise of a line is then 0.3 to 0.4 % of the
@@ -58,31 +60,42 @@ class LightSection:
     Attributes:
         ledger: where the light of each group goes.
         paths: typical photons of each group.
+        places: the light at places of the skin.
     """
 
     ledger: LightLedger
     paths: Mapping[str, Sequence[PhotonPath]]
+    places: Sequence[PlaceLight] = ()
 
     @staticmethod
-    def of(model: OpticalModel, photons: int | None = None, seed: int = 0) -> LightSection:
+    def of(
+        model: OpticalModel,
+        photons: int | None = None,
+        seed: int = 0,
+        at: Sequence[Place] = (),
+    ) -> LightSection:
         """Follow the light of a model.
 
         Args:
             model: the sensor.
             photons: of the ledger; as many as suit a drawing if left out.
             seed: another one gives other photons.
+            at: places of the skin that are looked at, as of `optisense.optics.light_at`.
 
         Raises:
+            ContactError: a place is off the surface.
             RenderError: there are too few photons.
         """
         from optisense.optics.ledger import cells_in_view, light_ledger
         from optisense.optics.light_paths import photon_paths
+        from optisense.optics.place_light import light_at
 
         lights = sum(len(group.lights) for group in model.design.lights.values())
         number = max(REPORT_PHOTONS, PHOTONS_PER_LIGHT * lights) if photons is None else photons
         seen = cells_in_view(model)
         ledger = light_ledger(model, number, seed, seen)
-        return LightSection(ledger, photon_paths(model, seed=seed, seen=seen))
+        places = [light_at(model, place, number, seed, seen) for place in at]
+        return LightSection(ledger, photon_paths(model, seed=seed, seen=seen), places)
 
     @cached_property
     def colours(self) -> dict[str, str]:
@@ -174,6 +187,7 @@ def ledger_page(design: SensorDesign, section: LightSection) -> str:
         title=design.name,
         description=design.description,
         light=section.values(design),
+        places=places_values(section.places, design),
         scene=as_json(scene_data(design, {}, ways=section.ways())),
         viewer_script=script("viewer.js"),
     )

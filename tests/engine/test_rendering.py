@@ -74,7 +74,7 @@ def test_relighting_equals_rendering_anew(engine: Any, first: dict[str, Any]) ->
 def test_a_page_of_an_image(engine: Any, first: dict[str, Any], tmp_path: Path) -> None:
     page = engine.ask("report", image=first["image"], file=str(tmp_path / "page.html"))["file"]
     text = Path(page).read_text(encoding="utf-8")
-    assert "gelsight-mini" in text
+    assert "gelsight-mini" in text and "Where the light goes" in text
     # Its 3-D view shows the same chief rays as a page that `optisense render` writes.
     scene = re.search(r'id="scene-data">(.*?)</script>', text, re.DOTALL)
     assert scene is not None
@@ -84,6 +84,18 @@ def test_a_page_of_an_image(engine: Any, first: dict[str, Any], tmp_path: Path) 
     for name, ends in rays.items():
         shown = np.frombuffer(base64.b64decode(drawn[name]), dtype="<f4").reshape(-1, 3)
         np.testing.assert_allclose(shown, ends, atol=1e-4)
+
+
+def test_where_light_goes_and_why_it_is_dark_somewhere(engine: Any) -> None:
+    few = {"design": "gelsight-mini", "photons": 30_000}
+    found = engine.ask("ledger", at=[[-6, 4], [0, 0, 0]], **few)
+    shares = [e["share"] for e in found["ledger"]["entries"] if e["group"] == "green"]
+    assert sum(shares) == pytest.approx(1.0, abs=1e-5)
+    corner, middle = found["places"]
+    assert middle["point"] == pytest.approx([0.0, 0.0, 0.0], abs=1e-6)
+    brought = [place["groups"]["red"]["of_mean_in_view"] for place in (corner, middle)]
+    assert brought[0] < brought[1]
+    assert "off the sensing surface" in engine.refused("ledger", at=[[60, 0]], **few)["message"]
 
 
 def test_a_moved_light_changes_the_picture(engine: Any, first: dict[str, Any]) -> None:

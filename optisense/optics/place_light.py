@@ -1,0 +1,216 @@
+"""The light at a place of the sensing surface: how much, of which groups, on which ways, whence.
+
+It answers why a place is as bright or as dark as it is, nothing pressed in.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from optisense.errors import RenderError
+from optisense.optics.ledger import LEDGER_PHOTONS, cells_in_view
+from optisense.optics.scene.surface_cells import surface_samples
+from optisense.optics.transport.photons import TargetCells
+from optisense.optics.transport.place_light import (
+    BATCHES,
+    TILT_BINS,
+    TURN_BINS,
+    Disc,
+    LightWay,
+    trace_to_place,
+)
+
+if TYPE_CHECKING:
+    from optisense.optics.model import OpticalModel
+
+Place = tuple[float, float] | tuple[float, float, float]
+"""mm, coordinates on the sensing surface, or a point in the frame of the design."""
+
+PLACE_RADIUS = 1.0
+"""mm: photons that land so near a place tell its light. A million photons on GelSight Mini then
+bring some thousand landings; light varies by some per cent over such a disc."""
+
+AREA_STEP = 0.02
+"""mm: distance of the samples that tell the area of skin within the disc, to about 0.2 %."""
+
+WAY_WORDS = {
+    LightWay.REFRACTED: "refracted only",
+    LightWay.REFLECTED: "reflected inside the optics",
+    LightWay.MIRRORED: "by mirrors",
+    LightWay.SCATTERED_BY_PARTS: "scattered by other parts",
+    LightWay.SCATTERED_BY_COATING: "scattered by the coating elsewhere",
+}
+"""What pages and tables call the ways, from the plainest to the longest."""
+
+
+@dataclass(frozen=True)
+class GroupLight:
+    """What one light group brings to a place.
+
+    Attributes:
+        irradiance: mW/mm^2 on the skin, over all channels and lights of the group.
+        noise: standard deviation of the irradiance, relative to it.
+        of_mean: the irradiance over its mean on the skin in the camera's view.
+        ways: shares of the irradiance by way, of `WAY_WORDS`; they add up to 1.
+        sky: (9, 12) shares of the irradiance by the direction that light comes from: the angle to
+            the normal of the skin in steps of 10 degrees, and the azimuth in steps of 30 degrees,
+            anticlockwise from the picture's right.
+    """
+
+    irradiance: float
+    noise: float
+    of_mean: float
+    ways: dict[str, float]
+    sky: NDArray[np.float64]
+
+    @property
+    def mean_angle(self) -> float:
+        """Degrees: the mean angle between the light and the normal of the skin."""
+        middles = (np.arange(TILT_BINS) + 0.5) * 90.0 / TILT_BINS
+        return float(self.sky.sum(axis=1) @ middles)
+
+    @property
+    def main_azimuth(self) -> float:
+        """Degrees anticlockwise from the picture's right, -180 to 180: where most light comes
+        from.
+        """
+        turns = (np.arange(TURN_BINS) + 0.5) * 2 * np.pi / TURN_BINS
+        by_turn = self.sky.sum(axis=0)
+        return float(np.degrees(np.arctan2(by_turn @ np.sin(turns), by_turn @ np.cos(turns))))
+
+
+@dataclass(frozen=True)
+class PlaceLight:
+    """The light at a place.
+
+    Attributes:
+        at: mm, the place as it was asked for.
+        point: (3,) mm, in the design's frame.
+        groups: by light group; groups that are off are left out.
+        photons: that were followed.
+    """
+
+    at: Place
+    point: NDArray[np.float64]
+    groups: dict[str, GroupLight]
+    photons: int
+
+    def as_data(self) -> dict[str, Any]:
+        """As plain numbers and names, to be written as JSON."""
+        return {
+            "units": {"irradiance": "mW/mm^2", "length": "mm", "angle": "degree"},
+            "at": list(self.at),
+            "point": self.point.tolist(),
+            "photons": self.photons,
+            "groups": {
+                name: {
+                    "irradiance": each.irradiance,
+                    "noise": each.noise,
+                    "of_mean_in_view": each.of_mean,
+                    "ways": each.ways,
+                    "mean_angle": each.mean_angle,
+                    "main_azimuth": each.main_azimuth,
+                    "sky": each.sky.tolist(),
+                }
+                for name, each in self.groups.items()
+            },
+        }
+
+
+def light_at(
+    model: OpticalModel,
+    at: Place,
+    photons: int = LEDGER_PHOTONS,
+    seed: int = 0,
+    seen: TargetCells | None = None,
+) -> PlaceLight:
+    """Follow photons from all lights, and look at those that land at a place of the skin.
+
+    Args:
+        model: the sensor; nothing presses.
+        at: mm, as of contacts: two coordinates on the sensing surface, or a point near it in the
+            frame of the design.
+        photons: of all lights together.
+        seed: another one gives other photons.
+        seen: `cells_in_view` of the model, if they are known.
+
+    Raises:
+        ContactError: the place is off the surface.
+        RenderError: there are too few photons.
+    """
+    lights = sum(len(group.lights) for group in model.design.lights.values())
+    if photons < 100 * lights:
+        raise RenderError(
+            f"{photons} photons are too few for {lights} lights",
+            hint=f"give at least {100 * lights}",
+        )
+    place = model.surface.point_at(*at) if len(at) == 2 else model.surface.nearest(at)
+    right = model.surface.u_axis - place.inward * (model.surface.u_axis @ place.inward)
+    right /= np.linalg.norm(right)
+    up = np.cross(place.inward, right)
+    up *= np.sign(up @ model.surface.v_axis)
+    disc = Disc(place.point, place.inward, right, up, PLACE_RADIUS)
+    seen = cells_in_view(model) if seen is None else seen
+    landed, in_view = trace_to_place(model.scene, model._emitter_table, disc, seen, photons, seed)
+    area = _area_within(model.sensing.triangles, disc)
+    view_area = float(seen.cells.areas[np.asarray(seen.flags) != 0].sum())
+    groups = {}
+    for number, (name, group) in enumerate(model.design.lights.items()):
+        flux = group.channel_flux()
+        power = landed[:, number] @ flux  # (batches, ways, tilts, turns)
+        total = power.mean(axis=0).sum()
+        mean = float((in_view[:, number] @ flux).mean()) / max(view_area, 1e-12)
+        if mean > 0.0 or total > 0.0:
+            groups[name] = _group_light(power, area, mean)
+    return PlaceLight(at, place.point, groups, photons)
+
+
+def _group_light(power: NDArray[np.float64], area: float, mean: float) -> GroupLight:
+    """What batches (n, ways, tilts, turns) of mW in a disc of mm^2 say; ``mean`` is in mW/mm^2."""
+    shares = power.mean(axis=0)
+    total = float(shares.sum())
+    batches = power.sum(axis=(1, 2, 3))
+    noise = float(batches.std(ddof=1) / np.sqrt(BATCHES)) / total if total > 0.0 else 0.0
+    shares = shares / total if total > 0.0 else shares
+    return GroupLight(
+        irradiance=total / area,
+        noise=noise,
+        of_mean=total / area / mean if mean > 0.0 else 0.0,
+        ways={words: float(shares[way].sum()) for way, words in WAY_WORDS.items()},
+        sky=shares.sum(axis=0),
+    )
+
+
+def _area_within(triangles: NDArray[np.floating], disc: Disc) -> float:
+    """mm^2 of triangles (n, 3, 3) within a ball around the middle of a disc."""
+    low, high = triangles.min(axis=1), triangles.max(axis=1)
+    near = ((low < disc.middle + disc.radius) & (high > disc.middle - disc.radius)).all(axis=1)
+    chosen = np.asarray(triangles[near], dtype=np.float64)
+    # The part of large triangles that can lie within, in pieces.
+    while len(chosen) and (sides := _longest(chosen)).max() > disc.radius:
+        chosen = np.concatenate([chosen[sides <= disc.radius], _quarters(chosen, sides, disc)])
+    faces = np.arange(3 * len(chosen)).reshape(-1, 3)
+    points, _, areas = surface_samples(chosen.reshape(-1, 3), faces, AREA_STEP)
+    offsets = points - disc.middle[:, None]
+    return float(areas[(offsets**2).sum(axis=0) < disc.radius**2].sum())
+
+
+def _longest(triangles: NDArray[np.float64]) -> NDArray[np.float64]:
+    return np.asarray(np.linalg.norm(triangles - np.roll(triangles, 1, axis=1), axis=2).max(axis=1))
+
+
+def _quarters(
+    triangles: NDArray[np.float64], sides: NDArray[np.float64], disc: Disc
+) -> NDArray[np.float64]:
+    """The quarters of triangles that are longer than the disc's radius, as far as they are near."""
+    a, b, c = np.moveaxis(triangles[sides > disc.radius], 1, 0)
+    ab, bc, ca = (a + b) / 2, (b + c) / 2, (c + a) / 2
+    pieces = [(a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca)]
+    quarters = np.concatenate([np.stack(piece, axis=1) for piece in pieces])
+    low, high = quarters.min(axis=1), quarters.max(axis=1)
+    near = ((low < disc.middle + disc.radius) & (high > disc.middle - disc.radius)).all(axis=1)
+    return quarters[near]

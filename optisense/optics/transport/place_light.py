@@ -1,0 +1,176 @@
+"""Photons that land at one place of the sensing surface: on which ways, and from where.
+
+Photons fly as those of a picture do. What lands within a disc is summed up by what it has met on
+its way and by the direction that it comes from.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import IntEnum
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+from numpy.typing import NDArray
+
+from optisense.optics.backend.arrays import indices
+from optisense.optics.backend.interrupts import lets_ctrl_c_through
+from optisense.optics.backend.sequences import seed_of
+from optisense.optics.scene.emitters import EmitterTable
+from optisense.optics.scene.ray_scene import Ray, RayScene
+from optisense.optics.scene.surface_cells import cell_at
+from optisense.optics.transport.emission_guide import uniform_guide
+from optisense.optics.transport.interact import LobeSample, Path, interact
+from optisense.optics.transport.photon_map import GROUP_MASK
+from optisense.optics.transport.photons import MAX_SURVIVAL, Emission, TargetCells, launch
+
+TILT_BINS, TURN_BINS = 9, 12
+"""Bins of 10 degrees of the angle of incidence, and of 30 degrees of azimuth."""
+
+BATCHES = 16
+"""Independent parts of the photons, whose spread gives the noise."""
+
+
+class LightWay(IntEnum):
+    """What light has met on its way to a place; where it is several, the last of this list."""
+
+    REFRACTED = 0  # nothing but interfaces that let it pass
+    REFLECTED = 1  # an interface that reflected it, totally or in part
+    MIRRORED = 2  # a mirror
+    SCATTERED_BY_PARTS = 3  # a housing, a paint
+    SCATTERED_BY_COATING = 4  # the coating at another place
+
+
+WAYS = len(LightWay)
+
+
+@dataclass(frozen=True)
+class Disc:
+    """Where photons are counted.
+
+    Attributes:
+        middle: (3,) mm, on the sensing surface.
+        inward: (3,) unit normal there, into the gel.
+        right, up: (3,) unit vectors across it, from which azimuths count, anticlockwise.
+        radius: mm.
+    """
+
+    middle: NDArray[np.float64]
+    inward: NDArray[np.float64]
+    right: NDArray[np.float64]
+    up: NDArray[np.float64]
+    radius: float
+
+
+@dr.syntax
+def _count(
+    scene: RayScene,
+    ray: Ray,
+    power: mi.Color3f,
+    line: mi.UInt32,
+    number: mi.UInt32,
+    disc: list[mi.Vector3f],
+    radius: mi.Float,
+    sums: mi.Float64,
+    seen: TargetCells,
+    view: mi.Float64,
+    seed: mi.UInt32,
+) -> None:
+    """Follow photons to their ends; add what lands in the disc to sums (lines, ways, tilts, turns,
+    3), and what lands in the camera's view to ``view`` (lines, 3).
+    """
+    middle, inward, right, up = disc
+    rng = mi.PCG32()
+    first, second = mi.sample_tea_32(number, seed)
+    rng.seed(mi.UInt64(first), mi.UInt64(second))
+    way = mi.UInt32(0)
+    while ray.active:
+        sample = LobeSample(rng.next_float32(), mi.Point2f(rng.next_float32(), rng.next_float32()))
+        step = interact(scene, ray, Path.PHOTON, sample)
+        power *= step.transmittance
+        offset = mi.Vector3f(step.hit.point) - middle
+        lands = step.sensed & (dr.squared_norm(offset) < radius * radius)
+        cell, near = cell_at(seen.cells, step.hit.point, step.sensed)
+        near &= dr.gather(mi.UInt32, seen.flags, cell, near) != 0
+        for k in range(3):
+            dr.scatter_add(view, mi.Float64(power[k]), line * 3 + k, near)
+        if lands:
+            towards = -ray.direction
+            cosine = dr.clip(dr.dot(towards, inward), 0, 1)
+            tilt = mi.UInt32(dr.minimum(dr.acos(cosine) * (2 / dr.pi) * TILT_BINS, TILT_BINS - 0.5))
+            angle = dr.atan2(dr.dot(towards, up), dr.dot(towards, right)) * (1 / dr.two_pi)
+            angle -= dr.floor(angle)
+            turn = mi.UInt32(dr.minimum(angle * TURN_BINS, TURN_BINS - 0.5))
+            row = ((line * WAYS + way) * TILT_BINS + tilt) * TURN_BINS + turn
+            for k in range(3):
+                dr.scatter_add(sums, mi.Float64(power[k]), row * 3 + k)
+        mirrored = step.scattered & ~step.opaque
+        met = dr.select(step.turned, mi.UInt32(int(LightWay.REFLECTED)), 0)
+        met = dr.select(mirrored, mi.UInt32(int(LightWay.MIRRORED)), met)
+        met = dr.select(step.opaque, mi.UInt32(int(LightWay.SCATTERED_BY_PARTS)), met)
+        met = dr.select(step.sensed, mi.UInt32(int(LightWay.SCATTERED_BY_COATING)), met)
+        way = dr.maximum(way, met)
+        power *= step.lobe.weight
+        ray = step.ray
+        if step.scattered:
+            survival = dr.minimum(dr.max(step.lobe.weight), MAX_SURVIVAL)
+            ray.active &= rng.next_float32() < survival
+            power /= dr.maximum(survival, 1e-6)
+
+
+@lets_ctrl_c_through
+def trace_to_place(
+    scene: RayScene,
+    table: EmitterTable,
+    disc: Disc,
+    seen: TargetCells,
+    photons: int,
+    seed: int,
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Count photons at a place.
+
+    Args:
+        scene: the sensor, nothing pressed in.
+        table: its lights.
+        disc: the place.
+        seen: the cells of the sensing surface, and which of them the camera sees.
+        photons: of all lights together.
+        seed: another one gives other photons.
+
+    Returns:
+        (batches, groups, ways, tilts, turns, 3) mW that land in the disc, and (batches, groups, 3)
+        mW that land in view, of lights of 1 mW in each channel.
+    """
+    groups = table.groups
+    sums = dr.zeros(mi.Float64, BATCHES * groups * WAYS * TILT_BINS * TURN_BINS * 3)
+    view = dr.zeros(mi.Float64, BATCHES * groups * 3)
+    axes = [
+        mi.Vector3f(*(dr.opaque(mi.Float, float(part)) for part in vector))
+        for vector in (disc.middle, disc.inward, disc.right, disc.up)
+    ]
+    per_light = max(1, photons // (BATCHES * table.count))
+    lights = indices(np.arange(table.count))
+    guide = uniform_guide(table.count)
+    for batch in range(BATCHES):
+        emission = Emission(table, guide, per_light, seed_of(seed, 6, batch))
+        flight, _ = launch(scene, emission, lights)
+        _count(
+            scene,
+            flight.ray,
+            flight.throughput,
+            (flight.group & GROUP_MASK) + dr.opaque(mi.UInt32, batch * groups),
+            flight.number,
+            axes,
+            dr.opaque(mi.Float, disc.radius),
+            sums,
+            seen,
+            view,
+            dr.opaque(mi.UInt32, seed_of(seed, 7, batch)),
+        )
+        dr.eval(sums, view)
+    found = np.asarray(sums, dtype=np.float64)
+    return (
+        found.reshape(BATCHES, groups, WAYS, TILT_BINS, TURN_BINS, 3),
+        np.asarray(view, dtype=np.float64).reshape(BATCHES, groups, 3),
+    )
