@@ -27,8 +27,8 @@ from .optimise import operator as optimise_operator
 from .optimise import prop as optimise_prop
 from .optimise import ui as optimise_ui
 from .scene import cages, fields, object_properties, old_files, properties
+from .sensor import cad, starting, workspace
 from .sensor import operator as sensor_operator
-from .sensor import starting, workspace
 from .sensor import ui as sensor_ui
 from .shapes import cage_operator, cage_warnings, reference_operator
 from .shapes import choosing as cage_choosing
@@ -56,6 +56,7 @@ MODULES = (
     evaluate_prop,
     optimise_prop,
     following,
+    cad,
     sensor_operator,
     workspace,
     reference_operator,

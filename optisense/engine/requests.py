@@ -71,5 +71,14 @@ def names() -> list[str]:
 
 def _load() -> None:
     """Import the modules that register requests; late, so that `hello` need not wait for them."""
-    for module in ("rendering", "placing", "designing", "keeping", "kinds", "scoring", "searching"):
+    for module in (
+        "rendering",
+        "placing",
+        "designing",
+        "cad",
+        "keeping",
+        "kinds",
+        "scoring",
+        "searching",
+    ):
         import_module(f"optisense.engine.{module}")

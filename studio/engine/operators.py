@@ -46,7 +46,8 @@ def start(
     wait = bpy.app.background if wait is None else wait
     if session.start_job(title, what, on_result, wait=wait, **fields):
         return {"FINISHED"}
-    return told(operator, session.state().problem)
+    now = session.state()
+    return told(operator, ". ".join(text for text in (now.problem, now.hint) if text))
 
 
 def start_with_design(

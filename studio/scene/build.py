@@ -59,7 +59,8 @@ def build(
         group = add_light_group(design, name, values)
         for pose in values["lights"]:
             add_light(scene, group, pose)
-    add_camera(scene, document["camera"])
+    if document.get("camera"):
+        add_camera(scene, document["camera"])
     for name, values in (document.get("cages") or {}).items():
         add_cage(scene, name, values)
 

@@ -68,10 +68,14 @@ def gather_document(scene: bpy.types.Scene) -> dict[str, Any]:
     document["cages"] = {name: cage for name, cage in cages.items() if cage["parts"]}
     document["parts"] = {name: _part(name, part, before["parts"]) for name, part in parts.items()}
     _own_files(document["parts"], parts)
+    if not parts:
+        raise SceneError("the sensor has no part; add CAD files in Shapes", "parts")
     document["lights"] = _lights(scene, before["lights"])
+    if not document["lights"]:
+        raise SceneError("the sensor has no light; add one in Lights and Camera", "lights")
     camera = camera_values(scene)
     if camera is None:
-        raise SceneError("the sensor has no camera; add one in Lights and Camera")
+        raise SceneError("the sensor has no camera; add one in Lights and Camera", "camera")
     document["camera"] = camera
     if "provenance" in before:
         document["provenance"] = provenance.updated(before, document)

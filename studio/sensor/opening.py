@@ -115,6 +115,17 @@ def open_stage(
     )
 
 
+def open_empty(scene: bpy.types.Scene, document: dict[str, Any]) -> None:
+    """Show a sensor that has no parts yet in place of the one before; references stay."""
+    clear_startup(scene)
+    picture_is_old()
+    build(scene, document, {}, keep_others=True)
+    scene.optisense.folder = str(new_stage())
+    scene.optisense.is_saved = False
+    session.push_undo("New sensor")
+    session.redraw()
+
+
 def picture_is_old() -> None:
     """What is shown is no picture of the sensor that opens, whose lights do not relight it.
 

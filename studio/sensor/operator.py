@@ -12,7 +12,7 @@ from ..core.engine import EngineError
 from ..engine import catalogue, handing, polls, session
 from ..engine.operators import ChoosingFile, Starting, fail, start, told
 from ..scene.paths import chosen, suggested
-from .opening import open_source
+from .opening import open_empty, open_source
 
 
 class _Opens:
@@ -43,6 +43,23 @@ class OPTISENSE_OT_new(polls.Replacing, _Opens, Starting, bpy.types.Operator):
         return self._open(context, f"builtin:{self.sensor}", "", wait=wait)
 
 
+class OPTISENSE_OT_new_empty(polls.Replacing, bpy.types.Operator):
+    """Start a sensor of your own: no part, no light and no camera yet; references stay"""
+
+    bl_idname = "optisense.new_empty"
+    bl_label = "Empty"
+    bl_options = {"REGISTER"}
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        try:
+            catalogue.learn_kinds()
+            document = session.ask_and_wait("empty")["data"]
+        except EngineError as error:
+            return fail(self, error)
+        open_empty(context.scene, handing.without_nulls(document))
+        return {"FINISHED"}
+
+
 class OPTISENSE_MT_new(bpy.types.Menu):
     """The built-in sensors"""
 
@@ -55,6 +72,9 @@ class OPTISENSE_MT_new(bpy.types.Menu):
             row = self.layout.row()
             row.enabled = name != "NONE"
             row.operator(OPTISENSE_OT_new.bl_idname, text=description or title).sensor = name
+        self.layout.separator()
+        self.layout.operator(OPTISENSE_OT_new_empty.bl_idname, icon="FILE_NEW")
+        self.layout.operator("optisense.cad_files", icon="IMPORT")
 
 
 class OPTISENSE_OT_open(polls.Replacing, _Opens, ChoosingFile, bpy.types.Operator):

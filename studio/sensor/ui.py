@@ -7,6 +7,7 @@ import bpy
 from ..engine import session
 from ..engine.layout import TAB, SidebarPanel, labelled, paragraph, show_job, show_other_outcomes
 from ..engine.preferences import HOW_TO_GET, engine_command
+from . import cad
 
 
 class OPTISENSE_PT_sensor(SidebarPanel, bpy.types.Panel):
@@ -25,6 +26,7 @@ class OPTISENSE_PT_sensor(SidebarPanel, bpy.types.Panel):
         elif session.running() is None:
             layout.operator("optisense.start_engine", icon="PLAY")
         layout.menu("OPTISENSE_MT_new", icon="FILE_NEW")
+        cad.draw(layout)
         row = layout.row(align=True)
         row.operator("optisense.open", text="Open", icon="FILE_FOLDER")
         row.operator("optisense.save", icon="FILE_TICK")

@@ -2,22 +2,23 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import bpy
 import numpy as np
-from bpy.props import EnumProperty, FloatProperty, StringProperty
+from bpy.props import CollectionProperty, EnumProperty, FloatProperty, StringProperty
 
 from ..core.mesh_file import Mesh
 from ..engine import polls, session
-from ..engine.operators import ChoosingFile, ChoosingProperties, refuse
+from ..engine.operators import ChoosingProperties, refuse, start
 from ..scene import kinds
 from ..scene.build import add_material, add_part
 from ..scene.collections import REFERENCE, collection, select_only
 from ..scene.contacts import add_contact, sensing_surface
 from ..scene.gather import free_name, part_names
 from ..scene.meshes import new_mesh, part_mesh
-from ..scene.paths import chosen
+from ..sensor.cad import FORMATS, ChoosingFiles
 
 READING = "Reading the mesh"
 """What messages are about, so that they are told beside the button that was pressed."""
@@ -43,15 +44,19 @@ FIRST_MATERIAL: dict[str, tuple[str, dict[str, Any]]] = {
 aluminium (the index of the diffuse-grey coating's flake); a blocker absorbs."""
 
 
-class OPTISENSE_OT_add_mesh(polls.Replacing, ChoosingFile, bpy.types.Operator):
-    """Read a mesh file (OBJ, STL, PLY) into the collection Reference"""
+class OPTISENSE_OT_add_mesh(polls.Replacing, ChoosingFiles, bpy.types.Operator):
+    """Read CAD files (STEP, STL, OBJ, PLY), as many as are marked, into the collection Reference"""
 
     bl_idname = "optisense.add_mesh"
-    bl_label = "Add .obj Mesh"
+    bl_label = "Add CAD Files"
     bl_options = {"REGISTER"}
 
-    filepath: StringProperty(name="File", description="OBJ, STL or PLY", subtype="FILE_PATH")
-    filter_glob: StringProperty(default="*.obj;*.stl;*.ply", options={"HIDDEN"})
+    filepath: StringProperty(name="File", description="A CAD file", subtype="FILE_PATH")
+    directory: StringProperty(name="Folder", description="Of the files", subtype="DIR_PATH")
+    files: CollectionProperty(
+        type=bpy.types.OperatorFileListElement, name="Files", description="In the folder"
+    )
+    filter_glob: StringProperty(default=FORMATS, options={"HIDDEN"})
     scale: FloatProperty(
         name="Scale",
         description="From the file's units to mm: 1000 for metres, 25.4 for inches",
@@ -61,38 +66,36 @@ class OPTISENSE_OT_add_mesh(polls.Replacing, ChoosingFile, bpy.types.Operator):
     )
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        path = chosen(self, "a mesh file")
-        if path is None:
-            return {"CANCELLED"}
-        name = context.scene.name
+        if not (self.filepath.strip() or self.directory.strip()):
+            return refuse(self, "Name a file first")
+        paths, name, scale = self.paths(), context.scene.name, self.scale
 
         def read(result: dict[str, Any]) -> None:
             scene = bpy.data.scenes.get(name)
             if scene is not None:
-                _bring(scene, path.stem, result)
-                session.push_undo(f"Add {path.name}")
+                made = [
+                    _bring(scene, each, 1.0 if each["own_units"] else scale)
+                    for each in result["bodies"]
+                ]
+                select_only(*made)
+                session.push_undo(f"Add {', '.join(Path(path).name for path in paths)}")
 
         # A large file takes a while.
-        done = session.start_job(
-            READING, "mesh", read, wait=bpy.app.background, file=str(path), scale=self.scale
-        )
-        if not done:
-            now = session.state()
-            self.report({"ERROR"}, f"{now.problem}. {now.hint}")
-        return {"FINISHED"} if done else {"CANCELLED"}
+        return start(self, READING, "cad", read, files=paths, units="mm", name="meshes")
 
 
-def _bring(scene: bpy.types.Scene, name: str, result: dict[str, Any]) -> None:
-    """Put a mesh that the engine has read into the collection Reference."""
-    files = result["mesh"]
-    vertices = np.load(files["vertices"]).astype(np.float64)
+def _bring(scene: bpy.types.Scene, body: dict[str, Any], scale: float) -> bpy.types.Object:
+    """Put a body that the engine has read into the collection Reference."""
+    files, name = body["mesh"], body["name"]
+    vertices = np.load(files["vertices"]).astype(np.float64) * scale
     mesh = Mesh(vertices, np.load(files["faces"]).astype(np.int32))
     item = bpy.data.objects.new(name, new_mesh(name, mesh))
     item.optisense.kind = "REFERENCE"
-    item.optisense.reference = "support" if result.get("closed") else "sensing_surface"
+    use = {"lights": "light", "nothing": "blocker"}.get(body["use"], body["use"])
+    item.optisense.reference = use
     item.color = (0.6, 0.6, 0.6, 0.5)
     collection(scene, REFERENCE).objects.link(item)
-    select_only(item)
+    return item
 
 
 class OPTISENSE_OT_set_reference(polls.Checked, ChoosingProperties, bpy.types.Operator):
@@ -113,6 +116,10 @@ class OPTISENSE_OT_set_reference(polls.Checked, ChoosingProperties, bpy.types.Op
             lambda c: _meshes(c), "Select a mesh first that is no part of the sensor yet"
         ),
     )
+
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        self.reference = _meshes(context)[0].optisense.reference  # as its name was understood
+        return context.window_manager.invoke_props_dialog(self)
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         scene = context.scene

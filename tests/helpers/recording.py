@@ -24,6 +24,9 @@ class Recording:
 
     row = column = box = split = grid_flow = column_flow = _sub
 
+    def separator(self, **_: Any) -> None:
+        """Nothing is to be seen of it."""
+
     def label(self, text: str = "", icon: str = "NONE", **_: Any) -> None:
         assert icon in ICONS, icon
         self.texts.append(text)

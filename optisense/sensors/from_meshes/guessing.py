@@ -6,8 +6,8 @@ What is guessed here is meant to be asked about or looked over; nothing is measu
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal, cast
 
@@ -93,8 +93,12 @@ class CadBody:
         return self.body.mesh.with_vertices(scale * self.body.mesh.vertices)
 
 
-def find_bodies(source: Path) -> list[CadBody]:
+def find_bodies(source: Path, chosen: Sequence[str] = ()) -> list[CadBody]:
     """All bodies of a CAD file, or of the CAD files in a folder.
+
+    Args:
+        source: the file or folder.
+        chosen: names of files in the folder; all CAD files there if none is given.
 
     Raises:
         SetupError: a STEP file, but the extra for it is missing.
@@ -103,6 +107,8 @@ def find_bodies(source: Path) -> list[CadBody]:
     folder = source if source.is_dir() else source.parent
     files = sorted(source.iterdir()) if source.is_dir() else [source]
     files = [file for file in files if file.suffix.lower() in ALL_FORMATS or file == source]
+    if chosen:
+        files = [folder / name for name in chosen]
     if not files:
         raise MeshError(
             "there are no CAD files here",
@@ -169,7 +175,28 @@ def guess_recipe(source: str | Path, units: Units | None = None) -> Recipe:
         SetupError, MeshError: see `find_bodies`; or no body can carry the coating.
     """
     source = Path(source)
-    found = find_bodies(source)
+    return recipe_of(find_bodies(source), source, units)
+
+
+def recipe_of(
+    bodies: Sequence[CadBody],
+    source: Path,
+    units: Units | None = None,
+    uses: Mapping[str, Use] | None = None,
+) -> Recipe:
+    """A recipe for bodies that were read, with usual lights and a usual camera.
+
+    Args:
+        bodies: of `find_bodies`.
+        source: the file or folder that they were found in.
+        units: of the files that don't know theirs; None means mm, or the only unit that fits.
+        uses: what bodies are by their names, where that is known better than it was guessed.
+
+    Raises:
+        MeshError: no body can carry the coating.
+    """
+    known = uses or {}
+    found = [replace(each, use=known.get(each.name, each.use)) for each in bodies]
     units = units or guess_units(found)
     folder = source if source.is_dir() else source.parent
     parts = {each.name: part_of(each, each.use) for each in found if isinstance(each.use, Role)}

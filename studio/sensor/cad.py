@@ -1,0 +1,183 @@
+"""A sensor of the user's CAD files: what each body is, in one table to confirm."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import bpy
+from bpy.props import BoolProperty, CollectionProperty, EnumProperty, StringProperty
+
+from ..core.engine import EngineError
+from ..engine import polls, session
+from ..engine.layout import labelled, show_job
+from ..engine.operators import fail, start
+from ..scene.kinds import ROLES
+from ..scene.paths import absolute
+from .opening import new_stage, open_stage
+
+READING, MAKING = "Reading the files", "Making the sensor"
+FORMATS = "*.obj;*.stl;*.ply;*.step;*.stp"
+
+USES = [
+    *ROLES,
+    ("lights", "Place of lights", "A light on each of its faces that look to the gel"),
+    ("camera", "Place of the camera", "The camera's pupil is in its middle"),
+    ("nothing", "Left out", "No part of the sensor"),
+]
+
+UNITS = [
+    (name, name, f"Lengths in the files are in {words}")
+    for name, words in (
+        ("mm", "millimetres"), ("cm", "centimetres"), ("m", "metres"), ("inch", "inches"),
+        ("mil", "thousandths of an inch"), ("um", "micrometres"),
+    )
+]  # fmt: skip
+
+
+class OPTISENSE_PG_body(bpy.types.PropertyGroup):
+    """A body of the files; its name is that of the part that it becomes."""
+
+    use: EnumProperty(name="Use", items=USES, description="What this body is to the sensor")
+    size: StringProperty(description="Its size in words", options={"HIDDEN"})
+
+
+class OPTISENSE_PG_cad(bpy.types.PropertyGroup):
+    """The files that a sensor is to be made of; never saved."""
+
+    bodies: CollectionProperty(type=OPTISENSE_PG_body)
+    files: StringProperty(description="Their paths, one a line", options={"HIDDEN"})
+    units: EnumProperty(
+        name="Units", items=UNITS, description="Of the lengths in files that do not say it"
+    )
+    has_units: BoolProperty(description="All files say their units", options={"HIDDEN"})
+
+
+def now() -> bpy.types.PropertyGroup:
+    """The files that are being looked at."""
+    return bpy.context.window_manager.optisense_cad
+
+
+class ChoosingFiles:
+    """Operators that ask for one file or several of a folder, or for the folder itself."""
+
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        context.window_manager.fileselect_add(self)
+        return {"RUNNING_MODAL"}
+
+    def paths(self) -> list[str]:
+        """The absolute paths that were chosen."""
+        names = [each.name for each in self.files if each.name]
+        if self.directory and names:
+            return [str(absolute(str(Path(self.directory) / name))) for name in names]
+        return [str(absolute(self.filepath or self.directory))]
+
+
+class OPTISENSE_OT_cad_files(polls.Replacing, ChoosingFiles, bpy.types.Operator):
+    """Make a sensor of CAD files (STEP, STL, OBJ, PLY): mark them all, or open their folder"""
+
+    bl_idname = "optisense.cad_files"
+    bl_label = "From CAD Files ..."
+    bl_options = {"REGISTER"}
+
+    filepath: StringProperty(name="File", description="A CAD file", subtype="FILE_PATH")
+    directory: StringProperty(name="Folder", description="Of the files", subtype="DIR_PATH")
+    files: CollectionProperty(
+        type=bpy.types.OperatorFileListElement, name="Files", description="In the folder"
+    )
+    filter_glob: StringProperty(default=FORMATS, options={"HIDDEN"})
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        paths = self.paths()
+
+        def read(result: dict[str, Any]) -> None:
+            found = now()
+            found.bodies.clear()
+            found.files = "\n".join(paths)
+            found.has_units = all(each["own_units"] for each in result["bodies"])
+            found.units = result["units"]
+            for each in result["bodies"]:
+                row = found.bodies.add()
+                row.name, row.use = each["name"], each["use"]
+                row.size = " x ".join(f"{length:.3g}" for length in each["size"])
+            session.redraw()
+
+        return start(self, READING, "cad", read, files=paths, name="cad")
+
+
+class OPTISENSE_OT_make_from_cad(polls.Replacing, bpy.types.Operator):
+    """Make the sensor of these bodies, with usual lights and a usual camera to begin with"""
+
+    bl_idname = "optisense.make_from_cad"
+    bl_label = "Make the Sensor"
+    bl_options = {"REGISTER"}
+
+    checks = (
+        *polls.Replacing.checks,
+        polls.needing(lambda c: c.window_manager.optisense_cad.bodies, "Choose CAD files first"),
+    )
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        found, name, wait = now(), context.scene.name, bpy.app.background
+        try:
+            stage = new_stage()
+        except EngineError as error:
+            return fail(self, error, MAKING)
+        fields: dict[str, Any] = {} if found.has_units else {"units": found.units}
+
+        def made(result: dict[str, Any]) -> None:
+            scene = bpy.data.scenes.get(name)
+            if scene is None:
+                return
+            now().bodies.clear()
+            notes = result["notes"]
+
+            def tell(_: bpy.types.Scene) -> None:
+                session.state().note = "; ".join(notes) or session.state().note
+
+            open_stage(scene, stage, wait=wait, then=tell)
+
+        return start(
+            self,
+            MAKING,
+            "from_cad",
+            made,
+            files=found.files.split("\n"),
+            uses={each.name: each.use for each in found.bodies},
+            to=str(stage),
+            **fields,
+        )
+
+
+class OPTISENSE_OT_forget_cad(bpy.types.Operator):
+    """Make no sensor of these files"""
+
+    bl_idname = "optisense.forget_cad"
+    bl_label = "Cancel"
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        now().bodies.clear()
+        return {"FINISHED"}
+
+
+def draw(layout: bpy.types.UILayout) -> None:
+    """The table: each body with its size in the files' units, and what it is."""
+    show_job(layout, READING, MAKING)
+    found = now()
+    if not found.bodies or session.is_busy():
+        return
+    box = layout.box()
+    box.label(text="What is each body?", icon="IMPORT")
+    column = box.column(align=True)
+    for each in found.bodies:
+        row = column.row(align=True)
+        row.label(text=f"{each.name}  {each.size}")
+        row.prop(each, "use", text="")
+    if not found.has_units:
+        labelled(box).prop(found, "units")
+    row = box.row(align=True)
+    row.operator("optisense.make_from_cad", icon="CHECKMARK")
+    row.operator("optisense.forget_cad", text="", icon="X")
+
+
+PROPERTIES = {"WindowManager": {"optisense_cad": OPTISENSE_PG_cad}}
