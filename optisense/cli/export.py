@@ -53,10 +53,13 @@ def export(
 
     for note in filter(None, (FORMATS.find(name).note for name in wanted)):
         messages.print(note, style="dim")
-    files = write(sensor, out, wanted)
+    notes: list[str] = []
+    files = write(sensor, out, wanted, notes)
     sheets = [shape.name for shape in shapes(sensor) if not shape.is_solid]
     for file in files:
         output.print(str(file), markup=False)
+    for note in notes:
+        output.print(note, markup=False, style="dim")
     if sheets:
         output.print(
             f"sheets without thickness, not to be printed: {', '.join(sheets)}",

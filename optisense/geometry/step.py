@@ -104,7 +104,7 @@ def read_step(path: str | Path) -> list[StepBody]:
     count: dict[str, int] = {}
     for name, shape in _products(tool.Label()):
         for solid, body in _bodies(shape):
-            mesh = _triangles(body)
+            mesh = triangles(body)
             if len(mesh.faces) == 0:
                 continue
             count[name] = count.get(name, 0) + 1
@@ -188,8 +188,14 @@ def _bodies(shape: Any) -> Iterator[tuple[bool, Any]]:
             explorer.Next()
 
 
-def _triangles(shape: Any) -> TriangleMesh:
-    """Cut the faces of a shape into triangles, which look out of a solid."""
+def triangles(shape: Any, chord: float = CHORD, bend: float = BEND) -> TriangleMesh:
+    """Cut the faces of a shape into triangles, which look out of a solid.
+
+    Args:
+        shape: of Open CASCADE, mm.
+        chord: mm, how far triangles may be off the exact surface.
+        bend: degrees, by which neighbouring ones on a curve may bend.
+    """
     from OCP.BRep import BRep_Tool
     from OCP.BRepMesh import BRepMesh_IncrementalMesh
     from OCP.TopAbs import TopAbs_FACE, TopAbs_REVERSED
@@ -198,7 +204,7 @@ def _triangles(shape: Any) -> TriangleMesh:
     from OCP.TopoDS import TopoDS
 
     cast = getattr(TopoDS, "Face_s", None) or TopoDS.Face
-    BRepMesh_IncrementalMesh(shape, CHORD, False, float(np.radians(BEND)), False)
+    BRepMesh_IncrementalMesh(shape, chord, False, float(np.radians(bend)), False)
     pieces = []
     explorer = TopExp_Explorer()
     explorer.Init(shape, TopAbs_FACE)

@@ -269,7 +269,8 @@ def _gel(
     """A plate with a vertical wall, a rounded edge and a dome, its top at z = 0.
 
     The dome rises with the square of the way from its rim to the middle. The rounded edge is a
-    parabola that leaves the wall upright and meets the dome at the dome's own slope.
+    parabola that leaves the wall upright and meets the dome at the dome's mean slope; so all
+    corners lie in level rings.
 
     Args:
         heights: mm, of the whole gel, its wall, its dome, and how far the edge reaches inward.
@@ -280,7 +281,7 @@ def _gel(
     foot, rim = outline.points(tessellation), outline.inset(inset).like(outline, tessellation)
     reach = np.linalg.norm(rim, axis=1)
     slope = 2.0 * rise / reach * np.linalg.norm(foot - rim, axis=1)
-    steep = np.maximum(rim_z - slope, 0.5 * (wall_z + rim_z))
+    steep = max(rim_z - float(slope.mean()), 0.5 * (wall_z + rim_z))
     rings = [_ring(foot, -thickness), _ring(foot, wall_z)]
     for t in np.linspace(0.0, 1.0, EDGE_STEPS + 1)[1:-1]:
         out, bend, end = (1.0 - t) ** 2, 2.0 * t * (1.0 - t), t * t

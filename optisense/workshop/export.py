@@ -23,7 +23,10 @@ Writer = Callable[[Path], object]
 
 
 def export(
-    design: SensorDesign, folder: str | Path, formats: Sequence[str] = ("stl",)
+    design: SensorDesign,
+    folder: str | Path,
+    formats: Sequence[str] = ("stl",),
+    notes: list[str] | None = None,
 ) -> list[Path]:
     """Write the deformed parts, where the LEDs go, files for each board, and the bill of materials.
 
@@ -31,6 +34,7 @@ def export(
 
     Args:
         formats: names in `FORMATS`.
+        notes: takes what is worth telling about the files, a sentence each.
 
     Returns:
         The files, in the order of the parts.
@@ -55,7 +59,7 @@ def export(
         (BILL_FILES[1], bill.markdown()),
     ):
         writers[file] = _bytes_writer(text.encode("utf-8"))
-    return _write_all(Path(folder), writers)
+    return _write_all(Path(folder), writers, [] if notes is None else notes)
 
 
 def _shape_writers(name: str, title: str, made: Sequence[Shape]) -> dict[str, Writer]:
@@ -92,10 +96,12 @@ def _bytes_writer(data: bytes) -> Writer:
     return write
 
 
-def _write_all(folder: Path, writers: dict[str, Writer]) -> list[Path]:
-    """Write each file under a temporary name, and rename them when all are there."""
+def _write_all(folder: Path, writers: dict[str, Writer], notes: list[str]) -> list[Path]:
+    """Write each file under a temporary name, and rename them when all are there; what a writer
+    returns as a list is a note."""
     finals = [folder / file for file in writers]
     with written_together("the workshop's files") as stage:
         for final, write in zip(finals, writers.values(), strict=True):
-            write(stage(final))
+            told = write(stage(final))
+            notes += told if isinstance(told, list) else []
     return finals

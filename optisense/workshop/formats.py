@@ -21,7 +21,8 @@ class ShapeFormat:
 
     Attributes:
         suffix: of the file name, with its dot.
-        write: writes a file; called with its path, the name of the design and the shapes.
+        write: writes a file; called with its path, the name of the design and the shapes. It may
+            return a list of sentences to tell.
         holds_all: whether one file holds all shapes; otherwise each shape has a file of its own.
         require: called before any work; raises `SetupError` where something is not installed.
         note: what a user should know before a long export; empty if nothing.
@@ -48,10 +49,10 @@ THREE_MF = ShapeFormat(
 )
 STEP = ShapeFormat(
     ".step",
-    lambda path, title, shapes: write_step(path, shapes),
+    lambda path, title, shapes: write_step(path, shapes, title),
     holds_all=True,
     require=require_step,
-    note="writing STEP; a finely cut curved part takes half a minute",
+    note="writing STEP; a finely cut part of no simple shape takes half a minute",
 )
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from optisense.design import Role, SensorDesign
+from optisense.design import Cage, Role, SensorDesign
 from optisense.errors import DesignError
 from optisense.geometry import TriangleMesh
 
@@ -21,12 +21,16 @@ class Shape:
         role: what it is for.
         material: the design's name of its material, None for a coated or an absorbing part.
         mesh: mm, in the frame of the design; corners that coincide are one vertex.
+        rest: the mesh before its cage bent it, None where none does.
+        cage: that bends it.
     """
 
     name: str
     role: Role
     material: str | None
     mesh: TriangleMesh
+    rest: TriangleMesh | None = None
+    cage: Cage | None = None
 
     @property
     def is_solid(self) -> bool:
@@ -66,5 +70,7 @@ def shapes(design: SensorDesign) -> list[Shape]:
         mesh = meshes[name].welded()
         if mesh.is_closed and mesh.volume < 0.0:
             mesh = mesh.flipped()
-        found.append(Shape(name, part.role, part.material, mesh))
+        cage = next((each for each in design.cages.values() if name in each.parts), None)
+        rest = None if cage is None else design.meshes[name].welded()
+        found.append(Shape(name, part.role, part.material, mesh, rest, cage))
     return found

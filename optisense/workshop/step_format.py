@@ -1,7 +1,7 @@
 """Shapes as a STEP file, with the extra `step` (Open CASCADE through cadquery-ocp).
 
-The faces are the triangles of the meshes; those that lie in one plane become one face. A curved
-surface stays faceted, as its exact shape is not known.
+Bodies of revolution, prisms and bent boxes are recognised and written with exact surfaces. The
+faces of all others are the triangles of their meshes; those that lie in one plane become one face.
 """
 
 from __future__ import annotations
@@ -12,11 +12,14 @@ from typing import Any
 
 import numpy as np
 
+from optisense.design.looks import ROLE_LOOKS
 from optisense.errors import OutputError
 from optisense.geometry import TriangleMesh
 from optisense.geometry.containment import inside
 from optisense.geometry.patches import patches
 from optisense.geometry.step import no_step
+from optisense.version import __version__
+from optisense.workshop.exact_shapes import WORTH_IT, exact_body
 from optisense.workshop.shapes import Shape
 
 
@@ -32,8 +35,11 @@ def require_step() -> None:
         raise no_step(error, "writing", "export STL, OBJ or 3MF files") from error
 
 
-def write_step(path: Path, shapes: Sequence[Shape]) -> None:
-    """Write a STEP file (AP214, mm) with a product for each shape, all in their places.
+def write_step(path: Path, shapes: Sequence[Shape], title: str = "sensor") -> list[str]:
+    """Write a STEP file (AP214, mm): an assembly of a product for each shape, in their colours.
+
+    Returns:
+        Which shapes stay cut into triangles, a sentence each.
 
     Raises:
         SetupError: the extra is not installed.
@@ -43,27 +49,70 @@ def write_step(path: Path, shapes: Sequence[Shape]) -> None:
     from OCP.STEPCAFControl import STEPCAFControl_Writer
     from OCP.STEPControl import STEPControl_AsIs
     from OCP.TCollection import TCollection_ExtendedString
-    from OCP.TDataStd import TDataStd_Name
     from OCP.TDocStd import TDocStd_Document
-    from OCP.XCAFDoc import XCAFDoc_DocumentTool
+    from OCP.TopLoc import TopLoc_Location
+    from OCP.XCAFDoc import XCAFDoc_ColorGen, XCAFDoc_DocumentTool
 
     from optisense.geometry.step import quiet
 
     quiet()
     document = TDocStd_Document(TCollection_ExtendedString("XmlOcaf"))
     tool = XCAFDoc_DocumentTool.ShapeTool_s(document.Main())
+    colours = XCAFDoc_DocumentTool.ColorTool_s(document.Main())
+    assembly = tool.NewShape()
+    _name(assembly, title)
+    notes = []
     for shape in shapes:
-        label = tool.AddShape(_boundary(shape), False)
-        TDataStd_Name.Set_s(label, TCollection_ExtendedString(shape.name))
+        body = exact_body(shape)
+        if body is None and len(shape.mesh.faces) >= WORTH_IT:
+            notes.append(
+                f"{shape.name} is written as {len(shape.mesh.faces):,} triangles, since its exact "
+                "shape is not known: use the CAD model that it is from, where there is one"
+            )
+        label = tool.AddShape(_boundary(shape) if body is None else body, False)
+        _name(label, shape.name)
+        _name(tool.AddComponent(assembly, label, TopLoc_Location()), shape.name)
+        colours.SetColor(label, _colour(shape), XCAFDoc_ColorGen)
+    tool.UpdateAssemblies()
     writer = STEPCAFControl_Writer()
     writer.SetNameMode(True)
+    writer.SetColorMode(True)
     transferred = writer.Transfer(document, STEPControl_AsIs)
+    _sign(writer)
     if not transferred or "RetDone" not in str(writer.Write(str(path))):
         raise OutputError(
             "the STEP file can't be written",
             where=str(path),
             hint="Check that the folder can be written and the disk is not full",
         )
+    return notes
+
+
+def _name(label: Any, text: str) -> None:
+    from OCP.TCollection import TCollection_ExtendedString
+    from OCP.TDataStd import TDataStd_Name
+
+    TDataStd_Name.Set_s(label, TCollection_ExtendedString(text))
+
+
+def _colour(shape: Shape) -> Any:
+    """As parts of its role are drawn elsewhere."""
+    from OCP.Quantity import Quantity_Color, Quantity_TOC_sRGB
+
+    hexadecimal = ROLE_LOOKS[shape.role.value][0].lstrip("#")
+    red, green, blue = (int(hexadecimal[k : k + 2], 16) / 255.0 for k in (0, 2, 4))
+    return Quantity_Color(red, green, blue, Quantity_TOC_sRGB)
+
+
+def _sign(writer: Any) -> None:
+    """Say in the file's head which program wrote it, instead of a placeholder."""
+    from OCP.APIHeaderSection import APIHeaderSection_MakeHeader
+    from OCP.TCollection import TCollection_HAsciiString
+
+    head = APIHeaderSection_MakeHeader(writer.ChangeWriter().Model())
+    text = TCollection_HAsciiString(f"OptiSense Studio {__version__}")
+    head.SetAuthorValue(1, text)
+    head.SetOriginatingSystem(text)
 
 
 def bodies(mesh: TriangleMesh) -> list[list[TriangleMesh]]:

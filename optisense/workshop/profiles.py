@@ -1,0 +1,138 @@
+"""Flat outlines from the corners of a mesh: their lines, arcs and smooth curves found again.
+
+A mesh keeps only corners. Corners on one line, or on one circle in equal steps, were cut from a
+line or an arc; smooth runs of other corners are taken for points on a curve.
+"""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from typing import Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+
+EXACT = 2e-6
+"""mm that corners may deviate from the line or circle that they were cut from: rounding of
+files."""
+
+ARC_CORNERS = 5
+"""So many corners on one circle make an arc; three lie on one circle always."""
+
+SMOOTH = 20.0
+"""Degrees that neighbouring sides of a smooth curve bend at most."""
+
+CURVE_CORNERS = 6
+"""So many corners in a smooth run make a curve."""
+
+
+class OutlinePiece(NamedTuple):
+    """A part of an outline.
+
+    Attributes:
+        kind: what it is.
+        points: (n, 2) mm, its corners; of a line the two ends, of an arc the ends and one between.
+    """
+
+    kind: Literal["line", "arc", "curve"]
+    points: FloatArray
+
+
+def pieces(corners: FloatArray) -> list[OutlinePiece]:
+    """The lines, arcs and curves of an open polygon.
+
+    Args:
+        corners: (n, 2) mm, n of at least 2; of a closed outline, the first again at the end.
+    """
+    found: list[OutlinePiece] = []
+    loose: list[int] = []
+    start = 0
+    while start < len(corners) - 1:
+        line, arc = _line_end(corners, start), _arc_end(corners, start)
+        if arc - start >= ARC_CORNERS - 1 and arc > line:
+            found += _loose(corners, loose)
+            loose = []
+            between = (start + arc) // 2
+            found.append(OutlinePiece("arc", corners[[start, between, arc]]))
+            start = arc
+        elif line - start >= 2:
+            found += _loose(corners, loose)
+            loose = []
+            found.append(OutlinePiece("line", corners[[start, line]]))
+            start = line
+        else:
+            loose = loose or [start]
+            loose.append(start + 1)
+            start += 1
+    return found + _loose(corners, loose)
+
+
+def _line_end(corners: FloatArray, start: int) -> int:
+    """The last corner on the line through a corner and the next one."""
+    end = start + 1
+    while end + 1 < len(corners):
+        way = corners[end + 1] - corners[start]
+        length = np.linalg.norm(way)
+        off = corners[start + 1 : end + 1] - corners[start]
+        away = np.abs(off[:, 0] * way[1] - off[:, 1] * way[0]) / max(length, 1e-12)
+        along = off @ way / max(length, 1e-12)
+        if away.max() > EXACT or along.min() < 0.0 or along.max() > length:
+            break
+        end += 1
+    return end
+
+
+def _arc_end(corners: FloatArray, start: int) -> int:
+    """The last corner on the circle through a corner and the next two; `start` if none.
+
+    The sides must bend one way and by no more than 20 degrees each.
+    """
+    if start + 2 >= len(corners):
+        return start
+    centre = _centre(*corners[start : start + 3])
+    if centre is None:
+        return start
+    radius = float(np.linalg.norm(corners[start] - centre))
+    end, sense, turned = start, 0.0, 0.0
+    while end + 1 < len(corners):
+        one, other = corners[end] - centre, corners[end + 1] - centre
+        angle = float(np.arctan2(one[0] * other[1] - one[1] * other[0], one @ other))
+        off = abs(float(np.linalg.norm(other)) - radius)
+        sense = sense or np.sign(angle)
+        turned += abs(angle)
+        if off > EXACT or angle * sense <= 0.0 or abs(angle) > np.radians(SMOOTH) or turned > 6.0:
+            break
+        end += 1
+    return end
+
+
+def _centre(a: FloatArray, b: FloatArray, c: FloatArray) -> FloatArray | None:
+    """Of the circle through three points, None where they lie on one line."""
+    ab, ac = b - a, c - a
+    twice = 2.0 * (ab[0] * ac[1] - ab[1] * ac[0])
+    if abs(twice) < 1e-9 * (ab @ ab + ac @ ac):
+        return None
+    x = (ac[1] * (ab @ ab) - ab[1] * (ac @ ac)) / twice
+    y = (ab[0] * (ac @ ac) - ac[0] * (ab @ ab)) / twice
+    return np.asarray(a + np.array([x, y]))
+
+
+def _loose(corners: FloatArray, run: list[int]) -> list[OutlinePiece]:
+    """Curves and lines through corners that lie on no line and no circle."""
+    if not run:
+        return []
+    points = corners[run]
+    sides = np.diff(points, axis=0)
+    sides /= np.linalg.norm(sides, axis=1, keepdims=True)
+    bends = np.degrees(np.arccos(np.clip((sides[1:] * sides[:-1]).sum(axis=1), -1.0, 1.0)))
+    cuts = [0, *(np.flatnonzero(bends > SMOOTH) + 1).tolist(), len(points) - 1]
+    found: list[OutlinePiece] = []
+    for low, high in pairwise(cuts):
+        part = points[low : high + 1]
+        if len(part) >= CURVE_CORNERS:
+            found.append(OutlinePiece("curve", part))
+        else:
+            found += [OutlinePiece("line", part[k : k + 2]) for k in range(len(part) - 1)]
+    return found

@@ -1,0 +1,282 @@
+"""What a mesh was made from, where that can be told: a profile turned about an axis, an outline
+drawn out along an axis, or a box bent by a cage."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from optisense.geometry import TriangleMesh
+from optisense.geometry.patches import smoothly_joined
+
+FloatArray = NDArray[np.float64]
+
+SAME = 1e-6
+"""mm: coordinates that agree so well are one; files keep seven digits."""
+
+FEWEST_CORNERS = 12
+"""Of a full turn; a body with fewer corners around an axis is meant to have flat sides."""
+
+NEAR_AXIS = 0.05
+"""Of the largest radius: a lone vertex so near to the axis is a pole, which may be set aside."""
+
+
+@dataclass(frozen=True)
+class Turned:
+    """A body of revolution.
+
+    Attributes:
+        axis: 0, 1 or 2 for x, y or z.
+        centre: (3,) mm, a point of the axis.
+        profile: (n, 2) mm, distance from the axis and place along it; a closed outline ends on its
+            first point.
+    """
+
+    axis: int
+    centre: FloatArray
+    profile: FloatArray
+
+
+@dataclass(frozen=True)
+class DrawnOut:
+    """An outline drawn out along an axis.
+
+    Attributes:
+        axis: 0, 1 or 2 for x, y or z, the direction.
+        low, high: mm, the ends along it.
+        outlines: (n, 2) mm each, across the axis (y and z, z and x, or x and y); closed ones end on
+            their first point. The first is the outer one, others are holes.
+    """
+
+    axis: int
+    low: float
+    high: float
+    outlines: list[FloatArray]
+
+
+def across(axis: int) -> tuple[int, int]:
+    """The two other axes, in their order around."""
+    return (axis + 1) % 3, (axis + 2) % 3
+
+
+def turned(mesh: TriangleMesh) -> Turned | None:
+    """The profile of a body of revolution about an axis along x, y or z; None if it is none."""
+    for axis in (2, 0, 1):
+        found = _turned_about(mesh, axis)
+        if found is not None:
+            return found
+    return None
+
+
+def _turned_about(mesh: TriangleMesh, axis: int) -> Turned | None:
+    i, j = across(axis)
+    centre = np.zeros(3)
+    for k in (i, j):  # the middle of a ring is the mean of its corners
+        centre[k] = _axis_place(mesh.vertices, axis, k)
+    flat = mesh.vertices[:, (i, j)] - centre[[i, j]]
+    radius, along = np.linalg.norm(flat, axis=1), mesh.vertices[:, axis]
+    if radius.max() < SAME:
+        return None
+    points = np.column_stack([radius, along])
+    rings = _joined(points, SAME * 10.0)
+    counts = np.bincount(rings)
+    poles = (counts == 1) & (np.bincount(rings, radius) < NEAR_AXIS * radius.max())
+    if (counts[~poles] < FEWEST_CORNERS).any() or len(set(counts[~poles].tolist())) != 1:
+        return None
+    angle = np.arctan2(flat[:, 1], flat[:, 0])
+    for ring in np.flatnonzero(~poles):
+        steps = np.diff(np.sort(angle[rings == ring]))
+        if np.ptp(steps) > 1e-5:
+            return None
+    profile = np.array([points[rings == ring].mean(axis=0) for ring in range(len(counts))])
+    profile[poles, 0] = 0.0
+    # Sides between rings, in the order in which the faces look outward.
+    where = rings[mesh.faces]
+    sides = np.concatenate([where[:, [0, 1]], where[:, [1, 2]], where[:, [2, 0]]])
+    sides = np.unique(np.sort(sides[sides[:, 0] != sides[:, 1]], axis=1), axis=0)
+    order = _walk(sides, len(counts))
+    return None if order is None else Turned(axis, centre, profile[order])
+
+
+def _axis_place(vertices: FloatArray, axis: int, k: int) -> float:
+    """mm: where the axis is along another one, if the largest ring is regular."""
+    levels = np.unique(np.round(vertices[:, axis], 5))
+    means = [vertices[np.abs(vertices[:, axis] - z) < 2e-5, k].mean() for z in levels[:64]]
+    return float(np.median(means))
+
+
+def _joined(points: FloatArray, distance: float) -> NDArray[np.int64]:
+    """The number of the group of each point; points nearer than `distance` are of one group."""
+    from scipy.sparse import coo_matrix
+    from scipy.sparse.csgraph import connected_components
+
+    grid = np.unique(np.round(points / distance).astype(np.int64), axis=0, return_inverse=True)
+    cells, inverse = grid[0], np.asarray(grid[1]).reshape(-1)
+    pairs = cKDTree(cells).query_pairs(1.5, output_type="ndarray")
+    shape = (len(cells), len(cells))
+    matrix = coo_matrix((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape)
+    labels = connected_components(matrix, directed=False)[1]
+    return np.asarray(labels[inverse], dtype=np.int64)
+
+
+def _walk(sides: NDArray[np.int64], count: int) -> list[int] | None:
+    """The corners of one path, or of one closed outline (its first again at the end)."""
+    beside: list[list[int]] = [[] for _ in range(count)]
+    for one, other in sides.tolist():
+        beside[one].append(other)
+        beside[other].append(one)
+    degrees = [len(each) for each in beside]
+    if max(degrees, default=0) > 2 or min(degrees, default=0) < 1:
+        return None
+    ends = [k for k, degree in enumerate(degrees) if degree == 1]
+    start = ends[0] if ends else 0
+    order, before = [start], -1
+    while True:
+        ahead = [k for k in beside[order[-1]] if k != before]
+        if not ahead or (ahead[0] == start and len(order) > 2):
+            break
+        before = order[-1]
+        order.append(ahead[0])
+        if len(order) > count:
+            return None
+    if len(order) != count:
+        return None
+    return order if ends else [*order, start]
+
+
+def drawn_out(mesh: TriangleMesh) -> DrawnOut | None:
+    """The outline of a prism, or of an open sheet, drawn out along x, y or z; None if it is none.
+
+    A box is one, too; the axis with the most corners around it counts.
+    """
+    for axis in (2, 1, 0):
+        found = _drawn_along(mesh, axis)
+        if found is not None:
+            return found
+    return None
+
+
+def _drawn_along(mesh: TriangleMesh, axis: int) -> DrawnOut | None:
+    normals = np.abs(mesh.face_normals[:, axis])
+    areas = mesh.face_areas > 0.0
+    upright = normals < 1e-5
+    if not (upright | (normals > 1.0 - 1e-9))[areas].all():
+        return None
+    along = mesh.vertices[:, axis]
+    low, high = float(along.min()), float(along.max())
+    if high - low < SAME:
+        return None
+    caps = ~upright & areas
+    ends = along[mesh.faces[caps]]
+    if (
+        caps.any()
+        and not ((ends - low < SAME).all(axis=1) | (high - ends < SAME).all(axis=1)).all()
+    ):
+        return None
+    # The sides' corners at the lower end, joined as the sides join them there.
+    bottom = along[mesh.faces] - low < SAME
+    walls = upright & areas
+    pairs = [
+        mesh.faces[walls & bottom[:, a] & bottom[:, b]][:, [a, b]]
+        for a, b in ((0, 1), (1, 2), (2, 0))
+    ]
+    sides = np.concatenate(pairs)
+    if len(sides) == 0:
+        return None
+    used, numbered = np.unique(sides, return_inverse=True)
+    loops = _loops(numbered.reshape(-1, 2), len(used))
+    if loops is None:
+        return None
+    i, j = across(axis)
+    flat = mesh.vertices[used][:, (i, j)]
+    outlines = [flat[loop] for loop in loops]
+    wall_area = sum(float(np.linalg.norm(np.diff(o, axis=0), axis=1).sum()) for o in outlines)
+    drawn = wall_area * (high - low)
+    if abs(drawn - float(mesh.face_areas[walls].sum())) > 1e-6 * max(drawn, 1.0):
+        return None
+    closed = all((outline[0] == outline[-1]).all() for outline in outlines)
+    if mesh.is_closed != (closed and bool(caps.any())):
+        return None
+    outlines.sort(key=lambda outline: -float(np.prod(np.ptp(outline, axis=0))))
+    return DrawnOut(axis, low, high, outlines)
+
+
+def _loops(sides: NDArray[np.int64], count: int) -> list[list[int]] | None:
+    """Outlines by their corners; None where more than two sides meet."""
+    from scipy.sparse import coo_matrix
+    from scipy.sparse.csgraph import connected_components
+
+    sides = np.unique(np.sort(sides, axis=1), axis=0)
+    matrix = coo_matrix((np.ones(len(sides)), (sides[:, 0], sides[:, 1])), (count, count))
+    number, labels = connected_components(matrix, directed=False)
+    loops = []
+    for label in range(number):
+        members = np.flatnonzero(labels == label)
+        rows = sides[np.isin(sides[:, 0], members)]
+        order = _walk(np.searchsorted(members, rows), len(members))
+        if order is None:
+            return None
+        loops.append([int(members[k]) for k in order])
+    return loops
+
+
+def rims(mesh: TriangleMesh) -> list[list[int]] | None:
+    """The loops of edges that have one face only, by their vertices, the first again at the end."""
+    edges = np.sort(
+        np.concatenate([mesh.faces[:, [0, 1]], mesh.faces[:, [1, 2]], mesh.faces[:, [2, 0]]]),
+        axis=1,
+    )
+    found, counts = np.unique(edges, axis=0, return_counts=True)
+    free = found[counts == 1]
+    used, numbered = np.unique(free, return_inverse=True)
+    loops = _loops(numbered.reshape(-1, 2), len(used))
+    if loops is None or any(loop[0] != loop[-1] for loop in loops):
+        return None
+    return [[int(used[k]) for k in loop] for loop in loops]
+
+
+def smooth_patches(mesh: TriangleMesh, sharp: float) -> list[NDArray[np.int64]]:
+    """The faces of a mesh in patches that are parted by edges sharper than `sharp` degrees."""
+    left = np.ones(len(mesh.faces), dtype=bool)
+    found = []
+    for face in range(len(mesh.faces)):
+        if left[face]:
+            patch = smoothly_joined(mesh, np.array([face]), sharp)
+            left[patch] = False
+            found.append(patch)
+    return found
+
+
+def box_sides(mesh: TriangleMesh) -> list[FloatArray]:
+    """(2, 2, 3) mm corners of each rectangle of a box, or of one rectangle; empty if it is neither.
+
+    The corners [0, 0], [0, 1], [1, 0], [1, 1] of a rectangle are seen anticlockwise from outside
+    in the order [0, 0], [1, 0], [1, 1], [0, 1].
+    """
+    low, high = mesh.bounds
+    size = high - low
+    flat = size < SAME
+    if mesh.is_closed:
+        if abs(abs(mesh.volume) - float(np.prod(size))) > 1e-9 * float(np.prod(size)):
+            return []
+        axes = [(axis, sign) for axis in range(3) for sign in (-1, 1)]
+    else:
+        if flat.sum() != 1:
+            return []
+        (axis,) = np.flatnonzero(flat).tolist()
+        i, j = across(axis)
+        if abs(mesh.area - size[i] * size[j]) > 1e-9 * mesh.area:
+            return []
+        axes = [(axis, int(np.sign(mesh.face_normals[mesh.face_areas.argmax(), axis])))]
+    found = []
+    for axis, sign in axes:
+        i, j = across(axis) if sign > 0 else across(axis)[::-1]
+        corners = np.empty((2, 2, 3))
+        corners[..., axis] = (high if sign > 0 else low)[axis]
+        corners[0, :, i], corners[1, :, i] = low[i], high[i]
+        corners[:, 0, j], corners[:, 1, j] = low[j], high[j]
+        found.append(corners)
+    return found

@@ -1,0 +1,160 @@
+"""Exact surfaces found again in meshes, and STEP files of them."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+from step_extra import needs_step
+
+from optisense import sensors
+from optisense.design import Role
+from optisense.geometry import TriangleMesh
+from optisense.sensors.half_round import HalfRound, stacked
+from optisense.sensors.shapes import revolve
+from optisense.workshop import export
+from optisense.workshop.profiles import pieces
+from optisense.workshop.recognised import box_sides, drawn_out, turned
+from optisense.workshop.shapes import Shape, shapes
+from optisense.workshop.step_format import write_step
+
+SAUCER = [(0.0, 0.0), (3.0, 0.0), *[(3.0 + math.sin(t), 1.0 - math.cos(t)) for t in
+          np.linspace(0.2, math.pi / 2, 12)], (0.0, 1.0)]  # fmt: skip
+
+
+def volume_read(mesh: TriangleMesh, folder: Path) -> float:
+    """mm3 of the only body of a STEP file of a mesh."""
+    from optisense.geometry.step import read_step
+
+    assert write_step(folder / "it.step", [Shape("it", Role.SUPPORT, None, mesh)]) == []
+    (body,) = read_step(folder / "it.step")
+    assert body.solid
+    return body.mesh.volume
+
+
+def plate_with_a_hole(sections: int) -> TriangleMesh:
+    plate = trimesh.creation.annulus(r_min=3.0, r_max=10.0, height=2.0, sections=sections)
+    return TriangleMesh(plate.vertices, plate.faces).welded()
+
+
+class TestProfiles:
+    def test_lines_and_arcs_of_an_outline(self) -> None:
+        corners = HalfRound(18.3, 15.85, 0.5, 3.0).points(0.7)
+        closed = np.concatenate([corners, corners[:1]])
+        assert [piece.kind for piece in pieces(closed)] == [
+            "line", "arc", "line", "arc", "line", "arc",
+        ]  # fmt: skip
+
+    def test_a_smooth_run_of_no_circle_is_a_curve(self) -> None:
+        x = np.linspace(-1.0, 1.0, 20)
+        (piece,) = pieces(np.column_stack([x, x**2]))
+        assert piece.kind == "curve"
+        np.testing.assert_array_equal(piece.points[:, 0], x)
+
+    def test_a_polygon_stays_one(self) -> None:
+        angle = np.linspace(0.0, 2.0 * np.pi, 7)
+        hexagon = np.column_stack([np.cos(angle), np.sin(angle)])
+        assert [piece.kind for piece in pieces(hexagon)] == ["line"] * 6
+
+
+class TestRecognised:
+    @pytest.mark.parametrize("axis", [0, 1, 2])
+    def test_a_turned_body_about_each_axis(self, axis: int) -> None:
+        mesh = revolve(SAUCER, 40)
+        moved = np.roll(mesh.vertices, axis - 2, axis=1) + (1.0, -2.0, 3.0)
+        found = turned(TriangleMesh(moved, mesh.faces))
+        assert found is not None
+        assert found.axis == axis
+        off = np.delete(found.centre - (1.0, -2.0, 3.0), axis)
+        np.testing.assert_allclose(off, 0.0, atol=1e-5)
+        assert found.profile[:, 0].max() == pytest.approx(4.0)
+
+    def test_an_outline_with_its_hole(self) -> None:
+        found = drawn_out(plate_with_a_hole(48))
+        assert found is not None
+        assert [np.ptp(outline[:, 0]) for outline in found.outlines] == pytest.approx(
+            [20.0, 6.0], rel=5e-3
+        )
+
+    def test_a_ball_and_a_bent_plate_are_neither(self) -> None:
+        ball = trimesh.creation.icosphere(subdivisions=2)
+        mesh = TriangleMesh(ball.vertices, ball.faces)
+        assert turned(mesh) is None
+        assert drawn_out(mesh) is None
+        assert box_sides(mesh) == []
+
+    def test_a_box_has_six_sides_that_look_outward(self) -> None:
+        box = TriangleMesh.box((0, 0, 0), (1, 2, 3), (2, 2, 2))
+        sides = box_sides(box)
+        assert len(sides) == 6
+        for corners in sides:
+            normal = np.cross(corners[1, 0] - corners[0, 0], corners[0, 1] - corners[0, 0])
+            assert normal @ (corners.mean(axis=(0, 1)) - (0.5, 1.0, 1.5)) > 0.0
+
+
+@needs_step
+class TestStepFiles:
+    def test_a_cut_cylinder_is_round_again(self, tmp_path: Path) -> None:
+        found = volume_read(plate_with_a_hole(48), tmp_path)
+        assert found == pytest.approx(math.pi * (100.0 - 9.0) * 2.0, rel=5e-4)
+
+    def test_a_turned_body_is_round_again(self, tmp_path: Path) -> None:
+        coarse, fine = revolve(SAUCER, 24), revolve(SAUCER, 2000)
+        assert volume_read(coarse, tmp_path) == pytest.approx(fine.volume, rel=2e-3)
+        assert coarse.volume < 0.99 * fine.volume
+
+    def test_a_tub_of_arcs_has_its_volume(self, tmp_path: Path) -> None:
+        def ring(width: float, z: float) -> np.ndarray:
+            points = HalfRound(width, width, 0.1 * width, 0.0).points(0.5)
+            return np.column_stack([points, np.full(len(points), z)])
+
+        def area(width: float) -> float:
+            corners = 2.0 * (1.0 - math.pi / 4.0) * (0.1 * width) ** 2
+            return width**2 + math.pi / 2.0 * (width / 2.0) ** 2 - corners
+
+        tub = stacked([ring(8.0, 1.0), ring(8.0, 5.0), ring(10.0, 5.0), ring(10.0, 0.0)]).flipped()
+        expected = 5.0 * area(10.0) - 4.0 * area(8.0)
+        assert volume_read(tub, tmp_path) == pytest.approx(expected, rel=1e-3)
+        assert (tmp_path / "it.step").stat().st_size < 60_000
+
+    def test_a_bent_box_is_exact(self, tmp_path: Path) -> None:
+        """Its sides are the cage's own polynomials: a mesh cut four times as finely agrees."""
+        from optisense.geometry.step import read_step
+
+        (file,) = export(sensors.gelsight_mini_spherical(), tmp_path, ["step"])[:1]
+        read = {body.name: body for body in read_step(file)}
+        fine = sensors.gelsight_mini_spherical(tessellation=0.25).deformed_meshes()["gel"]
+        assert read["gel"].mesh.volume == pytest.approx(fine.volume, rel=2e-4)
+        assert read["gel"].solid
+        assert file.stat().st_size < 100_000
+
+    @pytest.mark.parametrize(
+        "name", ["gelbelt", "gelsight360", "gelsight-mini", "gelsight-svelte", "digit"]
+    )
+    def test_each_sensor_is_an_assembly_of_less_than_a_megabyte(
+        self, name: str, tmp_path: Path
+    ) -> None:
+        design = sensors.build(name)
+        assert write_step(tmp_path / "it.step", shapes(design), name) == []
+        text = (tmp_path / "it.step").read_text(errors="replace")
+        assert len(text) < 1_000_000
+        assert "OptiSense Studio" in text.split("ENDSEC")[0]
+        assert "'Author'" not in text
+        for shape in shapes(design):
+            assert f"PRODUCT('{shape.name}'" in text
+        assert f"PRODUCT('{name}'" in text
+        assert text.count("NEXT_ASSEMBLY_USAGE_OCCURRENCE") >= len(shapes(design))
+        assert "COLOUR_RGB" in text
+
+    def test_what_stays_cut_into_triangles_is_told(self, tmp_path: Path) -> None:
+        from optisense.geometry.step import read_step
+
+        ball = trimesh.creation.icosphere(subdivisions=2)
+        mesh = TriangleMesh(ball.vertices, ball.faces)
+        (note,) = write_step(tmp_path / "it.step", [Shape("ball", Role.SUPPORT, None, mesh)])
+        assert note.startswith("ball is written as 320 triangles")
+        (body,) = read_step(tmp_path / "it.step")
+        assert body.mesh.volume == pytest.approx(mesh.volume)
