@@ -16,7 +16,7 @@ from ..scene.lamps import lamp_colour, window
 from .section import plane
 
 LINE = (0.02, 0.02, 0.03)
-"""The colour of outlines."""
+"""Linear red, green and blue of outlines: nearly black, so that they are seen on every material."""
 
 BEAM, WIDEST_BEAM = 3.0, 25.0
 """mm and degrees: how long and how wide the beam of a lamp is drawn at most; a wider one would hide
