@@ -2,17 +2,33 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any
+from typing import Annotated, Any, cast
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, GetCoreSchemaHandler
+from pydantic_core import CoreSchema
 
 LARGEST_NUMBER = 1e12
 """Of a number in a design, to either side of 0, whatever its unit. None that means something comes
 near, and the cube of it is still far from the largest number of a computer."""
 
-Number = Annotated[
-    float, Field(strict=True, allow_inf_nan=False, ge=-LARGEST_NUMBER, le=LARGEST_NUMBER)
-]
+
+class NotTooLarge:
+    """Keeps a number within `LARGEST_NUMBER`, where its field has no bounds of its own.
+
+    `Field(ge=..., le=...)` in its place would win over the bounds that a field of the type is given
+    as its default, `power: Number = Field(4.0, le=200.0)`, and these would not be checked.
+    """
+
+    def __get_pydantic_core_schema__(
+        self, source: type[float], handler: GetCoreSchemaHandler
+    ) -> CoreSchema:
+        schema: Any = handler(source)
+        schema.setdefault("ge", -LARGEST_NUMBER)
+        schema.setdefault("le", LARGEST_NUMBER)
+        return cast("CoreSchema", schema)
+
+
+Number = Annotated[float, Field(strict=True, allow_inf_nan=False), NotTooLarge()]
 """A finite number; text, true and false are refused."""
 
 Fraction = Annotated[Number, Field(ge=0.0, le=1.0)]

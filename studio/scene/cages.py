@@ -209,15 +209,15 @@ def _moved(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
 def show_idle(scene: bpy.types.Scene) -> None:
     """Draw and select by clicks only the cage that is worked at: it would hide the lights.
 
-    That is the active one, or the one around the active part; of others the box is drawn.
+    That is the active one, those that are selected, or the one around the active part; of others
+    the box is drawn.
     """
     layer = bpy.context.view_layer
     active = None if layer is None else layer.objects.active
     for cage in objects_of(scene, "CAGE"):
         own = active is not None and active.optisense
-        at_work = cage == active or (
-            own and own.kind == "PART" and own.key in cage_data(cage)["parts"]
-        )
+        inside = own and own.kind == "PART" and own.key in cage_data(cage)["parts"]
+        at_work = cage == active or inside or (layer is not None and cage.select_get())
         look = "TEXTURED" if at_work else "BOUNDS"
         if cage.display_type != look:
             cage.display_type = look

@@ -36,12 +36,16 @@ def object_of(scene: bpy.types.Scene, kind: str, key: str) -> bpy.types.Object |
 
 
 def select_only(*chosen: bpy.types.Object) -> None:
-    """Select nothing but these, the last of them active; those that the view does not have, not."""
+    """Select nothing but these, the last of them active; those that the view does not have, not.
+
+    Cages that no click finds are selected, too.
+    """
     layer = bpy.context.view_layer  # a timer's context knows no selected objects
     for each in layer.objects:
         each.select_set(False)
     for each in chosen:
         with contextlib.suppress(RuntimeError):  # its collection is excluded from the view
+            each.hide_select = False
             each.select_set(True)
             layer.objects.active = each
 

@@ -7,10 +7,11 @@ from typing import Any
 
 import numpy as np
 import pytest
-from pydantic import ValidationError
+from pydantic import Field, ValidationError
 
 import optisense as ots
 from optisense.design import Cage, Camera, LightGroup, Point, SensorDesign
+from optisense.design.fields import Model, Number
 from optisense.errors import DesignError
 
 
@@ -24,6 +25,22 @@ def test_a_light_without_colour_is_refused(design: SensorDesign) -> None:
     group = design.lights["red"].model_dump()
     with pytest.raises(ValidationError, match="colour"):
         LightGroup.model_validate(group | {"colour": (0, 0, 0)})
+
+
+@pytest.mark.parametrize("value", [500.0, 0.5, 1e13, -1e13])
+def test_bounds_of_a_field_of_a_bounded_type_count(value: float) -> None:
+    """Also where they are given with the default, as other packages write their kinds."""
+
+    class Lamp(Model):
+        power: Number = Field(default=4.0, ge=1.0, le=200.0)
+        shift: Number = 0.0
+
+    with pytest.raises(ValidationError, match="power"):
+        Lamp(power=value)
+    assert Lamp(shift=0.5).shift == 0.5
+    if abs(value) > 1e12:
+        with pytest.raises(ValidationError, match="shift"):
+            Lamp(shift=value)
 
 
 def test_camera_axes_are_a_picture_that_is_not_mirrored() -> None:
