@@ -59,6 +59,8 @@ def _tell_views(design: SensorDesign) -> None:
 def _describe(design: SensorDesign) -> None:
     """Print what the design is made of, and how much of it the camera sees."""
     from optisense.design.camera_checks import view_shares
+    from optisense.design.parts import Role
+    from optisense.mechanics import elasticity_in_words
 
     output.print(design.name, style="bold", markup=False)
     if design.description:
@@ -95,6 +97,8 @@ def _describe(design: SensorDesign) -> None:
             f"picture, and fills {100 * shares[1]:.0f} % of it",
             markup=False,
         )
+    if design.parts_of(Role.ELASTOMER):
+        output.print(f"elasticity  {elasticity_in_words(design)}", markup=False)
     assumed = sum(entry.status == "assumed" for entry in design.provenance.values())
     if assumed:
         output.print(f"{assumed} of its values are marked as assumed.", style="yellow")

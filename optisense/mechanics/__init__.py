@@ -13,7 +13,7 @@ from optisense.lazy_names import load_on_first_use
 if TYPE_CHECKING:
     from optisense.mechanics.deformed_mesh import SkinMesh, SkinState, skin_mesh
     from optisense.mechanics.elasticity import Elasticity, youngs_modulus_of_shore_a
-    from optisense.mechanics.gel import Gel, elasticity_of
+    from optisense.mechanics.gel import Gel, elasticity_in_words, elasticity_of
     from optisense.mechanics.pressed_skin import Pressed, PressedSkin
     from optisense.mechanics.skins import CONFORMING, ELASTIC, SKINS
 
@@ -27,6 +27,7 @@ _HOMES = {
     "PressedSkin": ".pressed_skin",
     "SkinMesh": ".deformed_mesh",
     "SkinState": ".deformed_mesh",
+    "elasticity_in_words": ".gel",
     "elasticity_of": ".gel",
     "skin_mesh": ".deformed_mesh",
     "youngs_modulus_of_shore_a": ".elasticity",
@@ -42,6 +43,7 @@ __all__ = [
     "PressedSkin",
     "SkinMesh",
     "SkinState",
+    "elasticity_in_words",
     "elasticity_of",
     "skin_mesh",
     "youngs_modulus_of_shore_a",

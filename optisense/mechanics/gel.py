@@ -46,6 +46,34 @@ def elasticity_of(design: SensorDesign) -> Elasticity:
     return USUAL_GEL
 
 
+def elasticity_in_words(design: SensorDesign) -> str:
+    """The elastic constants that are used for a design's gel, and the status of each."""
+    used = elasticity_of(design)
+    given = next(
+        (
+            material
+            for name in design.parts_of(Role.ELASTOMER)
+            if (material := design.parts[name].material or "")
+            and getattr(design.materials.get(material), "elasticity", None) is not None
+        ),
+        None,
+    )
+    words = []
+    for field, text in (
+        ("youngs_modulus", f"Young's modulus {used.youngs_modulus:g} MPa"),
+        ("poisson_ratio", f"Poisson ratio {used.poisson_ratio:g}"),
+        ("friction", f"friction {used.friction:g}"),
+    ):
+        status = "assumed"
+        if given is not None:
+            above = f"materials.{given}"
+            paths = (f"{above}.elasticity.{field}", f"{above}.elasticity", above)
+            known = [design.provenance[path] for path in paths if path in design.provenance]
+            status = known[0].status.value if known else "given"
+        words.append(f"{text} ({status})")
+    return ", ".join(words)
+
+
 class Gel:
     """The gel of a sensor, into which contacts are pressed.
 

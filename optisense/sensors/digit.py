@@ -360,6 +360,10 @@ def _provenance(frosted: bool) -> dict[str, Provenance]:
         "coating": (assumed, "grey, opaque and diffuse"),
         "coating.reflectance": (assumed, "as other grey coatings of the library"),
         "materials.silicone-solaris": (assumed, "the gel's silicone is not published"),
+        "materials.silicone-solaris.elasticity": (
+            assumed,
+            "Young's modulus of Solaris by Gent's formula from its Shore hardness of 15A",
+        ),
         "materials.acrylic.ior": (sourced, "PMMA, Sultanova 2009 at 589 nm"),
         "materials.black-plastic": (assumed, "the housing is printed in black"),
         "parts.gel": (

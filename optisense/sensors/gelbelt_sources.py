@@ -20,6 +20,14 @@ def gelbelt_sources(light_design: int) -> dict[str, Provenance]:
         "coating.reflectance": (assumed, "aluminium powder is brighter than grey paint"),
         "coating.specularity": (sourced, f"below 0.3 is best ({paper}); 0.2 is assumed"),
         "materials.silicone-xp565.ior": (assumed, "no index in the maker's datasheet"),
+        "materials.silicone-xp565.elasticity": (
+            assumed,
+            "Poisson ratio usual for silicones; friction as the FEATS project takes it",
+        ),
+        "materials.silicone-xp565.elasticity.youngs_modulus": (
+            assumed,
+            "as the gel of a GelSight Mini, fitted to measured forces (FEATS project)",
+        ),
         "materials.clear-tape.ior": (assumed, "polypropylene tape, usual value"),
         "materials.air-film.ior": (sourced, f"a thin layer of air is trapped ({paper})"),
         "materials.acrylic.ior": (sourced, "PMMA, Sultanova 2009 at 589 nm"),

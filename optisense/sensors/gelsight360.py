@@ -308,6 +308,14 @@ def _provenance(base_ring: str) -> dict[str, Provenance]:
             "Adelson 2024); not stated for GelSight360",
         ),
         "materials.silicone-xp565.ior": (assumed, "the gel's silicone is not published"),
+        "materials.silicone-xp565.elasticity": (
+            assumed,
+            "Poisson ratio usual for silicones; friction as the FEATS project takes it",
+        ),
+        "materials.silicone-xp565.elasticity.youngs_modulus": (
+            assumed,
+            "as the gel of a GelSight Mini, fitted to measured forces (FEATS project)",
+        ),
         "materials.epoxy.ior": (
             sourced,
             "calibrated epoxy core of a round sensor (published code of arXiv 2012.13184)",

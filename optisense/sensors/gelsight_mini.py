@@ -331,6 +331,15 @@ def _provenance() -> dict[str, Provenance]:
         "coating": (sourced, "opaque grey without metal flakes, Lambertian (gsrobotics FAQ)"),
         "coating.reflectance": (assumed, "near the calibrated albedo of a flat gel, about 0.45"),
         "materials.silicone-xp565.ior": (assumed, "the gel's silicone is not published"),
+        "materials.silicone-xp565.elasticity": (
+            assumed,
+            "Poisson ratio usual for silicones; friction as the FEATS project takes it",
+        ),
+        "materials.silicone-xp565.elasticity.youngs_modulus": (
+            sourced,
+            "E is 6 C10 with C10 = 0.0725 MPa, fitted to measured forces on this sensor's gel "
+            "(FEATS project, published simulation input)",
+        ),
         "materials.acrylic.ior": (sourced, "PMMA, Sultanova 2009 at 589 nm"),
         "parts.gel": (
             sourced,

@@ -17,6 +17,14 @@ def provenance(tip: bool) -> dict[str, Provenance]:
     table: dict[str, tuple[Status, str]] = {
         "coating": (assumed, "opaque grey; the coating of the sensor is not published"),
         "materials.silicone-xp565.ior": (assumed, "the silicone of the skin is not published"),
+        "materials.silicone-xp565.elasticity": (
+            assumed,
+            "Poisson ratio usual for silicones; friction as the FEATS project takes it",
+        ),
+        "materials.silicone-xp565.elasticity.youngs_modulus": (
+            assumed,
+            "as the gel of a GelSight Mini, fitted to measured forces (FEATS project)",
+        ),
         "materials.mirror-silver": (assumed, "the mirrors' metal is not published"),
         "parts.skin": (
             derived,

@@ -3,10 +3,20 @@
 import numpy as np
 import pytest
 
+from optisense import library
 from optisense.errors import ContactError
 from optisense.geometry import Contact, Cylinder, Plane, SensingSurface, Sphere, TriangleMesh
 from optisense.geometry.contact import place
-from optisense.mechanics import Elasticity, Gel, SkinState, skin_mesh
+from optisense.mechanics import (
+    Elasticity,
+    Gel,
+    SkinState,
+    elasticity_in_words,
+    elasticity_of,
+    skin_mesh,
+    youngs_modulus_of_shore_a,
+)
+from optisense.sensors import load
 
 GEL = Elasticity(0.435, 0.49)
 TOP = TriangleMesh.grid((20.0, 16.0)).flipped()  # looks into the gel below it
@@ -141,3 +151,26 @@ def test_a_force_beyond_what_the_gel_takes_is_told():
     pushed = Contact(Sphere(1.5), at=(0.0, 0.0), force=500.0)
     with pytest.raises(ContactError, match="500 N would press an indenter deeper than 70 %"):
         gel().at_depth(pushed)
+
+
+def test_the_status_of_each_elastic_constant_is_told():
+    words = elasticity_in_words(load("gelsight-mini"))
+    assert words == (
+        "Young's modulus 0.435 MPa (sourced), Poisson ratio 0.49 (assumed), friction 1 (assumed)"
+    )
+    silent = load("gelsight-mini")
+    silent.materials["silicone-xp565"].elasticity = None
+    assert elasticity_of(silent).youngs_modulus == 0.435
+    assert "MPa (assumed)" in elasticity_in_words(silent)
+
+
+@pytest.mark.parametrize("name", ["silicone-xp565", "silicone-solaris", "pdms"])
+def test_silicones_of_the_library_have_elastic_constants(name):
+    entry = library.entry("material", name)
+    assert 0.2 < entry.value.elasticity.youngs_modulus < 3.0
+    assert entry.source("elasticity") is not None
+
+
+def test_the_librarys_solaris_follows_from_its_hardness():
+    modulus = library.material("silicone-solaris").elasticity.youngs_modulus
+    assert modulus == pytest.approx(youngs_modulus_of_shore_a(15.0), rel=1e-3)
