@@ -24,6 +24,9 @@ JSON_FILE, PAGE_FILE = "ledger.json", "ledger.html"
 LEAST_SHOWN = 5e-5
 """Share of a group's light below which the table says nothing: less than 0.01 %."""
 
+LEAST_EXIT = 0.005
+"""Share of a group's light below which a face through which it escapes is not listed."""
+
 
 @ends_well
 def ledger(
@@ -99,6 +102,12 @@ def _print(found: LightLedger) -> None:
     output.print(table)
     worst = max((entry.noise for entry in found.entries), default=0.0)
     output.print(f"noise of a line: at most {100 * worst:.2g} %", style="dim")
+    if faces := found.faces(LEAST_EXIT):
+        output.print()
+        table = table_of("escaped through the face", *groups)
+        for face, shares in faces.items():
+            table.add_row(face, *(f"{100 * share:.2f}" for share in shares))
+        output.print(table)
 
 
 def _print_place(place: PlaceLight) -> None:

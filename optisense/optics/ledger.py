@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import mitsuba as mi
 import numpy as np
@@ -15,7 +15,7 @@ from optisense.errors import RenderError
 from optisense.optics.scene.ray_scene import Piece
 from optisense.optics.scene.surface_cells import build_cells, cells_near
 from optisense.optics.scene.surfaces import Region, SurfaceKind
-from optisense.optics.transport.light_ledger import Fate, trace_ledger
+from optisense.optics.transport.light_ledger import SIDES, Fate, trace_ledger
 from optisense.optics.transport.photons import TargetCells
 
 if TYPE_CHECKING:
@@ -42,6 +42,8 @@ class LightEnd(StrEnum):
     ESCAPED = "escaped"
     LOST = "lost"
 
+
+Line = TypeVar("Line")
 
 GIVEN_UP = "given up after 64 surfaces"
 SEEN, UNSEEN = LightEnd.SEEN.value, LightEnd.UNSEEN.value
@@ -70,6 +72,33 @@ class LedgerEntry:
 
 
 @dataclass(frozen=True)
+class LedgerExit:
+    """What of a group's light escapes through the faces of a part that look one way.
+
+    Attributes:
+        group: the light group.
+        part: the part, or its faces by their name in the design ("guide.edge").
+        side: the axis of the design's frame that the faces' outward normals are nearest to, of
+            `SIDES`.
+        power: mW, over all channels and lights of the group.
+        share: of the group's power, 0 to 1.
+        noise: standard deviation of the share.
+    """
+
+    group: str
+    part: str
+    side: str
+    power: float
+    share: float
+    noise: float
+
+    @property
+    def face(self) -> str:
+        """In words."""
+        return f"{self.part}, {self.side}"
+
+
+@dataclass(frozen=True)
 class LightLedger:
     """Where the light goes.
 
@@ -77,11 +106,13 @@ class LightLedger:
         emitted: mW of each light group.
         entries: its lines, the largest of each group first.
         photons: that were followed.
+        exits: what escapes, divided by faces; the largest of each group first.
     """
 
     emitted: dict[str, float]
     entries: list[LedgerEntry]
     photons: int
+    exits: list[LedgerExit]
 
     def places(self) -> list[str]:
         """All that light meets in the end, what takes most of it first."""
@@ -93,6 +124,20 @@ class LightLedger:
     def kinds(self) -> dict[str, LightEnd]:
         """The way in which light ends at each place."""
         return {entry.where: entry.kind for entry in self.entries}
+
+    def faces(self, least: float = 0.0) -> dict[str, list[float]]:
+        """Shares of each group that escape through faces, what lets most of it out first.
+
+        Args:
+            least: share of a group's light; faces through which less of every group goes are left
+                out.
+        """
+        found: dict[str, dict[str, float]] = {}
+        for each in self.exits:
+            found.setdefault(each.face, {})[each.group] = each.share
+        rows = {face: [of.get(g, 0.0) for g in self.emitted] for face, of in found.items()}
+        shown = [face for face, shares in rows.items() if max(shares) >= least]
+        return {face: rows[face] for face in sorted(shown, key=lambda face: -sum(rows[face]))}
 
     def share(self, group: str, where: str) -> float:
         """Share of a group's power; 0 where none of it goes."""
@@ -110,6 +155,7 @@ class LightLedger:
             "photons": self.photons,
             "emitted": self.emitted,
             "entries": [vars(entry) for entry in self.entries],
+            "exits": [vars(each) for each in self.exits],
         }
 
 
@@ -143,6 +189,7 @@ def light_ledger(
     seen = cells_in_view(model) if seen is None else seen
     bookings = trace_ledger(model.scene, model._emitter_table, len(pieces), seen, photons, seed)
     entries: list[LedgerEntry] = []
+    exits: list[LedgerExit] = []
     emitted = {}
     for number, (name, group) in enumerate(model.design.lights.items()):
         emitted[name] = float(group.flux * len(group.lights))
@@ -154,17 +201,42 @@ def light_ledger(
             lines[line] = lines.get(line, 0.0) + power
         lines[GIVEN_UP, LightEnd.LOST] += bookings.rest[:, number] @ flux
         entries += sorted(_entries(name, lines, emitted[name]), key=lambda entry: -entry.power)
-    return LightLedger(emitted, entries, photons)
+        faces: dict[tuple[str, str], NDArray[np.float64]] = {}
+        for surface, piece in enumerate(pieces):
+            for side, words in enumerate(SIDES):
+                power = bookings.exits[:, number, :, surface, side] @ flux
+                face = (_face_owner(piece), words)
+                faces[face] = faces.get(face, 0.0) + power
+        exits += sorted(
+            (LedgerExit(name, *face, *found) for face, found in _told(faces, emitted[name])),
+            key=lambda each: -each.power,
+        )
+    return LightLedger(emitted, entries, photons, exits)
 
 
 def _entries(
     group: str, lines: dict[tuple[str, LightEnd], NDArray[np.float64]], emitted: float
 ) -> Iterator[LedgerEntry]:
-    for (where, kind), batches in lines.items():
+    for (where, kind), found in _told(lines, emitted):
+        yield LedgerEntry(group, where, kind, *found)
+
+
+def _told(
+    lines: dict[Line, NDArray[np.float64]], emitted: float
+) -> Iterator[tuple[Line, tuple[float, float, float]]]:
+    """Power, share and noise of lines that are not empty, from their batches."""
+    for line, batches in lines.items():
         power = float(batches.mean())
         if power != 0.0:
             noise = float(batches.std(ddof=1) / np.sqrt(len(batches)))
-            yield LedgerEntry(group, where, kind, power, power / emitted, noise / emitted)
+            yield line, (power, power / emitted, noise / emitted)
+
+
+def _face_owner(piece: Piece) -> str:
+    """The solid that a surface belongs to, or its faces that have a name in the design."""
+    solids, _, rest = piece.name.partition("|")
+    frosted = rest.partition(":")[2]
+    return frosted or solids.split("/")[0]
 
 
 def cells_in_view(model: OpticalModel) -> TargetCells:

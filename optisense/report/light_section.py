@@ -117,6 +117,10 @@ class LightSection:
             "groups": groups,
             "bars": [self._bar(group, design) for group in groups],
             "rows": self._rows(),
+            "faces": {
+                face: [_percent(share) for share in shares]
+                for face, shares in self.ledger.faces(LEAST_DRAWN).items()
+            },
             "photons": f"{self.ledger.photons:,}",
             "noise": f"{100 * noise:.1g}",
             "drawn": max(len(paths) for paths in self.paths.values()) if self.paths else 0,

@@ -48,6 +48,34 @@ def test_it_closes_on_every_sensor(name: str) -> None:
         assert found.share(group, GIVEN_UP) < 0.001
 
 
+def test_what_escapes_is_divided_by_the_faces_of_each_part() -> None:
+    """Most of the light of a row of lamps leaves the guide by the face that they shine at."""
+    design = ots.load("gelsight-mini")
+    found = ledger_of(design)
+    for group in found.emitted:
+        for part in ("guide", "tray", "gel"):
+            shares = [e.share for e in found.exits if (e.group, e.part) == (group, part)]
+            assert len(shares) == len(set(shares)) <= 6
+            assert sum(shares) == pytest.approx(found.share(group, f"escaped from {part}"))
+    faces = found.faces(0.05)
+    assert all(max(shares) >= 0.05 for shares in faces.values()) and len(faces) < 15
+    mean_way = {
+        name: np.mean([light.direction for light in group.lights], axis=0)
+        for name, group in design.lights.items()
+    }
+    for number, (group, way) in enumerate(mean_way.items()):
+        most = max(faces, key=lambda face: faces[face][number])
+        axis = int(np.abs(way).argmax())
+        assert most == f"guide, {'+' if way[axis] > 0 else '-'}{'xyz'[axis]}", group
+
+
+def test_frosted_faces_tell_what_escapes_through_them() -> None:
+    faces = {"edge": {"direction": (1, 0, 0), "within": 10, "roughness": 0.3}}
+    found = ledger_of(ots.set_value(ots.load("gelsight-mini"), "parts.guide.faces", faces))
+    assert found.faces()["guide.edge, +x"][1] > 0.2
+    assert "guide, +x" not in found.faces()
+
+
 @pytest.mark.parametrize("reflectance", [0.3, 0.9])
 def test_a_white_sphere_shares_its_light_as_the_formula_says(reflectance: float) -> None:
     """The port takes r f / (1 - r (1 - f)), and the wall the rest."""

@@ -45,6 +45,9 @@ class Fate(IntEnum):
 
 FATES = len(Fate)
 
+SIDES = ("+x", "-x", "+y", "-y", "+z", "-z")
+"""Which way a face looks: the axis of the design's frame that its outward normal is nearest to."""
+
 
 @dataclass(frozen=True)
 class Bookings:
@@ -54,10 +57,13 @@ class Bookings:
         power: (batches, groups, 3, surfaces + 1, fates) mW of lights of 1 mW in each channel. The
             last surface stands for the lights themselves: for what happens before any surface.
         rest: (batches, groups, 3) mW of photons that were given up on their way.
+        exits: (batches, groups, 3, surfaces + 1, sides) mW of what escapes, by the way that the
+            face looks through which it does, of `SIDES`. Light that meets nothing has none.
     """
 
     power: NDArray[np.float64]
     rest: NDArray[np.float64]
+    exits: NDArray[np.float64]
 
 
 @dataclass
@@ -66,6 +72,7 @@ class _Sums:
 
     power: mi.Float64
     rest: mi.Float64
+    exits: mi.Float64
     surfaces: int
 
     def book(
@@ -83,6 +90,46 @@ class _Sums:
         row = (line * self.surfaces + surface) * FATES + fate
         for k in range(3):
             dr.scatter_add(self.power, mi.Float64(what[k]), row * 3 + k, where)
+
+    def book_end(self, line: mi.UInt32, end: _End) -> None:
+        """Add what is left of photons at their ends.
+
+        Args:
+            line: the number of batch and group.
+            end: of each photon.
+        """
+        self.book(line, end.last, mi.UInt32(int(Fate.ESCAPED)), end.escaped, mi.Bool(True))
+        through = (line * self.surfaces + end.last) * len(SIDES) + _side_of(end.outward)
+        leaves = end.last < self.surfaces - 1
+        for k in range(3):
+            dr.scatter_add(self.exits, mi.Float64(end.escaped[k]), through * 3 + k, leaves)
+            dr.scatter_add(self.rest, mi.Float64(end.given_up[k]), line * 3 + k)
+
+
+@dataclass
+class _End:
+    """Photons at their ends.
+
+    Attributes:
+        escaped: mW per channel of those that left the sensor, else 0.
+        given_up: mW per channel of those that were given up on their way, else 0.
+        last: the surface from which each went on last.
+        outward: its face normal, on the side on which the photon went on.
+    """
+
+    escaped: mi.Color3f
+    given_up: mi.Color3f
+    last: mi.UInt32
+    outward: mi.Vector3f
+
+
+def _side_of(normal: mi.Vector3f) -> mi.UInt32:
+    """The number of the side, of `SIDES`, that unit normals look to."""
+    far = dr.abs(normal)
+    axis = dr.select(far.x >= dr.maximum(far.y, far.z), mi.UInt32(0), 1)
+    axis = dr.select(far.z > dr.maximum(far.x, far.y), 2, axis)
+    along = dr.select(axis == 0, normal.x, dr.select(axis == 1, normal.y, normal.z))
+    return axis * 2 + dr.select(along < 0, mi.UInt32(1), 0)
 
 
 def _is_interface(step: Interaction) -> mi.Bool:
@@ -124,17 +171,15 @@ def _follow(
     sums: _Sums,
     seen: TargetCells,
     seed: mi.UInt32,
-) -> mi.Color3f:
-    """Follow photons to their ends and book what they lose.
-
-    Returns:
-        What is left of those that were given up.
-    """
+) -> _End:
+    """Follow photons to their ends and book what they lose on their way."""
     # Hashed: streams of neighbouring numbers resemble one another, and so would the batches.
     rng = mi.PCG32()
     first, second = mi.sample_tea_32(number, seed)
     rng.seed(mi.UInt64(first), mi.UInt64(second))
     last = mi.UInt32(sums.surfaces - 1)
+    outward = mi.Vector3f(0, 0, 1)
+    gone = mi.Color3f(0)
     # The interface that tells the medium, and the side of it.
     bound = mi.UInt32(sums.surfaces - 1)
     side = mi.UInt32(int(Fate.BEFORE))
@@ -148,7 +193,7 @@ def _follow(
             power *= step.transmittance
             side = medium_after(step, side)
         escaped = ray.active & ~hit.valid
-        sums.book(line, last, mi.UInt32(int(Fate.ESCAPED)), power, escaped)
+        gone = dr.select(escaped, power, gone)
         kept = dr.select(step.goes_on, power * step.lobe.weight, 0)
         cell, near = cell_at(seen.cells, hit.point, step.sensed)
         near &= dr.gather(mi.UInt32, seen.flags, cell, near) != 0
@@ -156,8 +201,10 @@ def _follow(
         sums.book(line, hit.surface, fate, power - kept, hit.valid)
         power = dr.select(escaped, 0, kept)
         last = dr.select(step.goes_on, hit.surface, last)
+        ahead = dr.sign(dr.dot(step.lobe.direction, hit.normal))
+        outward = dr.select(step.goes_on, hit.normal * ahead, outward)
         ray = step.ray
-    return power
+    return _End(gone, power, last, outward)
 
 
 @lets_ctrl_c_through
@@ -184,6 +231,7 @@ def trace_ledger(
     sums = _Sums(
         dr.zeros(mi.Float64, lines * (surfaces + 1) * FATES * 3),
         dr.zeros(mi.Float64, lines * 3),
+        dr.zeros(mi.Float64, lines * (surfaces + 1) * len(SIDES) * 3),
         surfaces + 1,
     )
     guide = uniform_guide(table.count)
@@ -199,13 +247,16 @@ def trace_ledger(
         line = batch * table.groups + group
         power = flight.throughput * (count * BATCHES / per_light)
         stream = dr.opaque(mi.UInt32, seed_of(seed, 6, first))
-        left = _follow(scene, flight.ray, power, line, flight.number, sums, seen, stream)
-        for k in range(3):
-            dr.scatter_add(sums.rest, mi.Float64(left[k]), line * 3 + k)
-        dr.eval(sums.power, sums.rest)
-    power = np.asarray(sums.power, dtype=np.float64)
-    shape = (BATCHES, table.groups, surfaces + 1, FATES, 3)
+        end = _follow(scene, flight.ray, power, line, flight.number, sums, seen, stream)
+        sums.book_end(line, end)
+        dr.eval(sums.power, sums.rest, sums.exits)
+
+    def by_surface(values: mi.Float64) -> NDArray[np.float64]:
+        each = np.asarray(values, dtype=np.float64)
+        return np.moveaxis(each.reshape(BATCHES, table.groups, surfaces + 1, -1, 3), 4, 2)
+
     return Bookings(
-        np.moveaxis(power.reshape(shape), 4, 2),
+        by_surface(sums.power),
         np.asarray(sums.rest, dtype=np.float64).reshape(BATCHES, table.groups, 3),
+        by_surface(sums.exits),
     )
