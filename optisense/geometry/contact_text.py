@@ -5,6 +5,7 @@
              | "cylinder:" radius [ "," length [ "," angle ] ]
              | "plane" [ ":" tilt_x "," tilt_y [ "," size ] ]
              | "mesh:" path [ "," scale ]
+             | "object:" name [ "," scale ]
              | any other kind in `INDENTERS` and its numbers
     place    = u "," v  |  x "," y "," z
 
@@ -19,7 +20,9 @@ from optisense.errors import ContactError
 from optisense.geometry.contact import Contact
 from optisense.geometry.indenter_kinds import INDENTERS, Indenter
 
-INDENTER_FORM = "Write sphere:RADIUS, cylinder:RADIUS[,LENGTH], plane or mesh:FILE[,SCALE]"
+INDENTER_FORM = (
+    "Write sphere:RADIUS, cylinder:RADIUS[,LENGTH], plane, mesh:FILE[,SCALE] or object:NAME"
+)
 _FORM = "Write it as KIND:SIZE@U,V:DEPTH, for example sphere:1.5@0,0:0.8, in mm without the unit"
 
 

@@ -236,6 +236,7 @@ INDENTERS: Registry[type[IndenterKind]] = Registry(
         "cylinder": "optisense.geometry.indenters:Cylinder",
         "plane": "optisense.geometry.indenters:Plane",
         "mesh": "optisense.geometry.indenters:MeshIndenter",
+        "object": "optisense.geometry.objects.catalogue:ObjectIndenter",
     },
     _check,
 )

@@ -53,7 +53,7 @@ def test_contact_text(text: str, contact: Contact) -> None:
     ("text", "expected"),
     [
         ("spher:1.5@0,0:0.8", "Did you mean 'sphere'"),
-        ("donut:1@0,0:0.8", "cylinder, mesh, plane, sphere"),
+        ("donut:1@0,0:0.8", "cylinder, mesh, object, plane, sphere"),
         ("sphere:1.5", "no '@'"),
         ("sphere:1.5@0,0", "no depth"),
         ("sphere@0,0:1", "sphere:radius"),
