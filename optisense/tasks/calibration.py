@@ -17,11 +17,12 @@ from optisense.errors import ContactError, TaskError
 from optisense.geometry import Contact, Sphere
 from optisense.mechanics import ELASTIC
 from optisense.quality import SAMPLE_PHOTONS
-from optisense.tasks.camera_noise import MEASURED_NOISE, add_camera_noise
-from optisense.tasks.colour_to_normal import METHODS, TiltReader, fit_reader, normals_of, tilts_of
+from optisense.reading.camera_noise import MEASURED_NOISE, add_camera_noise
+from optisense.reading.integration import NormalIntegrator
+from optisense.reading.tilts import normals_of, tilts_of
+from optisense.reading.untouched import UntouchedSurface
+from optisense.tasks.colour_to_normal import METHODS, TiltReader, fit_reader
 from optisense.tasks.draws import Places
-from optisense.tasks.integration import NormalIntegrator
-from optisense.tasks.untouched import UntouchedSurface
 
 if TYPE_CHECKING:
     from optisense.optics import OpticalModel, TactileImage

@@ -20,7 +20,6 @@ from sklearn.pipeline import Pipeline, make_pipeline
 from sklearn.preprocessing import StandardScaler
 
 from optisense.errors import TaskError
-from optisense.tasks.integration import STEEPEST
 
 FloatArray = NDArray[np.float64]
 
@@ -115,22 +114,3 @@ def fit_reader(
     if method == "network":
         return ColourNetwork(colours, places, tilts, seed)
     raise TaskError(f"there is no method '{method}'", hint="Use one of " + ", ".join(METHODS))
-
-
-def tilts_of(normals: NDArray[np.floating], first: FloatArray, second: FloatArray) -> FloatArray:
-    """(..., 2): the components of unit normals (..., 3) along two tangents (..., 3)."""
-    return np.stack(
-        [np.einsum("...i,...i", normals, first), np.einsum("...i,...i", normals, second)], axis=-1
-    )
-
-
-def normals_of(
-    tilts: FloatArray, first: FloatArray, second: FloatArray, normals: FloatArray
-) -> FloatArray:
-    """(..., 3): unit normals tilted so (..., 2) from the untouched ones, by STEEPEST at most."""
-    most = np.sin(np.radians(STEEPEST))
-    length = np.linalg.norm(tilts, axis=-1, keepdims=True)
-    within = tilts * np.minimum(1.0, most / np.maximum(length, 1e-12))
-    along = within[..., :1] * first + within[..., 1:] * second
-    rest = np.sqrt(1.0 - (within**2).sum(axis=-1, keepdims=True))
-    return along + rest * normals

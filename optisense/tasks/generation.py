@@ -22,8 +22,9 @@ from optisense.library import with_own_lights
 from optisense.mechanics import CONFORMING, ELASTIC
 from optisense.optics.estimators import RADIANCE_CACHE, current_name
 from optisense.quality import SAMPLE_PHOTONS
+from optisense.reading.camera_noise import add_camera_noise
+from optisense.reading.untouched import UntouchedSurface
 from optisense.sensors import save_design
-from optisense.tasks.camera_noise import add_camera_noise
 from optisense.tasks.dataset import (
     BACKGROUND,
     COLUMNS,
@@ -41,7 +42,6 @@ from optisense.tasks.dataset import (
 )
 from optisense.tasks.draws import ContactDraw, DrawnContact, Places, keeps_margin
 from optisense.tasks.records import CsvTable, refuse_differences, write_whole
-from optisense.tasks.untouched import UntouchedSurface
 from optisense.writing import inside, write_json, written_whole
 
 if TYPE_CHECKING:

@@ -23,7 +23,7 @@ from optisense.mechanics import CONFORMING, ELASTIC
 from optisense.objectives.score import json_ready
 from optisense.optics.estimators import RADIANCE_CACHE, current_name
 from optisense.quality import SAMPLE_PHOTONS
-from optisense.tasks.camera_noise import MEASURED_NOISE, add_camera_noise
+from optisense.reading.camera_noise import MEASURED_NOISE, add_camera_noise
 from optisense.tasks.generation import design_values, mesh_digests
 from optisense.tasks.records import KEPT, CsvTable, read_object, refuse_differences
 from optisense.tasks.regression import FOLDS, ForestReading, read_by_forest

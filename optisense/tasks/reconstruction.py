@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from optisense.errors import TaskError
 from optisense.geometry import Contact, Cylinder, MeshIndenter, Sphere, TriangleMesh
 from optisense.objectives.score import json_ready
+from optisense.reading.tilts import angles_between
 from optisense.tasks.calibration import LEAST_PIXELS, CalibratedSensor, ReconstructionSettings
 
 if TYPE_CHECKING:
@@ -197,9 +198,3 @@ def reconstruct_one(
         true_depth=sensor.untouched.image_depth(image).astype(np.float64),
         mask=image.contact_mask,
     )
-
-
-def angles_between(first: FloatArray, second: FloatArray) -> FloatArray:
-    """(...) degrees between unit vectors (..., 3)."""
-    cosine = np.einsum("...i,...i", first, second)
-    return np.degrees(np.arccos(np.clip(cosine, -1.0, 1.0)))

@@ -11,10 +11,11 @@ from scipy.ndimage import binary_erosion
 from optisense import OpticalModel
 from optisense.errors import ContactError, TaskError
 from optisense.geometry import Contact, Sphere
+from optisense.reading.tilts import angles_between, normals_of, tilts_of
 from optisense.tasks import ReconstructionSettings, reconstruct
-from optisense.tasks.colour_to_normal import fit_reader, normals_of, tilts_of
+from optisense.tasks.colour_to_normal import fit_reader
 from optisense.tasks.figures import draw_reconstruction
-from optisense.tasks.reconstruction import angles_between, pyramid
+from optisense.tasks.reconstruction import pyramid
 
 LAMBERTIAN = {"presses": 12, "camera_noise": 0.0, "resolution": (160, 120), "seed": 1}
 

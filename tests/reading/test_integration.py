@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from optisense.tasks.integration import GridIntegrator, NormalIntegrator
-from optisense.tasks.untouched import UntouchedSurface
+from optisense.reading.integration import GridIntegrator, NormalIntegrator
+from optisense.reading.untouched import UntouchedSurface
 
 SHAPE = 90, 120
 PITCH = 0.05  # mm between pixels

@@ -9,16 +9,14 @@ from numpy.typing import NDArray
 from scipy import sparse
 from scipy.sparse.linalg import factorized
 
-from optisense.tasks.untouched import UntouchedSurface
+from optisense.reading.tilts import STEEPEST
+from optisense.reading.untouched import UntouchedSurface
 
 FloatArray = NDArray[np.float64]
 
 ROUNDS = 3
 """Of `NormalIntegrator.depths`: the change of a ray's direction between pixels, times the depth,
 is a correction of some per cent, and each round makes its error that much smaller."""
-
-STEEPEST = 80.0
-"""Degrees between ray and surface normal; steeper ones count as this."""
 
 
 class GridIntegrator:
