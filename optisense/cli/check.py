@@ -13,6 +13,9 @@ from optisense.errors import SetupError
 if TYPE_CHECKING:
     from optisense.design import SensorDesign
 
+MOST_TOLD = 40
+"""Lines about what is odd in a design; the rest is counted, so that the end stays in sight."""
+
 
 @ends_well
 def check(design: DesignArgument, contact: ContactOption = None) -> None:
@@ -24,8 +27,10 @@ def check(design: DesignArgument, contact: ContactOption = None) -> None:
     sensor = sensors.load(design)
     problems = sensors.check(sensor)
     _describe(sensor)
-    for problem in problems:
+    for problem in problems[:MOST_TOLD]:
         output.print(f"odd: {problem}", markup=False, style="yellow")
+    if len(problems) > MOST_TOLD:
+        output.print(f"odd: and {len(problems) - MOST_TOLD:,} more like these", style="yellow")
     if any(part.role == "mirror" for part in sensor.parts.values()):
         _tell_views(sensor)
     if contacts:

@@ -12,6 +12,9 @@ from optisense.design.emitters import LightModel
 from optisense.design.fields import Colour, Direction, Model, Name, NonNegative, Vector, is_left_out
 from optisense.design.spectrum import LightSpectra
 
+MOST_LIGHTS = 10_000
+"""Lights of one group; the built-in sensors have at most some dozens."""
+
 
 class Light(Model):
     """The pose of one light."""
@@ -35,7 +38,7 @@ class LightGroup(Model):
         exclude_if=is_left_out,
         description="of the red, green and blue dies; without, each has its channel",
     )
-    lights: Annotated[list[Light], Field(min_length=1)] = Field(
+    lights: Annotated[list[Light], Field(min_length=1, max_length=MOST_LIGHTS)] = Field(
         description="position in mm, direction of any length"
     )
 

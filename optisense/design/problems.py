@@ -153,6 +153,8 @@ def _problems(
 
 def _sentence(message: str) -> str:
     text = message.removeprefix("Value error, ").replace("Input should be", "should be")
+    for kind in ("Dictionary ", "List "):
+        text = text.removeprefix(kind).replace(" after validation", "")
     if "should match pattern" in text:
         return "should be letters, digits, '-' and '_' only, at most 64"
     return text

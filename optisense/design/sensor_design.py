@@ -27,6 +27,13 @@ SCHEMA_VERSION = 1
 """Version of the design file's format; it is raised when a file of an older version has to be
 converted."""
 
+MOST_OF_A_KIND = 1000
+"""Materials, parts, light groups or cages of one design; the built-in sensors have at most some
+dozens, and checks of parts against each other take time that grows with their square."""
+
+MOST_NOTES = 20_000
+"""Values of one design whose source is noted, each in three lines of the file."""
+
 MATERIAL_REQUIRED = frozenset({Role.ELASTOMER, Role.SUPPORT, Role.INTERFACE, Role.MIRROR})
 
 
@@ -58,14 +65,18 @@ class SensorDesign(Model):
     name: Annotated[str, StringConstraints(min_length=1, max_length=200)]
     description: str = ""
     coating: CoatingModel = Field(description="of the sensing surface")
-    materials: dict[Name, Material] = Field(description="optical materials, by name")
-    parts: Annotated[dict[Name, Part], Field(min_length=1)] = Field(
+    materials: dict[Name, Material] = Field(
+        max_length=MOST_OF_A_KIND, description="optical materials, by name"
+    )
+    parts: Annotated[dict[Name, Part], Field(min_length=1, max_length=MOST_OF_A_KIND)] = Field(
         description="solids and surfaces; lengths in mm"
     )
-    lights: dict[Name, LightGroup] = Field(description="light groups")
+    lights: dict[Name, LightGroup] = Field(max_length=MOST_OF_A_KIND, description="light groups")
     camera: Camera
     cages: dict[Name, Cage] = Field(
-        default_factory=dict, description="control points that deform parts"
+        default_factory=dict,
+        max_length=MOST_OF_A_KIND,
+        description="control points that deform parts",
     )
     dispersion: bool | None = Field(
         default=None,
@@ -73,7 +84,9 @@ class SensorDesign(Model):
         description="whether R, G and B are refracted by indices of their own",
     )
     provenance: dict[str, Provenance] = Field(
-        default_factory=dict, description="where the numbers come from, by dotted path"
+        default_factory=dict,
+        max_length=MOST_NOTES,
+        description="where the numbers come from, by dotted path",
     )
 
     _meshes: dict[str, TriangleMesh] = PrivateAttr(default_factory=dict)

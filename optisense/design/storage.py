@@ -23,6 +23,9 @@ from optisense.untrusted_files import is_file, is_folder
 from optisense.writing import inside, written_together
 
 DESIGN_FILE = "design.yaml"
+MOST_TRIANGLES = 3_000_000
+"""Triangles of all parts of a design together; the largest built-in sensor has 53,000."""
+
 HEAD = "Sensor design. Lengths in mm, angles in degrees, powers in mW."
 
 
@@ -51,9 +54,17 @@ def load_design(path: str | Path) -> SensorDesign:
         raise design_error(error, data, where=str(file), lines=lines) from None
     design._source, design._lines = file, lines
     folder = file.parent
+    triangles = 0
     for name, part in design.parts.items():
         mesh_path = _inside(folder, part.mesh, design.where("parts", name, "mesh"))
         design.meshes[name] = _load_mesh(mesh_path, name, design)
+        triangles += len(design.meshes[name].faces)
+        if triangles > MOST_TRIANGLES:
+            raise DesignError(
+                f"the meshes have more than {MOST_TRIANGLES:,} triangles together",
+                where=design.where("parts", name, "mesh"),
+                hint="Simplify the largest of them in a modelling program",
+            )
     for place, value in design.values_of_kinds().items():
         for field, named in value.located(folder).files().items():
             _inside(folder, named, design.where(*place, field))

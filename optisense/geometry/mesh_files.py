@@ -21,6 +21,9 @@ FORMATS = (".obj", ".stl", ".ply")
 FARTHEST = 1e9
 """Of a coordinate in a file, whatever its unit: a kilometre in micrometres."""
 
+MOST_TRIANGLES = 1_000_000
+"""Triangles of one file; the built-in sensors have at most 25,000 in a part."""
+
 MOST_TWICE = 1000
 """Faces that may be there more than once. Some programs write a few; rays meet each of them."""
 
@@ -39,11 +42,13 @@ def load_mesh(path: Path) -> TriangleMesh:
         )
     data = read_bytes(path, MOST_MESH, MeshError, "the mesh file")
     if suffix == ".obj":
+        _refuse_many(data.count(b"\nf "), path)  # each has at least one triangle
         mesh = _parse_plain_obj(data) or _parse_obj(data, path)
     else:
         if suffix == ".stl":
             _refuse_cut_off_stl(data, path)
         mesh = _load_with_trimesh(data, path, suffix)
+    _refuse_many(len(mesh.faces), path)
     if len(mesh.faces) == 0:
         raise MeshError(
             "the mesh file has no triangles", where=str(path), hint="export a surface, not points"
@@ -64,6 +69,15 @@ def load_mesh(path: Path) -> TriangleMesh:
             hint="merge duplicate faces in your modelling program and export again",
         )
     return mesh
+
+
+def _refuse_many(triangles: int, path: Path) -> None:
+    if triangles > MOST_TRIANGLES:
+        raise MeshError(
+            f"the mesh has {triangles:,} triangles; at most {MOST_TRIANGLES:,} are read",
+            where=str(path),
+            hint="Export it with a larger deviation, or simplify it in a modelling program",
+        )
 
 
 def _faces_twice(mesh: TriangleMesh) -> int:
@@ -111,6 +125,7 @@ def _refuse_cut_off_stl(data: bytes, path: Path) -> None:
                 where=str(path),
                 hint="export or copy it again",
             )
+        _refuse_many(data.count(b"endfacet"), path)
         return
     count = int.from_bytes(data[80:84], "little") if len(data) >= 84 else 0
     if len(data) < 84 + 50 * count:
@@ -120,6 +135,7 @@ def _refuse_cut_off_stl(data: bytes, path: Path) -> None:
             where=str(path),
             hint="export or copy it again",
         )
+    _refuse_many(count, path)
 
 
 def _load_with_trimesh(data: bytes, path: Path, suffix: str) -> TriangleMesh:
