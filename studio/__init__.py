@@ -33,7 +33,7 @@ from .sensor import ui as sensor_ui
 from .shapes import cage_operator, cage_warnings, reference_operator
 from .shapes import choosing as cage_choosing
 from .shapes import ui as shape_ui
-from .simulate import drafts, editors, indenters, picture, relight
+from .simulate import drafts, editors, indenters, picture, relight, viewing
 from .simulate import operator as simulate_operator
 from .simulate import prop as simulate_prop
 from .simulate import ui as simulate_ui
@@ -50,6 +50,7 @@ MODULES = (
     picture,
     editors,
     simulate_prop,
+    viewing,
     relight,
     drafts,
     indenters,

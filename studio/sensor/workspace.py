@@ -68,9 +68,13 @@ def _fill() -> None:
     bench, editor = areas
     space = bench.spaces.active
     space.show_region_ui, space.show_region_toolbar = True, False
+    space.show_region_tool_header = False
     with bpy.context.temp_override(window=window, screen=window.screen, area=editor):
         editor.type = "IMAGE_EDITOR"
-    editor.spaces.active.image = bpy.data.images.get(picture.IMAGE)
+    shown = editor.spaces.active
+    shown.image = bpy.data.images.get(picture.IMAGE)
+    shown.show_region_header, shown.show_region_tool_header = False, True  # the latter is ours
+    shown.show_region_toolbar = shown.show_region_ui = False
     show_design(window.scene)
     bpy.app.timers.register(_open_tab, first_interval=editors.WAIT)
 

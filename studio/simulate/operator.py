@@ -14,7 +14,7 @@ from ..engine import polls, session
 from ..engine.operators import Starting, fail, refuse, start, start_with_design
 from ..scene.collections import objects_of, select_only
 from ..scene.contacts import add_contact, sensing_surface
-from . import editors, picture, requests
+from . import editors, picture, requests, viewing
 
 SHAPE = (
     "radius", "length", "size", "file", "shape", "scale", "depth", "rotation", "indenter",
@@ -63,6 +63,7 @@ class OPTISENSE_OT_show_picture(polls.Checked, bpy.types.Operator):
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         editors.show(context, bpy.data.images[picture.IMAGE])
+        viewing.refresh()
         return {"FINISHED"}
 
 

@@ -18,6 +18,9 @@ _previews: bpy.utils.previews.ImagePreviewCollection | None = None
 when_resized: list[Callable[[str], None]] = []
 """Called with the name of an image that is new, or has another size than before."""
 
+when_shown: list[Callable[[NDArray[np.float32]], None]] = []
+"""Called with the pixels (h, w, 4) of every picture that is shown."""
+
 
 def show(pixels: NDArray[np.float32], size: tuple[int, int] | None = None) -> bpy.types.Image:
     """Show a picture (h, w, 4), row 0 at the bottom, 0 to 1, in place of the one before.
@@ -29,20 +32,28 @@ def show(pixels: NDArray[np.float32], size: tuple[int, int] | None = None) -> bp
     """
     if size is not None:
         pixels = enlarged(pixels, size)
+    image = fill(IMAGE, pixels)
+    show_icon(IMAGE, pixels)
+    for each in when_shown:
+        each(pixels)
+    return image
+
+
+def fill(name: str, pixels: NDArray[np.float32]) -> bpy.types.Image:
+    """Give an image, which is made where there is none, other pixels (h, w, 4)."""
     height, width = pixels.shape[:2]
-    image = bpy.data.images.get(IMAGE)
+    image = bpy.data.images.get(name)
     if image is None:
-        image = bpy.data.images.new(IMAGE, width, height)
+        image = bpy.data.images.new(name, width, height)
         for each in when_resized:
-            each(IMAGE)
+            each(name)
     elif tuple(image.size) != (width, height):
         image.scale(width, height)
         for each in when_resized:
-            each(IMAGE)
+            each(name)
     flat = np.ascontiguousarray(pixels, dtype=np.float32).ravel()
     image.pixels.foreach_set(flat)
     image.update()
-    show_icon(IMAGE, pixels)
     return image
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import bpy
 
 from ..engine import session
-from ..engine.layout import SidebarPanel, labelled, show_job, show_outcome
+from ..engine.layout import TAB, SidebarPanel, labelled, show_job, show_outcome
 from ..scene.contacts import pressing
 from . import picture
 
@@ -42,7 +42,7 @@ class OPTISENSE_PT_simulate(SidebarPanel, bpy.types.Panel):
             layout.label(text=f"{count} contacts" if count != 1 else "1 contact")
             return
         icon = picture.icon()
-        if icon:
+        if icon and context.workspace.name != TAB:  # there the picture stands beside the bench
             layout.template_icon(icon_value=icon, scale=11.0)
         if now.is_before:
             layout.label(text="Picture of the sensor that was open before", icon="INFO")
