@@ -81,5 +81,9 @@ class TaskError(OptiSenseError):
     """A perception task, or a dataset, that can't be made or read as asked."""
 
 
+class CalibrationError(OptiSenseError):
+    """Photographs of a sensor that can't be read, or that a design can't be compared with."""
+
+
 class SearchError(OptiSenseError):
     """A search space, a method or a study that makes no sense, or can't go on."""

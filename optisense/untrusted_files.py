@@ -9,6 +9,7 @@ file, the place in it, and what to do.
 
 from __future__ import annotations
 
+import csv
 import io
 import json
 import math
@@ -181,6 +182,21 @@ def parse_json(text: str, source: str, error: Error, what: str = "the file") -> 
         raise error(f"{what} is nested too deeply", where=source, hint=COPY_AGAIN) from None
     except (ValueError, MemoryError) as found:
         raise error(f"{what} is not JSON: {found}", where=source, hint=COPY_AGAIN) from None
+
+
+def read_table(path: Path, error: Error, what: str = "the table") -> list[dict[str, str]]:
+    """The rows of a CSV file as text, by column.
+
+    Raises:
+        error: as `read_text`, or it is no such file; says the line.
+    """
+    text = read_text(path, MOST_TABLE, error, what)
+    reader = csv.DictReader(io.StringIO(text, newline=""))
+    try:
+        return list(reader)
+    except csv.Error as found:
+        where = f"{path}:{reader.line_num}"
+        raise error(f"can't read {what}: {found}", where=where, hint=COPY_AGAIN) from None
 
 
 def inside(folder: Path, relative: str) -> Path | None:

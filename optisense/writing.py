@@ -122,7 +122,8 @@ def is_own_page(path: Path, kind: str) -> bool:
 
     Args:
         path: of the file.
-        kind: of the page, which its head names: "render", "scores", "search" or "tolerance".
+        kind: of the page, which its head names: "render", "scores", "search",
+            "tolerance", "compare" or "calibrate".
     """
     try:
         with path.open("rb") as file:

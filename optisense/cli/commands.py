@@ -22,6 +22,7 @@ _HOMES = {
     "report": "report",
     "tolerance": "tolerance",
     "ledger": "ledger",
+    "compare": "compare",
     "export": "export",
     "studio": "studio",
     "engine": "engine",

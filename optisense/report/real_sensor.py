@@ -112,10 +112,11 @@ def compare_with_real(
         KeyboardInterrupt: Ctrl-C ended the rendering.
         OptiSenseError: the model can't be rendered.
     """
-    from optisense.tasks.dataset import read_picture
+    from optisense.errors import RenderError
+    from optisense.picture_files import read_picture
 
     with as_file(files("optisense.report") / "real" / PICTURE) as path:
-        real = read_picture(path)
+        real = read_picture(path, RenderError)
     height, width = real.shape[:2]
     column, row = BALL_PLACE
     x, y, z = model.chief_rays((width, height)).points[int(row), int(column)].tolist()

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import io
-import warnings
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,21 +9,19 @@ from typing import Annotated, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from PIL import Image
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from optisense.errors import TaskError
+from optisense.picture_files import read_picture
 from optisense.tasks.records import read_object, read_rows
 from optisense.text import brief
 from optisense.untrusted_files import (
     COPY_AGAIN,
-    MOST_PICTURE,
     check_arrays,
     first_problem,
     inside,
     is_file,
     read_arrays,
-    read_bytes,
 )
 
 SCHEMA_VERSION = 1
@@ -228,7 +224,7 @@ class Dataset:
         try:
             arrays = self._arrays(labels["arrays"], SAMPLE_ARRAYS)
             picture = self._existing(labels["file_name"])
-            image = read_picture(picture)
+            image = read_picture(picture, TaskError)
             height, width = arrays["mask"].shape
             if image.shape != (height, width, 3):
                 raise TaskError(
@@ -281,31 +277,6 @@ class Dataset:
         width, height = self.info["settings"]["resolution"]
         check_arrays(arrays, kinds, (height, width), path, TaskError)
         return arrays
-
-
-def read_picture(path: Path) -> NDArray[np.uint8]:
-    """(h, w, 3) uint8 of a picture file.
-
-    Raises:
-        TaskError: it can't be read.
-    """
-    data = read_bytes(path, MOST_PICTURE, TaskError, "the picture")
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("error", Image.DecompressionBombWarning)
-            with Image.open(io.BytesIO(data), formats=("PNG", "JPEG")) as picture:
-                return np.asarray(picture.convert("RGB"), dtype=np.uint8)
-    except Exception as error:  # Pillow raises many kinds on malformed files
-        raise TaskError(
-            f"can't read the picture: the file is cut off or damaged ({error})",
-            where=str(path),
-            hint=COPY_AGAIN,
-        ) from None
-
-
-def write_picture(path: Path, picture: NDArray[np.uint8]) -> None:
-    """Write (h, w, 3) uint8 as a PNG file."""
-    Image.fromarray(picture).save(path, format="PNG")
 
 
 def _typed(row: dict[str, str], where: str) -> dict[str, Any]:

@@ -21,6 +21,7 @@ from optisense.geometry import Contact, Indenter
 from optisense.library import with_own_lights
 from optisense.mechanics import CONFORMING, ELASTIC
 from optisense.optics.estimators import RADIANCE_CACHE, current_name
+from optisense.picture_files import write_picture
 from optisense.quality import SAMPLE_PHOTONS
 from optisense.reading.camera_noise import add_camera_noise
 from optisense.reading.untouched import UntouchedSurface
@@ -38,7 +39,6 @@ from optisense.tasks.dataset import (
     read_failures,
     read_info,
     read_labels,
-    write_picture,
 )
 from optisense.tasks.draws import ContactDraw, DrawnContact, Places, keeps_margin
 from optisense.tasks.records import CsvTable, refuse_differences, write_whole

@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from optisense.errors import OutputError, TaskError
-from optisense.untrusted_files import COPY_AGAIN, MOST_TABLE, read_json, read_text
+from optisense.untrusted_files import COPY_AGAIN, read_json, read_table
 from optisense.writing import written_whole
 
 KEPT = "Free space on this disk or choose another folder; finished samples are kept"
@@ -110,13 +110,7 @@ def read_rows(path: Path) -> list[dict[str, str]]:
     Raises:
         TaskError: it can't be read.
     """
-    text = read_text(path, MOST_TABLE, TaskError, "the table")
-    reader = csv.DictReader(io.StringIO(text, newline=""))
-    try:
-        return list(reader)
-    except csv.Error as error:
-        where = f"{path}:{reader.line_num}"
-        raise TaskError(f"can't read the table: {error}", where=where, hint=COPY_AGAIN) from error
+    return read_table(path, TaskError)
 
 
 def differences(before: Mapping[str, Any], now: Mapping[str, Any], prefix: str = "") -> list[str]:

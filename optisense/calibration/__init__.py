@@ -1,0 +1,42 @@
+"""A design beside photographs of the real sensor: how far the two differ.
+
+Names load on first use, so that importing the package loads neither SciPy nor the renderer.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from optisense.lazy_names import load_on_first_use
+
+if TYPE_CHECKING:
+    from optisense.calibration.comparing import Comparison, compare
+    from optisense.calibration.layouts import read_photographs
+    from optisense.calibration.photographs import PhotographedPress, Photographs
+    from optisense.calibration.realism import Realism
+    from optisense.calibration.staging import photograph_model, save_photographs
+
+_HOMES = {
+    "Comparison": ".comparing",
+    "PhotographedPress": ".photographs",
+    "Photographs": ".photographs",
+    "Realism": ".realism",
+    "compare": ".comparing",
+    "photograph_model": ".staging",
+    "read_photographs": ".layouts",
+    "save_photographs": ".staging",
+}
+
+__all__ = [
+    "Comparison",
+    "PhotographedPress",
+    "Photographs",
+    "Realism",
+    "compare",
+    "photograph_model",
+    "read_photographs",
+    "save_photographs",
+]
+
+if not TYPE_CHECKING:  # type checkers would take any name for one of the package's
+    __getattr__, __dir__ = load_on_first_use(__name__, _HOMES)

@@ -1,0 +1,179 @@
+"""Where a ball touches, found in the difference between a photograph and the background.
+
+The response of a tactile sensor to a tilt of its skin is nearly odd: what one flank of a ball loses
+in brightness, the opposite flank gains. So the contact's middle is the place about which the
+difference is most nearly antisymmetric. Inside the contact the skin's tilt, and with it the
+response, grows in proportion to the distance from the middle; outside it falls off at once. So the
+strength of the response peaks at the contact's edge, and blur moves the peak inward and the
+steepest fall outward by about the same; the radius is taken half-way between the two.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import (
+    binary_closing,
+    binary_fill_holes,
+    gaussian_filter,
+    label,
+    map_coordinates,
+    sum_labels,
+)
+from scipy.optimize import minimize
+
+FloatArray = NDArray[np.float64]
+
+BLUR = 0.005
+"""Standard deviation of the blur of the difference, a share of the picture's width: 1.6 pixels of
+320, which takes away most of the noise of single pixels and hardly widens a contact."""
+
+STRONG = 0.35
+"""Share of the strongest response from which on pixels belong to the first guess of a contact."""
+
+STRONGEST = 99.7
+"""Percentile of the pixels' responses that stands for the strongest, as single pixels are noisy."""
+
+ABOVE_NOISE = 6.0
+"""A contact is only believed where the strongest response exceeds the median by this factor."""
+
+REACH = 1.2
+"""The antisymmetry is judged within so many radii of the first guess."""
+
+SIDE = 24
+"""Number of points from the middle to the border of the grid on which antisymmetry is judged."""
+
+FARTHEST = 3.0
+"""Radii of the first guess up to which the edge of the contact is looked for."""
+
+LEAST_RADIUS = 2.0
+"""Pixels; smaller spots are dust."""
+
+
+@dataclass(frozen=True)
+class FoundContact:
+    """A contact found in a photograph.
+
+    Attributes:
+        centre: column and row of its middle, pixels from the left and top edge of the picture.
+        radius: pixels.
+        asymmetry: energy of the difference's even part about the middle over that of its odd part;
+            0.05 to 0.2 in photographs of balls, about 1 where there is no contact.
+    """
+
+    centre: tuple[float, float]
+    radius: float
+    asymmetry: float
+
+
+def find_contact(
+    picture: NDArray[np.uint8],
+    background: NDArray[np.uint8],
+    near: tuple[float, float] | None = None,
+    radius: float | None = None,
+) -> FoundContact | None:
+    """The contact in a photograph of a pressed ball.
+
+    Args:
+        picture: (h, w, 3), of the press.
+        background: (h, w, 3), of the untouched sensor.
+        near: column and row of a first guess, such as a label; the strongest response if None.
+        radius: pixels, of a first guess.
+
+    Returns:
+        The contact; None where no response stands out from the noise.
+    """
+    response = difference(picture, background)
+    strength = np.sqrt((response**2).sum(axis=2))
+    noise = float(np.median(strength))
+    peak = float(np.percentile(strength, STRONGEST))
+    if not peak > ABOVE_NOISE * max(noise, 0.1):
+        return None
+    start, size = _first_guess(strength, max(4.0 * noise, STRONG * peak))
+    start = start if near is None else (near[0] - 0.5, near[1] - 0.5)
+    size = size if radius is None else radius
+    if size < LEAST_RADIUS:
+        return None
+    (column, row), asymmetry = _most_odd(response, start, size)
+    found = _edge(strength, column, row, FARTHEST * size)
+    return FoundContact((column + 0.5, row + 0.5), found, asymmetry)
+
+
+def difference(picture: NDArray[np.uint8], background: NDArray[np.uint8]) -> FloatArray:
+    """(h, w, 3) levels: a photograph less the background, blurred, less the median of all."""
+    found = picture.astype(np.float64) - background
+    width = BLUR * picture.shape[1]
+    blurred = gaussian_filter(found, (width, width, 0.0))
+    return np.asarray(blurred - np.median(blurred, axis=(0, 1)))
+
+
+def _first_guess(strength: FloatArray, least: float) -> tuple[tuple[float, float], float]:
+    """Column and row (of pixel middles) and radius of the spot with the most energy."""
+    spots, count = label(binary_closing(strength > least, iterations=3))
+    if count == 0:
+        return (0.0, 0.0), 0.0
+    energy = sum_labels(strength**2, spots, np.arange(1, count + 1))
+    spot = spots == 1 + int(np.argmax(energy))
+    weight = np.where(spot, strength**2, 0.0)
+    rows, columns = np.mgrid[: strength.shape[0], : strength.shape[1]]
+    total = float(weight.sum())
+    middle = float((weight * columns).sum() / total), float((weight * rows).sum() / total)
+    return middle, float(np.sqrt(binary_fill_holes(spot).sum() / np.pi))
+
+
+def _most_odd(
+    response: FloatArray, start: tuple[float, float], radius: float
+) -> tuple[tuple[float, float], float]:
+    """The place about which the response is most nearly odd, and its asymmetry there."""
+    steps = np.linspace(-REACH, REACH, 2 * SIDE + 1)
+    x, y = np.meshgrid(steps, steps)
+    half = (np.hypot(x, y) < REACH) & ((y > 0.0) | ((y == 0.0) & (x > 0.0)))
+    x, y = radius * x[half], radius * y[half]
+
+    def at(columns: FloatArray, rows: FloatArray) -> FloatArray:
+        places = [rows, columns]
+        return np.stack(
+            [map_coordinates(response[..., c], places, order=1, mode="nearest") for c in range(3)]
+        )
+
+    def asymmetry(place: FloatArray) -> float:
+        one = at(place[0] + x, place[1] + y)
+        other = at(place[0] - x, place[1] - y)
+        odd = float(((one - other) ** 2).sum())
+        return float(((one + other) ** 2).sum()) / max(odd, 1e-9)
+
+    corner = np.array(start)
+    step = 0.15 * radius
+    simplex = np.array([corner, corner + (step, 0.0), corner + (0.0, step)])
+    found = minimize(
+        asymmetry,
+        corner,
+        method="Nelder-Mead",
+        options={"xatol": 0.05, "fatol": 1e-5, "initial_simplex": simplex},
+    )
+    return (float(found.x[0]), float(found.x[1])), float(found.fun)
+
+
+def _edge(strength: FloatArray, column: float, row: float, farthest: float) -> float:
+    """The radius, pixels, between the response's peak and its steepest fall."""
+    rows, columns = np.mgrid[: strength.shape[0], : strength.shape[1]]
+    distance = np.hypot(columns - column, rows - row)
+    rings = np.round(distance).astype(np.int64).ravel()
+    count = np.bincount(rings)
+    profile = np.bincount(rings, strength.ravel()) / np.maximum(count, 1)
+    profile = profile[: max(3, int(farthest) + 1)]
+    peak = int(np.argmax(profile))
+    fall = -np.gradient(profile)
+    steepest = peak + int(np.argmax(fall[peak:]))
+    return 0.5 * (_between(profile, peak) + _between(fall, steepest))
+
+
+def _between(values: FloatArray, top: int) -> float:
+    """Where the parabola through a maximum and its neighbours peaks."""
+    if not 0 < top < len(values) - 1:
+        return float(top)
+    left, middle, right = values[top - 1 : top + 2]
+    bend = left - 2.0 * middle + right
+    return float(top if bend >= 0.0 else top + 0.5 * (left - right) / bend)

@@ -1,0 +1,166 @@
+"""Photographs of a real sensor: its background, and balls that are pressed into it.
+
+A folder of photographs has one of three layouts, each of which `layouts` reads. What all of them
+lead to is `Photographs`: pictures of one size, and what is known of each press.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image
+
+from optisense.errors import CalibrationError
+
+ByteArray = NDArray[np.uint8]
+
+WORKING_WIDTH = 320
+"""Pixels across the pictures that are compared: contacts of millimetres are some 50 pixels wide
+then, and a picture renders in about half a second."""
+
+LEAST_SIDE = 32
+"""Pixels of the shorter side of a photograph, at least: contacts can't be made out in smaller
+ones."""
+
+FULL_LEVEL, FULL_SHARE = 255, 0.005
+"""Level of a channel that is full, and the share of such pixels of a picture above which it counts
+as overexposed."""
+
+DARK_LEVEL = 16.0
+"""Level that a twentieth of the pixels of the brightest channel should exceed; a picture whose
+pixels stay below is underexposed, as eight bits hold few levels of it."""
+
+BRIGHTEST = 95.0
+"""Percentile of the brightest channel that is compared with `DARK_LEVEL`."""
+
+
+@dataclass(frozen=True)
+class PhotographedPress:
+    """A photograph of a ball that is pressed into a sensor.
+
+    Attributes:
+        name: of its file, to show.
+        picture: (h, w, 3) uint8.
+        diameter: mm, of the ball.
+        centre: column and row of the contact's middle, pixels from the picture's left and top edge;
+            None where it is not known.
+        radius: pixels, of the contact; None where it is not known.
+        fingerprint: SHA-256 of the file, or of the array, that the picture is from.
+    """
+
+    name: str
+    picture: ByteArray = field(repr=False)
+    diameter: float
+    centre: tuple[float, float] | None = None
+    radius: float | None = None
+    fingerprint: str = ""
+
+    def __post_init__(self) -> None:
+        if not (np.isfinite(self.diameter) and self.diameter > 0.0):
+            raise CalibrationError(
+                f"the ball's diameter is {self.diameter:g}",
+                where=self.name,
+                hint="Give it in mm, above 0",
+            )
+
+
+@dataclass(frozen=True)
+class Photographs:
+    """Photographs of one sensor, all of one size.
+
+    Attributes:
+        background: (h, w, 3) uint8, nothing pressed in.
+        presses: at least one.
+        layout: the name of the layout that they were read from.
+        fingerprint: of the background, as of a press.
+        scale: pixels of these pictures for one of the photographs that were read.
+    """
+
+    background: ByteArray = field(repr=False)
+    presses: tuple[PhotographedPress, ...]
+    layout: str = ""
+    fingerprint: str = ""
+    scale: float = 1.0
+
+    def __post_init__(self) -> None:
+        if not self.presses:
+            raise CalibrationError(
+                "there is no photograph of a press", hint="Add at least one, better six"
+            )
+        height, width = self.background.shape[:2]
+        if min(height, width) < LEAST_SIDE:
+            raise CalibrationError(
+                f"the background has {width} x {height} pixels",
+                hint=f"Give pictures of at least {LEAST_SIDE} pixels a side",
+            )
+        for press in self.presses:
+            if press.picture.shape != self.background.shape:
+                rows, columns = press.picture.shape[:2]
+                raise CalibrationError(
+                    f"a press has {columns} x {rows} pixels and the background {width} x {height}",
+                    where=press.name,
+                    hint="Take all photographs with the same settings of the camera",
+                )
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """Width and height in pixels."""
+        return self.background.shape[1], self.background.shape[0]
+
+    def subset(self, indices: Sequence[int]) -> Photographs:
+        """The same background with some of the presses."""
+        return replace(self, presses=tuple(self.presses[index] for index in indices))
+
+    def scaled(self, width: int = WORKING_WIDTH) -> Photographs:
+        """The photographs at a smaller size, each pixel the mean of those that it stands for.
+
+        Smaller photographs are left as they are.
+        """
+        if self.size[0] <= width:
+            return self
+        factor = width / self.size[0]
+        size = width, max(1, round(factor * self.size[1]))
+        presses = [
+            replace(
+                press,
+                picture=_resized(press.picture, size),
+                centre=None if press.centre is None else _times(press.centre, factor),
+                radius=None if press.radius is None else factor * press.radius,
+            )
+            for press in self.presses
+        ]
+        background = _resized(self.background, size)
+        return replace(
+            self, background=background, presses=tuple(presses), scale=factor * self.scale
+        )
+
+    def warnings(self) -> list[str]:
+        """What is doubtful about the exposure of the pictures, one sentence each."""
+        found = []
+        pictures = [("the background", self.background)]
+        pictures += [(press.name, press.picture) for press in self.presses]
+        for name, picture in pictures:
+            full = float((picture.max(axis=2) >= FULL_LEVEL).mean())
+            if full > FULL_SHARE:
+                found.append(
+                    f"{name}: {100 * full:.1f} % of the pixels are overexposed; they say nothing "
+                    "of how bright it was there"
+                )
+            bright = float(np.percentile(picture.max(axis=2), BRIGHTEST))
+            if bright < DARK_LEVEL:
+                found.append(
+                    f"{name}: it is underexposed, as hardly a pixel is brighter than level "
+                    f"{bright:.0f} of 255"
+                )
+        return found
+
+
+def _resized(picture: ByteArray, size: tuple[int, int]) -> ByteArray:
+    return np.asarray(Image.fromarray(picture).resize(size, Image.Resampling.BOX), dtype=np.uint8)
+
+
+def _times(place: tuple[float, float], factor: float) -> tuple[float, float]:
+    return place[0] * factor, place[1] * factor

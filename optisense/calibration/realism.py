@@ -1,0 +1,231 @@
+"""How far a model's pictures are from photographs of the real sensor.
+
+A *response* is a picture with something pressed in, less the picture with nothing. All figures of
+presses compare responses, in two regions: the *contact*, a disc, and the *ring* around it, from 1.1
+to 1.6 radii, where an elastic skin is pulled in. The similarity of whole pictures says little: the
+bare background reaches 0.975 there.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import gaussian_filter
+
+from optisense.calibration.model_pictures import ModelPictures, SeenContact
+from optisense.calibration.photographs import Photographs
+
+FloatArray = NDArray[np.float64]
+
+RING = 1.1, 1.6
+"""Inner and outer edge of the ring, in radii of the contact."""
+
+PATCH = 1.35
+"""Radii of the contact that the patch reaches over which the unexplained energy and the similarity
+are measured: the contact and the steepest part of the skin around it."""
+
+FAR = 3.0
+"""Radii of the contact beyond which a press should change nothing."""
+
+SIMILARITY_WINDOW = 0.2
+"""Standard deviation of the similarity's window, in radii of the contact: about six pixels of a
+usual contact. In the window of 1.5 pixels that Wang et al. (2004) use for whole pictures, the noise
+of a photograph outweighs the response of a smooth ball."""
+
+LEVELS = 255.0
+"""Range of a picture's levels, from which the constants of the similarity follow."""
+
+SIMILARITY_CONSTANTS = (0.01 * LEVELS) ** 2, (0.03 * LEVELS) ** 2
+"""Constants that keep the similarity finite in dark and even places (Wang et al. 2004)."""
+
+
+@dataclass(frozen=True)
+class PressRealism:
+    """How far the model is from one photograph of a press; levels are those of 255.
+
+    Attributes:
+        name: of the photograph.
+        unexplained: energy of the error over that of the real response, in the patch of 1.35 radii.
+        contact: root mean square of the error over that of the real response, in the contact.
+        ring: the same in the ring.
+        strength: root mean square of the real response in the contact, levels.
+        far: root mean square of the error beyond three radii, levels.
+        far_real: the same of the real response, which is mostly noise.
+        similarity: structural similarity (SSIM) of the responses, mean over the patch.
+        turn: degrees between the directions in which the model and the sensor brighten over the
+            contact, for R, G and B.
+        gain: how much the model brightens along the sensor's direction, over what the sensor does.
+    """
+
+    name: str
+    unexplained: float
+    contact: float
+    ring: float
+    strength: float
+    far: float
+    far_real: float
+    similarity: float
+    turn: tuple[float, float, float]
+    gain: tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class BackgroundRealism:
+    """How far the model's untouched picture is from the real one, for R, G and B.
+
+    Attributes:
+        correlation: of the pixels.
+        real, model: mean level.
+        error: root mean square of the difference, levels.
+        ratio: peak signal-to-noise ratio of all three, dB.
+    """
+
+    correlation: tuple[float, float, float]
+    real: tuple[float, float, float]
+    model: tuple[float, float, float]
+    error: tuple[float, float, float]
+    ratio: float
+
+
+@dataclass(frozen=True)
+class Realism:
+    """How far a model is from photographs.
+
+    Attributes:
+        background: of the untouched sensor.
+        presses: of each press.
+        exposure: of the model's pictures.
+    """
+
+    background: BackgroundRealism
+    presses: tuple[PressRealism, ...]
+    exposure: float
+
+    def median(self, name: str) -> float:
+        """The median over the presses of one of their figures."""
+        return float(np.median([getattr(press, name) for press in self.presses]))
+
+    def as_data(self) -> dict[str, Any]:
+        """All figures, ready for JSON."""
+        return asdict(self)
+
+
+def realism(photographs: Photographs, seen: list[SeenContact], pictures: ModelPictures) -> Realism:
+    """Compare a model's pictures with photographs.
+
+    Args:
+        photographs: of the real sensor.
+        seen: where each shows its contact.
+        pictures: of the model, of the same presses.
+    """
+    real = photographs.background.astype(np.float64)
+    presses = tuple(
+        _press(
+            press.name,
+            press.picture.astype(np.float64) - real,
+            shown - pictures.background,
+            place,
+        )
+        for press, shown, place in zip(photographs.presses, pictures.presses, seen, strict=True)
+    )
+    return Realism(_background(real, pictures.background), presses, pictures.exposure)
+
+
+def _press(name: str, real: FloatArray, model: FloatArray, seen: SeenContact) -> PressRealism:
+    """The figures of one press, from both responses (h, w, 3)."""
+    distance = distances(real.shape[:2], seen)
+    contact = distance <= 1.0
+    ring = (distance >= RING[0]) & (distance <= RING[1])
+    patch = distance <= PATCH
+    far = distance > FAR
+    error = model - real
+    turns, gains = zip(
+        *(_brightening(real, model, c, seen, contact) for c in range(3)), strict=True
+    )
+    return PressRealism(
+        name=name,
+        unexplained=_square(error[patch]) / max(_square(real[patch]), 1e-12),
+        contact=math.sqrt(_square(error[contact]) / max(_square(real[contact]), 1e-12)),
+        ring=math.sqrt(_square(error[ring]) / max(_square(real[ring]), 1e-12)),
+        strength=math.sqrt(_square(real[contact])),
+        far=math.sqrt(_square(error[far])),
+        far_real=math.sqrt(_square(real[far])),
+        similarity=float(similarity(real, model, SIMILARITY_WINDOW * seen.radius)[patch].mean()),
+        turn=turns,
+        gain=gains,
+    )
+
+
+def distances(shape: tuple[int, ...], seen: SeenContact) -> FloatArray:
+    """(h, w) distance of pixels from the contact's middle, in its radii."""
+    rows, columns = np.mgrid[: shape[0], : shape[1]] + 0.5
+    found = np.hypot(columns - seen.centre[0], rows - seen.centre[1])
+    return np.asarray(found / max(seen.radius, 1e-9))
+
+
+def _brightening(
+    real: FloatArray, model: FloatArray, channel: int, seen: SeenContact, where: NDArray[np.bool_]
+) -> tuple[float, float]:
+    """Degrees by which the model's brightening over a contact is turned, and its gain.
+
+    The response of a channel over the contact is fitted by a plane; its slope points to where the
+    channel brightens.
+    """
+    rows, columns = np.nonzero(where)
+    x, y = columns + 0.5 - seen.centre[0], rows + 0.5 - seen.centre[1]
+    plane = np.stack([x, y, np.ones_like(x)], axis=1)
+    both = np.stack([real[where][:, channel], model[where][:, channel]], axis=1)
+    one, other = np.linalg.lstsq(plane, both, rcond=None)[0][:2].T
+    length = max(float(np.hypot(*one)), 1e-12)
+    turn = math.degrees(math.atan2(one[0] * other[1] - one[1] * other[0], float(one @ other)))
+    return turn, float(np.hypot(*other)) / length
+
+
+def similarity(one: FloatArray, other: FloatArray, window: float) -> FloatArray:
+    """(h, w) structural similarity of two pictures (h, w, 3), mean over the channels.
+
+    Wang, Bovik, Sheikh and Simoncelli 2004, with a Gaussian window.
+
+    Args:
+        one, other: the pictures, levels of 255.
+        window: pixels, its standard deviation.
+    """
+
+    def blurred(values: FloatArray) -> FloatArray:
+        return np.asarray(gaussian_filter(values, (window, window, 0.0)))
+
+    c1, c2 = SIMILARITY_CONSTANTS
+    a, b = blurred(one), blurred(other)
+    aa, bb, ab = blurred(one * one) - a * a, blurred(other * other) - b * b, blurred(one * other)
+    ab -= a * b
+    found = (2.0 * a * b + c1) * (2.0 * ab + c2) / ((a * a + b * b + c1) * (aa + bb + c2))
+    return np.asarray(found.mean(axis=2))
+
+
+def _background(real: FloatArray, model: FloatArray) -> BackgroundRealism:
+    def each(values: list[float]) -> tuple[float, float, float]:
+        return values[0], values[1], values[2]
+
+    error = _square(model - real)
+    return BackgroundRealism(
+        correlation=each([_correlation(real[..., c], model[..., c]) for c in range(3)]),
+        real=each([float(real[..., c].mean()) for c in range(3)]),
+        model=each([float(model[..., c].mean()) for c in range(3)]),
+        error=each([math.sqrt(_square(model[..., c] - real[..., c])) for c in range(3)]),
+        ratio=10.0 * math.log10(LEVELS**2 / max(error, 1e-6)),
+    )
+
+
+def _correlation(one: FloatArray, other: FloatArray) -> float:
+    spread = float(one.std() * other.std())
+    if spread < 1e-9:
+        return 0.0
+    return float(((one - one.mean()) * (other - other.mean())).mean()) / spread
+
+
+def _square(values: FloatArray) -> float:
+    return float((values**2).mean()) if values.size else 0.0

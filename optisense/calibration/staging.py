@@ -1,0 +1,109 @@
+"""Photographs of a model instead of a real sensor: to try out a calibration, whose answer is known,
+and to keep photographs in a folder."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from optisense.calibration.layouts import BACKGROUND, PRESSES
+from optisense.calibration.photographs import ByteArray, PhotographedPress, Photographs
+from optisense.errors import CalibrationError
+from optisense.geometry import Contact, Sphere
+from optisense.picture_files import write_picture
+from optisense.quality import PICTURE_PHOTONS
+from optisense.writing import written_together
+
+if TYPE_CHECKING:
+    from optisense.optics import OpticalModel
+
+USUAL_NOISE = 2.0
+"""Standard deviation of the noise of photographs, levels of 255: that of published ones of a
+GelSight Mini."""
+
+
+def photograph_model(
+    model: OpticalModel,
+    contacts: Sequence[Contact],
+    *,
+    exposure: float | None = None,
+    resolution: tuple[int, int] | None = None,
+    photons: int = PICTURE_PHOTONS,
+    seed: int = 0,
+    noise: float = USUAL_NOISE,
+) -> Photographs:
+    """What a camera would photograph of a model as if it were a real sensor.
+
+    Args:
+        model: of the sensor.
+        contacts: balls, one for each photograph.
+        exposure: factor on the radiance; found by itself if None.
+        resolution: width and height in pixels; the camera's own if None.
+        photons: of the light.
+        seed: of light and noise.
+        noise: standard deviation of the noise added to each pixel, levels.
+
+    Raises:
+        CalibrationError: something other than a ball presses.
+        OptiSenseError: the model can't be rendered.
+    """
+    for contact in contacts:
+        if not isinstance(contact.indenter, Sphere):
+            raise CalibrationError("only balls are photographed", hint="Press a Sphere")
+    blank = model.render(resolution=resolution, photons=photons, seed=seed, partial=False)
+    factor = blank.auto_exposure() if exposure is None else exposure
+    rng = np.random.default_rng([seed, 17])
+
+    def noisy(picture: ByteArray) -> ByteArray:
+        levels = picture + noise * rng.standard_normal(picture.shape)
+        return np.clip(np.round(levels), 0, 255).astype(np.uint8)
+
+    presses = []
+    for number, contact in enumerate(contacts, start=1):
+        image = model.render(
+            [contact], resolution=resolution, photons=photons, seed=seed, partial=False
+        )
+        assert isinstance(contact.indenter, Sphere)
+        presses.append(
+            PhotographedPress(
+                f"press-{number:02}.png",
+                noisy(image.picture(factor)),
+                2.0 * contact.indenter.radius,
+            )
+        )
+    return Photographs(noisy(blank.picture(factor)), tuple(presses))
+
+
+def save_photographs(folder: str | Path, photographs: Photographs) -> None:
+    """Write photographs as a folder of `background.png`, `presses.csv` and the presses.
+
+    Raises:
+        OutputError: a file can't be written.
+        CalibrationError: two presses have the same name, or one is no name of a PNG file.
+    """
+    place = Path(folder)
+    names = [press.name for press in photographs.presses]
+    odd = [n for n in names if not n.endswith(".png") or Path(n).name != n or n == BACKGROUND]
+    if odd or len(set(names)) < len(names):
+        raise CalibrationError(
+            "each press needs a name of its own that ends in .png",
+            where=odd[0] if odd else "",
+            hint="Rename them",
+        )
+    text = io.StringIO()
+    table = csv.writer(text, lineterminator="\n")
+    table.writerow(["file", "diameter", "column", "row", "radius"])
+    for press in photographs.presses:
+        column, row = press.centre or ("", "")
+        radius = "" if press.radius is None else press.radius
+        table.writerow([press.name, press.diameter, column, row, radius])
+    with written_together("the photographs") as stage:
+        write_picture(stage(place / BACKGROUND), photographs.background)
+        for press in photographs.presses:
+            write_picture(stage(place / press.name), press.picture)
+        stage(place / PRESSES).write_text(text.getvalue(), encoding="utf-8")

@@ -1,0 +1,114 @@
+"""``optisense compare``: a design beside photographs of the real sensor."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from optisense.cli.console import ends_well, messages, output, table_of
+from optisense.cli.options import DesignArgument, VariantOption
+from optisense.cli.progress import progress_line
+from optisense.commands.comparing import CompareOptions
+from optisense.time_left import TimedStep
+
+if TYPE_CHECKING:
+    from optisense.calibration.comparing import Comparison
+
+PICTURES, WRITING = "rendering the presses", "writing the page"
+"""Steps of the progress line."""
+
+PhotosArgument = Annotated[
+    Path,
+    typer.Argument(
+        metavar="PHOTOS",
+        help="Folder with background.png and presses.csv, of gs_sdk, or of Taxim (dataPack.npz).",
+        show_default=False,
+    ),
+]
+
+
+@ends_well
+def compare(
+    design: DesignArgument,
+    photos: PhotosArgument,
+    out: Annotated[
+        Path | None,
+        typer.Option("--out", "-o", metavar="FILE", help="The page to write.", show_default=False),
+    ] = None,
+    *,
+    options: CompareOptions,
+    as_json: Annotated[bool, typer.Option("--json", help="Print all figures as JSON.")] = False,
+    variant: VariantOption = "auto",
+) -> None:
+    """Tell how far a design is from photographs of the real sensor.
+
+    Presses the balls of the photographs into the model, at the same places and as wide, and
+    compares the pictures: in the contact, in the ring around it, far away, and the background.
+    """
+    if out is not None and out.is_dir():
+        raise typer.BadParameter(f"'{out}' is a folder", param_hint="--out")
+    with progress_line(TimedStep("loading", 1, 3.0), TimedStep(PICTURES, 8, 10.0)) as line:
+        line.begin("loading")
+        from optisense.calibration import read_photographs
+        from optisense.calibration.comparing import compare as compare_with
+        from optisense.cli.output_folder import ensure_writable
+        from optisense.optics import OpticalModel
+        from optisense.report.comparison import write_comparison
+        from optisense.sensors import load
+
+        sensor = load(design)
+        photographs = read_photographs(photos, options.ball)
+        if out is not None:
+            ensure_writable(out.parent)
+        model = OpticalModel(sensor, variant)
+        count = 1 + len(photographs.presses)
+        line.begin(PICTURES, count)
+        found = compare_with(
+            model,
+            photographs,
+            photons=options.photons,
+            seed=options.seed,
+            refine=not options.as_labelled,
+            progress=lambda done: line.advance(done, count),
+        )
+        if out is not None:
+            line.say(WRITING)
+            write_comparison(out, sensor, found)
+    for note in found.notes:
+        messages.print(f"note: {note}", markup=False)
+    if as_json:
+        data = {"notes": list(found.notes), **found.realism.as_data()}
+        print(json.dumps(data, indent=2, allow_nan=False))
+        return
+    print_comparison(found)
+    if out is not None:
+        output.print(f"page: {out}", markup=False)
+
+
+def print_comparison(found: Comparison) -> None:
+    """A table of the presses, and one of the background."""
+    table = table_of("press", "unexplained", "contact", "ring", "far field", "similarity")
+    for press in found.realism.presses:
+        table.add_row(
+            press.name,
+            f"{press.unexplained:.2f}",
+            f"{press.contact:.2f}",
+            f"{press.ring:.2f}",
+            f"{press.far:.1f} of {press.far_real:.1f}",
+            f"{press.similarity:.2f}",
+        )
+    output.print(table)
+    ground = found.realism.background
+    table = table_of("background", "R", "G", "B")
+    table.add_row("correlation", *(f"{value:.2f}" for value in ground.correlation))
+    table.add_row("mean level, real", *(f"{value:.0f}" for value in ground.real))
+    table.add_row("mean level, model", *(f"{value:.0f}" for value in ground.model))
+    output.print(table)
+    output.print(
+        f"signal-to-noise ratio of the background: {ground.ratio:.1f} dB; exposure "
+        f"{found.realism.exposure:.4g}",
+        style="dim",
+    )

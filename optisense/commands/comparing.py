@@ -1,0 +1,34 @@
+"""The options of a comparison with photographs."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from annotated_types import Ge, Le
+from pydantic import Field
+
+from optisense.commands.options import CommandOptions, Photons, Seed, Written
+from optisense.quality import PICTURE_PHOTONS
+
+LARGEST_BALL = 1000.0
+"""Largest diameter in mm of a ball; a sensor is far smaller, so more is a slip of the unit."""
+
+
+class PhotographOptions(CommandOptions):
+    """How photographs are read."""
+
+    ball: Annotated[float, Ge(0.01), Le(LARGEST_BALL), Written("MM")] | None = Field(
+        None, description="Diameter of the ball, where the photographs' folder does not say it."
+    )
+    as_labelled: bool = Field(
+        False,
+        description="Take labelled contacts as they are, instead of looking for them near their "
+        "labels.",
+    )
+
+
+class CompareOptions(PhotographOptions):
+    """How a design is compared with photographs."""
+
+    photons: Photons = Field(PICTURE_PHOTONS, description="Photons to trace for the pictures.")
+    seed: Seed = Field(0, description="The same seed gives the same light.")

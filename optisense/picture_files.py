@@ -1,0 +1,51 @@
+"""Pictures in files: PNG and JPEG, as arrays of bytes."""
+
+from __future__ import annotations
+
+import io
+import warnings
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image
+
+from optisense.errors import OptiSenseError
+from optisense.untrusted_files import COPY_AGAIN, MOST_PICTURE, read_bytes
+
+
+def read_picture(path: Path, error: type[OptiSenseError]) -> NDArray[np.uint8]:
+    """(h, w, 3) uint8 of a picture file.
+
+    Args:
+        path: of a PNG or JPEG file.
+        error: class of what is raised.
+
+    Raises:
+        error: it can't be read.
+    """
+    return decode_picture(read_bytes(path, MOST_PICTURE, error, "the picture"), path, error)
+
+
+def decode_picture(data: bytes, path: Path, error: type[OptiSenseError]) -> NDArray[np.uint8]:
+    """(h, w, 3) uint8 of the content of a PNG or JPEG file.
+
+    Raises:
+        error: it is no such content; names the path.
+    """
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("error", Image.DecompressionBombWarning)
+            with Image.open(io.BytesIO(data), formats=("PNG", "JPEG")) as picture:
+                return np.asarray(picture.convert("RGB"), dtype=np.uint8)
+    except Exception as found:  # Pillow raises many kinds on malformed files
+        raise error(
+            f"can't read the picture: the file is cut off or damaged ({found})",
+            where=str(path),
+            hint=COPY_AGAIN,
+        ) from None
+
+
+def write_picture(path: Path, picture: NDArray[np.uint8]) -> None:
+    """Write (h, w, 3) uint8 as a PNG file."""
+    Image.fromarray(picture).save(path, format="PNG")

@@ -1,0 +1,178 @@
+"""The page of a comparison: a model beside photographs of the real sensor."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from optisense.calibration.comparing import Comparison
+from optisense.calibration.realism import PATCH, PressRealism, distances
+from optisense.design import SensorDesign
+from optisense.report.drawing import figure_uri, new_figure
+from optisense.report.files import page
+from optisense.report.pictures import data_uri
+from optisense.writing import write_text
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+FloatArray = NDArray[np.float64]
+
+CONTRAST = 2.0
+"""Factor on responses and errors in the pictures, which show them around a middle grey: they are
+some tens of levels of 255."""
+
+GREY = 128.0
+"""Level that stands for no response."""
+
+CUT = 2.4
+"""Radii of the contact that the pictures of a press show to each side."""
+
+LEAST_CUT = 24
+"""Pixels that they show to each side, at least."""
+
+COLOURS = {"R": "#c0392b", "G": "#2e8b57", "B": "#1f6fb2"}
+"""Of the curves of the channels."""
+
+
+def write_comparison(path: str | Path, design: SensorDesign, found: Comparison) -> Path:
+    """Write a comparison as one self-contained HTML page.
+
+    Raises:
+        OutputError: the file can't be written.
+    """
+    write_text(Path(path), render_comparison(design, found))
+    return Path(path)
+
+
+def render_comparison(design: SensorDesign, found: Comparison) -> str:
+    """The page of `write_comparison` as text."""
+    figures = found.realism
+    width, height = found.photographs.size
+    return page(
+        "comparison",
+        title=design.name,
+        description=design.description,
+        headline=[
+            ("presses", str(len(figures.presses))),
+            ("compared at", f"{width} x {height} pixels"),
+            ("unexplained", f"{figures.median('unexplained'):.2f}"),
+            ("similarity", f"{figures.median('similarity'):.2f}"),
+            ("background", f"{figures.background.ratio:.1f} dB"),
+            ("exposure", f"{figures.exposure:.4g}"),
+        ],
+        notes=list(found.notes),
+        background=background_pictures(found),
+        channels=channel_rows(found),
+        presses=[press_section(found, index) for index in range(len(figures.presses))],
+        rows=[press_row(press) for press in figures.presses],
+        contrast=f"{CONTRAST:g}",
+        patch=f"{PATCH:g}",
+    )
+
+
+def background_pictures(found: Comparison) -> list[tuple[str, str]]:
+    """Caption and address of the pictures of the background."""
+    real, model = found.photographs.background, found.pictures.background
+    return [
+        ("photograph", data_uri(real)),
+        ("model", data_uri(shown(model))),
+        ("model less photograph", data_uri(shown(GREY + model - real))),
+    ]
+
+
+def channel_rows(found: Comparison) -> list[tuple[str, str, str, str]]:
+    """Figures of the background for R, G and B."""
+    ground = found.realism.background
+
+    def cells(values: tuple[float, float, float], digits: int) -> tuple[str, str, str]:
+        red, green, blue = (f"{value:.{digits}f}" for value in values)
+        return red, green, blue
+
+    return [
+        ("correlation of the pixels", *cells(ground.correlation, 2)),
+        ("mean level of the photograph", *cells(ground.real, 1)),
+        ("mean level of the model", *cells(ground.model, 1)),
+        ("root mean square difference, levels", *cells(ground.error, 1)),
+    ]
+
+
+def press_row(press: PressRealism) -> tuple[str, ...]:
+    """The figures of a press, as the table shows them."""
+    return (
+        press.name,
+        f"{press.unexplained:.3f}",
+        f"{press.contact:.2f}",
+        f"{press.ring:.2f}",
+        f"{press.similarity:.2f}",
+        f"{press.far:.1f} / {press.far_real:.1f}",
+        " / ".join(f"{turn:.0f}" for turn in press.turn),
+        " / ".join(f"{gain:.2f}" for gain in press.gain),
+    )
+
+
+def press_section(found: Comparison, index: int) -> dict[str, Any]:
+    """The pictures and the profile of one press."""
+    press, seen = found.photographs.presses[index], found.seen[index]
+    real = press.picture.astype(np.float64) - found.photographs.background
+    model = found.pictures.presses[index] - found.pictures.background
+    box = _around(real.shape, seen.centre, max(CUT * seen.radius, LEAST_CUT))
+    edge = np.abs(distances(real.shape[:2], seen) - 1.0) * seen.radius < 0.6
+    outlined = press.picture.copy()
+    outlined[edge] = 255
+    column, row = seen.centre
+    return {
+        "name": press.name,
+        "facts": f"ball of {press.diameter:g} mm; contact at column {column:.1f}, row {row:.1f}, "
+        f"radius {seen.radius:.1f} pixels; pressed {found.pictures.contacts[index].depth:.2f} mm "
+        "deep into the model",
+        "pictures": [
+            ("photograph, contact outlined", data_uri(outlined[box])),
+            ("model", data_uri(shown(found.pictures.presses[index][box]))),
+            ("response, photograph", data_uri(shown(GREY + CONTRAST * real[box]))),
+            ("response, model", data_uri(shown(GREY + CONTRAST * model[box]))),
+            ("difference of both", data_uri(shown(GREY + CONTRAST * (model - real)[box]))),
+        ],
+        "profile": figure_uri(profile_figure(real, model, seen.centre, seen.radius)),
+    }
+
+
+def shown(levels: FloatArray) -> NDArray[np.uint8]:
+    """Levels as a picture."""
+    return np.clip(np.round(levels), 0, 255).astype(np.uint8)
+
+
+def profile_figure(
+    real: FloatArray, model: FloatArray, centre: tuple[float, float], radius: float
+) -> Figure:
+    """Responses along the row and the column through a contact's middle."""
+    figure = new_figure(10.0, 2.6)
+    height, width = real.shape[:2]
+    column, row = min(int(centre[0]), width - 1), min(int(centre[1]), height - 1)
+    cuts = [
+        ("columns from the contact's middle", real[row], model[row], np.arange(width) - column),
+        ("rows from the contact's middle", real[:, column], model[:, column],
+         np.arange(height) - row),
+    ]  # fmt: skip
+    for axes, (text, one, other, places) in zip(figure.subplots(1, 2), cuts, strict=True):
+        near = np.abs(places) < CUT * radius
+        for channel, (name, colour) in enumerate(COLOURS.items()):
+            axes.plot(places[near], one[near, channel], color=colour, lw=0.8, alpha=0.55)
+            axes.plot(places[near], other[near, channel], color=colour, lw=1.6, label=name)
+        for side in (-radius, radius):
+            axes.axvline(side, color="#aaa", lw=0.8, ls=":")
+        axes.set_xlabel(text, fontsize=8)
+        axes.tick_params(labelsize=8)
+    return figure
+
+
+def _around(
+    shape: tuple[int, ...], centre: tuple[float, float], reach: float
+) -> tuple[slice, slice]:
+    """The rows and columns of a square about a place, as far as the picture has them."""
+    column, row = centre
+    rows = slice(max(0, int(row - reach)), min(shape[0], int(row + reach) + 1))
+    return rows, slice(max(0, int(column - reach)), min(shape[1], int(column + reach) + 1))

@@ -1,0 +1,157 @@
+"""Contacts are found where they are, and figures tell how far pictures differ."""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+import optisense as ots
+from optisense.calibration import Photographs, compare, save_photographs
+from optisense.calibration.contact_finding import find_contact
+from optisense.calibration.model_pictures import SeenContact, contact_of, doubts, seen_contacts
+from optisense.calibration.realism import similarity
+from optisense.cli import app
+from optisense.design import set_value
+from optisense.errors import CalibrationError
+
+from .conftest import PHOTONS, PLACES
+
+if TYPE_CHECKING:
+    from optisense.optics import OpticalModel
+
+
+def cone(centre: tuple[float, float], radius: float) -> np.ndarray:
+    """(120, 160, 3) levels of a response that is odd about a place, grows up to a radius, and falls
+    off beyond it as the slope of a gel's skin does."""
+    rows, columns = np.mgrid[:120, :160] + 0.5
+    x, y = (columns - centre[0]) / radius, (rows - centre[1]) / radius
+    away = np.hypot(x, y)
+    share = np.where(away <= 1.0, 1.0, np.exp(-4.0 * (away - 1.0)) / np.maximum(away, 1.0))
+    return np.stack([40.0 * x, 30.0 * y, -30.0 * (x + y)], axis=2) * share[..., None]
+
+
+@pytest.mark.parametrize("centre", [(70.3, 60.8), (40.0, 44.5)])
+def test_an_odd_response_is_found_to_half_a_pixel(centre: tuple[float, float]) -> None:
+    rng = np.random.default_rng(3)
+    plain = np.full((120, 160, 3), 120.0)
+    shown = plain + cone(centre, 18.0) + 2.0 * rng.standard_normal(plain.shape)
+    found = find_contact(np.round(shown).astype(np.uint8), plain.astype(np.uint8))
+    assert found is not None
+    assert math.dist(found.centre, centre) < 0.5
+    assert found.radius == pytest.approx(18.0, abs=1.0)
+    assert found.asymmetry < 0.1
+
+
+def test_no_contact_is_found_in_noise() -> None:
+    rng = np.random.default_rng(3)
+    plain = np.full((120, 160, 3), 120.0)
+    noisy = plain + 2.0 * rng.standard_normal(plain.shape)
+    assert find_contact(np.round(noisy).astype(np.uint8), plain.astype(np.uint8)) is None
+
+
+def test_contacts_of_a_model_are_found_where_they_press(
+    mini: OpticalModel, photographs: Photographs
+) -> None:
+    rays = mini.chief_rays(photographs.size)
+    for place, press, seen in zip(
+        PLACES, photographs.presses, seen_contacts(photographs), strict=True
+    ):
+        assert seen is not None
+        contact = contact_of(press, seen, mini, rays)
+        point = mini.surface.point_at(*place).point
+        scale = 18.6 / photographs.size[0]
+        assert math.dist(contact.point or (), point) < 1.5 * scale
+        assert contact.depth == pytest.approx(0.6, rel=0.2)
+
+
+def test_a_model_is_its_own_likeness(mini: OpticalModel, photographs: Photographs) -> None:
+    found = compare(mini, photographs, photons=PHOTONS, seed=5)
+    assert found.notes == ()
+    for press in found.realism.presses:
+        assert press.unexplained < 0.06
+        assert press.similarity > 0.9
+        assert press.far == pytest.approx(press.far_real, rel=0.1)
+        assert np.median(np.abs(press.turn)) < 3.0
+        assert np.abs(np.array(press.gain) - 1.0).max() < 0.2
+    assert found.realism.background.ratio > 38.0
+    assert min(found.realism.background.correlation) > 0.99
+
+
+def test_a_turned_sensor_is_told(mini: OpticalModel, photographs: Photographs) -> None:
+    design = mini.design
+    swapped = design.copy()
+    for one, other in (("red", "blue"), ("blue", "red")):
+        swapped = set_value(swapped, f"lights.{one}.colour", design.lights[other].colour)
+    found = compare(ots.OpticalModel(swapped), photographs, photons=PHOTONS, seed=5)
+    assert found.realism.median("unexplained") > 0.5
+    turns = [abs(press.turn[0]) for press in found.realism.presses]
+    assert min(turns) > 120.0
+
+
+def test_the_similarity_is_one_of_equals_and_less_of_opposites() -> None:
+    response = cone((70.0, 60.0), 18.0)
+    assert similarity(response, response, 4.0).min() == pytest.approx(1.0)
+    assert similarity(response, -response, 4.0)[50:70, 60:80].mean() < 0.5
+
+
+def test_wrong_labels_and_missing_contacts_are_told(photographs: Photographs) -> None:
+    first, second, third = photographs.presses
+    odd = replace(
+        photographs,
+        presses=(
+            replace(first, centre=(140.0, 20.0), radius=12.0),
+            replace(second, picture=photographs.background),
+            third,
+        ),
+    )
+    words = doubts(odd)
+    assert "away from the contact" in words[0]
+    assert "no contact is to be seen" in words[1]
+    assert len(words) == 2
+
+
+def test_impossible_contacts_are_refused(mini: OpticalModel, photographs: Photographs) -> None:
+    rays = mini.chief_rays(photographs.size)
+    press = photographs.presses[0]
+    with pytest.raises(CalibrationError, match=r"the ball one of 0\.5 mm"):
+        contact_of(replace(press, diameter=1.0), SeenContact((80.0, 60.0), 12.0), mini, rays)
+    with pytest.raises(CalibrationError, match="sees no skin"):
+        contact_of(press, SeenContact((500.0, 60.0), 12.0), mini, rays)
+    with pytest.raises(CalibrationError, match="can't be pressed in"):
+        contact_of(replace(press, diameter=12.0), SeenContact((80.0, 60.0), 50.0), mini, rays)
+
+
+def test_the_command_writes_a_page_and_prints_figures(
+    photographs: Photographs, tmp_path: Path
+) -> None:
+    folder = tmp_path / "photos"
+    save_photographs(folder, photographs.subset([0]))
+    run = CliRunner().invoke(
+        app,
+        ["compare", "gelsight-mini", str(folder), "--photons", "60000", "--json"]
+        + ["--out", str(tmp_path / "page.html")],
+    )
+    assert run.exit_code == 0, run.output
+    data = json.loads(run.stdout)
+    assert data["presses"][0]["unexplained"] < 0.1
+    page = (tmp_path / "page.html").read_text(encoding="utf-8")
+    assert page.count("data:image/png") == 3 + 5 + 1
+    assert "<script" not in page
+
+
+def test_the_command_says_what_is_wrong(photographs: Photographs, tmp_path: Path) -> None:
+    save_photographs(tmp_path, photographs.subset([0]))
+    run = CliRunner().invoke(app, ["compare", "digit", str(tmp_path)])
+    assert run.exit_code == 2
+    assert "another shape" in run.output
+    (tmp_path / "background.png").unlink()
+    run = CliRunner().invoke(app, ["compare", "gelsight-mini", str(tmp_path)])
+    assert run.exit_code == 2
+    assert "there is no background.png" in run.output

@@ -1,0 +1,138 @@
+"""Folders of photographs are read as they are, and refused with what to do."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from optisense.calibration import (
+    PhotographedPress,
+    Photographs,
+    read_photographs,
+    save_photographs,
+)
+from optisense.errors import CalibrationError
+
+WIDTH, HEIGHT = 64, 48
+
+
+def picture(seed: int, size: tuple[int, int] = (WIDTH, HEIGHT)) -> np.ndarray:
+    rng = np.random.default_rng(seed)
+    return rng.integers(40, 200, (size[1], size[0], 3), dtype=np.uint8)
+
+
+def own_folder(folder: Path, table: str = "file,diameter\na.png,6\n") -> Path:
+    folder.mkdir(exist_ok=True)
+    Image.fromarray(picture(0)).save(folder / "background.png")
+    Image.fromarray(picture(1)).save(folder / "a.png")
+    (folder / "presses.csv").write_text(table, encoding="utf-8")
+    return folder
+
+
+def test_what_is_saved_is_read_again(tmp_path: Path) -> None:
+    presses = (
+        PhotographedPress("one.png", picture(1), 6.0, (20.5, 30.25), 8.0),
+        PhotographedPress("two.png", picture(2), 9.5),
+    )
+    save_photographs(tmp_path / "new", Photographs(picture(0), presses))
+    found = read_photographs(tmp_path / "new")
+    assert (found.background == picture(0)).all()
+    assert [(p.name, p.diameter, p.centre, p.radius) for p in found.presses] == [
+        ("one.png", 6.0, (20.5, 30.25), 8.0),
+        ("two.png", 9.5, None, None),
+    ]
+    assert (found.presses[1].picture == picture(2)).all()
+    assert len({found.fingerprint, *(press.fingerprint for press in found.presses)}) == 3
+
+
+def test_a_ball_is_given_as_diameter_or_indenter_or_for_all(tmp_path: Path) -> None:
+    indenter = own_folder(tmp_path / "i", "file,indenter\na.png,sphere:3\n")
+    assert read_photographs(indenter).presses[0].diameter == 6.0
+    nothing = own_folder(tmp_path / "n", "file\na.png\n")
+    assert read_photographs(nothing, 4.0).presses[0].diameter == 4.0
+
+
+def test_a_folder_of_gs_sdk(tmp_path: Path) -> None:
+    Image.fromarray(picture(0)).save(tmp_path / "background.png")
+    place = tmp_path / "6.000mm" / "0"
+    place.mkdir(parents=True)
+    Image.fromarray(picture(1)).save(place / "gelsight.png")
+    np.savez(place / "label.npz", center=np.array([20, 30]), radius=8)
+    (tmp_path / "catalog.csv").write_text(
+        "experiment_reldir,diameter(mm)\n6.000mm/0,6.0\n", encoding="utf-8"
+    )
+    press = read_photographs(tmp_path).presses[0]
+    assert (press.diameter, press.centre, press.radius) == (6.0, (20.5, 30.5), 8.0)
+    assert (press.picture == picture(1)).all()
+
+
+def test_taxims_data_pack_is_stored_blue_first(tmp_path: Path) -> None:
+    np.savez(
+        tmp_path / "dataPack.npz",
+        f0=picture(0)[..., ::-1],
+        imgs=np.stack([picture(1), picture(2)])[..., ::-1],
+        touch_center=np.array([[20, 30], [25, 22]], dtype=np.uint16),
+        touch_radius=np.array([8, 9], dtype=np.uint16),
+    )
+    found = read_photographs(tmp_path, 4.0)
+    assert (found.background == picture(0)).all()
+    assert (found.presses[1].picture == picture(2)).all()
+    assert found.presses[1].centre == (25.5, 22.5)
+    assert read_photographs(tmp_path / "dataPack.npz", 4.0).presses[0].radius == 8.0
+    with pytest.raises(CalibrationError, match="how large its ball is") as raised:
+        read_photographs(tmp_path)
+    assert "--ball" in (raised.value.hint or "")
+
+
+@pytest.mark.parametrize(
+    ("table", "words"),
+    [
+        ("file,diameter\nb.png,6\n", "no photograph 'b.png'"),
+        ("file,diameter\n../a.png,6\n", "not inside the folder"),
+        ("file\na.png\n", "diameter is missing"),
+        ("file,diameter\na.png,six\n", "'six' under 'diameter' is no number"),
+        ("file,diameter\na.png,-6\n", "diameter is -6"),
+        ("file,diameter\na.png,nan\n", "diameter is nan"),
+        ("name,diameter\na.png,6\n", "column 'file' is missing"),
+        ("file,diameter\n", "no presses"),
+        ("file,indenter\na.png,cylinder:3\n", "no ball"),
+        ("file,diameter,column\na.png,6,3\n", "but not both"),
+    ],
+)
+def test_a_table_that_makes_no_sense_is_refused(tmp_path: Path, table: str, words: str) -> None:
+    with pytest.raises(CalibrationError, match=words) as raised:
+        read_photographs(own_folder(tmp_path / "f", table))
+    assert raised.value.where
+    assert raised.value.hint
+
+
+def test_a_folder_needs_a_background_of_the_same_size(tmp_path: Path) -> None:
+    folder = own_folder(tmp_path / "f")
+    (folder / "background.png").unlink()
+    with pytest.raises(CalibrationError, match=r"no background\.png"):
+        read_photographs(folder)
+    Image.fromarray(picture(0, (WIDTH, HEIGHT + 2))).save(folder / "background.png")
+    with pytest.raises(CalibrationError, match="64 x 48 pixels and the background 64 x 50"):
+        read_photographs(folder)
+    with pytest.raises(CalibrationError, match="tells of no presses"):
+        read_photographs(tmp_path)
+
+
+def test_exposure_is_judged() -> None:
+    dark = PhotographedPress("dark", picture(1) // 20, 6.0)
+    bright = PhotographedPress("bright", np.full((HEIGHT, WIDTH, 3), 255, np.uint8), 6.0)
+    words = Photographs(picture(0), (dark, bright)).warnings()
+    assert ["dark: it is underexposed" in words[0], "bright: 100.0 %" in words[1]] == [True, True]
+    assert len(words) == 2
+
+
+def test_smaller_photographs_keep_their_light_and_labels() -> None:
+    press = PhotographedPress("one", picture(1, (640, 480)), 6.0, (200.0, 100.0), 50.0)
+    small = Photographs(picture(0, (640, 480)), (press,)).scaled(320)
+    assert small.size == (320, 240)
+    assert small.presses[0].centre == (100.0, 50.0)
+    assert small.presses[0].radius == 25.0
+    assert small.background.mean() == pytest.approx(picture(0, (640, 480)).mean(), abs=0.6)
