@@ -27,6 +27,7 @@ LOCK := --universal --python-version 3.11 --generate-hashes --no-emit-index-url 
 
 .PHONY: help setup demo test quick-test lint types import-rules docs docs-as-typed pytest pytest-long pytest-rest bare-pytest quick-pytest \
     studio-tests test-blender studio-window-test package-test extension setup-blender \
+    browser-tests setup-browser \
     format bench fuzz lock clean
 
 help:
@@ -35,6 +36,7 @@ help:
 	@echo "make quick-test     lint and the tests that guard most, in two minutes"
 	@echo "make studio-tests   only the tests of the Blender extension"
 	@echo "make test-blender   the same on Blender 4.2, 5.0 and 5.1 too, and by mouse and keys in a window"
+	@echo "make browser-tests  only the tests of the report pages in Chromium, which is installed for them"
 	@echo "make extension      build and validate the Blender extension: dist/optisense_studio.zip"
 	@echo "make package-test   build the wheel, install it elsewhere and render with it"
 	@echo "make docs     build the documentation as a site, and check its links: site/index.html"
@@ -138,6 +140,13 @@ studio-window-test: setup $(if $(BLENDER),,$(WINDOW_STAMP))
 
 $(WINDOW_STAMP): scripts/setup_blender_window.sh
 	@sh scripts/setup_blender_window.sh
+
+# Part of pytest, too, where a Chromium is installed.
+browser-tests: setup setup-browser
+	$(BIN)/python -m pytest tests/browser
+
+setup-browser:
+	@sh scripts/setup_browser.sh
 
 extension: setup setup-blender
 	$(BIN)/optisense studio --zip dist/optisense_studio.zip

@@ -19,6 +19,7 @@ from optisense.report.camera_rays import CameraRays
 from optisense.report.drawing import swatch_of
 from optisense.report.files import as_json, page, script
 from optisense.report.light_section import LightSection
+from optisense.report.mixing import mixing_data
 from optisense.report.pictures import data_uri, mask_overlay, normal_colours
 from optisense.report.real_sensor import RealComparison
 from optisense.report.scene_view import scene_data
@@ -120,6 +121,7 @@ def render_page(
         pictures=_pictures(design, image, exposure),
         cross_at=_place_to_look_at(image.contact_mask),
         groups=[_group(name, group) for name, group in design.lights.items()],
+        mixing=as_json(_mixing(design, image, exposure)),
         contacts=tables.contact_rows(contacts, image.settings.get("presses") or ()),
         settings=tables.setting_rows(image.settings),
         real=None if real is None else _real(real),
@@ -134,13 +136,27 @@ def render_page(
     )
 
 
+def _exposure(
+    design: SensorDesign, image: RenderedImage, exposure: float | Literal["auto"]
+) -> tuple[float, PictureChain]:
+    """The factor on the radiance, and the camera without its noise."""
+    camera = design.camera.picture_chain().without_noise()
+    factor = camera.auto_exposure(image.radiance) if exposure == "auto" else float(exposure)
+    return factor, camera
+
+
+def _mixing(
+    design: SensorDesign, image: RenderedImage, exposure: float | Literal["auto"]
+) -> dict[str, Any]:
+    return mixing_data(image.layers, *_exposure(design, image, exposure))
+
+
 def _pictures(
     design: SensorDesign, image: RenderedImage, exposure: float | Literal["auto"]
 ) -> list[dict[str, str]]:
     """The pictures with their captions; the tactile image comes first."""
     picture = image.picture(exposure)
-    camera = design.camera.picture_chain().without_noise()
-    factor = camera.auto_exposure(image.radiance) if exposure == "auto" else float(exposure)
+    factor, camera = _exposure(design, image, exposure)
     shown: list[tuple[str, Callable[[], NDArray[np.uint8]], str, str]]
     shown = [("picture", lambda: picture, "tactile image", "")]
     for name, layer in image.layers.items():

@@ -17,6 +17,11 @@ MOST_STRETCHED = 4.0
 any more, and finer differences beyond that matter little."""
 
 
+UP = 2
+"""The filter type of PNG that keeps the difference of each row from the row above it; pictures of
+smooth surfaces become a third smaller by it."""
+
+
 def png(picture: ByteArray) -> bytes:
     """A PNG file of a picture.
 
@@ -28,8 +33,9 @@ def png(picture: ByteArray) -> bytes:
     height, width = picture.shape[:2]
     colour_type = 0 if picture.ndim == 2 else 2
     rows = picture.reshape(height, -1)
-    filtered = np.zeros((height, rows.shape[1] + 1), dtype=np.uint8)
-    filtered[:, 1:] = rows
+    filtered = np.full((height, rows.shape[1] + 1), UP, dtype=np.uint8)
+    filtered[:1, 1:] = rows[:1]
+    np.subtract(rows[1:], rows[:-1], out=filtered[1:, 1:])  # modulo 256, as the format says
     header = struct.pack(">IIBBBBB", width, height, 8, colour_type, 0, 0, 0)
     return b"".join(
         [

@@ -57,7 +57,7 @@ def test_texts_of_a_design_stay_texts(image: TactileImage) -> None:
     design.camera.model = "pi-v2"
     page = render_page(design, image, [BALL])
     assert "<img src=x" not in page
-    assert page.count("</script>") == 3  # the page's own: data and two scripts
+    assert page.count("</script>") == 4  # the page's own: data of two kinds and two scripts
 
 
 def test_an_interrupted_render_is_told(image: TactileImage) -> None:

@@ -132,6 +132,20 @@ class PictureChain:
         level = self.response.respond(self._on_sensor(exposed, place), place.width)
         return self._processed(self._read(level, place, seed), place)
 
+    def linear(self, exposed: FloatArray) -> NDArray[np.float32]:
+        """(h, w, 3) levels without noise, overexposure and clipping: those of a sum of lights are
+        the sum of their levels.
+
+        Args:
+            exposed: (h, w, 3) radiance times the exposure.
+        """
+        if self.is_plain:
+            return np.asarray(exposed, dtype=np.float32)
+        window = PictureWindow.whole(*exposed.shape[:2])
+        transmission = None if self.shading is None else self._transmission(window)
+        level = self._balanced(self._on_sensor(exposed, window), transmission)
+        return np.asarray(level, dtype=np.float32)
+
     def _on_sensor(self, exposed: FloatArray, window: PictureWindow) -> FloatArray:
         """What fills the pixels of the sensor, before they overflow."""
         level: FloatArray = np.asarray(exposed, dtype=np.float32)

@@ -16,36 +16,89 @@
 
   function load(button) {
     const image = button.querySelector("img");
-    return image.decode().then(() => {
-      const scratch = document.createElement("canvas");
-      scratch.width = width; scratch.height = height;
-      const paper = scratch.getContext("2d");
-      paper.drawImage(image, 0, 0, width, height);
-      pixels[button.dataset.name] = paper.getImageData(0, 0, width, height);
-    });
+    return image.decode().then(() => { pixels[button.dataset.name] = read(image); });
   }
 
-  // sRGB curve (IEC 61966-2-1) there and back, as tables.
-  const linear = Float32Array.from({ length: 256 }, (_, i) => {
-    const v = i / 255;
-    return v <= 0.04045 ? v / 12.92 : Math.pow((v + 0.055) / 1.055, 2.4);
-  });
-  const curve = Uint8ClampedArray.from({ length: 4097 }, (_, i) => {
-    const v = i / 4096;
-    return Math.round(255 * (v <= 0.0031308 ? 12.92 * v : 1.055 * Math.pow(v, 1 / 2.4) - 0.055));
-  });
+  function read(image) {
+    const scratch = document.createElement("canvas");
+    scratch.width = width; scratch.height = height;
+    const paper = scratch.getContext("2d");
+    paper.drawImage(image, 0, 0, width, height);
+    return paper.getImageData(0, 0, width, height);
+  }
 
-  // Light adds up, so other brightnesses of the groups need no new rendering.
+  // Light adds up, so other brightnesses of the groups need no new rendering. The layers are linear
+  // levels as roots, in two pictures of 8 and 4 bits; overexposure and the tone curve come after.
+  const mixing = JSON.parse(document.getElementById("mixing-data").textContent);
+  const curve = Uint8Array.from(atob(mixing.curve), (letter) => letter.charCodeAt(0));
+  const levels = {};
+
+  async function loadLayer(group) {
+    const { coarse, fine, least, step } = mixing.layers[group];
+    const [high, low] = await Promise.all([coarse, fine].map((address) => {
+      const image = new Image();
+      image.src = address;
+      return image.decode().then(() => read(image).data);
+    }));
+    const found = new Float32Array(3 * width * height);
+    for (let i = 0; i < found.length; i++) {
+      const k = 4 * Math.floor(i / 3) + i % 3, root = least + step * (16 * high[k] + low[k]);
+      found[i] = root * Math.abs(root);
+    }
+    levels[group] = found;
+  }
+
   function mixed() {
     if (sliders.every((slider) => Number(slider.value) === 100)) return pixels.picture;
-    const sum = new Float32Array(width * height * 4);
+    const sum = new Float32Array(3 * width * height);
     for (const slider of sliders) {
-      const layer = pixels[slider.dataset.layer].data, weight = Number(slider.value) / 100;
-      for (let i = 0; i < sum.length; i++) sum[i] += weight * linear[layer[i]];
+      const layer = levels[slider.dataset.group], weight = Number(slider.value) / 100;
+      for (let i = 0; i < sum.length; i++) sum[i] += weight * layer[i];
     }
-    const result = new ImageData(width, height);
-    for (let i = 0; i < sum.length; i++)
-      result.data[i] = i % 4 === 3 ? 255 : curve[Math.min(4096, Math.round(4096 * sum[i]))];
+    if (mixing.spread) overexpose(sum, mixing.spread);
+    const result = new ImageData(width, height), top = curve.length - 1;
+    for (let i = 0, k = 0; i < sum.length; i += 3, k += 4) {
+      for (let c = 0; c < 3; c++)
+        result.data[k + c] = curve[Math.round(top * Math.sqrt(Math.max(0, Math.min(1, sum[i + c]))))];
+      result.data[k + 3] = 255;
+    }
+    return result;
+  }
+
+  // Where a channel is overexposed, all three are lifted there and around, as by the simulated
+  // sensor: optisense/design/responses/full_well.py.
+  function overexpose(sum, { full, most, pixels: deviation }) {
+    let excess = new Float32Array(width * height), any = false;
+    for (let i = 0; i < excess.length; i++) {
+      const over = Math.max(sum[3 * i], sum[3 * i + 1], sum[3 * i + 2]) - full;
+      if (over > 0) { excess[i] = Math.min(most, over); any = true; }
+    }
+    if (!any) return;
+    const reach = Math.floor(4 * deviation + 0.5), kernel = [];
+    for (let d = -reach; d <= reach; d++) kernel.push(Math.exp(-0.5 * (d / (deviation || 1)) ** 2));
+    const total = kernel.reduce((one, other) => one + other);
+    for (const [count, stride, lines, along] of [[height, width, width, 1], [width, 1, height, width]])
+      excess = blurred(excess, count, stride, lines, along, kernel.map((each) => each / total), reach);
+    for (let i = 0; i < sum.length; i++) {
+      const mask = Math.max(0, Math.min(1, excess[Math.floor(i / 3)]));
+      sum[i] += mask * (full - Math.min(sum[i], full));
+    }
+  }
+
+  // Along one axis; beyond the borders the picture goes on mirrored.
+  function blurred(values, count, stride, lines, along, kernel, reach) {
+    const result = new Float32Array(values.length);
+    for (let line = 0; line < lines; line++)
+      for (let i = 0; i < count; i++) {
+        let sum = 0;
+        for (let d = -reach; d <= reach; d++) {
+          let at = (i + d) % (2 * count);
+          if (at < 0) at += 2 * count;
+          if (at >= count) at = 2 * count - 1 - at;
+          sum += kernel[d + reach] * values[line * along + at * stride];
+        }
+        result[line * along + i * stride] = sum;
+      }
     return result;
   }
 
@@ -137,9 +190,19 @@
     const box = cross.getBoundingClientRect();
     const x = Math.floor((event.clientX - box.left) / box.width * width);
     const y = Math.floor((event.clientY - box.top) / box.height * height);
+    look(x, y);
+  }
+  function look(x, y) {
     place = [Math.max(0, Math.min(width - 1, x)), Math.max(0, Math.min(height - 1, y))];
     mark();
   }
+  const STEPS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] };
+  cross.addEventListener("keydown", (event) => {
+    const step = STEPS[event.key], far = event.shiftKey ? 10 : 1;
+    if (!step) return;
+    event.preventDefault();
+    look(place[0] + far * step[0], place[1] + far * step[1]);
+  });
   cross.addEventListener("pointermove", point);
   cross.addEventListener("pointerdown", point);
   cross.addEventListener("dblclick", () => { along = along === "row" ? "column" : "row"; mark(); });
@@ -161,7 +224,7 @@
     }
     show("picture");
   });
-  Promise.all(thumbs.map(load)).then(() => {
+  Promise.all([...thumbs.map(load), ...Object.keys(mixing.layers).map(loadLayer)]).then(() => {
     document.getElementById("plain-picture").hidden = true;
     canvas.hidden = false; cross.hidden = false;
     show("picture");

@@ -247,6 +247,7 @@ function view3d(root, data) {
     corner: [-0.62, 0.42], front: [-Math.PI / 2, 0.02], above: [-Math.PI / 2, 1.5],
     below: [-Math.PI / 2, -1.5],
   };
+  const HALF_HEIGHT = Math.tan(0.5 * 0.55);  // of what is seen, at a distance of 1
   let yaw, pitch, distance, target;
   function reset(name) {
     [yaw, pitch] = VIEWS[name] || VIEWS.corner;
@@ -267,7 +268,7 @@ function view3d(root, data) {
       right[0], up[0], back[0], 0, right[1], up[1], back[1], 0, right[2], up[2], back[2], 0,
       -dot(right, eye), -dot(up, eye), -dot(back, eye), 1,
     ];
-    const f = 1 / Math.tan(0.5 * 0.55), near = distance * 0.02, far = distance + 4 * data.size;
+    const f = 1 / HALF_HEIGHT, near = distance * 0.02, far = distance + 4 * data.size;
     const aspect = canvas.width / canvas.height;
     const narrow = Math.min(1, aspect);
     const projection = [
@@ -399,7 +400,10 @@ function view3d(root, data) {
     pitch = Math.max(-1.55, Math.min(1.55, pitch + dy * 0.008));
   }
   function pan(dx, dy) {
-    const { right, up } = axes(), scale = distance * 0.55 / canvas.clientHeight;
+    // What is at the target's distance stays under the pointer.
+    const narrow = Math.min(1, canvas.clientWidth / canvas.clientHeight);
+    const scale = 2 * HALF_HEIGHT * distance / (narrow * canvas.clientHeight);
+    const { right, up } = axes();
     target = add(add(target, right, -dx * scale), up, dy * scale);
   }
   function zoom(factor) {

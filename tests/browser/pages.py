@@ -1,0 +1,73 @@
+"""One page of each kind, of a sensor whose names and texts would like to be more than text."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from optisense.design import Provenance, SensorDesign
+from optisense.geometry import Contact, Sphere
+from optisense.objectives import Evaluation, Objective, Score, Settings
+from optisense.objectives.scored import Scored
+from optisense.optics import OpticalModel, TactileImage
+from optisense.report import write_report
+from optisense.report.camera_rays import CameraRays
+from optisense.report.light_section import LightSection, ledger_page
+from optisense.report.scores import write_score_report
+from optisense.report.study import write_study_report
+from optisense.report.tolerance import write_tolerance_report
+from optisense.search import ToleranceDistribution, search
+from optisense.search.tolerance.analysis import tolerance
+from optisense.sensors import gelsight_mini
+
+BALL = Contact(Sphere(radius=1.5), at=(0.0, 0.0), depth=0.8)
+EVIL = "</script></table><script>window.ran = 1</script><img src=x onerror='window.ran = 1'> \"'"
+
+
+def evil_design() -> SensorDesign:
+    design = gelsight_mini().copy()
+    design.name = design.description = EVIL
+    design.provenance["camera.fov"] = Provenance(status="assumed", source=EVIL)
+    return design
+
+
+def red(design: SensorDesign) -> float:
+    """A score that fails for the brightest coatings."""
+    if design.coating.reflectance[0] > 0.9:
+        raise ValueError(EVIL)
+    return design.coating.reflectance[0] + 0.1 * design.coating.reflectance[1]
+
+
+def blue(design: SensorDesign) -> float:
+    return -(design.coating.reflectance[0] ** 2)
+
+
+def write_pages(folder: Path) -> dict[str, Path]:
+    """Files of the pages, by what they show."""
+    design = evil_design()
+    model = OpticalModel(design)
+    image: TactileImage = model.render([BALL], resolution=(64, 48), photons=40_000)
+    light = LightSection.of(model, 20_000, at=[(0.0, 0.0)])
+    rays = CameraRays.of(model)
+    pages = {
+        name: folder / f"{name}.html" for name in ("render", "ledger", "scores", "study", "errors")
+    }
+    write_report(pages["render"], design, image, [BALL], light=light, rays=rays)
+    pages["ledger"].write_text(ledger_page(design, light), encoding="utf-8")
+
+    scored = Scored(design)
+    evaluation = Evaluation(model, Settings(ray_resolution=(20, 16)))
+    score = Score(EVIL, 0.5, parts={EVIL: EVIL, "places": [{"place": [1.0, 2.0], "score": 0.75}]})
+    scored.add(evaluation).update({EVIL: score})
+    write_score_report(pages["scores"], scored, [Objective(EVIL, red, EVIL)])
+
+    space: dict[str, object] = {
+        "coating.reflectance.r": (0.2, 1.0),
+        "coating.reflectance.g": (0.2, 1.0),
+        "lights.*.colour": ["R", "G"],
+    }
+    found = search(design, space, [red, blue], method="pareto", budget=40, seed=2)
+    write_study_report(pages["study"], found.study)
+
+    errors = {"coating.reflectance.r": ToleranceDistribution(0.3, "uniform")}
+    write_tolerance_report(pages["errors"], tolerance(design, red, errors, sensors=60))
+    return pages
