@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from optisense.mechanics.deformed_mesh import SkinMesh, SkinState, skin_mesh
     from optisense.mechanics.elasticity import Elasticity, youngs_modulus_of_shore_a
     from optisense.mechanics.gel import Gel, elasticity_in_words, elasticity_of
-    from optisense.mechanics.pressed_skin import Pressed, PressedSkin
+    from optisense.mechanics.pressed_skin import Pressed, PressedSkin, SkinMaps
     from optisense.mechanics.skins import CONFORMING, ELASTIC, SKINS
 
 _HOMES = {
@@ -25,6 +25,7 @@ _HOMES = {
     "Gel": ".gel",
     "Pressed": ".pressed_skin",
     "PressedSkin": ".pressed_skin",
+    "SkinMaps": ".pressed_skin",
     "SkinMesh": ".deformed_mesh",
     "SkinState": ".deformed_mesh",
     "elasticity_in_words": ".gel",
@@ -41,6 +42,7 @@ __all__ = [
     "Gel",
     "Pressed",
     "PressedSkin",
+    "SkinMaps",
     "SkinMesh",
     "SkinState",
     "elasticity_in_words",

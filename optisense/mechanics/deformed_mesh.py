@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from optisense.geometry import TriangleMesh
 from optisense.geometry.refinement import refine
-from optisense.mechanics.pressed_skin import DECAY, Pressed, PressedSkin
+from optisense.mechanics.displacement_field import DECAY
+from optisense.mechanics.pressed_skin import Pressed, PressedSkin
 
 FloatArray = NDArray[np.float64]
 

@@ -4,165 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import distance_transform_edt, map_coordinates, spline_filter
 
-from optisense.mechanics.convolution import GridResponse
+from optisense.mechanics.displacement_field import DisplacementField, grid_response
 from optisense.mechanics.elasticity import Elasticity
 from optisense.mechanics.footprint import Footprint
 from optisense.mechanics.normal_contact import NormalContact, solve_normal_contact
 
 FloatArray = NDArray[np.float64]
 
-RING = 1.0
-"""Width of the fine grid around a footprint, over the footprint's shorter side."""
-DECAY = 6.0
-"""Distance from a footprint, in thicknesses, beyond which displacements are left out. They are less
-than 0.3 % of those at half a thickness there, for any Poisson ratio."""
-COARSE_POINTS = 20
-"""Points of the coarse grid for one thickness; it shows bulges, which are as wide as the gel is
-thick."""
-MAX_COARSE = 400
-"""Largest number of points of the coarse grid along a side, which bounds the time of its
-transform."""
 SETTLED = 1e-4
 """Change of the displacements that contacts cause each other (mm) at which they are settled."""
 MAX_SWEEPS = 8
 """Sweeps over contacts after which they are taken as they are; distant ones need one or two."""
-
-
-class DisplacementField:
-    """Normal displacement around one contact, on a fine grid inside a coarse one.
-
-    Between grid points it is a cubic spline, so that slopes are smooth.
-    """
-
-    def __init__(
-        self,
-        place: Footprint,
-        overlap: FloatArray,
-        pressure: FloatArray,
-        elasticity: Elasticity,
-    ) -> None:
-        """Sum what a pressure does.
-
-        Args:
-            place: the grid of the pressure.
-            overlap: (rows, columns) mm, of the place, less what other contacts displace.
-            pressure: (rows, columns) MPa.
-            elasticity: of the gel.
-        """
-        self.place, self._overlap = place, overlap
-        pitch, thickness = place.pitch, place.thickness
-        rows, columns = place.overlap.shape
-        ring = int(np.ceil(RING * min(rows, columns)))
-        shape = rows + 2 * ring, columns + 2 * ring
-        response = grid_response(shape, pitch, thickness, elasticity)
-        fine = response.normal(np.pad(pressure, ring))
-        inside = slice(ring, ring + rows), slice(ring, ring + columns)
-        touching = pressure > 0.0
-        fine[inside][touching] = overlap[touching]
-        x0, y0 = place.x[0] - ring * pitch, place.y[0] - ring * pitch
-        self._fine = _Spline(fine, x0, y0, pitch)
-        self._touching = touching
-        step = thickness / COARSE_POINTS
-        reach = DECAY * thickness
-        ends = [(g[0] - reach, g[-1] + reach) for g in (place.x, place.y)]
-        step = max(step, pitch, max(b - a for a, b in ends) / MAX_COARSE)
-        counts = [int(np.ceil((b - a) / step)) + 1 for a, b in ends]
-        coarse = _binned(pressure, place, (ends[0][0], ends[1][0]), step, (counts[1], counts[0]))
-        far = grid_response((counts[1], counts[0]), step, thickness, elasticity).normal(coarse)
-        self._coarse = _Spline(far, ends[0][0], ends[1][0], step)
-
-    def at(self, x: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Displacement into the gel (mm) at points of the tangent plane, and its slopes by x, y.
-
-        The slope jumps at the edge of a contact; inside, it is that of the indenter.
-        """
-        result = np.zeros((3, len(x)))
-        near = self._fine.holds(x, y)
-        reached = ~near & self._coarse.holds(x, y)
-        for where, spline in ((near, self._fine), (reached, self._coarse)):
-            if where.any():
-                result[:, where] = spline.at(x[where], y[where])
-        inside = self.touching(x, y)
-        if inside.any():
-            column, row = (
-                (values[inside] - start) / self.place.pitch
-                for values, start in ((x, self.place.x[0]), (y, self.place.y[0]))
-            )
-            for k, slope in enumerate(self._indenter_slopes):
-                result[1 + k, inside] = map_coordinates(slope, [row, column], order=1)
-        return result[0], result[1], result[2]
-
-    @cached_property
-    def _indenter_slopes(self) -> tuple[FloatArray, FloatArray]:
-        """(rows, columns) each: slopes of the overlap by x and by y."""
-        by_row, by_column = np.gradient(self._overlap, self.place.pitch)
-        return np.asarray(by_column), np.asarray(by_row)
-
-    def touching(self, x: FloatArray, y: FloatArray) -> NDArray[np.bool_]:
-        """Which points of the tangent plane lie in the contact."""
-        rows, columns, inside = self._cells(x, y)
-        return inside & self._touching[rows, columns]
-
-    def distance(self, x: FloatArray, y: FloatArray) -> FloatArray:
-        """Distance (mm) of points of the tangent plane from the contact, to about a pitch."""
-        rows, columns, _ = self._cells(x, y)
-        beyond = np.hypot(x - self.place.x[columns], y - self.place.y[rows])
-        return self._away[rows, columns] + np.where(beyond > self.place.pitch, beyond, 0.0)
-
-    @cached_property
-    def _away(self) -> FloatArray:
-        return np.asarray(distance_transform_edt(~self._touching)) * self.place.pitch
-
-    def _cells(
-        self, x: FloatArray, y: FloatArray
-    ) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.bool_]]:
-        """Nearest row and column of the pressure's grid, and whether points lie on it."""
-        column = np.round((x - self.place.x[0]) / self.place.pitch).astype(np.int64)
-        row = np.round((y - self.place.y[0]) / self.place.pitch).astype(np.int64)
-        rows, columns = self._touching.shape
-        inside = (row >= 0) & (row < rows) & (column >= 0) & (column < columns)
-        return row.clip(0, rows - 1), column.clip(0, columns - 1), inside
-
-
-class _Spline:
-    """A cubic spline through values on a regular grid."""
-
-    def __init__(self, values: FloatArray, x0: float, y0: float, pitch: float) -> None:
-        self._coefficients = spline_filter(values, order=3, mode="mirror")
-        self._start, self._pitch = (x0, y0), pitch
-        self._shape = values.shape
-
-    def holds(self, x: FloatArray, y: FloatArray) -> NDArray[np.bool_]:
-        column, row = self._place(x, y)
-        rows, columns = self._shape
-        return (column >= 1) & (column <= columns - 2) & (row >= 1) & (row <= rows - 2)
-
-    def at(self, x: FloatArray, y: FloatArray) -> FloatArray:
-        """(3, n): the value, and its slopes by x and y from points half a pitch aside."""
-        column, row = self._place(x, y)
-        half = 0.5
-        rows = np.concatenate([row, row, row, row - half, row + half])
-        columns = np.concatenate([column, column - half, column + half, column, column])
-        values = map_coordinates(
-            self._coefficients, [rows, columns], order=3, mode="mirror", prefilter=False
-        ).reshape(5, -1)
-        return np.stack(
-            [
-                values[0],
-                (values[2] - values[1]) / self._pitch,
-                (values[4] - values[3]) / self._pitch,
-            ]
-        )
-
-    def _place(self, x: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:
-        return (x - self._start[0]) / self._pitch, (y - self._start[1]) / self._pitch
 
 
 @dataclass(frozen=True, eq=False)
@@ -205,6 +62,20 @@ class SkinDisplacement(NamedTuple):
     touching: NDArray[np.bool_]
 
 
+class SkinMaps(NamedTuple):
+    """What is true of points of a pressed skin.
+
+    Attributes:
+        pressure: (...) MPa.
+        penetration: (...) mm that the undeformed skin lies inside an indenter there, 0 elsewhere.
+        displacement: (..., 3) mm, in the design's frame.
+    """
+
+    pressure: FloatArray
+    penetration: FloatArray
+    displacement: FloatArray
+
+
 @dataclass(frozen=True, eq=False)
 class PressedSkin:
     """A skin under all its contacts.
@@ -228,6 +99,35 @@ class PressedSkin:
             }
             for contact in self.contacts
         ]
+
+    def maps(self, points: NDArray[np.floating], inward: NDArray[np.floating]) -> SkinMaps:
+        """Pressure, penetration and displacement at points of the deformed skin.
+
+        Displacements along the skin are those of a skin that slides freely along the indenter.
+
+        Args:
+            points: (..., 3) mm, where the skin is; NaN gives NaN.
+            inward: (..., 3) its normals, into the gel.
+        """
+        shape = points.shape[:-1]
+        flat = np.asarray(points, dtype=np.float64).reshape(-1, 3)
+        normals = np.asarray(inward, dtype=np.float64).reshape(-1, 3)
+        known = np.isfinite(np.hstack([flat, normals])).all(axis=1)
+        found = np.full((len(flat), 5), np.nan)
+        found[known] = 0.0
+        for contact in self.contacts:
+            place, field = contact.place, contact.field
+            facing = np.zeros(len(flat), dtype=bool)
+            facing[known] = normals[known] @ place.axes[:, 2] < 0.0
+            local = place.local(flat[facing])
+            x, y = local[:, 0].copy(), local[:, 1].copy()
+            found[facing, 0] += field.pressure(x, y)
+            found[facing, 1] = np.maximum(found[facing, 1], field.penetration(x, y))
+            moved = np.stack([*field.sideways(x, y), -field.at(x, y)[0]], axis=1)
+            found[facing, 2:] += moved @ place.axes.T
+        return SkinMaps(
+            found[:, 0].reshape(shape), found[:, 1].reshape(shape), found[:, 2:].reshape(*shape, 3)
+        )
 
     def displaced(self, points: FloatArray, inward: FloatArray) -> SkinDisplacement:
         """How the skin moves at points (n, 3) mm with unit normals (n, 3) into the gel."""
@@ -303,35 +203,4 @@ def _caused_by(others: list[Pressed], place: Footprint) -> FloatArray:
         upright = float(other.place.axes[:, 2] @ place.axes[:, 2])
         depth, _, _ = other.field.at(local[:, 0], local[:, 1])
         result += (max(upright, 0.0) * depth).reshape(result.shape)
-    return result
-
-
-@lru_cache(maxsize=24)
-def grid_response(
-    shape: tuple[int, int], pitch: float, thickness: float, elasticity: Elasticity
-) -> GridResponse:
-    """The same object for the same grid and gel; it keeps its kernels (16 bytes a grid point)."""
-    return GridResponse(shape, pitch, thickness, elasticity)
-
-
-def _binned(
-    pressure: FloatArray,
-    place: Footprint,
-    start: tuple[float, float],
-    step: float,
-    shape: tuple[int, int],
-) -> FloatArray:
-    """A pressure on a coarser grid, with the same force and centre, shared out linearly."""
-    column = (place.x - start[0]) / step
-    row = (place.y - start[1]) / step
-    result = np.zeros(shape)
-    share = (place.pitch / step) ** 2
-    for up in (0, 1):
-        for right in (0, 1):
-            rows = np.floor(row).astype(np.int64) + up
-            columns = np.floor(column).astype(np.int64) + right
-            weight_y = np.abs(1 - up - (row - np.floor(row)))
-            weight_x = np.abs(1 - right - (column - np.floor(column)))
-            weights = weight_y[:, None] * weight_x[None, :]
-            np.add.at(result, np.ix_(rows, columns), share * weights * pressure)
     return result

@@ -14,13 +14,14 @@ from numpy.typing import NDArray
 from optisense.design import LightGroup, SensorDesign
 from optisense.design.responses import PictureChain
 from optisense.geometry import Contact, TriangleMesh
+from optisense.mechanics import SkinMaps
 from optisense.report import tables
 from optisense.report.camera_rays import CameraRays
 from optisense.report.drawing import swatch_of
 from optisense.report.files import as_json, page, script
 from optisense.report.light_section import LightSection
 from optisense.report.mixing import mixing_data
-from optisense.report.pictures import data_uri, mask_overlay, normal_colours
+from optisense.report.pictures import data_uri, mask_overlay, normal_colours, pressure_colours
 from optisense.report.real_sensor import RealComparison
 from optisense.report.scene_view import scene_data
 from optisense.writing import write_text
@@ -56,6 +57,9 @@ class RenderedImage(Protocol):
     @property
     def interrupted(self) -> bool:
         """Whether it was stopped before it was finished."""
+
+    def skin_maps(self) -> SkinMaps | None:
+        """Pressure behind each pixel; None where no pressures are known."""
 
     def picture(self, exposure: float | Literal["auto"] = "auto") -> NDArray[np.uint8]:
         """(h, w, 3), as a camera would give it."""
@@ -167,6 +171,11 @@ def _pictures(
     if image.contact_mask.any():
         covered = 100 * float(image.contact_mask.mean())
         overlay = partial(mask_overlay, picture, image.contact_mask)
+        maps = image.skin_maps()
+        if maps is not None:
+            most = f"white is {np.nanmax(maps.pressure):.3f} MPa, black none"
+            drawn = partial(pressure_colours, maps.pressure)
+            shown.append(("pressure", drawn, "pressure", most))
         shown.append(("contact", overlay, "contact", f"{covered:.1f} % of the picture"))
     with ThreadPoolExecutor() as pool:  # NumPy and zlib work outside Python's lock
         addresses = list(pool.map(lambda pixels: data_uri(pixels()), [row[1] for row in shown]))

@@ -89,6 +89,21 @@ def stretching_colours(stretching: FloatArray) -> ByteArray:
     return colours
 
 
+def pressure_colours(pressure: FloatArray) -> ByteArray:
+    """A map of pressure from black (none) by red and yellow to white (the greatest).
+
+    Args:
+        pressure: (h, w), 0 or more; NaN, drawn black, where nothing is seen.
+
+    Returns:
+        (h, w, 3) uint8.
+    """
+    known = np.nan_to_num(pressure)
+    share = known / max(float(known.max()), np.finfo(np.float64).tiny)
+    ramp = np.clip(3.0 * share[..., None] - np.arange(3.0), 0.0, 1.0)
+    return np.round(255 * ramp).astype(np.uint8)
+
+
 def mask_overlay(picture: ByteArray, mask: NDArray[np.bool_]) -> ByteArray:
     """The picture in grey with the masked pixels in their own colours and a white outline."""
     grey = (picture.astype(np.float64) @ [0.299, 0.587, 0.114] * 0.45)[..., None]

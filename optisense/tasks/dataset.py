@@ -17,11 +17,13 @@ from optisense.tasks.records import read_object, read_rows
 from optisense.text import brief
 from optisense.untrusted_files import (
     COPY_AGAIN,
+    MOST_TABLE,
     check_arrays,
     first_problem,
     inside,
     is_file,
     read_arrays,
+    read_text,
 )
 
 SCHEMA_VERSION = 1
@@ -48,7 +50,12 @@ NUMBER_COLUMNS = {
     "tilt_x": "degrees about the indenter's x axis",
     "tilt_y": "degrees about its y axis, after tilt_x",
     "deepest": "mm, the largest depth that the picture shows",
+    "force": "N, along the outward normal; empty for a conforming skin",
+    "area": "mm^2 of skin that touches; empty for a conforming skin",
+    "pressure": "MPa, the greatest; empty for a conforming skin",
 }
+LATER_COLUMNS = ("force", "area", "pressure")
+"""Columns that tables of release 0.1 lack; such tables are read, and go on without them."""
 COLUMNS = (
     "file_name",
     "index",
@@ -60,15 +67,22 @@ COLUMNS = (
     "radiance",
 )
 """Columns of `LABELS`; the first is what common loaders of picture folders look for."""
+FIRST_COLUMNS = tuple(name for name in COLUMNS if name not in LATER_COLUMNS)
+"""Columns of `LABELS` in release 0.1."""
 
 MAKE_AGAIN = "Copy the file again, or make it again: optisense dataset with --mend"
 
 ArrayKinds = Mapping[str, tuple[str, int | None]]
 
 SAMPLE_ARRAYS: ArrayKinds = {"depth": ("f", None), "normals": ("f", 3), "mask": ("b", None)}
+ELASTIC_ARRAYS: ArrayKinds = {
+    "pressure": ("f", None),
+    "penetration": ("f", None),
+    "displacement": ("f", 3),
+}
 BACKGROUND_ARRAYS: ArrayKinds = {"image": ("u", 3), "points": ("f", 3), "normals": ("f", 3)}
 """Arrays of the files by name: what their type may be (as of NumPy's `dtype.kind`), and the numbers
-of a pixel."""
+of a pixel. Those of an elastic skin are missing from samples of other skins and of release 0.1."""
 
 FiniteNumber = Annotated[float, Field(allow_inf_nan=False)]
 
@@ -172,6 +186,10 @@ class Sample:
     image: uint8 sRGB. depth: float32 mm, pushed in along the inward normal. normals: float32
     unit, inward, in the design's frame. mask: bool, where the indenter is seen. labels: a row of
     `LABELS`, numbers as numbers.
+
+    Of an elastic skin also, all float32 and NaN where no skin is seen (None for other skins):
+    pressure: MPa. penetration: mm that the undeformed skin lies inside the indenter, 0 elsewhere.
+    displacement: (h, w, 3) mm by which the skin behind a pixel has moved, in the design's frame.
     """
 
     image: NDArray[np.uint8]
@@ -179,6 +197,9 @@ class Sample:
     normals: NDArray[np.float32]
     mask: NDArray[np.bool_]
     labels: dict[str, Any]
+    pressure: NDArray[np.float32] | None = None
+    penetration: NDArray[np.float32] | None = None
+    displacement: NDArray[np.float32] | None = None
 
 
 @dataclass(frozen=True)
@@ -242,6 +263,9 @@ class Dataset:
             normals=arrays["normals"],
             mask=arrays["mask"],
             labels=labels,
+            pressure=arrays.get("pressure"),
+            penetration=arrays.get("penetration"),
+            displacement=arrays.get("displacement"),
         )
 
     def __iter__(self) -> Iterator[Sample]:
@@ -275,15 +299,24 @@ class Dataset:
         path = self._existing(name)
         arrays = read_arrays(path, TaskError)
         width, height = self.info["settings"]["resolution"]
-        check_arrays(arrays, kinds, (height, width), path, TaskError)
+        later = {each: ELASTIC_ARRAYS[each] for each in ELASTIC_ARRAYS if each in arrays}
+        check_arrays(arrays, {**kinds, **later}, (height, width), path, TaskError)
         return arrays
+
+
+def columns_of(folder: Path) -> tuple[str, ...]:
+    """The columns in which `LABELS` of a folder goes on, or begins."""
+    path = folder / LABELS
+    begun = read_text(path, MOST_TABLE, TaskError, "the table") if path.exists() else ""
+    return FIRST_COLUMNS if begun.startswith(",".join(FIRST_COLUMNS) + "\n") else COLUMNS
 
 
 def _typed(row: dict[str, str], where: str) -> dict[str, Any]:
     try:
         result: dict[str, Any] = {name: row[name] for name in TEXT_COLUMNS}
         result |= {name: int(row[name]) for name in WHOLE_COLUMNS}
-        result |= {n: float(row[n]) if row[n] else float("nan") for n in NUMBER_COLUMNS}
+        given = {**dict.fromkeys(LATER_COLUMNS, ""), **row}
+        result |= {n: float(given[n]) if given[n] else float("nan") for n in NUMBER_COLUMNS}
     except (KeyError, TypeError, ValueError) as error:
         raise TaskError(f"a row can't be read: {error}", where=where, hint=ROW_AGAIN) from error
     return {name: result[name] for name in COLUMNS}

@@ -28,7 +28,6 @@ from optisense.reading.untouched import UntouchedSurface
 from optisense.sensors import save_design
 from optisense.tasks.dataset import (
     BACKGROUND,
-    COLUMNS,
     DESIGN,
     FAILURES,
     INFO,
@@ -36,6 +35,7 @@ from optisense.tasks.dataset import (
     NUMBER_COLUMNS,
     SCHEMA_VERSION,
     Dataset,
+    columns_of,
     read_failures,
     read_info,
     read_labels,
@@ -169,7 +169,7 @@ class _Maker:
         self._larger_than_view = {
             text for text, each in self._indenters.items() if not self._fits(each)
         }
-        self._labels = CsvTable(folder / LABELS, COLUMNS)
+        self._labels = CsvTable(folder / LABELS, columns_of(folder))
         self._failures = CsvTable(folder / FAILURES, ("index", "reason"))
         self._labelled = {row["index"] for row in read_labels(folder)}
         self._failed = {int(row["index"]) for row in read_failures(folder)}
@@ -358,6 +358,14 @@ class _Maker:
         )
         depth = self._untouched.image_depth(image)
         arrays = {"depth": depth, "normals": image.normals, "mask": image.contact_mask}
+        force = {"force": "", "area": "", "pressure": ""}
+        maps = image.skin_maps()
+        if maps is not None:
+            named = {name: values.astype(np.float32) for name, values in maps._asdict().items()}
+            arrays |= named
+            press = image.settings["presses"][0]
+            of_press = press["force_n"], press["area_mm2"], press["greatest_pressure_mpa"]
+            force = dict(zip(force, of_press, strict=True))
         picture_file = inside(self._folder, f"images/{name}.png")
         write_whole(picture_file, lambda path: write_picture(path, picture))
         write_whole(inside(self._folder, f"arrays/{name}.npz"), partial(_save_arrays, arrays))
@@ -386,6 +394,7 @@ class _Maker:
                 "tilt_x": drawn.tilt_x,
                 "tilt_y": drawn.tilt_y,
                 "deepest": float(np.nanmax(depth)),
+                **force,
                 "contact_pixels": int(image.contact_mask.sum()),
                 "attempt": attempt,
                 "arrays": f"arrays/{name}.npz",

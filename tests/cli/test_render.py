@@ -25,6 +25,7 @@ FILES = {
     "radiance.exr",
     "normals.npy",
     "contact_mask.npy",
+    "pressure.npy",
     "run.json",
     "report.html",
     *(f"layers/{name}.exr" for name in LAYERS),
@@ -71,6 +72,14 @@ def test_the_files_have_the_wanted_size(folder: Path) -> None:
     assert mask.dtype == bool
 
 
+def test_the_pressure_adds_up_to_the_force(folder: Path) -> None:
+    pressure = np.load(folder / "pressure.npy")
+    press = json.loads((folder / "run.json").read_text())["presses"][0]
+    # Pixels of 18.6 mm / 40 on a flat gel; the contact is five of them across.
+    assert pressure.sum() * (18.6 / 40) ** 2 == pytest.approx(press["force_n"], rel=0.15)
+    assert 0.6 < pressure.max() / press["greatest_pressure_mpa"] <= 1.0
+
+
 def test_the_ball_is_in_the_middle_of_the_picture(folder: Path) -> None:
     rows, columns = np.nonzero(np.load(folder / "contact_mask.npy"))
     assert abs(rows.mean() - 14.5) < 1.0
@@ -89,7 +98,16 @@ def test_the_report_asks_the_network_for_nothing(folder: Path) -> None:
     assert "default-src 'none'" in page
     assert not re.findall(r"""(?:src|href|action)\s*=\s*["'](?!data:)""", page)
     assert not re.findall(r"url\(|@import|fetch\(|XMLHttpRequest", page)
-    shown = ("image", "image", *LAYERS, "normals", "mask", "a real sensor", "the model of it")
+    shown = (
+        "image",
+        "image",
+        *LAYERS,
+        "normals",
+        "mask",
+        "pressure",
+        "a real sensor",
+        "the model of it",
+    )
     assert page.count("data:image/png;base64,") == len(shown)
 
 

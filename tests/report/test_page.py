@@ -36,6 +36,8 @@ def test_settings_lights_contacts_and_sources_are_on_the_page(image: TactileImag
         "sphere, radius 1.5 mm",
         "0, 0 mm on the surface",
         "0.8 mm",
+        f"{image.settings['presses'][0]['greatest_pressure_mpa']:.3f} MPa",
+        f"white is {image.skin_maps().pressure.max():.3f} MPa",
         *(f"{name} lights alone" for name in design.lights),
         *(path for path, entry in design.provenance.items() if entry.status == "assumed"),
     ):
@@ -85,7 +87,9 @@ def test_contacts_tell_depth_force_and_area() -> None:
     (alone,) = contact_rows([pushed])
     assert (alone["depth"], alone["force"], alone["area"]) == ("", "2 N", "")
     known = {"depth_mm": 0.9467, "force_n": 2.0004, "area_mm2": 10.74}
+    known |= {"greatest_pressure_mpa": 0.2714}
     (row,) = contact_rows([pushed], [known])
+    assert row["pressure"] == "0.271 MPa"
     assert (row["depth"], row["force"], row["area"]) == ("0.95 mm", "2.00 N", "10.7 mm²")
     (flat,) = contact_rows([BALL])
     assert (flat["depth"], flat["force"]) == ("0.8 mm", "")

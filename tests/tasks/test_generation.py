@@ -45,7 +45,7 @@ def assert_same(one: Dataset, other: Dataset) -> None:
     for a, b in zip(one, other, strict=True):
         assert same_pictures(a.image, b.image)
         assert (a.image != b.image).mean() < 0.01
-        for name in ("depth", "normals", "mask"):
+        for name in ("depth", "normals", "mask", "pressure", "displacement"):
             assert np.array_equal(getattr(a, name), getattr(b, name), equal_nan=True)
 
 
@@ -85,9 +85,28 @@ def test_depth_normals_and_mask_describe_the_ball(made: Dataset) -> None:
         )
 
 
+def test_forces_and_displacements_describe_the_ball(made: Dataset) -> None:
+    for sample in made:
+        labels = sample.labels
+        assert sample.pressure[~sample.mask].sum() < 0.05 * sample.pressure.sum()
+        # A pixel is 0.31 mm wide on the flat gel.
+        total = np.nansum(sample.pressure) * 0.31**2
+        assert total == pytest.approx(labels["force"], rel=0.25)
+        assert labels["pressure"] >= sample.pressure.max()
+        assert np.pi * labels["radius"] * labels["depth"] < 2.0 * labels["area"]
+        # Depth is the displacement along the inward normal; the overlap is larger than the contact.
+        assert -sample.displacement[..., 2] == pytest.approx(sample.depth, abs=2e-3)
+        inside = binary_erosion(sample.mask)
+        assert sample.penetration[inside] == pytest.approx(sample.depth[inside], abs=2e-3)
+        assert (sample.penetration > 0).sum() > sample.mask.sum()
+        sideways = np.linalg.norm(sample.displacement[..., :2], axis=2)
+        assert 0.0 < sideways.max() < 0.3 * labels["depth"]
+
+
 def test_a_conforming_skin_stays_flat_around_the_ball(mini: OpticalModel, tmp_path: Path) -> None:
     sample = generate(mini, tmp_path / "flat", 1, replace(SETTINGS, skin="conforming"))[0]
     assert (sample.depth[~sample.mask] == 0).all()
+    assert sample.pressure is None and np.isnan(sample.labels["force"])
     assert sample.normals[~sample.mask] == pytest.approx(
         np.broadcast_to([0, 0, -1], sample.normals.shape)[~sample.mask], abs=1e-5
     )

@@ -20,7 +20,7 @@ from optisense.design.responses import PictureChain
 from optisense.design.responses.electronics import NoiseSeed
 from optisense.errors import RenderError
 from optisense.geometry import TriangleMesh
-from optisense.mechanics import PressedSkin
+from optisense.mechanics import PressedSkin, SkinMaps
 from optisense.optics.camera.response import picture
 from optisense.writing import inside, remove_own_page, written_together
 
@@ -29,6 +29,9 @@ RADIANCE_UNIT = "mW/(mm^2 sr)"
 
 REPORT_FILE = "report.html"
 """The page that `optisense render` writes beside an image."""
+
+PRESSURE_FILE = "pressure.npy"
+"""What `TactileImage.save` writes of the pressure on an elastic skin: (h, w) float32, MPa."""
 
 
 @dataclass
@@ -110,6 +113,14 @@ class TactileImage:
         """The factor that makes a good picture of the radiance."""
         return self.chain.auto_exposure(self.radiance)
 
+    def skin_maps(self) -> SkinMaps | None:
+        """Pressure (MPa), penetration (mm) and displacement (mm) of the skin behind each pixel.
+
+        They are NaN where the camera sees no skin. None without contacts, and of a conforming
+        skin, of which no forces are known.
+        """
+        return None if self.pressed is None else self.pressed.maps(self.points, self.normals)
+
     def _repr_png_(self) -> bytes:
         """The exposed picture as a PNG file, for notebooks."""
         stream = mi.MemoryStream()
@@ -125,17 +136,19 @@ class TactileImage:
         _bitmap(self.radiance, path)
 
     def save(self, folder: str | Path, exposure: float | str = "auto") -> None:
-        """Write image.png, radiance.exr, normals.npy, contact_mask.npy, `layers/*.exr`, run.json.
+        """Write image.png, radiance.exr, normals.npy, contact_mask.npy, `layers/*.exr`, run.json,
+        and pressure.npy of an elastic skin with contacts.
 
         They are written under temporary names and appear when all are whole. What an earlier
-        image left in the folder goes: its layers of groups that this image does not have, and the
-        page (report.html) that was written about it. Other files stay.
+        image left in the folder goes: its pressure, layers of groups that this image does not have,
+        and the page (report.html) that was written about it. Other files stay.
 
         Raises:
             OutputError: a file can't be written, for instance because the disk is full.
         """
         out = Path(folder)
         self.settings["exposure"] = self.auto_exposure() if exposure == "auto" else float(exposure)
+        maps = self.skin_maps()
         bitmaps = {"image.png": self.picture(exposure), "radiance.exr": self.radiance}
         bitmaps |= {f"layers/{name}.exr": layer for name, layer in self.layers.items()}
         with written_together("the results") as stage:
@@ -144,10 +157,15 @@ class TactileImage:
                 list(pool.map(_bitmap, bitmaps.values(), paths))
             np.save(stage(out / "normals.npy"), self.normals)
             np.save(stage(out / "contact_mask.npy"), self.contact_mask)
+            if maps is not None:
+                np.save(stage(out / PRESSURE_FILE), maps.pressure.astype(np.float32))
             text = json.dumps({**self.settings, "layers": list(self.layers)}, indent=2) + "\n"
             stage(out / "run.json").write_text(text, encoding="utf-8")
-            for stale in _layers_before(out) - set(self.layers):
+            before = _layers_before(out)
+            for stale in before - set(self.layers):
                 (out / "layers" / f"{stale}.exr").unlink(missing_ok=True)
+            if before and maps is None:
+                (out / PRESSURE_FILE).unlink(missing_ok=True)
             remove_own_page(out / REPORT_FILE, "render")
 
 

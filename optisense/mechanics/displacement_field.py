@@ -1,0 +1,228 @@
+"""How a flat gel is displaced around one contact, between the points of its grids."""
+
+from __future__ import annotations
+
+from functools import cached_property, lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import distance_transform_edt, map_coordinates, spline_filter
+
+from optisense.mechanics.convolution import GridResponse
+from optisense.mechanics.elasticity import Elasticity
+from optisense.mechanics.footprint import Footprint
+
+FloatArray = NDArray[np.float64]
+
+RING = 1.0
+"""Width of the fine grid around a footprint, over the footprint's shorter side."""
+DECAY = 6.0
+"""Distance from a footprint, in thicknesses, beyond which displacements are left out. They are less
+than 0.3 % of those at half a thickness there, for any Poisson ratio."""
+COARSE_POINTS = 20
+"""Points of the coarse grid for one thickness; it shows bulges, which are as wide as the gel is
+thick."""
+MAX_COARSE = 400
+"""Largest number of points of the coarse grid along a side, which bounds the time of its
+transform."""
+
+
+class DisplacementField:
+    """Normal displacement around one contact, on a fine grid inside a coarse one.
+
+    Between grid points it is a cubic spline, so that slopes are smooth.
+    """
+
+    def __init__(
+        self,
+        place: Footprint,
+        overlap: FloatArray,
+        pressure: FloatArray,
+        elasticity: Elasticity,
+    ) -> None:
+        """Sum what a pressure does.
+
+        Args:
+            place: the grid of the pressure.
+            overlap: (rows, columns) mm, of the place, less what other contacts displace.
+            pressure: (rows, columns) MPa.
+            elasticity: of the gel.
+        """
+        self.place, self._overlap = place, overlap
+        pitch, thickness = place.pitch, place.thickness
+        rows, columns = place.overlap.shape
+        ring = int(np.ceil(RING * min(rows, columns)))
+        shape = rows + 2 * ring, columns + 2 * ring
+        response = grid_response(shape, pitch, thickness, elasticity)
+        fine = response.normal(np.pad(pressure, ring))
+        inside = slice(ring, ring + rows), slice(ring, ring + columns)
+        touching = pressure > 0.0
+        fine[inside][touching] = overlap[touching]
+        x0, y0 = place.x[0] - ring * pitch, place.y[0] - ring * pitch
+        self._fine = _Spline(fine, x0, y0, pitch)
+        self._touching, self._pressure = touching, pressure
+        step = thickness / COARSE_POINTS
+        reach = DECAY * thickness
+        ends = [(g[0] - reach, g[-1] + reach) for g in (place.x, place.y)]
+        step = max(step, pitch, max(b - a for a, b in ends) / MAX_COARSE)
+        counts = [int(np.ceil((b - a) / step)) + 1 for a, b in ends]
+        coarse = _binned(pressure, place, (ends[0][0], ends[1][0]), step, (counts[1], counts[0]))
+        wide = grid_response((counts[1], counts[0]), step, thickness, elasticity)
+        self._coarse = _Spline(wide.normal(coarse), ends[0][0], ends[1][0], step)
+        # What `sideways` needs; it is asked for less often than normal displacements.
+        self._loads = (
+            (response, np.pad(pressure, ring), (x0, y0, pitch)),
+            (wide, coarse, (ends[0][0], ends[1][0], step)),
+        )
+
+    def at(self, x: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Displacement into the gel (mm) at points of the tangent plane, and its slopes by x, y.
+
+        The slope jumps at the edge of a contact; inside, it is that of the indenter.
+        """
+        result = np.zeros((3, len(x)))
+        near = self._fine.holds(x, y)
+        reached = ~near & self._coarse.holds(x, y)
+        for where, spline in ((near, self._fine), (reached, self._coarse)):
+            if where.any():
+                result[:, where] = spline.at(x[where], y[where])
+        inside = self.touching(x, y)
+        if inside.any():
+            column, row = (
+                (values[inside] - start) / self.place.pitch
+                for values, start in ((x, self.place.x[0]), (y, self.place.y[0]))
+            )
+            for k, slope in enumerate(self._indenter_slopes):
+                result[1 + k, inside] = map_coordinates(slope, [row, column], order=1)
+        return result[0], result[1], result[2]
+
+    def sideways(self, x: FloatArray, y: FloatArray) -> FloatArray:
+        """(2, n) mm that points of the tangent plane move along x and y."""
+        result = np.zeros((2, len(x)))
+        (near, near_y), (far, far_y) = self._sideways_splines
+        close = near.holds(x, y)
+        reached = ~close & far.holds(x, y)
+        for where, splines in ((close, (near, near_y)), (reached, (far, far_y))):
+            if where.any():
+                for k, spline in enumerate(splines):
+                    result[k, where] = spline.at(x[where], y[where])[0]
+        return result
+
+    @cached_property
+    def _sideways_splines(self) -> list[tuple[_Spline, _Spline]]:
+        """Splines of the displacements along x and along y on the fine and the coarse grid."""
+        found = []
+        for response, pressure, start in self._loads:
+            along_x, along_y, _ = response.displacement(pressure)
+            found.append((_Spline(along_x, *start), _Spline(along_y, *start)))
+        return found
+
+    def pressure(self, x: FloatArray, y: FloatArray) -> FloatArray:
+        """(n,) MPa at points of the tangent plane."""
+        return self._between(self._pressure, x, y)
+
+    def penetration(self, x: FloatArray, y: FloatArray) -> FloatArray:
+        """(n,) mm that points of the undeformed skin lie inside the indenter, or 0."""
+        return self._between(np.maximum(self.place.overlap, 0.0), x, y)
+
+    def _between(self, values: FloatArray, x: FloatArray, y: FloatArray) -> FloatArray:
+        """Values of the contact's grid, linearly between its points and 0 beside it."""
+        pitch = self.place.pitch
+        column, row = (x - self.place.x[0]) / pitch, (y - self.place.y[0]) / pitch
+        return np.asarray(map_coordinates(values, [row, column], order=1, mode="constant"))
+
+    @cached_property
+    def _indenter_slopes(self) -> tuple[FloatArray, FloatArray]:
+        """(rows, columns) each: slopes of the overlap by x and by y."""
+        by_row, by_column = np.gradient(self._overlap, self.place.pitch)
+        return np.asarray(by_column), np.asarray(by_row)
+
+    def touching(self, x: FloatArray, y: FloatArray) -> NDArray[np.bool_]:
+        """Which points of the tangent plane lie in the contact."""
+        rows, columns, inside = self._cells(x, y)
+        return inside & self._touching[rows, columns]
+
+    def distance(self, x: FloatArray, y: FloatArray) -> FloatArray:
+        """Distance (mm) of points of the tangent plane from the contact, to about a pitch."""
+        rows, columns, _ = self._cells(x, y)
+        beyond = np.hypot(x - self.place.x[columns], y - self.place.y[rows])
+        return self._away[rows, columns] + np.where(beyond > self.place.pitch, beyond, 0.0)
+
+    @cached_property
+    def _away(self) -> FloatArray:
+        return np.asarray(distance_transform_edt(~self._touching)) * self.place.pitch
+
+    def _cells(
+        self, x: FloatArray, y: FloatArray
+    ) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.bool_]]:
+        """Nearest row and column of the pressure's grid, and whether points lie on it."""
+        column = np.round((x - self.place.x[0]) / self.place.pitch).astype(np.int64)
+        row = np.round((y - self.place.y[0]) / self.place.pitch).astype(np.int64)
+        rows, columns = self._touching.shape
+        inside = (row >= 0) & (row < rows) & (column >= 0) & (column < columns)
+        return row.clip(0, rows - 1), column.clip(0, columns - 1), inside
+
+
+class _Spline:
+    """A cubic spline through values on a regular grid."""
+
+    def __init__(self, values: FloatArray, x0: float, y0: float, pitch: float) -> None:
+        self._coefficients = spline_filter(values, order=3, mode="mirror")
+        self._start, self._pitch = (x0, y0), pitch
+        self._shape = values.shape
+
+    def holds(self, x: FloatArray, y: FloatArray) -> NDArray[np.bool_]:
+        column, row = self._place(x, y)
+        rows, columns = self._shape
+        return (column >= 1) & (column <= columns - 2) & (row >= 1) & (row <= rows - 2)
+
+    def at(self, x: FloatArray, y: FloatArray) -> FloatArray:
+        """(3, n): the value, and its slopes by x and y from points half a pitch aside."""
+        column, row = self._place(x, y)
+        half = 0.5
+        rows = np.concatenate([row, row, row, row - half, row + half])
+        columns = np.concatenate([column, column - half, column + half, column, column])
+        values = map_coordinates(
+            self._coefficients, [rows, columns], order=3, mode="mirror", prefilter=False
+        ).reshape(5, -1)
+        return np.stack(
+            [
+                values[0],
+                (values[2] - values[1]) / self._pitch,
+                (values[4] - values[3]) / self._pitch,
+            ]
+        )
+
+    def _place(self, x: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:
+        return (x - self._start[0]) / self._pitch, (y - self._start[1]) / self._pitch
+
+
+@lru_cache(maxsize=24)
+def grid_response(
+    shape: tuple[int, int], pitch: float, thickness: float, elasticity: Elasticity
+) -> GridResponse:
+    """The same object for the same grid and gel; it keeps its kernels (16 bytes a grid point)."""
+    return GridResponse(shape, pitch, thickness, elasticity)
+
+
+def _binned(
+    pressure: FloatArray,
+    place: Footprint,
+    start: tuple[float, float],
+    step: float,
+    shape: tuple[int, int],
+) -> FloatArray:
+    """A pressure on a coarser grid, with the same force and centre, shared out linearly."""
+    column = (place.x - start[0]) / step
+    row = (place.y - start[1]) / step
+    result = np.zeros(shape)
+    share = (place.pitch / step) ** 2
+    for up in (0, 1):
+        for right in (0, 1):
+            rows = np.floor(row).astype(np.int64) + up
+            columns = np.floor(column).astype(np.int64) + right
+            weight_y = np.abs(1 - up - (row - np.floor(row)))
+            weight_x = np.abs(1 - right - (column - np.floor(column)))
+            weights = weight_y[:, None] * weight_x[None, :]
+            np.add.at(result, np.ix_(rows, columns), share * weights * pressure)
+    return result
