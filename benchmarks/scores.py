@@ -25,7 +25,7 @@ from optisense import library
 from optisense.objectives import Evaluation, Press, Score, Settings, evaluate, find
 from optisense.objectives.registry import pixels_read
 from optisense.objectives.rgb2normal import fit, line, signed_angles
-from optisense.objectives.run import run_objective
+from optisense.objectives.scoring import run_objective
 from optisense.optics import OpticalModel
 
 FOLDER = Path(__file__).parent

@@ -74,7 +74,8 @@ def relit_scores(inputs: Plain, folder: Path) -> Found:
     `objectives`, `settings` of the images, `own` settings of the objectives; and, where there are
     `normdiff_variants`, NormDiff with each of these settings.
     """
-    from optisense.objectives.registry import pixels_read, resolve
+    from optisense.objectives.combined import resolve
+    from optisense.objectives.registry import pixels_read
     from optisense.objectives.relighting import Relighting
     from optisense.objectives.run import split_settings
 

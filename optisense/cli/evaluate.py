@@ -70,7 +70,7 @@ def evaluate(
     ) as line:
         line.begin(LOADING)
         from optisense.objectives import BUILT_IN, Settings
-        from optisense.objectives.registry import resolve
+        from optisense.objectives.combined import resolve
         from optisense.objectives.run import split_settings
         from optisense.objectives.usual_score import usual_score
         from optisense.sensors import load
@@ -128,7 +128,8 @@ def _score(
     """Score with one seed, objective by objective, so that Ctrl-C keeps what is finished."""
     from optisense.objectives import Evaluation, Settings
     from optisense.objectives.registry import pixels_read
-    from optisense.objectives.run import run_objective, split_settings
+    from optisense.objectives.run import split_settings
+    from optisense.objectives.scoring import run_objective
 
     shared, own = split_settings(settings, objectives)
     evaluation = Evaluation(model, Settings(**shared), told.images, pixels_read(objectives, own))

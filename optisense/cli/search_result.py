@@ -30,6 +30,7 @@ def summary(result: SearchResult) -> dict[str, Any]:
         "failed": sum(trial.failure is not None for trial in trials),
         "interrupted": result.interrupted,
         "ended": result.ended,
+        "broken": sum(trial.failure is None and not trial.is_feasible for trial in trials),
         "notes": list(result.notes),
         "start": None if start is None else _plain(start),
         "best": None if best is None else _plain(best),
@@ -43,6 +44,7 @@ def _plain(trial: Trial) -> dict[str, Any]:
         "number": trial.number,
         "scores": {name: _or_none(value) for name, value in trial.scores.items()},
         "fresh_scores": fresh,
+        "conditions": dict(trial.conditions),
         "values": trial.values,
     }
 
@@ -57,6 +59,8 @@ def _several(result: SearchResult) -> bool:
 
 def print_result(result: SearchResult, out: Path) -> None:
     """The best trial, what stands beside it, and what to do next."""
+    from optisense.search.study.conditions import kept
+
     study = result.study
     for note in result.notes:
         messages.print(f"note: {note}", markup=False, style="yellow")
@@ -65,14 +69,14 @@ def print_result(result: SearchResult, out: Path) -> None:
     if failed:
         output.print(_failures(failed), markup=False)
     if best is None:
-        output.print("no trial has a score yet")
+        _print_nearest(result.trials)
         return
     name = study.objective
     said = "best so far" if result.interrupted else "best"
     output.print(f"{said}: trial {best.number}, {name} {_headline(best, start)}", markup=False)
     if best.fair_score != best.score:
         output.print(f"  by the search's own seed, by which it was chosen: {best.score:.4g}")
-    for line in _beside(study, best, start):
+    for line in [*_beside(study, best, start), *(f"  {each}" for each in kept(best, start))]:
         output.print(line, markup=False)
     values = list(best.values.items())
     for path, value in values[:MOST_VALUES]:
@@ -86,6 +90,20 @@ def print_result(result: SearchResult, out: Path) -> None:
         output.print("no trial is better than the start")
     elif not result.interrupted:
         output.print(f"Take it:  optisense apply {out} --trial best --out better", style="dim")
+
+
+def _print_nearest(trials: Sequence[Trial]) -> None:
+    """What there is where no trial is the best: the one that comes nearest to the conditions."""
+    from optisense.search.study.best import nearest
+    from optisense.search.study.conditions import kept
+
+    close = nearest(trials)
+    if close is None:
+        output.print("no trial has a score yet")
+        return
+    output.print(f"no best trial; nearest to the conditions: trial {close.number}")
+    for line in kept(close, None):
+        output.print(f"  {line}", markup=False)
 
 
 def _headline(best: Trial, start: Trial | None) -> str:

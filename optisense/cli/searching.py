@@ -114,6 +114,12 @@ def notes(progress: SearchProgress) -> list[str]:
     parts = []
     if math.isfinite(progress.best):
         parts.append(f"best {_score(progress.best)} (start {_score(progress.start)})")
+        if progress.lost:
+            parts.append(f"but {', '.join(progress.lost)}")
+    elif progress.nearest:
+        parts.append(f"no trial meets the conditions yet, nearest: {progress.nearest}")
+    if progress.broken:
+        parts.append(f"{progress.broken} break a condition")
     if progress.failed:
         parts.append(f"{progress.failed} failed")
     if progress.trials_per_hour > 0.0 and progress.stage == "trials":

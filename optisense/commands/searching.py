@@ -27,9 +27,16 @@ class SearchOptions(CommandOptions):
     )
     objectives: Annotated[list[str], Written("NAME", ("--objective", "-b"))] = Field(
         [],
-        description="What to maximise: rgb2normal, normdiff, aoap, 2to3pw, or your own as "
-        "FILE.py:FUNCTION. Given several times, the first is maximised and the others are told, "
-        "or all are weighed by --method pareto.",
+        description="What to maximise: rgb2normal, normdiff, aoap, 2to3pw, another objective, your "
+        "own as FILE.py:FUNCTION, or arithmetic such as 'aoap + 0.5*coverage'. Given several "
+        "times, the first is maximised and the others are told, or all are weighed by --method "
+        "pareto.",
+    )
+    require: Annotated[list[str], Written("CONDITION", ("--require",))] = Field(
+        [],
+        description="A condition that the best design must meet, such as 'coverage>=0.55' or "
+        "'distortion<=1.5': any objective, or one of its numbers as in "
+        "'aoap.coverage_by_area>=0.5'. May be given several times.",
     )
     method: Annotated[str, Written("NAME", usual="cma-es")] | None = Field(
         None, description="How to search; --methods lists them."
@@ -91,6 +98,7 @@ class SearchOptions(CommandOptions):
             goals=self.objectives,
             apart=not self.may_cross,
             errors=errors,
+            requirements=self.require,
             **{name: value for name, value in given.items() if value not in (None, {})},
         )
 
@@ -101,6 +109,7 @@ class SearchOptions(CommandOptions):
             SearchError: something can't be read.
         """
         from optisense.search import SearchSpace
+        from optisense.search.evaluation.requirements import requirements_of
         from optisense.search.space.constraints import UserRule
         from optisense.search.space.text import parse_errors, parse_space
         from optisense.search.study.plan import reference, rule_reference
@@ -111,6 +120,7 @@ class SearchOptions(CommandOptions):
             "rules": [rule_reference(UserRule(text)) for text in self.rules],
             "errors": parse_errors(self.errors).to_plain() if self.errors else None,
             "apart": False if self.may_cross else None,
+            "requirements": [str(each) for each in requirements_of(self.require)],
         }
         for name in ("method", "options", "seed", "settings", "samples"):
             found[name] = getattr(self, name)

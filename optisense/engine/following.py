@@ -179,6 +179,8 @@ class Following:
 
 def _score(row: Row, objective: str) -> float:
     assert row.outcome is not None
+    if not row.outcome.is_feasible:
+        return -math.inf
     score = row.outcome.scores.get(objective, math.nan)
     return score if math.isfinite(score) else -math.inf
 

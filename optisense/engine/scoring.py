@@ -47,6 +47,9 @@ def objectives(session: Session, fields: Fields, job: Job) -> dict[str, Any]:
                 "title": each.title,
                 "summary": each.summary,
                 "settings": each.settings,
+                "unit": each.unit,
+                "lower_is_better": each.lower_is_better,
+                "rays_only": each.rays_only,
             }
         )
     return {"objectives": rows}
@@ -56,8 +59,10 @@ def objectives(session: Session, fields: Fields, job: Job) -> dict[str, Any]:
 def evaluate(session: Session, fields: Evaluate, job: Job) -> dict[str, Any]:
     """Score a design, objective by objective."""
     from optisense.objectives import Evaluation, Settings
-    from optisense.objectives.registry import pixels_read, resolve
-    from optisense.objectives.run import run_objective, split_settings
+    from optisense.objectives.combined import resolve
+    from optisense.objectives.registry import pixels_read
+    from optisense.objectives.run import split_settings
+    from optisense.objectives.scoring import run_objective
 
     files = session.files(fields, job.id)
     with own_objectives():
@@ -105,7 +110,7 @@ def _figure(score: Score, files: Files) -> str | None:
     """Draw a score; None where a user's own drawing fails."""
     from optisense.library.previews import save
 
-    path = files.path(f"{score.objective}.png")
+    path = files.path(f"{score.file_name}.png")
     try:
         save(score.figure(), path)
     except (ValueError, TypeError, KeyError, AttributeError) as error:

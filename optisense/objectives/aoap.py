@@ -10,7 +10,8 @@ import numpy as np
 
 from optisense.errors import ObjectiveError
 from optisense.objectives import figures
-from optisense.objectives.registry import no_pixels, objective
+from optisense.objectives.coverage import triangles_seen
+from optisense.objectives.registry import objective
 from optisense.objectives.settings import refuse_outside
 
 if TYPE_CHECKING:
@@ -34,9 +35,9 @@ def bounds(*, coverage_weight: float) -> tuple[float, float]:
     title="AOAP",
     draw=figures.draw_aoap,
     beside=("coverage",),
-    reads=no_pixels,
     range=bounds,
     needs=f"{LEAST_PIXELS} pixels that see the surface",
+    rays_only=True,
 )
 def aoap(
     evaluation: Evaluation, *, coverage_weight: float = COVERAGE_WEIGHT
@@ -60,8 +61,7 @@ def aoap(
             "surface",
             hint="Use a higher ray_resolution, or check the camera's position and direction",
         )
-    faces = evaluation.sensing_faces
-    seen = np.bincount(rays.face[hit], minlength=faces)[:faces] > 0
+    seen = triangles_seen(evaluation)
     cosine = np.where(hit, np.clip(rays.incidence, 0.0, 1.0), np.float32(0))
     mean_cosine = float(cosine.mean(dtype=np.float64))
     coverage = float(seen.mean())
@@ -74,6 +74,6 @@ def aoap(
         "pixels_that_see_the_surface": float(hit.mean()),
         "pixels": int(hit.size),
         "triangles_seen": int(seen.sum()),
-        "triangles": faces,
+        "triangles": len(seen),
     }
     return mean_cosine + coverage_weight * coverage, parts, {"cosine": cosine, "hit": hit}

@@ -136,6 +136,43 @@ def draw_projection_warping(score: Score) -> Figure:
     return figure
 
 
+def draw_coverage(score: Score) -> Figure:
+    """The pixels that see the sensing surface, and the share of the surface that they see."""
+    hit = score.arrays["hit"]
+    figure = _figure(9, 4.2)
+    picture, shares = figure.subplots(1, 2, width_ratios=[2, 1])
+    picture.imshow(hit, cmap="Blues_r", vmin=0, vmax=1.4, interpolation="nearest")
+    picture.set_xticks([])
+    picture.set_yticks([])
+    picture.set_xlabel("light: the surface is seen; dark: it is not", fontsize=9)
+    names = ("triangles of\nthe surface", "area of\nthe surface", "pixels of\nthe picture")
+    parts = score.parts
+    values = (score.value, parts["by_area"], parts["pixels_that_see_the_surface"])
+    bars = shares.bar(names, [100 * value for value in values], color=DOT)
+    shares.bar_label(bars, fmt="%.1f %%", padding=2)
+    shares.set_ylim(0, 110)
+    shares.set_ylabel("seen (%)")
+    shares.tick_params(labelsize=8)
+    return figure
+
+
+def draw_distortion(score: Score) -> Figure:
+    """How many times as long as wide the footprint of each pixel is."""
+    anisotropy = score.arrays["anisotropy"]
+    known = anisotropy[np.isfinite(anisotropy)]
+    figure = _figure(9, 4.2)
+    picture, histogram = figure.subplots(1, 2, width_ratios=[2, 1])
+    most = max(1.5, float(np.percentile(known, 99)))
+    _map(figure, picture, anisotropy, "length over width of a pixel's footprint", 1.0, most)
+    weights = np.full(len(known), 100 / len(known))
+    histogram.hist(np.clip(known, 1.0, most), bins=50, range=(1.0, most), weights=weights)
+    histogram.axvline(score.value, color=LINE, lw=1.2)
+    histogram.set_xlabel("length over width of a footprint")
+    histogram.set_ylabel("footprints (%)")
+    histogram.set_title(f"geometric mean {score.value:.3g}", fontsize=10)
+    return figure
+
+
 def _map(
     figure: Figure, axes: Axes, values: Any, label: str, lowest: float, highest: float
 ) -> None:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from optisense.errors import ObjectiveError
 from optisense.objectives import figures
-from optisense.objectives.registry import no_pixels, objective
+from optisense.objectives.registry import objective
 from optisense.objectives.settings import refuse_outside
 
 if TYPE_CHECKING:
@@ -50,9 +50,9 @@ class TriangleAreas(NamedTuple):
     title="2to3PW",
     draw=figures.draw_projection_warping,
     beside=("mean_area",),
-    reads=no_pixels,
     range=(0.0, 1.0 / MOST_EVEN),
     needs=f"{LEAST_TRIANGLES} triangles between pixels on the surface",
+    rays_only=True,
 )
 def projection_warping(
     evaluation: Evaluation, *, jump: float = JUMP
@@ -110,8 +110,8 @@ def triangle_areas(
     whole = np.stack(
         [corner[0] & corner[1] & corner[2], corner[1] & corner[2] & corner[3]], axis=-1
     )
-    leap_right = _leaps(right, hit[:, 1:] & hit[:, :-1], 1, jump)
-    leap_down = _leaps(down, hit[1:] & hit[:-1], 0, jump)
+    leap_right = leaping_edges(right, hit[:, 1:] & hit[:, :-1], 1, jump)
+    leap_down = leaping_edges(down, hit[1:] & hit[:-1], 0, jump)
     leaps = whole & np.stack(
         [leap_right[:-1] | leap_down[:, :-1], leap_right[1:] | leap_down[:, 1:]], axis=-1
     )
@@ -133,10 +133,17 @@ def _half_cross(a: list[NDArray[np.float32]], b: list[NDArray[np.float32]]) -> N
     return half
 
 
-def _leaps(
+def leaping_edges(
     edges: list[NDArray[np.float32]], there: NDArray[np.bool_], axis: int, jump: float
 ) -> NDArray[np.bool_]:
-    """Edges much longer than both their neighbours along an axis (those that exist)."""
+    """(h, w) whether edges are much longer than both their neighbours along an axis.
+
+    Args:
+        edges: x, y and z (h, w) of the edges, mm.
+        there: (h, w), whether both ends of the edge lie on the surface.
+        axis: of the pixels along which the edges run.
+        jump: see `JUMP`.
+    """
     square = edges[0] ** 2 + edges[1] ** 2 + edges[2] ** 2
     square[~there] = np.nan
     lines = np.moveaxis(square, axis, 0)

@@ -28,9 +28,24 @@ ENTRY_POINTS = "optisense.objectives"
 """Installed packages add objectives under this group: name = "module:function"."""
 
 BUILT_IN = ("rgb2normal", "normdiff", "aoap", "2to3pw")
+"""The four objectives of the OptiSense paper."""
 
-RAYS_ONLY = frozenset({"aoap", "2to3pw"})
-"""Objectives that trace chief rays and need no light."""
+FURTHER = ("coverage", "distortion")
+"""Objectives of this package beside the paper's."""
+
+CONDITIONS, WATCHED = "conditions", "watched"
+"""Names under which the store of a study keeps the conditions of its trials, and other scores that
+are watched, beside the parts of each objective; no objective may have them."""
+
+_MODULES = (
+    "rgb2normal",
+    "normdiff",
+    "aoap",
+    "projection_warping",
+    "coverage",
+    "distortion",
+)
+"""Modules of this package that register objectives."""
 
 UNBOUNDED = (-math.inf, math.inf)
 
@@ -57,6 +72,10 @@ class Objective:
             (keyword arguments) that returns both; a value outside is no score.
         needs: the least evidence that it scores by, in words, beside what every score needs
             (`Settings.least_skin` and `Settings.least_picture`).
+        unit: of the value, such as "mm"; empty for a plain number.
+        lower_is_better: a lower value is better, as of an error. A search maximises the negative
+            value of such an objective.
+        rays_only: it traces chief rays and needs no light.
     """
 
     name: str
@@ -67,6 +86,9 @@ class Objective:
     reads: Callable[..., Any] | None = None
     range: Range = UNBOUNDED
     needs: str = ""
+    unit: str = ""
+    lower_is_better: bool = False
+    rays_only: bool = False
 
     def __call__(self, evaluation: Evaluation, **settings: Any) -> Any:
         """Call the function itself, without any checks of what it returns."""
@@ -120,8 +142,11 @@ def objective(
     reads: Callable[..., Any] | None = None,
     range: Range = UNBOUNDED,
     needs: str = "",
+    unit: str = "",
+    lower_is_better: bool = False,
+    rays_only: bool = False,
 ) -> Callable[[_F], _F]:
-    """Register a function as an objective; higher values must be better.
+    """Register a function as an objective.
 
     Args:
         name: lower case; may not be taken.
@@ -131,13 +156,28 @@ def objective(
         reads: which pixels of a press are read, if not all one by one (see `Objective`).
         range: the lowest and the highest value, as of `Objective`; any number if left out.
         needs: the least evidence that it scores by, in words.
+        unit: of the value.
+        lower_is_better: a lower value is better; a higher one if left out.
+        rays_only: it traces chief rays and needs no light.
 
     Raises:
         ObjectiveError: the name is taken or malformed, or the function takes no evaluation.
     """
 
     def register(function: _F) -> _F:
-        given = Objective(name, function, title or name, draw, beside, reads, range, needs)
+        given = Objective(
+            name,
+            function,
+            title or name,
+            draw,
+            beside,
+            no_pixels if rays_only and reads is None else reads,
+            range,
+            needs,
+            unit,
+            lower_is_better,
+            rays_only,
+        )
         _register(given)
         return function
 
@@ -193,10 +233,11 @@ def find(name: str) -> Objective:
 
 
 def names() -> list[str]:
-    """All objectives that can be named: built-in ones first, then others."""
+    """All objectives that can be named: the paper's, further ones of this package, then others."""
     _load_built_in()
     offered = [point.name for point in entry_points(group=ENTRY_POINTS)]
-    return [*BUILT_IN, *sorted({*_registry, *offered} - set(BUILT_IN))]
+    own = (*BUILT_IN, *FURTHER)
+    return [*own, *sorted({*_registry, *offered} - set(own))]
 
 
 @contextmanager
@@ -271,10 +312,15 @@ def _from_entry_point(name: str, point: Any) -> Objective:
 
 
 def _register(new: Objective) -> Objective:
-    if new.name != new.name.strip().lower() or not new.name or ":" in new.name:
+    if (
+        new.name != new.name.strip().lower()
+        or not new.name
+        or new.name in (CONDITIONS, WATCHED)
+        or any(sign in new.name for sign in ":'\"")
+    ):
         raise ObjectiveError(
             f"'{new.name}' can't be the name of an objective",
-            hint="Use lower case, without colons or spaces around it",
+            hint="Use lower case, without colons, quotes or spaces around it",
         )
     try:
         parameters = list(inspect.signature(new.function).parameters.values())
@@ -292,7 +338,9 @@ def _register(new: Objective) -> Objective:
     old = _registry.get(new.name)
     # The same function again is a cell or file that was run once more, and replaces itself.
     if (old is not None and _home(old.function) != _home(new.function)) or (
-        old is None and new.name in BUILT_IN and not new.function.__module__.startswith(__package__)
+        old is None
+        and new.name in (*BUILT_IN, *FURTHER)
+        and not new.function.__module__.startswith(__package__)
     ):
         raise ObjectiveError(
             f"there is already an objective '{new.name}'",
@@ -310,21 +358,5 @@ def _home(function: Callable[..., Any]) -> str:
 
 
 def _load_built_in() -> None:
-    for module in ("rgb2normal", "normdiff", "aoap", "projection_warping"):
+    for module in _MODULES:
         import_module(f"optisense.objectives.{module}")
-
-
-def resolve(wanted: str | Objective | Iterable[str | Objective]) -> list[Objective]:
-    """Objectives by name, keeping those that are objectives already.
-
-    Raises:
-        ObjectiveError: one is unknown, or named twice.
-    """
-    several = [wanted] if isinstance(wanted, str | Objective) else list(wanted)
-    found = [each if isinstance(each, Objective) else find(each) for each in several]
-    seen: set[str] = set()
-    for each in found:
-        if each.name in seen:
-            raise ObjectiveError(f"the objective '{each.name}' is named twice")
-        seen.add(each.name)
-    return found

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
@@ -26,7 +27,7 @@ Drawing = Callable[["Score"], "Figure"]
 
 @dataclass(frozen=True)
 class Score:
-    """The result of one objective; higher is better.
+    """The result of one objective.
 
     Attributes:
         objective: name in the registry.
@@ -38,6 +39,8 @@ class Score:
         arrays: what the figure is drawn from; not part of `to_dict`.
         draw: makes the figure.
         shown: names of parts to show beside the value wherever it stands.
+        unit: of the value; empty for a plain number.
+        lower_is_better: a lower value is better, as of an error.
     """
 
     objective: str
@@ -49,11 +52,18 @@ class Score:
     arrays: Mapping[str, Any] = field(default_factory=dict, repr=False, compare=False)
     draw: Drawing | None = field(default=None, repr=False, compare=False)
     shown: tuple[str, ...] = ()
+    unit: str = ""
+    lower_is_better: bool = False
 
     @property
     def name(self) -> str:
         """The title, or the registry's name where there is none."""
         return self.title or self.objective
+
+    @property
+    def file_name(self) -> str:
+        """The objective's name with the characters that file names can't have as dashes."""
+        return re.sub(r"[^\w.+-]+", "-", self.objective).strip("-.") or "score"
 
     @property
     def beside(self) -> str:
@@ -77,6 +87,8 @@ class Score:
         return {
             "objective": self.objective,
             "title": self.name,
+            "unit": self.unit,
+            "lower_is_better": self.lower_is_better,
             "value": json_ready(self.value),
             "failure": self.failure,
             "seconds": round(self.seconds, 4),

@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 from optisense.design import SensorDesign
-from optisense.objectives.registry import RAYS_ONLY
+from optisense.objectives.combined import are_rays_only, named_in
 from optisense.objectives.settings import Settings, size_for
 from optisense.quality import SCORE_PHOTONS, photons_of
 from optisense.usual_times import LOADING, UsualTimes
@@ -139,12 +139,12 @@ class UsualTrials:
 
 def usual_score(design: SensorDesign, names: Iterable[str], settings: Settings) -> UsualScore:
     """What scores of a sensor usually take, by objectives of these names, on this machine now."""
-    wanted = list(names)
+    wanted = named_in(names)
     times = UsualTimes.here(design.sensing_area, len(design.lights))
     judging = sum(JUDGING.get(name, OWN_JUDGING) for name in wanted) * times.pace
     building = REBUILDING * times.thread_pace
     loading = 0.6 * LOADING * times.thread_pace
-    if set(wanted) <= RAYS_ONLY:
+    if are_rays_only(wanted):
         starting = times.preparing() + building
         return UsualScore(starting, loading, building, 0.0, 0.0, judging * times.light)
     width, height = settings.resolution or size_for(design.camera.resolution)

@@ -23,7 +23,8 @@ from optisense.report.files import page
 from optisense.report.pictures import MOST_STRETCHED, data_uri, stretching_colours
 from optisense.report.tolerance import shown_size
 from optisense.search.methods import find
-from optisense.search.study.best import best_of
+from optisense.search.study.best import best_of, nearest
+from optisense.search.study.conditions import condition_note, lost_note
 from optisense.search.study.study import Study, front_among
 from optisense.search.study.trial import Trial
 from optisense.writing import write_text
@@ -93,6 +94,10 @@ def render_study(study: Study, looks: Mapping[str, Look] | None = None) -> str:
         sides=_sides(study, best, looks),
         overlay=_overlay(study, best),
         scores=tables.scores(study, start, best),
+        conditions=tables.conditions(study, start, best or nearest(trials)),
+        warnings=[
+            note for note in (condition_note(trials), lost_note(best, start)) if note is not None
+        ],
         no_fresh=tables.why_no_fresh(study, trials),
         rays=tables.ray_figures(*figures) if moves_rays(study) else None,
         worse=tables.got_worse(*figures),
@@ -122,7 +127,11 @@ def moves_rays(study: Study) -> bool:
 
 
 def _best_by(trials: Sequence[Trial], name: str) -> Trial | None:
-    fine = [trial for trial in trials if math.isfinite(trial.scores.get(name, math.nan))]
+    fine = [
+        trial
+        for trial in trials
+        if trial.is_feasible and math.isfinite(trial.scores.get(name, math.nan))
+    ]
     return max(fine, key=lambda trial: trial.scores[name], default=None)
 
 
@@ -134,6 +143,9 @@ def _headline(study: Study, trials: Sequence[Trial], best: Trial | None) -> list
     failed = sum(trial.failure is not None for trial in trials)
     if failed:
         facts.append(("failed", f"{failed:,}"))
+    broken = sum(trial.failure is None and not trial.is_feasible for trial in trials)
+    if broken:
+        facts.append(("break a condition", f"{broken:,}"))
     facts += [("parameters", f"{study.space.size:,}"), ("seed", str(settings.seed))]
     spent = sum(trial.outcome.seconds for trial in trials)
     facts.append(("computing time", f"{spent:,.0f} s" if spent >= 10 else f"{spent:.2g} s"))

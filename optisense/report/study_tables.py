@@ -11,6 +11,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from optisense.report.before_after import RayFigures
+from optisense.search.evaluation.outcome import rank_of
+from optisense.search.evaluation.requirements import Requirement
 from optisense.search.study.failures import by_cause
 from optisense.search.study.study import Study, beside
 from optisense.search.study.trial import Trial
@@ -72,6 +74,27 @@ def scores(study: Study, start: Trial | None, best: Trial | None) -> Table:
             rows.append([name.replace("_", " "), *cells, NONE, NONE])
     heads = ["", "before", "after", "before, fresh seeds", "after, fresh seeds"]
     return Table(heads, rows).without_empty_columns()
+
+
+def conditions(study: Study, start: Trial | None, best: Trial | None) -> Table | None:
+    """Each condition with the value before and after, and the margin of the best; None if there
+    are none.
+    """
+    rows = []
+    for text in study.settings.requirements:
+        wanted = Requirement.parse(text)
+        values = [
+            math.nan if trial is None else _or_nan(trial.conditions.get(text))
+            for trial in (start, best)
+        ]
+        margin = wanted.margin(values[1])
+        told = "broken" if margin < 0.0 and wanted.breach(values[1]) else number(margin)
+        rows.append([str(wanted), *map(number, values), told])
+    return Table(["", "before", "after", "margin"], rows) if rows else None
+
+
+def _or_nan(value: float | None) -> float:
+    return math.nan if value is None else value
 
 
 def fresh(trial: Trial, name: str) -> str:
@@ -168,18 +191,24 @@ def changes(
 
 def trials(study: Study, found: Sequence[Trial], columns: Sequence[int]) -> Table:
     """The best trials, with the parameters that matter most."""
-    fine = sorted(
-        (trial for trial in found if math.isfinite(trial.score)), key=lambda trial: -trial.score
-    )
+    scored = (trial for trial in found if math.isfinite(trial.score))
+    fine = sorted(scored, key=lambda trial: rank_of(trial.outcome, study.objective), reverse=True)
     rows = []
     for trial in fine[:MOST_TRIALS]:
         values = list(trial.values.values())
         name = f"{trial.number} (start)" if trial.is_start else str(trial.number)
         row = [name, *(number(trial.scores[each]) for each in study.settings.names)]
         row.append(fresh(trial, study.objective))
+        row.append("" if trial.is_feasible else "broken")
         rows.append([*row, *(value_text(values[column]) for column in columns)])
     paths = [study.space.names[column] for column in columns]
-    heads = ["trial", *study.settings.names, f"{study.objective}, fresh seeds", *paths]
+    heads = [
+        "trial",
+        *study.settings.names,
+        f"{study.objective}, fresh seeds",
+        "conditions",
+        *paths,
+    ]
     return Table(heads, rows).without_empty_columns()
 
 
@@ -199,6 +228,8 @@ def settings(study: Study) -> list[tuple[str, str]]:
     rows = [("varied", "; ".join(f"{path}: {_plain(v)}" for path, v in known.space.items()))]
     rows += [(f"option {key}", _plain(value)) for key, value in known.options.items()]
     rows += [(f"setting {key}", _plain(value)) for key, value in known.settings.items()]
+    if known.requirements:
+        rows.append(("conditions", ", ".join(known.requirements)))
     if known.rules:
         rows.append(("rules", ", ".join(known.rules)))
     ended = study.store.fact("ended")

@@ -44,6 +44,7 @@ def search(
     settings: Mapping[str, Any] | None = None,
     errors: ManufacturingErrors | Mapping[str, ToleranceDistribution | float] | None = None,
     samples: int = SAMPLES,
+    require: str | Sequence[str] = (),
     apart: bool = True,
     variant: str = "auto",
     progress: SearchProgressCallback | None = None,
@@ -57,9 +58,10 @@ def search(
     Args:
         design: where the search starts.
         space: what may change.
-        objective: what to maximise: a name, an `Objective`, or a function of a design that
-            returns a number. Several: the first is maximised and the others are told, or, with
-            the method "pareto", all are weighed against each other.
+        objective: what to maximise: a name, arithmetic such as "aoap + 0.5*coverage", an
+            `Objective`, or a function of a design that returns a number. Several: the first is
+            maximised and the others are told, or, with the method "pareto", all are weighed against
+            each other.
         method: "cma-es", "grid", "random", "types", "pareto", ... (see docs/search.md).
         budget: number of trials; the method's own idea if None.
         seed: of the method and of every trial.
@@ -72,6 +74,7 @@ def search(
         settings: of the objectives, as of `optisense.evaluate`.
         errors: of making: P10 over manufactured sensors is maximised instead of the plain score.
         samples: manufactured sensors a trial.
+        require: conditions that the best design must meet, such as "coverage >= 0.55".
         apart: whether parts must not cut through one another, nor leave those on which they rest.
         variant: of the renderer: "auto", "llvm" or "cuda".
         progress: called now and then.
@@ -99,6 +102,7 @@ def search(
         apart=apart,
         errors=making,
         samples=samples,
+        requirements=[require] if isinstance(require, str) else list(require),
     )
     if resume:
         if out is None:

@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from optisense.objectives import BUILT_IN, names, registry
+from optisense.objectives.registry import FURTHER
 from optisense.objectives.testing import ObjectiveContract
 
 OWN = '''
@@ -36,6 +37,14 @@ class TestAoap(ObjectiveContract):
 
 class TestProjectionWarping(ObjectiveContract):
     objective = "2to3pw"
+
+
+class TestCoverage(ObjectiveContract):
+    objective = "coverage"
+
+
+class TestDistortion(ObjectiveContract):
+    objective = "distortion"
 
 
 class TestFromAFile(ObjectiveContract):
@@ -74,5 +83,5 @@ def test_no_objective_of_the_package_goes_without_the_contract() -> None:
         for each in ObjectiveContract.__subclasses__()
         if isinstance(getattr(each, "objective", None), str)
     }
-    own = {name for name in names() if name in BUILT_IN}
+    own = {*BUILT_IN, *FURTHER} & {*names()}
     assert own <= tested

@@ -1,4 +1,4 @@
-"""AOAP and 2to3PW of pinholes and planes against integrals."""
+"""AOAP, 2to3PW, coverage and distortion of pinholes and planes against integrals."""
 
 from __future__ import annotations
 
@@ -12,6 +12,8 @@ from optisense.errors import ObjectiveError
 from optisense.geometry import TriangleMesh
 from optisense.objectives import Evaluation
 from optisense.objectives.aoap import aoap
+from optisense.objectives.coverage import coverage
+from optisense.objectives.distortion import distortion, footprints
 from optisense.objectives.projection_warping import projection_warping, triangle_areas
 from optisense.optics.camera.projection import RayCamera
 from optisense.optics.scene.ray_scene import Piece, RayScene
@@ -203,3 +205,63 @@ def test_a_sensor_that_sees_nothing_has_a_reason() -> None:
     for objective in (aoap, projection_warping):
         with pytest.raises(ObjectiveError, match=r"^0 of the 100 .* it needs"):
             objective(evaluation(plate(), nothing))
+
+
+def test_an_upright_view_has_no_distortion() -> None:
+    value, parts, _ = distortion(evaluation(plate()))
+    assert value == pytest.approx(1.0, abs=1e-4)
+    assert parts["area_variation"] == pytest.approx(0.0, abs=1e-3)
+
+
+@pytest.mark.parametrize("tilt", [15.0, 40.0])
+def test_distortion_of_a_tilted_plate_is_that_of_the_projection(tilt: float) -> None:
+    """The singular values of the derivative of where a pixel's ray meets the plane."""
+    tilted = plate(size=100.0, tilt=tilt)
+    value, parts, _ = distortion(evaluation(tilted))
+    normal = tilted.face_normals[0]
+    pixel = 2 * SLOPE / PIXELS[0]
+
+    def meets(x: Any, y: Any) -> Any:
+        direction = np.stack([x, y, -np.ones_like(x)], axis=-1)
+        origin = np.array([0.0, 0.0, DISTANCE])
+        return direction * (-(origin @ normal) / (direction @ normal))[..., None]
+
+    x = (np.arange(1, PIXELS[0]) - PIXELS[0] / 2) * pixel
+    y = (np.arange(1, PIXELS[1]) - PIXELS[1] / 2) * pixel
+    x, y = np.meshgrid(x, y)
+    h = 1e-5
+    along_x = (meets(x + h, y) - meets(x - h, y)) / (2 * h)
+    along_y = (meets(x, y + h) - meets(x, y - h)) / (2 * h)
+    sizes = np.linalg.svd(np.stack([along_x, along_y], axis=-1), compute_uv=False)
+    expected = np.exp(np.log(sizes[..., 0] / sizes[..., 1]).mean())
+    assert value == pytest.approx(expected, rel=1e-3)
+    area = sizes.prod(axis=-1)
+    assert parts["area_variation"] == pytest.approx(area.std() / area.mean(), rel=0.01)
+    assert parts["mean_length"] == pytest.approx(sizes[..., 0].mean() * pixel, rel=0.01)
+
+
+def test_footprints_that_leap_over_a_gap_are_left_out() -> None:
+    left = TriangleMesh.grid((10.0, 40.0), (2, 8))
+    lower = TriangleMesh.grid((10.0, 40.0), (2, 8))
+    both = TriangleMesh(
+        np.concatenate([left.vertices + [-5.0, 0, 0], lower.vertices + [5.0, 0, -8.0]]),
+        np.concatenate([left.faces, lower.faces + len(left.vertices)]),
+    )
+    rays = evaluation(both).judged_rays
+    long, wide = footprints(rays.points, rays.hit)
+    known = np.isfinite(long)
+    assert 0 < np.count_nonzero(~known) < 4 * PIXELS[1]
+    assert (long[known] / wide[known]).max() < 1.1
+
+
+def test_too_few_footprints_are_no_score() -> None:
+    with pytest.raises(ObjectiveError, match="of the 100 footprints"):
+        distortion(evaluation(plate(size=0.5, divisions=1)))
+
+
+def test_coverage_is_that_of_aoap() -> None:
+    view = evaluation(plate(size=20))
+    value, parts, _ = coverage(view)
+    assert value == aoap(view)[1]["coverage"]
+    # The picture sees 11.55 mm x 8.66 mm of the plate.
+    assert parts["by_area"] * 400.0 == pytest.approx(12 * 10, abs=4)

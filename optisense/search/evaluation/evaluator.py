@@ -15,13 +15,16 @@ from numpy.typing import NDArray
 from optisense.design import Role, SensorDesign
 from optisense.errors import OptiSenseError, SearchError, SetupError
 from optisense.objectives import Objective, Score, Settings, evaluate
+from optisense.objectives.combined import goal_of
 from optisense.objectives.evaluation import ProgressCallback
 from optisense.objectives.files import place_of
-from optisense.objectives.registry import resolve
+from optisense.objectives.registry import CONDITIONS, FURTHER, WATCHED, find
 from optisense.objectives.run import split_settings
+from optisense.objectives.score import json_ready
 from optisense.objectives.usual_score import UsualScore, UsualTrials, usual_score
 from optisense.search.evaluation.models import ModelKeeper
 from optisense.search.evaluation.outcome import Outcome
+from optisense.search.evaluation.requirements import requirements_of
 from optisense.search.evaluation.views import SameMirrors, least_skin, may_change_view
 from optisense.search.space.buildable import (
     BentPartsRest,
@@ -47,6 +50,12 @@ RELIT = re.compile(r"^lights\..*\.(flux|colour)(\W|$)")
 """Parameters that change how light of a group counts, and no ray."""
 
 
+WATCHES = FURTHER
+"""Objectives by rays that are scored with every trial where the view may change, so that a search
+can say that it wins its score by seeing less, or by seeing the skin distorted. They take a tenth of
+the time of AOAP."""
+
+
 class Evaluator(Protocol):
     """What workers call: made once a worker (it must pickle), then asked for many points."""
 
@@ -64,6 +73,7 @@ class DesignEvaluator:
         space: with the design.
         goals: objectives by name, `Objective`s, or functions of the design.
         settings: of the objectives (see `optisense.evaluate`).
+        requirements: conditions that are measured beside the goals.
         constraints: designs that they forbid are not scored.
         kept: what a point of the space must keep of the design; manufacturing errors may not.
         renders: whether the renderer is needed at all.
@@ -76,6 +86,7 @@ class DesignEvaluator:
         goals: Sequence[Goal],
         settings: Mapping[str, Any] | None = None,
         *,
+        requirements: Sequence[str] = (),
         apart: bool | None = None,
         keeps: bool = True,
         variant: str = "auto",
@@ -86,6 +97,7 @@ class DesignEvaluator:
             space: a bound space.
             goals: one or more; the first is what single-goal methods search for.
             settings: of the objectives.
+            requirements: conditions as texts, such as "coverage >= 0.55".
             apart: whether parts must not cut through one another, nor leave those that they rest
                 on; only looked at where surfaces move, which is also the default.
             keeps: whether points must keep what the design begins with, see `kept`; not where the
@@ -93,7 +105,7 @@ class DesignEvaluator:
             variant: of the renderer.
 
         Raises:
-            SearchError: there is no goal, or two of one name.
+            SearchError: there is no goal, two of one name, or a condition can't be read.
             ObjectiveError: an objective or a setting is unknown.
         """
         self.space = space
@@ -104,6 +116,7 @@ class DesignEvaluator:
             raise SearchError("there is nothing to search for", hint="Name an objective")
         if len(set(self.names)) < len(self.names):
             raise SearchError(f"an objective is named twice: {', '.join(self.names)}")
+        self.requirements = requirements_of(requirements)
         self._functions: dict[str, DesignFunction] = {}
         self._objectives: list[str | Objective] = []
         for name, goal in zip(self.names, self.goals, strict=True):
@@ -118,12 +131,14 @@ class DesignEvaluator:
             self.constraints.append(Unfolded(space.design))
         self.keeper = ModelKeeper(variant)
         self._resolved: list[Objective] | None = None
-        self.renders = bool(self._objectives)
+        self._needed: list[Objective] | None = None
+        self.renders = bool(self._objectives or self.requirements)
         self.kept: list[Constraint] = []
         if keeps:
             self._keep(apart is None or apart)
         self._asks_view = keeps and self.renders and may_change_view(space.names)
         self._least_skin: float | None = None
+        self._watches = keeps and self.renders and may_change_view(space.names)
         self.variant = variant
         self._progress: ProgressCallback | None = None
         self._check_settings()
@@ -173,7 +188,7 @@ class DesignEvaluator:
 
     def usual_score(self) -> UsualScore | None:
         """What scores usually take; None where only functions of the design are wanted."""
-        if not self._objectives:
+        if not self.renders:
             return None
         shared, _ = split_settings(self.settings, self._ready())
         names = [each.name for each in self._ready()]
@@ -217,12 +232,21 @@ class DesignEvaluator:
                 failures.append(f"{name} returned {value}, which is no score")
                 value = math.nan
             scores[name] = value
-        if self._objectives:
+        if self.renders:
             found = self.objective_scores(design, seed)
+            needed = {each.name for each in self._wanted()}
             for name, score in found.items():
-                scores[name], parts[name] = score.value, score.to_dict()["parts"]
-                if score.failure is not None:
-                    failures.append(f"{name}: {score.failure}" if len(found) > 1 else score.failure)
+                if name in scores:
+                    scores[name], parts[name] = score.value, score.to_dict()["parts"]
+            failures += _failures([found[name] for name in found if name in needed])
+            watched = {each: found[each].value for each in found if each in WATCHES}
+            if self._watches and all(map(math.isfinite, watched.values())):
+                parts[WATCHED] = watched
+            if self.requirements:
+                parts[CONDITIONS] = {
+                    str(each): json_ready(found[each.objective().name].value)
+                    for each in self.requirements
+                }
         return scores, parts, failures
 
     def _keep(self, apart: bool) -> None:
@@ -241,16 +265,28 @@ class DesignEvaluator:
             self.kept.append(SameMirrors(design, self.keeper))
 
     def _ready(self) -> list[Objective]:
-        """The objectives; a user's file is run once a process and not once a trial."""
+        """The objectives of goals and conditions, and those that are watched, each once.
+
+        A user's file is run once a process and not once a trial.
+        """
         if self._resolved is None:
-            self._resolved = resolve(self._objectives)
+            watched = [find(name) for name in WATCHES] if self._watches else []
+            every = [*self._wanted(), *watched]
+            self._resolved = list({each.name: each for each in every}.values())
         return self._resolved
 
+    def _wanted(self) -> list[Objective]:
+        """The objectives of goals and conditions."""
+        if self._needed is None:
+            goals = [goal_of(each) for each in self._objectives]
+            self._needed = [*goals, *(each.objective() for each in self.requirements)]
+        return self._needed
+
     def __getstate__(self) -> dict[str, object]:
-        return {**self.__dict__, "_resolved": None, "_progress": None}
+        return {**self.__dict__, "_resolved": None, "_needed": None, "_progress": None}
 
     def _check_settings(self) -> None:
-        if not self._objectives:
+        if not self.renders:
             if self.settings:
                 raise SearchError("a function of the design takes no settings")
             return
@@ -258,6 +294,17 @@ class DesignEvaluator:
             raise SearchError("the seed belongs to the study", hint="Give it as --seed")
         shared, _ = split_settings(self.settings, self._ready())
         Settings(**shared)
+
+
+def _failures(scores: Sequence[Score]) -> list[str]:
+    """Why scores are missing, each reason once with the objectives that give it."""
+    reasons: dict[str, list[str]] = {}
+    for score in scores:
+        if score.failure is not None:
+            reasons.setdefault(score.failure, []).append(score.objective)
+    if len(reasons) == 1 and all(score.failure is not None for score in scores):
+        return list(reasons)
+    return [f"{', '.join(names)}: {reason}" for reason, names in reasons.items()]
 
 
 def moved_parts(space: BoundSpace) -> set[str]:
@@ -273,7 +320,7 @@ def goal_name(goal: Goal) -> str:
         ObjectiveError: there is no such objective; names the near match.
     """
     if isinstance(goal, str | Objective):
-        return resolve(goal)[0].name
+        return goal_of(goal).name
     return getattr(goal, "__name__", type(goal).__name__)
 
 

@@ -23,6 +23,7 @@ from optisense.search.evaluation.outcome import Outcome
 from optisense.search.space.search_space import BoundSpace
 
 FloatArray = NDArray[np.float64]
+BoolArray = NDArray[np.bool_]
 
 
 @dataclass(frozen=True)
@@ -32,6 +33,7 @@ class Problem:
     Attributes:
         space: the points it may propose.
         objectives: names of the goals; methods for one goal maximise the first.
+        requirements: conditions that the best design must meet, as texts.
         budget: how many trials there may be; a method need not use them all.
         seed: of its random numbers.
     """
@@ -40,6 +42,7 @@ class Problem:
     objectives: tuple[str, ...]
     budget: int
     seed: int = 0
+    requirements: tuple[str, ...] = ()
 
     def random(self, name: str) -> np.random.Generator:
         """Random numbers of a method's own."""
@@ -101,13 +104,29 @@ class Method(ABC):
 
 
 def values_to_maximise(outcomes: Sequence[Outcome], objective: str) -> FloatArray:
-    """(k,) scores; failed trials count a little less than the worst that did not fail.
+    """(k,) values of a generation in the order of `rank_of`.
 
-    NaN for all if all failed.
+    Trials that meet all conditions have their scores. Those that break one follow below the worst
+    of these, the farther the more they break it, and failed ones are the last. NaN for all if all
+    failed.
     """
     values = np.array([outcome.scores.get(objective, np.nan) for outcome in outcomes])
     failed = ~np.isfinite(values)
-    if failed.any() and not failed.all():
-        worst, best = values[~failed].min(), values[~failed].max()
-        values[failed] = worst - max(best - worst, 1e-3 * abs(worst), 1e-9)
+    broken = np.array([outcome.breach for outcome in outcomes])
+    _put_below(values, ~failed & (broken > 0.0), ~failed & (broken == 0.0), broken)
+    _put_below(values, failed, ~failed, np.zeros(len(values)))
     return values
+
+
+def _put_below(values: FloatArray, lower: BoolArray, upper: BoolArray, amounts: FloatArray) -> None:
+    """Give some values (k,) new ones below some others, which are kept, by falling amounts (k,)."""
+    if not lower.any():
+        return
+    if not upper.any():
+        if amounts[lower].any():
+            values[lower] = -amounts[lower]
+        return
+    worst, best = values[upper].min(), values[upper].max()
+    step = max(best - worst, 1e-3 * abs(worst), 1e-9)
+    most = amounts[lower].max()
+    values[lower] = worst - step * (1.0 + (amounts[lower] / most if most > 0.0 else 0.0))

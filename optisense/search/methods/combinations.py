@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 from optisense.errors import SearchError
-from optisense.search.evaluation.outcome import Outcome
-from optisense.search.methods.base import FloatArray, Method, Problem, values_to_maximise
+from optisense.search.evaluation.outcome import FAILED, Outcome, Rank, rank_of
+from optisense.search.methods.base import FloatArray, Method, Problem
 from optisense.search.space.search_space import BoundSpace
 
 Combination = tuple[int, ...]
@@ -38,7 +38,7 @@ class Combinations(Method):
         self.size = 1
         for each in self.levels:
             self.size *= len(each)
-        self._known: dict[Combination, float] = {}
+        self._known: dict[Combination, Rank] = {}
         self._asked: list[Combination] = []
         self._left = problem.budget
         self._random = problem.random(self.name)
@@ -68,9 +68,9 @@ class Combinations(Method):
 
     def tell(self, vectors: FloatArray, outcomes: Sequence[Outcome]) -> None:
         """Remember what each combination gave; failed ones count least."""
-        values = values_to_maximise(outcomes, self.problem.objectives[0])
-        for key, outcome, value in zip(self._asked, outcomes, values, strict=True):
-            self._known[key] = -np.inf if outcome.failed else float(value)
+        for key, outcome in zip(self._asked, outcomes, strict=True):
+            rank = rank_of(outcome, self.problem.objectives[0])
+            self._known[key] = FAILED if outcome.failed else rank
 
     def describe(self) -> dict[str, Any]:
         """Which stage it is in."""
@@ -102,8 +102,8 @@ class Combinations(Method):
                 if level != here[members[0]]
             ]
             yield stage, near
-            best = max(near, key=lambda each: self._known.get(each, -np.inf))
-            if self._known.get(best, -np.inf) <= self._known.get(here, -np.inf):
+            best = max(near, key=lambda each: self._known.get(each, FAILED))
+            if self._known.get(best, FAILED) <= self._known.get(here, FAILED):
                 return
             here = best
 

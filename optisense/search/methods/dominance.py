@@ -8,17 +8,26 @@ from numpy.typing import ArrayLike, NDArray
 FloatArray = NDArray[np.float64]
 
 
-def dominates(values: ArrayLike) -> NDArray[np.bool_]:
+def dominates(values: ArrayLike, broken: ArrayLike | None = None) -> NDArray[np.bool_]:
     """(k, k): whether i is at least as good as j in all goals and better in one; higher is better.
+
+    Where conditions are broken this is constrained domination (Deb et al., 2002, section VI): what
+    breaks them less dominates what breaks them more.
 
     Args:
         values: (k, m), NaN where a trial failed: dominated by all that did not.
+        broken: (k,) how far each breaks its conditions, 0 where it meets them; all do if None.
     """
     given = np.asarray(values, dtype=np.float64)
     known = np.where(_fine(given)[:, None], given, -np.inf)
     never_worse = (known[:, None] >= known[None]).all(axis=2)
     better = (known[:, None] > known[None]).any(axis=2)
-    return np.asarray(never_worse & better)
+    found = never_worse & better
+    if broken is not None:
+        amount = np.where(_fine(given), np.asarray(broken, dtype=np.float64), np.inf)
+        less, same = amount[:, None] < amount[None], amount[:, None] == amount[None]
+        found = less | (same & found)
+    return np.asarray(found)
 
 
 def front(values: ArrayLike) -> NDArray[np.int64]:
@@ -41,11 +50,15 @@ def front(values: ArrayLike) -> NDArray[np.int64]:
     return np.array(sorted(kept), dtype=np.int64)
 
 
-def ranks(values: ArrayLike) -> NDArray[np.int64]:
+def ranks(values: ArrayLike, broken: ArrayLike | None = None) -> NDArray[np.int64]:
     """(k,): 0 for the front, 1 for the front of the rest, and so on (Deb et al., "A fast and
     elitist multiobjective genetic algorithm: NSGA-II", 2002).
+
+    Args:
+        values: (k, m), as of `dominates`.
+        broken: (k,), as of `dominates`.
     """
-    dominated = dominates(values)
+    dominated = dominates(values, broken)
     rank = np.full(len(dominated), -1, dtype=np.int64)
     left = np.ones(len(dominated), dtype=bool)
     level = 0

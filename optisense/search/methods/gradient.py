@@ -86,6 +86,11 @@ class Gradient(Method):
                 f"'{self.objective}' has no gradient",
                 hint=f"Only {' and '.join(SMOOTH)} have one; use cma-es for others",
             )
+        if problem.requirements:
+            raise SearchError(
+                "the method 'gradient' can't keep conditions, which have no gradient",
+                hint="Use --method cma-es with --require",
+            )
         if resolution < 16:
             raise SearchError(f"a resolution of {resolution} is too coarse for gradients")
         if starts < 1:

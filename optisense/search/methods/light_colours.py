@@ -20,7 +20,8 @@ from optisense.objectives import Evaluation, Objective, Score, Settings
 from optisense.objectives.evaluation import ProgressCallback
 from optisense.objectives.registry import pixels_read
 from optisense.objectives.relighting import Relighting
-from optisense.objectives.run import run_objective, split_settings
+from optisense.objectives.run import split_settings
+from optisense.objectives.scoring import run_objective
 from optisense.objectives.usual_score import UsualTrials
 from optisense.search.evaluation.evaluator import DesignEvaluator, Evaluator
 from optisense.search.methods.base import Problem
@@ -81,7 +82,13 @@ class RelitEvaluator(DesignEvaluator):
 
     def __init__(self, usual: DesignEvaluator) -> None:
         """Take over what the usual evaluator scores; nothing is rendered yet."""
-        super().__init__(usual.space, usual.goals, usual.settings, variant=usual.variant)
+        super().__init__(
+            usual.space,
+            usual.goals,
+            usual.settings,
+            requirements=[str(each) for each in usual.requirements],
+            variant=usual.variant,
+        )
         self._lit: OrderedDict[int, _Lit] = OrderedDict()
 
     def objective_scores(self, design: SensorDesign, seed: int) -> Mapping[str, Score]:

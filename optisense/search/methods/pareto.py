@@ -55,6 +55,7 @@ class Pareto(Method):
         self._random = problem.random(self.name)
         self._genes = np.empty((0, self.space.size))
         self._values = np.empty((0, len(problem.objectives)))
+        self._broken = np.empty(0)
         self._children = np.empty((0, self.space.size))
 
     def ask(self) -> FloatArray:
@@ -79,16 +80,17 @@ class Pareto(Method):
         genes = self._children if same else self.space.unit_of(vectors)
         everyone = np.concatenate([self._genes, genes])
         scores = np.concatenate([self._values, values])
-        rank = ranks(scores)
+        broken = np.concatenate([self._broken, [outcome.breach for outcome in outcomes]])
+        rank = ranks(scores, broken)
         best = np.lexsort((-crowding(scores, rank), rank))[: self.population]
-        self._genes, self._values = everyone[best], scores[best]
+        self._genes, self._values, self._broken = everyone[best], scores[best], broken[best]
 
     def describe(self) -> dict[str, Any]:
         """The size of a generation."""
         return {"population": self.population}
 
     def _offspring(self) -> FloatArray:
-        rank = ranks(self._values)
+        rank = ranks(self._values, self._broken)
         room = crowding(self._values, rank)
         mothers, fathers = self._winners(rank, room), self._winners(rank, room)
         children = self._crossed(self._genes[mothers], self._genes[fathers])

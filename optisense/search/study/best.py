@@ -1,5 +1,7 @@
 """Which trial is the best, and what is said where several share the best score.
 
+A trial that breaks a condition of the study is never the best.
+
 The rule: the highest score by fresh seeds where some trials were scored so, else the highest score
 by the study's seed. Of trials that share it the one nearest to the start is the best, since it
 changes least, and of equally near ones the one that was proposed first. So the start itself wins
@@ -30,19 +32,31 @@ def distance(trial: Trial) -> float:
 
 
 def ranked(trials: Iterable[Trial]) -> list[Trial]:
-    """Trials with a score by the study's own seed, the best first; see the rule above."""
-    fine = [trial for trial in trials if math.isfinite(trial.score)]
+    """Trials with a score by the study's own seed that break no condition, the best first; see the
+    rule above.
+    """
+    fine = [trial for trial in trials if math.isfinite(trial.score) and trial.is_feasible]
     return sorted(fine, key=lambda trial: (-trial.score, distance(trial), trial.number))
 
 
 def best_of(trials: Sequence[Trial]) -> Trial | None:
-    """The best trial by the rule above; None where no trial has a score."""
+    """The best trial by the rule above; None where none has a score and meets the conditions."""
     fine = ranked(trials)
     again = [trial for trial in fine if math.isfinite(trial.fresh_score())]
     if again:
         # `min` keeps the first of equals, and `fine` is in the order of the rule.
         return min(again, key=lambda trial: (-trial.fresh_score(), -trial.score))
     return fine[0] if fine else None
+
+
+def nearest(trials: Sequence[Trial]) -> Trial | None:
+    """The trial that breaks the conditions least, with the highest score of equals; None where a
+    trial meets them or none has a score.
+    """
+    scored = [trial for trial in trials if math.isfinite(trial.score)]
+    if not scored or any(trial.is_feasible for trial in scored):
+        return None
+    return min(scored, key=lambda trial: (trial.breach, -trial.score, trial.number))
 
 
 def tied(trials: Sequence[Trial]) -> list[Trial]:
@@ -69,7 +83,7 @@ def tie_note(trials: Sequence[Trial]) -> str | None:
     if len(same) < 2:
         return None
     best = same[0]
-    points = {trial.vector.tobytes() for trial in trials if math.isfinite(trial.score)}
+    points = {trial.vector.tobytes() for trial in ranked(trials)}
     if len(same) == len(points):
         return (
             f"all {len(same)} designs that were scored have the same score: within these bounds "

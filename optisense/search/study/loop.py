@@ -21,6 +21,7 @@ from optisense.search.executors.base import outcome_of
 from optisense.search.methods import Method, Problem, make
 from optisense.search.space.manufacturing import ManufacturingErrors
 from optisense.search.study.best import tie_note
+from optisense.search.study.conditions import condition_note, lost, lost_note, unmet
 from optisense.search.study.failures import cause_of
 from optisense.search.study.progress import SearchProgress, SearchProgressCallback, SearchResult
 from optisense.search.study.rescoring import SEEDS as FRESH_SEEDS
@@ -89,7 +90,13 @@ class StudyRun:
         settings = study.settings
         self.limit = settings.budget if limit is None else limit
         usual = study.evaluator(variant)
-        problem = Problem(study.space, tuple(settings.names), settings.budget, settings.seed)
+        problem = Problem(
+            study.space,
+            tuple(settings.names),
+            settings.budget,
+            settings.seed,
+            tuple(settings.requirements),
+        )
         self.method: Method = make(settings.method, problem, settings.options)
         self._evaluator: Evaluator = self.method.evaluator(usual)
         if settings.errors is not None:
@@ -110,7 +117,10 @@ class StudyRun:
         self._progress = progress or (lambda progress: None)
         self._notes: list[str] = []
         self._finished: queue.SimpleQueue[tuple[int, Future[Outcome]]] = queue.SimpleQueue()
-        self._done = self._failed = 0
+        self._done = self._failed = self._broken = 0
+        self._nearest: Outcome | None = None
+        self._best_outcome: Outcome | None = None
+        self._start_outcome: Outcome | None = None
         self._first_seconds = 0.0
         self._reasons: dict[str, list[str]] = {}
         self._scored: dict[bytes, Outcome] = {}
@@ -159,7 +169,9 @@ class StudyRun:
             raise self._all_failed()
         several = self.method.several  # its result is a front, not one best trial
         tie = None if several else tie_note(study.trials)
-        notes = [*self._notes, *self.method.notes(), *([] if tie is None else [tie])]
+        told = [tie, condition_note(study.trials)]
+        told += [] if several else [lost_note(study.best, study.start)]
+        notes = [*self._notes, *self.method.notes(), *(note for note in told if note is not None)]
         return SearchResult(study, interrupted, ended, tuple(notes))
 
     def _search(self, runner: Runner) -> str:
@@ -289,15 +301,19 @@ class StudyRun:
         """
         score = outcome.scores.get(self.study.objective, math.nan)
         if row.generation == START:
-            self._start_score = score
+            self._start_score, self._start_outcome = score, outcome
         else:
             self._done += 1
             self._failed += outcome.failed
+            self._broken += not outcome.failed and not outcome.is_feasible
             if outcome.failure is not None:
                 self._reasons.setdefault(cause_of(outcome.failure), []).append(outcome.failure)
         if not outcome.failed:
             self._scored[row.vector.tobytes()] = outcome
-            self._best = score if math.isnan(self._best) else max(self._best, score)
+            if outcome.is_feasible and not score <= self._best:
+                self._best, self._best_outcome = score, outcome
+            if self._nearest is None or outcome.breach < self._nearest.breach:
+                self._nearest = outcome
         enough = ALL_FAIL_WITH_START if math.isnan(self._start_score) else ALL_FAIL
         if self._failed == self._done >= enough:
             raise self._all_failed()
@@ -387,6 +403,9 @@ class StudyRun:
                 done=self._fresh_done if fresh else self._done,
                 total=self._fresh_count if fresh else self.limit,
                 failed=self._failed,
+                broken=self._broken,
+                nearest=_nearest_note(self._nearest),
+                lost=self._lost(),
                 best=self._best,
                 start=self._start_score,
                 trials_per_hour=self._trials_an_hour,
@@ -395,3 +414,18 @@ class StudyRun:
                 doing=self._doing,
             )
         )
+
+    def _lost(self) -> tuple[str, ...]:
+        """What the best trial so far has lost that the start has."""
+        best, start = self._best_outcome, self._start_outcome
+        if best is None or start is None or start.failed or not self._best > self._start_score:
+            return ()
+        worse = lost(best, start)
+        return tuple(f"{name} {now:.3g} (start {was:.3g})" for name, (now, was) in worse.items())
+
+
+def _nearest_note(outcome: Outcome | None) -> str:
+    """What the trial that comes nearest to meeting all conditions lacks; nothing if one does."""
+    if outcome is None or outcome.is_feasible:
+        return ""
+    return ", ".join(unmet(outcome))

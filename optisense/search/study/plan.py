@@ -12,10 +12,11 @@ from optisense.design import SensorDesign
 from optisense.design.difference import fingerprint
 from optisense.errors import SearchError
 from optisense.objectives import Objective
-from optisense.objectives.registry import RAYS_ONLY
+from optisense.objectives.combined import goal_of
 from optisense.objectives.settings import size_for
 from optisense.quality import TRIAL_PHOTONS
 from optisense.search.evaluation.evaluator import DesignEvaluator, Goal, goal_name, placed
+from optisense.search.evaluation.requirements import requirements_of
 from optisense.search.methods import Problem, find, make
 from optisense.search.space.constraints import Constraint, UserRule
 from optisense.search.space.manufacturing import SAMPLES, ManufacturingErrors
@@ -45,6 +46,7 @@ class Plan:
     apart: bool = True
     errors: ManufacturingErrors | None = None
     samples: int = SAMPLES
+    requirements: Sequence[str] = ()
 
     def settings_for(self, design: SensorDesign) -> StudySettings:
         """The plan for a design, with everything that it leaves open decided.
@@ -56,15 +58,26 @@ class Plan:
         """
         bound = self.space.bind(design)
         settings = dict(self.settings or {})
-        if RAYS_ONLY & {goal_name(goal) for goal in self.goals}:
+        requirements = requirements_of(self.requirements)
+        if requirements and self.errors is not None:
+            raise SearchError(
+                "conditions can't be kept by sensors with manufacturing errors",
+                hint="Leave out --error, and look at the winner with `optisense tolerance`; or "
+                "leave out --require",
+            )
+        measured = [goal_of(goal) for goal in self.goals if isinstance(goal, str | Objective)]
+        measured += [each.objective() for each in requirements]
+        if any(each.rays_only for each in measured):
             settings.setdefault(
                 "ray_resolution", list(size_for(design.camera.resolution, RAYS_ACROSS))
             )
         chosen = find(self.method)
-        rendered = [goal for goal in self.goals if isinstance(goal, str | Objective)]
-        if not {goal_name(goal) for goal in rendered} <= RAYS_ONLY and not chosen.renders_once:
+        if not all(each.rays_only for each in measured) and not chosen.renders_once:
             settings.setdefault("photons", TRIAL_PHOTONS)
-        evaluator = DesignEvaluator(bound, self.goals, settings, apart=self.apart)
+        kept = [str(each) for each in requirements]
+        evaluator = DesignEvaluator(
+            bound, self.goals, settings, requirements=kept, apart=self.apart
+        )
         if self.errors is not None:
             self.errors.bind(design)
         budget = self.budget
@@ -75,7 +88,8 @@ class Plan:
         if not 0 <= self.seed < 2**32:
             raise SearchError(f"the seed is {self.seed}", hint="Give 0 to 4294967295")
         options = dict(self.options or {})
-        make(self.method, Problem(bound, tuple(evaluator.names), budget, self.seed), options)
+        names = tuple(evaluator.names)
+        make(self.method, Problem(bound, names, budget, self.seed, tuple(kept)), options)
         objectives = [reference(goal) for goal in self.goals]
         rules = [rule_reference(rule) for rule in self.space.constraints]
         return StudySettings(
@@ -94,6 +108,7 @@ class Plan:
             files=file_prints([*objectives, *rules]),
             errors=None if self.errors is None else self.errors.to_plain(),
             samples=0 if self.errors is None else self.samples,
+            requirements=kept,
         )
 
 

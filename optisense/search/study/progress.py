@@ -21,7 +21,11 @@ class SearchProgress:
             the stage "fresh seeds".
         total: trials that there may be; scores that are wanted in the stage "fresh seeds".
         failed: of the finished ones.
-        best: the best score so far, NaN before there is one.
+        broken: of the finished ones, those that break a condition.
+        nearest: what the trial that comes nearest to meeting all conditions lacks; empty as soon as
+            one meets them.
+        lost: what the best trial so far has lost that the start has, such as coverage.
+        best: the best score so far of those that meet all conditions, NaN before there is one.
         start: score of the start.
         trials_per_hour: at the pace of the last ones; 0 before that can be known.
         seconds_left: until the end, scoring the best again included; NaN before that can be known.
@@ -39,6 +43,9 @@ class SearchProgress:
     seconds_left: float
     facts: dict[str, Any] = field(default_factory=dict)
     doing: str = ""
+    broken: int = 0
+    nearest: str = ""
+    lost: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)

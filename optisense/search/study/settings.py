@@ -28,6 +28,10 @@ LIBRARIES = ("optisense", "cma", "numpy", "scipy", "mitsuba")
 MOST_NAMES = 100
 """Objectives, or rules, of a study; a search by more than a few finds no front."""
 
+LATER = ("requirements",)
+"""Settings that studies of earlier releases do not have. They count as their defaults, and one with
+its default is left out where settings are compared, so that such studies go on as they are."""
+
 Names = Annotated[list[str], Field(max_length=MOST_NAMES)]
 Whole = Annotated[int, Field(ge=0, le=2**53)]
 
@@ -53,6 +57,7 @@ class StudySettings:
         files: the SHA-256 of each user's file that objectives and rules come from, by path.
         errors: of making, where P10 is searched; as of `ManufacturingErrors.to_plain`.
         samples: manufactured sensors a trial.
+        requirements: conditions that the best trial must meet.
         begun: when, UTC.
         versions: of the packages that it was begun with.
 
@@ -77,6 +82,7 @@ class StudySettings:
     files: dict[str, str] = field(default_factory=dict)
     errors: dict[str, Any] | None = None
     samples: Whole = 0
+    requirements: Names = field(default_factory=list)
     begun: str = field(default_factory=lambda: datetime.now(UTC).isoformat(timespec="seconds"))
     versions: dict[str, str] = field(default_factory=lambda: package_versions())
 
@@ -86,15 +92,22 @@ class StudySettings:
 
     def fingerprint_of_all(self) -> str:
         """The same for studies that go the same way."""
-        kept = {k: v for k, v in asdict(self).items() if k not in ("begun", "versions", "design")}
+        kept = self._without("begun", "versions", "design")
         return hashlib.sha256(json.dumps(kept, sort_keys=True).encode()).hexdigest()
 
     def comparable(self) -> dict[str, Any]:
         """What must be the same when a study is gone on with by the same call; the design, which
         is compared value by value, and the budget, which may grow, are not in it.
         """
-        left_out = ("begun", "versions", "design", "fingerprint", "budget")
-        return {key: value for key, value in asdict(self).items() if key not in left_out}
+        return self._without("begun", "versions", "design", "fingerprint", "budget")
+
+    def _without(self, *names: str) -> dict[str, Any]:
+        """All settings but these, and but later ones that are not used."""
+        return {
+            key: value
+            for key, value in asdict(self).items()
+            if key not in names and not (key in LATER and not value)
+        }
 
     def save(self, folder: Path) -> None:
         """Write study.json, whole.
@@ -127,7 +140,7 @@ class StudySettings:
                 where=str(path),
                 hint="A newer release wrote it: update OptiSense Studio" if newer else COPY_AGAIN,
             )
-        missing = {name for name in _fields() if name not in data}
+        missing = {name for name in _fields() if name not in data} - set(LATER)
         if missing:
             names = ", ".join(sorted(missing))
             raise SearchError(f"{names} is missing", where=str(path), hint=COPY_AGAIN)

@@ -22,6 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from optisense.errors import OptiSenseError, OutputError, SearchError
+from optisense.objectives.registry import CONDITIONS
 from optisense.search.evaluation.outcome import Outcome
 from optisense.search.study.reader import Reader
 from optisense.untrusted_files import MOST_STORE, check_size
@@ -360,6 +361,9 @@ def _objects(parts: Any) -> dict[str, Any]:
     """
     if not isinstance(parts, dict) or not all(isinstance(each, dict) for each in parts.values()):
         raise TypeError("the parts of its scores are no objects")
+    for value in parts.get(CONDITIONS, {}).values():
+        if value is not None and not isinstance(value, int | float):
+            raise TypeError("a condition's value is no number")
     return parts
 
 

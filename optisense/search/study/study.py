@@ -20,14 +20,14 @@ import numpy as np
 
 from optisense.design import SensorDesign
 from optisense.design.difference import differences, fingerprint, notes, plain_differences
-from optisense.errors import SearchError
+from optisense.errors import ObjectiveError, SearchError
 from optisense.folders import FolderLock
 from optisense.library import with_own_lights
 from optisense.search.evaluation.evaluator import DesignEvaluator, Goal
 from optisense.search.methods.dominance import front as front_of
 from optisense.search.space.constraints import Constraint
 from optisense.search.space.search_space import SearchSpace
-from optisense.search.study.best import best_of
+from optisense.search.study.best import best_of, nearest
 from optisense.search.study.folder import STORE_FILE, as_begun, begin, kept, listed
 from optisense.search.study.plan import ONLY_HERE, Plan, file_prints, known_goals, known_rules
 from optisense.search.study.settings import StudySettings
@@ -216,7 +216,12 @@ class Study:
             )
         settings = self.settings
         return DesignEvaluator(
-            self.space, self.goals, settings.settings, apart=settings.apart, variant=variant
+            self.space,
+            self.goals,
+            settings.settings,
+            requirements=settings.requirements,
+            apart=settings.apart,
+            variant=variant,
         )
 
     @property
@@ -272,6 +277,9 @@ class Study:
             hint = f"Trials 0 to {last} are there" if trials else "No trial is finished yet"
             if which == "best" and trials:
                 hint = "All trials failed"
+                close = nearest(trials)
+                if close is not None:
+                    hint = f"No trial meets all conditions; trial {close.number} comes nearest"
             raise SearchError(f"the study has no trial '{which}'", hint=hint)
         return found
 
@@ -336,20 +344,35 @@ def beside(study: Study, trial: Trial) -> dict[str, float]:
     """What stands beside a trial's score: its other scores, and the parts that an objective wants
     to be seen with its own, such as the coverage with AOAP.
     """
-    from optisense.objectives.registry import BUILT_IN, find
-
     found: dict[str, float] = {}
     for number, name in enumerate(study.settings.names):
         if number:
             found[name] = trial.scores[name]
-        if name in BUILT_IN:
-            parts = trial.parts.get(name, {})
-            found |= {part: float(parts[part]) for part in find(name).beside if part in parts}
+        parts = trial.parts.get(name, {})
+        found |= {part: float(parts[part]) for part in _shown(name) if part in parts}
     return found
 
 
+def _shown(name: str) -> tuple[str, ...]:
+    """The parts that an objective wants to be seen with its value; none of those of a user's own,
+    whose file is not run to look at a study.
+    """
+    from optisense.objectives.combined import is_plain, objective_of
+    from optisense.objectives.registry import BUILT_IN, FURTHER
+
+    try:
+        known = name in (*BUILT_IN, *FURTHER) or not is_plain(name)
+        return objective_of(name).beside if known else ()
+    except ObjectiveError:  # an expression with an objective that is not installed here
+        return ()
+
+
 def front_among(trials: Sequence[Trial], names: Sequence[str]) -> list[Trial]:
-    """The trials that no other one beats in all objectives, the best in the first one first."""
+    """The trials that no other one beats in all objectives, the best in the first one first.
+
+    Those that break a condition are left out.
+    """
+    trials = [trial for trial in trials if trial.is_feasible]
     if not trials:
         return []
     values = np.array([[trial.scores.get(name, np.nan) for name in names] for trial in trials])

@@ -64,6 +64,21 @@ class Trial:
         return self.outcome.parts
 
     @property
+    def conditions(self) -> Mapping[str, float | None]:
+        """The value of the limited quantity, by the text of each condition of the study."""
+        return self.outcome.conditions
+
+    @property
+    def breach(self) -> float:
+        """How far it breaks the conditions of the study; 0 where it meets them."""
+        return self.outcome.breach
+
+    @property
+    def is_feasible(self) -> bool:
+        """Whether it meets all conditions of the study."""
+        return self.outcome.is_feasible
+
+    @property
     def values(self) -> dict[str, float | int | str]:
         """What it sets, by parameter."""
         return self.space.values(self.vector)

@@ -1,0 +1,220 @@
+"""Objectives by what a user writes: a name, a file, or arithmetic with several objectives."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from optisense.errors import ObjectiveError
+from optisense.near import suggestion
+from optisense.objectives import figures
+from optisense.objectives.expressions import Expression, Quantity
+from optisense.objectives.registry import Objective, find, names
+from optisense.objectives.scoring import run_objective
+
+if TYPE_CHECKING:
+    from optisense.objectives.evaluation import Evaluation
+
+_ARITHMETIC = re.compile(r"[-+*/().,'\"\s]")
+
+
+@dataclass(frozen=True)
+class CombinedObjective(Objective):
+    """An objective that is computed from others, such as ``aoap + 0.5*coverage``.
+
+    Its settings are those of the objectives in it; one that several of them have is given to all.
+
+    Attributes:
+        terms: the objectives in it.
+    """
+
+    terms: tuple[Objective, ...] = ()
+
+    @property
+    def settings(self) -> dict[str, Any]:
+        """The settings of all objectives in it, and their defaults."""
+        found: dict[str, Any] = {}
+        for each in self.terms:
+            found |= each.settings
+        return found
+
+    @property
+    def summary(self) -> str:
+        """What it is made of."""
+        return "combined from " + " and ".join(each.title for each in self.terms)
+
+
+def combined(
+    expression: Expression, known: Mapping[str, Objective] | None = None
+) -> CombinedObjective:
+    """The objective that an expression stands for.
+
+    Args:
+        expression: what is computed.
+        known: objectives by their names in the expression; others are found by the registry.
+
+    Raises:
+        ObjectiveError: it names an objective that there is none of.
+    """
+    terms = {name: (known or {}).get(name) or find(name) for name in expression.objectives}
+
+    def function(evaluation: Evaluation, **settings: Any) -> tuple[float, dict[str, Any]]:
+        values, parts = _measured(expression, terms, evaluation, settings)
+        shown = {str(quantity): value for quantity, value in values.items()}
+        return expression.value(values), {**shown, "parts": parts}
+
+    return CombinedObjective(
+        name=expression.text,
+        function=function,
+        title=expression.text,
+        draw=figures.draw_parts,
+        beside=tuple(str(quantity) for quantity in expression.quantities),
+        reads=None if any(each.reads is None for each in terms.values()) else _reads(terms),
+        unit=_unit(expression, terms),
+        rays_only=all(each.rays_only for each in terms.values()),
+        terms=tuple(terms.values()),
+    )
+
+
+def _measured(
+    expression: Expression,
+    terms: Mapping[str, Objective],
+    evaluation: Evaluation,
+    settings: Mapping[str, Any],
+) -> tuple[dict[Quantity, float], dict[str, Any]]:
+    """The value of each quantity, and the parts of each objective.
+
+    Raises:
+        ObjectiveError: an objective fails, or has no such number among its parts.
+    """
+    scores = {}
+    for name, each in terms.items():
+        own = {key: value for key, value in settings.items() if key in each.settings}
+        scores[name] = run_objective(each, evaluation, own)
+        if scores[name].failure is not None:
+            raise ObjectiveError(f"{each.title}: {scores[name].failure}")
+    values = {}
+    for quantity in expression.quantities:
+        score = scores[quantity.objective]
+        values[quantity] = score.value
+        if quantity.part:
+            numbers = {
+                key: float(value)
+                for key, value in score.parts.items()
+                if isinstance(value, int | float) and not isinstance(value, bool)
+            }
+            if quantity.part not in numbers:
+                raise ObjectiveError(
+                    f"{quantity.objective} has no part '{quantity.part}'",
+                    hint=suggestion(quantity.part, numbers, limit=30),
+                )
+            values[quantity] = numbers[quantity.part]
+    return values, {name: dict(score.parts) for name, score in scores.items()}
+
+
+def _reads(terms: Mapping[str, Objective]) -> Any:
+    """Which pixels of a press the objectives read, with one dict of settings for all of them."""
+    from optisense.objectives.registry import pixels_read
+
+    def reads(press: Any, **settings: Any) -> Any:
+        own = {
+            name: {key: value for key, value in settings.items() if key in each.settings}
+            for name, each in terms.items()
+        }
+        found = pixels_read(terms.values(), own)
+        assert found is not None, "each objective of it names the pixels that it reads"
+        return found(press)
+
+    return reads
+
+
+def _unit(expression: Expression, terms: Mapping[str, Objective]) -> str:
+    """The unit of an expression that is one objective's value or its negative; else none."""
+    single = expression.single or (
+        expression.quantities[0]
+        if expression.text == f"-{expression.quantities[0]}" and len(expression.quantities) == 1
+        else None
+    )
+    return terms[single.objective].unit if single is not None and not single.part else ""
+
+
+def resolve(wanted: str | Objective | Iterable[str | Objective]) -> list[Objective]:
+    """Objectives by name, file or expression, keeping those that are objectives already.
+
+    Raises:
+        ObjectiveError: one is unknown, or named twice.
+    """
+    several = [wanted] if isinstance(wanted, str | Objective) else list(wanted)
+    found = [each if isinstance(each, Objective) else objective_of(each) for each in several]
+    seen: set[str] = set()
+    for each in found:
+        if each.name in seen:
+            raise ObjectiveError(f"the objective '{each.name}' is named twice")
+        seen.add(each.name)
+    return found
+
+
+def objective_of(text: str) -> Objective:
+    """The objective that a text stands for: a name, ``FILE.py:FUNCTION``, or an expression.
+
+    Raises:
+        ObjectiveError: it is none of these.
+    """
+    if is_plain(text):
+        return find(text)
+    expression = Expression.parse(text)
+    single = expression.single
+    if single is not None and not single.part:
+        return find(single.objective)
+    return combined(expression)
+
+
+def goal_of(wanted: str | Objective) -> Objective:
+    """The objective that a search maximises: the negative value where lower is better.
+
+    Raises:
+        ObjectiveError: the text is no objective.
+    """
+    found = objective_of(wanted) if isinstance(wanted, str) else wanted
+    if not found.lower_is_better:
+        return found
+    return combined(Expression.parse(f"-'{found.name}'"), {found.name: found})
+
+
+def is_plain(text: str) -> bool:
+    """Whether a text is the name of an objective, or of a Python file, and no expression."""
+    file = text.rpartition(":")[0] or text
+    return (
+        file.endswith(".py")
+        or _ARITHMETIC.search(text.strip()) is None
+        or text.strip().lower() in names()
+    )
+
+
+def named_in(texts: Iterable[str]) -> list[str]:
+    """The names of the objectives in names and expressions, each once; files as they are.
+
+    Raises:
+        ObjectiveError: an expression can't be read.
+    """
+    found: dict[str, None] = {}
+    for text in texts:
+        inner = (text,) if is_plain(text) else Expression.parse(text).objectives
+        found |= dict.fromkeys(inner)
+    return list(found)
+
+
+def are_rays_only(texts: Iterable[str]) -> bool:
+    """Whether all objectives trace chief rays only, as far as their names tell.
+
+    An objective in a user's file counts as one that renders: no file is run to find out.
+
+    Raises:
+        ObjectiveError: an expression can't be read, or an objective is unknown.
+    """
+    inner = named_in(texts)
+    return all(not name.endswith(".py") and ".py:" not in name for name in inner) and all(
+        find(name).rays_only for name in inner
+    )

@@ -1,0 +1,51 @@
+"""Coverage: how much of the sensing surface the camera sees."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from optisense.objectives import figures
+from optisense.objectives.registry import objective
+
+if TYPE_CHECKING:
+    from optisense.objectives.evaluation import Evaluation
+
+
+@objective(
+    "coverage",
+    title="Coverage",
+    draw=figures.draw_coverage,
+    beside=("by_area",),
+    range=(0.0, 1.0),
+    rays_only=True,
+)
+def coverage(evaluation: Evaluation) -> tuple[float, dict[str, Any], dict[str, Any]]:
+    """How much of the sensing surface the camera sees.
+
+    The value is the share of the surface's triangles on which a chief ray arrives, as in AOAP; the
+    part `by_area` weighs each triangle by its area.
+
+    Args:
+        evaluation: the sensor.
+    """
+    rays = evaluation.judged_rays
+    seen = triangles_seen(evaluation)
+    areas = evaluation.model.sensing.face_areas
+    parts = {
+        "by_area": float(areas[seen].sum() / areas.sum()),
+        "area": float(areas[seen].sum()),
+        "triangles_seen": int(seen.sum()),
+        "triangles": len(seen),
+        "pixels_that_see_the_surface": float(rays.hit.mean()),
+    }
+    return float(seen.mean()), parts, {"hit": rays.hit}
+
+
+def triangles_seen(evaluation: Evaluation) -> NDArray[np.bool_]:
+    """(f,) whether a chief ray arrives on each triangle of the sensing surface."""
+    rays, faces = evaluation.judged_rays, evaluation.sensing_faces
+    seen: NDArray[np.bool_] = np.bincount(rays.face[rays.hit], minlength=faces)[:faces] > 0
+    return seen

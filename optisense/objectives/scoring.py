@@ -1,0 +1,94 @@
+"""Scoring a sensor by one objective: what goes wrong is told in the score."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from optisense.errors import ObjectiveError, OptiSenseError, SetupError
+from optisense.objectives.evaluation import Evaluation
+from optisense.objectives.files import place_of
+from optisense.objectives.registry import Objective
+from optisense.objectives.score import Score, json_ready
+
+RETURNS = "a number, a number and a dict of its parts, or a Score"
+
+
+def run_objective(
+    objective: Objective, evaluation: Evaluation, settings: Mapping[str, Any] | None = None
+) -> Score:
+    """Score a sensor by one objective; any failure of it becomes the score's `failure`.
+
+    Raises:
+        SetupError: the renderer can't run on this machine.
+    """
+    began = time.perf_counter()
+
+    def failed(reason: str) -> Score:
+        seconds = time.perf_counter() - began
+        return Score(
+            objective=objective.name,
+            value=math.nan,
+            failure=reason,
+            seconds=seconds,
+            title=objective.title,
+            unit=objective.unit,
+            lower_is_better=objective.lower_is_better,
+        )
+
+    try:
+        if isinstance(evaluation, Evaluation):  # others are made from one with the same camera
+            evaluation.check_possible()
+        result = objective(evaluation, **(settings or {}))
+        value, parts, arrays, draw = _read(result)
+        low, high = objective.bounds(settings)
+        parts = json_ready(parts)
+    except SetupError:
+        raise
+    except OptiSenseError as error:
+        return failed(str(error))
+    except Exception as error:
+        return failed(f"{type(error).__name__}: {error} ({place_of(error)})")
+    if not math.isfinite(value):
+        return failed(f"the objective returned {value}, which is no score")
+    if not low <= value <= high:
+        return failed(
+            f"the objective returned {value:g}, which is outside its range from {low:g} to {high:g}"
+        )
+    return Score(
+        objective=objective.name,
+        value=value,
+        parts=parts,
+        seconds=time.perf_counter() - began,
+        title=objective.title,
+        arrays=arrays,
+        draw=draw or objective.draw,
+        shown=objective.beside,
+        unit=objective.unit,
+        lower_is_better=objective.lower_is_better,
+    )
+
+
+def _read(result: Any) -> tuple[float, Mapping[str, Any], Mapping[str, Any], Any]:
+    """Value, parts, figure data and drawing of what an objective returned."""
+    if isinstance(result, Score):
+        if result.failure is not None:
+            raise ObjectiveError(result.failure)
+        return _number(result.value), result.parts, result.arrays, result.draw
+    if isinstance(result, tuple) and len(result) in (2, 3):
+        value, *rest = result
+        if all(isinstance(each, Mapping) for each in rest):
+            return _number(value), rest[0], rest[1] if len(rest) == 2 else {}, None
+    return _number(result), {}, {}, None
+
+
+def _number(value: Any) -> float:
+    if isinstance(value, int | float | np.integer | np.floating) and not isinstance(value, bool):
+        return float(value)
+    raise ObjectiveError(
+        f"the objective returned a {type(value).__name__}", hint=f"Return {RETURNS}"
+    )

@@ -1,0 +1,140 @@
+"""Conditions that a good design must meet, such as ``coverage >= 0.55``.
+
+Designs that break a condition are scored all the same, because a search learns from them in which
+direction the allowed designs are. They are compared by the rules of Deb, "An efficient constraint
+handling method for genetic algorithms", 2000: a design that meets all conditions is better than
+one that does not; of two that do, the one with the higher score is better; and of two that do not,
+the one that breaks them less.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from functools import lru_cache
+
+from optisense.errors import ObjectiveError, SearchError
+from optisense.near import suggestion
+from optisense.objectives.combined import named_in, objective_of
+from optisense.objectives.expressions import Expression, marked
+from optisense.objectives.registry import Objective, names
+
+ROUNDING = 1e-9
+"""Values count as within a limit if they miss it by a smaller part of the limit, which is rounding.
+"""
+
+HINT = "Write it as in 'coverage>=0.55' or 'distortion<=1.5'"
+
+
+@dataclass(frozen=True)
+class Requirement:
+    """One condition on a quantity that can be measured for every design.
+
+    Attributes:
+        quantity: the objective, or the expression, that is limited.
+        at_least: the limit is the lowest value that is allowed, not the highest.
+        limit: the limit itself, in the unit of the quantity.
+    """
+
+    quantity: str
+    at_least: bool
+    limit: float
+
+    def __str__(self) -> str:
+        return f"{self.quantity} {'>=' if self.at_least else '<='} {self.limit:.10g}"
+
+    @staticmethod
+    def parse(text: str) -> Requirement:
+        """Read a condition.
+
+        Raises:
+            SearchError: the text is no condition; marks the place.
+        """
+        found = re.fullmatch(r"(?P<what>[^<>=]*)(?P<sign>>=|<=)(?P<limit>[^<>=]*)", text)
+        if found is None:
+            signs = re.search(r"[<>=]+", text)
+            where = len(text.rstrip()) if signs is None else signs.start()
+            problem = "a condition has one '>=' or '<='"
+            raise SearchError(str(marked(text, where, problem).message), hint=HINT)
+        try:
+            limit = float(found["limit"])
+        except ValueError:
+            limit = math.nan
+        if not math.isfinite(limit):
+            problem = "the limit of a condition is a number"
+            raise SearchError(marked(text, found.start("limit"), problem).message, hint=HINT)
+        try:
+            quantity = Expression.parse(found["what"]).text
+        except ObjectiveError as error:
+            raise SearchError(error.message, hint=error.hint) from None
+        return Requirement(quantity, found["sign"] == ">=", limit)
+
+    def breach(self, value: float) -> float:
+        """How far a value misses the limit, as a part of the limit; 0 where it meets it.
+
+        A limit of 0 counts as 1. A value that is no number misses it infinitely.
+        """
+        if math.isnan(value):
+            return math.inf
+        short = self.limit - value if self.at_least else value - self.limit
+        missed = short / (abs(self.limit) or 1.0)
+        return missed if missed > ROUNDING else 0.0
+
+    def margin(self, value: float) -> float:
+        """How far a value is on the allowed side of the limit; below 0 on the other side."""
+        return value - self.limit if self.at_least else self.limit - value
+
+    def objective(self) -> Objective:
+        """What measures the quantity.
+
+        Raises:
+            SearchError: there is no such objective.
+        """
+        try:
+            for name in named_in([self.quantity]):
+                if name not in names():
+                    hint = suggestion(name, names())
+                    raise SearchError(f"the condition '{self}' names no objective", hint=hint)
+            return objective_of(self.quantity)
+        except ObjectiveError as error:
+            raise SearchError(error.message, where=str(self), hint=error.hint) from None
+
+
+def requirements_of(texts: Iterable[str]) -> list[Requirement]:
+    """Several conditions as they are written, each once.
+
+    Raises:
+        SearchError: one is no condition, names no objective, or contradicts another.
+    """
+    found = list(dict.fromkeys(Requirement.parse(text) for text in texts))
+    for each in found:
+        each.objective()
+    for low in (each for each in found if each.at_least):
+        for high in (each for each in found if not each.at_least):
+            if low.quantity == high.quantity and low.limit > high.limit:
+                raise SearchError(f"nothing can meet both '{low}' and '{high}'")
+    return found
+
+
+@lru_cache(maxsize=256)
+def _requirement(text: str) -> Requirement:
+    """A condition from its stored text; all trials of a study have the same few."""
+    return Requirement.parse(text)
+
+
+def breach_of(conditions: Mapping[str, float | None]) -> float:
+    """How far a design breaks its conditions in all: the sum over them.
+
+    Args:
+        conditions: the value of the limited quantity, by the text of each condition; None where it
+            could not be measured.
+
+    Raises:
+        SearchError: a text is no condition.
+    """
+    return sum(
+        _requirement(text).breach(math.nan if value is None else value)
+        for text, value in conditions.items()
+    )

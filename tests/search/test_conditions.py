@@ -1,0 +1,249 @@
+"""Searches with conditions: which trial is the best, what is said, and what is refused."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from optisense import set_value
+from optisense.design import SensorDesign
+from optisense.errors import SearchError
+from optisense.objectives.registry import WATCHED
+from optisense.search import SearchSpace, Study, search
+from optisense.search.evaluation.outcome import FAILED, Outcome, rank_of
+from optisense.search.evaluation.requirements import Requirement, requirements_of
+from optisense.search.methods.base import values_to_maximise
+from optisense.search.methods.dominance import dominates, ranks
+from optisense.search.study.best import best_of, nearest
+from optisense.search.study.conditions import condition_note, kept, lost_note
+from optisense.search.study.progress import SearchProgress
+from optisense.search.study.settings import LATER, StudySettings
+from optisense.search.study.trial import Trial
+
+RAYS: dict[str, Any] = {"ray_resolution": (64, 48)}
+FOV = {"camera.fov": (40.0, 60.0, 6)}
+
+
+def outcome(score: float, **conditions: float) -> Outcome:
+    limits = {"coverage": "coverage >= 0.5", "distortion": "distortion <= 1.2"}
+    parts = {"conditions": {limits[name]: value for name, value in conditions.items()}}
+    failure = None if math.isfinite(score) else "no"
+    return Outcome({"s": score}, failure, parts)
+
+
+@pytest.mark.parametrize(
+    ("text", "shown"),
+    [
+        ("coverage>=0.55", "coverage >= 0.55"),
+        (" Coverage  <= 1e-1 ", "coverage <= 0.1"),
+        ("aoap.coverage_by_area+1>=-2", "aoap.coverage_by_area + 1 >= -2"),
+    ],
+)
+def test_a_condition_is_read(text: str, shown: str) -> None:
+    wanted = Requirement.parse(text)
+    assert str(wanted) == shown
+    assert Requirement.parse(shown) == wanted
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("coverage>0.5", "one '>=' or '<='"),
+        ("coverage", "one '>=' or '<='"),
+        ("0.1<=coverage<=0.5", "one '>=' or '<='"),
+        ("coverage>=high", "is a number"),
+        ("coverage>=nan", "is a number"),
+        ("coverage>=0.5 mm", "is a number"),
+        (">=0.5", "something is missing"),
+        ("cover age>=0.5", "not expected"),
+        ("covrage>=0.5", "Did you mean 'coverage'"),
+    ],
+)
+def test_what_is_no_condition_is_refused(text: str, says: str) -> None:
+    with pytest.raises(SearchError, match=says):
+        requirements_of([text])
+
+
+def test_conditions_that_contradict_each_other_are_refused() -> None:
+    with pytest.raises(SearchError, match="nothing can meet both"):
+        requirements_of(["coverage>=0.6", "coverage<=0.5"])
+    assert len(requirements_of(["coverage>=0.5", "coverage >= 0.50"])) == 1
+
+
+def test_a_breach_is_a_part_of_the_limit() -> None:
+    low, high = Requirement.parse("coverage>=0.5"), Requirement.parse("distortion<=2")
+    assert low.breach(0.4) == pytest.approx(0.2)
+    assert low.breach(0.5 - 1e-12) == 0.0
+    assert high.breach(2.5) == pytest.approx(0.25)
+    assert high.breach(1.0) == 0.0
+    assert high.margin(1.5) == 0.5
+    assert low.breach(math.nan) == math.inf
+    assert Requirement.parse("aoap>=0").breach(-0.25) == 0.25
+
+
+def test_outcomes_are_ranked_by_conditions_before_scores() -> None:
+    good, better = outcome(1.0, coverage=0.6), outcome(2.0, coverage=0.5)
+    near, far = outcome(9.0, coverage=0.45), outcome(10.0, coverage=0.1, distortion=1.3)
+    failed = outcome(math.nan)
+    order = [failed, far, near, good, better]
+    rank = [rank_of(each, "s") for each in order]
+    assert rank == sorted(rank)
+    assert rank[0] == FAILED
+    assert list(np.argsort(values_to_maximise(order, "s"))) == [0, 1, 2, 3, 4]
+    values = np.array([[9.0], [10.0], [1.0], [2.0]])
+    broken = [each.breach for each in (near, far, good, better)]
+    assert list(ranks(values, broken)) == [2, 3, 1, 0]
+    assert dominates(values, broken)[2, 0]
+    assert not dominates(values, broken)[0, 2]
+
+
+def test_a_generation_in_which_all_break_conditions_still_teaches() -> None:
+    values = values_to_maximise([outcome(9.0, coverage=0.1), outcome(1.0, coverage=0.4)], "s")
+    assert values[1] > values[0]
+    assert np.isfinite(values).all()
+
+
+def test_a_trial_that_breaks_a_condition_is_never_the_best(mini: SensorDesign) -> None:
+    space = SearchSpace({"camera.fov": (30.0, 60.0)}).bind(mini)
+
+    def trial(number: int, found: Outcome) -> Trial:
+        generation = -1 if number == 0 else 0
+        return Trial(number, generation, np.array([40.0 + number]), found, space, "s")
+
+    trials = [
+        trial(0, outcome(1.0, coverage=0.4)),
+        trial(1, outcome(9.0, coverage=0.45)),
+        trial(2, outcome(2.0, coverage=0.6)),
+    ]
+    best = best_of(trials)
+    assert best is not None and best.number == 2
+    assert nearest(trials) is None
+    assert condition_note(trials) == (
+        "the start breaks conditions, which is allowed: coverage >= 0.5 (is 0.4)"
+    )
+    assert kept(trials[2], trials[0]) == ["coverage >= 0.5: 0.6 (margin 0.1, start 0.4)"]
+    assert best_of(trials[:2]) is None
+    close = nearest(trials[:2])
+    assert close is not None and close.number == 1
+    note = condition_note(trials[:2])
+    assert note is not None and "trial 1 comes nearest: coverage >= 0.5 (is 0.45)" in note
+
+
+@pytest.mark.parametrize("method", ["grid", "random", "cma-es"])
+def test_the_best_of_a_search_keeps_the_condition(mini: SensorDesign, method: str) -> None:
+    """A narrow field of view looks straight at the skin, but sees less of it."""
+    free = search(mini, FOV, "aoap", method=method, budget=6, settings=RAYS)
+    assert free.best.parts["aoap"]["coverage"] < 0.4
+    kept_ = search(
+        mini, FOV, "aoap", method=method, budget=6, settings=RAYS, require="coverage >= 0.5"
+    )
+    assert kept_.best.is_feasible
+    limit = "coverage >= 0.5"
+    assert (kept_.best.conditions[limit] or 0.0) >= 0.5
+    fine = [trial for trial in kept_.trials if (trial.conditions[limit] or 0.0) >= 0.5]
+    assert kept_.best.score == max(trial.score for trial in fine)
+
+
+def test_a_front_holds_no_trial_that_breaks_a_condition(mini: SensorDesign) -> None:
+    result = search(
+        mini,
+        FOV,
+        ["aoap", "coverage"],
+        method="pareto",
+        budget=24,
+        settings=RAYS,
+        options={"population": 8},
+        require=["coverage >= 0.5"],
+    )
+    assert result.front
+    assert all((trial.conditions["coverage >= 0.5"] or 0.0) >= 0.5 for trial in result.front)
+
+
+def test_nothing_that_meets_the_conditions_is_told_with_the_nearest(mini: SensorDesign) -> None:
+    seen: list[SearchProgress] = []
+    result = search(
+        mini,
+        FOV,
+        "aoap",
+        method="grid",
+        settings=RAYS,
+        require="coverage >= 0.99",
+        progress=seen.append,
+    )
+    assert result.study.best is None
+    assert any("no trial meets all conditions" in note for note in result.notes)
+    assert seen[-1].nearest.startswith("coverage >= 0.99 (is 0.")
+    assert seen[-1].broken == 6
+    with pytest.raises(SearchError, match="no trial 'best'") as caught:
+        _ = result.best
+    assert "comes nearest" in str(caught.value.hint)
+
+
+def test_a_study_with_conditions_goes_on_and_old_ones_do_too(
+    mini: SensorDesign, tmp_path: Path
+) -> None:
+    out = tmp_path / "study"
+    first = search(
+        mini,
+        FOV,
+        "aoap",
+        method="random",
+        budget=3,
+        settings=RAYS,
+        require="coverage>=0.6",
+        out=out,
+    )
+    again = search(
+        mini, FOV, "aoap", method="random", budget=3, settings=RAYS, require="coverage >= 0.6",
+        out=out, resume=True,
+    )  # fmt: skip
+    assert [t.score for t in again.trials] == [t.score for t in first.trials]
+    with pytest.raises(SearchError, match="begun otherwise"):
+        search(mini, FOV, "aoap", method="random", budget=3, settings=RAYS, out=out, resume=True,
+               require="coverage>=0.5")  # fmt: skip
+
+    old = tmp_path / "old"
+    search(mini, FOV, "aoap", method="random", budget=2, settings=RAYS, out=old)
+    path = old / "study.json"
+    plain = json.loads(path.read_text())
+    for name in LATER:
+        del plain[name]
+    path.write_text(json.dumps(plain))
+    study = Study.open(old)
+    assert study.settings.requirements == []
+    assert StudySettings.load(old).comparable() == study.settings.comparable()
+    study.close()
+
+
+def test_what_can_not_keep_conditions_says_so(svelte: SensorDesign, mini: SensorDesign) -> None:
+    blend = {"cages.M1.blend.x": (0.0, 1.0)}
+    with pytest.raises(SearchError, match="can't keep conditions"):
+        search(svelte, blend, "aoap", method="gradient", require="coverage>=0.5")
+    with pytest.raises(SearchError, match="manufacturing errors"):
+        search(mini, FOV, "aoap", require="coverage>=0.5", errors={"camera.fov": 1.0})
+
+
+def test_a_score_won_by_seeing_less_is_told(mini: SensorDesign) -> None:
+    result = search(mini, FOV, "aoap", method="grid", settings=RAYS)
+    assert set(result.start.parts[WATCHED]) == {"coverage", "distortion"}
+    assert any("--require 'coverage>=" in note for note in result.notes), result.notes
+    assert lost_note(result.start, result.start) is None
+
+
+def test_lights_alone_are_not_watched(mini: SensorDesign) -> None:
+    space = {"lights.red.flux": (1.0, 2.0, 2)}
+    result = search(mini, space, "aoap", method="grid", settings=RAYS)
+    assert WATCHED not in result.start.parts
+
+
+def test_the_start_may_break_a_condition(mini: SensorDesign) -> None:
+    narrow = set_value(mini, "camera.fov", 42.0)
+    result = search(narrow, FOV, "aoap", method="grid", settings=RAYS, require="coverage>=0.5")
+    assert not result.start.is_feasible
+    assert result.best.is_feasible
+    assert any("which is allowed" in note for note in result.notes)
