@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from optisense.errors import ObjectiveError
 from optisense.near import suggestion
 from optisense.objectives import figures
-from optisense.objectives.expressions import Expression, Quantity
+from optisense.objectives.expressions import Expression, ScoreTerm
 from optisense.objectives.registry import Objective, find, names
 from optisense.objectives.scoring import run_objective
 
@@ -83,7 +83,7 @@ def _measured(
     terms: Mapping[str, Objective],
     evaluation: Evaluation,
     settings: Mapping[str, Any],
-) -> tuple[dict[Quantity, float], dict[str, Any]]:
+) -> tuple[dict[ScoreTerm, float], dict[str, Any]]:
     """The value of each quantity, and the parts of each objective.
 
     Raises:

@@ -57,7 +57,7 @@ SUM, PRODUCT, SIGN, VALUE = 1, 2, 3, 4
 
 
 @dataclass(frozen=True)
-class Quantity:
+class ScoreTerm:
     """The value of an objective, or one of the numbers that it is made of.
 
     Attributes:
@@ -78,7 +78,7 @@ class Quantity:
 class _Term:
     """A node of the tree: what computes its value, its text, and how strongly that text binds."""
 
-    value: Callable[[Mapping[Quantity, float]], float]
+    value: Callable[[Mapping[ScoreTerm, float]], float]
     text: str
     strength: int
 
@@ -96,7 +96,7 @@ class Expression:
     """
 
     text: str
-    quantities: tuple[Quantity, ...]
+    quantities: tuple[ScoreTerm, ...]
     _tree: _Term
 
     @property
@@ -105,12 +105,12 @@ class Expression:
         return tuple(dict.fromkeys(each.objective for each in self.quantities))
 
     @property
-    def single(self) -> Quantity | None:
+    def single(self) -> ScoreTerm | None:
         """The quantity that the expression consists of; None for anything else."""
         same = len(self.quantities) == 1 and str(self.quantities[0]) == self.text
         return self.quantities[0] if same else None
 
-    def value(self, known: Mapping[Quantity, float]) -> float:
+    def value(self, known: Mapping[ScoreTerm, float]) -> float:
         """The value of the expression.
 
         Args:
@@ -162,7 +162,7 @@ class _Parser:
         self._tokens = list(self._split(text))
         self._next = 0
         self._depth = 0
-        self._found: dict[Quantity, None] = {}
+        self._found: dict[ScoreTerm, None] = {}
 
     def expression(self) -> Expression:
         tree = self._sum()
@@ -275,13 +275,13 @@ def _operation(sign: str, left: _Term, right: _Term, strength: int) -> _Term:
     return _Term(lambda known: compute(left.value(known), right.value(known)), text, strength)
 
 
-def _quantity(token: _Token) -> Quantity:
+def _quantity(token: _Token) -> ScoreTerm:
     """The objective and its part that a name stands for."""
     if token.kind == "quoted":
         name, _, part = token.text[1:].rpartition(token.text[0])
-        return Quantity(name.strip().lower(), part.removeprefix("."))
+        return ScoreTerm(name.strip().lower(), part.removeprefix("."))
     name, _, part = token.text.partition(".")
-    return Quantity(name.lower(), part)
+    return ScoreTerm(name.lower(), part)
 
 
 def quantities_of(expressions: Sequence[Expression]) -> list[str]:

@@ -19,11 +19,11 @@ from optisense.objectives.combined import (
     objective_of,
     resolve,
 )
-from optisense.objectives.expressions import MOST_CHARACTERS, Expression, Quantity
+from optisense.objectives.expressions import MOST_CHARACTERS, Expression, ScoreTerm
 from optisense.objectives.testing import evaluation
 from optisense.objectives.usual_score import usual_score
 
-KNOWN = {Quantity("a"): 3.0, Quantity("b"): -2.0, Quantity("a", "part"): 0.25}
+KNOWN = {ScoreTerm("a"): 3.0, ScoreTerm("b"): -2.0, ScoreTerm("a", "part"): 0.25}
 
 
 @pytest.mark.parametrize(
@@ -71,7 +71,7 @@ def test_random_expressions_keep_their_value_when_they_are_written_out() -> None
         return f"{build(depth - 1)} {sign} {build(depth - 1)}"
 
     values = {"x": 1.7, "y": -0.3, "z": 2.9}
-    known = {Quantity(name): value for name, value in values.items()}
+    known = {ScoreTerm(name): value for name, value in values.items()}
     tried = 0
     for _ in range(300):
         text = f"x + {build(4)}"

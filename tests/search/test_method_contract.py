@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from functools import cache
 from typing import Any
 
@@ -124,6 +124,12 @@ class TestGradient(MethodContract):
 
     def landscapes(self) -> dict[str, str | Landscape]:
         return {"aoap": "aoap", "2to3pw": "2to3pw"}
+
+    def cases(self) -> Iterator[tuple[str, Mapping[str, object], str | Landscape]]:
+        """2to3PW takes the same ways through the method, so one space tells all of it."""
+        for case, space, goal in super().cases():
+            if goal == "aoap" or case.startswith("two numbers"):
+                yield case, space, goal
 
     def settings(self) -> dict[str, Any]:
         return {"ray_resolution": [48, 36]}
