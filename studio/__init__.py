@@ -18,7 +18,7 @@ from .lights import choosing as light_choosing
 from .lights import operator as light_operator
 from .lights import ui as light_ui
 from .lights import windows
-from .looks import drawing, section
+from .looks import drawing, footprint, section
 from .materials import gallery
 from .materials import operator as material_operator
 from .materials import ui as material_ui
@@ -69,6 +69,7 @@ MODULES = (
     light_choosing,
     section,
     drawing,
+    footprint,
     light_operator,
     windows,
     simulate_operator,

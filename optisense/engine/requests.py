@@ -73,6 +73,7 @@ def _load() -> None:
     """Import the modules that register requests; late, so that `hello` need not wait for them."""
     for module in (
         "rendering",
+        "footprint",
         "placing",
         "designing",
         "cad",

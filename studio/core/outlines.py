@@ -15,6 +15,11 @@ BEAM_STEPS = 24
 """Sides of a beam that is drawn as a cone: it looks round."""
 
 
+FAR_APART = 8.0
+"""Length of a quad's side, of the usual one, from which its corners are no neighbours on the
+surface: a view at a slant stretches quads less than that."""
+
+
 def feature_edges(
     corners: ArrayLike, starts: ArrayLike, normals: ArrayLike, edges: int
 ) -> NDArray[np.int64]:
@@ -96,3 +101,34 @@ def nearness(points: ArrayLike, seen: ArrayLike, reach: float) -> NDArray[np.flo
 
 PIECE = 1024
 """Points that are compared with all others at once: some megabytes."""
+
+
+def grid_quads(
+    points: NDArray[np.float32], hit: NDArray[np.bool_]
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Return the quads between neighbouring points of a grid, and the outline of all of them.
+
+    Args:
+        points: (h, w, 3) where rays met a surface.
+        hit: (h, w) whether they did.
+
+    Returns:
+        (n, 4) indices of the corners of quads, in their order around; without those between points
+        that lie far apart, such as on either side of a mirror's edge. (m, 2) indices of the ends of
+        those of their edges that only one of them has.
+    """
+    height, width = hit.shape
+    number = np.arange(height * width).reshape(height, width)
+    corners = np.stack(
+        [number[:-1, :-1], number[:-1, 1:], number[1:, 1:], number[1:, :-1]], axis=-1
+    ).reshape(-1, 4)
+    corners = corners[hit.ravel()[corners].all(axis=1)]
+    if not len(corners):
+        return corners, np.empty((0, 2), dtype=np.int64)
+    flat = points.reshape(-1, 3)
+    sides = np.linalg.norm(flat[corners] - flat[np.roll(corners, -1, axis=1)], axis=2)
+    corners = corners[sides.max(axis=1) < FAR_APART * np.median(sides)]
+    edges = np.stack([corners, np.roll(corners, -1, axis=1)], axis=-1).reshape(-1, 2)
+    edges.sort(axis=1)
+    found, count = np.unique(edges, axis=0, return_counts=True)
+    return corners, found[count == 1]

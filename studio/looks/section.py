@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import bpy
@@ -23,8 +24,17 @@ MARGIN = 1e-3
 """mm: at the slider's ends the plane lies so far beyond the sensor, and cuts nothing or all off."""
 
 
+when_footprint_asked: list[Callable[[], None]] = []
+"""Called when the camera's footprint is switched on or off."""
+
+
 def _changed(values: bpy.types.PropertyGroup, context: bpy.types.Context) -> None:
     show(context.scene)
+
+
+def _footprint_asked(values: bpy.types.PropertyGroup, context: bpy.types.Context) -> None:
+    for each in when_footprint_asked:
+        each()
 
 
 class OPTISENSE_PG_looks(bpy.types.PropertyGroup):
@@ -42,6 +52,12 @@ class OPTISENSE_PG_looks(bpy.types.PropertyGroup):
         description="Where the cut is: 0 leaves the whole sensor, 1 nothing of it",
         update=_changed,
     )  # fmt: skip
+    footprint: BoolProperty(
+        name="Camera's Footprint",
+        description="Outline what the camera sees of the skin, and tint the rest of it red; it "
+        "follows the camera, mirrors and the skin",
+        update=_footprint_asked,
+    )
 
 
 def bounds(scene: bpy.types.Scene) -> tuple[Vector, Vector] | None:

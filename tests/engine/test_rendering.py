@@ -188,6 +188,25 @@ def test_chief_rays_obey_snells_law_and_end_on_the_skin(engine: Any) -> None:
         assert sine[0] == pytest.approx(acrylic * sine[1], abs=2e-3)
 
 
+def test_the_footprint_is_where_the_camera_looks(engine: Any) -> None:
+    found = engine.ask("footprint", design="gelsight-mini", columns=40)
+    points, hit = load(found["files"]["points"]), load(found["files"]["hit"]) > 0
+    assert points.shape == (30, 40, 3) and found["size"] == [40, 30]
+    assert hit.mean() == pytest.approx(found["picture"])
+    np.testing.assert_allclose(points[hit][:, 2], 0.0, atol=1e-4)
+    # The skin is flat and its middle is the origin: the area within the outermost rays, of all.
+    low, high = points[hit].min(axis=0), points[hit].max(axis=0)
+    assert (high[:2] > 1.0).all() and (low[:2] < -1.0).all()
+    opened = engine.ask("open", design="gelsight-mini")
+    skin = np.ptp(load(opened["meshes"]["skin"]["vertices"]), axis=0)
+    seen = (high - low)[:2].prod() / skin[:2].prod()
+    assert found["skin"] == pytest.approx(seen, rel=0.1)
+    near = {"from": "gelsight-mini", "set": {"camera.fov": 20.0}}
+    assert engine.ask("footprint", design=near)["skin"] < 0.5 * found["skin"]
+    refused = engine.refused("footprint", design="gelsight-mini", columns=1)
+    assert "columns" in refused["message"]
+
+
 def test_scores_share_the_warm_model(engine: Any) -> None:
     number = engine.send(
         "evaluate",

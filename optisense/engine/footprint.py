@@ -1,0 +1,51 @@
+"""The request about the camera's footprint: where on the sensing surface its pixels look."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from pydantic import Field
+
+from optisense.engine.jobs import Job
+from optisense.engine.rendering import OfDesign, design_of
+from optisense.engine.requests import Lane, handles
+from optisense.engine.session import Session
+
+WIDTH = 96
+"""Columns of the grid of chief rays, unless asked for otherwise: the border of the footprint is
+told to a hundredth of the picture, in some milliseconds."""
+
+MOST = 640
+"""Largest number of columns or rows of the grid: the pixels of a usual picture."""
+
+
+class FootprintGrid(OfDesign):
+    """See docs/engine.md."""
+
+    columns: int = Field(default=WIDTH, ge=2, le=MOST)
+
+
+@handles("footprint", FootprintGrid, Lane.RENDER)
+def footprint(session: Session, fields: FootprintGrid, job: Job) -> dict[str, Any]:
+    """Where a grid of chief rays meets the sensing surface, and how much of it they see."""
+    from optisense.objectives.view import view_of
+
+    files = session.files(fields, job.id)
+    design = design_of(session, fields, job)
+    width, height = design.camera.resolution
+    rows = min(max(2, round(fields.columns * height / width)), MOST)
+    # The model of drafts follows what is being edited; that of whole pictures keeps its light.
+    model = session.renderer.draft_model(design)
+    rays = model.chief_rays((fields.columns, rows))
+    view = view_of(rays, model.sensing.face_areas)
+    return {
+        "files": {
+            "points": files.array("footprint.points.npy", rays.points.astype(np.float32)),
+            "normals": files.array("footprint.normals.npy", rays.normals.astype(np.float32)),
+            "hit": files.array("footprint.hit.npy", rays.hit.astype(np.uint8)),
+        },
+        "size": [fields.columns, rows],
+        "skin": view.skin,
+        "picture": view.picture,
+    }

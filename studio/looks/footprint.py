@@ -1,0 +1,223 @@
+"""The camera's footprint: what it sees of the skin, outlined, and the rest of the skin in red."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import bpy
+import numpy as np
+from bpy.props import StringProperty
+from numpy.typing import NDArray
+
+from ..core import outlines
+from ..core.engine import EngineError, Request
+from ..engine import handing, session
+from ..scene.contacts import sensing_surface
+from . import drawing, section
+
+KINDS = ("PART", "CAMERA", "CAGE")
+
+SEEN, UNSEEN, BORDER = (0.1, 0.8, 0.45, 0.22), (0.9, 0.08, 0.05, 0.45), (0.1, 1.0, 0.5, 1.0)
+"""Red, green, blue and opacity of the skin that is seen, that is not, and of the line between."""
+
+LIFT, UNSEEN_LIFT = 0.06, 0.02
+"""mm: how far beside the skin the seen part and the red are drawn, on both sides: so the former
+hides the latter, neither is hidden by the skin, and both still lie on it."""
+
+BORDER_WIDTH = 2.5
+"""Pixels: wide enough to be told from the outlines of parts."""
+
+_shown: dict[str, Any] = {}
+"""The footprint that is drawn: `seen` and `border`, arrays of corners (n, 3) in mm, and the sensing
+surface that it is `of`."""
+
+_open: Request | None = None
+_wanted = False
+
+
+class OPTISENSE_PG_footprint(bpy.types.PropertyGroup):
+    """What there is to tell of the footprint; never saved."""
+
+    text: StringProperty(description="How much the camera sees", options={"SKIP_SAVE"})
+
+
+def is_on(scene: bpy.types.Scene | None) -> bool:
+    """Whether a scene shows the footprint of its camera."""
+    return scene is not None and scene.optisense.is_open and scene.optisense_looks.footprint
+
+
+def wanted() -> None:
+    """Something changed that the camera sees, or the footprint was switched on or off."""
+    global _wanted
+    _wanted = True
+    if not is_on(bpy.context.scene):
+        _leave()
+        session.redraw()
+    elif session.running() is not None:
+        _ask()
+
+
+def _ask() -> None:
+    """One request at a time; what changes meanwhile goes into the next."""
+    global _open, _wanted
+    scene = bpy.context.scene
+    if not _wanted or not is_on(scene) or session.is_busy():
+        return
+    if _open is not None and not _open.done:
+        return
+    _wanted = False
+    name = scene.name
+    try:
+        design = handing.design(scene)
+    except EngineError as error:
+        _refused(error)
+        return
+
+    def seen(result: dict[str, Any]) -> None:
+        if bpy.context.scene is not None and bpy.context.scene.name == name:
+            _take(result)
+
+    _open = session.ask("footprint", seen, _refused, design=design, name="footprint")
+
+
+def _take(result: dict[str, Any]) -> None:
+    if not is_on(bpy.context.scene):
+        return
+    points, hit = np.load(result["files"]["points"]), np.load(result["files"]["hit"]) > 0
+    normals = np.load(result["files"]["normals"]).reshape(-1, 3)
+    quads, border = outlines.grid_quads(points, hit)
+    flat = points.reshape(-1, 3)
+    triangles = quads[:, [0, 1, 2, 0, 2, 3]].ravel()
+    surface = sensing_surface(bpy.context.scene)
+    _shown["of"] = None if surface is None else surface.as_pointer()
+    _shown["seen"] = np.concatenate(
+        [(flat + side * LIFT * normals)[triangles] for side in (1.0, -1.0)]
+    )
+    _shown["border"] = np.concatenate(
+        [(flat + side * LIFT * normals)[border.ravel()] for side in (1.0, -1.0)]
+    )
+    bpy.context.window_manager.optisense_footprint.text = words(result)
+    session.redraw()
+
+
+def is_current(scene: bpy.types.Scene) -> bool:
+    """Whether what is known is of the sensor in a scene, and not of one that was open before."""
+    surface = sensing_surface(scene)
+    return surface is not None and _shown.get("of") == surface.as_pointer()
+
+
+def told(scene: bpy.types.Scene) -> str:
+    """What there is to tell of the footprint in a scene."""
+    text = str(bpy.context.window_manager.optisense_footprint.text)
+    return text if is_current(scene) or not _shown else ""
+
+
+def words(result: dict[str, Any]) -> str:
+    """How much the camera sees, in words."""
+    skin, picture = 100 * result["skin"], 100 * result["picture"]
+    text = f"The camera sees {skin:.0f} % of the skin"
+    return text if picture > 99.5 else f"{text}; {picture:.0f} % of its pixels see skin"
+
+
+def _refused(error: EngineError) -> None:
+    if error.kind in ("Replaced", "Cancelled"):
+        return
+    _shown.clear()
+    bpy.context.window_manager.optisense_footprint.text = f"No footprint: {error.message}"
+    session.redraw()
+
+
+def _draw(scene: bpy.types.Scene) -> None:
+    if not is_on(scene) or not is_current(scene):
+        return
+    import gpu
+
+    surface = sensing_surface(scene)
+    gpu.state.depth_mask_set(True)  # what is seen hides the red behind it
+    _draw_faces(scene, _shown["seen"], SEEN)
+    if surface is not None and surface.visible_get():
+        skin = skin_triangles(surface)
+        shift = UNSEEN_LIFT * np.repeat(face_normals(skin), 3, axis=0)
+        for side in (1.0, -1.0):
+            _draw_faces(scene, skin + side * shift, UNSEEN)
+    border = drawing.cut_lines(scene, _shown["border"])
+    drawing.draw_lines(border, BORDER, width=BORDER_WIDTH)
+    gpu.state.depth_mask_set(False)
+
+
+def _draw_faces(
+    scene: bpy.types.Scene, corners: NDArray[np.float32], colour: tuple[float, ...]
+) -> None:
+    corners = cut_faces(scene, corners)
+    drawing.draw_faces(corners, np.tile(np.array(colour, dtype=np.float32), (len(corners), 1)))
+
+
+def cut_faces(scene: bpy.types.Scene, corners: NDArray[np.float32]) -> NDArray[np.float32]:
+    """(3 m, 3): the triangles that the section plane of a scene leaves whole."""
+    found = section.plane(scene)
+    if found is None or not len(corners):
+        return corners
+    normal, offset = np.array(found[:3]), found[3]
+    kept = (corners @ normal + offset > 0.0).reshape(-1, 3).all(axis=1)
+    return corners.reshape(-1, 3, 3)[kept].reshape(-1, 3)
+
+
+def skin_triangles(surface: bpy.types.Object) -> NDArray[np.float32]:
+    """(3 n, 3) mm: the corners of the sensing surface's triangles in the world."""
+    mesh = surface.data
+    mesh.calc_loop_triangles()
+    corners = np.empty(3 * len(mesh.loop_triangles), dtype=np.int32)
+    mesh.loop_triangles.foreach_get("vertices", corners)
+    places = np.empty(3 * len(mesh.vertices), dtype=np.float32)
+    mesh.vertices.foreach_get("co", places)
+    return drawing.in_world(places.reshape(-1, 3)[corners], surface.matrix_world)
+
+
+def face_normals(corners: NDArray[np.float32]) -> NDArray[np.float32]:
+    """(n, 3) unit normals of triangles of corners (3 n, 3); 0 where one has no area."""
+    one, two, three = np.moveaxis(corners.reshape(-1, 3, 3), 1, 0)
+    found = np.cross(two - one, three - one)
+    return found / np.maximum(np.linalg.norm(found, axis=1, keepdims=True), 1e-12)
+
+
+def _leave() -> None:
+    """Draw no footprint any more."""
+    global _open, _wanted
+    if _open is not None:
+        _open.ignore()
+    _open, _wanted = None, False
+    _shown.clear()
+    bpy.context.window_manager.optisense_footprint.text = ""
+
+
+@bpy.app.handlers.persistent
+def _changed(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
+    global _wanted
+    if not is_on(scene):
+        return
+    for update in depsgraph.updates:
+        item = update.id.original
+        if isinstance(item, bpy.types.Object) and item.optisense.kind in KINDS:
+            _wanted = True  # asked at the next tick: Blender is in the middle of an edit
+            return
+
+
+@bpy.app.handlers.persistent
+def _loaded(*_: Any) -> None:
+    _leave()
+    wanted()
+
+
+PROPERTIES = {"WindowManager": {"optisense_footprint": OPTISENSE_PG_footprint}}
+HOOKS = (
+    (section.when_footprint_asked, wanted),
+    (drawing.when_drawing, _draw),
+    (session.when_ticking, _ask),
+    (session.when_leaving, _leave),
+    (bpy.app.handlers.depsgraph_update_post, _changed),
+    (bpy.app.handlers.load_post, _loaded),
+)
+
+
+def unregister() -> None:
+    _leave()
