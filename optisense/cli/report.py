@@ -13,10 +13,17 @@ from optisense.commands.rendering import BeforeAndAfterOptions
 from optisense.time_left import TimedStep
 
 if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
     from optisense.report.before_after import Look
     from optisense.search import Study
 
 REPORT_FILE = "report.html"
+
+FEW_PICTURES, MOST_PICTURES = 6, 100
+"""Number of trials that are rendered unless something else is asked for, some 2 s each, and at
+most, with which the page has about 10 MB."""
 
 
 @ends_well
@@ -40,13 +47,33 @@ def report(
     *,
     options: BeforeAndAfterOptions,
     pictures: Annotated[
-        bool, typer.Option(help="Render the sensor as it was and as it is best.")
+        bool, typer.Option(help="Render the sensor as it was and as it is best, and trials.")
     ] = True,
+    trial_pictures: Annotated[
+        int,
+        typer.Option(
+            metavar="N", min=0, max=MOST_PICTURES, help="Trials whose pictures a click shows."
+        ),
+    ] = FEW_PICTURES,
+    watch: Annotated[
+        bool,
+        typer.Option("--watch", help="Serve the page on this machine, and keep it up to date."),
+    ] = False,
+    port: Annotated[
+        int, typer.Option(metavar="N", min=0, max=65535, help="For --watch; 0 takes a free one.")
+    ] = 0,
 ) -> None:
     """Write a study as one HTML page: how the search went, what it found, and the trials.
 
     A search may still be running: the page shows the trials so far.
     """
+    if watch:
+        from optisense.cli.report_watch import watch as watch_study
+
+        if out is not None:
+            raise typer.BadParameter("--watch writes no file", param_hint="--out")
+        watch_study(study, port, pictures)
+        return
     from optisense.cli.output_folder import ensure_writable
     from optisense.report.study import write_study_report
     from optisense.search import Study
@@ -57,27 +84,43 @@ def report(
         if page.is_dir():
             raise typer.BadParameter(f"'{page}' is a folder", param_hint="--out")
         ensure_writable(page.parent)
-        with progress_line(*_steps(options.photons, pictures)) as line:
+        count = trial_pictures if pictures else 0
+        with progress_line(*_steps(options.photons, pictures, count)) as line:
             looks = _looks(opened, options.photons, pictures, line)
+            shown = _pictures(opened, count, line)
             line.begin(WRITING)
-            write_study_report(page, opened, looks)
+            write_study_report(page, opened, looks, pictures=shown, named=str(study))
     finally:
         opened.close()
     output.print(f"report: {page}", markup=False)
 
 
-WRITING = "writing the page"
+WRITING, TRIALS = "writing the page", "rendering trials"
 
 
-def _steps(photons: int, pictures: bool) -> list[TimedStep]:
+def _steps(photons: int, pictures: bool, trials: int) -> list[TimedStep]:
     """The steps, with their usual times (seconds on two cores of a desktop processor, GelSight
     Mini)."""
     look = 5.0 + 2.2 * photons / 1e6 if pictures else 1.0
     return [
         TimedStep("the sensor before the search", 1, 3.0 + look),
         TimedStep("the sensor after the search", 1, look),
+        TimedStep(TRIALS, trials, 2.0),
         TimedStep(WRITING, 1, 3.0),
     ]
+
+
+def _pictures(study: Study, count: int, line: ProgressLine) -> dict[int, NDArray[np.uint8]]:
+    """Pictures of the trials that a reader looks at first, by number."""
+    from optisense.report.trial_pictures import TrialPictures, worth_a_picture
+
+    made, found = TrialPictures(study), {}
+    for done, trial in enumerate(worth_a_picture(study, study.trials, count)):
+        line.begin(TRIALS, count, done, text=f"rendering trial {trial.number}")
+        picture = made.of(trial)
+        if picture is not None:
+            found[trial.number] = picture
+    return found
 
 
 def _looks(study: Study, photons: int, pictures: bool, line: ProgressLine) -> dict[str, Look]:

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
+import numpy as np
 from markupsafe import Markup
+from numpy.typing import NDArray
 
 from optisense.design import SensorDesign
 from optisense.design.section import along_rows
@@ -15,19 +18,24 @@ from optisense.design.section_drawing import section_svg
 from optisense.errors import OptiSenseError
 from optisense.report import study_figures
 from optisense.report import study_tables as tables
-from optisense.report.balls import marks_svg, told
+from optisense.report.balls import marks_svg
+from optisense.report.balls import told as balls_told
 from optisense.report.before_after import Look
 from optisense.report.cage_changes import CageChange, cage_changes, cage_figure
 from optisense.report.drawing import figure_uri
-from optisense.report.files import page
+from optisense.report.files import as_json, page, script
 from optisense.report.pictures import MOST_STRETCHED, data_uri, stretching_colours
 from optisense.report.tolerance import shown_size
+from optisense.report.trial_marks import Marks, TrialFigure, answering, told
 from optisense.search.methods import find
 from optisense.search.study.best import best_of, nearest
 from optisense.search.study.conditions import condition_note, lost_note
 from optisense.search.study.study import Study, front_among
 from optisense.search.study.trial import Trial
 from optisense.writing import write_text
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 MOST_COLUMNS = 8
 """Parameters in the table of trials: those that go most with the score."""
@@ -37,7 +45,12 @@ FEW_CHANGES = 8
 
 
 def write_study_report(
-    path: str | Path, study: Study, looks: Mapping[str, Look] | None = None
+    path: str | Path,
+    study: Study,
+    looks: Mapping[str, Look] | None = None,
+    *,
+    pictures: Mapping[int, NDArray[np.uint8]] | None = None,
+    named: str | None = None,
 ) -> Path:
     """Write a study as one self-contained HTML page.
 
@@ -45,6 +58,8 @@ def write_study_report(
         path: the file to write; it is written whole or not at all.
         study: finished or not.
         looks: of the designs "before" and "after", where they were rendered.
+        pictures: (h, w, 3) of some trials, by number (`TrialPictures`), which a click shows.
+        named: the study's folder as the user names it, for the commands on the page.
 
     Returns:
         The path.
@@ -52,12 +67,28 @@ def write_study_report(
     Raises:
         OutputError: the file can't be written.
     """
-    write_text(Path(path), render_study(study, looks))
+    write_text(Path(path), render_study(study, looks, pictures=pictures, named=named))
     return Path(path)
 
 
-def render_study(study: Study, looks: Mapping[str, Look] | None = None) -> str:
-    """The page of `write_study_report` as text."""
+def render_study(
+    study: Study,
+    looks: Mapping[str, Look] | None = None,
+    *,
+    pictures: Mapping[int, NDArray[np.uint8]] | None = None,
+    named: str | None = None,
+    live: str | None = None,
+) -> str:
+    """The page of `write_study_report` as text.
+
+    Args:
+        study: finished or not.
+        looks: of the designs "before" and "after", where they were rendered.
+        pictures: of some trials, by number.
+        named: the study's folder as the user names it.
+        live: the version of the page, where a `LiveServer` serves it: the page then refreshes
+            itself, and asks the server for the pictures of trials.
+    """
     trials = study.trials
     names = study.settings.names
     best, start = best_of(trials), study.start
@@ -66,10 +97,18 @@ def render_study(study: Study, looks: Mapping[str, Look] | None = None) -> str:
     front = front_among([t for t in trials if not t.is_start], names) if several else []
     strongest = [each.number for each in study_figures.influences(trials, names[0])]
     weighed = names if find(study.settings.method).several else names[:1]
-    drawn = {
-        name: study_figures.parameters(trials, name, _best_by(trials, name) if number else best)
-        for number, name in enumerate(weighed)
-    }
+    known = answering(trials)
+    figures_of = _Figures({trial.number for trial in known})
+    if scored:
+        figures_of.draw("convergence", partial(study_figures.convergence, trials, names))
+    drawn = {}
+    for number, name in enumerate(weighed):
+        top = _best_by(trials, name) if number else best
+        label = f"parameters {name}"
+        if figures_of.draw(label, partial(study_figures.parameters, trials, name, top)):
+            drawn[name] = label
+    if front:
+        figures_of.draw("front", partial(study_figures.front, trials, front, names, best))
     looks = looks or {}
     figures = [looks.get(label, Look()).figures for label in ("before", "after")]
     after = _design(study, best)
@@ -84,11 +123,11 @@ def render_study(study: Study, looks: Mapping[str, Look] | None = None) -> str:
         headline=_headline(study, trials, best),
         unfinished=_unfinished(study, trials),
         robust=_robust(study),
-        convergence=figure_uri(study_figures.convergence(trials, names)) if scored else "",
-        parameters=[(name, figure_uri(each)) for name, each in drawn.items() if each is not None],
+        convergence=figures_of.uri("convergence"),
+        parameters=[(name, label, figures_of.uri(label)) for name, label in drawn.items()],
         shown_parameters=min(len(strongest), study_figures.MOST_PANELS),
         all_parameters=study.space.size,
-        front=figure_uri(study_figures.front(trials, front, names, best)) if front else "",
+        front=figures_of.uri("front"),
         front_rows=[_front_row(trial, names) for trial in front[: tables.MOST_TRIALS]],
         names=names,
         sides=_sides(study, best, looks),
@@ -116,7 +155,41 @@ def render_study(study: Study, looks: Mapping[str, Look] | None = None) -> str:
         failures=failures,
         more_causes=more_causes,
         settings=tables.settings(study),
+        live=live,
+        data=as_json(
+            {
+                **told(study, known, strongest, pictures or {}, named),
+                "figures": {name: each.places for name, each in figures_of.found.items()},
+                "live": live,
+            }
+        ),
+        script=script("study.js"),
     )
+
+
+class _Figures:
+    """The figures of a page that answer for trials.
+
+    Attributes:
+        found: by name.
+    """
+
+    def __init__(self, known: set[int]) -> None:
+        """`known`: numbers of the trials that the page tells about."""
+        self.found: dict[str, TrialFigure] = {}
+        self._known = known
+
+    def draw(self, name: str, make: Callable[..., Figure | None]) -> bool:
+        """Draw one; whether there was something to draw."""
+        marks = Marks()
+        figure = make(marks=marks)
+        if figure is not None:
+            self.found[name] = TrialFigure.of(figure, marks, self._known)
+        return figure is not None
+
+    def uri(self, name: str) -> str:
+        """The picture of one; empty where it was not drawn."""
+        return self.found[name].uri if name in self.found else ""
 
 
 def moves_rays(study: Study) -> bool:
@@ -215,7 +288,7 @@ def _picture(seen: Look) -> dict[str, Any]:
     return {
         "picture": data_uri(seen.picture),
         "marks": marks_svg(seen.balls, width, height),
-        "told": f"What the camera sees of {len(seen.balls)} {balls}. {told(seen.balls)}"
+        "told": f"What the camera sees of {len(seen.balls)} {balls}. {balls_told(seen.balls)}"
         if seen.balls
         else "",
     }

@@ -19,6 +19,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+    from optisense.report.trial_marks import Marks
+
 FloatArray = NDArray[np.float64]
 
 MOST_PANELS = 12
@@ -49,8 +51,16 @@ class Influence:
     strength: float
 
 
-def convergence(trials: Sequence[Trial], names: Sequence[str]) -> Figure:
-    """Scores in the order of the trials, and the best so far; one panel an objective."""
+def convergence(
+    trials: Sequence[Trial], names: Sequence[str], marks: Marks | None = None
+) -> Figure:
+    """Scores in the order of the trials, and the best so far; one panel an objective.
+
+    Args:
+        trials: of the study.
+        names: of its objectives.
+        marks: takes down where which trial is drawn.
+    """
     figure = new_figure(9.5, 0.6 + 2.7 * len(names))
     start = next((trial for trial in trials if trial.is_start), None)
     later = [trial for trial in trials if not trial.is_start]
@@ -77,6 +87,10 @@ def convergence(trials: Sequence[Trial], names: Sequence[str]) -> Figure:
                 clip_on=False,
                 label="failed",
             )
+            if marks is not None:
+                marks.add(axes, numbers[~known], numbers[~known], np.full((~known).sum(), lowest))
+        if marks is not None:
+            marks.add(axes, numbers[known], numbers[known], scores[known])
         axes.set_ylabel(name)
         axes.grid(alpha=0.25)
         legend_above(axes, columns=4)
@@ -124,8 +138,17 @@ def correlation_ratio(groups: ArrayLike, values: ArrayLike) -> float:
     return float(np.sqrt(between / total))
 
 
-def parameters(trials: Sequence[Trial], name: str, best: Trial | None) -> Figure | None:
-    """The score against the parameters that go most with it; None without enough trials."""
+def parameters(
+    trials: Sequence[Trial], name: str, best: Trial | None, marks: Marks | None = None
+) -> Figure | None:
+    """The score against the parameters that go most with it; None without enough trials.
+
+    Args:
+        trials: of the study.
+        name: of the score.
+        best: the trial that is marked.
+        marks: takes down where which trial is drawn.
+    """
     chosen = influences(trials, name)[:MOST_PANELS]
     if not chosen:
         return None
@@ -141,9 +164,12 @@ def parameters(trials: Sequence[Trial], name: str, best: Trial | None) -> Figure
     for axes, each in zip(panels, chosen, strict=False):
         parameter = known[0].space.parameters[each.number]
         column = points[:, each.number]
+        across = column + spread if isinstance(parameter.kind, Choice) else column
+        if marks is not None:
+            marks.add(axes, order, across, scores)
         if isinstance(parameter.kind, Choice):
             shown = axes.scatter(
-                column + spread, scores, c=order, s=6, cmap="viridis", alpha=0.5, linewidths=0
+                across, scores, c=order, s=6, cmap="viridis", alpha=0.5, linewidths=0
             )
             options = np.unique(column)
             means = [scores[column == option].mean() for option in options]
@@ -171,16 +197,32 @@ def parameters(trials: Sequence[Trial], name: str, best: Trial | None) -> Figure
 
 
 def front(
-    trials: Sequence[Trial], chosen: Sequence[Trial], names: Sequence[str], best: Trial | None
+    trials: Sequence[Trial],
+    chosen: Sequence[Trial],
+    names: Sequence[str],
+    best: Trial | None,
+    marks: Marks | None = None,
 ) -> Figure:
-    """Two objectives against each other, with the trials that no other beats in all of them."""
+    """Two objectives against each other, with the trials that no other beats in all of them.
+
+    Args:
+        trials: of the study.
+        chosen: those that no other beats.
+        names: of the objectives.
+        best: the trial that is marked.
+        marks: takes down where which trial is drawn.
+    """
     one, other = names[:2]
     values = np.array([[trial.scores[one], trial.scores[other]] for trial in trials])
-    values = values[np.isfinite(values).all(axis=1)]
+    known = np.isfinite(values).all(axis=1)
+    numbers = np.array([trial.number for trial in trials])[known]
+    values = values[known]
     edge = np.array(sorted((trial.scores[one], trial.scores[other]) for trial in chosen))
     figure = new_figure(7.5, 5.0)
     axes = figure.subplots()
     axes.plot(*values.T, ".", color=PALE, ms=5, label="trials", zorder=1)
+    if marks is not None:
+        marks.add(axes, numbers, *values.T)
     if len(edge):
         label = "not beaten in both" if len(names) == 2 else "not beaten in all"
         style = "o-" if len(names) == 2 else "o"
@@ -188,7 +230,7 @@ def front(
             *edge.T, style, color=BLUE, ms=5, lw=1.2, drawstyle="steps-pre", label=label, zorder=3
         )
     start = next((trial for trial in trials if trial.is_start), None)
-    for each in _spread_out(chosen, one):
+    for each in spread_out(chosen, one, MOST_NUMBERED):
         axes.annotate(
             str(each.number),
             (each.scores[one], each.scores[other]),
@@ -197,8 +239,8 @@ def front(
             fontsize=8,
             color=BLUE,
         )
-    marks = ((start, GREY, "s", "the start"), (best, RED, "*", f"best by {one}"))
-    for trial, colour, mark, label in marks:
+    special = ((start, GREY, "s", "the start"), (best, RED, "*", f"best by {one}"))
+    for trial, colour, mark, label in special:
         if trial is not None and np.isfinite([trial.scores[one], trial.scores[other]]).all():
             size = 14 if mark == "*" else 7
             axes.plot(
@@ -221,12 +263,12 @@ def front(
     return figure
 
 
-def _spread_out(trials: Sequence[Trial], name: str) -> list[Trial]:
-    """Some of many trials, from the lowest score to the highest."""
+def spread_out(trials: Sequence[Trial], name: str, most: int) -> list[Trial]:
+    """At most so many trials, from the lowest score of a name to the highest."""
     if not trials:
         return []
     ordered = sorted(trials, key=lambda trial: trial.scores[name])
-    places = np.linspace(0, len(ordered) - 1, min(MOST_NUMBERED, len(ordered))).round()
+    places = np.linspace(0, len(ordered) - 1, min(most, len(ordered))).round()
     return [ordered[place] for place in sorted({int(place) for place in places})]
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -22,8 +23,15 @@ class Visit:
     """
 
     def __init__(
-        self, browser: Browser, page: Path | str, size: tuple[int, int], **context: object
+        self,
+        browser: Browser,
+        page: Path | str,
+        size: tuple[int, int],
+        allowed: Sequence[str] = (),
+        **context: object,
     ) -> None:
+        """`allowed`: addresses that the page may ask for, beside its own."""
+        self._allowed = allowed
         self.complaints: list[str] = []
         self.asked_for: list[str] = []
         self._context = browser.new_context(
@@ -41,7 +49,7 @@ class Visit:
             self.complaints.append(message.text)
 
     def _note(self, wanted: str, own: str) -> None:
-        if wanted != own and not wanted.startswith("data:"):
+        if wanted != own and wanted not in self._allowed and not wanted.startswith("data:"):
             self.asked_for.append(wanted)
 
     def close(self) -> None:

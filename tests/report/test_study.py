@@ -70,7 +70,7 @@ def test_every_figure_is_there(page: str) -> None:
     """
     images = re.findall(r'<img [^>]*src="([^"]*)"', page)
     assert len(images) == 5
-    assert 'alt="parameters against opposite"' in page
+    assert 'aria-label="parameters against opposite;' in page
     assert "search for steep and opposite</h1>" in page
     assert all(image.startswith("data:image/png;base64,") for image in images)
     assert page.count("<svg") == 3  # two sections, and what lies over the picture

@@ -1,0 +1,119 @@
+"""``optisense report --watch``: the page of a study that runs, on this machine only."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from optisense.cli.console import messages, output
+
+if TYPE_CHECKING:
+    from optisense.report.before_after import Look
+    from optisense.search import Study
+
+LOOK_EVERY = 1.0
+"""Seconds between looks at the study's files; trials that end within one are shown together."""
+
+
+def watch(study: Path, port: int, pictures: bool) -> None:
+    """Serve the page of a study until Ctrl-C.
+
+    Args:
+        study: the folder, as the user names it.
+        port: 0 takes a free one.
+        pictures: whether to render the trials that are clicked.
+
+    Raises:
+        SearchError: there is no study, or it was damaged meanwhile.
+        OutputError: the port can't be had.
+    """
+    from optisense.report.live import LiveServer
+    from optisense.search import Study
+
+    opened = Study.open(study)
+    try:
+        server = LiveServer(port)
+        try:
+            watched = _Watched(opened, str(study), server, pictures)
+            watched.refresh()
+            output.print(f"watching: {server.address}", markup=False)
+            messages.print("Open it in a browser of this machine. Ctrl-C ends it.")
+            while True:
+                watched.answer()
+                watched.refresh()
+        finally:
+            server.close()
+    finally:
+        opened.close()
+
+
+class _Watched:
+    """A study and what is shown of it."""
+
+    def __init__(self, study: Study, named: str, server: object, pictures: bool) -> None:
+        from optisense.report.live import LiveServer
+        from optisense.report.trial_pictures import TrialPictures
+
+        assert isinstance(server, LiveServer)
+        self._study, self._named, self._server = study, named, server
+        self._pictures = TrialPictures(study) if pictures else None
+        self._version = ""
+        self._looks: dict[int, Look] = {}
+
+    def refresh(self) -> None:
+        """Show the study as it is, if its files have changed."""
+        from optisense.report.study import render_study
+
+        version = _version_of(self._study)
+        if version == self._version:
+            return
+        page = render_study(self._study, self._sides(), named=self._named, live=version)
+        self._server.show(page, version)
+        self._version = version
+
+    def answer(self) -> None:
+        """Wait a little for a browser that asks for a trial's picture, and render it."""
+        from optisense.report.pictures import png
+
+        asked = self._server.wait(LOOK_EVERY)
+        if asked is None:
+            return
+        number, answer = asked
+        found = None
+        try:
+            trial = next((each for each in self._study.trials if each.number == number), None)
+            if trial is not None and self._pictures is not None:
+                found = self._pictures.of(trial)
+        finally:
+            answer.set_result(None if found is None else png(found))
+
+    def _sides(self) -> dict[str, Look]:
+        """Chief rays of the start and of the best trial; each design is traced once."""
+        from optisense.report.before_after import look
+
+        best = self._study.best
+        designs = {-1: ("before", self._study.space.design)}
+        if best is not None:
+            designs[best.number] = ("after", best.design)
+        found = {}
+        for number, (label, design) in designs.items():
+            if number not in self._looks:
+                settings = self._study.settings.settings
+                self._looks[number] = look(design, settings, pictures=False)
+            found[label] = self._looks[number]
+        return found
+
+
+def _version_of(study: Study) -> str:
+    """Differs when something was written to the study's store."""
+    from optisense.search.study.folder import STORE_FILE
+
+    assert study.folder is not None
+    told = []
+    for end in ("", "-wal"):
+        try:
+            found = (study.folder / f"{STORE_FILE}{end}").stat()
+        except OSError:
+            continue
+        told.append(f"{found.st_mtime_ns:x}.{found.st_size:x}")
+    return "-".join(told)

@@ -1,0 +1,85 @@
+"""Small pictures of the trials of a study."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from optisense.errors import OptiSenseError, SetupError
+from optisense.geometry import Sphere
+from optisense.objectives import Settings
+from optisense.report.study_figures import spread_out
+from optisense.search.study.study import Study
+from optisense.search.study.trial import Trial
+
+if TYPE_CHECKING:
+    from optisense.optics import OpticalModel
+
+ACROSS = 240
+"""Width of a picture in pixels: it is shown 390 pixels wide at most, beside the trial's numbers."""
+
+PHOTONS = 200_000
+"""Number of photons of a picture: its noise, some 4 %, is hardly seen at this size."""
+
+
+class TrialPictures:
+    """Renders trials with the nine balls that objectives press in; each once."""
+
+    def __init__(self, study: Study) -> None:
+        """Nothing is rendered yet."""
+        taken = ("radius", "depth", "skin")
+        given = study.settings.settings
+        self._settings = Settings(**{key: given[key] for key in taken if key in given})
+        self._model: OpticalModel | None = None
+        self._found: dict[int, NDArray[np.uint8] | None] = {}
+
+    def of(self, trial: Trial) -> NDArray[np.uint8] | None:
+        """(h, w, 3) of a trial; None where its design can't be rendered.
+
+        Raises:
+            SetupError: the renderer can't run on this machine.
+        """
+        if trial.number not in self._found:
+            try:
+                self._found[trial.number] = self._rendered(trial)
+            except SetupError:
+                raise
+            except OptiSenseError:
+                self._found[trial.number] = self._model = None
+        return self._found[trial.number]
+
+    def _rendered(self, trial: Trial) -> NDArray[np.uint8]:
+        from optisense.optics import OpticalModel
+
+        design = trial.design
+        if self._model is None:
+            self._model = OpticalModel(design)
+        else:
+            self._model.set_design(design)
+        width, height = design.camera.resolution
+        size = ACROSS, max(1, round(ACROSS * height / width))
+        shared = self._settings
+        contacts = self._model.nine_contacts(Sphere(shared.radius), shared.depth)
+        image = self._model.render(contacts, resolution=size, photons=PHOTONS, skin=shared.skin)
+        if image.interrupted:
+            raise KeyboardInterrupt
+        return image.picture()
+
+
+def worth_a_picture(study: Study, trials: Sequence[Trial], count: int) -> list[Trial]:
+    """The trials that a reader looks at first: some along the front of several objectives, and the
+    best ones by the first.
+
+    Args:
+        study: the study.
+        trials: of it.
+        count: how many at most.
+    """
+    names = study.settings.names
+    fine = [trial for trial in trials if np.isfinite(trial.score)]
+    front = spread_out(study.front, names[0], count) if len(names) > 1 else []
+    best = sorted(fine, key=lambda trial: -trial.score)
+    return list({trial.number: trial for trial in (*front, *best)}.values())[:count]
