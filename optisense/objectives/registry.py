@@ -30,7 +30,7 @@ ENTRY_POINTS = "optisense.objectives"
 BUILT_IN = ("rgb2normal", "normdiff", "aoap", "2to3pw")
 """The four objectives of the OptiSense paper."""
 
-FURTHER = ("coverage", "distortion")
+FURTHER = ("coverage", "distortion", "bend_radius")
 """Objectives of this package beside the paper's."""
 
 CONDITIONS, WATCHED = "conditions", "watched"
@@ -44,6 +44,7 @@ _MODULES = (
     "projection_warping",
     "coverage",
     "distortion",
+    "bend_radius",
 )
 """Modules of this package that register objectives."""
 

