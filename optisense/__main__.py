@@ -2,17 +2,12 @@
 
 from __future__ import annotations
 
-import signal
+from optisense.starting import leave_on_signals
 
 
 def main() -> None:
-    """Run the command line.
-
-    While Python still imports it, Ctrl-C ends the process without a word, as it ends a program
-    that does not handle it. Then `optisense.cli.stopping` takes over.
-    """
-    if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
-        signal.signal(signal.SIGINT, signal.SIG_DFL)
+    """Run the command line; `optisense.cli.stopping` answers signals as soon as it is imported."""
+    leave_on_signals()
     from optisense.cli import main as run
 
     run()

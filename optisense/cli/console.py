@@ -102,7 +102,10 @@ def ends_well(command: Callable[_P, _R]) -> Callable[..., _R]:
 
     @functools.wraps(command)
     def run(*args: _P.args, **kwargs: _P.kwargs) -> _R:
+        from optisense.cli import stopping
+
         try:
+            stopping.begin()
             with ExitStack() as ending:
                 before = _ending.set(ending)
                 ending.callback(_ending.reset, before)

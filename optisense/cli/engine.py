@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import sys
 
-import typer
-
-from optisense.cli.console import messages
+from optisense.cli import stopping
+from optisense.cli.console import EXIT_INTERRUPTED, messages
 
 
 def engine() -> None:
@@ -19,5 +18,5 @@ def engine() -> None:
         )
     from optisense.engine.server import serve
 
-    serve()
-    raise typer.Exit
+    stopping.begin()
+    serve(lambda: stopping.exit_code(EXIT_INTERRUPTED))

@@ -3,10 +3,15 @@
 Python runs its signal handlers in the main thread and between two of its own instructions, so they
 wait while the renderer compiles or computes. A thread is told of the signal at once: it says what
 the command waits for, and ends the process a little after a second signal.
+
+Before a command begins, and after its end, a signal ends the process at once. While a command
+imports a package, it waits: an exception amid an import comes out as an error of another kind, and
+of compiled packages as an abort.
 """
 
 from __future__ import annotations
 
+import _thread
 import os
 import select
 import signal
@@ -17,6 +22,7 @@ from contextlib import contextmanager
 from types import FrameType
 from typing import NoReturn
 
+from optisense import starting
 from optisense.cli.console import EXIT_INTERRUPTED, messages
 
 EXIT_TERMINATED = 143
@@ -29,11 +35,20 @@ GRACE = 1.5
 """Seconds after a second signal in which the command may still end by itself."""
 
 
+AGAIN = 0.02
+"""Seconds after which a signal that came amid an import is looked at again."""
+
+_IMPORTS = ("<frozen importlib._bootstrap>", "<frozen importlib._bootstrap_external>")
+"""Files of the functions that import."""
+
+
 class _State:
     """The signals that this process has received, and what a first one waits for."""
 
     def __init__(self) -> None:
+        self.begun = False
         self.signals = 0
+        self.repeated = 0
         self.terminated = False
         self.said = False
         self.waits: Callable[[], str] | None = None
@@ -87,10 +102,49 @@ def watch() -> None:
     reader, writer = os.pipe()
     os.set_blocking(writer, False)
     if signal.getsignal(signal.SIGINT) is not signal.SIG_IGN:
-        signal.signal(signal.SIGINT, signal.default_int_handler)
+        signal.signal(signal.SIGINT, _interrupt)
     signal.signal(signal.SIGTERM, _terminate)
     signal.set_wakeup_fd(writer, warn_on_full_buffer=False)
     threading.Thread(target=_answer, args=(reader,), name="signals", daemon=True).start()
+
+
+def begin() -> None:
+    """From here on, Ctrl-C is a KeyboardInterrupt: called as a command begins its work."""
+    _state.begun = True
+
+
+def over(code: int) -> None:
+    """From here on, a signal ends the process at once, with the code of the finished command."""
+    for number in (signal.SIGINT, signal.SIGTERM):
+        if signal.getsignal(number) in (_interrupt, _terminate):
+            signal.signal(number, lambda *_: os._exit(code))
+
+
+def _interrupt(number: int, frame: FrameType | None) -> None:
+    """Ctrl-C: a KeyboardInterrupt, unless it would come out of an import."""
+    if not _state.begun:
+        starting.leave(signal.SIGTERM if _state.terminated else signal.SIGINT)
+    if _imports(frame):
+        timer = threading.Timer(AGAIN, _repeat)
+        timer.daemon = True
+        timer.start()
+        return
+    raise KeyboardInterrupt
+
+
+def _imports(frame: FrameType | None) -> bool:
+    """Whether a frame, or one that called it, imports."""
+    while frame is not None:
+        if frame.f_code.co_filename in _IMPORTS:
+            return True
+        frame = frame.f_back
+    return False
+
+
+def _repeat() -> None:
+    """Let Python handle Ctrl-C once more; it is no second one."""
+    _state.repeated += 1
+    _thread.interrupt_main()
 
 
 def _terminate(number: int, frame: FrameType | None) -> None:
@@ -100,7 +154,7 @@ def _terminate(number: int, frame: FrameType | None) -> None:
     if callable(handler):
         handler(signal.SIGINT, frame)
     else:
-        raise KeyboardInterrupt
+        _interrupt(signal.SIGINT, frame)
 
 
 def _answer(reader: int) -> None:
@@ -108,6 +162,9 @@ def _answer(reader: int) -> None:
     while True:
         for number in os.read(reader, 16):
             if number not in (signal.SIGINT, signal.SIGTERM):
+                continue
+            if _state.repeated:
+                _state.repeated -= 1
                 continue
             _state.signals += 1
             _state.terminated |= number == signal.SIGTERM

@@ -8,9 +8,9 @@ import sys
 import threading
 import time
 import traceback
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import IO, Any
+from typing import IO, Any, NoReturn
 
 from optisense import __version__
 from optisense.engine import requests
@@ -254,16 +254,21 @@ class _Work:
         self._engine.answered(self.job, message)
 
 
-def serve() -> None:
-    """Serve the front end at standard input and output, and end the process with it."""
+def serve(interrupted: Callable[[], int] = lambda: 130) -> NoReturn:
+    """Serve the front end at standard input and output, and end the process with it.
+
+    Args:
+        interrupted: the exit code after Ctrl-C or SIGTERM.
+    """
     faulthandler.enable()
     channel = Channel.of_standard_output()
+    code = 0
     try:
         Engine(channel).serve(sys.stdin.buffer)
     except KeyboardInterrupt:
-        pass
+        code = interrupted()
     finally:
         channel.close()
         sys.stderr.flush()
         # Threads may be in the middle of a render, which can't be waited for.
-        os._exit(0)
+        os._exit(code)

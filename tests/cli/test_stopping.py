@@ -49,14 +49,46 @@ IMPORTING = """
 import signal, sys
 signal.signal(signal.SIGINT, signal.default_int_handler)
 
-class PressesCtrlC:
+class Presses:
     def find_spec(self, name, path=None, target=None):
-        if name == "optisense.cli.app":
-            signal.raise_signal(signal.SIGINT)
+        if name == "{module}":
+            signal.raise_signal({number})
 
-sys.meta_path.insert(0, PressesCtrlC())
+sys.meta_path.insert(0, Presses())
+sys.argv[1:] = {words}
 from optisense.__main__ import main
 main()
+"""
+
+EXECUTING = """
+import signal, sys
+signal.signal(signal.SIGINT, signal.default_int_handler)
+from optisense.cli import stopping
+from optisense.cli.console import ends_well
+from optisense.cli.leaving import run_and_leave
+import typer
+
+app = typer.Typer(add_completion=False)
+
+@app.command()
+@ends_well
+def make_a_class():
+    exec("import signal; signal.raise_signal(signal.SIGINT)\\nfor _ in range(9): pass")
+
+stopping.watch()
+run_and_leave(app)
+"""
+
+LEAVING = """
+import atexit, signal
+signal.signal(signal.SIGINT, signal.default_int_handler)
+from optisense.cli import stopping
+from optisense.cli.leaving import run_and_leave
+atexit.register(signal.raise_signal, {number})
+def command():
+    raise SystemExit(7)
+stopping.watch()
+run_and_leave(command)
 """
 
 
@@ -114,7 +146,44 @@ def test_a_command_ends_with_the_code_of_its_signal(number: signal.Signals, code
         assert child.stderr.read() == "interrupted\n"
 
 
-def test_ctrl_c_while_python_imports_shows_no_traceback() -> None:
-    child = subprocess.run([sys.executable, "-c", IMPORTING], capture_output=True, text=True)
-    assert child.returncode == -signal.SIGINT
+SIGNALS = pytest.mark.parametrize(
+    ("number", "code"), [(int(signal.SIGINT), 130), (int(signal.SIGTERM), 143)]
+)
+
+
+def ended(program: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run([sys.executable, "-c", program], capture_output=True, text=True)
+
+
+@pytest.mark.parametrize(
+    ("number", "words", "module"),
+    [
+        (signal.SIGINT, ["check", "gelsight-mini"], "optisense.cli.app"),
+        (signal.SIGTERM, ["check", "gelsight-mini"], "optisense.cli.app"),
+        (signal.SIGINT, ["library", "list"], "optisense.cli.library"),
+        (signal.SIGTERM, ["export", "gelsight-mini", "--out", "/nowhere"], "optisense.cli.export"),
+        (signal.SIGINT, ["check", "gelsight-mini"], "numpy._core.multiarray"),
+        (signal.SIGTERM, ["ledger", "gelsight-mini"], "drjit.ast"),
+    ],
+)
+def test_a_signal_while_python_imports_ends_the_command_in_a_word(
+    number: signal.Signals, words: list[str], module: str
+) -> None:
+    child = ended(IMPORTING.format(module=module, number=int(number), words=words))
+    assert child.stderr == "interrupted\n"
+    assert child.returncode == 128 + number
+
+
+def test_ctrl_c_in_code_that_is_executed_gives_the_usual_code() -> None:
+    """Python 3.11 remembers such an interrupt although it was handled, and ends by a signal."""
+    child = ended(EXECUTING)
+    assert child.stderr == "interrupted\n"
+    assert child.returncode == 130
+
+
+@SIGNALS
+def test_a_signal_at_the_end_leaves_the_result_as_it_is(number: int, code: int) -> None:
+    assert code not in (7, 0)
+    child = ended(LEAVING.format(number=number))
     assert child.stderr == ""
+    assert child.returncode == 7

@@ -26,13 +26,20 @@ from pathlib import Path
 from .cases import Case, keep_case, read_case, write_case
 
 CASE_TIME = 30.0
-"""Seconds for one case; the slowest that is right takes a few."""
+"""Seconds of the processor for one case; the slowest that is right takes a few."""
+
+PATIENCE = 20.0
+"""Times these seconds that a case may take on the wall, where other programs work, too."""
 
 ENGINE_TIME = 90.0
 """The same for requests to the engine, which compiles kernels for the first of them."""
 
 MEMORY = 6 * 2**30
 """Bytes of address space that a process may have; an ordinary one has some 2 GiB."""
+
+MOST_STILLBORN = 5
+"""Processes of the fuzzer that end, or take too long, before their first case: on a busy machine
+one may."""
 
 Found = tuple[str, str, Case]
 """Kind of input, what went wrong, and with which files."""
@@ -90,6 +97,8 @@ def _work(kind: str, seed: int, end: float, channel: Connection, folder: Path) -
                 raise Over
             write_case(case, folder)
             channel.send(("begun", None))
+            end_of_case = int(time.process_time() + CASE_TIME) + 1
+            resource.setrlimit(resource.RLIMIT_CPU, (end_of_case, resource.RLIM_INFINITY))
             outcome = one_case(kind, case, folder)
             channel.send((outcome, case if outcome not in ("read", "refused") else None))
 
@@ -113,7 +122,8 @@ def fuzz(kind: str, seconds: float, seed: int) -> tuple[Counter[str], dict[str, 
     counts: Counter[str] = Counter()
     faults: dict[str, Case] = {}
     end = time.time() + seconds
-    limit = ENGINE_TIME if kind == "engine" else CASE_TIME
+    limit = ENGINE_TIME if kind == "engine" else PATIENCE * CASE_TIME
+    stillborn = 0
     while time.time() < end:
         home = Path(tempfile.mkdtemp(prefix="optisense-fuzz-"))
         ours, theirs = multiprocessing.get_context("spawn").Pipe(duplex=False)
@@ -137,11 +147,16 @@ def fuzz(kind: str, seconds: float, seed: int) -> tuple[Counter[str], dict[str, 
                     if case is not None:
                         faults.setdefault(outcome, case)
         except (TimeoutError, EOFError) as error:
-            what = "takes too long" if isinstance(error, TimeoutError) else "the process has ended"
-            if not (home / "case").exists():
+            late = isinstance(error, TimeoutError)
+            if not late:
+                child.join()
+                late = child.exitcode == -signal.SIGXCPU
+            what = "takes too long" if late else "the process has ended"
+            if (home / "case").exists():
+                counts[what] += 1
+                faults.setdefault(what, read_case(home / "case"))
+            elif (stillborn := stillborn + 1) > MOST_STILLBORN:
                 raise RuntimeError("the fuzzer's own process has failed") from None
-            counts[what] += 1
-            faults.setdefault(what, read_case(home / "case"))
         finally:
             if child.is_alive() and not over:
                 os.kill(child.pid or 0, signal.SIGKILL)
