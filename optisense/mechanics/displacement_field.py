@@ -39,6 +39,7 @@ class DisplacementField:
         overlap: FloatArray,
         pressure: FloatArray,
         elasticity: Elasticity,
+        beyond: GridSpline | None = None,
     ) -> None:
         """Sum what a pressure does.
 
@@ -47,7 +48,9 @@ class DisplacementField:
             overlap: (rows, columns) mm, of the place, less what other contacts displace.
             pressure: (rows, columns) MPa.
             elasticity: of the gel.
+            beyond: what the gel yields beyond a flat layer; `overlap` is less this as well.
         """
+        self._beyond = beyond
         self.place, self._overlap = place, overlap
         pitch, thickness = place.pitch, place.thickness
         rows, columns = place.overlap.shape
@@ -59,16 +62,16 @@ class DisplacementField:
         touching = pressure > 0.0
         fine[inside][touching] = overlap[touching]
         x0, y0 = place.x[0] - ring * pitch, place.y[0] - ring * pitch
-        self._fine = _Spline(fine, x0, y0, pitch)
+        self._fine = GridSpline(fine, x0, y0, pitch)
         self._touching, self._pressure = touching, pressure
         step = thickness / COARSE_POINTS
         reach = DECAY * thickness
         ends = [(g[0] - reach, g[-1] + reach) for g in (place.x, place.y)]
         step = max(step, pitch, max(b - a for a, b in ends) / MAX_COARSE)
         counts = [int(np.ceil((b - a) / step)) + 1 for a, b in ends]
-        coarse = _binned(pressure, place, (ends[0][0], ends[1][0]), step, (counts[1], counts[0]))
+        coarse = binned(pressure, place, (ends[0][0], ends[1][0]), step, (counts[1], counts[0]))
         wide = grid_response((counts[1], counts[0]), step, thickness, elasticity)
-        self._coarse = _Spline(wide.normal(coarse), ends[0][0], ends[1][0], step)
+        self._coarse = GridSpline(wide.normal(coarse), ends[0][0], ends[1][0], step)
         # What `sideways` needs; it is asked for less often than normal displacements.
         self._loads = (
             (response, np.pad(pressure, ring), (x0, y0, pitch)),
@@ -94,6 +97,9 @@ class DisplacementField:
             )
             for k, slope in enumerate(self._indenter_slopes):
                 result[1 + k, inside] = map_coordinates(slope, [row, column], order=1)
+        if self._beyond is not None:
+            known = self._beyond.holds(x, y)
+            result[:, known] += self._beyond.at(x[known], y[known])
         return result[0], result[1], result[2]
 
     def sideways(self, x: FloatArray, y: FloatArray) -> FloatArray:
@@ -109,12 +115,12 @@ class DisplacementField:
         return result
 
     @cached_property
-    def _sideways_splines(self) -> list[tuple[_Spline, _Spline]]:
+    def _sideways_splines(self) -> list[tuple[GridSpline, GridSpline]]:
         """Splines of the displacements along x and along y on the fine and the coarse grid."""
         found = []
         for response, pressure, start in self._loads:
             along_x, along_y, _ = response.displacement(pressure)
-            found.append((_Spline(along_x, *start), _Spline(along_y, *start)))
+            found.append((GridSpline(along_x, *start), GridSpline(along_y, *start)))
         return found
 
     def pressure(self, x: FloatArray, y: FloatArray) -> FloatArray:
@@ -163,15 +169,17 @@ class DisplacementField:
         return row.clip(0, rows - 1), column.clip(0, columns - 1), inside
 
 
-class _Spline:
+class GridSpline:
     """A cubic spline through values on a regular grid."""
 
     def __init__(self, values: FloatArray, x0: float, y0: float, pitch: float) -> None:
+        """Take (rows, columns) values of points from (x0, y0) on, at a pitch in mm."""
         self._coefficients = spline_filter(values, order=3, mode="mirror")
         self._start, self._pitch = (x0, y0), pitch
         self._shape = values.shape
 
     def holds(self, x: FloatArray, y: FloatArray) -> NDArray[np.bool_]:
+        """Which points lie on the grid, a point from its rim."""
         column, row = self._place(x, y)
         rows, columns = self._shape
         return (column >= 1) & (column <= columns - 2) & (row >= 1) & (row <= rows - 2)
@@ -205,7 +213,7 @@ def grid_response(
     return GridResponse(shape, pitch, thickness, elasticity)
 
 
-def _binned(
+def binned(
     pressure: FloatArray,
     place: Footprint,
     start: tuple[float, float],

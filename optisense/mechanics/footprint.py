@@ -113,11 +113,11 @@ def footprint(
 
 
 def _overlap(body: TriangleMesh, skin: TriangleMesh, x: FloatArray, y: FloatArray) -> FloatArray:
-    depth = heights(_beside(skin, x, y), x, y, highest=True) - heights(body, x, y)
+    depth = heights(outer_faces(skin, x, y), x, y, highest=True) - heights(body, x, y)
     return np.where(np.isfinite(depth), depth, NO_OVERLAP)
 
 
-def _beside(skin: TriangleMesh, x: FloatArray, y: FloatArray) -> TriangleMesh:
+def outer_faces(skin: TriangleMesh, x: FloatArray, y: FloatArray) -> TriangleMesh:
     """The faces of a skin that look outward and lie in the rectangle of a grid."""
     low, high = skin.triangles.min(axis=1), skin.triangles.max(axis=1)
     near = (high[:, 0] >= x[0]) & (low[:, 0] <= x[-1]) & (high[:, 1] >= y[0]) & (low[:, 1] <= y[-1])

@@ -15,6 +15,7 @@ from optisense.geometry.contact import available_depth, locate
 from optisense.mechanics.deformed_mesh import SkinMesh, skin_mesh
 from optisense.mechanics.elasticity import Elasticity
 from optisense.mechanics.footprint import DOES_NOT_REACH, footprint
+from optisense.mechanics.gel_patches import GelPatches
 from optisense.mechanics.pressed_skin import PressedSkin, press
 
 USUAL_GEL = Elasticity(youngs_modulus=0.435, poisson_ratio=0.49, friction=1.0)
@@ -103,6 +104,7 @@ class Gel:
         self._last: tuple[tuple[Contact, ...], PressedSkin] | None = None
         self._mesh: tuple[PressedSkin, SkinMesh] | None = None
         self._depths: dict[Contact, Contact] = {}
+        self._patches = GelPatches(skin, elastomers, elasticity.poisson_ratio)
 
     def pressed(
         self, contacts: Sequence[Contact], placed: Sequence[TriangleMesh] | None = None
@@ -130,7 +132,8 @@ class Gel:
                 )
                 for contact, mesh in zip(contacts, placed, strict=True)
             ]
-            self._last = asked, press(places, self._elasticity)
+            patches = [self._patches.around(place) for place in places]
+            self._last = asked, press(places, self._elasticity, patches)
         return self._last[1]
 
     def mesh(self, contacts: Sequence[Contact]) -> SkinMesh:

@@ -131,6 +131,19 @@ def _corrections(poisson_ratio: float) -> _Corrections:
     )
 
 
+def layer_correction(distance: FloatArray, poisson_ratio: float) -> FloatArray:
+    """Normal displacement by a point force that a layer has beyond a half-space.
+
+    Args:
+        distance: from the force, 0 to `FARTHEST` thicknesses.
+        poisson_ratio: below 0.5.
+
+    Returns:
+        mm for 1 N, a thickness of 1 mm and a shear modulus of 1 MPa.
+    """
+    return np.asarray(_corrections(poisson_ratio).normal(distance))
+
+
 class LoadKernels(NamedTuple):
     """Displacements (mm) at points by unit loads (1 MPa) on a square around the origin.
 

@@ -9,15 +9,23 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from optisense.mechanics.displacement_field import DisplacementField, grid_response
+from optisense.mechanics.displacement_field import (
+    DisplacementField,
+    GridSpline,
+    binned,
+    grid_response,
+)
 from optisense.mechanics.elasticity import Elasticity
 from optisense.mechanics.footprint import Footprint
+from optisense.mechanics.gel_patch import GelPatch
 from optisense.mechanics.normal_contact import NormalContact, solve_normal_contact
 
 FloatArray = NDArray[np.float64]
 
 SETTLED = 1e-4
 """Change of the displacements that contacts cause each other (mm) at which they are settled."""
+MAX_TURNS = 12
+"""Turns in which pressure and the gel's shape are matched; each is several times nearer."""
 MAX_SWEEPS = 8
 """Sweeps over contacts after which they are taken as they are; distant ones need one or two."""
 
@@ -147,15 +155,20 @@ class PressedSkin:
         return SkinDisplacement(moved, tilt, touching)
 
 
-def press(places: Sequence[Footprint], elasticity: Elasticity) -> PressedSkin:
+def press(
+    places: Sequence[Footprint],
+    elasticity: Elasticity,
+    patches: Sequence[GelPatch | None] | None = None,
+) -> PressedSkin:
     """Press indenters into a gel, without friction.
 
-    Around each contact the gel is taken to be a flat layer of its thickness there, bonded to a
-    rigid base. Contacts change each other's overlap until that settles.
+    Around each contact the gel is a flat layer of its thickness there, bonded to a rigid base, but
+    for what a patch says of its shape. Contacts change each other's overlap until that settles.
 
     Args:
         places: where each indenter overlaps the undeformed skin.
         elasticity: of the gel.
+        patches: the gel's shape around each place; None where it is a flat layer.
 
     Raises:
         ContactError: the pressure under an indenter is not found.
@@ -175,19 +188,49 @@ def press(places: Sequence[Footprint], elasticity: Elasticity) -> PressedSkin:
             else:
                 change = max(change, SETTLED)
             overlaps[i] = overlap
-            solved = _solve(place, overlap, elasticity, before)
-            field = DisplacementField(place, overlap, solved.pressure, elasticity)
-            contacts[i] = Pressed(place, solved.pressure, field)
+            patch = None if patches is None else patches[i]
+            contacts[i] = _pressed(place, overlap, elasticity, patch, before)
         if change < SETTLED:
             break
     return PressedSkin(tuple(each for each in contacts if each is not None), elasticity)
 
 
+def _pressed(
+    place: Footprint,
+    overlap: FloatArray,
+    elasticity: Elasticity,
+    patch: GelPatch | None,
+    before: Pressed | None,
+) -> Pressed:
+    """One contact; what the gel's shape changes is found in turns with the pressure."""
+    pressure = None if before is None else before.pressure
+    solved = _solve(place, overlap, elasticity, pressure)
+    if patch is None:
+        field = DisplacementField(place, overlap, solved.pressure, elasticity)
+        return Pressed(place, solved.pressure, field)
+    x, y = (each.ravel() for each in np.meshgrid(place.x, place.y))
+    columns = patch.columns
+    start = columns.x[0], columns.y[0]
+    beyond = np.zeros(overlap.shape)
+    for _ in range(MAX_TURNS):
+        coarse = binned(solved.pressure, place, start, columns.pitch, columns.solid.shape)
+        force = coarse * columns.pitch**2 / elasticity.shear_modulus
+        spline = GridSpline(patch.correction(force), *start, columns.pitch)
+        found = spline.at(x, y)[0].reshape(overlap.shape)
+        change = float(np.abs(found - beyond).max())
+        beyond = found
+        solved = _solve(place, overlap - beyond, elasticity, solved.pressure)
+        if change < SETTLED:
+            break
+    field = DisplacementField(place, overlap - beyond, solved.pressure, elasticity, spline)
+    return Pressed(place, solved.pressure, field)
+
+
 def _solve(
-    place: Footprint, overlap: FloatArray, elasticity: Elasticity, before: Pressed | None
+    place: Footprint, overlap: FloatArray, elasticity: Elasticity, start: FloatArray | None
 ) -> NormalContact:
     response = grid_response(overlap.shape, place.pitch, place.thickness, elasticity)
-    return solve_normal_contact(response, overlap, None if before is None else before.pressure)
+    return solve_normal_contact(response, overlap, start)
 
 
 def _caused_by(others: list[Pressed], place: Footprint) -> FloatArray:

@@ -75,9 +75,10 @@ def test_neighbours_lift_each_other():
     left, right = (contact.force for contact in pair.contacts)
     assert left == pytest.approx(right, rel=1e-3)
     assert 1.005 < left / alone < 1.1
+    alone = press(Contact(Sphere(1.5), at=(-6.0, 0.0), depth=0.5)).contacts[0].force
     far = press(
-        Contact(Sphere(1.5), at=(-8.0, 0.0), depth=0.5),
-        Contact(Sphere(1.5), at=(8.0, 0.0), depth=0.5),
+        Contact(Sphere(1.5), at=(-6.0, 0.0), depth=0.5),
+        Contact(Sphere(1.5), at=(6.0, 0.0), depth=0.5),
     )
     assert far.contacts[0].force == pytest.approx(alone, rel=5e-3)
 

@@ -1,0 +1,261 @@
+"""What the shape of a gel changes about how it yields, by finite elements around a contact.
+
+A flat layer's response (`layer`) is right where the gel is flat, as thick everywhere, and wide. For
+other gels the response is written as that of a half-space in the tangent plane of each load, which
+has the singularity, and a smooth rest. The rest is a displacement field of the gel without a load
+on the contact: on the base it cancels the half-space's displacements, and on free faces its
+stresses. Linear hexahedra with few elements through the thickness resolve it.
+"""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import ndimage
+
+from optisense.mechanics import point_load
+from optisense.mechanics.gel_columns import LAYERS, GelColumns
+from optisense.mechanics.hexahedra import face_points, stiffnesses
+from optisense.mechanics.layer import FARTHEST, layer_correction
+
+if TYPE_CHECKING:
+    from scipy.sparse import csc_matrix
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+BoolArray = NDArray[np.bool_]
+
+TAPER = 1.0
+"""Thicknesses over which the correction fades at the rim of what is modelled."""
+BLIND = 0.5
+"""Distance from a load, in pitches, below which its stresses on the skin are left out: facets are
+not known as finely."""
+
+
+class GelPatch:
+    """The gel around one contact: what it yields more, or less, than a flat layer.
+
+    The stiffness matrix is factorised once; each pressure then takes one solution.
+    """
+
+    def __init__(
+        self,
+        columns: GelColumns,
+        loaded: tuple[float, float],
+        thickness: float,
+        poisson_ratio: float,
+    ) -> None:
+        """Set up the elements.
+
+        Args:
+            columns: of the gel.
+            loaded: mm, half of the sides of the rectangle in which loads lie.
+            thickness: mm, of the flat layer that stands for the gel.
+            poisson_ratio: of the gel.
+        """
+        self.columns, self._thickness, self._nu = columns, thickness, poisson_ratio
+        rows, cols = np.nonzero(columns.solid)
+        self._number = np.full(columns.solid.shape, -1)
+        self._number[rows, cols] = np.arange(len(rows))
+        share = np.arange(LAYERS + 1) / LAYERS
+        self._top = columns.top[rows, cols]
+        self._inward = columns.inward[rows, cols]
+        length = columns.length[rows, cols]
+        down = share[None, :, None] * length[:, None, None] * self._inward[:, None]
+        self._nodes = (self._top[:, None] + down).reshape(-1, 3)
+        self._fixed = np.zeros((len(rows), LAYERS + 1), dtype=bool)
+        self._fixed[:, -1] = True
+        self._fixed[columns.held[rows, cols]] = True
+        room = np.array(loaded) + columns.pitch
+        self._sources = np.flatnonzero((np.abs(self._top[:, :2]) <= room).all(axis=1))
+
+    def correction(self, force: FloatArray) -> FloatArray:
+        """What the gel yields beyond a flat layer, along the normal of the tangent plane.
+
+        Args:
+            force: (rows, columns) on the columns, along this normal: N over the shear modulus in
+                MPa.
+
+        Returns:
+            (rows, columns) mm into the gel, times MPa over MPa: as of a shear modulus of 1.
+        """
+        loads = self._on_sources(force)
+        rest = self._solve(self._right_sides @ loads)
+        upright = -self._inward[:, 2]
+        inside = np.einsum("ci,ci->c", rest, self._inward) / upright
+        found = inside + self._beside @ loads
+        result = np.zeros(self.columns.solid.shape)
+        result[self.columns.solid] = found
+        nearest = ndimage.distance_transform_edt(
+            ~self.columns.solid, return_distances=False, return_indices=True
+        )
+        return np.asarray(result[tuple(nearest)] * self._fade)
+
+    def _on_sources(self, force: FloatArray) -> FloatArray:
+        """(sources,) forces along the skin's normals; those beside columns go to the nearest."""
+        from scipy.spatial import cKDTree
+
+        rows, cols = np.nonzero(force)
+        points = np.column_stack([self.columns.x[cols], self.columns.y[rows]])
+        _, nearest = cKDTree(self._top[self._sources, :2]).query(points)
+        loads = np.zeros(len(self._sources))
+        np.add.at(loads, nearest, force[rows, cols])
+        return np.asarray(loads / -self._inward[self._sources, 2])
+
+    @cached_property
+    def _fade(self) -> FloatArray:
+        """(rows, columns) 1 inside, falling to 0 at the rim of the grid."""
+        width = max(TAPER * self._thickness / self.columns.pitch, 1.0)
+        shares = [
+            np.clip(np.minimum(np.arange(n), n - 1 - np.arange(n)) / width, 0.0, 1.0)
+            for n in self.columns.solid.shape
+        ]
+        smooth = [s * s * (3.0 - 2.0 * s) for s in shares]
+        return np.asarray(smooth[0][:, None] * smooth[1])
+
+    @cached_property
+    def _beside(self) -> FloatArray:
+        """(columns, sources) of the half-spaces less the flat layer."""
+        offsets = self._offsets(self._top)
+        moved = self._in_frame(point_load.displacements(offsets, self._nu))
+        upright = -self._inward[:, 2]
+        into = np.einsum("sni,ni->ns", moved, self._inward) / upright[:, None]
+        source = self._sources
+        apart = np.hypot(
+            self._top[:, None, 0] - self._top[None, source, 0],
+            self._top[:, None, 1] - self._top[None, source, 1],
+        )
+        itself = np.arange(len(self._top))[:, None] == source
+        flat = (1.0 - self._nu) / (2.0 * np.pi) / np.where(itself, np.inf, apart)
+        far = np.minimum(apart / self._thickness, FARTHEST)
+        flat = flat + layer_correction(far, self._nu) / self._thickness
+        # The layer is loaded along its normal: by the share of the force that lies along it.
+        return np.asarray(np.where(itself, 0.0, into) - flat * upright[source])
+
+    def _offsets(self, points: FloatArray) -> FloatArray:
+        """(sources, n, 3) points as the half-space of each source sees them."""
+        return np.einsum(
+            "snk,ski->sni", points[None] - self._top[self._sources][:, None], self._frames
+        )
+
+    def _in_frame(self, vectors: FloatArray) -> FloatArray:
+        """(sources, n, 3) vectors of the sources' half-spaces in the contact's frame."""
+        return np.einsum("sni,ski->snk", vectors, self._frames)
+
+    @cached_property
+    def _frames(self) -> FloatArray:
+        """(sources, 3, 3): columns along the skin, across, and into the gel."""
+        z = self._inward[self._sources]
+        x = np.array([1.0, 0.0, 0.0]) - z[:, :1] * z
+        x /= np.linalg.norm(x, axis=1, keepdims=True)
+        return np.stack([x, np.cross(z, x), z], axis=2)
+
+    @cached_property
+    def _cells(self) -> IntArray:
+        """(cells, 4) columns at the corners, x running first."""
+        n = self._number
+        corners = np.stack([n[:-1, :-1], n[:-1, 1:], n[1:, :-1], n[1:, 1:]], axis=2)
+        return corners[(corners >= 0).all(axis=2)]
+
+    @cached_property
+    def _elements(self) -> IntArray:
+        """(elements, 8) nodes: the lower four, then the upper four."""
+        base = self._cells[:, None, :] * (LAYERS + 1) + np.arange(LAYERS)[None, :, None]
+        return np.concatenate([base + 1, base], axis=2).reshape(-1, 8)
+
+    @cached_property
+    def _matrix(self) -> csc_matrix:
+        from scipy.sparse import coo_matrix
+
+        elements = self._elements
+        values = stiffnesses(self._nodes[elements], self._nu)
+        freedom = (3 * elements[:, :, None] + np.arange(3)).reshape(-1, 24)
+        rows, columns = np.repeat(freedom, 24, axis=1), np.tile(freedom, (1, 24))
+        size = 3 * len(self._nodes)
+        return coo_matrix(
+            (values.ravel(), (rows.ravel(), columns.ravel())), shape=(size, size)
+        ).tocsc()
+
+    @cached_property
+    def _free(self) -> IntArray:
+        return np.flatnonzero(np.repeat(~self._fixed.ravel(), 3))
+
+    @cached_property
+    def _factor(self) -> Any:
+        from scipy.sparse.linalg import splu
+
+        inner = self._matrix[self._free][:, self._free].tocsc()
+        return splu(
+            inner,
+            permc_spec="MMD_AT_PLUS_A",
+            diag_pivot_thresh=0.0,
+            options={"SymmetricMode": True},
+        )
+
+    def _solve(self, right_side: FloatArray) -> FloatArray:
+        """(columns, 3) displacements of the skin, but for those that are held."""
+        moved = np.zeros(3 * len(self._nodes))
+        moved[self._free] = self._factor.solve(right_side)
+        return np.asarray(moved.reshape(-1, LAYERS + 1, 3)[:, 0])
+
+    @cached_property
+    def _right_sides(self) -> FloatArray:
+        """(free, sources): what cancels the half-spaces on the base and on free faces."""
+        fixed = np.flatnonzero(self._fixed.ravel())
+        moved = self._in_frame(
+            point_load.displacements(self._offsets(self._nodes[fixed]), self._nu)
+        )
+        columns = (3 * fixed[:, None] + np.arange(3)).ravel()
+        coupling = self._matrix[self._free][:, columns]
+        result = coupling @ moved.reshape(len(moved), -1).T
+        loads = np.zeros((3 * len(self._nodes), len(self._sources)))
+        for corners, outward_sign in (self._skin_faces(), self._side_faces()):
+            self._cancel(loads, corners, outward_sign)
+        return np.asarray(result + loads[self._free])
+
+    def _skin_faces(self) -> tuple[IntArray, FloatArray]:
+        """(faces, 4) nodes, and the sign that turns their normals outward."""
+        return self._cells * (LAYERS + 1), np.ones(len(self._cells))
+
+    def _side_faces(self) -> tuple[IntArray, FloatArray]:
+        """The same of the sides of the gel that are free."""
+        cells = self._cells
+        held = self._fixed[:, 0]
+        found, signs = [], []
+        # Corners of a side along its run, and the sign that makes run x up point outward.
+        for one, other, sign in ((0, 1, 1.0), (2, 3, -1.0), (0, 2, -1.0), (1, 3, 1.0)):
+            pairs = cells[:, [one, other]]
+            opposite = {(0, 1): (2, 3), (2, 3): (0, 1), (0, 2): (1, 3), (1, 3): (0, 2)}[one, other]
+            beyond = set(map(tuple, cells[:, list(opposite)].tolist()))
+            free = [
+                k
+                for k, pair in enumerate(map(tuple, pairs.tolist()))
+                if pair not in beyond and not held[list(pair)].all()
+            ]
+            found.append(pairs[free])
+            signs.append(np.full(len(free), sign))
+        runs, sign_of = np.concatenate(found), np.concatenate(signs)
+        base = runs[:, None, :] * (LAYERS + 1) + np.arange(LAYERS)[None, :, None]
+        nodes = np.concatenate([base + 1, base], axis=2).reshape(-1, 4)
+        return nodes, np.repeat(sign_of, LAYERS)
+
+    def _cancel(self, loads: FloatArray, faces: IntArray, signs: FloatArray) -> None:
+        """Add the forces that cancel the half-spaces' stresses on faces."""
+        if not len(faces):
+            return
+        points, normals, weights = face_points(self._nodes[faces])
+        normals = normals * signs[:, None, None]
+        offsets = self._offsets(points.reshape(-1, 3))
+        stress = point_load.stresses(offsets, self._nu)
+        out = np.einsum("nk,ski->sni", normals.reshape(-1, 3), self._frames)
+        push = self._in_frame(np.einsum("snij,snj->sni", stress, out))
+        blind = np.linalg.norm(offsets, axis=2) < BLIND * self.columns.pitch
+        push[blind] = 0.0
+        shared = np.einsum(
+            "sfgi,ga->fasi", push.reshape(len(push), len(faces), 4, 3), weights, optimize=True
+        )
+        for axis in range(3):
+            np.add.at(loads, 3 * faces.ravel() + axis, -shared[..., axis].reshape(-1, len(push)))

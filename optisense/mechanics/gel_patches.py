@@ -1,0 +1,78 @@
+"""Patches of a gel around contacts, kept while contacts come back to the same places."""
+
+from __future__ import annotations
+
+import math
+from collections import OrderedDict
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from optisense.geometry import TriangleMesh
+from optisense.mechanics.footprint import Footprint
+from optisense.mechanics.gel_columns import gel_columns
+from optisense.mechanics.gel_patch import GelPatch
+
+FLAT = 0.02
+"""Rise of the skin or change of thickness within a thickness of a contact, as a share of it, up to
+which a gel is a flat layer. Forces change by less than half as much."""
+MOST_KEPT = 12
+"""Patches that are kept: nine places and some more. Each takes about 20 MB."""
+STEP = 0.5
+"""Step in which the loaded rectangle around a place grows, in thicknesses, so that presses of
+several depths at one place share a patch."""
+SAME_PLACE = 6
+"""Decimals of mm at which places are the same."""
+
+
+class _Kept(NamedTuple):
+    """A patch, or None where the gel is a flat layer, and how far from its middle it is loaded."""
+
+    loaded: tuple[float, float]
+    patch: GelPatch | None
+
+
+class GelPatches:
+    """Makes patches of one gel."""
+
+    def __init__(
+        self, skin: TriangleMesh, elastomers: Sequence[TriangleMesh], poisson_ratio: float
+    ) -> None:
+        """Take the undeformed sensing surface and the gels under it, in the design's frame."""
+        self._skin, self._elastomers, self._nu = skin, elastomers, poisson_ratio
+        self._kept: OrderedDict[tuple[float, ...], _Kept] = OrderedDict()
+
+    def around(self, place: Footprint) -> GelPatch | None:
+        """The patch around a contact; None where the gel is a flat layer, or where there is none.
+
+        A patch takes a second or two to make, and a solution with it some milliseconds.
+        """
+        if not self._elastomers:
+            return None
+        key = _key(place)
+        needed = tuple(float(np.abs(grid).max()) for grid in (place.x, place.y))
+        kept = self._kept.get(key)
+        if kept is None or any(a < b for a, b in zip(kept.loaded, needed, strict=True)):
+            step = STEP * place.thickness
+            wide, high = (step * math.ceil(half / step) for half in needed)
+            kept = _Kept((wide, high), self._made(place, (wide, high)))
+            self._kept[key] = kept
+        self._kept.move_to_end(key)
+        while len(self._kept) > MOST_KEPT:
+            self._kept.popitem(last=False)
+        return kept.patch
+
+    def _made(self, place: Footprint, loaded: tuple[float, float]) -> GelPatch | None:
+        columns = gel_columns(place, loaded, self._skin, self._elastomers)
+        if columns is None or columns.uneven <= FLAT:
+            return None
+        return GelPatch(columns, loaded, place.thickness, self._nu)
+
+
+def _key(place: Footprint) -> tuple[float, ...]:
+    numbers: NDArray[np.float64] = np.concatenate(
+        [place.origin, place.axes.ravel(), [place.thickness]]
+    )
+    return tuple(np.round(numbers, SAME_PLACE).tolist())

@@ -1,0 +1,80 @@
+"""Linear elasticity of hexahedra with eight corners, which do not lock near incompressibility."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+
+CORNERS = np.array([(x, y, z) for z in (-1, 1) for y in (-1, 1) for x in (-1, 1)], dtype=np.float64)
+"""(8, 3) corners of the unit cell, in the order in which elements list their nodes: x runs first,
+then y, then z."""
+GAUSS = CORNERS / np.sqrt(3.0)
+"""(8, 3) points of the Gauss rule of order 2 in each direction; all weights are 1."""
+FACE_GAUSS = np.array([(x, y) for y in (-1, 1) for x in (-1, 1)]) / np.sqrt(3.0)
+"""(4, 2) points of the Gauss rule of order 2 on a face; all weights are 1."""
+
+
+def stiffnesses(corners: FloatArray, poisson_ratio: float) -> FloatArray:
+    """(m, 24, 24) stiffness matrices for a shear modulus of 1; degrees of freedom node by node.
+
+    The change of volume is the element's mean (Hughes, "Generalization of selective integration
+    procedures to anisotropic and nonlinear media", Int. J. Numer. Methods Eng. 15, 1980).
+
+    Args:
+        corners: (m, 8, 3) mm.
+        poisson_ratio: below 0.5.
+    """
+    count = len(corners)
+    slopes, weights = _shape_slopes(corners)
+    volume = weights.sum(axis=1)
+    mean = np.einsum("mg,mgai->mai", weights, slopes) / volume[:, None, None]
+    flat = (slopes * np.sqrt(weights)[:, :, None, None]).reshape(count, 8, 24)
+    outer = np.einsum("mgp,mgq->mpq", flat, flat, optimize=True).reshape(count, 8, 3, 8, 3)
+    straight = np.einsum("maibi->mab", outer)
+    result = np.swapaxes(outer, 2, 4) - (2.0 / 3.0) * outer
+    for axis in range(3):
+        result[:, :, axis, :, axis] += straight
+    bulk = 2.0 * (1.0 + poisson_ratio) / (3.0 * (1.0 - 2.0 * poisson_ratio))
+    spread = mean.reshape(count, 24)
+    return np.asarray(
+        result.reshape(count, 24, 24)
+        + (bulk * volume)[:, None, None] * spread[:, :, None] * spread[:, None, :]
+    )
+
+
+def _shape_slopes(corners: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """(m, 8, 8, 3) derivatives of the shape functions at the Gauss points, and their weights."""
+    local = np.empty((8, 8, 3))
+    for axis in range(3):
+        others = [k for k in range(3) if k != axis]
+        factor = np.ones((8, 8))
+        for other in others:
+            factor *= 1.0 + GAUSS[:, None, other] * CORNERS[None, :, other]
+        local[:, :, axis] = CORNERS[None, :, axis] * factor / 8.0
+    jacobian = np.einsum("gak,mai->mgik", local, corners)
+    inverse = np.linalg.inv(jacobian)
+    slopes = np.einsum("gak,mgki->mgai", local, inverse, optimize=True)
+    return slopes, np.linalg.det(jacobian)
+
+
+def face_points(corners: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Where loads on faces are looked up.
+
+    Args:
+        corners: (m, 4, 3) mm, x running first; the normal is that of x cross y.
+
+    Returns:
+        (m, 4, 3) points, (m, 4, 3) normals times their share of the area, and (4, 4) the weights
+        of the corners (columns) at each point (rows).
+    """
+    x, y = FACE_GAUSS.T
+    signs = np.array([(-1, -1), (1, -1), (-1, 1), (1, 1)])
+    weights = (1.0 + x[:, None] * signs[:, 0]) * (1.0 + y[:, None] * signs[:, 1]) / 4.0
+    by_x = signs[:, 0] * (1.0 + y[:, None] * signs[:, 1]) / 4.0
+    by_y = signs[:, 1] * (1.0 + x[:, None] * signs[:, 0]) / 4.0
+    points = np.einsum("ga,mai->mgi", weights, corners)
+    along = np.einsum("ga,mai->mgi", by_x, corners)
+    across = np.einsum("ga,mai->mgi", by_y, corners)
+    return points, np.cross(along, across), weights

@@ -1,0 +1,183 @@
+"""Gels that are no flat layers: finite elements against closed forms and each other."""
+
+import math
+
+import numpy as np
+import pytest
+
+from optisense.geometry import Contact, SensingSurface, Sphere, TriangleMesh
+from optisense.geometry.contact import place
+from optisense.mechanics import Elasticity, Gel, gel_patches, point_load
+from optisense.mechanics.gel_columns import gel_columns
+from optisense.mechanics.gel_patch import GelPatch
+from optisense.mechanics.hexahedra import CORNERS, stiffnesses
+from optisense.sensors.shapes import revolve
+
+GEL = Elasticity(1.0, 0.49)
+
+
+def layer(width, depth, thickness):
+    """A flat gel: its skin, which looks into it, and its body."""
+    half = width / 2, depth / 2
+    top = TriangleMesh.grid((width, depth)).flipped()
+    return top, TriangleMesh.box((-half[0], -half[1], -thickness), (*half, 0.0))
+
+
+def dome(radius, thickness, opening=1.2, rings=24, segments=48):
+    """A gel on a ball, its pole at the origin."""
+    angle = np.linspace(opening, 0.0, rings)
+    outer = np.column_stack([radius * np.sin(angle), radius * np.cos(angle) - radius])
+    inner = outer * [1, 1] - thickness * np.column_stack([np.sin(angle), np.cos(angle)])
+    outer[-1, 0] = inner[-1, 0] = 0.0
+    skin = revolve(outer, segments)
+    if skin.face_normals[:, 2].mean() > 0.0:
+        skin = skin.flipped()
+    body = revolve(np.concatenate([inner[::-1], outer]), segments)
+    assert body.is_closed
+    return skin, body
+
+
+def pressed(skin, body, radius=1.5, depth=0.8, at=(0.0, 0.0)):
+    surface = SensingSurface(skin, (0, 0, 0), (1, 0, 0), (0, 1, 0))
+    gel = Gel(surface, skin, [body], GEL, lambda contact: place(contact, surface, body))
+    return gel.pressed([Contact(Sphere(radius), at=at, depth=depth)]).contacts[0]
+
+
+def patch_at(skin, body, thickness, loaded=(2.0, 2.0), nu=0.49):
+    surface = SensingSurface(skin, (0, 0, 0), (1, 0, 0), (0, 1, 0))
+    gel = Gel(surface, skin, [body], GEL, lambda contact: place(contact, surface, body))
+    contact = Contact(Sphere(1.5), at=(0.0, 0.0), depth=0.3)
+    spot = gel.pressed([contact]).contacts[0].place
+    assert spot.thickness == pytest.approx(thickness, rel=0.01)
+    columns = gel_columns(spot, loaded, skin, [body])
+    return GelPatch(columns, loaded, spot.thickness, nu)
+
+
+def unit_forces(patch, offsets):
+    """The corrections (rows, columns) of a unit force at some columns from the middle."""
+    middle = np.array(patch.columns.solid.shape) // 2
+    found = []
+    for offset in offsets:
+        force = np.zeros(patch.columns.solid.shape)
+        force[tuple(middle + offset)] = 1.0
+        found.append(patch.correction(force))
+    return middle, found
+
+
+@pytest.mark.parametrize("nu", [0.3, 0.49])
+def test_a_point_load_is_carried_by_every_plane_below_it(nu):
+    x = np.linspace(-60.0, 60.0, 1201)
+    grid = np.stack([*np.meshgrid(x, x), np.full((1201, 1201), 1.5)], axis=2)
+    total = point_load.stresses(grid, nu)[:, :, :, 2].sum(axis=(0, 1)) * 0.1**2
+    assert total == pytest.approx([0.0, 0.0, -1.0], abs=2e-3)
+    surface = point_load.stresses(np.array([[0.3, -0.2, 0.0], [2.0, 1.0, 0.0]]), nu)
+    assert surface[:, :, 2] == pytest.approx(0.0, abs=1e-12)
+
+
+def test_derivatives_of_a_point_load_are_its_differences():
+    points = np.random.default_rng(0).uniform(0.1, 1.0, (20, 3))
+    steps = 1e-5 * np.eye(3)
+    differences = np.stack(
+        [
+            point_load.displacements(points + step, 0.45)
+            - point_load.displacements(points - step, 0.45)
+            for step in steps
+        ],
+        axis=-1,
+    )
+    assert point_load.gradients(points, 0.45) == pytest.approx(differences / 2e-5, abs=1e-6)
+
+
+def test_elements_resist_strains_and_nothing_else():
+    rng = np.random.default_rng(1)
+    corners = CORNERS[None] + rng.uniform(-0.2, 0.2, (1, 8, 3))
+    matrix = stiffnesses(corners, 0.49)[0]
+    assert matrix == pytest.approx(matrix.T, abs=1e-9)
+    shift = np.tile([1.0, -2.0, 0.5], 8)
+    turn = np.cross([0.3, -0.1, 0.2], corners[0]).ravel()
+    assert matrix @ shift == pytest.approx(0.0, abs=1e-9)
+    assert matrix @ turn == pytest.approx(0.0, abs=1e-9)
+    assert (np.linalg.eigvalsh(matrix) > -1e-9).sum() == 24
+    # A uniform stretch stores the energy of the bulk modulus: 9 K / 2 for each mm^3.
+    cube = CORNERS[None] / 2.0
+    stretch = cube[0].ravel()
+    bulk = 2.0 * 1.49 / (3.0 * 0.02)
+    assert stretch @ stiffnesses(cube, 0.49)[0] @ stretch == pytest.approx(9.0 * bulk)
+
+
+@pytest.mark.parametrize("nu", [0.3, 0.49])
+def test_elements_find_what_a_flat_layer_adds_to_a_half_space(nu):
+    patch = patch_at(*layer(60.0, 60.0, 4.25), 4.25, nu=nu)
+    middle, (found,) = unit_forces(patch, [(0, 0)])
+    # By the closed solution the layer yields 0.033 to 0.036 mm less under the load.
+    assert np.abs(found[tuple(middle)]) < 0.02 * 0.033
+    assert np.abs(found).max() < 0.02 * 0.033
+
+
+@pytest.mark.parametrize(("thickness", "depth"), [(4.25, 0.8), (1.5, 0.5)])
+def test_a_flat_gel_is_the_same_by_both_solvers(monkeypatch, thickness, depth):
+    body = layer(50.0, 50.0, thickness)
+    flat = pressed(*body, depth=depth)
+    monkeypatch.setattr(gel_patches, "FLAT", -1.0)
+    elements = pressed(*body, depth=depth)
+    assert elements.force == pytest.approx(flat.force, rel=0.01)
+    assert elements.area == pytest.approx(flat.area, rel=0.01)
+    assert elements.force != flat.force
+
+
+def test_free_sides_make_a_pad_softer(monkeypatch):
+    monkeypatch.setattr(gel_patches, "FLAT", -1.0)
+    wide = pressed(*layer(50.0, 50.0, 4.25)).force
+    pad = layer(25.25, 20.75, 4.25)
+    # A model of the pad in quadratic elements is 0.4 % softer in its middle than a wide layer.
+    forces = [pressed(*pad, at=(x, 0.0)).force / wide for x in (0.0, 8.0, 10.0, 11.0)]
+    assert forces[0] == pytest.approx(0.9965, abs=0.003)
+    assert forces == sorted(forces, reverse=True)
+    assert 0.75 < forces[-1] < 0.9
+
+
+def test_a_thick_dome_takes_the_force_and_radius_of_hertz():
+    # Both radii count: 1 / R = 1 / 4 + 1 / 40. The gel is sixty times as thick as the contact wide.
+    skin, body = dome(40.0, 25.0, opening=0.7, rings=80, segments=120)
+    contact = pressed(skin, body, radius=4.0, depth=0.05)
+    radius = 1.0 / (1.0 / 4.0 + 1.0 / 40.0)
+    hertz = 4.0 / 3.0 * GEL.plane_modulus * math.sqrt(radius) * 0.05**1.5
+    assert contact.force == pytest.approx(hertz, rel=0.03)
+    assert math.sqrt(contact.area / math.pi) == pytest.approx(math.sqrt(radius * 0.05), rel=0.02)
+
+
+def test_columns_of_a_dome_yield_to_each_others_loads_alike():
+    # Betti's theorem holds for the whole response, and for the flat layer's, so for the rest.
+    patch = patch_at(*dome(14.0, 3.0), 3.0)
+    offsets = [(0, 0), (2, 0), (1, -2), (-2, 2)]
+    middle, found = unit_forces(patch, offsets)
+    matrix = np.array([[each[tuple(middle + o)] for o in offsets] for each in found])
+    assert np.abs(matrix).max() > 2e-3
+    assert matrix == pytest.approx(matrix.T, abs=0.05 * np.abs(matrix).max())
+
+
+def test_a_dome_is_softer_than_a_flat_gel_of_its_thickness(monkeypatch):
+    skin, body = dome(14.0, 3.0)
+    elements = pressed(skin, body)
+    monkeypatch.setattr(gel_patches, "FLAT", math.inf)
+    flat = pressed(skin, body)
+    assert 0.9 < elements.force / flat.force < 0.98
+
+
+def test_patches_are_kept_for_other_depths_and_forgotten_at_last(monkeypatch):
+    skin, body = layer(25.25, 20.75, 4.25)
+    patches = gel_patches.GelPatches(skin, [body], 0.49)
+    surface = SensingSurface(skin, (0, 0, 0), (1, 0, 0), (0, 1, 0))
+    gel = Gel(surface, skin, [body], GEL, lambda contact: place(contact, surface, body))
+
+    def around(at, depth):
+        contact = Contact(Sphere(1.5), at=at, depth=depth)
+        return patches.around(gel.pressed([contact]).contacts[0].place)
+
+    assert around((0.0, 0.0), 0.5) is None
+    side = around((10.0, 0.0), 0.5)
+    assert side is not None
+    assert around((10.0, 0.0), 0.4) is side
+    monkeypatch.setattr(gel_patches, "MOST_KEPT", 1)
+    around((-10.0, 0.0), 0.5)
+    assert around((10.0, 0.0), 0.5) is not side
