@@ -72,7 +72,8 @@ def main() -> None:
     OUT.mkdir(parents=True, exist_ok=True)
     evaluation = Evaluation(ots.OpticalModel(ots.load("gelsight-mini")))
     straight_and_bent(evaluation)
-    _save(ots.evaluate(evaluation, "normdiff").figure(), "score-normdiff")
+    for name in ("normdiff", "reading"):
+        _save(ots.evaluate(evaluation, name).figure(), f"score-{name}")
     curved = Evaluation(ots.OpticalModel(ots.load(CURVED)))
     for name in ("aoap", "2to3pw"):
         _save(ots.evaluate(curved, name).figure(), f"score-{name}")

@@ -163,6 +163,15 @@ class Evaluation:
         """
         return self._once("presses", self._presses)
 
+    def shared(self, name: str, make: Callable[[], _T]) -> _T:
+        """What several objectives need of this evaluation: made once; an error is kept too.
+
+        Args:
+            name: of it, with the settings that it depends on.
+            make: makes it.
+        """
+        return self._once(name, make)
+
     def _once(self, name: str, make: Callable[[], _T]) -> _T:
         """Make something on first use; an error is kept too, and raised again."""
         if name not in self._made:
@@ -294,10 +303,22 @@ class Evaluation:
     def _presses(self) -> list[Press]:
         presses = []
         for each in self._once("pressed images", self._unexposed):
-            press = replace(each.press, response=self._response(each.touched, each.radiance))
+            press = replace(
+                each.press,
+                response=self._response(each.touched, each.radiance),
+                respond_untouched=self._untouched_response,
+            )
             press.check()
             presses.append(press)
         return presses
+
+    def _untouched_response(self) -> NDArray[np.float32]:
+        """(h, w, 3): without noise."""
+        camera, exposure = self.model.picture_chain.without_noise(), np.float32(self.exposure)
+        return self._once(
+            "untouched response without noise",
+            lambda: camera.respond(self._untouched_radiance * exposure),
+        )
 
     def _response(
         self, touched: NDArray[np.bool_], radiance: NDArray[np.float32]

@@ -173,6 +173,28 @@ def draw_distortion(score: Score) -> Figure:
     return figure
 
 
+def draw_reading(score: Score) -> Figure:
+    """How far what is read is off in each contact."""
+    maps, places = score.arrays["maps"], score.parts["places"]
+    across = int(np.ceil(len(maps) ** 0.5))
+    down = -(-len(maps) // across)
+    figure = _figure(2.2 * across + 0.8, 2.3 * down)
+    grid = np.atleast_1d(figure.subplots(down, across, squeeze=False)).ravel()
+    seen = np.concatenate([each["errors"][np.isfinite(each["errors"])] for each in maps])
+    most = max(1.0, float(np.percentile(seen, 98)))
+    for number, (axes, each) in enumerate(zip(grid, maps, strict=False)):
+        axes.set_facecolor("#888888")
+        shown = axes.imshow(each["errors"], cmap="magma", vmin=0.0, vmax=most)
+        axes.set_title(f"{number + 1}: {places[number]['error']:.1f}°", fontsize=10)
+        axes.set_xticks([])
+        axes.set_yticks([])
+    for axes in grid[len(maps) :]:
+        axes.set_axis_off()
+    figure.colorbar(shown, ax=list(grid), label="normal off by (°)", shrink=0.8)
+    figure.suptitle("place and the mean over its contact", fontsize=11)
+    return figure
+
+
 def _map(
     figure: Figure, axes: Axes, values: Any, label: str, lowest: float, highest: float
 ) -> None:

@@ -10,6 +10,7 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from optisense.design.lenses.film import PictureWindow
 from optisense.design.responses import PictureChain
 from optisense.errors import ObjectiveError
 
@@ -43,6 +44,8 @@ class Press:
         points: (h, w, 3) mm, what is seen.
         before: (h, w, 3) unit normals of the untouched surface.
         camera: turns the response into what is stored.
+        window: which part of the picture the images are; all of it if None.
+        respond_untouched: makes `untouched`.
         geometry: what objectives have derived of all but the response (see `derived`).
     """
 
@@ -58,6 +61,10 @@ class Press:
     points: NDArray[np.float32]
     before: NDArray[np.float32]
     camera: PictureChain = field(default_factory=PictureChain)
+    window: PictureWindow | None = None
+    respond_untouched: Callable[[], NDArray[np.float32]] | None = field(
+        default=None, repr=False, compare=False
+    )
     geometry: dict[Hashable, Any] = field(default_factory=dict, repr=False, compare=False)
 
     def derived(self, key: Hashable, derive: Callable[[], Value]) -> Value:
@@ -77,6 +84,25 @@ class Press:
         a = np.radians(angle)
         along: FloatArray = np.cos(a) * self.east + np.sin(a) * self.north
         return along
+
+    @cached_property
+    def untouched(self) -> NDArray[np.float32]:
+        """(h, w, 3): the response, without noise, where nothing touches the sensor.
+
+        Raises:
+            ObjectiveError: nobody said how it is made.
+        """
+        if self.respond_untouched is None:
+            raise ObjectiveError(f"nobody knows how {self.name} looks untouched")
+        return self.respond_untouched()
+
+    @cached_property
+    def picture_places(self) -> FloatArray:
+        """(h, w, 2): of each pixel in the picture, -1 to 1 across its width and its height."""
+        window = self.window or PictureWindow.whole(*self.mask.shape)
+        y = np.linspace(-1.0, 1.0, window.height)[window.rows]
+        x = np.linspace(-1.0, 1.0, window.width)[window.columns]
+        return np.stack(np.meshgrid(x, y), axis=-1)
 
     @cached_property
     def box(self) -> tuple[slice, slice]:

@@ -30,7 +30,7 @@ ENTRY_POINTS = "optisense.objectives"
 BUILT_IN = ("rgb2normal", "normdiff", "aoap", "2to3pw")
 """The four objectives of the OptiSense paper."""
 
-FURTHER = ("coverage", "distortion", "bend_radius")
+FURTHER = ("coverage", "distortion", "bend_radius", "reading")
 """Objectives of this package beside the paper's."""
 
 CONDITIONS, WATCHED = "conditions", "watched"
@@ -45,6 +45,7 @@ _MODULES = (
     "coverage",
     "distortion",
     "bend_radius",
+    "reading",
 )
 """Modules of this package that register objectives."""
 

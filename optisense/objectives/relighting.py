@@ -8,7 +8,7 @@ sum of layers: exact, and thousands of times sooner than a new image.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -128,7 +128,13 @@ class Relighting:
         found = []
         for seen, contact in zip(self._seen, contacts, strict=True):
             response = self._response(seen, background, contact, exposure, whole)
-            press = replace(seen.press if whole else seen.small, response=response)
+            press = replace(
+                seen.press if whole else seen.small,
+                response=response,
+                respond_untouched=partial(
+                    self._untouched_response, seen, background, exposure, whole
+                ),
+            )
             press.check()
             found.append(press)
         return found
@@ -160,7 +166,9 @@ class Relighting:
             for name in ("mask", "response", "normals", "points", "before")
         }
         own = press.mask[around][touched]
-        return _Seen(press, replace(press, **cut, geometry={}), box, around, touched, own, layers)
+        window = PictureWindow.part(press.mask.shape, box)
+        small = replace(press, **cut, window=window, geometry={})
+        return _Seen(press, small, box, around, touched, own, layers)
 
     def _contacts(self, flux: ArrayLike) -> list[NDArray[np.float32]]:
         """(n, 3) for each press: the radiance of what contacts touch in its image."""
@@ -191,20 +199,36 @@ class Relighting:
         """The camera's response: of the whole image, or of the box of the contact."""
         radiance = background[seen.around].copy()
         radiance[seen.touched] = contact
-        exposed, seed = radiance * np.float32(exposure), self.settings.seed
+        exposed = radiance * np.float32(exposure)
         if whole:
             image = background * np.float32(exposure)
             image[seen.around] = exposed
-            return self._camera.respond(image, seed=seed)
+            return self._camera.respond(image, seed=self.settings.seed)
+        return self._response_of_box(seen, exposed, self._camera)
+
+    def _untouched_response(
+        self, seen: _Seen, background: NDArray[np.float32], exposure: float, whole: bool
+    ) -> NDArray[np.float32]:
+        """The same without the contact, and without noise."""
+        camera = self._camera.without_noise()
+        if whole:
+            return camera.respond(background * np.float32(exposure))
+        return self._response_of_box(seen, background[seen.around] * np.float32(exposure), camera)
+
+    def _response_of_box(
+        self, seen: _Seen, exposed: NDArray[np.float32], camera: PictureChain
+    ) -> NDArray[np.float32]:
+        """The response of the box of a contact, of what is exposed around it."""
+        seed = self.settings.seed
         inner = tuple(
             slice(box.start - around.start, box.stop - around.start)
             for box, around in zip(seen.box, seen.around, strict=True)
         )
         around = PictureWindow.part(self._shape, seen.around)
-        if not self._camera.spreads(exposed, around):
+        if not camera.spreads(exposed, around):
             box = PictureWindow.part(self._shape, seen.box)
-            return self._camera.respond(exposed[inner], box, seed)
-        return self._camera.respond(exposed, around, seed)[inner]
+            return camera.respond(exposed[inner], box, seed)
+        return camera.respond(exposed, around, seed)[inner]
 
     @property
     def _camera(self) -> PictureChain:

@@ -47,6 +47,10 @@ class TestDistortion(ObjectiveContract):
     objective = "distortion"
 
 
+class TestReading(ObjectiveContract):
+    objective = "reading"
+
+
 class TestFromAFile(ObjectiveContract):
     @pytest.fixture(autouse=True)
     def own_file(self, tmp_path: Path) -> Iterator[None]:

@@ -1,0 +1,206 @@
+"""What a calibrated reader makes of each press, when all the other presses calibrate it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import partial
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from optisense.errors import ObjectiveError
+from optisense.objectives.press import FloatArray, Press
+from optisense.objectives.settings import refuse_outside
+from optisense.reading.camera_noise import MEASURED_NOISE
+from optisense.reading.lookup import (
+    Pixels,
+    PressTable,
+    TiltLookup,
+    normals_to_tilts,
+    tilt_grid,
+    tilt_kernel,
+)
+
+if TYPE_CHECKING:
+    from optisense.objectives.evaluation import Evaluation
+
+CAMERA_NOISE = MEASURED_NOISE
+
+MOST_NOISE = 128.0
+"""Levels of 255: noise of half the range, in which no picture is left."""
+
+PIXELS_A_PRESS = 600
+"""Pixels of a contact that are read, about: every second one along rows and columns of GelSight
+Mini's at 640 across. With all of them the error differs by less than a per cent and takes four
+times as long."""
+
+LEAST_PIXELS = 50
+"""Pixels of a contact below which a press has no score, as of NormDiff."""
+
+LEAST_PRESSES = 4
+"""Presses below which there is no score: three, from which a fourth is read, are the fewest that
+tell how colours change along two directions."""
+
+_CAMERA = 11
+"""A number that is mixed into the seed of the camera's noise, so that it depends on no other noise.
+No two modules that draw from the same seed share one."""
+
+
+@dataclass(frozen=True)
+class ReadPress:
+    """One press as it is and as it was read, on a grid of its pixels; arrays are (h, w, ...).
+
+    Attributes:
+        press: the press.
+        grid: rows and columns of its images that are read.
+        mask: the pixels of the contact, whose errors count.
+        seen: all pixels that were read; those outside the contact show level skin.
+        normals: unit, in the design's frame, as read; the untouched ones where nothing is.
+        true_normals: unit; the untouched ones outside the contact.
+    """
+
+    press: Press
+    grid: tuple[slice, slice]
+    mask: NDArray[np.bool_]
+    seen: NDArray[np.bool_]
+    normals: FloatArray
+    true_normals: FloatArray
+
+
+def pixels_to_read(press: Press, **settings: object) -> NDArray[np.bool_]:
+    """(h, w): the pixels of a contact that are read.
+
+    Raises:
+        ObjectiveError: the contact has too few pixels.
+    """
+    rows, columns = grid_of(press)
+    chosen = np.zeros_like(press.mask)
+    chosen[rows, columns] = press.mask[rows, columns]
+    return chosen
+
+
+def grid_of(press: Press) -> tuple[slice, slice]:
+    """Rows and columns that are read: every k-th of the box around the contact.
+
+    Raises:
+        ObjectiveError: the contact has too few pixels.
+    """
+    count = int(press.mask.sum())
+    if count < LEAST_PIXELS:
+        raise ObjectiveError(
+            f"{press.name} has {count} of the {LEAST_PIXELS} pixels that it needs",
+            hint="Use a higher resolution",
+        )
+    step = max(1, round((count / PIXELS_A_PRESS) ** 0.5))
+    rows, columns = press.box
+    return slice(rows.start, rows.stop, step), slice(columns.start, columns.stop, step)
+
+
+def read_presses(evaluation: Evaluation, camera_noise: float = CAMERA_NOISE) -> list[ReadPress]:
+    """Each press of a sensor, read by a reader that only knows the other ones.
+
+    Args:
+        evaluation: the sensor. What is read is kept in it for other objectives.
+        camera_noise: standard deviation in levels of 255, on all pictures.
+
+    Raises:
+        ObjectiveError: there are too few presses, or one can't be judged.
+    """
+    refuse_outside("camera_noise", camera_noise, 0.0, MOST_NOISE)
+    return evaluation.shared(
+        f"presses read with noise {camera_noise!r}",
+        partial(_read, evaluation, camera_noise),
+    )
+
+
+def _read(evaluation: Evaluation, noise: float) -> list[ReadPress]:
+    presses = evaluation.presses
+    if len(presses) < LEAST_PRESSES:
+        raise ObjectiveError(
+            f"{len(presses)} presses can't show what a reader makes of one that it has not seen",
+            hint=f"Press at {LEAST_PRESSES} places or more",
+        )
+    known = [press.derived("pixels to read", partial(_KnownPress.of, press)) for press in presses]
+    steepest = max(each.steepest for each in known)
+    grid = tilt_grid(steepest)
+    pixels, tables = [], []
+    for press, each in zip(presses, known, strict=True):
+        kernel = press.derived(
+            ("kernel of tilts", steepest), partial(tilt_kernel, each.tilts, grid)
+        )
+        pixels.append(each.pixels(press, noise, evaluation.settings.seed))
+        tables.append(PressTable.of(pixels[-1][: len(each.tilts)], kernel))
+    found = []
+    for number, (press, each) in enumerate(zip(presses, known, strict=True)):
+        reader = TiltLookup([*tables[:number], *tables[number + 1 :]], grid, noise)
+        found.append(each.read(press, reader.normals(pixels[number])))
+    return found
+
+
+@dataclass(frozen=True)
+class _KnownPress:
+    """What is known of a press under any light.
+
+    Attributes:
+        grid, mask, seen, true_normals: as in `ReadPress`.
+        order: (n,) of the pixels seen, so that the m of the contact come first.
+        frames: (n, 3, 3) of each of these: two unit tangents of the untouched surface, its normal.
+        tilts: (m, 2) degrees (see `optisense.reading.lookup.tilt_grid`).
+    """
+
+    grid: tuple[slice, slice]
+    mask: NDArray[np.bool_]
+    seen: NDArray[np.bool_]
+    true_normals: FloatArray
+    order: NDArray[np.intp]
+    frames: FloatArray
+    tilts: FloatArray
+
+    @classmethod
+    def of(cls, press: Press) -> _KnownPress:
+        """What a press's images tell.
+
+        Raises:
+            ObjectiveError: the contact has too few pixels.
+        """
+        grid = grid_of(press)
+        before = press.before[grid].astype(np.float64)
+        seen = np.logical_and.reduce(np.isfinite(before), axis=2)
+        mask = np.logical_and(press.mask[grid], seen)
+        true = np.where(mask[..., None], press.normals[grid].astype(np.float64), before)
+        order = np.argsort(~mask[seen], kind="stable")
+        untouched = before[seen][order]
+        first = press.east - (untouched @ press.east)[:, None] * untouched
+        first /= np.linalg.norm(first, axis=1, keepdims=True)
+        frames = np.stack([first, np.cross(first, untouched), untouched], axis=1)
+        local = np.einsum("nij,nj->ni", frames, true[seen][order])
+        tilts = normals_to_tilts(local[: np.count_nonzero(mask)])
+        return cls(grid, mask, seen, true, order, frames, tilts)
+
+    @property
+    def steepest(self) -> float:
+        """Degrees."""
+        return float(np.linalg.norm(self.tilts, axis=1).max())
+
+    def pixels(self, press: Press, noise: float, seed: int) -> Pixels:
+        """What the camera stores of the pixels seen, those of the contact first."""
+
+        def chosen(images: NDArray[np.floating]) -> FloatArray:
+            return images[self.grid][self.seen][self.order].astype(np.float64)
+
+        picture = 255.0 * press.camera.curve(chosen(press.response))
+        if noise > 0:
+            random = np.random.default_rng([seed, press.number, _CAMERA])
+            picture = picture + random.normal(0.0, noise, picture.shape)
+        untouched = 255.0 * press.camera.curve(chosen(press.untouched))
+        stored = np.clip(np.round(picture), 0.0, 255.0)
+        return Pixels(stored, untouched, chosen(press.picture_places))
+
+    def read(self, press: Press, local: FloatArray) -> ReadPress:
+        """The press with the normals (n, 3) that were read, in the frames of its pixels."""
+        normals = self.true_normals.copy()
+        ordered = np.empty_like(local)
+        ordered[self.order] = np.einsum("nij,ni->nj", self.frames, local)
+        normals[self.seen] = ordered
+        return ReadPress(press, self.grid, self.mask, self.seen, normals, self.true_normals)

@@ -1,0 +1,183 @@
+"""What a calibrated reader finds on presses new to it, whose colours follow from algebra."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+import optisense as ots
+from optisense.design import set_value
+from optisense.design.lenses.film import PictureWindow
+from optisense.errors import ObjectiveError
+from optisense.objectives import Evaluation, Press, Settings, evaluate
+from optisense.objectives.reader import LEAST_PIXELS, grid_of, pixels_to_read
+from optisense.objectives.reading import reading
+from optisense.objectives.relighting import Relighting
+from optisense.optics import OpticalModel
+
+PIXELS = 61
+LIGHTS = np.array([[0.5, 0.0, 0.866], [-0.25, 0.433, 0.866], [-0.25, -0.433, 0.866]])
+PLACES = ((0.0, 0.0), (4.0, 3.0), (-4.0, 3.0), (4.0, -3.0), (-4.0, -3.0))
+
+Colour = Callable[[np.ndarray], np.ndarray]
+
+
+def lambertian(normals: np.ndarray) -> np.ndarray:
+    """A diffuse coating under three lights from three sides, one of each colour."""
+    return 0.5 * np.maximum(normals @ LIGHTS.T, 0.0)
+
+
+class Presses:
+    """Stands for an evaluation whose presses are given."""
+
+    def __init__(self, presses: list[Press]) -> None:
+        self.presses, self.settings = presses, Settings()
+
+    def shared(self, name: str, make: Callable[[], Any]) -> Any:
+        return make()
+
+
+@pytest.fixture
+def nine(make_press: Callable[..., Press]) -> Callable[..., Presses]:
+    """Nine presses in rows of three, each with the colours of a function of the normals."""
+
+    def made(*colours: Colour, turned: float = 0.0) -> Presses:
+        presses = []
+        for number in range(9):
+            colour = colours[number % len(colours)]
+            press = make_press(colour, pixels=PIXELS, number=number + 1, turned=turned)
+            flat = np.broadcast_to(
+                colour(np.array([[0.0, 0.0, 1.0]])).astype(np.float32), press.response.shape
+            )
+            row, column = divmod(number, 3)
+            box = tuple(slice(at * PIXELS, (at + 1) * PIXELS) for at in (row, column))
+            presses.append(
+                replace(
+                    press,
+                    response=np.where(press.mask[..., None], press.response, flat),
+                    respond_untouched=lambda flat=flat: flat,
+                    window=PictureWindow.part((3 * PIXELS, 3 * PIXELS), box),
+                )
+            )
+        return Presses(presses)
+
+    return made
+
+
+@pytest.mark.parametrize("turned", [0.0, 50.0])
+def test_three_lights_and_no_noise_are_read_nearly_without_error(
+    nine: Callable[..., Presses], turned: float
+) -> None:
+    """Wherever the skin faces."""
+    value, parts, _ = reading(nine(lambertian, turned=turned), camera_noise=0.0)
+    assert 0.0 < value < 1.0
+    assert parts["level_skin"] < 0.5
+    assert 20.0 < parts["reading_nothing"] < 30.0
+
+
+def test_one_colour_for_all_tells_no_tilt(nine: Callable[..., Presses]) -> None:
+    """What is read is then the mean of all tilts, which is level: as if nothing were read."""
+    value, parts, _ = reading(nine(lambda n: np.full((len(n), 3), 0.3)))
+    assert value == pytest.approx(parts["reading_nothing"], rel=0.02)
+
+
+def test_noise_of_the_camera_makes_it_worse(nine: Callable[..., Presses]) -> None:
+    presses = nine(lambertian)
+    values = [reading(presses, camera_noise=noise)[0] for noise in (0.0, 3.0, 12.0)]
+    assert values[0] < values[1] - 0.2
+    assert values[1] < values[2] - 1.0
+
+
+def test_two_lights_of_one_colour_leave_a_side_unknown(nine: Callable[..., Presses]) -> None:
+    """A colour that is the same on both flanks of the ball tells how steep, and not where to."""
+
+    def mirrored(normals: np.ndarray) -> np.ndarray:
+        both = lambertian(normals) + lambertian(normals * [-1.0, -1.0, 1.0])
+        return 0.5 * both
+
+    value, parts, _ = reading(nine(mirrored), camera_noise=0.0)
+    assert value > 0.8 * parts["reading_nothing"]
+
+
+def test_a_press_is_read_by_what_the_others_tell(nine: Callable[..., Presses]) -> None:
+    """One place of which the channels are swapped is misread, and the others are not much worse."""
+    usual = [lambertian] * 8
+    odd = nine(*usual, lambda n: lambertian(n)[:, ::-1])
+    _, parts, _ = reading(odd, camera_noise=0.0)
+    errors = [place["error"] for place in parts["places"]]
+    assert errors[8] > 15.0
+    assert parts["worst_place"] == errors[8]
+    assert parts["median_of_places"] < 5.0
+
+
+def test_colours_that_change_steadily_over_the_picture_are_followed(
+    nine: Callable[..., Presses],
+) -> None:
+    """Each press is brighter than the one before, by a factor that the untouched skin shows."""
+    fading = [lambda n, k=k: lambertian(n) * (0.5 + 0.06 * k) for k in range(9)]
+    value, parts, _ = reading(nine(*fading), camera_noise=0.0)
+    assert value < 2.0
+    assert parts["worst_place"] < 4.0
+
+
+def test_four_presses_are_needed(nine: Callable[..., Presses]) -> None:
+    few = nine(lambertian)
+    few.presses = few.presses[:3]
+    with pytest.raises(ObjectiveError, match="3 presses can't show"):
+        reading(few)
+
+
+def test_small_contacts_are_refused(make_press: Callable[..., Press]) -> None:
+    press = make_press(lambertian, pixels=7, number=2)
+    assert press.mask.sum() < LEAST_PIXELS
+    with pytest.raises(ObjectiveError, match=f"of the {LEAST_PIXELS} pixels that it needs"):
+        grid_of(press)
+
+
+def test_what_is_read_is_rendered(make_press: Callable[..., Press]) -> None:
+    """About so many pixels of a large contact, all of a small one, none beside it."""
+    small, large = (make_press(lambertian, pixels=size) for size in (25, 201))
+    assert (pixels_to_read(small) == small.mask).all()
+    chosen = pixels_to_read(large)
+    assert not (chosen & ~large.mask).any()
+    assert 400 < chosen.sum() < 1000 < large.mask.sum()
+
+
+@pytest.mark.parametrize("noise", [-1.0, 200.0])
+def test_noise_has_bounds(nine: Callable[..., Presses], noise: float) -> None:
+    with pytest.raises(ObjectiveError, match="'camera_noise' is"):
+        reading(nine(lambertian), camera_noise=noise)
+
+
+@pytest.fixture(scope="module")
+def relighting() -> Relighting:
+    settings = Settings(resolution=(200, 150), photons=200_000, places=PLACES)
+    return Relighting(Evaluation(OpticalModel(ots.load("gelsight-mini")), settings))
+
+
+def test_presses_under_other_lights_read_the_same_whether_cut_or_whole(
+    relighting: Relighting,
+) -> None:
+    design = ots.load("gelsight-mini")
+    for name in design.lights:
+        design = set_value(design, f"lights.{name}.colour", (0.9, 0.3, 0.2))
+    one_colour, usual = design, ots.load("gelsight-mini")
+    values = []
+    for each in (usual, one_colour):
+        whole = evaluate(relighting.lit(each), "reading")
+        cut = evaluate(relighting.lit(each, whole=False), "reading")
+        assert whole.failure is None and cut.failure is None
+        assert cut.value == pytest.approx(whole.value, rel=1e-9)
+        values.append(whole.value)
+    assert values[0] < values[1] - 2.0  # three colours tell more than one
+
+
+def test_relit_presses_read_as_rendered_ones(relighting: Relighting) -> None:
+    usual = ots.load("gelsight-mini")
+    rendered = Evaluation(OpticalModel(usual), relighting.settings)
+    direct = evaluate(rendered, "reading").value
+    assert evaluate(relighting.lit(usual), "reading").value == pytest.approx(direct, rel=0.02)
