@@ -145,6 +145,7 @@ def about_study(session: Session, fields: OfStudy, job: Job) -> dict[str, Any]:
         return {
             "design": settings.design,
             "objectives": settings.names,
+            "requirements": settings.requirements,
             "method": settings.method,
             "budget": settings.budget,
             "seed": settings.seed,
@@ -193,11 +194,13 @@ def curve_row(trial: Trial) -> dict[str, Any]:
         "start": trial.is_start,
         "scores": {name: _finite(value) for name, value in trial.scores.items()},
         "failure": trial.failure,
+        "feasible": trial.failure is None and trial.is_feasible,
     }
 
 
 def trial_row(study: Study, trial: Trial) -> dict[str, Any]:
     """A trial without its design."""
+    from optisense.search.study.conditions import margins
     from optisense.search.study.study import beside
 
     return {
@@ -205,6 +208,10 @@ def trial_row(study: Study, trial: Trial) -> dict[str, Any]:
         "values": trial.values,
         "vector": trial.vector,
         "beside": beside(study, trial),
+        "conditions": [
+            {"condition": text, "value": value, "margin": margin}
+            for text, value, margin in margins(trial)
+        ],
     }
 
 

@@ -29,6 +29,18 @@ NEAR = 0.1
 """How far a number without two bounds may change, as a share of what it is now."""
 
 
+def listed(text: str) -> list[str]:
+    """The entries of a list with commas between them; one inside brackets is part of an entry."""
+    found, depth = [""], 0
+    for sign in text:
+        depth += (sign == "(") - (sign == ")")
+        if sign == "," and depth <= 0:
+            found.append("")
+        else:
+            found[-1] += sign
+    return [each.strip() for each in found if each.strip()]
+
+
 @dataclass(frozen=True)
 class Suggestion:
     """A parameter of a search: a label, and the text that the engine reads."""

@@ -33,7 +33,7 @@ def begin() -> None:
     """Forget the search before."""
     _curve.clear()
     found = bpy.context.window_manager.optisense_found
-    found.best = found.values = found.start = found.ended = found.offer = ""
+    found.best = found.values = found.start = found.ended = found.offer = found.conditions = ""
     clear_ghosts(bpy.context.scene)
 
 
@@ -54,6 +54,11 @@ def take(event: dict[str, Any]) -> None:
             f"{name} = {value:.4g}" if isinstance(value, float) else f"{name} = {value}"
             for name, value in list((event.get("values") or {}).items())[:8]
         )
+        found.conditions = "\n".join(
+            f"{each['condition']}: {each['value']:.4g}"
+            for each in event.get("conditions") or []
+            if each["value"] is not None
+        )
         show_ghosts(bpy.context.scene, event.get("shapes") or {})
     in_order = [_curve[number] for number in sorted(_curve)]
     picture.show_icon(CURVE, curve_picture(in_order, CURVE_SIZE))
@@ -66,7 +71,8 @@ def take_curve(rows: list[dict[str, Any]]) -> None:
     best = None
     for row in rows:
         score = next(iter((row.get("scores") or {}).values()), None)
-        better = score is not None and (best is None or score > best)
+        allowed = score is not None and row.get("feasible", True)
+        better = allowed and (best is None or score > best)
         best = score if better else best
         take({"event": "trial", "best": better, **row})
 

@@ -61,6 +61,7 @@ def offer(scene: bpy.types.Scene) -> None:
             search.study, search.budget = study, result["budget"]
             search.objective = ", ".join(result["objectives"])
             search.method = result["method"]
+            search.require = ", ".join(result["requirements"])
         following.take_curve(result["curve"])
         done = sum(not row["start"] for row in result["curve"])
         far = f"{done} of {search.budget or result['budget']} trials"

@@ -46,8 +46,14 @@ class OPTISENSE_PG_search(bpy.types.PropertyGroup):
     objective: StringProperty(
         name="Objective",
         default="aoap",
-        description="What to make as high as possible: a name, or FILE.py:FUNCTION of your own; "
-        "several, with commas between them, for the method pareto",
+        description="What to make as high as possible: a name, arithmetic such as aoap + "
+        "0.5*coverage, or FILE.py:FUNCTION of your own; several, with commas between them, for the "
+        "method pareto",
+    )
+    require: StringProperty(
+        name="Conditions",
+        description="What the best sensor must keep, such as coverage>=0.55, distortion<=1.5, with "
+        "commas between them; empty for none",
     )
     method: StringProperty(
         name="Method", default="cma-es", description="How the next trials are chosen"
@@ -100,6 +106,9 @@ class OPTISENSE_PG_found(bpy.types.PropertyGroup):
     )  # fmt: skip
     best: StringProperty(description="The best score so far", options={"SKIP_SAVE"})
     values: StringProperty(description="What it has, one a line", options={"SKIP_SAVE"})
+    conditions: StringProperty(
+        description="What it has of each condition, one a line", options={"SKIP_SAVE"}
+    )
     start: StringProperty(description="The score at the start", options={"SKIP_SAVE"})
     ended: StringProperty(description="Why it is over", options={"SKIP_SAVE"})
     offer: StringProperty(description="What a study waits for", options={"SKIP_SAVE"})

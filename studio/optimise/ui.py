@@ -42,6 +42,7 @@ class OPTISENSE_PT_optimise(SidebarPanel, bpy.types.Panel):
                 row.prop(found, f"{what}_choice", text="", icon_only=True)
             else:
                 column.prop(search, what)
+        column.prop(search, "require")
         for name in ("budget", "workers", "seed", "study"):
             column.prop(search, name)
         layout.prop(search, "go_on")  # its name is longer than half a line
@@ -61,6 +62,8 @@ class OPTISENSE_PT_optimise(SidebarPanel, bpy.types.Panel):
         if found.best:
             start = f", at the start {found.start}" if found.start else ""
             column.label(text=f"Best so far {found.best}{start}")
+        for line in found.conditions.splitlines():
+            column.label(text=line, icon="CHECKMARK")
         for line in found.values.splitlines():
             column.label(text=line, icon="DOT")
         if found.ended:

@@ -71,6 +71,24 @@ def test_a_search_starts_from_what_is_there(
     assert starts["materials.silicone-xp565.roughness"] == pytest.approx(0.75)
 
 
+def test_the_best_of_a_search_keeps_the_conditions(mini: Any, tmp_path: Path) -> None:
+    search = mini.optisense_search
+    row = search.vary.add()
+    row.text = "camera.fov=40:60:3"
+    search.objective, search.method, search.study = "aoap", "grid", str(tmp_path / "study")
+    search.require = "coverage>=0.5, min(coverage, 1)<=0.99"
+    assert bpy.ops.optisense.search() == {"FINISHED"}
+    about = session.ask_and_wait("study", study=search.study)
+    assert about["requirements"] == ["coverage >= 0.5", "min(coverage, 1) <= 0.99"]
+    fine = [row for row in about["curve"] if row["feasible"]]
+    assert 0 < len(fine) < len(about["curve"])
+    scores = {row["number"]: row["scores"]["aoap"] for row in fine}
+    assert about["best"] == max(scores, key=lambda number: scores[number])
+    found = bpy.context.window_manager.optisense_found
+    assert float(found.best) == pytest.approx(max(scores.values()), rel=1e-3)
+    assert found.conditions.splitlines()[0].startswith("coverage >= 0.5: 0.")
+
+
 def test_several_objectives_are_weighed_against_each_other(mini: Any, tmp_path: Path) -> None:
     goals = tmp_path / "goals.py"
     goals.write_text(

@@ -26,6 +26,16 @@ def unmet(outcome: Outcome) -> list[str]:
     ]
 
 
+def margins(trial: Trial) -> list[tuple[str, float | None, float | None]]:
+    """Each condition with its value and its margin: how far the value is on the allowed side of the
+    limit, below 0 on the other side. Both are None where nothing was measured.
+    """
+    return [
+        (text, value, None if value is None else Requirement.parse(text).margin(value))
+        for text, value in trial.conditions.items()
+    ]
+
+
 def kept(trial: Trial, start: Trial | None) -> list[str]:
     """A line for each condition: the value of a trial, that of the start, and the margin."""
     lines = []
