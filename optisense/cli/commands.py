@@ -19,6 +19,7 @@ _HOMES = {
     "evaluate": "evaluate",
     "search": "search",
     "apply": "apply",
+    "verify": "verify",
     "report": "report",
     "tolerance": "tolerance",
     "ledger": "ledger",

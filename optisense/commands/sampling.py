@@ -129,3 +129,87 @@ class ReconstructionOptions(PictureOptions):
         1.5, description="Radius of these balls."
     )
     depth: Range = Field("0.2:0.6", validate_default=True, description="How deep they press, mm.")
+
+
+ALL_OBJECTS = 12
+"""Number of objects of `optisense.geometry.objects`, which is not loaded here: it takes long."""
+
+QUICK_OBJECTS = ("screw-head", "coin", "cable", "wedge", "nut", "bean")
+"""Objects of a quick verification: the fewest by which a difference can be told, and unlike each
+other."""
+
+QUICK_PHOTONS = 500_000
+"""Photons of a quick verification: a tenth of the usual light."""
+
+QUICK_WIDTH = 160
+"""Pixels across the pictures of a quick verification; objects of 5 mm then cover 1000 or more."""
+
+PLACES, QUICK_PLACES = 3, 2
+"""Presses of each object: the fewest whose spread tells something, and the fewest that have one."""
+
+PRESSES, QUICK_PRESSES = 40, 20
+"""Balls that readers are fitted to, as of a reconstruction, and half of them."""
+
+
+class VerifyOptions(CommandOptions):
+    """How two sensors are compared on things that no score has seen."""
+
+    quick: bool = Field(False, description="Six objects, small pictures and few photons.")
+    objects: Annotated[list[str], Written("NAME", ("--object",), "all twelve")] = Field(
+        [],
+        description="What presses: screw-head, coin, nut, ... May be given several times.",
+    )
+    places: Annotated[int, Ge(1), Le(MOST_THINGS), Written("N", usual="3, quick 2")] | None = Field(
+        None, description="Presses of each object."
+    )
+    presses: Annotated[int, Ge(1), Le(MOST_THINGS), Written("N", usual="40, quick 20")] | None = (
+        Field(None, description="Balls that the readers are fitted to.")
+    )
+    seed: Seed = Field(0, description="Of places, presses and noise.")
+    camera_noise: CameraNoise = Field(NOISE, description=NOISE_HELP)
+    resolution: Resolution | None = Field(
+        None, description="Pixels of the pictures; 320 across, quick 160, when left out."
+    )
+    photons: Annotated[Photons, Written("N", usual="fine, quick 500,000", is_text=True)] | None = (
+        Field(None, description="Photons of the light that all pictures of a sensor share.")
+    )
+    skin: Skin = Field(ELASTIC, description=SKIN_HELP)
+    method: Annotated[str, Written("network|table")] = Field(
+        "network", description="What colours are read with."
+    )
+
+    def wanted_photons(self) -> int:
+        """Photons of the light of each sensor."""
+        return self.photons or (QUICK_PHOTONS if self.quick else SAMPLE_PHOTONS)
+
+    def pictures(self) -> int:
+        """Pictures of each sensor."""
+        objects = len(self.objects) or (len(QUICK_OBJECTS) if self.quick else ALL_OBJECTS)
+        return self._presses() + objects * self._places()
+
+    def settings(self) -> Any:
+        """The settings of `optisense.tasks.verify`, which takes a second to load.
+
+        Raises:
+            TaskError: they make no sense.
+        """
+        from optisense.tasks import ReconstructionSettings, VerificationSettings
+
+        reading = ReconstructionSettings(
+            method=self.method,
+            presses=self._presses(),
+            seed=self.seed,
+            camera_noise=self.camera_noise,
+            resolution=self.resolution,
+            width=QUICK_WIDTH if self.quick else ReconstructionSettings.width,
+            photons=self.wanted_photons(),
+            skin=self.skin,
+        )
+        chosen = self.objects or (QUICK_OBJECTS if self.quick else VerificationSettings.objects)
+        return VerificationSettings(tuple(chosen), self._places(), reading=reading)
+
+    def _presses(self) -> int:
+        return self.presses or (QUICK_PRESSES if self.quick else PRESSES)
+
+    def _places(self) -> int:
+        return self.places or (QUICK_PLACES if self.quick else PLACES)

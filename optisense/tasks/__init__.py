@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     )
     from optisense.tasks.reconstruction import ReconstructionResult, reconstruct
     from optisense.tasks.snr import signal_to_noise
+    from optisense.tasks.verification import Verification, VerificationSettings, verify
 
 _HOMES = {
     "CalibratedSensor": ".calibration",
@@ -38,10 +39,13 @@ _HOMES = {
     "ReconstructionSettings": ".calibration",
     "Sample": ".dataset",
     "SampleSettings": ".perception",
+    "Verification": ".verification",
+    "VerificationSettings": ".verification",
     "generate": ".generation",
     "perceive": ".perception",
     "reconstruct": ".reconstruction",
     "signal_to_noise": ".snr",
+    "verify": ".verification",
 }
 
 __all__ = [
@@ -57,10 +61,13 @@ __all__ = [
     "ReconstructionSettings",
     "Sample",
     "SampleSettings",
+    "Verification",
+    "VerificationSettings",
     "generate",
     "perceive",
     "reconstruct",
     "signal_to_noise",
+    "verify",
 ]
 
 if not TYPE_CHECKING:  # type checkers would take any name for one of the package's

@@ -54,6 +54,9 @@ _PLACE, _CAMERA, _SAMPLES, _SENSOR = 5, 6, 7, 10
 """Numbers that are mixed into a seed, one for each thing that is drawn, so that none depends on
 another. No two modules of this package share one."""
 
+_NEXT_READER = 1009
+"""What is added to the seed of a fit for each further reader: more than seeds usually differ by."""
+
 
 @dataclass(frozen=True)
 class ReconstructionSettings:
@@ -66,7 +69,8 @@ class ReconstructionSettings:
         depth: mm, least and most; the steepest slope that is learned follows from the deepest.
         seed: of places, depths, noise and network.
         camera_noise: standard deviation in levels of 255, on all pictures.
-        resolution: (width, height) pixels; 320 wide, in the camera's shape, if None.
+        resolution: (width, height) pixels; `width` wide, in the camera's shape, if None.
+        width: pixels, where no resolution is given.
         photons: of the light that all pictures share.
         skin: "elastic" or "conforming"; see docs/mechanics.md.
     """
@@ -78,6 +82,7 @@ class ReconstructionSettings:
     seed: int = 0
     camera_noise: float = MEASURED_NOISE
     resolution: tuple[int, int] | None = None
+    width: int = WIDTH
     photons: int = SAMPLE_PHOTONS
     skin: str = ELASTIC
 
@@ -105,14 +110,22 @@ class CalibratedSensor:
         model: OpticalModel,
         settings: ReconstructionSettings,
         progress: Callable[[int], None] = lambda done: None,
+        readers: int = 1,
     ) -> None:
-        """Press the balls and fit the reader. progress: called with the number of balls pressed."""
+        """Press the balls and fit the reader.
+
+        Args:
+            model: the sensor. settings: of presses and reader.
+            progress: called with the number of balls pressed.
+            readers: how many are fitted to the same presses, each to other pixels of them and from
+                another seed, so that the luck of a fit can be told from the sensor.
+        """
         self._model = model
         self._settings = settings
         camera = model.design.camera
-        height = max(1, round(WIDTH * camera.resolution[1] / camera.resolution[0]))
-        self._resolution = settings.resolution or (WIDTH, height)
-        self.untouched = UntouchedSurface.of(model.chief_rays(self._resolution))
+        height = max(1, round(settings.width * camera.resolution[1] / camera.resolution[0]))
+        self.resolution = settings.resolution or (settings.width, height)
+        self.untouched = UntouchedSurface.of(model.chief_rays(self.resolution))
         self._frames = self.untouched.frames(model.surface.u_axis)
         self._integrator = NormalIntegrator(self.untouched)
         blank = self._render([])
@@ -120,24 +133,29 @@ class CalibratedSensor:
         # A real one is the mean of many pictures, without noise.
         self._background = blank.without_noise().picture(self._exposure).astype(np.float64)
         samples = [np.hstack(self._press(i)) for i in _counted(settings.presses, progress)]
-        chosen = np.concatenate(samples)
-        if len(chosen) > MOST_SAMPLES:
-            rng = np.random.default_rng([settings.seed, _SAMPLES])
-            chosen = chosen[rng.choice(len(chosen), MOST_SAMPLES, replace=False)]
-        self.fitted_pixels = len(chosen)
-        self._reader: TiltReader = fit_reader(
-            settings.method, chosen[:, :3], chosen[:, 3:5], chosen[:, 5:], settings.seed
-        )
+        known = np.concatenate(samples)
+        self.fitted_pixels = min(len(known), MOST_SAMPLES)
+        self._readers = [self._fitted(known, number) for number in range(readers)]
 
-    def read(self, picture: NDArray[np.uint8]) -> tuple[FloatArray, FloatArray]:
-        """Normals (h, w, 3) and depth (h, w) mm from a picture (h, w, 3)."""
+    def _fitted(self, known: FloatArray, number: int) -> TiltReader:
+        """A reader of colours, places and tilts (n, 7); its number changes its seeds."""
+        settings = self._settings
+        if len(known) > MOST_SAMPLES:
+            seed = [settings.seed, _SAMPLES, *([number] if number else [])]
+            rng = np.random.default_rng(seed)
+            known = known[rng.choice(len(known), MOST_SAMPLES, replace=False)]
+        seed_of_fit = (settings.seed + _NEXT_READER * number) % 2**32
+        return fit_reader(settings.method, known[:, :3], known[:, 3:5], known[:, 5:], seed_of_fit)
+
+    def read(self, picture: NDArray[np.uint8], reader: int = 0) -> tuple[FloatArray, FloatArray]:
+        """Normals (h, w, 3) and depth (h, w) mm from a picture (h, w, 3), by one of the readers."""
         seen = self.untouched.seen
         colours, places = self._features(picture)
         tilts = np.zeros((*seen.shape, 2))
         changed = np.abs(gaussian_filter(colours, (QUIET_BLUR, QUIET_BLUR, 0))).max(axis=2) >= QUIET
         read = seen & changed
         if read.any():
-            tilts[read] = self._reader.tilts(colours[read], places[read])
+            tilts[read] = self._readers[reader].tilts(colours[read], places[read])
         normals = normals_of(tilts, *self._frames, self.untouched.normals)
         return normals, self._integrator.depths(normals)
 
@@ -185,7 +203,7 @@ class CalibratedSensor:
     def _render(self, contacts: Sequence[Contact]) -> TactileImage:
         image = self._model.render(
             contacts,
-            resolution=self._resolution,
+            resolution=self.resolution,
             photons=self._settings.photons,
             seed=self._settings.seed,
             partial=False,

@@ -1,0 +1,183 @@
+"""``optisense verify``: whether what a search found reads better, by things no score has seen."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from optisense.cli.console import ends_well, output
+from optisense.cli.options import VariantOption, out_option
+from optisense.cli.output_folder import take_folder
+from optisense.cli.progress import ProgressLine, progress_line
+from optisense.cli.sampling import BUILDING, LOADING, loading_steps, sample_steps, shown_samples
+from optisense.cli.verify_result import print_verification
+from optisense.commands.sampling import VerifyOptions
+from optisense.time_left import TimedStep
+from optisense.usual_times import UsualTimes
+from optisense.writing import write_text
+
+if TYPE_CHECKING:
+    from optisense.design import SensorDesign
+    from optisense.optics import OpticalModel
+
+JSON_FILE = "verify.json"
+REPORT_FILE = "verify.html"
+
+PICTURE_WORK = 0.4
+"""Processor seconds that a picture with an object, and reading it, usually take."""
+
+LIBRARIES_TIME = 1.0
+"""Seconds that the libraries of the tasks take to load."""
+
+FITTING_TIME = 5.0
+"""Seconds that the fits of the readers usually take."""
+
+
+@ends_well
+def verify(
+    first: Annotated[
+        str,
+        typer.Argument(
+            metavar="STUDY|DESIGN",
+            help="The folder of a search (its --out), whose best trial is compared with its start; "
+            "or a design, by the folder or the name of a built-in sensor.",
+            show_default=False,
+        ),
+    ],
+    second: Annotated[
+        str | None,
+        typer.Argument(
+            metavar="[DESIGN]",
+            help="The design that is compared with the first one.",
+            show_default=False,
+        ),
+    ] = None,
+    trial: Annotated[
+        str, typer.Option(metavar="best|NUMBER", help="Which trial of a study.")
+    ] = "best",
+    *,
+    options: VerifyOptions,
+    out: Annotated[Path | None, out_option("Folder for verify.json and verify.html.")] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print JSON instead of a table.")] = False,
+    variant: VariantOption = "auto",
+) -> None:
+    """Tell whether a sensor reads better than another, by objects that no score has seen.
+
+    Both are calibrated with balls, and screws, coins, letters and other things are then pressed
+    into both at the same places. The errors of what is read of them decide.
+    """
+    count = options.pictures()
+    with progress_line(*loading_steps(LIBRARIES_TIME), *_steps(options, UsualTimes.here())) as line:
+        line.begin(LOADING)
+        settings = options.settings()
+        names, designs = _designs(first, second, trial)
+        if out is not None:
+            take_folder(out)
+        line.begin(BUILDING)
+        models = [
+            _model(name, design, variant) for name, design in zip(names, designs, strict=True)
+        ]
+        for design, label in zip(designs, SIDES, strict=True):
+            _expect(line, options, design, label)
+        from optisense.tasks import verify as compare
+
+        shown: dict[int, Any] = {}
+
+        def show(side: int, done: int, of: int) -> None:
+            if side not in shown:
+                after = "reading the other sensor" if side == 0 else "comparing"
+                shown[side] = shown_samples(line, models[side], SIDES[side], after)
+            shown[side](done, count)
+
+        found = compare((models[0], models[1]), settings, names, show)
+        if out is not None:
+            write_text(out / JSON_FILE, json.dumps(found.to_dict(), indent=2) + "\n")
+    if as_json:
+        print(json.dumps(found.to_dict(), indent=2, allow_nan=False))
+        return
+    print_verification(found)
+    if out is not None:
+        output.print(f"written: {out / JSON_FILE}", markup=False)
+
+
+SIDES = ("first sensor", "second sensor")
+"""The steps of the progress in which each sensor is pressed."""
+
+
+def _steps(options: VerifyOptions, times: UsualTimes) -> list[TimedStep]:
+    photons, count = options.wanted_photons(), options.pictures()
+    found: list[TimedStep] = []
+    for label in SIDES:
+        found += sample_steps(label, photons, count, PICTURE_WORK, FITTING_TIME, times=times)
+    return found
+
+
+def _expect(line: ProgressLine, options: VerifyOptions, design: SensorDesign, label: str) -> None:
+    """Expect the times of this sensor on this machine."""
+    times = UsualTimes.here(design.sensing_area, len(design.lights))
+    for step in _steps(options, times):
+        if label in step.name:
+            line.time_left.expect(step.name, seconds=step.seconds)
+
+
+def _designs(
+    first: str, second: str | None, trial: str
+) -> tuple[tuple[str, str], tuple[SensorDesign, SensorDesign]]:
+    """What is compared, and what it is called.
+
+    Raises:
+        SearchError: there is no such trial, or it is the start itself.
+        typer.BadParameter: only one design is named.
+    """
+    from optisense.errors import SearchError
+    from optisense.search import Study
+    from optisense.search.study.settings import STUDY_FILE
+    from optisense.sensors import load
+
+    if second is not None:
+        if trial != "best":
+            raise typer.BadParameter("is for a study", param_hint="--trial")
+        one, other = load(first), load(second)
+        names = (first, second) if one.name == other.name else (one.name, other.name)
+        return names, (one, other)
+    if not (Path(first) / STUDY_FILE).is_file():
+        raise typer.BadParameter(
+            f"'{first}' is no study; name a second design to compare it with", param_hint="DESIGN"
+        )
+    study = Study.open(first)
+    try:
+        chosen = study.trial(trial)
+        if chosen.is_start:
+            raise SearchError(
+                "no trial is better than the start, so there is nothing to compare",
+                where=first,
+                hint="Search on, choose a --trial NUMBER, or name two designs",
+            )
+        return ("the start", f"trial {chosen.number}"), (study.space.design, chosen.design)
+    finally:
+        study.close()
+
+
+def _model(name: str, design: SensorDesign, variant: str) -> OpticalModel:
+    """The sensor as a scene.
+
+    Raises:
+        SetupError: the renderer can't run on this machine.
+        TaskError: no picture of the design can be taken.
+    """
+    from optisense.errors import OptiSenseError, SetupError, TaskError
+    from optisense.optics import OpticalModel
+
+    try:
+        return OpticalModel(design, variant)
+    except SetupError:
+        raise
+    except OptiSenseError as error:
+        raise TaskError(
+            f"no picture of {name} can be taken: {error.message}",
+            where=error.where,
+            hint=error.hint,
+        ) from error

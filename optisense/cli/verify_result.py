@@ -1,0 +1,42 @@
+"""What `optisense verify` prints."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from optisense.cli.console import output, table_of
+
+if TYPE_CHECKING:
+    from optisense.tasks import Verification
+
+
+def print_verification(found: Verification) -> None:
+    """What each sensor reads, and the verdict."""
+    first, second = found.names
+    table = table_of("", first, second, "change", "95 % interval")
+    for label, change, digits, unit in (
+        ("normals off by", found.normal_change, 1, "degrees"),
+        ("depth off by", found.depth_change, 3, "mm"),
+    ):
+        table.add_row(
+            label,
+            f"{change.before:.{digits}f} {unit}",
+            f"{change.after:.{digits}f} {unit}",
+            f"{change.change:+.{digits}f}",
+            f"{change.low:+.{digits}f} to {change.high:+.{digits}f}",
+        )
+    one, other = found.views
+    table.add_row("skin in view", f"{100 * one.coverage:.0f} %", f"{100 * other.coverage:.0f} %")
+    table.add_row("a pixel shows", f"{one.detail:.3f} mm", f"{other.detail:.3f} mm")
+    table.add_row("stretched", f"{one.stretching:.2f}", f"{other.stretching:.2f}")
+    output.print(table)
+    count, places = len(found.settings.objects), found.settings.places
+    each = "one place" if places == 1 else f"{places} places"
+    output.print(
+        f"{count} objects, each at {each}; reading nothing is off by {found.flat[0]:.1f} degrees "
+        f"and {found.flat[1]:.3f} mm",
+        style="dim",
+    )
+    for note in found.notes():
+        output.print(f"note: {note}", markup=False, style="yellow")
+    output.print(f"{found.in_words()}.", markup=False)

@@ -1,0 +1,146 @@
+"""What a calibrated sensor reads of one press, and what two sensors miss of it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from optisense.errors import TaskError
+from optisense.reading.tilts import angles_between
+from optisense.tasks.calibration import LEAST_PIXELS, CalibratedSensor
+
+if TYPE_CHECKING:
+    from optisense.geometry import Contact
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class PressPictures:
+    """What one press looks like; arrays are (h, w, ...).
+
+    picture: uint8. true_normals, read_normals: unit, in the design's frame. angles: degrees between
+    them, NaN where nothing touches.
+    """
+
+    picture: NDArray[np.uint8]
+    true_normals: NDArray[np.float32]
+    read_normals: NDArray[np.float32]
+    angles: NDArray[np.float32]
+
+
+@dataclass(frozen=True)
+class PressReading:
+    """What a sensor reads of one press, where its camera sees the contact.
+
+    Attributes:
+        points: (n, 3) mm, the untouched skin behind the pixels of the contact.
+        areas: (n,) mm^2 of skin behind each.
+        angles: (readers, n) degrees between read and true normals.
+        depths: (readers, n) mm between read and true depth, absolute.
+        flat_angles: (n,) degrees from the untouched normals to the true ones, which is the error
+            of reading nothing.
+        flat_depths: (n,) mm, the true depth, which is the same for depth.
+        pictures: where they are kept.
+    """
+
+    points: FloatArray
+    areas: FloatArray
+    angles: FloatArray
+    depths: FloatArray
+    flat_angles: FloatArray
+    flat_depths: FloatArray
+    pictures: PressPictures | None = None
+
+
+def read_press(
+    sensor: CalibratedSensor,
+    areas: FloatArray,
+    contact: Contact,
+    number: int,
+    readers: int,
+    keeps: bool,
+) -> PressReading:
+    """Press something into a calibrated sensor and read it.
+
+    Args:
+        sensor: the sensor. areas: (h, w) mm^2 of skin behind each of its pixels.
+        contact: what presses. number: of the picture, for its noise.
+        readers: of the sensor, all of which read. keeps: whether the pictures are kept.
+    """
+    image, picture = sensor.look(contact, number)
+    mask = image.contact_mask & (areas > 0.0)
+    true = image.normals.astype(np.float64)
+    true_depth = sensor.untouched.image_depth(image).astype(np.float64)
+    angles, depths = [], []
+    first = None
+    for reader in range(readers):
+        normals, depth = sensor.read(picture, reader)
+        first = normals if first is None else first
+        angles.append(angles_between(normals, true)[mask])
+        depths.append(np.abs(depth - true_depth)[mask])
+    assert first is not None
+    pictures = None
+    if keeps:
+        off = np.where(image.contact_mask, angles_between(first, true), np.nan)
+        narrow = (each.astype(np.float32) for each in (true, first, off))
+        pictures = PressPictures(picture, *narrow)
+    return PressReading(
+        points=sensor.untouched.points[mask],
+        areas=areas[mask],
+        angles=np.array(angles),
+        depths=np.array(depths),
+        flat_angles=angles_between(sensor.untouched.normals, true)[mask],
+        flat_depths=np.abs(true_depth)[mask],
+        pictures=pictures,
+    )
+
+
+def whole_errors(
+    pair: tuple[PressReading, ...], trees: Sequence[cKDTree], reach: float
+) -> tuple[list[FloatArray], list[FloatArray]]:
+    """Errors of normals and of depth over the whole contact: (readers,) of each sensor.
+
+    What only the other camera sees counts as read flat.
+
+    Args:
+        pair: what each of two sensors reads of the same press.
+        trees: of the points (mm) of the skin that each camera sees.
+        reach: mm within which one of these means that a place is seen.
+
+    Raises:
+        TaskError: neither camera sees the contact.
+    """
+    if max(len(each.areas) for each in pair) < LEAST_PIXELS:
+        raise TaskError(
+            "no camera sees one of the objects where it presses",
+            hint="Use a higher resolution, or another seed",
+        )
+    normals: list[FloatArray] = []
+    depths: list[FloatArray] = []
+    for side, own in enumerate(pair):
+        other = pair[1 - side]
+        unseen = np.zeros(len(other.areas), dtype=bool)
+        if len(other.points):
+            unseen = trees[side].query(other.points)[0] > reach
+        hidden = other.areas[unseen]
+        whole = own.areas.sum() + hidden.sum()
+        if whole == 0.0:  # nothing of it is seen, and nothing lies where it could be
+            unseen[:], hidden, whole = True, other.areas, other.areas.sum()
+        for kept, read, flat in (
+            (normals, own.angles, other.flat_angles),
+            (depths, own.depths, other.flat_depths),
+        ):
+            kept.append((read @ own.areas + flat[unseen] @ hidden) / whole)
+    return normals, depths
+
+
+def flat_errors(press: PressReading) -> tuple[float, float]:
+    """Degrees and mm by which reading nothing is off."""
+    shares = press.areas / press.areas.sum()
+    return float(press.flat_angles @ shares), float(press.flat_depths @ shares)

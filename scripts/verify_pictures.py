@@ -1,0 +1,53 @@
+"""Make the pictures of docs/verify.md anew: python scripts/verify_pictures.py"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from matplotlib.colors import LightSource
+from matplotlib.figure import Figure
+
+import optisense as ots
+from optisense.geometry import Contact
+from optisense.geometry.objects import OBJECTS, ObjectIndenter
+from optisense.mechanics.height_map import heights
+
+OUT = Path(__file__).parent.parent / "docs" / "images"
+PITCH = 0.03
+PHOTONS = 2_000_000
+
+
+def objects() -> None:
+    """The twelve objects, lit from the side, and below each what a GelSight Mini sees of it."""
+    model = ots.OpticalModel(ots.load("gelsight-mini"))
+    figure = Figure(figsize=(12, 8.6), layout="constrained")
+    grid = figure.subplots(4, 6)
+    side = np.arange(-5.2, 5.2, PITCH)
+    for number, (name, relief) in enumerate(OBJECTS.items()):
+        row, column = divmod(number, 6)
+        height = np.minimum(heights(relief.mesh(), side, side), 1.2)
+        light = LightSource(azdeg=315, altdeg=45)
+        shaded = light.shade(
+            -height, _copper(), dx=PITCH, dy=PITCH, blend_mode="soft", vmin=-1.2, vmax=0.0
+        )
+        shaded[~np.isfinite(height) | (height >= 1.2)] = 1.0
+        contact = Contact(ObjectIndenter(name), at=(0.0, 0.0), depth=relief.depth)
+        seen = model.render([contact], (320, 240), photons=PHOTONS).picture()
+        above, below = grid[2 * row][column], grid[2 * row + 1][column]
+        above.imshow(shaded, origin="lower")
+        below.imshow(seen[30:210, 50:270])
+        above.set_title(name, fontsize=11)
+        for axes in (above, below):
+            axes.set_axis_off()
+    figure.savefig(OUT / "verify-objects.png", dpi=80)
+
+
+def _copper() -> object:
+    from matplotlib import colormaps
+
+    return colormaps["copper"]
+
+
+if __name__ == "__main__":
+    objects()

@@ -1,0 +1,52 @@
+"""The interval of a difference: known cases, and how often it is wrong where nothing differs."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from optisense.tasks.paired_bootstrap import BETTER, UNKNOWN, WORSE, error_change
+
+
+def test_a_constant_difference_is_told_exactly() -> None:
+    before = np.random.default_rng(0).uniform(5.0, 20.0, (8, 3, 1))
+    found = error_change(before, before - 2.0)
+    assert (found.low, found.high) == pytest.approx((-2.0, -2.0))
+    assert found.change == pytest.approx(-2.0)
+    assert found.verdict == BETTER
+    assert error_change(before - 2.0, before).verdict == WORSE
+
+
+def test_equal_errors_tell_nothing() -> None:
+    errors = np.random.default_rng(1).uniform(5.0, 20.0, (8, 3, 2))
+    found = error_change(errors, errors)
+    assert found.low < 0.0 < found.high
+    assert found.verdict == UNKNOWN
+
+
+def test_few_objects_tell_nothing_however_different() -> None:
+    before = np.full((5, 9, 1), 20.0)
+    assert error_change(before, before / 2).verdict == UNKNOWN
+
+
+def test_the_luck_of_readers_widens_the_interval() -> None:
+    errors = np.tile(np.linspace(5.0, 20.0, 8)[:, None, None], (1, 3, 3))
+    lucky = errors + np.array([-1.0, 0.0, 1.0])
+    assert error_change(errors, errors - 0.3).verdict == BETTER
+    assert error_change(lucky, lucky - 0.3).verdict == UNKNOWN
+
+
+def test_it_is_seldom_wrong_where_nothing_differs() -> None:
+    rng = np.random.default_rng(2)
+    wrong = 0
+    for number in range(200):
+        objects, places = rng.normal(0.0, 1.0, (10, 1, 1)), rng.normal(0.0, 1.0, (10, 3, 1))
+        difference = objects + places
+        wrong += error_change(np.zeros((10, 3, 1)), difference, seed=number).verdict != UNKNOWN
+    # 5 per cent by construction; percentile intervals of 10 objects are a little too narrow.
+    assert wrong <= 26
+
+
+def test_other_presses_are_refused() -> None:
+    with pytest.raises(ValueError, match="other presses"):
+        error_change(np.zeros((6, 2, 1)), np.zeros((6, 3, 1)))
