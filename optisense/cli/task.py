@@ -117,6 +117,28 @@ def cylinder_radius(
 
 @task_app.command()
 @ends_well
+def force(
+    design: DesignArgument,
+    ball: Annotated[float, typer.Option(min=0.1, metavar="MM", help="Radius of the ball.")] = 3.0,
+    depth: Annotated[
+        float, typer.Option(min=0.11, metavar="MM", help="The deepest press; the least is 0.1 mm.")
+    ] = 1.0,
+    *,
+    options: SampleOptions,
+    out: OutOption = None,
+    as_json: JsonOption = False,
+    variant: VariantOption = "auto",
+) -> None:
+    """The force on a pressing ball, from the spread of colours in the picture."""
+
+    def task() -> PerceptionTask:
+        return tasks.BallForce(radius=ball, most=depth)
+
+    _perceive(design, {"force": task}, options, out, as_json, variant)
+
+
+@task_app.command()
+@ends_well
 def snr(
     design: DesignArgument,
     *,

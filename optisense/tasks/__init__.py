@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 from optisense.lazy_names import load_on_first_use
 
 if TYPE_CHECKING:
+    from optisense.tasks.ball_force import BallForce
     from optisense.tasks.calibration import CalibratedSensor, ReconstructionSettings
     from optisense.tasks.cylinder_radius import CylinderRadius
     from optisense.tasks.dataset import Dataset, Sample
@@ -29,6 +30,7 @@ if TYPE_CHECKING:
 _HOMES = {
     "CalibratedSensor": ".calibration",
     "ContactDraw": ".draws",
+    "BallForce": ".ball_force",
     "CylinderRadius": ".cylinder_radius",
     "Dataset": ".dataset",
     "DatasetSettings": ".generation",
@@ -49,6 +51,7 @@ _HOMES = {
 }
 
 __all__ = [
+    "BallForce",
     "CalibratedSensor",
     "ContactDraw",
     "CylinderRadius",

@@ -12,7 +12,7 @@ from optisense import OpticalModel, load
 from optisense.design.colour import srgb_curve
 from optisense.errors import ContactError, TaskError
 from optisense.geometry import Contact, Cylinder
-from optisense.tasks import CylinderRadius, Misalignment, SampleSettings, perceive
+from optisense.tasks import BallForce, CylinderRadius, Misalignment, SampleSettings, perceive
 from optisense.tasks.misalignment import plane_contact
 from optisense.tasks.perception import collect
 
@@ -155,6 +155,22 @@ def test_a_crop_beyond_the_contact_is_told(lambertian: Any) -> None:
         Misalignment().measure(image.picture(1.0), image)
     with pytest.raises(TaskError, match="pixels show the contact"):
         CylinderRadius().measure(image.picture(1.0), lambertian.render([], (48, 36)))
+
+
+def test_a_force_is_read_from_the_spread(mini: OpticalModel) -> None:
+    settings = SampleSettings(count=16, resolution=(48, 36), photons=60_000)
+    result = perceive(BallForce(), mini, settings)
+    assert result.unit == "N"
+    forces = result.samples.targets[:, 0]
+    # Hertz: 4/3 E* R^0.5 d^1.5 for a half-space; the layer takes 10 to 30 % more.
+    hertz = 4.0 / 3.0 * 0.435 / (1.0 - 0.49**2) * 3.0**0.5
+    assert forces.min() > hertz * 0.1**1.5
+    assert forces.max() < 1.6 * hertz
+    assert result.reading.error < 0.6 * result.reading.guess
+    with pytest.raises(TaskError, match="make no sense"):
+        BallForce(least=0.5, most=0.4)
+    with pytest.raises(ContactError, match="thick"):
+        perceive(BallForce(most=5.0), mini, settings)
 
 
 @pytest.mark.slow
