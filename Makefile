@@ -28,7 +28,7 @@ LOCK := --universal --python-version 3.11 --generate-hashes --no-emit-index-url 
 .PHONY: help setup demo test quick-test lint types import-rules docs docs-as-typed pytest pytest-long pytest-rest bare-pytest quick-pytest \
     studio-tests test-blender studio-window-test package-test extension setup-blender \
     browser-tests setup-browser \
-    format bench fuzz lock clean
+    format bench fuzz kill-tests lock clean
 
 help:
 	@echo "make demo     press a ball into a GelSight Mini and write the picture and a report"
@@ -43,6 +43,7 @@ help:
 	@echo "make docs-as-typed  type all commands of README and docs as shown, also the long ones (hours)"
 	@echo "make bench    measure speed and accuracy (minutes)"
 	@echo "make fuzz     look for malformed input that is not refused in words (an hour)"
+	@echo "make kill-tests     kill commands at 200 random moments, and give them again (an hour)"
 	@echo "make setup    only the set-up: .venv and the libLLVM the renderer needs"
 	@echo "make format   let ruff tidy the code"
 	@echo "make lock     resolve the dependencies anew into requirements.lock"
@@ -163,6 +164,11 @@ format: setup
 FUZZ_MINUTES := 60
 fuzz: setup
 	$(BIN)/python -m tests.fuzz --minutes $(FUZZ_MINUTES) --keep fuzz-found
+
+# Commands that are killed at random moments must leave nothing half and end well when given again.
+KILLS := 200
+kill-tests: setup
+	$(BIN)/python -m tests.kills --kills $(KILLS)
 
 bench: setup
 	$(BIN)/python -m benchmarks

@@ -122,7 +122,8 @@ def fuzz(kind: str, seconds: float, seed: int) -> tuple[Counter[str], dict[str, 
     counts: Counter[str] = Counter()
     faults: dict[str, Case] = {}
     end = time.time() + seconds
-    limit = ENGINE_TIME if kind == "engine" else PATIENCE * CASE_TIME
+    from .engine_kind import busy
+
     stillborn = 0
     while time.time() < end:
         home = Path(tempfile.mkdtemp(prefix="optisense-fuzz-"))
@@ -135,6 +136,7 @@ def fuzz(kind: str, seconds: float, seed: int) -> tuple[Counter[str], dict[str, 
         over, began = False, time.time() + 60.0  # it imports first
         try:
             while not over:
+                limit = ENGINE_TIME * busy() if kind == "engine" else PATIENCE * CASE_TIME
                 if not ours.poll(max(began + limit - time.time(), 0.0)):
                     raise TimeoutError
                 outcome, case = ours.recv()

@@ -1,0 +1,139 @@
+"""Killing a command at a moment, judging what it left, and giving it again."""
+
+from __future__ import annotations
+
+import os
+import random
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from .work import GOALS, WORK, half_files, whole_files
+
+LONGEST = 1800.0
+"""Seconds after which a command is said to hang; on a busy machine the slowest takes minutes."""
+
+POLL = 0.002
+"""Seconds between looks at whether a command has begun to write."""
+
+
+@dataclass
+class Report:
+    """What came of killing one command again and again.
+
+    Attributes:
+        killed: kills that came before the command's end.
+        late: kills that came after it.
+        wrong: what was not as it must be, with the moment of the kill.
+    """
+
+    killed: int = 0
+    late: int = 0
+    wrong: list[str] = field(default_factory=list)
+
+
+class Target:
+    """A command, with its result where nothing kills it."""
+
+    def __init__(self, name: str, home: Path) -> None:
+        """Run it once without a kill, in a folder of its own.
+
+        Raises:
+            RuntimeError: it has failed.
+        """
+        self.work, self._home, self._runs = WORK[name], home, 0
+        home.mkdir(parents=True, exist_ok=True)
+        (home / "goals.py").write_text(GOALS)
+        out = home / "whole"
+        process = self._begin(out)
+        _until_it_writes(process, out)
+        began = time.monotonic()
+        said = process.communicate(timeout=LONGEST)[0]
+        self.writes_for = time.monotonic() - began
+        if process.returncode:
+            raise RuntimeError(f"{name} has failed: {said}")
+        self._result, self._files = self.work.result(out), whole_files(out)
+
+    def kill_once(self, chance: random.Random, report: Report) -> None:
+        """Kill it, one time in eight while it starts, else while it writes; then give it again."""
+        self._runs += 1
+        out = self._home / str(self._runs)
+        process = self._begin(out)
+        starting = chance.random() < 1 / 8
+        if not starting:
+            _until_it_writes(process, out)
+        moment = chance.uniform(0.0, self.writes_for)
+        time.sleep(moment)
+        alone = bool(self.work.workers) and chance.random() < 0.5
+        (process.kill if alone else lambda: _kill_group(process))()
+        process.communicate()
+        late = process.returncode == 0
+        report.late += late
+        report.killed += not late
+        when = f"{'start' if starting else 'writing'} + {moment:.3f} s"
+        wrong = half_files(out, self._files) if out.is_dir() else []
+        report.wrong += [f"{when}: {each}" for each in wrong]
+        if not late:
+            wrong = self._again(out)
+            report.wrong += [f"{when}: {wrong}"] if wrong else []
+        shutil.rmtree(out, ignore_errors=True)
+
+    def _again(self, out: Path) -> str:
+        """Give the command again; what is wrong with how it ended."""
+        begun = out.is_dir() and any(not path.name.startswith(".") for path in out.iterdir())
+        process = self._begin(out, *(self.work.again if begun else ()))
+        said = process.communicate(timeout=LONGEST)[0]
+        if process.returncode and not self._is_whole(out):
+            return f"given again, it ends with {process.returncode}: {said[-300:]}"
+        return "" if self._is_whole(out) else "given again, it ends with another result"
+
+    def _is_whole(self, out: Path) -> bool:
+        return out.is_dir() and bool(self.work.result(out) == self._result) and not strays(out)
+
+    def _begin(self, out: Path, *more: str) -> subprocess.Popen[str]:
+        stand = {"@OUT": str(out), "@GOALS": str(self._home / "goals.py")}
+        words = [*self.work.words, *more]
+        for name, value in stand.items():
+            words = [word.replace(name, value) for word in words]
+        return subprocess.Popen(
+            [sys.executable, "-m", "optisense", *words],
+            stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
+            start_new_session=True, cwd=self._home,
+        )  # fmt: skip
+
+
+def strays(folder: Path) -> list[str]:
+    """Temporary files that nobody will remove."""
+    return [path.name for path in folder.rglob(".*") if path.name.startswith(".")]
+
+
+def _until_it_writes(process: subprocess.Popen[str], out: Path) -> None:
+    until = time.monotonic() + LONGEST
+    while process.poll() is None and time.monotonic() < until:
+        if out.exists() or any(out.parent.glob(f".{out.name}*")):
+            return
+        time.sleep(POLL)
+
+
+def _kill_group(process: subprocess.Popen[str]) -> None:
+    try:
+        os.killpg(process.pid, signal.SIGKILL)
+    except ProcessLookupError:
+        process.kill()
+
+
+def kill_repeatedly(
+    name: str, kills: int, seed: int, home: Path, told: Callable[[Report], None] = lambda _: None
+) -> Report:
+    """Kill a command at so many moments; what came of it."""
+    chance, report = random.Random(f"{seed} {name}"), Report()
+    target = Target(name, home)
+    for _ in range(kills):
+        target.kill_once(chance, report)
+        told(report)
+    return report

@@ -1,0 +1,60 @@
+"""Commands that are killed at a random moment; `make kill-tests` does so 200 times."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from .killing import kill_repeatedly
+from .work import half_files, whole_files
+
+SEED = 7
+"""Of the moments, which depend on the machine's speed all the same."""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["export", "cma-es, 2 workers"])
+def test_it_leaves_nothing_half_and_ends_as_if_it_had_not_been_killed(
+    name: str, tmp_path: Path
+) -> None:
+    report = kill_repeatedly(name, 1, SEED, tmp_path)
+    assert report.wrong == []
+    assert report.killed + report.late == 1
+
+
+def test_half_files_are_found(tmp_path: Path) -> None:
+    """What `half_files` says of files that are cut off, strange, or in order."""
+    made = {
+        "whole.png": b"picture",
+        "half.png": b"pic",
+        "table.csv": b"a,b\n1,2\n",
+        "half.csv": b"a,b\n1,",
+        "run.json": b'{"seconds": 2}',
+        "report.html": b"<html>\n</html>\n",
+        "deep/strange.bin": b"",
+        ".temporary": b"anything",
+    }
+    for name, data in made.items():
+        path = tmp_path / name
+        path.parent.mkdir(exist_ok=True)
+        path.write_bytes(data)
+    whole = {
+        "whole.png": b"picture",
+        "half.png": b"picture",
+        "table.csv": b"a,b\n1,2\n3,4\n",
+        "half.csv": b"a,b\n1,2\n",
+        "run.json": None,
+        "report.html": None,
+    }
+    assert half_files(tmp_path, whole) == [
+        "deep/strange.bin: is not in the result",
+        "half.csv: has half a line",
+        "half.png: has other content",
+    ]
+    (tmp_path / "run.json").write_bytes(b'{"sec')
+    (tmp_path / "report.html").write_bytes(b"<html>\n")
+    told = half_files(tmp_path, whole)
+    assert "report.html: is cut off" in told
+    assert any(each.startswith("run.json: can't be read") for each in told)
+    assert "report.html" in whole_files(tmp_path)
