@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from . import registration
 from .engine import catalogue, preferences, session
+from .evaluate import live as evaluate_live
 from .evaluate import operator as evaluate_operator
 from .evaluate import prop as evaluate_prop
 from .evaluate import ui as evaluate_ui
@@ -74,6 +75,7 @@ MODULES = (
     windows,
     simulate_operator,
     evaluate_operator,
+    evaluate_live,
     optimise_operator,
     offering,
     export_operator,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import sys
 import threading
 from collections.abc import Iterator
@@ -50,9 +51,16 @@ def objectives(session: Session, fields: Fields, job: Job) -> dict[str, Any]:
                 "unit": each.unit,
                 "lower_is_better": each.lower_is_better,
                 "rays_only": each.rays_only,
+                "usual": each.usual,
+                "range": _finite(each.bounds()),
             }
         )
     return {"objectives": rows}
+
+
+def _finite(bounds: tuple[float, float]) -> tuple[float, float] | None:
+    """The lowest and highest value, where both are numbers."""
+    return bounds if all(map(math.isfinite, bounds)) else None
 
 
 @handles("evaluate", Evaluate, Lane.RENDER)

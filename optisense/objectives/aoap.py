@@ -30,6 +30,11 @@ def bounds(*, coverage_weight: float) -> tuple[float, float]:
     return 0.0, 1.0 + coverage_weight
 
 
+USUAL = (0.24, 1.0)
+"""Values of the poorest and the best built-in sensor: GelSight Svelte, and the spherical
+GelSight Mini."""
+
+
 @objective(
     "aoap",
     title="AOAP",
@@ -38,6 +43,7 @@ def bounds(*, coverage_weight: float) -> tuple[float, float]:
     range=bounds,
     needs=f"{LEAST_PIXELS} pixels that see the surface",
     rays_only=True,
+    usual=USUAL,
 )
 def aoap(
     evaluation: Evaluation, *, coverage_weight: float = COVERAGE_WEIGHT

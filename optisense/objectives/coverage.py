@@ -14,6 +14,10 @@ if TYPE_CHECKING:
     from optisense.objectives.evaluation import Evaluation
 
 
+USUAL = (0.46, 0.83)
+"""Values of the poorest and the best built-in sensor: GelBelt, GelSight360."""
+
+
 @objective(
     "coverage",
     title="Coverage",
@@ -21,6 +25,7 @@ if TYPE_CHECKING:
     beside=("by_area",),
     range=(0.0, 1.0),
     rays_only=True,
+    usual=USUAL,
 )
 def coverage(evaluation: Evaluation) -> tuple[float, dict[str, Any], dict[str, Any]]:
     """How much of the sensing surface the camera sees.

@@ -34,6 +34,10 @@ HIGH_SHARE = 95.0
 """Percentile of the anisotropy that is told beside its mean: one footprint in twenty is longer."""
 
 
+USUAL = (1.24, 1.01)
+"""Values of the poorest and the best built-in sensor: GelSight360, GelBelt."""
+
+
 @objective(
     "distortion",
     title="Distortion",
@@ -43,6 +47,7 @@ HIGH_SHARE = 95.0
     needs=f"{LEAST_FOOTPRINTS} footprints of pixels on the surface",
     lower_is_better=True,
     rays_only=True,
+    usual=USUAL,
 )
 def distortion(evaluation: Evaluation) -> tuple[float, dict[str, Any], dict[str, Any]]:
     """How many times as long as wide a pixel's footprint on the sensing surface is.

@@ -95,6 +95,11 @@ def bounds(*, theta_weight: float, phi_weight: float, **others: object) -> tuple
     return -180.0 * (theta_weight + phi_weight), 0.0
 
 
+USUAL = (-76.0, -34.0)
+"""Values of the poorest and the best built-in sensor: the first and third of GelBelt's
+designs in docs/experiments.md."""
+
+
 @objective(
     "normdiff",
     title="NormDiff",
@@ -103,6 +108,7 @@ def bounds(*, theta_weight: float, phi_weight: float, **others: object) -> tuple
     reads=in_crowd,
     range=bounds,
     needs=f"each press seen, with {LEAST_PIXELS} indented pixels",
+    usual=USUAL,
 )
 def normdiff(
     evaluation: Evaluation,

@@ -45,6 +45,10 @@ class TriangleAreas(NamedTuple):
     leaping: int
 
 
+USUAL = (1.2, 60.0)
+"""Values of the poorest and the best built-in sensor: GelSight360, GelBelt."""
+
+
 @objective(
     "2to3pw",
     title="2to3PW",
@@ -53,6 +57,7 @@ class TriangleAreas(NamedTuple):
     range=(0.0, 1.0 / MOST_EVEN),
     needs=f"{LEAST_TRIANGLES} triangles between pixels on the surface",
     rays_only=True,
+    usual=USUAL,
 )
 def projection_warping(
     evaluation: Evaluation, *, jump: float = JUMP

@@ -78,6 +78,8 @@ class Objective:
         lower_is_better: a lower value is better, as of an error. A search maximises the negative
             value of such an objective.
         rays_only: it traces chief rays and needs no light.
+        usual: the values of the poorest and of the best built-in sensor, so that a value can be
+            judged; None where they are not known.
     """
 
     name: str
@@ -91,6 +93,7 @@ class Objective:
     unit: str = ""
     lower_is_better: bool = False
     rays_only: bool = False
+    usual: tuple[float, float] | None = None
 
     def __call__(self, evaluation: Evaluation, **settings: Any) -> Any:
         """Call the function itself, without any checks of what it returns."""
@@ -147,6 +150,7 @@ def objective(
     unit: str = "",
     lower_is_better: bool = False,
     rays_only: bool = False,
+    usual: tuple[float, float] | None = None,
 ) -> Callable[[_F], _F]:
     """Register a function as an objective.
 
@@ -161,6 +165,7 @@ def objective(
         unit: of the value.
         lower_is_better: a lower value is better; a higher one if left out.
         rays_only: it traces chief rays and needs no light.
+        usual: a poor and a good value, to judge others by.
 
     Raises:
         ObjectiveError: the name is taken or malformed, or the function takes no evaluation.
@@ -179,6 +184,7 @@ def objective(
             unit,
             lower_is_better,
             rays_only,
+            usual,
         )
         _register(given)
         return function

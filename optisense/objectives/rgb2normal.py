@@ -67,6 +67,11 @@ def on_lines(
     )
 
 
+USUAL = (0.66, 0.98)
+"""Values of the poorest and the best built-in sensor: the first of GelBelt's designs in
+docs/experiments.md, and DIGIT."""
+
+
 @objective(
     "rgb2normal",
     title="RGB2Normal",
@@ -75,6 +80,7 @@ def on_lines(
     reads=on_lines,
     range=(0.0, 1.0),
     needs=f"each press seen, with {LEAST_PIXELS} pixels on each line",
+    usual=USUAL,
 )
 def rgb2normal(
     evaluation: Evaluation,

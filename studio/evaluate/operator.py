@@ -7,6 +7,7 @@ from typing import Any
 import bpy
 from bpy.props import StringProperty
 
+from ..core import scores
 from ..core.engine import EngineError
 from ..core.numbers import shown_number
 from ..engine import catalogue, handing, polls, session
@@ -14,6 +15,9 @@ from ..engine.operators import Starting, refuse, start_with_design
 from ..scene.paths import objective
 from ..simulate import editors
 from . import figures, rays
+
+ABOUT = ("unit", "lower_is_better")
+"""What a score tells of its objective, which may be one of the user's own."""
 
 RAYS = (16, 12)
 """Grid of the chief rays that are drawn (columns, rows); more hide the sensor."""
@@ -71,24 +75,64 @@ def chosen(context: bpy.types.Context) -> list[str]:
 
 
 def take(result: dict[str, Any]) -> None:
-    """Keep the scores for the panel."""
+    """Keep the scores for the panel, in place of those before."""
     values = bpy.context.window_manager.optisense_evaluation
+    before = _before()
+    opened = {score.name for score in values.scores if score.is_open}
     values.scores.clear()
     values.is_before = False
     for row in result["scores"]:
         score = values.scores.add()
         score.name = row["objective"]
-        score.title = row.get("title") or row["objective"]
-        score.value = "" if row["value"] is None else f"{row['value']:.4g}"
-        score.failure = row.get("failure") or ""
-        parts = row.get("parts") or {}
-        score.parts = "\n".join(
-            f"{name.replace('_', ' ')}: {shown_number(value)}"
-            for name, value in parts.items()
-            if isinstance(value, (int, float))
-        )
-        score.figure = row.get("figure") or ""
+        _fill(score, row, before.get(score.name))
+        score.is_open = score.name in opened
     session.redraw()
+
+
+def take_live(result: dict[str, Any]) -> None:
+    """The same for scores that were made while the sensor is edited; the others stay, as old."""
+    values = bpy.context.window_manager.optisense_evaluation
+    before = _before()
+    for row in result["scores"]:
+        score = values.scores.get(row["objective"]) or values.scores.add()
+        score.name = row["objective"]
+        _fill(score, row, before.get(score.name))
+        score.is_live = True
+    values.is_before = False
+    session.redraw()
+
+
+def _before() -> dict[str, float]:
+    """The scores of this sensor so far, by objective."""
+    values = bpy.context.window_manager.optisense_evaluation
+    if values.is_before:
+        return {}
+    return {score.name: score.number for score in values.scores if score.value}
+
+
+def _fill(score: bpy.types.PropertyGroup, row: dict[str, Any], before: float | None) -> None:
+    """Show what the engine says of a score, and how it changed."""
+    known = {each["name"]: each for each in catalogue.entries("objectives")}
+    about = {**known.get(row["objective"], {}), **{k: row[k] for k in ABOUT if k in row}}
+    value = row["value"]
+    score.title = row.get("title") or row["objective"]
+    score.value = "" if value is None else f"{value:.4g}"
+    score.unit = about.get("unit") or ""
+    score.number = value or 0.0
+    found = scores.share(value, about)
+    score.has_share, score.share = found is not None, found or 0.0
+    score.direction = scores.direction(about)
+    lower = bool(about.get("lower_is_better"))
+    score.change = scores.change(value, before, lower_is_better=lower)
+    score.failure = row.get("failure") or ""
+    parts = row.get("parts") or {}
+    score.parts = "\n".join(
+        f"{name.replace('_', ' ')}: {shown_number(value)}"
+        for name, value in parts.items()
+        if isinstance(value, (int, float))
+    )
+    score.figure = row.get("figure") or ""
+    score.is_live = False
 
 
 class OPTISENSE_OT_show_figure(polls.Checked, bpy.types.Operator):
@@ -111,8 +155,8 @@ class OPTISENSE_OT_show_figure(polls.Checked, bpy.types.Operator):
     )
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        scores = context.window_manager.optisense_evaluation.scores
-        drawn = [each for each in scores if figures.is_there(each.figure)]
+        found = context.window_manager.optisense_evaluation.scores
+        drawn = [each for each in found if figures.is_there(each.figure)]
         chosen = [each for each in drawn if self.objective in ("", each.name)]
         if not chosen:
             return refuse(self, f"There is no figure of '{self.objective}'; evaluate again")

@@ -2,15 +2,26 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import bpy
 from bpy.props import (
     BoolProperty,
     CollectionProperty,
     EnumProperty,
+    FloatProperty,
     StringProperty,
 )
 
 from ..engine import catalogue
+
+when_live_changed: list[Callable[[], None]] = []
+"""Called when scoring while editing is switched on or off."""
+
+
+def _live_changed(values: bpy.types.PropertyGroup, context: bpy.types.Context) -> None:
+    for each in when_live_changed:
+        each()
 
 
 class OPTISENSE_PG_score(bpy.types.PropertyGroup):
@@ -18,6 +29,20 @@ class OPTISENSE_PG_score(bpy.types.PropertyGroup):
 
     title: StringProperty()
     value: StringProperty()
+    number: FloatProperty(description="The value in single precision")
+    share: FloatProperty(description="How good it is, 0 to 1")
+    per_cent: FloatProperty(
+        name="How good", subtype="PERCENTAGE", min=0.0, max=100.0, precision=0,
+        description="From the poorest (0) to the best (100) of the built-in sensors, or of all "
+        "values that the objective can have",
+        get=lambda self: 100.0 * self.share,
+    )  # fmt: skip
+    has_share: BoolProperty(description="Its objective says what is poor and what is good")
+    unit: StringProperty()
+    direction: StringProperty(description="Which way it is good, in words")
+    change: StringProperty(description="Since the scores before, in words")
+    is_open: BoolProperty(name="Details", description="Show its parts and its figure")
+    is_live: BoolProperty(description="It was scored while the sensor was edited")
     parts: StringProperty(description="One 'name: number' a line")
     failure: StringProperty()
     figure: StringProperty(description="A picture file")
@@ -31,6 +56,13 @@ class OPTISENSE_PG_evaluation(bpy.types.PropertyGroup):
         items=catalogue.objectives,
         options={"ENUM_FLAG", "SKIP_SAVE"},
         description="What the sensor is scored by",
+    )
+    live: BoolProperty(
+        name="Score while editing",
+        description="Keep the scores up to date that trace rays only, such as AOAP, while the "
+        "camera, parts and cages are moved",
+        update=_live_changed,
+        options={"SKIP_SAVE"},
     )
     own: StringProperty(
         name="Your own",

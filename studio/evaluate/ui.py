@@ -4,10 +4,18 @@ from __future__ import annotations
 
 import bpy
 
+from ..core import scores
 from ..engine import catalogue
 from ..engine.layout import SidebarPanel, lines_of, paragraph, show_job, show_outcome
 from ..simulate.picture import file_icon
 from . import figures
+
+TITLE, VALUE = 0.28, 0.78
+"""Share of a score's line that its title has, and share of the rest that value and change have; the
+bar has what is left."""
+
+ARROWS = {"better": "TRIA_UP", "worse": "TRIA_DOWN"}
+"""Icons of changes: up is better, whichever way the value goes."""
 
 FIGURE = 10.5
 """Width of a figure in the panel, in widths of an icon; in full it opens in an editor."""
@@ -35,15 +43,14 @@ class OPTISENSE_PT_evaluate(SidebarPanel, bpy.types.Panel):
         else:
             column.label(text=catalogue.items("objectives")[0][1])
         layout.prop(values, "own")
+        layout.prop(values, "live")
         row = layout.row()
         row.scale_y = 1.4
         if not show_job(row, "Evaluating"):
             row.operator("optisense.evaluate", icon="CHECKMARK")
         show_outcome(layout, "Evaluating", "Tracing rays")
-        if values.scores and values.is_before:
-            layout.label(text="Scores of the sensor that was open before", icon="INFO")
-        for score in values.scores:
-            _score(layout.box(), score)
+        if values.scores:
+            _strip(layout.box(), values)
         row = layout.row(align=True)
         if not show_job(row, "Tracing rays"):
             row.operator("optisense.show_rays", icon="CURVE_DATA")
@@ -52,16 +59,55 @@ class OPTISENSE_PT_evaluate(SidebarPanel, bpy.types.Panel):
             paragraph(layout, values.rays)
 
 
-def _score(layout: bpy.types.UILayout, score: bpy.types.PropertyGroup) -> None:
-    row = layout.row()
-    row.label(text=score.title)
+def _strip(layout: bpy.types.UILayout, values: bpy.types.PropertyGroup) -> None:
+    """All scores, one line each; a click on the arrow shows what one is made of."""
+    if values.is_before:
+        layout.label(text="Scores of the sensor that was open before", icon="INFO")
+    column = layout.column(align=True)
+    for score in values.scores:
+        _line(column, score)
+        if score.failure:
+            paragraph(column, score.failure, boxed=True)
+        elif score.is_open:
+            _details(column, score)
+    notes = []
+    if any(score.is_live for score in values.scores):
+        named = ", ".join(score.title for score in values.scores if score.is_live)
+        notes.append(f"Scored while editing: {named}.")
+    if any(score.has_share for score in values.scores):
+        notes.append("0 % is the poorest built-in sensor, 100 % the best.")
+    if notes:
+        paragraph(layout, " ".join(notes), boxed=True)
+
+
+def _line(column: bpy.types.UILayout, score: bpy.types.PropertyGroup) -> None:
+    row = column.row(align=True)
+    icon = "DOWNARROW_HLT" if score.is_open else "RIGHTARROW"
+    row.prop(score, "is_open", text="", icon=icon, emboss=False)
+    parts = row.split(factor=TITLE, align=True)
+    parts.label(text=score.title)
     if score.failure:
-        row.label(text="failed", icon="ERROR")
-        paragraph(layout, score.failure, boxed=True)
+        parts.label(text="failed", icon="ERROR")
         return
-    row.label(text=score.value)
+    amount, _, sense = score.change.partition(" ")  # that of an unchanged score is one word
+    said = scores.with_unit(score.number, score.unit, 3 if sense else 4)
+    said = f"{said} {amount}" if sense else said
+    if score.has_share:
+        parts = parts.split(factor=VALUE, align=True)
+    parts.label(text=said, icon=ARROWS.get(sense, "NONE"))
+    if not score.has_share:
+        return
+    bar = parts.row(align=True)
+    bar.enabled = False
+    bar.prop(score, "per_cent", text="", slider=True)
+
+
+def _details(layout: bpy.types.UILayout, score: bpy.types.PropertyGroup) -> None:
     column = layout.column(align=True)
     column.scale_y = 0.8
+    column.label(text=score.direction.capitalize(), icon="DOT")
+    if score.change:
+        column.label(text=f"Since the score before: {score.change}", icon="DOT")
     for line in score.parts.splitlines():
         for number, piece in enumerate(lines_of(line, has_icon=True, boxed=True)):
             column.label(text=piece, icon="BLANK1" if number else "DOT")
