@@ -103,6 +103,10 @@ class DatasetOptions(EstimatorOptions):
     exposure: Exposure = Field(
         "auto", description="One for all pictures; auto suits the untouched sensor."
     )
+    hold_out: Annotated[list[str], Written("KIND:SIZE")] = Field(
+        default_factory=list,
+        description="An --indenter that is in the test split only; may be given several times.",
+    )
     radiance: bool = Field(False, description="Also write linear radiance as EXR files.")
 
     def settings(self) -> dict[str, Any]:
@@ -113,7 +117,8 @@ class DatasetOptions(EstimatorOptions):
         contacts = ContactDraw(
             tuple(self.indenter), self.depth, self.rotation, self.tilt, self.margin / 100
         )
-        return self.model_dump(exclude=drawn) | {"contacts": contacts}
+        made = self.model_dump(exclude=drawn)
+        return made | {"contacts": contacts, "hold_out": tuple(self.hold_out)}
 
 
 class ReconstructionOptions(PictureOptions):

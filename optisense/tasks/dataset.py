@@ -14,6 +14,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from optisense.errors import TaskError
 from optisense.picture_files import read_picture
 from optisense.tasks.records import read_object, read_rows
+from optisense.tasks.splits import SPLITS
 from optisense.text import brief
 from optisense.untrusted_files import (
     COPY_AGAIN,
@@ -34,10 +35,11 @@ INFO = "dataset.json"
 LABELS = "metadata.csv"
 FAILURES = "failures.csv"
 BACKGROUND = "background.npz"
+CAMERA = "camera.npz"
 DESIGN = "design"
 
-TEXT_COLUMNS = ("file_name", "arrays", "radiance", "indenter")
-WHOLE_COLUMNS = ("index", "contact_pixels", "attempt")
+TEXT_COLUMNS = ("file_name", "arrays", "radiance", "indenter", "split")
+WHOLE_COLUMNS = ("index", "contact_pixels", "cut", "attempt")
 NUMBER_COLUMNS = {
     "radius": "mm, of a ball or a cylinder; empty for others",
     "x": "mm, the place on the untouched surface, in the design's frame",
@@ -54,8 +56,9 @@ NUMBER_COLUMNS = {
     "area": "mm^2 of skin that touches; empty for a conforming skin",
     "pressure": "MPa, the greatest; empty for a conforming skin",
 }
-LATER_COLUMNS = ("force", "area", "pressure")
-"""Columns that tables of release 0.1 lack; such tables are read, and go on without them."""
+LATER_COLUMNS = {"force": "", "area": "", "pressure": "", "cut": "-1", "split": ""}
+"""Columns that tables of release 0.1 lack, with what stands for them; such tables are read, and go
+on without them."""
 COLUMNS = (
     "file_name",
     "index",
@@ -65,6 +68,8 @@ COLUMNS = (
     "attempt",
     "arrays",
     "radiance",
+    "cut",
+    "split",
 )
 """Columns of `LABELS`; the first is what common loaders of picture folders look for."""
 FIRST_COLUMNS = tuple(name for name in COLUMNS if name not in LATER_COLUMNS)
@@ -75,14 +80,19 @@ MAKE_AGAIN = "Copy the file again, or make it again: optisense dataset with --me
 ArrayKinds = Mapping[str, tuple[str, int | None]]
 
 SAMPLE_ARRAYS: ArrayKinds = {"depth": ("f", None), "normals": ("f", 3), "mask": ("b", None)}
-ELASTIC_ARRAYS: ArrayKinds = {
+LATER_ARRAYS: ArrayKinds = {
+    "points": ("f", 3),
     "pressure": ("f", None),
     "penetration": ("f", None),
     "displacement": ("f", 3),
 }
 BACKGROUND_ARRAYS: ArrayKinds = {"image": ("u", 3), "points": ("f", 3), "normals": ("f", 3)}
 """Arrays of the files by name: what their type may be (as of NumPy's `dtype.kind`), and the numbers
-of a pixel. Those of an elastic skin are missing from samples of other skins and of release 0.1."""
+of a pixel. The later ones may be missing: release 0.1 wrote none of them, and only an elastic skin
+has pressure, penetration and displacement."""
+
+CAMERA_ARRAYS: ArrayKinds = {"points": ("f", 3), "directions": ("f", 3)}
+"""Arrays of `CAMERA`, as above."""
 
 FiniteNumber = Annotated[float, Field(allow_inf_nan=False)]
 
@@ -187,6 +197,9 @@ class Sample:
     unit, inward, in the design's frame. mask: bool, where the indenter is seen. labels: a row of
     `LABELS`, numbers as numbers.
 
+    points: (h, w, 3) float32 mm, the pressed surface behind each pixel in the design's frame, NaN
+    where the camera sees none; None in samples of release 0.1.
+
     Of an elastic skin also, all float32 and NaN where no skin is seen (None for other skins):
     pressure: MPa. penetration: mm that the undeformed skin lies inside the indenter, 0 elsewhere.
     displacement: (h, w, 3) mm by which the skin behind a pixel has moved, in the design's frame.
@@ -197,6 +210,7 @@ class Sample:
     normals: NDArray[np.float32]
     mask: NDArray[np.bool_]
     labels: dict[str, Any]
+    points: NDArray[np.float32] | None = None
     pressure: NDArray[np.float32] | None = None
     penetration: NDArray[np.float32] | None = None
     displacement: NDArray[np.float32] | None = None
@@ -263,6 +277,7 @@ class Dataset:
             normals=arrays["normals"],
             mask=arrays["mask"],
             labels=labels,
+            points=arrays.get("points"),
             pressure=arrays.get("pressure"),
             penetration=arrays.get("penetration"),
             displacement=arrays.get("displacement"),
@@ -278,6 +293,34 @@ class Dataset:
             TaskError: its file is missing or damaged.
         """
         return self._arrays(BACKGROUND, BACKGROUND_ARRAYS)
+
+    def camera_rays(self) -> dict[str, NDArray[Any]]:
+        """The ray of each pixel inside the gel: points (mm) where it meets the skin at rest, and
+        directions (unit), against the view; see `optisense.tasks.camera_model`.
+
+        Raises:
+            TaskError: its file is missing, as in datasets of release 0.1, or damaged.
+        """
+        return self._arrays(CAMERA, CAMERA_ARRAYS)
+
+    def split(self, name: str) -> list[int]:
+        """Numbers of the samples of a split, to be given to `dataset[number]`.
+
+        Args:
+            name: "train", "validation" or "test".
+
+        Raises:
+            TaskError: there is no such split, or release 0.1 wrote the dataset, which has none.
+        """
+        if name not in SPLITS:
+            raise TaskError(f"there is no split '{name}'", hint="Name one: " + ", ".join(SPLITS))
+        if any(row["split"] == "" for row in self.labels):
+            raise TaskError(
+                "the dataset has no splits",
+                where=str(self.folder / LABELS),
+                hint="An earlier release made it; make it again in another folder",
+            )
+        return [number for number, row in enumerate(self.labels) if row["split"] == name]
 
     def _existing(self, name: str) -> Path:
         path = inside(self.folder, name)
@@ -299,7 +342,7 @@ class Dataset:
         path = self._existing(name)
         arrays = read_arrays(path, TaskError)
         width, height = self.info["settings"]["resolution"]
-        later = {each: ELASTIC_ARRAYS[each] for each in ELASTIC_ARRAYS if each in arrays}
+        later = {each: LATER_ARRAYS[each] for each in LATER_ARRAYS if each in arrays}
         check_arrays(arrays, {**kinds, **later}, (height, width), path, TaskError)
         return arrays
 
@@ -313,9 +356,11 @@ def columns_of(folder: Path) -> tuple[str, ...]:
 
 def _typed(row: dict[str, str], where: str) -> dict[str, Any]:
     try:
-        result: dict[str, Any] = {name: row[name] for name in TEXT_COLUMNS}
-        result |= {name: int(row[name]) for name in WHOLE_COLUMNS}
-        given = {**dict.fromkeys(LATER_COLUMNS, ""), **row}
+        given = {**LATER_COLUMNS, **row}
+        result: dict[str, Any] = {name: given[name] for name in TEXT_COLUMNS}
+        result |= {name: int(given[name]) for name in WHOLE_COLUMNS}
+        if given["split"] not in ("", *SPLITS):
+            raise ValueError(f"there is no split '{brief(given['split'])}'")
         result |= {n: float(given[n]) if given[n] else float("nan") for n in NUMBER_COLUMNS}
     except (KeyError, TypeError, ValueError) as error:
         raise TaskError(f"a row can't be read: {error}", where=where, hint=ROW_AGAIN) from error

@@ -41,6 +41,17 @@ def keeps_margin(mask: NDArray[np.bool_], margin: float) -> bool:
     return not inner.any()
 
 
+def is_cut(mask: NDArray[np.bool_]) -> bool:
+    """Whether a contact reaches the picture's edge, so that some of it may be out of view.
+
+    Args:
+        mask: (h, w), true where the contact is seen.
+    """
+    inner = mask.copy()
+    inner[1:-1, 1:-1] = False
+    return bool(inner.any())
+
+
 class Places:
     """The places of a sensing surface that the camera sees, to draw from evenly by area."""
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Callable
 from contextlib import closing
 from dataclasses import asdict, dataclass, field, replace
@@ -13,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from optisense.design import SensorDesign, load_design
+from optisense.design import load_design
 from optisense.design.storage import files_of
 from optisense.errors import ContactError, TaskError
 from optisense.folders import LOCK_FILE, FolderLock, held
@@ -26,8 +25,10 @@ from optisense.quality import SAMPLE_PHOTONS
 from optisense.reading.camera_noise import add_camera_noise
 from optisense.reading.untouched import UntouchedSurface
 from optisense.sensors import save_design
+from optisense.tasks.camera_model import camera_model, ray_arrays
 from optisense.tasks.dataset import (
     BACKGROUND,
+    CAMERA,
     DESIGN,
     FAILURES,
     INFO,
@@ -40,8 +41,10 @@ from optisense.tasks.dataset import (
     read_info,
     read_labels,
 )
-from optisense.tasks.draws import ContactDraw, DrawnContact, Places, keeps_margin
+from optisense.tasks.digests import design_values, file_digest, mesh_digests
+from optisense.tasks.draws import ContactDraw, DrawnContact, Places, is_cut, keeps_margin
 from optisense.tasks.records import CsvTable, refuse_differences, write_whole
+from optisense.tasks.splits import split_of
 from optisense.writing import inside, write_json, written_whole
 
 if TYPE_CHECKING:
@@ -75,6 +78,7 @@ class DatasetSettings:
             clean, so that noise can be added when they are used.
         radiance: also write linear radiance as EXR.
         estimator: "radiance-cache" or "sppm"; see docs/simulation.md.
+        hold_out: texts of indenters that are in the test split only.
         skin: "elastic" or "conforming"; see docs/mechanics.md.
     """
 
@@ -87,12 +91,19 @@ class DatasetSettings:
     radiance: bool = False
     estimator: str = RADIANCE_CACHE
     skin: str = ELASTIC
+    hold_out: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         if not 0 <= self.camera_noise < 256:
             raise TaskError(f"the camera noise is {self.camera_noise}", hint="Give 0 to 255")
         if self.seed < 0:
             raise TaskError(f"the seed is {self.seed}", hint="Give 0 or more")
+        for text in self.hold_out:
+            if text not in self.contacts.indenters:
+                raise TaskError(
+                    f"'{text}' is held out, but nothing is pressed in with it",
+                    hint="Indenters: " + ", ".join(self.contacts.indenters),
+                )
 
 
 def generate(
@@ -164,7 +175,10 @@ class _Maker:
         width, height = settings.resolution or model.design.camera.resolution
         self._resolution = int(width), int(height)
         self._exposure = self._exposure_of_all(lock)
-        self._untouched = UntouchedSurface.of(model.chief_rays(self._resolution))
+        rays = model.chief_rays(self._resolution)
+        self._untouched = UntouchedSurface.of(rays)
+        if not (folder / CAMERA).exists():  # release 0.1 wrote none
+            self._write_arrays(CAMERA, ray_arrays(rays))
         self._places = Places.of(model)
         self._larger_than_view = {
             text for text, each in self._indenters.items() if not self._fits(each)
@@ -185,6 +199,10 @@ class _Maker:
             dataset.background()
         except TaskError:
             self._write_background(self._untouched_image(), self._exposure)
+        try:
+            dataset.camera_rays()
+        except TaskError:
+            self._write_arrays(CAMERA, ray_arrays(self._model.chief_rays(self._resolution)))
         damaged = set()
         for number, labels in enumerate(dataset.labels):
             try:
@@ -263,6 +281,7 @@ class _Maker:
             kept["contacts"].setdefault("margin", 0.0)
             kept["estimator"] = current_name(kept["estimator"])
             kept.setdefault("skin", CONFORMING)
+            kept.setdefault("hold_out", [])
             known = {key: before.get(key) for key in common}
             known["design"] = design_values(load_design(self._folder / DESIGN))
             now = common | {"design": design_values(with_own_lights(self._model.design))}
@@ -271,7 +290,7 @@ class _Maker:
         lock.check_empty()
         design = with_own_lights(self._model.design)
         inner = [f"{DESIGN}/{file}" for file in (*files_of(design), LOCK_FILE)]
-        lock.will_make([*inner, BACKGROUND, INFO])
+        lock.will_make([*inner, BACKGROUND, CAMERA, INFO])
         try:
             exposure = self._begin(common)
         except BaseException:
@@ -287,6 +306,8 @@ class _Maker:
         exposure = float(image.auto_exposure() if asked == "auto" else asked)
         save_design(self._model.design, self._folder / DESIGN)
         self._write_background(image, exposure)
+        rays = self._model.chief_rays(self._resolution)
+        self._write_arrays(CAMERA, ray_arrays(rays))
         info = {
             "schema_version": SCHEMA_VERSION,
             **common,
@@ -294,6 +315,7 @@ class _Maker:
             "versions": image.settings["versions"],
             "units": {"length": "mm", "angle": "degrees", "radiance": "mW/(mm^2 sr)"},
             "columns": NUMBER_COLUMNS,
+            "camera": camera_model(self._model.design.camera, rays),
         }
         write_json(self._folder / INFO, info, "the dataset")  # last: now it is a dataset
         return exposure
@@ -314,7 +336,10 @@ class _Maker:
             "points": image.points,
             "normals": image.normals,
         }
-        with written_whole(self._folder / BACKGROUND, "the dataset") as temporary:
+        self._write_arrays(BACKGROUND, arrays)
+
+    def _write_arrays(self, name: str, arrays: dict[str, Any]) -> None:
+        with written_whole(self._folder / name, "the dataset") as temporary:
             _save_arrays(arrays, temporary)
 
     def _common(self) -> dict[str, Any]:
@@ -329,7 +354,7 @@ class _Maker:
             "made_with": {name: made_with[name] for name in ("optisense", "mitsuba")},
             "settings": values,
             "mesh_files": {
-                text: _file_digest(Path(str(indenter.source)))
+                text: file_digest(Path(str(indenter.source)))
                 for text, indenter in self._indenters.items()
                 if hasattr(indenter, "source")
             },
@@ -357,7 +382,12 @@ class _Maker:
             [settings.seed, index, _CAMERA],
         )
         depth = self._untouched.image_depth(image)
-        arrays = {"depth": depth, "normals": image.normals, "mask": image.contact_mask}
+        arrays = {
+            "depth": depth,
+            "normals": image.normals,
+            "mask": image.contact_mask,
+            "points": np.where(np.isnan(depth)[..., None], np.nan, image.points),
+        }
         force = {"force": "", "area": "", "pressure": ""}
         maps = image.skin_maps()
         if maps is not None:
@@ -399,39 +429,16 @@ class _Maker:
                 "attempt": attempt,
                 "arrays": f"arrays/{name}.npz",
                 "radiance": f"radiance/{name}.exr" if settings.radiance else "",
+                "cut": int(is_cut(image.contact_mask)),
+                "split": split_of(
+                    settings.seed,
+                    drawn.indenter,
+                    (drawn.spot[0], drawn.spot[1] * height / width),
+                    settings.hold_out,
+                ),
             }
         )
 
 
 def _save_arrays(arrays: dict[str, Any], path: Path) -> None:
     np.savez_compressed(path, **arrays)
-
-
-def design_values(design: SensorDesign) -> dict[str, Any]:
-    """What makes a design's pictures, without names of files and where numbers come from."""
-    values = design.model_dump(mode="json", exclude={"provenance", "description", "name"})
-    for part in values["parts"].values():
-        part.pop("mesh", None)
-    return values
-
-
-def mesh_digests(design: SensorDesign) -> dict[str, str]:
-    """What tells meshes of the same name apart."""
-    return {
-        name: _digest(mesh.vertices.tobytes(), mesh.faces.tobytes())
-        for name, mesh in design.meshes.items()
-    }
-
-
-def _digest(*contents: bytes) -> str:
-    total = hashlib.sha256()
-    for content in contents:
-        total.update(content)
-    return total.hexdigest()
-
-
-def _file_digest(path: Path) -> str:
-    try:
-        return _digest(path.read_bytes())
-    except OSError as error:
-        raise TaskError(f"can't read the mesh: {error.strerror}", where=str(path)) from error

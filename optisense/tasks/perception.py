@@ -24,7 +24,7 @@ from optisense.objectives.score import json_ready
 from optisense.optics.estimators import RADIANCE_CACHE, current_name
 from optisense.quality import SAMPLE_PHOTONS
 from optisense.reading.camera_noise import MEASURED_NOISE, add_camera_noise
-from optisense.tasks.generation import design_values, mesh_digests
+from optisense.tasks.digests import design_values, mesh_digests
 from optisense.tasks.records import KEPT, CsvTable, read_object, refuse_differences
 from optisense.tasks.regression import FOLDS, ForestReading, read_by_forest
 from optisense.tasks.snr import NEIGHBOURS, signal_to_noise

@@ -16,6 +16,7 @@ from optisense import OpticalModel, SensorDesign, library, load
 from optisense.design import LightGroup
 from optisense.errors import ContactError, OutputError, TaskError
 from optisense.tasks import ContactDraw, Dataset, DatasetSettings, generate
+from optisense.tasks.dataset import LATER_COLUMNS
 
 COUNT = 4
 SETTINGS = DatasetSettings(
@@ -290,3 +291,64 @@ def test_a_dataset_of_a_release_without_margins_goes_on_without_one(
     assert len(generate(mini, tmp_path / "old", 2, settings)) == 2
     with pytest.raises(TaskError, match=r"margin was 0\.0, is 0\.02"):
         generate(mini, tmp_path / "old", 2, replace(settings, contacts=ContactDraw()))
+
+
+def test_samples_tell_their_points_splits_and_whether_they_are_cut(
+    made: Dataset, mini: OpticalModel
+) -> None:
+    """Points are where the rays of the camera meet the pressed skin, deeper by `depth`."""
+    rays, background = made.camera_rays(), made.background()
+    np.testing.assert_allclose(rays["points"], background["points"], atol=1e-4)
+    assert set(made.split("train") + made.split("validation") + made.split("test")) == set(
+        range(COUNT)
+    )
+    for number, sample in enumerate(made):
+        assert sample.points is not None
+        assert sample.labels["cut"] == 0  # the margin keeps contacts from the edge
+        assert number in made.split(sample.labels["split"])
+        away = sample.points[sample.mask] - rays["points"][sample.mask]
+        along = (away * rays["directions"][sample.mask]).sum(axis=1)
+        assert np.linalg.norm(
+            away - along[:, None] * rays["directions"][sample.mask], axis=1
+        ).max() < (0.02)
+        # The skin of a GelSight Mini is flat, and its inward normal is -z.
+        np.testing.assert_allclose(-away[:, 2], sample.depth[sample.mask], atol=2e-3)
+
+
+def test_contacts_that_the_edge_cuts_are_told(mini: OpticalModel, tmp_path: Path) -> None:
+    draw = ContactDraw(("sphere:3",), depth=(0.9, 0.9), margin=0.0)
+    settings = DatasetSettings(draw, resolution=(40, 30), photons=FEW, hold_out=("sphere:3",))
+    found = generate(mini, tmp_path / "cut", 8, settings)
+    cut = [sample.labels["cut"] for sample in found]
+    assert 0 < sum(cut) < len(cut)
+    for sample in found:
+        mask = sample.mask
+        edge = mask[0].any() or mask[-1].any() or mask[:, 0].any() or mask[:, -1].any()
+        assert sample.labels["cut"] == edge
+    assert found.split("test") == list(range(8)) and found.split("train") == []
+    with pytest.raises(TaskError, match="no split 'exam'"):
+        found.split("exam")
+    with pytest.raises(TaskError, match="held out"):
+        DatasetSettings(draw, hold_out=("plane",))
+
+
+def test_a_dataset_of_release_0_1_opens_and_goes_on(mini: OpticalModel, tmp_path: Path) -> None:
+    """It has neither splits nor rays; the rays are written when it goes on."""
+    settings = DatasetSettings(resolution=(60, 45), photons=FEW)
+    folder = generate(mini, tmp_path / "old", 1, settings).folder
+    table = (folder / "metadata.csv").read_text().splitlines()
+    later = [table[0].split(",").index(name) for name in LATER_COLUMNS]
+    kept = [
+        ",".join(cell for number, cell in enumerate(line.split(",")) if number not in later)
+        for line in table
+    ]
+    (folder / "metadata.csv").write_text("\n".join(kept) + "\n")
+    (folder / "camera.npz").unlink()
+    old = Dataset.load(folder)
+    assert old.labels[0]["split"] == "" and old.labels[0]["cut"] == -1
+    with pytest.raises(TaskError, match="has no splits"):
+        old.split("train")
+    with pytest.raises(TaskError, match=r"lacks the file 'camera\.npz'"):
+        old.camera_rays()
+    longer = generate(mini, folder, 2, settings)
+    assert len(longer) == 2 and longer.camera_rays()["points"].shape == (45, 60, 3)

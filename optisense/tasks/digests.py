@@ -1,0 +1,45 @@
+"""What tells designs and meshes apart when a dataset goes on."""
+
+from __future__ import annotations
+
+import hashlib
+from pathlib import Path
+from typing import Any
+
+from optisense.design import SensorDesign
+from optisense.errors import TaskError
+
+
+def design_values(design: SensorDesign) -> dict[str, Any]:
+    """What makes a design's pictures, without names of files and where numbers come from."""
+    values = design.model_dump(mode="json", exclude={"provenance", "description", "name"})
+    for part in values["parts"].values():
+        part.pop("mesh", None)
+    return values
+
+
+def mesh_digests(design: SensorDesign) -> dict[str, str]:
+    """What tells meshes of the same name apart."""
+    return {
+        name: _digest(mesh.vertices.tobytes(), mesh.faces.tobytes())
+        for name, mesh in design.meshes.items()
+    }
+
+
+def _digest(*contents: bytes) -> str:
+    total = hashlib.sha256()
+    for content in contents:
+        total.update(content)
+    return total.hexdigest()
+
+
+def file_digest(path: Path) -> str:
+    """The same of a file.
+
+    Raises:
+        TaskError: it can't be read.
+    """
+    try:
+        return _digest(path.read_bytes())
+    except OSError as error:
+        raise TaskError(f"can't read the mesh: {error.strerror}", where=str(path)) from error

@@ -1,0 +1,43 @@
+"""Which samples of a dataset learn, which choose, and which judge."""
+
+from __future__ import annotations
+
+import hashlib
+import math
+
+TRAIN, VALIDATION, TEST = "train", "validation", "test"
+
+SPLITS = (TRAIN, VALIDATION, TEST)
+
+SHARES = (0.8, 0.1, 0.1)
+"""Parts of all cells that the splits get, as is usual for data of some thousand samples."""
+
+CELLS = 8
+"""Number of cells across the picture, squares; on a GelSight Mini they are 2.3 mm wide, and presses
+of one indenter inside a cell look alike."""
+
+
+def split_of(
+    seed: int, indenter: str, spot: tuple[float, float], hold_out: tuple[str, ...] = ()
+) -> str:
+    """The split of a press.
+
+    The picture is cut into cells, and all presses of an indenter in a cell are in one split; so no
+    press has a near copy of itself in another. The split depends on these arguments only, so more
+    samples change nothing for those that are there.
+
+    Args:
+        seed: of the dataset.
+        indenter: as given.
+        spot: where the picture shows the place, in parts of its width, from the left and from the
+            upper edge.
+        hold_out: indenters that are in the test split only.
+    """
+    if indenter in hold_out:
+        return TEST
+    cell = [math.floor(CELLS * each) for each in spot]
+    name = f"{seed} {indenter} {cell[0]} {cell[1]}"
+    drawn = int.from_bytes(hashlib.sha256(name.encode("utf-8")).digest()[:8], "big") / 2.0**64
+    if drawn < SHARES[0]:
+        return TRAIN
+    return VALIDATION if drawn < SHARES[0] + SHARES[1] else TEST
