@@ -20,6 +20,10 @@ RIM = {0.6: 0.03, 1.0: 0.2}
 """Of the row of pixels around the contact, where skin and flank mirror each other: 0.6 and 6 % with
 many photons; without the lobes of the places seen half of the light is missing at 1."""
 
+RING = 0.04
+"""Of the green light of the skin around the contact, a twentieth of which the contact throws back
+by way of the glass."""
+
 
 @pytest.mark.parametrize("specularity", CONTACT)
 def test_metal_in_a_contact_is_as_bright_as_path_traced(specularity: float) -> None:
@@ -31,3 +35,6 @@ def test_metal_in_a_contact_is_as_bright_as_path_traced(specularity: float) -> N
         truth = np.array(PATH[where][f"{specularity:g}"])
         off = (means(image.radiance, getattr(patches, where)) - truth) / truth.mean(axis=0)
         assert np.sqrt((off**2).mean()) < limits[specularity]
+    if specularity == 1.0:
+        green = image.radiance[patches.skin >= 0].mean(axis=0)[1]
+        assert green == pytest.approx(PATH["ring"]["1"][1], rel=RING)

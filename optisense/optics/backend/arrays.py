@@ -7,7 +7,7 @@ compiled kernels, which could then not be used again.
 from __future__ import annotations
 
 from dataclasses import fields, is_dataclass
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import drjit as dr
 import mitsuba as mi
@@ -25,6 +25,20 @@ def gathered(value: Value, lanes: mi.UInt32) -> Value:
         parts = {each.name: gathered(getattr(value, each.name), lanes) for each in fields(value)}
         return type(value)(**parts)
     return dr.gather(type(value), value, lanes)
+
+
+def joined(first: Value, second: Value) -> Value:
+    """One array after the other, or so each array of two tuples or dataclasses of arrays."""
+    if isinstance(first, tuple) and isinstance(second, tuple):
+        return type(first)(joined(one, other) for one, other in zip(first, second, strict=True))
+    if is_dataclass(first) and not isinstance(first, type):
+        names = [each.name for each in fields(first)]
+        return type(first)(**{n: joined(getattr(first, n), getattr(second, n)) for n in names})
+    if dr.depth_v(first) > 1:
+        one: Any = first
+        other: Any = second
+        return type(first)(*(joined(one[k], other[k]) for k in range(len(one))))
+    return dr.concat((first, second))
 
 
 def floats(values: NDArray[np.floating]) -> mi.Float:

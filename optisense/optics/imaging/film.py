@@ -6,6 +6,7 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
+from scipy import ndimage
 
 from optisense.optics.scene.emitters import Emitter
 from optisense.optics.transport.camera_paths import VisiblePoints
@@ -55,3 +56,33 @@ class Film:
         for layer, total in zip(out, self.sums, strict=True):
             np.multiply(np.asarray(total).reshape(height, width, 3), share, out=layer)
         return out
+
+    def spread_layers(
+        self, width: int, height: int, where: NDArray[np.bool_], reach: int
+    ) -> NDArray[np.float32]:
+        """The same, where ``where`` (h, w) is set averaged over the samples of the pixels around
+        for which it is set, too.
+
+        Args:
+            width: pixels of a row.
+            height: rows.
+            where: which pixels are averaged, with others alone.
+            reach: pixels; half the side of the square over which a triangular kernel averages.
+        """
+        layers = self.layers(width, height)
+        inside = where.astype(np.float32)
+
+        def around(image: NDArray[np.floating]) -> NDArray[np.floating]:
+            for _ in range(2):
+                image = ndimage.uniform_filter(image, reach, mode="constant")
+            return image
+
+        counts = np.asarray(self.counts).reshape(height, width) * inside
+        near = around(counts)
+        share = np.divide(1, near, out=np.zeros_like(near), where=where & (near > 0))
+        for layer in layers:
+            for k in range(3):
+                if layer[..., k].any():
+                    mean = around(layer[..., k] * counts) * share
+                    layer[..., k] = np.where(where, mean, layer[..., k])
+        return layers

@@ -38,7 +38,7 @@ MIN_LANES = 2
 
 
 @dataclass
-class _Seen:
+class PlacesSeen:
     """Places that rays have met.
 
     Attributes:
@@ -87,8 +87,8 @@ def glossily_interreflected(
         seen = _places_seen(scenes, looking)
         if seen is None:
             break
-        looking = _shading_points(field, scenes, seen)
-        light = _light_of(field, scenes, looking)
+        looking = shading_points(field, scenes, seen)
+        light = light_of(field, scenes, looking)
         for total, value in zip(totals, light, strict=True):
             for k in range(3):
                 weighted = value[k] * looking.seen.weight[k]
@@ -101,7 +101,7 @@ def glossily_interreflected(
     ]
 
 
-def _places_seen(scenes: ContactScenes, at: ShadingPoints) -> _Seen | None:
+def _places_seen(scenes: ContactScenes, at: ShadingPoints) -> PlacesSeen | None:
     """The places that one ray from each point meets, drawn from its coating's lobes."""
     assert scenes.indenters is not None
     indenters, fixed, points = scenes.indenters, scenes.fixed, at.seen
@@ -138,7 +138,7 @@ def _places_seen(scenes: ContactScenes, at: ShadingPoints) -> _Seen | None:
         series=next_random(random ^ points.series),
         number=mi.UInt32(points.number),
     )
-    seen = _Seen(found, raised, at.cell)
+    seen = PlacesSeen(found, raised, at.cell)
     dr.eval(seen)
     lanes = dr.compress(valid)
     count = dr.width(lanes)
@@ -146,13 +146,13 @@ def _places_seen(scenes: ContactScenes, at: ShadingPoints) -> _Seen | None:
         return None
     if count < MIN_LANES:
         lanes = dr.repeat(lanes, MIN_LANES)
-    seen = dr.gather(_Seen, seen, lanes)
+    seen = dr.gather(PlacesSeen, seen, lanes)
     if count < MIN_LANES:
         seen.points.valid &= dr.arange(mi.UInt32, MIN_LANES) == 0
     return seen
 
 
-def _shading_points(field: RadianceCache, scenes: ContactScenes, seen: _Seen) -> ShadingPoints:
+def shading_points(field: RadianceCache, scenes: ContactScenes, seen: PlacesSeen) -> ShadingPoints:
     """Where places that are seen read the cache: below them, along the normal of the skin there."""
     points = seen.points
     upright, offset = plane_of(field.cells, seen.near, points.valid)
@@ -172,7 +172,7 @@ def _shading_points(field: RadianceCache, scenes: ContactScenes, seen: _Seen) ->
     )
 
 
-def _light_of(field: RadianceCache, scenes: ContactScenes, at: ShadingPoints) -> list[mi.Color3f]:
+def light_of(field: RadianceCache, scenes: ContactScenes, at: ShadingPoints) -> list[mi.Color3f]:
     """What places send to the points that see them, of the light that comes from afar."""
     sky = occluder_horizon(
         scenes.balls,

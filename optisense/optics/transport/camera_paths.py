@@ -66,7 +66,7 @@ class VisiblePoints(PathEnd):
 
 
 @dr.syntax
-def _follow(
+def follow(
     scene: RayScene, ray: Ray, weight: mi.Color3f, rng: mi.PCG32, path: Path
 ) -> tuple[PathEnd, Ray, mi.Color3f]:
     """Follow paths to their ends.
@@ -162,7 +162,7 @@ def find_visible_points(
     if channel is not None:
         start.channel = dr.opaque(mi.UInt32, channel, dr.width(film))
         weight = mi.Color3f(*(dr.select(start.channel == k, mi.Float(1), 0) for k in range(3)))
-    end, branch, total = _follow(scene, start, weight, _generator(own), Path.CAMERA)
+    end, branch, total = follow(scene, start, weight, generator(own), Path.CAMERA)
     dr.eval(end, branch, total, own, other, series)
     main = VisiblePoints(**vars(end), pixel=pixel, random=own, series=series, number=number)
     if only_main:
@@ -171,11 +171,11 @@ def find_visible_points(
     if dr.width(lanes) == 0:
         return main, None
     other, series, number = (dr.gather(mi.UInt32, each, lanes) for each in (other, series, number))
-    end, _, _ = _follow(
+    end, _, _ = follow(
         scene,
         gathered(branch, lanes),
         dr.gather(mi.Color3f, total, lanes),
-        _generator(other),
+        generator(other),
         Path.REFLECTION,
     )
     dr.eval(end, other, series, number)
@@ -198,7 +198,7 @@ def find_visible_points(
     return main, reflected
 
 
-def _generator(bits: mi.UInt32) -> mi.PCG32:
+def generator(bits: mi.UInt32) -> mi.PCG32:
     """Random numbers that follow from these bits and not from the place in an array."""
     random = mi.PCG32()
     random.seed(mi.UInt64(bits), mi.UInt64(bits))

@@ -1,0 +1,137 @@
+"""Light that contacts throw back to metal coatings by way of the interfaces.
+
+The radiance cache is that of the undeformed skin. A metallic coating mirrors the faces of gel and
+glass in front of it, and these mirror the contacts. So a few rays are drawn from the lobes of each
+visible point and followed as paths from the camera are. Where one ends on an indenter, the light of
+that place takes the place of what the undeformed skin behind it sends, which the cache has.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import drjit as dr
+import mitsuba as mi
+
+from optisense.optics.backend.arrays import gathered, joined
+from optisense.optics.backend.sequences import STEPS_2D, unit_float
+from optisense.optics.radiance_cache.beam_sums import sum_beams
+from optisense.optics.radiance_cache.cache import RadianceCache
+from optisense.optics.radiance_cache.glossy_interreflection import (
+    PlacesSeen,
+    light_of,
+    shading_points,
+)
+from optisense.optics.radiance_cache.shading_points import ShadingPoints, interpolating_cell
+from optisense.optics.scene.bsdf import coating_of, sample_coating, surface_kind, surface_region
+from optisense.optics.scene.contact_scenes import ContactScenes
+from optisense.optics.scene.ray_scene import Ray, leave
+from optisense.optics.scene.surfaces import Region, SurfaceKind
+from optisense.optics.transport.camera_paths import PathEnd, VisiblePoints, follow, generator
+from optisense.optics.transport.interact import Path
+
+MIN_LANES = 2
+"""Fewest places that are shaded at once: Dr.Jit compiles other kernels for single ones."""
+
+
+def thrown_back(
+    field: RadianceCache, scenes: ContactScenes, points: VisiblePoints, rays: int
+) -> tuple[VisiblePoints, list[mi.Color3f]] | None:
+    """What visible points have of the light that indenters throw back.
+
+    Args:
+        field: the radiance cache.
+        scenes: the scenes of the image, with indenters.
+        points: what the camera sees.
+        rays: that go out from each.
+
+    Returns:
+        The places on indenters that rays end on, with pixels and weights of the points that they
+        came from; and by how much these send more than the undeformed skin would, one colour per
+        group (less than none before brighter skin). None where no ray ends on an indenter.
+    """
+    lane = dr.arange(mi.UInt32, dr.width(points.pixel) * rays)
+    points = dr.gather(VisiblePoints, points, lane // rays)
+    points.number = points.number * rays + lane % rays
+    points.weight /= rays
+    found = None
+    for end, owner in _ends(scenes, points):
+        region = surface_region(scenes.full.table, end.surface, end.valid)
+        kept = dr.compress(end.valid & (region >= int(Region.INDENTER)))
+        if dr.width(kept) > 0:
+            some = dr.gather(PathEnd, end, kept), dr.gather(mi.UInt32, owner, kept)
+            dr.eval(some)
+            found = some if found is None else joined(found, some)
+    if found is None:
+        return None
+    end, owner = found
+    alone = dr.width(owner) < MIN_LANES
+    if alone:
+        lanes = dr.repeat(mi.UInt32(0), MIN_LANES)
+        end, owner = dr.gather(PathEnd, end, lanes), dr.gather(mi.UInt32, owner, lanes)
+        end.valid &= dr.arange(mi.UInt32, MIN_LANES) == 0
+    seen = replace(dr.gather(VisiblePoints, points, owner), **vars(end))
+    dr.eval(seen)
+    return seen, _changes(field, scenes, seen)
+
+
+def _ends(scenes: ContactScenes, points: VisiblePoints) -> Iterator[tuple[PathEnd, mi.UInt32]]:
+    """Where rays from points end, and the number of the point of each: first of those that go
+    through interfaces, then of what interfaces reflect of them.
+    """
+    scene = scenes.full
+    coating = coating_of(scene.table, points.surface, points.valid)
+    u = unit_float(points.series * 747796405 + points.number * STEPS_2D[0])
+    v = unit_float(points.series * 2891336453 + points.number * STEPS_2D[1])
+    bits = (points.random ^ (points.number * 0x9E3779B9)) * 277803737
+    way, weight = sample_coating(
+        coating, points.normal, -points.towards_eye, unit_float(bits), mi.Point2f(u, v)
+    )
+    weight *= points.weight
+    looks = points.valid & (dr.dot(way, points.face_normal) > 0) & (dr.max(weight) > 0)
+    ray = Ray(leave(points.point, points.face_normal, way), way, looks)
+    # An indenter that is met before any interface is a matter of interreflection.
+    first = scene.intersect(ray)
+    kind, _, _ = surface_kind(scene.table, first.surface, first.valid)
+    ray.active &= first.valid & (kind == int(SurfaceKind.DIELECTRIC))
+    if scene.absorbing:
+        ray.absorption = mi.Color3f(0) if scenes.absorption is None else scenes.absorption
+    end, branch, rest = follow(scene, ray, weight, generator(bits), Path.CAMERA)
+    number = dr.arange(mi.UInt32, dr.width(points.pixel))
+    dr.eval(end, branch, rest, number, bits)
+    yield end, number
+    lanes = dr.compress(branch.active)
+    if dr.width(lanes) == 0:
+        return
+    again, _, _ = follow(
+        scene,
+        gathered(branch, lanes),
+        dr.gather(mi.Color3f, rest, lanes),
+        generator(dr.gather(mi.UInt32, bits, lanes) * 69069),
+        Path.REFLECTION,
+    )
+    dr.eval(again)
+    yield again, lanes
+
+
+def _changes(field: RadianceCache, scenes: ContactScenes, seen: VisiblePoints) -> list[mi.Color3f]:
+    """What places on indenters send, less what the undeformed skin behind them would."""
+    away = -seen.towards_eye
+    behind = scenes.fixed.intersect(Ray(seen.point, away, seen.valid))
+    base = dr.select(behind.valid, behind.point, seen.point)
+    cell, shift, found = interpolating_cell(field.cells, base, seen.valid, seen.series, seen.number)
+    side = -dr.sign(dr.dot(away, behind.normal))
+    skin = replace(
+        seen,
+        point=base,
+        normal=behind.shading_normal * side,
+        face_normal=behind.normal * side,
+        surface=behind.surface,
+    )
+    coating = coating_of(scenes.full.table, behind.surface, behind.valid)
+    flat = ShadingPoints(skin, coating, base, cell, shift, found & behind.valid, mi.Bool(False))
+    without = sum_beams(field.beams, field.groups, flat)
+    places = PlacesSeen(seen, mi.Bool(seen.valid), cell)
+    lit = light_of(field, scenes, shading_points(field, scenes, places))
+    return [one - other for one, other in zip(lit, without, strict=True)]
