@@ -150,7 +150,8 @@ def _load_with_trimesh(data: bytes, path: Path, suffix: str) -> TriangleMesh:
         raise MeshError(
             f"the mesh file is malformed: {error}", where=str(path), hint="export it again"
         ) from error
-    return mesh.welded() if suffix == ".stl" and np.isfinite(mesh.vertices).all() else mesh
+    near = bool((np.abs(mesh.vertices) <= FARTHEST).all())  # others are refused, with their place
+    return mesh.welded() if suffix == ".stl" and near else mesh
 
 
 def _parse_plain_obj(data: bytes) -> TriangleMesh | None:

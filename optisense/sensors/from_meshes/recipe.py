@@ -31,6 +31,10 @@ from optisense.sensors.from_meshes.recipe_parts import PartChoice, ShapeReferenc
 
 Pixels = Annotated[Count, Field(le=65_536)]
 
+SMALLEST_FOV = 0.1
+"""Degrees: of a camera whose place is to be found; one of a smaller field of view would stand half
+a kilometre away from the skin."""
+
 
 class CameraChoice(Model):
     """The camera and where it is."""
@@ -46,7 +50,7 @@ class CameraChoice(Model):
     )
     direction: Way | None = Field(default=None, description="where it looks, instead of look_at")
     up: Way | None = Field(default=None, description="upward in the picture")
-    fov: Annotated[Number, Field(gt=0.0, le=360.0)] | None = Field(
+    fov: Annotated[Number, Field(ge=SMALLEST_FOV, le=360.0)] | None = Field(
         default=None, description="degrees across the width, if not the library's"
     )
     resolution: tuple[Pixels, Pixels] | None = Field(
