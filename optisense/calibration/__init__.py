@@ -1,4 +1,4 @@
-"""A design beside photographs of the real sensor: how far the two differ.
+"""A design beside photographs of the real sensor: how far the two differ, and fits of the design.
 
 Names load on first use, so that importing the package loads neither SciPy nor the renderer.
 """
@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 from optisense.lazy_names import load_on_first_use
 
 if TYPE_CHECKING:
+    from optisense.calibration.calibrating import Calibration, CalibrationSettings, calibrate
     from optisense.calibration.comparing import Comparison, compare
     from optisense.calibration.layouts import read_photographs
     from optisense.calibration.photographs import PhotographedPress, Photographs
@@ -17,10 +18,13 @@ if TYPE_CHECKING:
     from optisense.calibration.staging import photograph_model, save_photographs
 
 _HOMES = {
+    "Calibration": ".calibrating",
+    "CalibrationSettings": ".calibrating",
     "Comparison": ".comparing",
     "PhotographedPress": ".photographs",
     "Photographs": ".photographs",
     "Realism": ".realism",
+    "calibrate": ".calibrating",
     "compare": ".comparing",
     "photograph_model": ".staging",
     "read_photographs": ".layouts",
@@ -28,10 +32,13 @@ _HOMES = {
 }
 
 __all__ = [
+    "Calibration",
+    "CalibrationSettings",
     "Comparison",
     "PhotographedPress",
     "Photographs",
     "Realism",
+    "calibrate",
     "compare",
     "photograph_model",
     "read_photographs",

@@ -24,6 +24,7 @@ _HOMES = {
     "tolerance": "tolerance",
     "ledger": "ledger",
     "compare": "compare",
+    "calibrate": "calibrate",
     "export": "export",
     "studio": "studio",
     "engine": "engine",

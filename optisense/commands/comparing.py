@@ -32,3 +32,23 @@ class CompareOptions(PhotographOptions):
 
     photons: Photons = Field(PICTURE_PHOTONS, description="Photons to trace for the pictures.")
     seed: Seed = Field(0, description="The same seed gives the same light.")
+
+
+class CalibrateOptions(PhotographOptions):
+    """What of a design is fitted to photographs, and how."""
+
+    keep: Annotated[list[str], Written("NAME")] = Field(
+        [],
+        description="What stays as it is: powers, colours, tone, black, shading or view. May be "
+        "given several times.",
+    )
+    fit: Annotated[list[str], Written("PATH=LO:HI")] = Field(
+        [],
+        description="A further number of the design that may change, and its range. May be given "
+        "several times.",
+    )
+    rounds: Annotated[int, Ge(1), Le(20), Written("N")] = Field(
+        3, description="Rounds of rendering and fitting."
+    )
+    photons: Photons = Field(300_000, description="Photons to trace for each round.")
+    seed: Seed = Field(0, description="The same seed gives the same light.")

@@ -41,6 +41,8 @@ class Status(StrEnum):
     """How far a number can be trusted."""
 
     MEASURED = "measured"
+    CALIBRATED = "calibrated"
+    """Fitted to photographs of a real sensor."""
     DATASHEET = "datasheet"
     SOURCED = "sourced"
     DERIVED = "derived"

@@ -56,6 +56,7 @@ def gelsight_mini(
     tray_size: tuple[Positive, Positive] = (28.23, 23.73),
     tray_thickness: Positive = 1.0,
     guide_thickness: Positive = 4.0,
+    guide_size: tuple[Positive, Positive] | None = None,
     pupil_distance: Positive = 17.0,
     view_width: float = 18.6,
     fov: float | None = None,
@@ -74,7 +75,8 @@ def gelsight_mini(
         gel_thickness: mm.
         tray_size: mm, along x and y, of the rigid plate the gel is cast on.
         tray_thickness: mm.
-        guide_thickness: mm, of the side-lit acrylic block under the tray (as large as the gel).
+        guide_thickness: mm, of the side-lit acrylic block under the tray.
+        guide_size: mm, along x and y, of this block; as large as the gel if None.
         pupil_distance: mm, from the back of the tray to the camera's entrance pupil.
         view_width: mm, what the image width shows of the flat gel.
         fov: degrees, across the image width; None derives it from view_width.
@@ -96,7 +98,8 @@ def gelsight_mini(
     guide_top = tray_top - tray_thickness
     guide_bottom = guide_top - guide_thickness
     lamp_z = 0.5 * (guide_top + guide_bottom)
-    half_x, half_y = 0.5 * gel_size[0], 0.5 * gel_size[1]
+    guide = gel_size if guide_size is None else guide_size
+    half_x, half_y = 0.5 * guide[0], 0.5 * guide[1]
 
     support, gel_index = library.material(GUIDE), library.material(GEL)
     layers = [
@@ -139,7 +142,7 @@ def gelsight_mini(
         skin=_top(gel),
         gel=gel,
         tray=_plate(tray_size, guide_top, tray_top),
-        guide=_plate(gel_size, guide_bottom, guide_top),
+        guide=_plate(guide, guide_bottom, guide_top),
     )
     design.cages = {"skin": Cage.around(["skin", "gel"], gel.bounds)}
     describe_changes(design, gelsight_mini, given)

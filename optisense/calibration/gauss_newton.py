@@ -1,0 +1,317 @@
+"""The fit of a layered model to photographs by damped Gauss-Newton steps.
+
+The residuals are those of the background, over its own usual error, and of each press's response
+near its contact, over that of all responses; both are taken anew before each round. So the
+background, which differs more, does not outweigh the contacts. Priors of the plausible ranges are
+added. Huber's weights keep dust and scratches from counting.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from optisense.calibration.layered_pictures import LayeredPictures, contact_slopes
+from optisense.calibration.model_pictures import SeenContact, levels_of
+from optisense.calibration.photographs import Photographs
+from optisense.calibration.quantities import FitQuantity, chain_with, power_factors
+from optisense.calibration.realism import distances
+
+FloatArray = NDArray[np.float64]
+
+NEAR = 2.2
+"""Radii of a contact within which its response counts; beyond, there is noise."""
+
+LEAST_ERROR = 2.0
+"""Levels, at least, of the error that residuals are divided by: the noise of a photograph."""
+
+INDEPENDENT = 36.0
+"""Pixels of a photograph for which there is one independent error: what a model gets wrong, it gets
+wrong over some six pixels each way."""
+
+HUBER = 2.0
+"""Errors, in their root mean square, beyond which residuals count in proportion instead of by their
+square (Huber 1964)."""
+
+TO_DEVIATION = 1.4826
+"""Standard deviation of a normal distribution over the median of its absolute values."""
+
+STEP = 0.02
+"""Plausible ranges by which a number is moved for its difference quotient."""
+
+CONTACT_SPREAD = (2.0, 2.0, 0.1)
+"""Plausible ranges of a contact's column and row, pixels at a width of 320, and of the logarithm of
+its radius: what hand labels are off by."""
+
+TILE = 16
+"""Pixels of the side of tiles whose errors are taken to be independent of each other's when
+uncertainties are worked out."""
+
+MOST_STEPS = 20
+"""Damped steps of one descent, at most; several times what a fit needs."""
+
+SMALL_GAIN = 0.02
+"""Fall of the sum of squares below which a descent ends. Numbers that are off by their uncertainty
+add 1."""
+
+LARGEST_STEP = 1.0
+"""Plausible ranges that a number moves in one step, at most: the model is nearly linear there."""
+
+TRUST = 2.5
+"""Plausible ranges up to which layers are extrapolated by their difference quotients."""
+
+
+@dataclass(frozen=True)
+class Solution:
+    """What a round of the fit found.
+
+    Attributes:
+        steps: (n,) of the quantities, in plausible ranges from their starts.
+        contacts: (presses, 3) column and row, pixels, and logarithm of the radius, from where they
+            were.
+        covariance: (n, n) of the steps: that of the posterior, with one independent error for 36
+            pixels, and that of errors which agree within tiles.
+        errors: root mean square error of the background and of the responses, levels.
+        outlying: root mean square error of each press's response, levels.
+    """
+
+    steps: FloatArray
+    contacts: FloatArray
+    covariance: FloatArray
+    errors: tuple[float, float]
+    outlying: FloatArray
+
+
+class LayeredFit:
+    """Photographs, and the layers of a model with their slopes."""
+
+    def __init__(
+        self,
+        photographs: Photographs,
+        seen: Sequence[SeenContact],
+        layers: LayeredPictures,
+        chosen: Sequence[FitQuantity],
+        exposure: float,
+        start: FloatArray,
+        slopes: dict[int, list[NDArray[np.float32]]],
+    ) -> None:
+        """Prepare a round.
+
+        Args:
+            photographs: to come close to.
+            seen: where they show their contacts.
+            layers: of the model at `start`.
+            chosen: the quantities.
+            exposure: factor on the radiance.
+            start: (n,) steps of the quantities at which the layers were rendered.
+            slopes: of quantities that need a rendering, by index: how the layers of the background
+                and of each press change for one plausible range.
+        """
+        self._layers, self._chosen, self._exposure = layers, list(chosen), exposure
+        self._start, self._slopes = start, slopes
+        self._real = photographs.background.astype(np.float64)
+        self._responses = [p.picture.astype(np.float64) - self._real for p in photographs.presses]
+        shape = self._real.shape[:2]
+        self._masks = [distances(shape, place) <= NEAR for place in seen]
+        scale = shape[1] / 320.0
+        self._contact_spread = np.array(CONTACT_SPREAD) * (scale, scale, 1.0)
+        self._contact_slopes = [
+            contact_slopes(layers, index, place) for index, place in enumerate(seen)
+        ]
+        rows, columns = np.mgrid[: shape[0], : shape[1]] // TILE
+        self._tiles = rows * (shape[1] // TILE + 1) + columns
+
+    @property
+    def count(self) -> int:
+        """Number of quantities."""
+        return len(self._chosen)
+
+    def pictures(self, steps: FloatArray, contacts: FloatArray) -> list[FloatArray]:
+        """Levels of the background and of each press."""
+        return [self._shown(-1, steps, None)] + [
+            self._shown(index, steps, contacts[index]) for index in range(len(self._masks))
+        ]
+
+    def _shown(self, index: int, steps: FloatArray, contact: FloatArray | None) -> FloatArray:
+        """Levels of a press, or of the background (index -1)."""
+        layers = self._layers.background if index < 0 else self._layers.presses[index]
+        moved = layers
+        for number, slopes in self._slopes.items():
+            off = float(np.clip(steps[number] - self._start[number], -TRUST, TRUST))
+            if off:
+                moved = moved + off * slopes[index + 1]
+        if contact is not None and index >= 0:
+            for amount, slope in zip(contact, self._contact_slopes[index], strict=True):
+                if amount:
+                    moved = moved + np.float32(amount) * slope
+        factors = power_factors(self._layers.groups, self._chosen, steps)
+        radiance = np.tensordot(factors.astype(np.float32), moved, axes=1)
+        chain = chain_with(self._layers.chain, self._chosen, steps)
+        return levels_of(np.maximum(radiance, 0.0), chain, self._exposure)
+
+    def solve(
+        self,
+        steps: FloatArray,
+        contacts: FloatArray,
+        progress: Callable[[], None] = lambda: None,
+    ) -> Solution:
+        """Damped Gauss-Newton steps until the sum of squares falls no more."""
+        steps, contacts, pictures, _ = self._descend(steps, contacts, progress)
+        # The errors are smaller now, and with them what residuals are divided by.
+        steps, contacts, pictures, scales = self._descend(steps, contacts, progress)
+        matrix, _, tiles = self._normal(pictures, steps, contacts, scales)
+        inverse = np.linalg.inv(matrix)
+        # What noise and priors leave open, and what errors that agree within tiles add.
+        spread = np.asarray(inverse + inverse @ tiles @ inverse, dtype=np.float64)
+        return Solution(
+            steps,
+            contacts,
+            spread[: self.count, : self.count],
+            self._errors(pictures),
+            self._press_errors(pictures),
+        )
+
+    def _descend(
+        self, steps: FloatArray, contacts: FloatArray, progress: Callable[[], None]
+    ) -> tuple[FloatArray, FloatArray, list[FloatArray], tuple[float, float]]:
+        """Steps, contacts, their pictures and the scales of the residuals at the least cost."""
+        pictures = self.pictures(steps, contacts)
+        scales = self._scales(pictures)
+        cost = self._cost(pictures, steps, contacts, scales)
+        damping = 1e-3
+        for _ in range(MOST_STEPS):
+            progress()
+            matrix, gradient, _ = self._normal(pictures, steps, contacts, scales)
+            fell = False
+            for _ in range(6):
+                damped = matrix + damping * np.diag(np.diag(matrix))
+                move = -np.linalg.solve(damped, gradient)
+                move *= min(1.0, LARGEST_STEP / max(float(np.abs(move).max()), 1e-12))
+                new_steps = steps + move[: self.count]
+                new_contacts = contacts + move[self.count :].reshape(-1, 3) * self._contact_spread
+                shown = self.pictures(new_steps, new_contacts)
+                new_cost = self._cost(shown, new_steps, new_contacts, scales)
+                if new_cost < cost:
+                    fell = True
+                    damping = max(0.3 * damping, 1e-9)
+                    break
+                damping = 10.0 * max(damping, 1e-6)
+            if not fell:
+                break
+            gain = cost - new_cost
+            steps, contacts, pictures, cost = new_steps, new_contacts, shown, new_cost
+            if gain < SMALL_GAIN:
+                break
+        return steps, contacts, pictures, scales
+
+    def _errors(self, pictures: list[FloatArray]) -> tuple[float, float]:
+        ground = float(np.sqrt(((pictures[0] - self._real) ** 2).mean()))
+        pressed = self._press_errors(pictures)
+        return ground, float(np.sqrt((pressed**2).mean()))
+
+    def _press_errors(self, pictures: list[FloatArray]) -> FloatArray:
+        return np.array(
+            [
+                np.sqrt(((shown - pictures[0] - real)[mask] ** 2).mean())
+                for shown, real, mask in zip(
+                    pictures[1:], self._responses, self._masks, strict=True
+                )
+            ]
+        )
+
+    def _scales(self, pictures: list[FloatArray]) -> tuple[float, float]:
+        """The usual error of the background and of responses, which dust does not change."""
+        ground = pictures[0] - self._real
+        pressed = [
+            (shown - pictures[0] - real)[mask].ravel()
+            for shown, real, mask in zip(pictures[1:], self._responses, self._masks, strict=True)
+        ]
+        return (
+            max(TO_DEVIATION * float(np.median(np.abs(ground))), LEAST_ERROR),
+            max(TO_DEVIATION * float(np.median(np.abs(np.concatenate(pressed)))), LEAST_ERROR),
+        )
+
+    def _residuals(
+        self, pictures: list[FloatArray], index: int, scales: tuple[float, float]
+    ) -> FloatArray:
+        """(k, 3) of the background (index -1), or of a press's pixels near its contact."""
+        if index < 0:
+            return ((pictures[0] - self._real) / scales[0]).reshape(-1, 3)
+        error = pictures[index + 1] - pictures[0] - self._responses[index]
+        return np.asarray(error[self._masks[index]] / scales[1])
+
+    def _cost(
+        self,
+        pictures: list[FloatArray],
+        steps: FloatArray,
+        contacts: FloatArray,
+        scales: tuple[float, float],
+    ) -> float:
+        total = float((steps**2).sum() + ((contacts / self._contact_spread) ** 2).sum())
+        for index in range(-1, len(self._masks)):
+            size = np.abs(self._residuals(pictures, index, scales))
+            loss = np.where(size < HUBER, size**2, HUBER * (2.0 * size - HUBER))
+            total += float(loss.sum()) / INDEPENDENT
+        return total
+
+    def _normal(
+        self,
+        pictures: list[FloatArray],
+        steps: FloatArray,
+        contacts: FloatArray,
+        scales: tuple[float, float],
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Matrix and gradient of the normal equations, and the spread of the tiles' gradients."""
+        n, count = self.count, len(self._masks)
+        size = n + 3 * count
+        matrix, tiles = np.zeros((size, size)), np.zeros((size, size))
+        gradient = np.zeros(size)
+        moved = [self._moved(pictures, steps, contacts, k) for k in range(n)]
+        for index in range(-1, count):
+            residual = self._residuals(pictures, index, scales)
+            columns = list(range(n))
+            if not columns and index < 0:
+                continue
+            slopes = [(self._residuals(m, index, scales) - residual) / STEP for m in moved]
+            if index >= 0:
+                columns += range(n + 3 * index, n + 3 * index + 3)
+                slopes += [
+                    (self._residuals(m, index, scales) - residual) / STEP
+                    for m in self._contact_moved(pictures, steps, contacts, index)
+                ]
+            jacobian = np.stack(slopes, axis=-1)  # (k, 3, columns)
+            weight = np.minimum(1.0, HUBER / np.maximum(np.abs(residual), 1e-12)) / INDEPENDENT
+            flat = jacobian.reshape(-1, len(columns))
+            weighted = flat * weight.reshape(-1, 1)
+            place = np.ix_(columns, columns)
+            matrix[place] += weighted.T @ flat
+            scores = (jacobian * (weight * residual)[..., None]).sum(axis=1)
+            gradient[columns] += scores.sum(axis=0)
+            where = self._tiles.ravel() if index < 0 else self._tiles[self._masks[index]]
+            sums = np.zeros((int(self._tiles.max()) + 1, len(columns)))
+            np.add.at(sums, where, scores)
+            tiles[place] += sums.T @ sums
+        prior = np.concatenate([steps, (contacts / self._contact_spread).ravel()])
+        return matrix + np.eye(size), gradient + prior, tiles
+
+    def _moved(
+        self, pictures: list[FloatArray], steps: FloatArray, contacts: FloatArray, number: int
+    ) -> list[FloatArray]:
+        other = steps.copy()
+        other[number] += STEP
+        return self.pictures(other, contacts)
+
+    def _contact_moved(
+        self, pictures: list[FloatArray], steps: FloatArray, contacts: FloatArray, index: int
+    ) -> list[list[FloatArray]]:
+        found = []
+        for axis in range(3):
+            other = contacts[index].copy()
+            other[axis] += STEP * self._contact_spread[axis]
+            changed = list(pictures)
+            changed[index + 1] = self._shown(index, steps, other)
+            found.append(changed)
+        return found

@@ -1,0 +1,135 @@
+"""``optisense calibrate``: a design that is fitted to photographs of the real sensor."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from optisense.cli.compare import PhotosArgument
+from optisense.cli.console import ends_well, messages, output, table_of
+from optisense.cli.options import DesignArgument, VariantOption
+from optisense.cli.output_folder import take_folder
+from optisense.cli.progress import progress_line
+from optisense.commands.comparing import CalibrateOptions
+from optisense.time_left import TimedStep
+from optisense.writing import write_json
+
+if TYPE_CHECKING:
+    from optisense.calibration.calibrating import Calibration
+    from optisense.calibration.realism import Realism
+
+LOADING, FITTING = "loading", "fitting"
+"""Steps of the progress line."""
+
+JSON_FILE, PAGE_FILE = "calibration.json", "calibration.html"
+
+
+@ends_well
+def calibrate(
+    design: DesignArgument,
+    photos: PhotosArgument,
+    out: Annotated[
+        Path, typer.Option("--out", "-o", metavar="DIR", help="Folder for the fitted design.")
+    ],
+    *,
+    options: CalibrateOptions,
+    variant: VariantOption = "auto",
+) -> None:
+    """Fit a design to photographs of the real sensor.
+
+    Writes the fitted design, calibration.json and calibration.html into the folder. Every third
+    press is held out of the fit and only judged.
+    """
+    with progress_line(TimedStep(LOADING, 1, 3.0), TimedStep(FITTING, 20, 100.0)) as line:
+        line.begin(LOADING)
+        from optisense.calibration import read_photographs
+        from optisense.calibration.calibrating import CalibrationSettings
+        from optisense.calibration.calibrating import calibrate as fit_design
+        from optisense.calibration.quantities import FAMILIES
+        from optisense.report.calibration import write_calibration
+        from optisense.sensors import load, save_design
+
+        unknown = [name for name in options.keep if name not in FAMILIES]
+        if unknown:
+            raise typer.BadParameter(
+                f"'{unknown[0]}' is none of " + ", ".join(FAMILIES), param_hint="--keep"
+            )
+        asked = tuple(_asked(text) for text in options.fit)
+        sensor = load(design)
+        photographs = read_photographs(photos, options.ball)
+        take_folder(out)
+        line.begin(FITTING)
+
+        def told(what: str, done: int, count: int) -> None:
+            line.time_left.expect(FITTING, count=count)
+            line.time_left.advance(done)
+            line.say(what, done, count)
+
+        found = fit_design(
+            sensor,
+            photographs,
+            CalibrationSettings(
+                families=tuple(name for name in FAMILIES if name not in options.keep),
+                asked=asked,
+                rounds=options.rounds,
+                photons=options.photons,
+                seed=options.seed,
+                refine=not options.as_labelled,
+            ),
+            variant=variant,
+            progress=told,
+        )
+        save_design(found.design, out)
+        write_json(out / JSON_FILE, found.as_data())
+        write_calibration(out / PAGE_FILE, found)
+    for note in (*found.before.notes, *found.notes):
+        messages.print(f"note: {note}", markup=False)
+    print_calibration(found)
+    output.print(f"design: {out}", markup=False)
+    output.print(f"page:   {out / PAGE_FILE}", markup=False)
+
+
+def print_calibration(found: Calibration) -> None:
+    """What was fitted, and how far the design is from the photographs before and after."""
+    table = table_of("fitted", "before", "after", "±", "")
+    for each in found.numbers:
+        table.add_row(
+            each.words,
+            f"{each.before:.4g}",
+            f"{each.after:.4g}",
+            f"{each.uncertainty:.2g}",
+            each.unit if each.determined else f"{each.unit} (not determined)".strip(),
+        )
+    output.print(table)
+    for one, other, value in found.alike:
+        output.print(
+            f"hardly told apart: {one}, and {other} (correlation {value:.2f})", style="dim"
+        )
+    held = bool(found.held_out)
+    what = "presses held out" if held else "fitted presses"
+    table = table_of(what, "unexplained", "contact", "ring", "similarity", "background (dB)")
+    for name, side in (("before", found.before), ("after", found.after)):
+        chosen = found.of_presses(side.realism, held_out=held)
+        table.add_row(name, *_figures(chosen))
+    output.print(table)
+    output.print(f"exposure of the photographs: {found.exposure:.4g}")
+
+
+def _figures(found: Realism) -> list[str]:
+    names = ("unexplained", "contact", "ring", "similarity")
+    return [*(f"{found.median(name):.3f}" for name in names), f"{found.background.ratio:.1f}"]
+
+
+def _asked(text: str) -> tuple[str, float, float]:
+    path, equals, given = text.partition("=")
+    low, colon, high = given.partition(":")
+    try:
+        if not (equals and colon and path.strip()):
+            raise ValueError
+        return path.strip(), float(low), float(high)
+    except ValueError:
+        raise typer.BadParameter(
+            f"'{text}' is not PATH=LO:HI, such as camera.fov=45:60", param_hint="--fit"
+        ) from None

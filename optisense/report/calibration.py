@@ -1,0 +1,111 @@
+"""The page of a calibration: the design before and after, beside photographs."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from optisense.calibration.calibrating import Calibration
+from optisense.calibration.realism import PATCH, Realism
+from optisense.report.comparison import (
+    CONTRAST,
+    background_pictures,
+    channel_rows,
+    press_row,
+    press_section,
+)
+from optisense.report.files import page
+from optisense.writing import write_text
+
+FIGURES = {
+    "unexplained": "unexplained, patch of 1.35 radii",
+    "contact": "error over response, contact",
+    "ring": "error over response, ring",
+    "similarity": "similarity of the responses",
+    "far": "far field, levels",
+}
+"""Figures of presses whose medians the page shows, and in words."""
+
+
+def write_calibration(path: str | Path, found: Calibration) -> Path:
+    """Write a calibration as one self-contained HTML page.
+
+    Raises:
+        OutputError: the file can't be written.
+    """
+    write_text(Path(path), render_calibration(found))
+    return Path(path)
+
+
+def render_calibration(found: Calibration) -> str:
+    """The page of `write_calibration` as text."""
+    before, after = found.before, found.after
+    count = len(after.realism.presses)
+    return page(
+        "calibration",
+        title=found.design.name,
+        description=found.design.description,
+        headline=[
+            ("presses", str(count)),
+            ("held out", str(len(found.held_out))),
+            ("exposure", f"{found.exposure:.4g}"),
+        ],
+        notes=list(found.notes),
+        numbers=[
+            (
+                each.words,
+                f"{each.before:.4g}",
+                f"{each.after:.4g}",
+                f"{each.uncertainty:.2g}",
+                each.unit,
+                each.determined,
+            )
+            for each in found.numbers
+        ],
+        alike=[(one, other, f"{value:.2f}") for one, other, value in found.alike],
+        summary=summary_rows(found),
+        held_out=list(found.held_out),
+        sides=[
+            {
+                "name": name,
+                "background": background_pictures(side),
+                "channels": channel_rows(side),
+                "ratio": f"{side.realism.background.ratio:.1f}",
+            }
+            for name, side in (("Before", before), ("After", after))
+        ],
+        rows=[
+            (*press_row(press), "held out" if press.name in found.held_out else "fitted")
+            for press in after.realism.presses
+        ],
+        presses=[
+            {
+                "name": after.photographs.presses[index].name,
+                "held_out": after.photographs.presses[index].name in found.held_out,
+                "before": press_section(before, index),
+                "after": press_section(after, index),
+            }
+            for index in range(count)
+        ],
+        contrast=f"{CONTRAST:g}",
+        patch=f"{PATCH:g}",
+    )
+
+
+def summary_rows(found: Calibration) -> list[tuple[str, ...]]:
+    """Medians before and after, of the presses that were fitted and of those held out."""
+
+    def sides(held_out: bool) -> list[Realism | None]:
+        each = [
+            found.of_presses(side.realism, held_out=held_out)
+            for side in (found.before, found.after)
+        ]
+        return [side if side.presses else None for side in each]
+
+    columns = [*sides(False), *sides(True)]
+    rows = [
+        (words, *("" if each is None else f"{each.median(name):.3f}" for each in columns))
+        for name, words in FIGURES.items()
+    ]
+    ratios = [side.realism.background.ratio for side in (found.before, found.after)]
+    rows.append(("background, dB", *(f"{ratio:.1f}" for ratio in ratios), "", ""))
+    return rows

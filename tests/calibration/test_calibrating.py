@@ -1,0 +1,182 @@
+"""A fit finds the numbers that photographs were made with, and says what they do not tell."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+import optisense as ots
+from optisense.calibration import Photographs, save_photographs
+from optisense.calibration.calibrating import CalibrationSettings, calibrate
+from optisense.calibration.gauss_newton import LayeredFit
+from optisense.calibration.layered_pictures import LayeredPictures, layered_pictures
+from optisense.calibration.model_pictures import SeenContact, seen_contacts
+from optisense.calibration.quantities import designed, quantities_of
+from optisense.calibration.realism import distances
+from optisense.cli import app
+from optisense.design import Status, get_value, set_value
+from optisense.errors import CalibrationError
+
+from .conftest import PHOTONS
+
+if TYPE_CHECKING:
+    from optisense.optics import OpticalModel
+
+CHEAP = ("powers", "colours", "tone", "black", "shading")
+"""What is fitted without a rendering."""
+
+HIDDEN = {
+    "lights.red.flux": 1.5,
+    "lights.blue.flux": 3.2,
+    "camera.colour_matrix[0][2]": -0.3,
+    "camera.colour_matrix[1][0]": 0.15,
+    "camera.tone_curve.gamma": 1.5,
+    "camera.black_level.level": 0.06,
+    "camera.shading.falloff": 0.35,
+}
+"""Numbers of the sensor that is photographed; the others are those of the start."""
+
+
+@pytest.fixture(scope="module")
+def seen(photographs: Photographs) -> list[SeenContact]:
+    found = [place for place in seen_contacts(photographs) if place is not None]
+    assert len(found) == len(photographs.presses)
+    return found
+
+
+@pytest.fixture(scope="module")
+def layers(
+    mini: OpticalModel, photographs: Photographs, seen: list[SeenContact]
+) -> LayeredPictures:
+    return layered_pictures(mini, photographs, seen, PHOTONS, 5)
+
+
+def hidden_steps(chosen: list) -> np.ndarray:  # type: ignore[type-arg]
+    """How far the hidden numbers are from the starts, in plausible ranges."""
+    found = []
+    for each in chosen:
+        value = HIDDEN.get(each.path, each.start)
+        off = np.log(value / each.start) if each.logarithmic else value - each.start
+        found.append(off / each.spread)
+    return np.array(found)
+
+
+def test_hidden_numbers_are_found_within_their_uncertainties(
+    photographs: Photographs, seen: list[SeenContact], layers: LayeredPictures
+) -> None:
+    chosen = quantities_of(ots.load("gelsight-mini"), CHEAP)
+    exposure = 250.0
+    still = np.zeros((len(seen), 3))
+    start = np.zeros(len(chosen))
+    truth = hidden_steps(chosen)
+    made = LayeredFit(photographs, seen, layers, chosen, exposure, start, {})
+    moved = np.tile([0.6, -0.4, 0.05], (len(seen), 1))
+    rng = np.random.default_rng(1)
+    pictures = []
+    for levels in made.pictures(truth, moved):
+        noisy = levels + 2.0 * rng.standard_normal(levels.shape)
+        noisy[30:33, 20:24] = 230.0  # dust
+        pictures.append(np.clip(np.round(noisy), 0, 255).astype(np.uint8))
+    presses = [
+        replace(press, picture=picture)
+        for press, picture in zip(photographs.presses, pictures[1:], strict=True)
+    ]
+    real = replace(photographs, background=pictures[0], presses=tuple(presses))
+    fit = LayeredFit(real, seen, layers, chosen, exposure, start, {})
+    found = fit.solve(start, still)
+    deviations = np.sqrt(np.diag(found.covariance))
+    assert np.abs(found.steps - truth).max() < 0.15  # of a range of two to each side: below 5 %
+    assert (np.abs(found.steps - truth) < 3.0 * deviations).all(), (found.steps - truth, deviations)
+    assert np.abs(found.contacts - moved).max() < 0.2
+    assert found.errors[1] < 3.5
+
+
+def test_what_a_change_of_contact_does_is_known_without_rendering(
+    mini: OpticalModel, photographs: Photographs, seen: list[SeenContact], layers: LayeredPictures
+) -> None:
+    fit = LayeredFit(photographs, seen, layers, [], 250.0, np.zeros(0), {})
+    moved = [
+        SeenContact((place.centre[0] + 1.0, place.centre[1] - 0.5), place.radius * 1.08)
+        for place in seen
+    ]
+    other = layered_pictures(mini, photographs, moved, PHOTONS, 5)
+    again = LayeredFit(photographs, moved, other, [], 250.0, np.zeros(0), {})
+    none = np.zeros(0)
+    amount = np.tile([1.0, -0.5, np.log(1.08)], (len(seen), 1))
+    rough = fit.pictures(none, amount)
+    still = fit.pictures(none, 0.0 * amount)
+    exact = again.pictures(none, 0.0 * amount)
+    for index, place in enumerate(seen, start=1):
+        near = distances(photographs.background.shape, place) <= 1.6
+        change = ((exact[index] - still[index])[near] ** 2).sum()
+        assert ((rough[index] - exact[index])[near] ** 2).sum() < 0.5 * change
+
+
+def test_fitted_numbers_become_a_design() -> None:
+    design = ots.load("gelsight-mini")
+    chosen = quantities_of(design, [*CHEAP, "view"], [("coating.specularity", 0.0, 0.4)])
+    steps = np.linspace(-0.5, 0.5, len(chosen))
+    made = designed(design, chosen, steps)
+    for each, step in zip(chosen, steps, strict=True):
+        if not each.path.startswith("camera.across."):
+            assert get_value(made, each.path) == pytest.approx(each.value(float(step)))
+    right, up, ahead = design.camera.axes()
+    moved = np.array(made.camera.position) - design.camera.position
+    assert abs(moved @ ahead) < 1e-9
+    assert moved @ right == pytest.approx(chosen[-3].value(float(steps[-3])))
+    assert moved @ up == pytest.approx(chosen[-2].value(float(steps[-2])))
+    assert design.camera.tone_curve is None
+
+
+@pytest.mark.parametrize(
+    ("families", "asked", "words"),
+    [
+        (["colors"], [], "nothing called 'colors'"),
+        ([], [("camera.fov", 60.0, 70.0)], "does not hold its value"),
+        (["view"], [("camera.fov", 20.0, 70.0)], "fitted twice"),
+        ([], [("camera.projection", 0.0, 1.0)], "is no number"),
+    ],
+)
+def test_what_makes_no_sense_is_refused(
+    families: list[str], asked: list[tuple[str, float, float]], words: str
+) -> None:
+    with pytest.raises(CalibrationError, match=words):
+        quantities_of(ots.load("gelsight-mini"), families, asked)
+
+
+def test_too_few_photographs_are_refused_before_the_work(photographs: Photographs) -> None:
+    with pytest.raises(CalibrationError, match="1 press is too few"):
+        calibrate(ots.load("gelsight-mini"), photographs.subset([0]))
+
+
+def test_a_design_is_fitted_and_marked(photographs: Photographs, tmp_path: Path) -> None:
+    save_photographs(tmp_path / "photos", photographs)
+    design = ots.load("gelsight-mini")
+    start = set_value(design, "lights.red.flux", 0.5 * design.lights["red"].flux)
+    ots.save_design(start, tmp_path / "start")
+    run = CliRunner().invoke(
+        app,
+        ["calibrate", str(tmp_path / "start"), str(tmp_path / "photos"), "--rounds", "1"]
+        + ["--keep", "view", "--keep", "tone", "--keep", "black", "--keep", "shading"]
+        + ["--photons", "60000", "--out", str(tmp_path / "fitted")],
+    )
+    assert run.exit_code == 0, run.output
+    fitted = ots.load(tmp_path / "fitted")
+    ratio = fitted.lights["red"].flux / fitted.lights["green"].flux
+    assert ratio == pytest.approx(1.0, rel=0.12)
+    marked = fitted.provenance["lights.red.flux"]
+    assert marked.status is Status.CALIBRATED
+    data = json.loads((tmp_path / "fitted" / "calibration.json").read_text("utf-8"))
+    assert data["photographs"]["press-02.png"][:12] in marked.source
+    assert data["held_out"] == ["press-03.png"]
+    assert data["after"]["background"]["ratio"] > data["before"]["background"]["ratio"] + 3.0
+    page = (tmp_path / "fitted" / "calibration.html").read_text("utf-8")
+    assert "press-03.png" in page
+    assert "<script" not in page
+    assert CalibrationSettings().rounds >= 1
