@@ -26,8 +26,8 @@ LONGEST_EDGE = 0.25
 MAX_FACES = 600_000
 """Most triangles of a deformed skin; more points of contacts than these can show are left out."""
 BENT_SHARE = 0.1
-"""Share of the greatest depth of a contact from which the skin around it counts as bent: such skin
-casts shadows, and is lit as indenters are."""
+"""Share of the greatest depth of a contact from which skin that is pushed in around it counts as
+bent: such skin casts shadows, and is lit as indenters are. Skin that bulges outward does not."""
 
 
 class SkinState(IntEnum):
@@ -101,7 +101,8 @@ def skin_mesh(skin: TriangleMesh, pressed: PressedSkin) -> SkinMesh:
     touching[used] = moved.touching & free
     bent = np.zeros(len(vertices), dtype=bool)
     deepest = max(float(each.place.overlap.max()) for each in pressed.contacts)
-    bent[used] = free & (np.linalg.norm(moved.displacement, axis=1) > BENT_SHARE * deepest)
+    into = np.einsum("vi,vi->v", moved.displacement, inward[used])
+    bent[used] = free & (into > BENT_SHARE * deepest)
     state = np.where(
         touching[fine].sum(axis=1) >= 2,  # so that areas are neither too large nor too small
         SkinState.TOUCHING,

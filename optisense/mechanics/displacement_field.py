@@ -10,7 +10,8 @@ from scipy.ndimage import distance_transform_edt, map_coordinates, spline_filter
 
 from optisense.mechanics.convolution import GridResponse
 from optisense.mechanics.elasticity import Elasticity
-from optisense.mechanics.footprint import Footprint
+from optisense.mechanics.footprint import NO_OVERLAP, Footprint
+from optisense.mechanics.height_map import slopes
 
 FloatArray = NDArray[np.float64]
 
@@ -139,9 +140,13 @@ class DisplacementField:
 
     @cached_property
     def _indenter_slopes(self) -> tuple[FloatArray, FloatArray]:
-        """(rows, columns) each: slopes of the overlap by x and by y."""
-        by_row, by_column = np.gradient(self._overlap, self.place.pitch)
-        return np.asarray(by_column), np.asarray(by_row)
+        """(rows, columns) each: slopes of the overlap by x and by y.
+
+        Where an indenter ends in a wall, they are those of what touches beside it.
+        """
+        known = np.where(self.place.overlap > NO_OVERLAP / 2, self._overlap, np.nan)
+        by_x, by_y = slopes(known, self.place.pitch)
+        return np.nan_to_num(by_x), np.nan_to_num(by_y)
 
     def touching(self, x: FloatArray, y: FloatArray) -> NDArray[np.bool_]:
         """Which points of the tangent plane lie in the contact."""

@@ -12,7 +12,7 @@ from scipy import ndimage
 from optisense.geometry import TriangleMesh
 from optisense.geometry.rays import ray_hits
 from optisense.mechanics.footprint import Footprint, outer_faces
-from optisense.mechanics.height_map import heights
+from optisense.mechanics.height_map import heights, slopes
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
@@ -171,20 +171,8 @@ def _to_the_border(
 
 def _inward(height: FloatArray, pitch: float) -> FloatArray:
     """(rows, columns, 3) unit normals into the gel; one-sided slopes at borders."""
-    slopes = []
-    for axis in (1, 0):
-        before = np.roll(height, 1, axis)
-        after = np.roll(height, -1, axis)
-        first: list[int | slice] = [slice(None), slice(None)]
-        last: list[int | slice] = [slice(None), slice(None)]
-        first[axis], last[axis] = 0, -1
-        before[tuple(first)], after[tuple(last)] = np.nan, np.nan
-        steps = np.stack([height - before, after - height])
-        known = np.isfinite(steps)
-        total = np.where(known, steps, 0.0).sum(axis=0)
-        number = known.sum(axis=0)
-        slopes.append(np.where(number > 0, total / np.maximum(number, 1), np.nan) / pitch)
-    normals = np.stack([slopes[0], slopes[1], -np.ones_like(height)], axis=2)
+    by_x, by_y = slopes(height, pitch)
+    normals = np.stack([by_x, by_y, -np.ones_like(height)], axis=2)
     return np.asarray(normals / np.linalg.norm(normals, axis=2, keepdims=True))
 
 

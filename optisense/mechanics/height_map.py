@@ -69,6 +69,30 @@ def heights(mesh: TriangleMesh, x: FloatArray, y: FloatArray, highest: bool = Fa
     return sign * result.reshape(len(y), len(x))
 
 
+def slopes(height: FloatArray, pitch: float) -> tuple[FloatArray, FloatArray]:
+    """Slopes of heights by x and by y, from the neighbours that have a height.
+
+    Args:
+        height: (rows, columns) mm; NaN where there is none.
+        pitch: mm between points.
+
+    Returns:
+        (rows, columns) each: the mean of the slopes to both neighbours, that to the only one, or
+        NaN where there is none.
+    """
+    found = []
+    for axis in (1, 0):
+        step = np.diff(height, axis=axis)
+        around = [(1, 0) if k == axis else (0, 0) for k in range(2)]
+        behind = np.pad(step, around, constant_values=np.nan)
+        around = [(0, 1) if k == axis else (0, 0) for k in range(2)]
+        ahead = np.pad(step, around, constant_values=np.nan)
+        known = np.isfinite(behind).astype(np.int64) + np.isfinite(ahead)
+        total = np.nan_to_num(behind) + np.nan_to_num(ahead)
+        found.append(np.where(known > 0, total / np.maximum(known, 1), np.nan) / pitch)
+    return found[0], found[1]
+
+
 def _on_triangles(
     mesh: TriangleMesh,
     corners: FloatArray,

@@ -108,6 +108,27 @@ def test_a_flat_punch_and_a_cylinder_and_a_tilted_plate():
     assert tilted.contacts[0].force > 0.1
 
 
+def test_the_rim_of_a_flat_punch_is_flat():
+    punch = press(Contact(Plane(0.0, 0.0, 6.0), at=(0.0, 0.0), depth=0.3))
+    place_of, field = punch.contacts[0].place, punch.contacts[0].field
+    rows, columns = (punch.contacts[0].pressure > 0).nonzero()
+    depth, slope_x, slope_y = field.at(place_of.x[columns], place_of.y[rows])
+    assert depth == pytest.approx(0.3, abs=1e-3)
+    assert np.abs([slope_x, slope_y]).max() < 1e-3
+
+
+def test_skin_that_bulges_outward_is_not_bent():
+    top = TriangleMesh.grid((50.0, 50.0)).flipped()
+    body = TriangleMesh.box((-25.0, -25.0, -4.25), (25.0, 25.0, 0.0))
+    surface = SensingSurface(top, (0, 0, 0), (1, 0, 0), (0, 1, 0))
+    wide = Gel(surface, top, [body], GEL, lambda contact: place(contact, surface, body))
+    mesh = skin_mesh(top, wide.pressed([Contact(Plane(0.0, 0.0, 12.0), at=(0, 0), depth=0.3)]))
+    lowest = mesh.vertices[:, 2][mesh.faces].min(axis=1)
+    assert lowest.max() > 0.1 * 0.3
+    assert (mesh.state[lowest > 0.0] == SkinState.RESTING).all()
+    assert (mesh.state == SkinState.BENT).any()
+
+
 def test_the_mesh_is_fine_in_contacts_and_joins_the_rest(ball):
     mesh = skin_mesh(TOP, ball)
     assert set(np.unique(mesh.state)) == {0, 1, 2}
