@@ -73,6 +73,7 @@ class Evaluation:
         self.seconds: dict[str, float] = {}
         self._progress = progress or (lambda fraction, text: None)
         self._made: dict[str, Any] = {}
+        self._untouched_responses: dict[tuple[float, bool], NDArray[np.float32]] = {}
 
     @property
     def design(self) -> SensorDesign:
@@ -150,6 +151,16 @@ class Evaluation:
         return float(self.settings.exposure)
 
     @property
+    def untouched_exposure(self) -> float:
+        """The factor that suits the untouched sensor, whatever contacts look like."""
+        if self.settings.exposure == "auto":
+            chain = self.model.picture_chain
+            return self._once(
+                "untouched exposure", lambda: chain.auto_exposure(self._untouched_radiance)
+            )
+        return float(self.settings.exposure)
+
+    @property
     def contacts(self) -> list[Contact]:
         """The ball at each place."""
         return self._once("contacts", self._contacts)
@@ -162,6 +173,19 @@ class Evaluation:
             ObjectiveError: a place is not seen, overexposed or black.
         """
         return self._once("presses", self._presses)
+
+    @property
+    def calibration_presses(self) -> list[Press]:
+        """One press a place, under the exposure that suits the untouched sensor, as users set the
+        camera before they calibrate a sensor; they may be overexposed or black.
+
+        Raises:
+            ObjectiveError: a place is not seen.
+        """
+        exposure = self.untouched_exposure
+        if exposure == self.exposure:
+            return self._once("exposed presses", lambda: self._exposed(exposure))
+        return self._once("calibration presses", lambda: self._exposed(exposure))
 
     def shared(self, name: str, make: Callable[[], _T]) -> _T:
         """What several objectives need of this evaluation: made once; an error is kept too.
@@ -301,27 +325,33 @@ class Evaluation:
         return exposure_for(self._untouched_radiance, pressed, camera)
 
     def _presses(self) -> list[Press]:
-        presses = []
-        for each in self._once("pressed images", self._unexposed):
-            press = replace(
-                each.press,
-                response=self._response(each.touched, each.radiance),
-                respond_untouched=self._untouched_response,
-            )
+        presses = self._once("exposed presses", lambda: self._exposed(self.exposure))
+        for press in presses:
             press.check()
-            presses.append(press)
         return presses
 
-    def _untouched_response(self) -> NDArray[np.float32]:
-        """(h, w, 3): without noise."""
-        camera, exposure = self.model.picture_chain.without_noise(), np.float32(self.exposure)
-        return self._once(
-            "untouched response without noise",
-            lambda: camera.respond(self._untouched_radiance * exposure),
-        )
+    def _exposed(self, exposure: float) -> list[Press]:
+        return [
+            replace(
+                each.press,
+                response=self._response(each.touched, each.radiance, exposure),
+                respond_untouched=partial(self._untouched_response, exposure),
+            )
+            for each in self._once("pressed images", self._unexposed)
+        ]
+
+    def _untouched_response(self, exposure: float, noisy: bool = False) -> NDArray[np.float32]:
+        """(h, w, 3), made once for each exposure."""
+        if (exposure, noisy) not in self._untouched_responses:
+            chain = self.model.picture_chain
+            camera = chain if noisy else chain.without_noise()
+            self._untouched_responses[exposure, noisy] = camera.respond(
+                self._untouched_radiance * np.float32(exposure), seed=self.settings.seed
+            )
+        return self._untouched_responses[exposure, noisy]
 
     def _response(
-        self, touched: NDArray[np.bool_], radiance: NDArray[np.float32]
+        self, touched: NDArray[np.bool_], radiance: NDArray[np.float32], factor: float
     ) -> NDArray[np.float32]:
         """(h, w, 3): the camera sensor's response, 0 to 1; the untouched one outside contacts,
         which have a radiance (n, 3) in the n pixels that they touch.
@@ -329,12 +359,9 @@ class Evaluation:
         Overexposure spreads as far as its blur reaches, so only what lies that near to a contact
         is worked out anew.
         """
-        exposure, untouched = np.float32(self.exposure), self._untouched_radiance
+        exposure, untouched = np.float32(factor), self._untouched_radiance
         camera, seed = self.model.picture_chain, self.settings.seed
-        known = self._once(
-            "untouched response", lambda: camera.respond(untouched * exposure, seed=seed)
-        )
-        response = known.copy()
+        response = self._untouched_response(factor, noisy=True).copy()
         if touched.any():
             reach = camera.reach(touched.shape[1])
             changed, needed = _around(touched, reach), _around(touched, 2 * reach)

@@ -136,6 +136,28 @@ def draw_projection_warping(score: Score) -> Figure:
     return figure
 
 
+def draw_depth(score: Score) -> Figure:
+    """The depth along a row of each contact, as it is and as it is read."""
+    profiles, places = score.arrays["profiles"], score.parts["places"]
+    across = int(np.ceil(len(profiles) ** 0.5))
+    down = -(-len(profiles) // across)
+    figure = _figure(2.6 * across, 1.9 * down)
+    grid = figure.subplots(down, across, squeeze=False, sharey=True).ravel()
+    for number, (axes, each) in enumerate(zip(grid, profiles, strict=False)):
+        axes.plot(each["true"], color="#888888", lw=2.5, label="true")
+        axes.plot(each["read"], color=LINE, lw=1.2, label="read")
+        axes.set_title(f"{number + 1}: {places[number]['error']:.3f} mm", fontsize=10)
+        axes.set_xticks([])
+        if number % across == 0:
+            axes.set_ylabel("depth (mm)")
+    for axes in grid[len(profiles) :]:
+        axes.set_axis_off()
+    grid[0].invert_yaxis()
+    grid[0].legend(fontsize=8, frameon=False)
+    figure.suptitle("place and the mean error over its contact; along its middle row", fontsize=11)
+    return figure
+
+
 def draw_coverage(score: Score) -> Figure:
     """The pixels that see the sensing surface, and the share of the surface that they see."""
     hit = score.arrays["hit"]

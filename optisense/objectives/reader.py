@@ -115,7 +115,7 @@ def read_presses(evaluation: Evaluation, camera_noise: float = CAMERA_NOISE) -> 
 
 
 def _read(evaluation: Evaluation, noise: float) -> list[ReadPress]:
-    presses = evaluation.presses
+    presses = evaluation.calibration_presses
     if len(presses) < LEAST_PRESSES:
         raise ObjectiveError(
             f"{len(presses)} presses can't show what a reader makes of one that it has not seen",
@@ -166,7 +166,7 @@ class _KnownPress:
         """
         grid = grid_of(press)
         before = press.before[grid].astype(np.float64)
-        seen = np.logical_and.reduce(np.isfinite(before), axis=2)
+        seen = np.linalg.norm(before, axis=2) > 0.5  # it is 0 where a ray misses the skin
         mask = np.logical_and(press.mask[grid], seen)
         true = np.where(mask[..., None], press.normals[grid].astype(np.float64), before)
         order = np.argsort(~mask[seen], kind="stable")

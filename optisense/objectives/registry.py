@@ -30,7 +30,7 @@ ENTRY_POINTS = "optisense.objectives"
 BUILT_IN = ("rgb2normal", "normdiff", "aoap", "2to3pw")
 """The four objectives of the OptiSense paper."""
 
-FURTHER = ("coverage", "distortion", "bend_radius", "reading")
+FURTHER = ("coverage", "distortion", "bend_radius", "reading", "depth")
 """Objectives of this package beside the paper's."""
 
 CONDITIONS, WATCHED = "conditions", "watched"
@@ -46,6 +46,7 @@ _MODULES = (
     "distortion",
     "bend_radius",
     "reading",
+    "depth",
 )
 """Modules of this package that register objectives."""
 

@@ -125,6 +125,24 @@ class Relighting:
         """
         background, contacts = self.untouched(flux), self._contacts(flux)
         exposure = self._exposure(background, contacts)
+        found = self._lit_presses(background, contacts, exposure, whole)
+        for press in found:
+            press.check()
+        return found
+
+    def presses_exposed(
+        self, flux: ArrayLike, exposure: float, *, whole: bool = False
+    ) -> list[Press]:
+        """The same under an exposure of one's own; they may be overexposed or black."""
+        return self._lit_presses(self.untouched(flux), self._contacts(flux), exposure, whole)
+
+    def _lit_presses(
+        self,
+        background: NDArray[np.float32],
+        contacts: list[NDArray[np.float32]],
+        exposure: float,
+        whole: bool,
+    ) -> list[Press]:
         found = []
         for seen, contact in zip(self._seen, contacts, strict=True):
             response = self._response(seen, background, contact, exposure, whole)
@@ -135,7 +153,6 @@ class Relighting:
                     self._untouched_response, seen, background, exposure, whole
                 ),
             )
-            press.check()
             found.append(press)
         return found
 
@@ -263,8 +280,15 @@ class _Relit(Evaluation):
     def _auto_exposure(self) -> float:
         return self._relighting.exposure(self._flux)
 
+    @property
+    def _untouched_radiance(self) -> NDArray[np.float32]:
+        return self._once("untouched radiance", lambda: self._relighting.untouched(self._flux))
+
     def _presses(self) -> list[Press]:
         return self._relighting.presses(self._flux, whole=self._whole)
+
+    def _exposed(self, exposure: float) -> list[Press]:
+        return self._relighting.presses_exposed(self._flux, exposure, whole=self._whole)
 
 
 def _planes(layer: NDArray[np.float32]) -> NDArray[np.float32]:

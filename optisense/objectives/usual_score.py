@@ -21,7 +21,14 @@ pixels. Less than a whole picture's, because only contacts are lit."""
 LARGE_IMAGE = 640 * 480
 """Number of pixels of an image for which `IMAGE_PIXELS` is stated."""
 
-JUDGING = {"rgb2normal": 0.15, "normdiff": 0.22, "aoap": 0.02, "2to3pw": 0.015, "reading": 0.5}
+JUDGING = {
+    "rgb2normal": 0.15,
+    "normdiff": 0.22,
+    "aoap": 0.02,
+    "2to3pw": 0.015,
+    "reading": 0.5,
+    "depth": 0.6,
+}
 """Processor seconds of the built-in objectives beside rendering."""
 
 OWN_JUDGING = 0.2

@@ -51,6 +51,10 @@ class TestReading(ObjectiveContract):
     objective = "reading"
 
 
+class TestDepth(ObjectiveContract):
+    objective = "depth"
+
+
 class TestFromAFile(ObjectiveContract):
     @pytest.fixture(autouse=True)
     def own_file(self, tmp_path: Path) -> Iterator[None]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -14,12 +15,14 @@ from optisense.design import set_value
 from optisense.design.lenses.film import PictureWindow
 from optisense.errors import ObjectiveError
 from optisense.objectives import Evaluation, Press, Settings, evaluate
+from optisense.objectives.depth import depth
 from optisense.objectives.reader import LEAST_PIXELS, grid_of, pixels_to_read
 from optisense.objectives.reading import reading
 from optisense.objectives.relighting import Relighting
 from optisense.optics import OpticalModel
 
 PIXELS = 61
+RADIUS, DEPTH = 1.5, 0.3  # mm, of the fixture's balls
 LIGHTS = np.array([[0.5, 0.0, 0.866], [-0.25, 0.433, 0.866], [-0.25, -0.433, 0.866]])
 PLACES = ((0.0, 0.0), (4.0, 3.0), (-4.0, 3.0), (4.0, -3.0), (-4.0, -3.0))
 
@@ -35,10 +38,24 @@ class Presses:
     """Stands for an evaluation whose presses are given."""
 
     def __init__(self, presses: list[Press]) -> None:
-        self.presses, self.settings = presses, Settings()
+        self.calibration_presses, self.settings = presses, Settings()
 
     def shared(self, name: str, make: Callable[[], Any]) -> Any:
+        if name == "rays of the images":  # of a plane that is seen from above, in parallel
+            return self.rays
         return make()
+
+    @property
+    def rays(self) -> Any:
+        """The plane that the presses are pressed into, below all nine of them."""
+        reach = 1.1 * np.sqrt(DEPTH * (2 * RADIUS - DEPTH))
+        steps = np.arange(3 * PIXELS) * 2 * reach / (PIXELS - 1)
+        column, row = np.meshgrid(steps, -steps)
+        level = np.full_like(column, RADIUS - DEPTH)
+        up = np.broadcast_to(np.array([0.0, 0.0, 1.0]), (*level.shape, 3))
+        return SimpleNamespace(
+            points=np.stack([column, row, level], -1), normals=up, directions=-up
+        )
 
 
 @pytest.fixture
@@ -126,7 +143,7 @@ def test_colours_that_change_steadily_over_the_picture_are_followed(
 
 def test_four_presses_are_needed(nine: Callable[..., Presses]) -> None:
     few = nine(lambertian)
-    few.presses = few.presses[:3]
+    few.calibration_presses = few.calibration_presses[:3]
     with pytest.raises(ObjectiveError, match="3 presses can't show"):
         reading(few)
 
@@ -153,6 +170,34 @@ def test_noise_has_bounds(nine: Callable[..., Presses], noise: float) -> None:
         reading(nine(lambertian), camera_noise=noise)
 
 
+def on_the_plane(presses: Presses) -> Presses:
+    """The same presses where they lie in the picture of the plane; they are made in its corner."""
+    moved = []
+    for press in presses.calibration_presses:
+        assert press.window is not None
+        rows, columns = press.window.box
+        corner = presses.rays.points[rows, columns][PIXELS // 2, PIXELS // 2]
+        moved.append(replace(press, points=press.points + corner * [1.0, 1.0, 0.0]))
+    presses.calibration_presses = moved
+    return presses
+
+
+def test_the_depth_of_balls_comes_back(nine: Callable[..., Presses]) -> None:
+    value, parts, _ = depth(on_the_plane(nine(lambertian)), camera_noise=0.0)
+    assert value < 0.01
+    # The mean depth of a cap is about half of it.
+    assert parts["reading_nothing"] == pytest.approx(DEPTH / 2, rel=0.05)
+    for place in parts["places"]:
+        assert place["deepest"] == pytest.approx(DEPTH, abs=1e-3)
+        assert place["deepest_read"] == pytest.approx(DEPTH, abs=0.02)
+
+
+def test_where_no_tilt_is_read_there_is_no_depth(nine: Callable[..., Presses]) -> None:
+    grey = on_the_plane(nine(lambda n: np.full((len(n), 3), 0.3)))
+    value, parts, _ = depth(grey)
+    assert value == pytest.approx(parts["reading_nothing"], rel=0.05)
+
+
 @pytest.fixture(scope="module")
 def relighting() -> Relighting:
     settings = Settings(resolution=(200, 150), photons=200_000, places=PLACES)
@@ -168,11 +213,12 @@ def test_presses_under_other_lights_read_the_same_whether_cut_or_whole(
     one_colour, usual = design, ots.load("gelsight-mini")
     values = []
     for each in (usual, one_colour):
-        whole = evaluate(relighting.lit(each), "reading")
-        cut = evaluate(relighting.lit(each, whole=False), "reading")
-        assert whole.failure is None and cut.failure is None
-        assert cut.value == pytest.approx(whole.value, rel=1e-9)
-        values.append(whole.value)
+        whole = evaluate(relighting.lit(each), ["reading", "depth"])
+        cut = evaluate(relighting.lit(each, whole=False), ["reading", "depth"])
+        for name, score in cut.items():
+            assert score.failure is None and whole[name].failure is None
+            assert score.value == pytest.approx(whole[name].value, rel=1e-9)
+        values.append(whole["reading"].value)
     assert values[0] < values[1] - 2.0  # three colours tell more than one
 
 
@@ -181,3 +227,19 @@ def test_relit_presses_read_as_rendered_ones(relighting: Relighting) -> None:
     rendered = Evaluation(OpticalModel(usual), relighting.settings)
     direct = evaluate(rendered, "reading").value
     assert evaluate(relighting.lit(usual), "reading").value == pytest.approx(direct, rel=0.02)
+
+
+def test_the_exposure_is_that_of_the_untouched_skin() -> None:
+    """A shiny coating saturates where other scores turn the exposure down."""
+    design = set_value(ots.load("gelsight-mini"), "coating.specularity", 0.8)
+    settings = {"resolution": (160, 120), "photons": 200_000}
+    sensor = OpticalModel(design)
+    evaluation = Evaluation(sensor, Settings(**settings, places=PLACES))
+    as_set = evaluate(evaluation, "reading")
+    assert evaluation.untouched_exposure > 3.0 * evaluation.exposure
+    brightest = [each.response.max() for each in evaluation.calibration_presses]
+    assert min(brightest) == 1.0
+    lowered = Settings(**settings, places=PLACES, exposure=evaluation.exposure)
+    assert as_set.value > evaluate(Evaluation(sensor, lowered), "reading").value + 2.0
+    shared = evaluate(evaluation, "rgb2normal").value  # not changed by what reading exposes
+    assert shared == evaluate(Evaluation(sensor, evaluation.settings), "rgb2normal").value

@@ -1,0 +1,184 @@
+"""Do the objectives follow what the full reconstruction task finds?
+
+``python -m benchmarks.reading [--sensor NAME ...] [--specularity S ...] [--wide W] [--again]``
+writes reading.json and reading.md beside this file, sensor by sensor; what is there is not measured
+again. Each built-in sensor is given coatings from diffuse to shiny. Scores are those of
+`optisense.evaluate`; the error beside them is that of `optisense.tasks.reconstruct`: 24 balls at
+random places, a network, three other things to read, an elastic skin.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from rich.console import Console
+from scipy.stats import spearmanr
+
+from benchmarks.results import machine, say_if_busy
+from optisense import OpticalModel, evaluate, sensors
+from optisense.design import SensorDesign, set_value
+from optisense.objectives import Evaluation, Settings
+from optisense.tasks import ReconstructionSettings, reconstruct
+
+FOLDER = Path(__file__).parent
+SENSORS = (
+    "gelsight-mini",
+    "gelsight-mini-cylindrical",
+    "gelbelt",
+    "gelsight-svelte",
+    "gelsight360",
+)
+SPECULARITIES = (0.0, 0.2, 0.4, 0.6, 0.8)
+WIDE = 320
+"""Pixels across the pictures of the scores; twice as many where contacts are small."""
+SMALL_CONTACTS = ("gelsight360", "gelsight-svelte")
+"""Sensors with a large view, in whose pictures a contact has few pixels."""
+TASK_WIDE = 160
+"""Pixels across the pictures of the task."""
+BALLS = 24
+"""Presses that the task's network learns from; 40 are usual, and take longer."""
+PHOTONS = 300_000
+"""Of each image."""
+SCORES = {"reading": -1.0, "rgb2normal": 1.0, "normdiff": 1.0}
+"""Objectives, and 1 where a higher value is better."""
+
+
+def main() -> None:
+    """Measure what is missing, and write both files after each sensor and coating."""
+    options = _options()
+    console = Console()
+    about = machine()
+    say_if_busy(console, about)
+    content: dict[str, Any] = {"machine": about, "rows": []}
+    file = FOLDER / "reading.json"
+    if file.exists() and not options.again:
+        content["rows"] = json.loads(file.read_text(encoding="utf-8"))["rows"]
+    for name in options.sensor:
+        model: OpticalModel | None = None
+        for specularity in options.specularity:
+            if any(_key(row) == (name, specularity) for row in content["rows"]):
+                continue
+            design = set_value(sensors.load(name), "coating.specularity", specularity)
+            if model is None:
+                model = OpticalModel(design)
+            else:
+                model.set_design(design)
+            row = {"sensor": name, "specularity": specularity} | _measure(model, design, options)
+            console.print(row)
+            content["rows"] = sorted([*content["rows"], row], key=_order)
+            file.write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")
+            (FOLDER / "reading.md").write_text(_page(content), encoding="utf-8")
+    (FOLDER / "reading.md").write_text(_page(content), encoding="utf-8")
+
+
+def _measure(
+    model: OpticalModel, design: SensorDesign, options: argparse.Namespace
+) -> dict[str, Any]:
+    width, height = design.camera.resolution
+
+    def size(across: int) -> tuple[int, int]:
+        return across, round(across * height / width)
+
+    across = options.wide * (2 if design.name in SMALL_CONTACTS else 1)
+    settings = Settings(resolution=size(across), photons=PHOTONS)
+    began = time.process_time()
+    scores = evaluate(Evaluation(model, settings), list(SCORES))
+    scored = time.process_time()
+    task = reconstruct(
+        model, ReconstructionSettings(presses=BALLS, resolution=size(TASK_WIDE), photons=PHOTONS)
+    ).to_dict()
+    found: dict[str, Any] = {
+        "normal_error": round(task["normal_error"], 2),
+        "cpu_s": {
+            "scores": round(scored - began, 1),
+            "task": round(time.process_time() - scored, 1),
+        },
+    }
+    for name, score in scores.items():
+        found[name] = None if score.failure else round(score.value, 4)
+    found["median_of_places"] = round(scores["reading"].parts["median_of_places"], 2)
+    return found
+
+
+def agreement(rows: list[dict[str, Any]], score: str) -> tuple[float, int]:
+    """Spearman's rank correlation of a score's goodness with the task's, and of how many rows."""
+    known = [row for row in rows if row[score] is not None]
+    if len(known) < 3:
+        return float("nan"), len(known)
+    goodness = [SCORES[score] * row[score] for row in known]
+    found = spearmanr(goodness, [-row["normal_error"] for row in known]).statistic
+    return float(found), len(known)
+
+
+def _page(content: dict[str, Any]) -> str:
+    rows = content["rows"]
+    lines = [
+        "# Do the objectives follow the full reconstruction task?",
+        "",
+        "Written by `python -m benchmarks.reading`. Errors of normals in degrees; RGB2Normal and",
+        f"NormDiff are better where higher. Pictures {WIDE} across for the scores ({2 * WIDE} for",
+        f"{' and '.join(SMALL_CONTACTS)}) and {TASK_WIDE} for the task, {BALLS} balls,",
+        f"{PHOTONS:,} photons.",
+        "",
+        "| sensor | specularity | task: normals off by | reading | RGB2Normal | NormDiff |",
+        "|---|---|---|---|---|---|",
+    ]
+    for row in rows:
+        cells = [
+            "fails" if row[name] is None else f"{row[name]:.{digits}f}"
+            for name, digits in (("reading", 1), ("rgb2normal", 3), ("normdiff", 1))
+        ]
+        lines.append(
+            f"| {row['sensor']} | {row['specularity']:g} | {row['normal_error']:.1f} | "
+            + " | ".join(cells)
+            + " |"
+        )
+    lines += [
+        "",
+        "Rank correlation (Spearman) with the task, each score's better end against the smaller",
+        "error; within one sensor over its coatings, and over all:",
+        "",
+        "| | reading | RGB2Normal | NormDiff |",
+        "|---|---|---|---|",
+    ]
+    groups = {name: [row for row in rows if row["sensor"] == name] for name in SENSORS}
+    for title, some in [*groups.items(), ("all", rows)]:
+        if len(some) > 2:
+            found = [agreement(some, score)[0] for score in SCORES]
+            cells = ["" if np.isnan(each) else f"{each:.2f}" for each in found]
+            lines.append(f"| {title} | " + " | ".join(cells) + " |")
+    seconds = [row["cpu_s"] for row in rows]
+    lines += [
+        "",
+        f"{len(rows)} sensors and coatings. Processor seconds, median: all three scores "
+        f"{np.median([each['scores'] for each in seconds]):.0f}, the task "
+        f"{np.median([each['task'] for each in seconds]):.0f}.",
+        "",
+    ]
+    return "\n".join(lines)
+
+
+def _key(row: dict[str, Any]) -> tuple[str, float]:
+    return row["sensor"], row["specularity"]
+
+
+def _order(row: dict[str, Any]) -> tuple[int, float]:
+    return SENSORS.index(row["sensor"]), row["specularity"]
+
+
+def _options() -> argparse.Namespace:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--sensor", nargs="+", choices=SENSORS, default=list(SENSORS))
+    parser.add_argument("--specularity", nargs="+", type=float, default=list(SPECULARITIES))
+    parser.add_argument("--wide", type=int, default=WIDE, help="pixels across a score's pictures")
+    parser.add_argument("--again", action="store_true", help="measure also what is there")
+    return parser.parse_args()
+
+
+if __name__ == "__main__":
+    main()

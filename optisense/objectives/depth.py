@@ -1,0 +1,103 @@
+"""Depth: how far the shape is off that a calibrated reader finds on presses new to it."""
+
+from __future__ import annotations
+
+import math
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from optisense.objectives import figures
+from optisense.objectives.press import FloatArray
+from optisense.objectives.reader import (
+    CAMERA_NOISE,
+    LEAST_PIXELS,
+    LEAST_PRESSES,
+    ReadPress,
+    pixels_to_read,
+    read_presses,
+)
+from optisense.objectives.registry import objective
+from optisense.reading.integration import NormalIntegrator
+from optisense.reading.untouched import UntouchedSurface
+
+if TYPE_CHECKING:
+    from optisense.objectives.evaluation import Evaluation
+
+
+@objective(
+    "depth",
+    title="Depth",
+    draw=figures.draw_depth,
+    beside=("reading_nothing", "worst_place"),
+    reads=pixels_to_read,
+    range=(0.0, math.inf),
+    needs=f"{LEAST_PRESSES} presses or more, each seen, with {LEAST_PIXELS} pixels",
+    unit="mm",
+    lower_is_better=True,
+)
+def depth(
+    evaluation: Evaluation, *, camera_noise: float = CAMERA_NOISE
+) -> tuple[float, dict[str, Any], dict[str, Any]]:
+    """How many mm the shape is off that a calibrated reader finds on presses new to it.
+
+    The normals of the objective `reading` are integrated to depth below the untouched surface. The
+    mean absolute difference is taken over the pixels of a contact, then over places.
+
+    Args:
+        evaluation: the sensor.
+        camera_noise: standard deviation in levels of 255, on all pictures.
+    """
+    places: list[dict[str, Any]] = []
+    maps = []
+    for each in read_presses(evaluation, camera_noise):
+        integrator, true = each.press.derived(
+            "integrator and depth", partial(_known, evaluation, each)
+        )
+        read = integrator.depths(each.normals)
+        inside = each.mask
+        places.append(
+            {
+                "place": each.press.place,
+                "error": float(np.abs(read - true)[inside].mean()),
+                "reading_nothing": float(true[inside].mean()),
+                "deepest": float(true[inside].max()),
+                "deepest_read": float(read[inside].max()),
+                "pixels": int(inside.sum()),
+            }
+        )
+        maps.append({"read": _along_middle(read, inside), "true": _along_middle(true, inside)})
+    errors = [place["error"] for place in places]
+    parts = {
+        "reading_nothing": float(np.mean([place["reading_nothing"] for place in places])),
+        "worst_place": max(errors),
+        "median_of_places": float(np.median(errors)),
+        "places": places,
+    }
+    return float(np.mean(errors)), parts, {"profiles": maps}
+
+
+def _known(evaluation: Evaluation, read: ReadPress) -> tuple[NormalIntegrator, FloatArray]:
+    """What integrates normals on the grid of a press, and (h, w) mm of its true depth."""
+    rays = evaluation.shared(
+        "rays of the images", lambda: evaluation.model.chief_rays(evaluation.resolution)
+    )
+    window = read.press.window
+    box = (slice(None), slice(None)) if window is None else window.box
+    surface = UntouchedSurface(
+        points=rays.points[box][read.grid].astype(np.float64),
+        normals=rays.normals[box][read.grid].astype(np.float64),
+        directions=rays.directions[box][read.grid].astype(np.float64),
+        seen=read.seen,
+    )
+    points = np.where(read.mask[..., None], read.press.points[read.grid], surface.points)
+    return NormalIntegrator(surface), surface.depth(points)
+
+
+def _along_middle(values: FloatArray, inside: NDArray[np.bool_]) -> FloatArray:
+    """(w,) mm along the row through the middle of a contact."""
+    row = int(np.argmax(inside.sum(axis=1)))
+    middle: FloatArray = values[row]
+    return middle
