@@ -24,6 +24,7 @@ from optisense.calibration.quantities import FAMILIES, FitQuantity, designed, qu
 from optisense.calibration.realism import Realism, realism
 from optisense.design import Provenance, SensorDesign, Status, set_value
 from optisense.errors import CalibrationError
+from optisense.near import suggestion
 
 if TYPE_CHECKING:
     from optisense.optics import OpticalModel
@@ -46,7 +47,10 @@ LEAST_PRESSES = 2
 """Presses that a fit needs at least; one ball alone could be explained by its place."""
 
 FEW_PRESSES = 6
-"""Presses below which a fit is told to rest on few."""
+"""Presses that are recommended, a third of which are held out."""
+
+FEW_FITTED = 4
+"""Presses that are fitted below which a fit is told to rest on few."""
 
 HELD_OUT = 3
 """Every third press is held out and only judged, where there are at least as many."""
@@ -77,6 +81,7 @@ class CalibrationSettings:
         photons: of the light of the fit; that of the comparison has as many or more.
         seed: of the light.
         refine: whether labelled contacts are looked for near their labels first.
+        held_out: names of the presses that are held out; every third one if None.
     """
 
     families: tuple[str, ...] = tuple(FAMILIES)
@@ -85,6 +90,7 @@ class CalibrationSettings:
     photons: int = FIT_PHOTONS
     seed: int = 0
     refine: bool = True
+    held_out: tuple[str, ...] | None = None
 
 
 @dataclass(frozen=True)
@@ -183,7 +189,8 @@ def calibrate(
     chosen_settings = settings or CalibrationSettings()
     full, seen, notes = usable(photographs, refine=chosen_settings.refine)
     chosen = quantities_of(design, chosen_settings.families, chosen_settings.asked)
-    notes += _refuse_too_few(full, chosen)
+    held_out = _held_out(full, chosen_settings.held_out)
+    notes += _refuse_too_few(full, chosen, held_out)
     model = OpticalModel(design, variant)
     check_shape(full, model)
     fit = _Fit(design, model, full, seen, chosen, chosen_settings, progress)
@@ -235,7 +242,7 @@ class _Fit:
         self._factor = factor
         self._seen = [_scaled(place, factor) for place in seen]
         count = len(photographs.presses)
-        self.held_out = list(range(HELD_OUT - 1, count, HELD_OUT)) if count >= HELD_OUT else []
+        self.held_out = _held_out(photographs, settings.held_out)
         self._used = [index for index in range(count) if index not in self.held_out]
         self._rendering = [number for number, each in enumerate(chosen) if each.renders]
         self.exposure = 1.0
@@ -347,25 +354,47 @@ class _Fit:
         return found
 
 
-def _refuse_too_few(photographs: Photographs, chosen: Sequence[FitQuantity]) -> list[str]:
+def _held_out(photographs: Photographs, asked: Sequence[str] | None) -> list[int]:
+    """Indices of the presses that are held out.
+
+    Raises:
+        CalibrationError: there is no press of a name.
+    """
+    names = [press.name for press in photographs.presses]
+    if asked is None:
+        return list(range(HELD_OUT - 1, len(names), HELD_OUT))
+    for name in asked:
+        if name not in names:
+            raise CalibrationError(
+                f"there is no press '{name}' to hold out",
+                hint=suggestion(name, names),
+            )
+    return [index for index, name in enumerate(names) if name in asked]
+
+
+def _refuse_too_few(
+    photographs: Photographs, chosen: Sequence[FitQuantity], held_out: Sequence[int]
+) -> list[str]:
     """What is to be said of the number of photographs.
 
     Raises:
         CalibrationError: there are too few, or nothing is to be fitted.
     """
-    count = len(photographs.presses)
+    count = len(photographs.presses) - len(held_out)
     if not chosen:
         raise CalibrationError("nothing may change", hint="Keep less as it is")
     if count < LEAST_PRESSES:
         raise CalibrationError(
-            f"{count} press is too few to fit {len(chosen)} numbers",
+            f"{count} press{'' if count == 1 else 'es'} can't tell {len(chosen)} numbers",
             hint=f"Photograph at least {LEAST_PRESSES}, better {FEW_PRESSES}, at different places",
         )
     notes = []
-    if count < HELD_OUT:
+    if not held_out:
         notes.append("no press is held out: the figures are those of the presses that were fitted")
-    if count < FEW_PRESSES:
-        notes.append(f"{count} presses are few; {FEW_PRESSES} at different places tell more")
+    if count < FEW_FITTED:
+        notes.append(
+            f"the fit rests on {count} presses; {FEW_PRESSES} at different places tell more"
+        )
     return notes
 
 

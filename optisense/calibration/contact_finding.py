@@ -48,6 +48,12 @@ SIDE = 24
 FARTHEST = 3.0
 """Radii of the first guess up to which the edge of the contact is looked for."""
 
+BESIDE = 2.2
+"""Radii of a contact within which the skin is drawn along with it."""
+
+AS_STRONG = 0.3
+"""Share of the strongest response of a picture that a second contact has at least."""
+
 LEAST_RADIUS = 2.0
 """Pixels; smaller spots are dust."""
 
@@ -85,7 +91,29 @@ def find_contact(
     Returns:
         The contact; None where no response stands out from the noise.
     """
+    return _contact_in(difference(picture, background), near, radius)
+
+
+def find_another(
+    picture: NDArray[np.uint8], background: NDArray[np.uint8], known: FoundContact
+) -> FoundContact | None:
+    """A second contact in a photograph, beside a known one; None where there is none as strong.
+
+    Two contacts in each of several photographs mean that the background shows one of them.
+    """
     response = difference(picture, background)
+    rows, columns = np.mgrid[: response.shape[0], : response.shape[1]] + 0.5
+    away = np.hypot(columns - known.centre[0], rows - known.centre[1])
+    strongest = np.percentile(np.abs(response), STRONGEST)
+    response[away < BESIDE * known.radius] = 0.0
+    if np.percentile(np.abs(response), STRONGEST) < AS_STRONG * strongest:
+        return None
+    return _contact_in(response)
+
+
+def _contact_in(
+    response: FloatArray, near: tuple[float, float] | None = None, radius: float | None = None
+) -> FoundContact | None:
     strength = np.sqrt((response**2).sum(axis=2))
     noise = float(np.median(strength))
     peak = float(np.percentile(strength, STRONGEST))

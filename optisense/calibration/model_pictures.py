@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import map_coordinates
 from scipy.optimize import minimize_scalar
 
-from optisense.calibration.contact_finding import find_contact
+from optisense.calibration.contact_finding import find_another, find_contact
 from optisense.calibration.photographs import PhotographedPress, Photographs
 from optisense.errors import CalibrationError, ContactError
 from optisense.geometry import Contact, Sphere
@@ -98,8 +98,12 @@ def seen_contacts(photographs: Photographs, *, refine: bool = True) -> list[Seen
 def doubts(photographs: Photographs) -> list[str]:
     """What is doubtful about presses: no contact to be seen, or labels that contradict it."""
     found = []
+    twice = 0
     for press in photographs.presses:
         seen = find_contact(press.picture, photographs.background)
+        if seen is not None:
+            other = find_another(press.picture, photographs.background, seen)
+            twice += other is not None and other.asymmetry < DOUBTFUL
         if seen is None:
             found.append(f"{press.name}: no contact is to be seen; it is left out")
             continue
@@ -119,6 +123,11 @@ def doubts(photographs: Photographs) -> list[str]:
                     f"{press.name}: its label says a radius of {press.radius:.0f} pixels, and the "
                     f"picture shows {seen.radius:.0f}"
                 )
+    if 2 * twice > len(photographs.presses):
+        found.append(
+            "the background: it seems to show a contact, as most photographs show two; take one "
+            "with nothing pressed in"
+        )
     return found
 
 
@@ -153,6 +162,13 @@ def contact_of(
     Raises:
         CalibrationError: the contact is not on the skin, too wide for the ball, or too deep.
     """
+    size = min(np.sort(np.ptp(gel.vertices, axis=0))[1] for gel in model.gels)
+    if press.diameter > 2.0 * size:
+        raise CalibrationError(
+            f"the ball's diameter is {press.diameter:g} mm, and the gel is {size:.0f} mm wide",
+            where=press.name,
+            hint="Give the ball's diameter in mm",
+        )
     point, scale = place_on_skin(seen.centre, rays, press.name)
     ball, wanted = 0.5 * press.diameter, seen.radius * scale
     if wanted >= ball:

@@ -39,8 +39,8 @@ def calibrate(
 ) -> None:
     """Fit a design to photographs of the real sensor.
 
-    Writes the fitted design, calibration.json and calibration.html into the folder. Every third
-    press is held out of the fit and only judged.
+    Writes the fitted design, calibration.json and calibration.html into the folder. Some
+    presses are held out of the fit and only judged.
     """
     with progress_line(TimedStep(LOADING, 1, 3.0), TimedStep(FITTING, 20, 100.0)) as line:
         line.begin(LOADING)
@@ -77,6 +77,7 @@ def calibrate(
                 photons=options.photons,
                 seed=options.seed,
                 refine=not options.as_labelled,
+                held_out=tuple(options.hold_out) or None,
             ),
             variant=variant,
             progress=told,

@@ -47,6 +47,11 @@ class CalibrateOptions(PhotographOptions):
         description="A further number of the design that may change, and its range. May be given "
         "several times.",
     )
+    hold_out: Annotated[list[str], Written("PRESS")] = Field(
+        [],
+        description="A press that is held out of the fit and only judged, by its file's name; "
+        "every third one if none is named. May be given several times.",
+    )
     rounds: Annotated[int, Ge(1), Le(20), Written("N")] = Field(
         3, description="Rounds of rendering and fitting."
     )

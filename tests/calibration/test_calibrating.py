@@ -151,8 +151,15 @@ def test_what_makes_no_sense_is_refused(
 
 
 def test_too_few_photographs_are_refused_before_the_work(photographs: Photographs) -> None:
-    with pytest.raises(CalibrationError, match="1 press is too few"):
+    with pytest.raises(CalibrationError, match="1 press can't tell"):
         calibrate(ots.load("gelsight-mini"), photographs.subset([0]))
+    others = CalibrationSettings(held_out=("press-01.png", "press-02.png"))
+    with pytest.raises(CalibrationError, match="1 press can't tell"):
+        calibrate(ots.load("gelsight-mini"), photographs, others)
+    misspelt = CalibrationSettings(held_out=("press-1.png",))
+    with pytest.raises(CalibrationError, match=r"no press 'press-1\.png'") as raised:
+        calibrate(ots.load("gelsight-mini"), photographs, misspelt)
+    assert "press-01.png" in (raised.value.hint or "")
 
 
 def test_a_design_is_fitted_and_marked(photographs: Photographs, tmp_path: Path) -> None:

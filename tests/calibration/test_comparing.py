@@ -117,11 +117,20 @@ def test_wrong_labels_and_missing_contacts_are_told(photographs: Photographs) ->
     assert len(words) == 2
 
 
+def test_a_background_with_a_contact_is_told(photographs: Photographs) -> None:
+    assert doubts(photographs) == []
+    first, *others = photographs.presses
+    words = doubts(replace(photographs, background=first.picture, presses=tuple(others)))
+    assert any("seems to show a contact" in note for note in words)
+
+
 def test_impossible_contacts_are_refused(mini: OpticalModel, photographs: Photographs) -> None:
     rays = mini.chief_rays(photographs.size)
     press = photographs.presses[0]
     with pytest.raises(CalibrationError, match=r"the ball one of 0\.5 mm"):
         contact_of(replace(press, diameter=1.0), SeenContact((80.0, 60.0), 12.0), mini, rays)
+    with pytest.raises(CalibrationError, match="the gel is 21 mm wide"):
+        contact_of(replace(press, diameter=60.0), SeenContact((80.0, 60.0), 12.0), mini, rays)
     with pytest.raises(CalibrationError, match="sees no skin"):
         contact_of(press, SeenContact((500.0, 60.0), 12.0), mini, rays)
     with pytest.raises(CalibrationError, match="can't be pressed in"):

@@ -17,10 +17,12 @@ from typing import Any
 import numpy as np
 import yaml
 from hypothesis import strategies as st
+from PIL import Image
 from pydantic import TypeAdapter
 
 import optisense as ots
 from optisense import library
+from optisense.calibration import read_photographs
 from optisense.design import SensorDesign, check_design, save_design
 from optisense.design.ies import read_ies
 from optisense.geometry import TriangleMesh, parse_contact
@@ -366,6 +368,44 @@ def read_dataset(folder: Path) -> None:
     shapes = {sample.depth.shape for sample in dataset}
     assert len(shapes) <= 1
     dataset.background()
+
+
+# ---- photographs
+
+
+def _photographs() -> Case:
+    """A folder of photographs in each of the layouts that are read."""
+    picture = io.BytesIO()
+    grey = np.full((32, 40, 3), 90, np.uint8)
+    Image.fromarray(grey).save(picture, format="PNG")
+    label, pack = io.BytesIO(), io.BytesIO()
+    np.savez(label, center=np.array([12, 14]), radius=np.array(5))
+    labels = {"touch_center": np.array([[12, 14]]), "touch_radius": np.array([5])}
+    np.savez(pack, f0=grey, imgs=grey[None], **labels)
+    return {
+        "own/background.png": picture.getvalue(),
+        "own/a.png": picture.getvalue(),
+        "own/presses.csv": b"file,diameter,indenter,column,row,radius\na.png,6,,12,14,5\n",
+        "sdk/background.png": picture.getvalue(),
+        "sdk/6mm/0/gelsight.png": picture.getvalue(),
+        "sdk/6mm/0/label.npz": label.getvalue(),
+        "sdk/catalog.csv": b"experiment_reldir,diameter(mm)\n6mm/0,6.0\n",
+        "taxim/dataPack.npz": pack.getvalue(),
+    }
+
+
+PHOTOGRAPHS = _photographs()
+
+
+@kind("photographs", st.one_of(
+    *[_with_file(PHOTOGRAPHS, name, spoilt_bytes(PHOTOGRAPHS[name])) for name in PHOTOGRAPHS],
+))  # fmt: skip
+def read_photograph_folders(folder: Path) -> None:
+    """Read the folders of all layouts."""
+    for name in ("own", "sdk", "taxim"):
+        found = read_photographs(folder / name, 4.0)
+        assert all(press.picture.shape == found.background.shape for press in found.presses)
+        found.scaled(36).warnings()
 
 
 # ---- texts
