@@ -89,7 +89,8 @@ def print_result(result: SearchResult, out: Path) -> None:
     if best.is_start:
         output.print("no trial is better than the start")
     elif not result.interrupted:
-        output.print(f"Take it:  optisense apply {out} --trial best --out better", style="dim")
+        output.print(f"Take it:    optisense apply {out} --trial best --out better", style="dim")
+        output.print(f"Verify it:  optisense verify {out}", style="dim")
 
 
 def _print_nearest(trials: Sequence[Trial]) -> None:

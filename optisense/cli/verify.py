@@ -94,13 +94,19 @@ def verify(
 
         found = compare((models[0], models[1]), settings, names, show)
         if out is not None:
-            write_text(out / JSON_FILE, json.dumps(found.to_dict(), indent=2) + "\n")
+            from optisense.report.verification import write_verification_report
+
+            text = json.dumps(found.to_dict(), indent=2, allow_nan=False)
+            write_text(out / JSON_FILE, text + "\n")
+            first_axes, second_axes = (design.camera.axes() for design in designs)
+            write_verification_report(out / REPORT_FILE, found, (first_axes, second_axes))
     if as_json:
         print(json.dumps(found.to_dict(), indent=2, allow_nan=False))
         return
     print_verification(found)
     if out is not None:
-        output.print(f"written: {out / JSON_FILE}", markup=False)
+        for name in (JSON_FILE, REPORT_FILE):
+            output.print(f"written: {out / name}", markup=False)
 
 
 SIDES = ("first sensor", "second sensor")

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import binary_erosion
 from scipy.spatial import cKDTree
 
 from optisense.errors import ContactError, TaskError
@@ -42,6 +43,10 @@ FITS = 0.8
 
 RIM = 0.12
 """Share of the same that a press keeps away from the border of the skin."""
+
+VIEW_RIM = 0.2
+"""Share of the same that a press keeps away from the border of what a camera sees, so that most of
+an object is in the picture."""
 
 MOST_DEEP = 0.4
 """Largest share of the gel's thickness that an object is pressed in: gels that are pressed deeper
@@ -92,7 +97,8 @@ class _Skin:
 
     def __post_init__(self) -> None:
         points = _seen_places(self.models, self.seed)
-        self.room = _narrower_side(points)
+        seen = [model.chief_rays(PLACES_SEEN) for model in self.models]
+        self.room = max(_narrower_side(rays.points[rays.hit].astype(np.float64)) for rays in seen)
         self.points = points[_inside(points, self.models, RIM * self.room)]
         if not len(self.points):
             raise TaskError("the cameras see only the border of the sensing surface")
@@ -204,6 +210,7 @@ def _seen_places(models: Sequence[OpticalModel], seed: int) -> FloatArray:
         areas = np.where(rays.hit, pixel_areas(rays), 0.0)
         if not areas.any():
             raise TaskError("a camera sees nothing of the sensing surface")
+        areas = _away_from_the_border(rays.points.astype(np.float64), areas)
         density = density or CANDIDATES / float(areas.sum())
         rng = np.random.default_rng([seed, number])
         pixels = rng.choice(
@@ -216,6 +223,19 @@ def _seen_places(models: Sequence[OpticalModel], seed: int) -> FloatArray:
             points = points[away > 2.0 / np.sqrt(density)]
         found.append(points)
     return np.concatenate(found)
+
+
+def _away_from_the_border(points: FloatArray, areas: FloatArray) -> FloatArray:
+    """Areas (h, w) of pixels, 0 where they are near the border of what is seen; the points are
+    (h, w, 3) mm. All of them where nothing else is left.
+    """
+    seen = areas > 0.0
+    border = seen & ~binary_erosion(seen)
+    near = VIEW_RIM * _narrower_side(points[seen])
+    away = np.zeros(seen.shape)
+    away[seen] = cKDTree(points[border]).query(points[seen])[0]
+    kept = np.where(away > near, areas, 0.0)
+    return kept if kept.any() else areas
 
 
 def _narrower_side(points: FloatArray) -> float:

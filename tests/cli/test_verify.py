@@ -44,6 +44,9 @@ def test_a_study_is_compared_with_its_start(study: Path, tmp_path: Path) -> None
     assert "the start" in text
     assert "1 objects are too few to tell a difference" in told
     assert "cannot be told" in told
+    page = (tmp_path / "proof" / "verify.html").read_text()
+    assert "Cannot be told" in page
+    assert OBJECTS["nut"].help in page
     values = json.loads((tmp_path / "proof" / "verify.json").read_text())
     assert values["verdict"] == "cannot be told"
     assert values["before"]["name"] == "the start"

@@ -1,0 +1,90 @@
+"""The page of a verification says what the numbers say, and shows every object."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from optisense.geometry import Contact
+from optisense.geometry.objects import OBJECTS, ObjectIndenter
+from optisense.report.verification import (
+    change_figure,
+    render_verification,
+    write_verification_report,
+)
+from optisense.tasks import Verification, VerificationSettings
+from optisense.tasks.press_readings import PressPictures
+from optisense.tasks.verification import SensorView
+
+EVIL = "</h1><img src=x onerror=alert(1)>"
+AXES = (np.diag([1.0, 1.0, 1.0]), np.diag([1.0, 1.0, 1.0]))
+NAMES = tuple(OBJECTS)
+
+
+def pictures() -> PressPictures:
+    normals = np.zeros((60, 80, 3), np.float32)
+    normals[..., 2] = -1.0
+    angles = np.full((60, 80), np.nan, np.float32)
+    angles[20:30, 30:45] = 12.0
+    return PressPictures(np.full((60, 80, 3), 90, np.uint8), normals, normals, angles)
+
+
+@pytest.fixture
+def found() -> Verification:
+    settings = VerificationSettings(NAMES, places=2, readers=1)
+    before = np.random.default_rng(0).uniform(8.0, 16.0, (len(NAMES), 2, 1))
+    view = SensorView(coverage=0.5, detail=0.06, stretching=1.02)
+    return Verification(
+        names=("the start", "trial 7"),
+        settings=settings,
+        scale=1.0,
+        same_places=True,
+        normals=(before, before - 4.0),
+        depths=(before / 100, before / 100),
+        flat=(20.0, 0.4),
+        views=(view, replace(view, coverage=0.25)),
+        pictures={name: (pictures(), pictures()) for name in NAMES},
+        contacts={name: [Contact(ObjectIndenter(name), point=(0.0, 0.0, 0.0))] for name in NAMES},
+    )
+
+
+def test_the_verdict_and_every_number_are_on_the_page(found: Verification, tmp_path: Path) -> None:
+    page = render_verification(found, AXES)
+    assert "<b>Better</b>" in page
+    assert "trial 7 reads better" in page
+    assert "-4.0 to -4.0" in page
+    assert "50.0 %" in page
+    assert "25.0 %" in page
+    for relief in OBJECTS.values():
+        assert relief.title in page
+        assert relief.help in page
+    # Four pictures of each object from each sensor, and the figure.
+    assert len(re.findall(r'src="data:image/png', page)) == 8 * len(NAMES) + 1
+    assert write_verification_report(tmp_path / "page.html", found, AXES).read_text() == page
+    worse = render_verification(replace(found, normals=found.normals[::-1]), AXES)
+    assert "<b>Worse</b>" in worse
+
+
+def test_names_of_strangers_are_shown_and_not_obeyed(found: Verification) -> None:
+    page = render_verification(replace(found, names=(EVIL, "b")), AXES)
+    assert "<img src=x" not in page
+    assert "&lt;img src=x" in page
+
+
+def test_notes_are_told(found: Verification) -> None:
+    page = render_verification(replace(found, scale=0.5, same_places=False), AXES)
+    assert "scaled to 50 %" in page
+    assert "other skins" in page
+    assert "notice" not in re.sub(
+        r"<style>.*?</style>", "", render_verification(found, AXES), flags=re.S
+    )
+
+
+def test_the_figure_marks_the_mean_change(found: Verification) -> None:
+    axes = change_figure(found).axes[0]
+    assert [line.get_xdata()[0] for line in axes.lines[-2:-1]] == pytest.approx([-4.0])
+    assert axes.get_yticklabels()[-1].get_text() == "all"
