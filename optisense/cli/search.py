@@ -121,8 +121,13 @@ def _begun(out: Path, design: str | None, options: SearchOptions, line: Progress
     sensor = load(design)
     expect_search(line, sensor, options)
     from optisense.search import Study
+    from optisense.search.study.advice import advice
 
-    return Study.create(out, sensor, options.plan())
+    plan = options.plan()
+    hint = advice(plan.space.parameters, options.objectives)
+    if hint is not None:
+        messages.print(f"Hint: {hint}.", style="yellow", markup=False)
+    return Study.create(out, sensor, plan)
 
 
 def _resumed(out: Path, design: str | None, wanted: dict[str, Any], trust: bool) -> Study:

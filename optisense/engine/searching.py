@@ -43,6 +43,14 @@ class Search(Space, SearchOptions):
     go_on: bool = False
 
 
+class Advise(Space):
+    """See docs/engine.md."""
+
+    objectives: list[str] = Field(min_length=1)
+    method: str = "cma-es"
+    budget: int | None = Field(default=None, ge=1)
+
+
 class OfStudy(Fields):
     """A request about a study."""
 
@@ -86,6 +94,31 @@ def space(session: Session, fields: Space, job: Job) -> dict[str, Any]:
     design = design_of(session, fields, job)
     bound = SearchSpace(parse_space(fields.vary)).bind(design)
     return {"parameters": _parameters(bound)}
+
+
+@handles("advise", Advise, Lane.QUICK)
+def advise(session: Session, fields: Advise, job: Job) -> dict[str, Any]:
+    """Whether a search can succeed, and how long it takes, before it is begun."""
+    from optisense.objectives.settings import Settings
+    from optisense.objectives.usual_score import UsualTrials, usual_score
+    from optisense.search import SearchSpace
+    from optisense.search.methods import find
+    from optisense.search.space.text import parse_space
+    from optisense.search.study.advice import LIGHT_OBJECTIVES, advice
+
+    design = design_of(session, fields, job)
+    space = parse_space(fields.vary)
+    bound = SearchSpace(space).bind(design)
+    budget = fields.budget or find(fields.method).usual_budget(bound)
+    usual = usual_score(design, fields.objectives, Settings())
+    trials = UsualTrials.of(usual, usual.building + usual.whole, usual.whole)
+    against = advice(space, fields.objectives)
+    return {
+        "advice": against,
+        "fitting": [] if against is None else list(LIGHT_OBJECTIVES),
+        "trials": budget,
+        "seconds": round(trials.first + budget * trials.trial, 1),
+    }
 
 
 @handles("search", Search, Lane.OWN)

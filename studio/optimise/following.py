@@ -119,6 +119,11 @@ def has_trials() -> bool:
     return bool(_curve)
 
 
+def known_scores() -> list[float]:
+    """The scores of the trials so far; those that failed have none."""
+    return [score for score in _curve.values() if score is not None]
+
+
 def finished(result: dict[str, Any]) -> None:
     """The search is over."""
     found = bpy.context.window_manager.optisense_found

@@ -17,7 +17,7 @@ from ..evaluate import rays
 from ..evaluate.operator import draw_again
 from ..scene.paths import chosen, objective
 from ..sensor.opening import new_stage, open_stage
-from . import following
+from . import advising, following
 from .offering import NOT_OVER, new_study, study_of
 from .suggesting import suggestions
 
@@ -44,6 +44,7 @@ class OPTISENSE_OT_vary(polls.Designing, bpy.types.Operator):
             row = search.vary.add()
             row.name, row.text = self.label or self.text.partition("=")[0], self.text
             search.vary_index = len(search.vary) - 1
+            advising.choose_objective(search)
         return {"FINISHED"}
 
 
@@ -129,8 +130,13 @@ class OPTISENSE_OT_search(polls.Checked, Starting, bpy.types.Operator):
             design = handing.design(context.scene)
         except EngineError as error:
             return fail(self, error, TITLE)
-        following.begin()
         fields: dict[str, Any] = {"budget": search.budget} if search.budget else {}
+        try:
+            told = advising.advice(design, search, fields)
+        except EngineError as error:
+            return fail(self, error, TITLE)
+        following.begin()
+        bpy.context.window_manager.optisense_found.expected = told
         return start(
             self,
             TITLE,

@@ -111,6 +111,7 @@ class OPTISENSE_PG_found(bpy.types.PropertyGroup):
     )
     start: StringProperty(description="The score at the start", options={"SKIP_SAVE"})
     ended: StringProperty(description="Why it is over", options={"SKIP_SAVE"})
+    expected: StringProperty(description="How long the search takes", options={"SKIP_SAVE"})
     offer: StringProperty(description="What a study waits for", options={"SKIP_SAVE"})
 
 

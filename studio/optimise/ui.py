@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import bpy
 
-from ..engine import catalogue
+from ..engine import catalogue, session
 from ..engine.layout import SidebarPanel, labelled, paragraph, show_job, show_outcome
 from ..simulate.picture import icon
-from .following import CURVE, has_trials
+from .advising import is_flat
+from .following import CURVE, has_trials, known_scores
 
 
 class OPTISENSE_UL_vary(bpy.types.UIList):
@@ -53,7 +54,12 @@ class OPTISENSE_PT_optimise(SidebarPanel, bpy.types.Panel):
         if not show_job(row, "Searching", "Reading the study"):
             row.operator("optisense.search", icon="VIEWZOOM")
             row.operator("optisense.resume", icon="PLAY")
+        if found.expected and session.state().busy == "Searching":
+            layout.label(text=found.expected, icon="TIME")
         show_outcome(layout, "Searching", "Reading the study")
+        if is_flat(known_scores()):
+            text = "All trials score alike: the objective does not see what varies"
+            paragraph(layout, text, "ERROR")
         curve = icon(CURVE) if has_trials() else 0
         if curve:
             layout.template_icon(icon_value=curve, scale=8.0)

@@ -203,6 +203,16 @@ def test_bad_input_is_told_and_leaves_nothing(
     assert list(tmp_path.iterdir()) == []
 
 
+def test_a_search_that_can_not_succeed_is_hinted_at(tmp_path: Path) -> None:
+    words = ("gelsight-mini", "--vary", "coating.specularity=0:1", "--budget", "1")
+    found = run(*words, "--out", tmp_path / "rays", "-b", "aoap")
+    assert found.exit_code == 0, found.output
+    assert "all trials will score alike" in " ".join(found.output.split())
+    found = run("gelsight-mini", "--vary", "camera.fov=50:60", "--budget", "1",
+                "--out", tmp_path / "view", "-b", "aoap")  # fmt: skip
+    assert found.exit_code == 0 and "score alike" not in found.output
+
+
 def test_an_objective_that_always_fails(mine: Path, tmp_path: Path) -> None:
     result = run("gelsight-mini", "--vary", "coating.specularity=0:1", "-b", f"{mine}:shy",
                  "--out", tmp_path / "study", "--budget", 500)  # fmt: skip

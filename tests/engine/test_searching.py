@@ -125,6 +125,16 @@ def test_mistakes_are_told_before_anything_is_begun(engine: Any, tmp_path: Path)
     ]
 
 
+def test_what_a_search_is_worth_is_told_before(engine: Any) -> None:
+    asked = {"design": "gelsight-mini", "objectives": ["aoap"]}
+    bright = engine.ask("advise", vary=["coating.specularity=0:1"], budget=60, **asked)
+    assert "score alike" in bright["advice"] and bright["fitting"] == ["rgb2normal", "normdiff"]
+    view = engine.ask("advise", vary=["camera.fov=50:60"], **asked)
+    assert view["advice"] is None and view["fitting"] == [] and view["trials"] > 1
+    twice = engine.ask("advise", vary=["camera.fov=50:60"], budget=2 * view["trials"], **asked)
+    assert twice["seconds"] > view["seconds"] > 0.0
+
+
 def test_a_search_in_which_everything_fails_says_why(engine: Any, tmp_path: Path) -> None:
     file = tmp_path / "fails.py"
     file.write_text("def fails(evaluation):\n    raise ValueError('no luck')\n")

@@ -1,0 +1,65 @@
+"""Whether a search can succeed, and how long it takes: told before it begins."""
+
+from __future__ import annotations
+
+import re
+from typing import Any
+
+import bpy
+
+from ..core import vary
+from ..core.engine import EngineError
+from ..engine import session
+from ..scene.paths import objective
+
+BY_RAYS, BY_PICTURES = "aoap", "rgb2normal"
+"""The objectives that a search begins with: where rays go, and what the picture tells of shapes."""
+
+BRIGHTNESS = re.compile(r"coating\.|lights\.[^.]+\.(flux|colour)|materials\.[^.]+\.reflectance")
+"""Begins the paths that change brightness and colours only; the engine knows all of them."""
+
+
+def choose_objective(search: bpy.types.PropertyGroup) -> None:
+    """Let the usual objective fit what varies; one that the user has chosen stays."""
+    texts = vary.texts_of(search.vary)
+    if search.objective in (BY_RAYS, BY_PICTURES) and texts:
+        bright = all(BRIGHTNESS.match(text) for text in texts)
+        search.objective = BY_PICTURES if bright else search.objective
+
+
+def advice(design: dict[str, Any], search: bpy.types.PropertyGroup, fields: dict[str, Any]) -> str:
+    """How long a search takes, in words.
+
+    Raises:
+        EngineError: it can't succeed, or there is no engine.
+    """
+    told = session.ask_and_wait(
+        "advise",
+        design=design,
+        vary=vary.texts_of(search.vary),
+        objectives=[objective(each) for each in search.objective.split(",")],
+        method=search.method,
+        **fields,
+    )
+    if told["advice"] is not None:
+        message, _, hint = told["advice"].partition(". ")
+        raise EngineError({"kind": "SearchError", "message": message, "hint": hint})
+    return f"{told['trials']} trials usually take {duration(told['seconds'] / search.workers)}"
+
+
+def duration(seconds: float) -> str:
+    """About how long, in words."""
+    for unit, name in ((3600.0, "hours"), (60.0, "minutes")):
+        if seconds >= 1.5 * unit:
+            return f"{seconds / unit:.0f} {name}"
+    return f"{max(seconds, 1.0):.0f} seconds"
+
+
+def is_flat(scores: list[float]) -> bool:
+    """Whether all trials of a search scored alike, so that nothing is to be found."""
+    return len(scores) >= LEAST and max(scores) - min(scores) <= ALIKE * max(map(abs, scores))
+
+
+LEAST, ALIKE = 5, 1e-6
+"""Trials after which alike scores are told, and the part of a score up to which they are alike: the
+rounding of single precision."""

@@ -1,0 +1,55 @@
+"""A search whose trials can't differ is told before it is begun."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import optisense as ots
+from optisense.design import set_value
+from optisense.optics import OpticalModel
+from optisense.search.study.advice import advice, turns_no_ray
+
+BRIGHT = [
+    "coating.specularity",
+    "coating.roughness",
+    "lights.red.flux",
+    "lights.red.colour",
+    "materials.tray.reflectance",
+    "coating.library",
+]
+RAYS = ["camera.fov", "cages.skin.points", "parts.tray.shift.x", "materials.acrylic.ior"]
+
+
+def test_only_what_is_bright_is_told_from_what_turns_rays() -> None:
+    assert all(turns_no_ray(each) for each in BRIGHT)
+    assert not any(turns_no_ray(each) for each in [*RAYS, "lights.red.shift.z", "lights.model"])
+
+
+def test_chief_rays_stay_where_only_brightness_varies() -> None:
+    """What the paths are said to be, they are."""
+    design = ots.load("gelsight-mini")
+    model = OpticalModel(design)
+    before = model.chief_rays((40, 30)).points
+    for path, value in (("coating.specularity", 0.9), ("lights.red.flux", 40.0)):
+        assert turns_no_ray(path)
+        model.set_design(set_value(design, path, value))
+        np.testing.assert_array_equal(model.chief_rays((40, 30)).points, before)
+    model.set_design(set_value(design, "camera.fov", 40.0))
+    assert not np.allclose(model.chief_rays((40, 30)).points, before)
+
+
+@pytest.mark.parametrize("objectives", [["aoap"], ["aoap", "2to3pw"], ["aoap + 0.5*coverage"]])
+def test_rays_and_brightness_do_not_go_together(objectives: list[str]) -> None:
+    text = advice(["coating.specularity", "lights.red.flux"], objectives)
+    assert text is not None and "all trials will score alike" in text
+    assert "coating.specularity and lights.red.flux do not change" in text
+    assert "rgb2normal" in text
+
+
+def test_nothing_is_said_against_what_may_succeed() -> None:
+    assert advice(["coating.specularity", "camera.fov"], ["aoap"]) is None
+    assert advice(["coating.specularity"], ["rgb2normal"]) is None
+    assert advice(["coating.specularity"], ["aoap", "normdiff"]) is None
+    assert advice(["coating.specularity"], ["mine.py:own"]) is None
+    assert advice(["coating.specularity"], ["no-such-objective"]) is None  # told by others

@@ -1,0 +1,58 @@
+"""Before a search begins: whether it can succeed, which objective fits, and how long it takes."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import bpy
+import pytest
+from recording import draw
+
+from studio.engine import session
+from studio.optimise import advising, following
+from studio.optimise.ui import OPTISENSE_PT_optimise
+
+
+def test_a_search_that_can_not_succeed_is_refused(mini: Any, tmp_path: Path) -> None:
+    search = mini.optisense_search
+    bpy.ops.optisense.vary(label="Specularity", text="coating.specularity=0:1")
+    assert search.objective == "rgb2normal"  # what fits is chosen
+    search.objective, search.study = "aoap", str(tmp_path / "study")
+    with pytest.raises(RuntimeError, match="all trials will score alike"):
+        bpy.ops.optisense.search()
+    assert "rgb2normal or normdiff" in session.state().hint
+    assert not (tmp_path / "study").exists()
+
+
+def test_an_objective_that_was_chosen_stays(mini: Any) -> None:
+    search = mini.optisense_search
+    search.objective = "2to3pw"
+    bpy.ops.optisense.vary(label="Flux", text="lights.red.flux=1:9")
+    assert search.objective == "2to3pw"
+    search.objective = "aoap"
+    bpy.ops.optisense.vary(label="View", text="camera.fov=40:70")
+    assert search.objective == "aoap"
+
+
+def test_how_long_it_takes_is_told(mini: Any) -> None:
+    from studio.engine import handing
+
+    search = mini.optisense_search
+    bpy.ops.optisense.vary(label="View", text="camera.fov=40:70")
+    few = advising.advice(handing.design(mini), search, {"budget": 30})
+    assert few.startswith("30 trials usually take ")
+    assert advising.duration(7300.0) == "2 hours" and advising.duration(100.0) == "2 minutes"
+    assert advising.duration(20.0) == "20 seconds" and advising.duration(0.1) == "1 seconds"
+
+
+def test_a_flat_curve_is_told(mini: Any) -> None:
+    rows = [{"number": each, "scores": {"aoap": 0.9}, "start": each == 0} for each in range(6)]
+    following.take_curve(rows[:4])
+    assert not advising.is_flat(following.known_scores())
+    following.take_curve(rows)
+    layout = draw(OPTISENSE_PT_optimise)
+    assert layout is not None and any("All trials score alike" in text for text in layout.texts)
+    following.take_curve([*rows, {"number": 6, "scores": {"aoap": 0.91}, "start": False}])
+    assert not advising.is_flat(following.known_scores())
+    following.begin()
