@@ -29,8 +29,8 @@ if TYPE_CHECKING:
     from optisense.tasks import Dataset
 
 
-SAMPLES = "samples"
-"""The step of the progress."""
+SAMPLES, WRITING = "samples", "writing Parquet files"
+"""Steps of the progress."""
 
 SAMPLE_WORK = 0.5
 """Processor seconds that a sample of `USUAL_PIXELS` usually takes, its files included."""
@@ -54,6 +54,19 @@ def dataset(
             "damaged.",
         ),
     ] = False,
+    parquet: Annotated[
+        bool,
+        typer.Option(
+            "--parquet",
+            help="Also write all samples as Parquet files, which Hugging Face's datasets loads.",
+        ),
+    ] = False,
+    licence: Annotated[
+        str | None,
+        typer.Option(
+            metavar="ID", help="For the card of the dataset, such as cc-by-4.0.", show_default=False
+        ),
+    ] = None,
     variant: VariantOption = "auto",
 ) -> None:
     """Make a dataset of random contacts: pictures, depth, normals, masks and labels.
@@ -67,8 +80,15 @@ def dataset(
         if sensor is not None:
             pixels = math.prod(options.resolution or sensor.camera.resolution)
         work = SAMPLE_WORK * (0.5 + 0.5 * pixels / USUAL_PIXELS)
-        return sample_steps(SAMPLES, options.photons, count, work, 0.2, times=times)
+        made = sample_steps(SAMPLES, options.photons, count, work, 0.2, times=times)
+        return [*made, TimedStep(WRITING, count, 0.1)] if parquet else made
 
+    from optisense.tasks.data_card import check_licence, write_card
+    from optisense.tasks.parquet import require_parquet, write_parquet
+
+    check_licence(licence)
+    if parquet:
+        require_parquet()
     try:
         with progress_line(*loading_steps(), *steps(UsualTimes.here())) as line:
             line.begin(LOADING)
@@ -79,6 +99,10 @@ def dataset(
             model = sensor_to_press(line, design, out, variant, steps)
             show = shown_samples(line, model, SAMPLES, "reading the dataset")
             made = generate(model, out, count, settings, show, mend=mend)
+            if parquet:
+                line.begin(WRITING, text="writing Parquet files")
+                write_parquet(made)
+            write_card(made, licence)
     except KeyboardInterrupt:
         from optisense.tasks.dataset import LABELS, Dataset
 

@@ -8,8 +8,9 @@ from __future__ import annotations
 
 import sys
 
-OPTIONAL = ("OCP", "dask", "distributed", "lxml", "networkx", "pyluxcore", "pyte")
-"""Top-level modules of the extras `step`, `dask` and `bench`, and of the tests' own readers."""
+OPTIONAL = ("OCP", "dask", "distributed", "lxml", "networkx", "pyarrow", "pyluxcore", "pyte")
+"""Top-level modules of the extras `step`, `parquet`, `dask` and `bench`, and of the tests' own
+readers."""
 
 for name in OPTIONAL:
     sys.modules[name] = None  # type: ignore[assignment]  # an import of it fails, and none finds it

@@ -1,0 +1,117 @@
+"""The card of a dataset: what it is, for people and for hubs of datasets, as README.md."""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from pathlib import Path
+
+from optisense.errors import TaskError
+from optisense.tasks.dataset import Dataset
+from optisense.tasks.parquet import FOLDER
+from optisense.tasks.splits import SPLITS
+from optisense.text import markdown
+from optisense.writing import write_text
+
+CARD = "README.md"
+
+OURS = "<!-- Written by optisense dataset. Without this line the file is left as it is. -->"
+
+LICENCE = re.compile(r"[A-Za-z0-9][A-Za-z0-9.+-]{0,63}")
+
+SIZES = (("n<1K", 1_000), ("1K<n<10K", 10_000), ("10K<n<100K", 100_000), ("100K<n<1M", 1_000_000))
+"""Words of hubs for the number of samples, and the number below which each holds."""
+
+
+def check_licence(licence: str | None) -> None:
+    """Raise where a licence is no identifier.
+
+    Raises:
+        TaskError: says how one looks.
+    """
+    if licence is not None and not LICENCE.fullmatch(licence):
+        raise TaskError(
+            f"'{licence}' is no identifier of a licence",
+            hint="Write it as SPDX does, such as cc-by-4.0, cc0-1.0 or mit",
+        )
+
+
+def write_card(dataset: Dataset, licence: str | None = None) -> Path | None:
+    """Write the card into the dataset's folder.
+
+    Args:
+        dataset: as it is on disk.
+        licence: an identifier such as cc-by-4.0; None says that none was chosen, or leaves that of
+            the card that is there.
+
+    Returns:
+        The file; None where somebody else wrote it, so that it was left as it is.
+
+    Raises:
+        TaskError: the licence is no identifier.
+        OutputError: it can't be written.
+    """
+    check_licence(licence)
+    path = dataset.folder / CARD
+    if path.exists():
+        before = path.read_text(encoding="utf-8", errors="replace")
+        if OURS not in before:
+            return None
+        known = re.search(rf"^license: ({LICENCE.pattern})$", before, re.MULTILINE)
+        if licence is None and known is not None and known[1] != "unknown":
+            licence = known[1]
+    write_text(path, card_text(dataset, licence))
+    return path
+
+
+def card_text(dataset: Dataset, licence: str | None = None) -> str:
+    """The card as Markdown, with a head of YAML that hubs read."""
+    info, settings = dataset.info, dataset.info["settings"]
+    contacts = settings["contacts"]
+    counts = Counter(row["split"] for row in dataset.labels)
+    splits = [name for name in SPLITS if counts[name]]
+    size = next((word for word, below in SIZES if len(dataset) < below), "n>1M")
+    head = ["---", f"license: {licence or 'unknown'}", "tags:", "- tactile", "- synthetic"]
+    head += ["size_categories:", f"- {size}"]
+    if (dataset.folder / FOLDER).is_dir():
+        head += ["configs:", "- config_name: default", "  data_files:"]
+        for name in splits:
+            head += [f"  - split: {name}", f"    path: {FOLDER}/{name}-*.parquet"]
+    width, height = settings["resolution"]
+    versions = ", ".join(
+        f"{markdown(str(name))} {markdown(str(text))}" for name, text in info["made_with"].items()
+    )
+    indenters = ", ".join(markdown(str(text)) for text in contacts["indenters"])
+    fitted = (info.get("camera") or {}).get("fitted")
+    rows = [
+        ("sensor", markdown(info["design_name"])),
+        ("samples", f"{len(dataset):,}, and {len(dataset.failures):,} that could not be made"),
+        ("splits", ", ".join(f"{name} {counts[name]:,}" for name in splits) or "none"),
+        ("held out", ", ".join(map(markdown, settings.get("hold_out") or [])) or "no indenter"),
+        ("pictures", f"{width} x {height} pixels, exposure {info['exposure']:.6g}"),
+        ("indenters", indenters),
+        ("depth", f"{contacts['depth'][0]:g} to {contacts['depth'][1]:g} mm"),
+        ("rotation", f"{contacts['rotation'][0]:g} to {contacts['rotation'][1]:g} degrees"),
+        ("tilt", f"{contacts['tilt']:g} degrees at most"),
+        ("skin", markdown(str(settings.get("skin", "conforming")))),
+        ("light", f"{settings['photons']:,} photons, {markdown(settings['estimator'])}"),
+        ("noise of the camera", f"{settings['camera_noise']:g} of 255 levels, added"),
+        ("seed", str(settings["seed"])),
+        ("made with", versions),
+        ("licence", licence or "not chosen: say under which one others may use it"),
+    ]
+    if fitted is not None:
+        error = fitted["error"]
+        rows.append(("pinhole in dataset.json", f"{error['rms_mm']:.3g} mm off (root mean square)"))
+    table = "\n".join(f"| {name} | {text} |" for name, text in rows)
+    return "\n".join([*head, "---", "", OURS, ""]) + (
+        f"# Simulated touches of {markdown(info['design_name'])}\n\n"
+        "Pictures of a camera-based tactile sensor into which things are pressed, with the ground "
+        "truth of each: depth, normals, points, contact mask, forces and labels. All of it is "
+        "simulated: light by photon mapping, the skin as an elastic layer where it says so.\n\n"
+        f"| | |\n|---|---|\n{table}\n\n"
+        "Lengths are in mm, angles in degrees, forces in N, pressures in MPa, in the frame of the "
+        "design in `design/`. `camera.npz` has the ray of each pixel inside the gel.\n\n"
+        "Not in it: slip, shear by tangential forces, wear, dust, and what makes one unit of a "
+        "sensor differ from another.\n"
+    )

@@ -1,0 +1,226 @@
+"""A dataset as Parquet files, which libraries of machine learning load without a script.
+
+A file is a table with a row for each sample: its picture as PNG, its arrays, its labels. The files
+tell the types of their columns as Hugging Face's `datasets` does, by its features in the metadata
+of the table; with PyArrow alone the arrays are nested lists.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+from collections.abc import Callable, Iterator, Sequence
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from optisense.errors import SetupError, TaskError
+from optisense.folders import held
+from optisense.tasks.dataset import NUMBER_COLUMNS, Dataset, Sample
+from optisense.tasks.records import write_whole
+from optisense.tasks.splits import SPLITS, TRAIN
+from optisense.untrusted_files import MOST_PICTURE, read_bytes
+from optisense.writing import inside
+
+FOLDER = "parquet"
+
+SAMPLES_OF_A_FILE = 256
+"""Number of samples in a file; at 320 x 240 pixels it has some 500 MB, the size that hubs of
+datasets advise."""
+
+SAMPLES_AT_ONCE = 16
+"""Number of samples that are in memory at once, some 60 MB at 320 x 240 pixels; they are a row
+group of the file."""
+
+OWN_FILE = re.compile(rf"(?:{'|'.join(SPLITS)})-\d{{5}}-of-\d{{5}}\.parquet")
+
+ARRAYS = {
+    "depth": ("float32", 1),
+    "mask": ("bool", 1),
+    "normals": ("float32", 3),
+    "points": ("float32", 3),
+    "pressure": ("float32", 1),
+    "penetration": ("float32", 1),
+    "displacement": ("float32", 3),
+}
+"""Arrays of a sample: their types, and the numbers of a pixel."""
+
+WHOLE = ("index", "contact_pixels", "cut", "attempt")
+TEXTS = ("indenter", "split")
+
+RENAMED = {"depth": "press_depth", "pressure": "greatest_pressure"}
+"""Labels that have the name of an array, and what they are called here."""
+
+NUMBERS = {each: RENAMED.get(each, each) for each in NUMBER_COLUMNS}
+"""Columns of numbers by label."""
+
+
+def require_parquet() -> None:
+    """Find out whether Parquet files can be written.
+
+    Raises:
+        SetupError: the extra is not installed.
+    """
+    try:
+        import pyarrow.parquet  # noqa: F401
+    except ImportError as error:
+        raise SetupError(
+            "writing Parquet files needs PyArrow, which is not installed",
+            hint="pip install 'optisense[parquet]', or leave --parquet out",
+        ) from error
+
+
+def write_parquet(
+    dataset: Dataset, progress: Callable[[int, int], None] | None = None
+) -> list[Path]:
+    """Write all samples into the folder `parquet` of a dataset, a few files for each split.
+
+    Samples of a release without splits are all in "train". Files of an earlier call go.
+
+    Args:
+        dataset: as it is on disk.
+        progress: called with the number of samples written and how many there are.
+
+    Returns:
+        The files.
+
+    Raises:
+        SetupError: the extra is not installed.
+        TaskError: a sample is damaged.
+        FolderInUseError: another process is writing to the dataset.
+        OutputError: a file can't be written.
+    """
+    require_parquet()
+    done, files = 0, []
+
+    def told(count: int) -> None:
+        nonlocal done
+        done += count
+        if progress is not None:
+            progress(done, len(dataset))
+
+    with held(dataset.folder):
+        for split in SPLITS:
+            numbers = [
+                k for k, row in enumerate(dataset.labels) if (row["split"] or TRAIN) == split
+            ]
+            count = math.ceil(len(numbers) / SAMPLES_OF_A_FILE)
+            for part in range(count):
+                of_file = numbers[part * SAMPLES_OF_A_FILE : (part + 1) * SAMPLES_OF_A_FILE]
+                name = f"{FOLDER}/{split}-{part:05d}-of-{count:05d}.parquet"
+                file = inside(dataset.folder, name)
+                write_whole(file, partial(_write, dataset=dataset, numbers=of_file, told=told))
+                files.append(file)
+        if files:
+            for other in files[0].parent.iterdir():
+                if other not in files and OWN_FILE.fullmatch(other.name):
+                    other.unlink()
+    return files
+
+
+def _write(
+    path: Path, dataset: Dataset, numbers: Sequence[int], told: Callable[[int], None]
+) -> None:
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    width, height = dataset.info["settings"]["resolution"]
+    features = features_of(int(height), int(width))
+    metadata = {"huggingface": json.dumps({"info": {"features": features}})}
+    schema = pa.schema([_field(name, each) for name, each in features.items()], metadata=metadata)
+    with pq.ParquetWriter(path, schema, compression="zstd") as writer:
+        for start in range(0, len(numbers), SAMPLES_AT_ONCE):
+            some = numbers[start : start + SAMPLES_AT_ONCE]
+            columns = _columns(dataset, some, features)
+            arrays = [columns[field.name] for field in schema]
+            writer.write_table(pa.Table.from_arrays(arrays, schema=schema))
+            told(len(some))
+
+
+def features_of(height: int, width: int) -> dict[str, Any]:
+    """The types of the columns, as Hugging Face's `datasets` writes them.
+
+    Args:
+        height, width: pixels of the pictures.
+    """
+    found: dict[str, Any] = {"image": {"_type": "Image"}}
+    for name, (dtype, channels) in ARRAYS.items():
+        shape = [height, width] if channels == 1 else [height, width, channels]
+        found[name] = {"shape": shape, "dtype": dtype, "_type": f"Array{len(shape)}D"}
+    found |= {name: {"dtype": "string", "_type": "Value"} for name in TEXTS}
+    found |= {name: {"dtype": "int64", "_type": "Value"} for name in WHOLE}
+    found |= {name: {"dtype": "float64", "_type": "Value"} for name in NUMBERS.values()}
+    return found
+
+
+def _field(name: str, feature: dict[str, Any]) -> Any:
+    """A column; those of arrays tell `datasets` their shape, and are lists to other readers."""
+    import pyarrow as pa
+
+    told = None
+    if "shape" in feature:
+        told = {
+            "ARROW:extension:name": f"datasets.features.features.{feature['_type']}ExtensionType",
+            "ARROW:extension:metadata": json.dumps([feature["shape"], feature["dtype"]]),
+        }
+    return pa.field(name, _arrow_type(feature), metadata=told)
+
+
+def _arrow_type(feature: dict[str, Any]) -> Any:
+    import pyarrow as pa
+
+    if feature["_type"] == "Image":
+        return pa.struct([("bytes", pa.binary()), ("path", pa.string())])
+    plain = {
+        "float32": pa.float32(), "float64": pa.float64(), "int64": pa.int64(),
+        "bool": pa.bool_(), "string": pa.string(),
+    }[feature["dtype"]]  # fmt: skip
+    for _ in feature.get("shape", ()):
+        plain = pa.list_(plain)
+    return plain
+
+
+def _columns(dataset: Dataset, numbers: Sequence[int], features: dict[str, Any]) -> dict[str, Any]:
+    """Samples as Arrow's arrays, by column."""
+    import pyarrow as pa
+
+    samples = [dataset[number] for number in numbers]
+    rows = [sample.labels for sample in samples]
+    found: dict[str, Any] = {
+        "image": pa.array(list(_pictures(dataset, samples)), _arrow_type(features["image"]))
+    }
+    for name in ARRAYS:
+        found[name] = _nested([getattr(sample, name) for sample in samples], features[name])
+    for name, label in {**{each: each for each in (*TEXTS, *WHOLE)}, **NUMBERS}.items():
+        values = [None if row[name] != row[name] else row[name] for row in rows]  # NaN: not told
+        found[label] = pa.array(values, _arrow_type(features[label]))
+    return found
+
+
+def _pictures(dataset: Dataset, samples: Sequence[Sample]) -> Iterator[dict[str, object]]:
+    for sample in samples:
+        name = sample.labels["file_name"]
+        content = read_bytes(dataset.folder / name, MOST_PICTURE, TaskError, "the picture")
+        yield {"bytes": content, "path": Path(name).name}
+
+
+def _nested(arrays: Sequence[NDArray[Any] | None], feature: dict[str, Any]) -> Any:
+    """Arrays of one shape as nested lists; what is missing is null."""
+    import pyarrow as pa
+
+    shape = tuple(feature["shape"])
+    known = [each for each in arrays if each is not None]
+    flat = np.concatenate([np.ascontiguousarray(each).ravel() for each in known] or [np.zeros(0)])
+    values = pa.array(flat.astype(feature["dtype"]))
+    for axis in range(len(shape) - 1, 0, -1):
+        lists = len(known) * math.prod(shape[:axis])
+        offsets = np.arange(lists + 1, dtype=np.int32) * shape[axis]
+        values = pa.ListArray.from_arrays(pa.array(offsets), values)
+    ends = (np.cumsum([0, *(each is not None for each in arrays)]) * shape[0]).tolist()
+    missing = [*(each is None for each in arrays), False]
+    told = [None if gone else end for end, gone in zip(ends, missing, strict=True)]
+    return pa.ListArray.from_arrays(pa.array(told, pa.int32()), values)
