@@ -11,9 +11,11 @@ import pytest
 from optisense.optics.radiance_cache.angular_variance import (
     AngularVariance,
     angular_variance,
+    broadened_coating,
     cosine_half_width,
     mirrored_above,
     sample_direction,
+    two_discs,
 )
 from optisense.optics.scene.bsdf import CoatingBsdf, evaluate_coating
 
@@ -98,3 +100,46 @@ def test_directions_below_a_plane_are_mirrored_up() -> None:
     assert np.asarray(mirrored_above(mi.Vector3f(0.6, 0, 0.8), normal)).ravel() == pytest.approx(
         [0.6, 0, 0.8]
     )
+
+
+def test_two_discs_have_the_variances_of_the_light() -> None:
+    one, other, cosine = two_discs(light())
+    apart = np.asarray(one).ravel() - np.asarray(other).ravel()
+    within = 1 - cosine[0]
+    assert within + (apart @ ALONG / 2) ** 2 == pytest.approx(VARIANCES[0], rel=0.02)
+    assert within + (apart @ UP / 2) ** 2 == pytest.approx(VARIANCES[1], rel=0.02)
+
+
+def test_a_narrow_lobe_mirrors_long_light_as_two_discs() -> None:
+    """The mean over drawn directions, for eyes about the mirror direction; as one round disc the
+    light is nearly twice as far off.
+    """
+    coating = CoatingBsdf(
+        reflectance=mi.Color3f(0),
+        metal_eta=mi.Color3f(1.5),
+        metal_k=mi.Color3f(7.0),
+        specularity=mi.Float(1),
+        alpha=mi.Float(0.05),
+    )
+    normal = mi.Vector3f(0, 0, 1)
+    mirrored = np.array([-0.6, 0.0, 0.8])
+    ways = drawn()[:20_000]
+    cosine = mi.Float(np.linalg.norm(ways.mean(axis=0)))
+    one, other, within = two_discs(light())
+
+    def of(towards: np.ndarray | mi.Vector3f, eye: mi.Vector3f, lobe: CoatingBsdf) -> float:
+        towards = mi.Vector3f(towards.T) if isinstance(towards, np.ndarray) else towards
+        return float(np.asarray(evaluate_coating(lobe, normal, towards, eye))[0].mean())
+
+    truth, split, round_ = [], [], []
+    for along in np.linspace(-0.3, 0.3, 7):
+        for up in np.linspace(-0.2, 0.2, 5):
+            eye = mirrored + along * ALONG + up * np.array([0.8, 0.0, 0.6])
+            eye = mi.Vector3f(eye / np.linalg.norm(eye))
+            truth.append(of(ways, eye, coating))
+            lobe = broadened_coating(coating, within)
+            split.append((of(one, eye, lobe) + of(other, eye, lobe)) / 2)
+            round_.append(of(mi.Vector3f(TOWARDS), eye, broadened_coating(coating, cosine)))
+    errors = [np.sqrt(np.mean((np.array(v) - truth) ** 2)) / max(truth) for v in (split, round_)]
+    assert errors[0] < 0.09
+    assert errors[1] > 1.5 * errors[0]

@@ -14,8 +14,8 @@ from optisense import OpticalModel
 PATH = json.loads((Path(__file__).parents[1] / "assets" / "metal-patches.json").read_text())
 PHOTONS = 3_000_000
 CONTACT = {0.6: 0.03, 1.0: 0.12}
-"""RMS over patches and channels, in relation to each channel's mean: with many photons 1.2 and
-4.8 %. Where metal reflects metal as if it were paint it is 5 and 40 %."""
+"""RMS over patches and channels, in relation to each channel's mean: with many photons 1.1 and
+1.5 %. Where metal reflects metal as if it were paint it is 5 and 40 %."""
 RIM = {0.6: 0.03, 1.0: 0.2}
 """Of the row of pixels around the contact, where skin and flank mirror each other: 0.6 and 6 % with
 many photons; without the lobes of the places seen half of the light is missing at 1."""

@@ -79,6 +79,19 @@ def angular_variance(
     return AngularVariance(towards, along, dr.cross(towards, along), 2 * half - variance, variance)
 
 
+def two_discs(light: AngularVariance) -> tuple[mi.Vector3f, mi.Vector3f, mi.Float]:
+    """Two discs beside each other with the variances of a beam that is longer than wide.
+
+    Returns:
+        The mean directions of both, and the mean cosine of each with its own.
+    """
+    wide = dr.maximum(light.variance_along, light.variance_up)
+    slim = dr.maximum(dr.minimum(light.variance_along, light.variance_up), 0)
+    aside = dr.select(light.variance_along > light.variance_up, light.along, light.up)
+    aside *= dr.sqrt(dr.maximum(wide - slim, 0))
+    return dr.normalize(light.towards + aside), dr.normalize(light.towards - aside), 1 - slim
+
+
 def squared_radius(cosine: mi.Float) -> mi.Float:
     """Squared angular radius R^2 of a uniform disc of this mean cosine, which is 1 - R^2 / 4."""
     return 4 * dr.minimum(1 - cosine, MAX_SPREAD)

@@ -7,6 +7,7 @@ import mitsuba as mi
 
 from optisense.optics.backend.sequences import GOLDEN_BITS, in_series, next_random
 from optisense.optics.radiance_cache.angular_variance import (
+    AngularVariance,
     angular_variance,
     broadened_coating,
     cosine_half_width,
@@ -14,6 +15,7 @@ from optisense.optics.radiance_cache.angular_variance import (
     mirrored_above,
     sample_direction,
     squared_radius,
+    two_discs,
 )
 from optisense.optics.radiance_cache.cache import MIN_COSINE, BinnedLight
 from optisense.optics.radiance_cache.irradiance import irradiance
@@ -100,13 +102,7 @@ def sum_bins(
                 beam = angular_variance(axis, towards, cosine, height)
                 # On the undeformed surface the mean cosine is the sum's already.
                 half_width = dr.select(raised, cosine_half_width(beam, points.normal, upright), 0)
-                reflected = evaluate_coating(
-                    broadened_coating(at.coating, cosine),
-                    points.normal,
-                    towards,
-                    points.towards_eye,
-                    half_width,
-                )
+                reflected = _reflected(light, at, beam, cosine, half_width)
                 sine = dr.dot(upright, towards)
                 doubtful = sine - dr.sqrt(squared_radius(cosine)) < sky
                 weight = dr.select(doubtful, mi.Float(0), 1)
@@ -140,6 +136,28 @@ def sum_bins(
                 totals[g] += reflected * weight
         k += 1
     return totals
+
+
+def _reflected(
+    light: BinnedLight,
+    at: ShadingPoints,
+    beam: AngularVariance,
+    cosine: mi.Float,
+    half_width: mi.Float,
+) -> mi.Color3f:
+    """What the coating reflects of a beam of this mean cosine, whose cosines with the normal are
+    spread by so much. To narrow lobes, the beam is two discs.
+    """
+    points = at.seen
+
+    def of_disc(towards: mi.Vector3f, mean_cosine: mi.Float) -> mi.Color3f:
+        coating = broadened_coating(at.coating, mean_cosine)
+        return evaluate_coating(coating, points.normal, towards, points.towards_eye, half_width)
+
+    if not light.narrow_lobes:
+        return of_disc(beam.towards, cosine)
+    one, other, within = two_discs(beam)
+    return (of_disc(one, within) + of_disc(other, within)) * 0.5
 
 
 def _spared(scenes: ContactScenes, rise: mi.Float, sine: mi.Float) -> mi.Color3f:

@@ -22,6 +22,7 @@ from optisense.optics.backend.arrays import floats, indices
 from optisense.optics.radiance_cache.beams import Beams, collect_beams
 from optisense.optics.radiance_cache.direction_bins import (
     DIFFUSE_BINS,
+    FINEST_BINS,
     DirectionBins,
     bin_centres,
     direction_bin,
@@ -67,6 +68,7 @@ class RadianceCache:
             the same array as ``moments``.
         coloured: whether surfaces are coloured.
         metallic: whether a coating has a metallic lobe.
+        narrow_lobes: whether one is narrower than most lamps.
         centres: the middle direction of each bin, and its number as bits; four floats each.
         irradiance: the table of `irradiance.irradiance_table`.
         beams: the same light in short lists of beams.
@@ -84,6 +86,7 @@ class RadianceCache:
     colours: mi.Float
     coloured: bool
     metallic: bool
+    narrow_lobes: bool
     centres: mi.Float
     irradiance: mi.Float
     beams: Beams
@@ -102,6 +105,7 @@ class RadianceCache:
             bins=dr.opaque(mi.UInt32, self.bins),
             groups=self.groups,
             coloured=self.coloured,
+            narrow_lobes=self.narrow_lobes,
         )
 
 
@@ -110,7 +114,7 @@ class BinnedLight:
     """What of a radiance cache points on and near indenters read.
 
     Attributes:
-        cells, centres, irradiance, groups, coloured: as in `RadianceCache`.
+        cells, centres, irradiance, groups, coloured, narrow_lobes: as in `RadianceCache`.
         tables: the light on the surface.
         above: the light half-way up the flux layer, if there is one.
         bins: number of direction bins, as an opaque array.
@@ -124,6 +128,7 @@ class BinnedLight:
     bins: mi.UInt32
     groups: int
     coloured: bool
+    narrow_lobes: bool
 
 
 class CacheTally:
@@ -316,6 +321,7 @@ class CacheTally:
             colours=colours,
             coloured=self.coloured,
             metallic=self.metallic,
+            narrow_lobes=self.directions.across >= FINEST_BINS.across,
             centres=bin_centres(self.cells, self.directions, used),
             irradiance=table,
             beams=collect_beams(
