@@ -7,12 +7,14 @@ from pathlib import Path
 from matplotlib.figure import Figure
 
 import optisense as ots
+from optisense.design import Markers
 from optisense.geometry.contact_text import parse_contact
 from optisense.mechanics import SKINS
 
 OUT = Path(__file__).parent.parent / "docs" / "images"
 PHOTONS = 1_000_000
 RESOLUTION = 400, 300
+ENLARGED = 8
 
 
 def skins() -> None:
@@ -36,5 +38,29 @@ def skins() -> None:
     figure.savefig(OUT / "skins.jpg", dpi=150, pil_kwargs={"quality": 88})
 
 
+def markers() -> None:
+    """Dots on a GelSight Mini under a ball, and arrows of their motion."""
+    design = ots.load("gelsight-mini")
+    design.markers = Markers(grid=(11, 9), pitch=1.5, radius=0.3)
+    ball = ots.Contact(ots.Sphere(4.0), at=(0.0, 0.0), depth=1.2)
+    seen = ots.OpticalModel(design).render([ball], RESOLUTION, photons=PHOTONS)
+    figure = Figure(figsize=(8.4, 3.4), layout="constrained")
+    left, right = figure.subplots(1, 2)
+    left.imshow(seen.picture())
+    right.imshow(seen.contact_mask, cmap="Greys", vmax=4)
+    places = seen.markers
+    assert places is not None
+    motion = places.after - places.before
+    right.quiver(
+        *places.before.T, *(ENLARGED * motion.T), angles="xy", scale_units="xy", scale=1, width=4e-3
+    )
+    left.set_title("ball of 4 mm, 1.2 mm deep", fontsize=9)
+    right.set_title(f"motion of the dots, {ENLARGED} times as long, and the contact", fontsize=9)
+    for axes in (left, right):
+        axes.set_axis_off()
+    figure.savefig(OUT / "markers.png", dpi=110)
+
+
 if __name__ == "__main__":
     skins()
+    markers()

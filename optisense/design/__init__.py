@@ -18,6 +18,7 @@ from optisense.design.camera import Camera
 from optisense.design.check import check_design
 from optisense.design.emitters import AreaEmitter, IesEmitter, LightModel, SpotEmitter
 from optisense.design.lights import Light, LightGroup
+from optisense.design.markers import Markers
 from optisense.design.materials import (
     Absorber,
     Coating,
@@ -46,6 +47,7 @@ __all__ = [
     "Light",
     "LightGroup",
     "LightModel",
+    "Markers",
     "Material",
     "Part",
     "Point",

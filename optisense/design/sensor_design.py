@@ -15,6 +15,7 @@ from optisense.design.camera import Camera
 from optisense.design.fields import MisfitError, Model, Name, is_left_out
 from optisense.design.kinds import KindModel
 from optisense.design.lights import LightGroup
+from optisense.design.markers import Markers
 from optisense.design.materials import CoatingModel, Material, kinds_for
 from optisense.design.part_faces import check_finishes
 from optisense.design.parts import Part, Role
@@ -84,6 +85,9 @@ class SensorDesign(Model):
         default=None,
         exclude_if=is_left_out,
         description="whether R, G and B are refracted by indices of their own",
+    )
+    markers: Markers | None = Field(
+        default=None, exclude_if=is_left_out, description="dots printed on the sensing surface"
     )
     provenance: dict[str, Provenance] = Field(
         default_factory=dict,

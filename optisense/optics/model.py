@@ -12,16 +12,18 @@ from functools import cached_property
 
 import drjit as dr
 import numpy as np
+from numpy.typing import NDArray
 
 from optisense.errors import RenderError
 from optisense.geometry import Contact, TriangleMesh
-from optisense.mechanics import ELASTIC, SKINS
+from optisense.mechanics import ELASTIC, SKINS, PressedSkin
 from optisense.optics.backend.interrupts import lets_ctrl_c_through
 from optisense.optics.backend.stages import Stage, StageCallback, fraction_done
 from optisense.optics.backend.versions import versions
 from optisense.optics.camera.projection import RayCamera
 from optisense.optics.estimators import ESTIMATORS, RADIANCE_CACHE, SPPM
 from optisense.optics.imaging.cached import ImageLayers, PixelImportance, render_cached
+from optisense.optics.imaging.markers import MarkerDots, MarkerPlaces, ink_factor
 from optisense.optics.imaging.tactile_image import RADIANCE_UNIT, TactileImage
 from optisense.optics.radiance_cache.store import CacheStore, PilotScene
 from optisense.optics.ray_model import RayModel
@@ -231,6 +233,10 @@ class OpticalModel(RayModel):
         ended = time.perf_counter()
         on_stage(Stage.DONE, 1.0, layers.photons, layers.noise)
         units = dict(zip(self.groups, layers.radiance, strict=True))
+        markers = None
+        if self.design.markers is not None:
+            factor, markers = self._marked(layers, pressed, camera)
+            units = {name: layer * factor for name, layer in units.items()}
         image = TactileImage(
             layers={
                 name: layer * self.design.lights[name].channel_flux().astype(np.float32)
@@ -244,6 +250,7 @@ class OpticalModel(RayModel):
             chain=self.picture_chain,
             indenters=_named(contacts, placed),
             pressed=pressed,
+            markers=markers,
         )
         image.settings = {
             "design": self.design.name,
@@ -270,6 +277,23 @@ class OpticalModel(RayModel):
             "versions": versions(self.variant),
         }
         return image
+
+    def _marked(
+        self, layers: ImageLayers, pressed: PressedSkin | None, camera: RayCamera
+    ) -> tuple[NDArray[np.float32], MarkerPlaces]:
+        """What the markers leave of each pixel's light (h, w, 3), and where they are seen."""
+        markers = self.design.markers
+        assert markers is not None
+        points = layers.points.astype(np.float64)
+        moved = np.zeros_like(points)
+        if pressed is not None:
+            moved = pressed.maps(points, layers.normals).displacement
+        material = points - moved
+        dots = MarkerDots.on(markers, self.surface)
+        share = dots.coverage(material)[..., None]
+        factor = 1.0 - share + share * ink_factor(markers, self.design.coating)
+        untouched = self.chief_rays((camera.width, camera.height))
+        return factor.astype(np.float32), dots.places(untouched, material, moved)
 
     def _render_sppm(
         self,

@@ -203,6 +203,9 @@ class Sample:
     Of an elastic skin also, all float32 and NaN where no skin is seen (None for other skins):
     pressure: MPa. penetration: mm that the undeformed skin lies inside the indenter, 0 elsewhere.
     displacement: (h, w, 3) mm by which the skin behind a pixel has moved, in the design's frame.
+
+    Of a design with markers, markers: (n, 4) column and row in pixels at which each is seen in the
+    untouched sensor, and in this sample; NaN where it is not seen.
     """
 
     image: NDArray[np.uint8]
@@ -214,6 +217,7 @@ class Sample:
     pressure: NDArray[np.float32] | None = None
     penetration: NDArray[np.float32] | None = None
     displacement: NDArray[np.float32] | None = None
+    markers: NDArray[np.float32] | None = None
 
 
 @dataclass(frozen=True)
@@ -281,6 +285,7 @@ class Dataset:
             pressure=arrays.get("pressure"),
             penetration=arrays.get("penetration"),
             displacement=arrays.get("displacement"),
+            markers=self._markers(arrays, labels["arrays"]),
         )
 
     def __iter__(self) -> Iterator[Sample]:
@@ -337,6 +342,18 @@ class Dataset:
                 hint=MAKE_AGAIN,
             )
         return path
+
+    def _markers(self, arrays: Mapping[str, NDArray[Any]], name: str) -> NDArray[np.float32] | None:
+        markers = arrays.get("markers")
+        if markers is not None and (
+            markers.dtype.kind != "f" or markers.ndim != 2 or markers.shape[1] != 4
+        ):
+            raise TaskError(
+                f"the array 'markers' has the shape {markers.shape}, not (n, 4)",
+                where=str(self.folder / name),
+                hint=COPY_AGAIN,
+            )
+        return markers
 
     def _arrays(self, name: str, kinds: ArrayKinds) -> dict[str, NDArray[Any]]:
         path = self._existing(name)

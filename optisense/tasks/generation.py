@@ -396,6 +396,8 @@ class _Maker:
             press = image.settings["presses"][0]
             of_press = press["force_n"], press["area_mm2"], press["greatest_pressure_mpa"]
             force = dict(zip(force, of_press, strict=True))
+        if image.markers is not None:
+            arrays["markers"] = image.markers.rows()
         picture_file = inside(self._folder, f"images/{name}.png")
         write_whole(picture_file, lambda path: write_picture(path, picture))
         write_whole(inside(self._folder, f"arrays/{name}.npz"), partial(_save_arrays, arrays))

@@ -153,6 +153,9 @@ def full_data() -> dict[str, object]:
             },
         },
         "dispersion": True,
+        "markers": {
+            "radius": 0.3, "reflectance": [0.05, 0.04, 0.03], "grid": [4, 3], "pitch": 1.5,
+        },
         "provenance": {"parts.gel": {"status": "assumed", "source": "for the test"}},
     }  # fmt: skip
 

@@ -11,7 +11,7 @@ import pytest
 import yaml
 from pydantic import BaseModel
 
-from optisense.design import Camera, SensorDesign, load_design, save_design, set_value
+from optisense.design import Camera, Markers, SensorDesign, load_design, save_design, set_value
 from optisense.design.cage import Share
 from optisense.design.kinds import KindModel
 from optisense.errors import DesignError, MeshError, OutputError
@@ -67,7 +67,9 @@ class TestRoundTrip:
     def test_the_test_design_uses_every_field(
         self, design: SensorDesign, other_cameras: list[Camera]
     ) -> None:
-        assert used_fields(design) | used_fields(other_cameras) == all_fields()
+        listed = Markers(radius=0.3, places=[(0.0, 1.0)])
+        used = used_fields(design) | used_fields(other_cameras) | used_fields(listed)
+        assert used == all_fields()
 
     def test_every_field_comes_back(
         self, design: SensorDesign, folder: Path, other_cameras: list[Camera]

@@ -22,6 +22,7 @@ from optisense.errors import RenderError
 from optisense.geometry import TriangleMesh
 from optisense.mechanics import PressedSkin, SkinMaps
 from optisense.optics.camera.response import picture
+from optisense.optics.imaging.markers import MarkerPlaces
 from optisense.writing import inside, remove_own_page, written_together
 
 RADIANCE_UNIT = "mW/(mm^2 sr)"
@@ -32,6 +33,12 @@ REPORT_FILE = "report.html"
 
 PRESSURE_FILE = "pressure.npy"
 """What `TactileImage.save` writes of the pressure on an elastic skin: (h, w) float32, MPa."""
+
+MARKERS_FILE = "markers.csv"
+"""What `TactileImage.save` writes of markers: a row for each, empty where it is not seen."""
+
+MARKER_COLUMNS = "u,v,column_before,row_before,column_after,row_after,dx,dy,dz"
+"""Columns of `MARKERS_FILE`: mm on the undeformed surface, pixels from the upper left, mm."""
 
 
 @dataclass
@@ -47,7 +54,7 @@ class TactileImage:
         lights of 1 mW in every channel, from which others follow (see ``relight``). chain: of the
         camera, from radiance to the picture. indenters: what pressed in, by a name to show, in the
         design's frame (mm). pressed: forces, pressures and displacements of an elastic skin with
-        contacts.
+        contacts. markers: where the design's markers are seen, if it has any.
     """
 
     layers: dict[str, NDArray[np.float32]]
@@ -60,6 +67,7 @@ class TactileImage:
     chain: PictureChain = field(default_factory=PictureChain)
     indenters: dict[str, TriangleMesh] = field(default_factory=dict)
     pressed: PressedSkin | None = None
+    markers: MarkerPlaces | None = None
 
     def relight(self, flux: Mapping[str, ArrayLike]) -> TactileImage:
         """The same image under lights of other colours and powers; exact, with no new rendering.
@@ -137,11 +145,11 @@ class TactileImage:
 
     def save(self, folder: str | Path, exposure: float | str = "auto") -> None:
         """Write image.png, radiance.exr, normals.npy, contact_mask.npy, `layers/*.exr`, run.json,
-        and pressure.npy of an elastic skin with contacts.
+        pressure.npy of an elastic skin with contacts, and markers.csv where the design has markers.
 
         They are written under temporary names and appear when all are whole. What an earlier
-        image left in the folder goes: its pressure, layers of groups that this image does not have,
-        and the page (report.html) that was written about it. Other files stay.
+        image left in the folder goes: its pressure, markers, layers of groups that this image does
+        not have, and the page (report.html) that was written about it. Other files stay.
 
         Raises:
             OutputError: a file can't be written, for instance because the disk is full.
@@ -159,6 +167,8 @@ class TactileImage:
             np.save(stage(out / "contact_mask.npy"), self.contact_mask)
             if maps is not None:
                 np.save(stage(out / PRESSURE_FILE), maps.pressure.astype(np.float32))
+            if self.markers is not None:
+                stage(out / MARKERS_FILE).write_text(_marker_table(self.markers), encoding="utf-8")
             text = json.dumps({**self.settings, "layers": list(self.layers)}, indent=2) + "\n"
             stage(out / "run.json").write_text(text, encoding="utf-8")
             before = _layers_before(out)
@@ -166,7 +176,17 @@ class TactileImage:
                 (out / "layers" / f"{stale}.exr").unlink(missing_ok=True)
             if before and maps is None:
                 (out / PRESSURE_FILE).unlink(missing_ok=True)
+            if before and self.markers is None:
+                (out / MARKERS_FILE).unlink(missing_ok=True)
             remove_own_page(out / REPORT_FILE, "render")
+
+
+def _marker_table(markers: MarkerPlaces) -> str:
+    """The places of markers as CSV: a heading, and a row for each."""
+    values = np.hstack([markers.coordinates, markers.before, markers.after, markers.displacement])
+    lines = [MARKER_COLUMNS]
+    lines += [",".join("" if np.isnan(v) else f"{v:.5g}" for v in row) for row in values]
+    return "\n".join(lines) + "\n"
 
 
 def _layers_before(folder: Path) -> set[str]:

@@ -1,0 +1,169 @@
+"""Dots on the skin: how dark they make pixels, and where pictures show them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from optisense.design.markers import Markers
+from optisense.design.materials import CoatingModel
+from optisense.design.materials.base import GEL_INDEX
+from optisense.design.reflectance import fresnel_metal
+from optisense.errors import ContactError
+from optisense.geometry import SensingSurface
+
+if TYPE_CHECKING:
+    from optisense.optics.transport.chief_rays import ChiefRays
+
+FloatArray = NDArray[np.float64]
+
+FARTHEST = 1.5
+"""Distance of a dot from the nearest pixel's place, over the width of a pixel, from which it counts
+as unseen."""
+DEEPEST_MISS = 1.0
+"""mm that a pixel's place may lie off the skin at a dot, along its normal: a conforming skin tells
+no displacement, and the other side of a thin sensor must not count."""
+
+
+@dataclass(frozen=True, eq=False)
+class MarkerPlaces:
+    """Where a picture shows the markers.
+
+    Attributes:
+        coordinates: (n, 2) u, v on the undeformed surface, mm; markers beyond its edge are absent.
+        before: (n, 2) column and row in the untouched sensor's picture, in pixels from its upper
+            left corner; NaN where it is not seen.
+        after: (n, 2) the same with the contacts.
+        displacement: (n, 3) mm by which each has moved, in the design's frame; NaN if unseen.
+    """
+
+    coordinates: FloatArray
+    before: FloatArray
+    after: FloatArray
+    displacement: FloatArray
+
+    def rows(self) -> NDArray[np.float32]:
+        """(n, 4): column and row before, column and row after."""
+        return np.hstack([self.before, self.after]).astype(np.float32)
+
+
+@dataclass(frozen=True, eq=False)
+class MarkerDots:
+    """The markers of a design on its skin: (n, 2) coordinates, (n, 3) points and normals."""
+
+    coordinates: FloatArray
+    points: FloatArray
+    normals: FloatArray
+    radius: float
+
+    @classmethod
+    def on(cls, markers: Markers, surface: SensingSurface) -> MarkerDots:
+        """The dots that lie on the surface; those beyond its edge are left out."""
+        kept, points, normals = [], [], []
+        for u, v in markers.coordinates():
+            try:
+                spot = surface.point_at(u, v)
+            except ContactError:
+                continue
+            kept.append((u, v))
+            points.append(spot.point)
+            normals.append(spot.inward)
+        shape = (-1, 3)
+        return cls(
+            np.array(kept, dtype=np.float64).reshape(-1, 2),
+            np.array(points, dtype=np.float64).reshape(shape),
+            np.array(normals, dtype=np.float64).reshape(shape),
+            markers.radius,
+        )
+
+    def coverage(self, material: FloatArray) -> FloatArray:
+        """(h, w) share of each pixel that a dot covers.
+
+        Args:
+            material: (h, w, 3) mm, where the skin behind a pixel was before it moved.
+        """
+        result = np.zeros(material.shape[:2])
+        if not len(self.points):
+            return result
+        seen = np.isfinite(material).all(axis=2)
+        where = material[seen]
+        _, nearest = cKDTree(self.points).query(where)
+        offset = where - self.points[nearest]
+        along = np.einsum("ni,ni->n", offset, self.normals[nearest])
+        beside = np.sqrt(np.maximum(np.einsum("ni,ni->n", offset, offset) - along**2, 0.0))
+        width = np.maximum(_pixel_width(material)[seen], 1e-9)
+        share = np.clip(0.5 + (self.radius - beside) / width, 0.0, 1.0)
+        result[seen] = np.where(np.abs(along) < DEEPEST_MISS, share, 0.0)
+        return result
+
+    def pixels(self, material: FloatArray) -> FloatArray:
+        """(n, 2) column and row at which each dot is seen; NaN where it is not."""
+        result = np.full((len(self.points), 2), np.nan)
+        seen = np.isfinite(material).all(axis=2)
+        if not seen.any() or not len(self.points):
+            return result
+        rows, columns = np.nonzero(seen)
+        away, nearest = cKDTree(material[seen]).query(self.points)
+        width = _pixel_width(material)
+        height, across = seen.shape
+        for number, (distance, pixel) in enumerate(zip(away, nearest, strict=True)):
+            row, column = int(rows[pixel]), int(columns[pixel])
+            if not distance <= FARTHEST * width[row, column]:
+                continue
+            left, right = max(column - 1, 0), min(column + 1, across - 1)
+            up, down = max(row - 1, 0), min(row + 1, height - 1)
+            by_column = (material[row, right] - material[row, left]) / (right - left)
+            by_row = (material[down, column] - material[up, column]) / (down - up)
+            slopes = np.column_stack([by_column, by_row])
+            step = np.zeros(2)
+            if np.isfinite(slopes).all():
+                rest = self.points[number] - material[row, column]
+                step = np.linalg.lstsq(slopes, rest, rcond=None)[0].clip(-1.0, 1.0)
+            result[number] = column + 0.5 + step[0], row + 0.5 + step[1]
+        return result
+
+    def places(self, untouched: ChiefRays, material: FloatArray, moved: FloatArray) -> MarkerPlaces:
+        """Where the dots are seen before and after.
+
+        Args:
+            untouched: chief rays of the untouched sensor.
+            material: (h, w, 3) mm, as for `coverage`.
+            moved: (h, w, 3) mm, the displacement behind each pixel.
+        """
+        at_rest = np.where(untouched.hit[..., None], untouched.points, np.nan).astype(np.float64)
+        after = self.pixels(material)
+        displacement = np.full((len(self.points), 3), np.nan)
+        known = np.isfinite(after).all(axis=1)
+        column, row = (
+            after[known, k].astype(np.int64).clip(0, size - 1)
+            for k, size in ((0, moved.shape[1]), (1, moved.shape[0]))
+        )
+        displacement[known] = moved[row, column]
+        return MarkerPlaces(self.coordinates, self.pixels(at_rest), after, displacement)
+
+
+def ink_factor(markers: Markers, coating: CoatingModel) -> FloatArray:
+    """(3,) what a dot's ink reflects over what the coating reflects straight on, for R, G, B.
+
+    Dots darken light by this factor: exact for a diffuse coating but for light between surfaces.
+    """
+    lobe = coating.reflection()
+    diffuse = np.array(lobe.reflectance)
+    metal = fresnel_metal(
+        np.array(1.0), np.array(lobe.eta) / GEL_INDEX, np.array(lobe.k) / GEL_INDEX
+    )
+    share = lobe.specularity
+    own = (1.0 - share) * diffuse + (share * metal if share > 0.0 else 0.0)
+    return np.asarray(np.array(markers.reflectance) / np.maximum(own, 1e-6))
+
+
+def _pixel_width(material: FloatArray) -> FloatArray:
+    """(h, w) mm: the side of the patch of skin behind a pixel; 0 where it is not known."""
+    along = np.gradient(material, axis=1)
+    down = np.gradient(material, axis=0)
+    area = np.linalg.norm(np.cross(along, down), axis=2)
+    return np.asarray(np.nan_to_num(np.sqrt(area)))

@@ -1,0 +1,102 @@
+"""Dots on the skin: where pictures show them, and how dark they are."""
+
+from __future__ import annotations
+
+import csv
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from optisense import OpticalModel, load
+from optisense.design import Markers
+from optisense.errors import OptiSenseError
+from optisense.geometry import Contact, Sphere
+from optisense.optics.imaging.markers import MarkerDots, ink_factor
+from optisense.optics.imaging.tactile_image import TactileImage
+
+SIZE = (160, 120)
+BALL = Contact(Sphere(3.0), at=(0.5, 0.0), depth=0.8)
+
+
+@pytest.fixture(scope="module")
+def model() -> OpticalModel:
+    design = load("gelsight-mini")
+    design.markers = Markers(grid=(9, 7), pitch=2.0, radius=0.4)
+    return OpticalModel(design)
+
+
+@pytest.fixture(scope="module")
+def touched(model: OpticalModel) -> TactileImage:
+    return model.render([BALL], SIZE, photons=60_000)
+
+
+def test_dots_are_where_the_flat_gel_has_them(touched: TactileImage) -> None:
+    # The Mini's picture is 18.6 mm wide, u to the right and v up.
+    places = touched.markers
+    column = 80 + places.coordinates[:, 0] * 160 / 18.6
+    row = 60 - places.coordinates[:, 1] * 160 / 18.6
+    assert places.before == pytest.approx(np.column_stack([column, row]), abs=0.6)
+
+
+def test_dots_are_dark_where_the_truth_says(model: OpticalModel, touched: TactileImage) -> None:
+    plain = load("gelsight-mini")
+    without = OpticalModel(plain).render([BALL], SIZE, photons=60_000)
+    left = touched.radiance.sum(axis=2) / without.radiance.sum(axis=2)
+    column, row = np.floor(touched.markers.after).astype(int).T
+    assert left[row, column] == pytest.approx(0.06, abs=0.02)  # 0.03 over the coating's 0.5
+    ratio = ink_factor(model.design.markers, model.design.coating)
+    assert left.min() == pytest.approx(ratio[0], abs=1e-3)
+    # Dots cover pi 0.4^2 of every 4 mm^2.
+    inner = left[int(row.min()) : int(row.max()), int(column.min()) : int(column.max())]
+    assert 1 - inner.mean() == pytest.approx(0.94 * np.pi * 0.4**2 / 4.0, rel=0.15)
+
+
+def test_dots_around_a_contact_move_outward(model: OpticalModel, touched: TactileImage) -> None:
+    places = touched.markers
+    motion = places.displacement @ np.stack([model.surface.u_axis, model.surface.v_axis], axis=1)
+    away = places.coordinates - [0.5, 0.0]
+    distance = np.linalg.norm(away, axis=1)
+    outward = np.einsum("ni,ni->n", motion, away) / distance
+    ring = (distance > 1.0) & (distance < 6.0)
+    assert ring.sum() > 10
+    assert (outward[ring] > 0.005).all()  # a nearly incompressible gel has to go somewhere
+    assert outward.max() < 0.2
+    # What moves in mm moves in the picture: 8.6 pixels a mm, rows against v.
+    moved = (places.after - places.before) * [18.6 / 160, -18.6 / 160]
+    flat = distance > 3.0  # perspective shows deep dots elsewhere
+    assert moved[flat] == pytest.approx(motion[flat], abs=0.02)
+
+
+def test_nothing_moves_without_a_contact(model: OpticalModel) -> None:
+    places = model.render([], SIZE, photons=20_000).markers
+    assert places.after == pytest.approx(places.before, abs=0.05)
+    assert places.displacement == pytest.approx(0.0)
+
+
+def test_a_table_of_them_is_saved_and_goes_with_them(
+    model: OpticalModel, touched: TactileImage, tmp_path: Path
+) -> None:
+    touched.save(tmp_path)
+    with (tmp_path / "markers.csv").open() as file:
+        rows = list(csv.DictReader(file))
+    assert len(rows) == 63
+    assert float(rows[0]["column_after"]) == pytest.approx(touched.markers.after[0, 0], rel=1e-4)
+    OpticalModel(load("gelsight-mini")).render([], (32, 24), photons=20_000).save(tmp_path)
+    assert not (tmp_path / "markers.csv").exists()
+
+
+def test_dots_beyond_the_edge_are_left_out(model: OpticalModel) -> None:
+    markers = Markers(places=[(0.0, 0.0), (50.0, 0.0)], radius=0.2)
+    assert len(MarkerDots.on(markers, model.surface).points) == 1
+
+
+@pytest.mark.parametrize(
+    "fields",
+    [{}, {"grid": (2, 2)}, {"pitch": 1.0, "places": [(0, 0)]}, {"grid": (0, 2), "pitch": 1.0}],
+)
+def test_markers_that_make_no_sense_are_refused(fields: dict[str, object]) -> None:
+    design = load("gelsight-mini").model_dump()
+    design["markers"] = {"radius": 0.3, **fields}
+    with pytest.raises((OptiSenseError, ValueError), match=r"markers|grid"):
+        type(load("gelsight-mini")).model_validate(design)
