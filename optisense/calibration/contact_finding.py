@@ -48,6 +48,11 @@ SIDE = 24
 FARTHEST = 3.0
 """Radii of the first guess up to which the edge of the contact is looked for."""
 
+LABEL_RANGE = 0.75, 1.3
+"""Radii of a label between which the edge of its contact is looked for. Where light is low, the
+response to steep flanks falls off again inside the contact, and the strongest one is not at its
+edge; labels by hand are off by a tenth."""
+
 BESIDE = 2.2
 """Radii of a contact within which the skin is drawn along with it."""
 
@@ -125,7 +130,8 @@ def _contact_in(
     if size < LEAST_RADIUS:
         return None
     (column, row), asymmetry = _most_odd(response, start, size)
-    found = _edge(strength, column, row, FARTHEST * size)
+    reach = (0.0, FARTHEST) if radius is None else LABEL_RANGE
+    found = _edge(strength, column, row, (reach[0] * size, reach[1] * size))
     return FoundContact((column + 0.5, row + 0.5), found, asymmetry)
 
 
@@ -184,18 +190,20 @@ def _most_odd(
     return (float(found.x[0]), float(found.x[1])), float(found.fun)
 
 
-def _edge(strength: FloatArray, column: float, row: float, farthest: float) -> float:
-    """The radius, pixels, between the response's peak and its steepest fall."""
+def _edge(strength: FloatArray, column: float, row: float, reach: tuple[float, float]) -> float:
+    """The radius, pixels, between the response's peak and its steepest fall, within two radii."""
     rows, columns = np.mgrid[: strength.shape[0], : strength.shape[1]]
     distance = np.hypot(columns - column, rows - row)
     rings = np.round(distance).astype(np.int64).ravel()
     count = np.bincount(rings)
     profile = np.bincount(rings, strength.ravel()) / np.maximum(count, 1)
-    profile = profile[: max(3, int(farthest) + 1)]
-    peak = int(np.argmax(profile))
+    first, last = int(reach[0]), max(int(reach[1]) + 1, int(reach[0]) + 3)
+    profile = profile[:last]
+    peak = first + int(np.argmax(profile[first:]))
     fall = -np.gradient(profile)
     steepest = peak + int(np.argmax(fall[peak:]))
-    return 0.5 * (_between(profile, peak) + _between(fall, steepest))
+    found = 0.5 * (_between(profile, peak) + _between(fall, steepest))
+    return min(max(found, reach[0]), reach[1])
 
 
 def _between(values: FloatArray, top: int) -> float:

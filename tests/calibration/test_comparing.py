@@ -49,6 +49,24 @@ def test_an_odd_response_is_found_to_half_a_pixel(centre: tuple[float, float]) -
     assert found.asymmetry < 0.1
 
 
+def test_a_label_leads_past_a_response_that_is_strongest_inside_the_contact() -> None:
+    """As where light is low: flanks beyond a few degrees respond no stronger."""
+    rows, columns = np.mgrid[:120, :160] + 0.5
+    x, y = columns - 80.0, rows - 60.0
+    away = np.hypot(x, y)
+    strength = 300.0 / (25.0 + away**2) * (away <= 24.0)
+    response = np.stack([x, y, -x], axis=2) * strength[..., None]
+    plain = np.full((120, 160, 3), 120.0)
+    shown = np.clip(np.round(plain + response), 0, 255).astype(np.uint8)
+    free = find_contact(shown, plain.astype(np.uint8))
+    led = find_contact(shown, plain.astype(np.uint8), (82.0, 59.0), 22.0)
+    assert free is not None
+    assert led is not None
+    assert free.radius < 17.0
+    assert math.dist(led.centre, (80.0, 60.0)) < 0.5
+    assert 18.0 < led.radius < 26.0
+
+
 def test_no_contact_is_found_in_noise() -> None:
     rng = np.random.default_rng(3)
     plain = np.full((120, 160, 3), 120.0)
