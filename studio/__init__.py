@@ -17,6 +17,7 @@ from .export import operator as export_operator
 from .export import ui as export_ui
 from .lights import choosing as light_choosing
 from .lights import operator as light_operator
+from .lights import rows as light_rows
 from .lights import ui as light_ui
 from .lights import windows
 from .looks import drawing, footprint, section
@@ -31,7 +32,7 @@ from .scene import cages, fields, object_properties, old_files, properties
 from .sensor import cad, starting, workspace
 from .sensor import operator as sensor_operator
 from .sensor import ui as sensor_ui
-from .shapes import cage_operator, cage_warnings, reference_operator
+from .shapes import cage_operator, cage_warnings, reference_operator, skin_operator
 from .shapes import choosing as cage_choosing
 from .shapes import ui as shape_ui
 from .simulate import drafts, editors, indenters, picture, relight, viewing
@@ -62,6 +63,7 @@ MODULES = (
     sensor_operator,
     workspace,
     reference_operator,
+    skin_operator,
     cage_choosing,
     cage_operator,
     cage_warnings,
@@ -72,6 +74,7 @@ MODULES = (
     drawing,
     footprint,
     light_operator,
+    light_rows,
     windows,
     simulate_operator,
     evaluate_operator,

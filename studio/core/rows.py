@@ -2,12 +2,60 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 FloatArray = NDArray[np.float64]
+
+OFF_LINE = 0.1
+"""How far lights of one row stand beside its line at most, as a share of its length."""
+
+
+@dataclass(frozen=True)
+class Row:
+    """Lights on a line.
+
+    Attributes:
+        middle: (3,) mm, between the first and the last.
+        along: (3,) unit, from the first to the last.
+        pitch: mm, mean distance of neighbours; 0 for a single light.
+    """
+
+    middle: FloatArray
+    along: FloatArray
+    pitch: float
+
+    def places(self, count: int, pitch: float) -> FloatArray:
+        """(count, 3) mm: lights with another pitch about the same middle."""
+        shifts = (np.arange(count) - (count - 1) / 2) * pitch
+        return self.middle + shifts[:, None] * self.along
+
+
+def row_through(positions: Sequence[Sequence[float]]) -> Row | None:
+    """The row in which lights stand, in the order given; None where they stand in no row.
+
+    Args:
+        positions: (n, 3) mm. A single light is a row along x.
+    """
+    places = np.array(positions, dtype=np.float64).reshape(-1, 3)
+    if len(places) == 0:
+        return None
+    middle = (places[0] + places[-1]) / 2
+    if len(places) == 1:
+        return Row(middle, np.array((1.0, 0.0, 0.0)), 0.0)
+    _, _, axes = np.linalg.svd(places - places.mean(axis=0), full_matrices=False)
+    shares = (places - places.mean(axis=0)) @ axes[0]
+    along = axes[0] * (1.0 if shares[-1] >= shares[0] else -1.0)
+    length = float(np.ptp(shares))
+    beside = (places - places.mean(axis=0)) - np.outer(shares, axes[0])
+    if length < 1e-9 or np.linalg.norm(beside, axis=1).max() > OFF_LINE * length:
+        return None
+    middle = places.mean(axis=0) + (shares.min() + shares.max()) / 2 * axes[0]
+    return Row(middle, along, length / (len(places) - 1))
 
 
 def row_on_face(

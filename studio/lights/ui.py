@@ -16,9 +16,14 @@ class OPTISENSE_UL_light_groups(bpy.types.UIList):
 
     def draw_item(self, context, layout, data, item, icon, active_data, active_property) -> None:
         row = layout.row(align=True)
-        row.label(text=item.name, icon="LIGHT")
+        row.label(text=item.name)
         row.prop(item, "colour", text="")
         row.prop(item, "flux", text="")
+        icon = "HIDE_OFF" if item.shown else "HIDE_ON"
+        row.prop(item, "shown", text="", icon=icon, emboss=False)
+        alone = [each.name for each in data.light_groups if each.shown] == [item.name]
+        icon = "SOLO_ON" if alone else "SOLO_OFF"
+        row.operator("optisense.solo_group", text="", icon=icon, emboss=False).group = item.name
 
 
 class OPTISENSE_PT_lights(SidebarPanel, bpy.types.Panel):
@@ -41,7 +46,9 @@ class OPTISENSE_PT_lights(SidebarPanel, bpy.types.Panel):
         )  # fmt: skip
         if 0 <= design.light_group_index < len(design.light_groups):
             _group(layout.box(), design.light_groups[design.light_group_index])
-        layout.operator("optisense.set_group", icon="GROUP")
+        row = layout.row(align=True)
+        row.operator("optisense.arrange_row", icon="MOD_ARRAY")
+        row.operator("optisense.set_group", icon="GROUP")
         cameras = objects_of(scene, "CAMERA")
         if cameras:
             _camera(layout.box(), cameras[0].optisense)

@@ -61,6 +61,16 @@ when_reshaped: list[Callable[[bpy.types.Scene, bpy.types.PropertyGroup], None]] 
 """Called when the kind or a number of the lamps of a light group changes."""
 
 
+def _show(group: bpy.types.PropertyGroup, context: bpy.types.Context) -> None:
+    for each in when_group_hidden:
+        each(group.id_data, group)
+    _relight(group, context)
+
+
+when_group_hidden: list[Callable[[bpy.types.Scene, bpy.types.PropertyGroup], None]] = []
+"""Called when the light of a group is hidden or shown again."""
+
+
 def _recolour(group: bpy.types.PropertyGroup, context: bpy.types.Context) -> None:
     _redraw_group(group, context)
     _relight(group, context)
@@ -96,6 +106,10 @@ class OPTISENSE_PG_light_group(HasFields, bpy.types.PropertyGroup):
     )  # fmt: skip
     kind_name: StringProperty(options={"HIDDEN"}, default="library")
     fields: CollectionProperty(type=OPTISENSE_PG_field)
+    shown: BoolProperty(
+        name="Show", default=True, update=_show,
+        description="Show the group's lights, and its light in the picture; the design keeps them",
+    )  # fmt: skip
     drawn: StringProperty(
         description="How its lamps are drawn, as the engine has told", options={"HIDDEN"}
     )

@@ -6,6 +6,7 @@ import bpy
 
 from ..engine.layout import SidebarPanel, labelled, paragraph, show_job, show_outcome
 from ..scene.collections import objects_of
+from ..scene.contacts import sensing_surface
 from .cage_operator import active_cage
 from .cage_warnings import warnings_of
 from .reference_operator import READING
@@ -25,6 +26,8 @@ class OPTISENSE_PT_shapes(SidebarPanel, bpy.types.Panel):
         if not show_job(column, READING):
             column.operator("optisense.add_mesh", icon="IMPORT")
         column.operator("optisense.set_reference", icon="PINNED")
+        if sensing_surface(context.scene) is None:
+            column.operator("optisense.make_skin", icon="SURFACE_DATA")
         show_outcome(layout, READING)
         active = context.active_object
         if active is not None and active.optisense.kind == "PART":

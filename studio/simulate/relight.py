@@ -44,14 +44,15 @@ def shown(values: dict[str, Any]) -> None:
 
 
 def lights(scene: bpy.types.Scene) -> dict[str, Any]:
-    """All groups as they are now; one without a colour, which no design may have, is dark."""
+    """All groups as they are now; dark is one that is hidden, or without a colour, which no design
+    may have."""
     used = {each.optisense.group for each in scene.objects if each.optisense.kind == "LIGHT"}
     return {
         group.name: {
             "flux": short(group.flux),
             "colour": [short(channel) for channel in group.colour],
         }
-        if max(group.colour) > 0.0
+        if group.shown and max(group.colour) > 0.0
         else {"flux": 0.0}
         for group in scene.optisense.light_groups
         if group.name in used

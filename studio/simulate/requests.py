@@ -51,6 +51,8 @@ def take(result: dict[str, Any], *, draft: bool) -> None:
     now.is_relit = now.is_before = False
     now.file = result["files"].get("picture", "")
     now.summary = summary(result)
+    if not all(group.shown for group in scene.optisense.light_groups):
+        relight.wanted()
     _tell_unseen(result.get("unseen") or [])
     session.redraw()
 

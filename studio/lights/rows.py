@@ -1,0 +1,137 @@
+"""Rows of lights as a whole: pitch, count and length as numbers; shown, hidden, or alone."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import bpy
+from bpy.props import FloatProperty, IntProperty, StringProperty
+
+from ..core import rows
+from ..engine import polls
+from ..engine.layout import labelled
+from ..engine.operators import refuse
+from ..scene import properties
+from ..scene.collections import objects_of, select_only
+from ..scene.lamps import add_light, light_pose
+from .choosing import lights_of
+from .windows import ask_for_windows
+
+_setting = False
+
+
+def _of_one_group(context: bpy.types.Context) -> list[bpy.types.Object]:
+    """The selected lights, in the order of the design; none where they are of several groups."""
+    chosen = [each for each in objects_of(context.scene, "LIGHT") if each.select_get()]
+    return chosen if len({each.optisense.group for each in chosen}) == 1 else []
+
+
+def _pitch_changed(values: Any, context: bpy.types.Context) -> None:
+    _keep(values, "length", values.pitch * (values.count - 1))
+
+
+def _length_changed(values: Any, context: bpy.types.Context) -> None:
+    if values.count > 1:
+        _keep(values, "pitch", values.length / (values.count - 1))
+
+
+def _keep(values: Any, name: str, value: float) -> None:
+    """Let one number follow another, without the other following it back."""
+    global _setting
+    if not _setting:
+        _setting = True
+        try:
+            setattr(values, name, value)
+        finally:
+            _setting = False
+
+
+class OPTISENSE_OT_arrange_row(polls.Checked, bpy.types.Operator):
+    """Give the selected row of lights another count, pitch or length; its middle, its direction and
+    the way its lights shine stay"""
+
+    bl_idname = "optisense.arrange_row"
+    bl_label = "Arrange Row"
+    bl_options = {"REGISTER", "UNDO"}
+
+    count: IntProperty(
+        name="Count", description="How many lights", min=1, max=1000, default=1,
+        update=_pitch_changed,
+    )  # fmt: skip
+    pitch: FloatProperty(
+        name="Pitch (mm)", description="mm, between the middles of neighbours", min=0.0,
+        precision=3, default=4.0, update=_pitch_changed,
+    )  # fmt: skip
+    length: FloatProperty(
+        name="Length (mm)", description="mm, from the middle of the first to that of the last",
+        min=0.0, precision=3, update=_length_changed,
+    )  # fmt: skip
+
+    checks = (
+        polls.has_design,
+        polls.in_object_mode,
+        polls.needing(_of_one_group, "Select the lights of one row: click on their group"),
+    )
+
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        poses = [light_pose(each) for each in _of_one_group(context)]
+        self.count = len(poses)
+        row = rows.row_through([pose["position"] for pose in poses])
+        self.pitch = row.pitch if row is not None and len(poses) > 1 else self.pitch
+        return context.window_manager.invoke_props_dialog(self)
+
+    def draw(self, context: bpy.types.Context) -> None:
+        column = labelled(self.layout)
+        for name in ("count", "pitch", "length"):
+            column.prop(self, name)
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        scene, lights = context.scene, _of_one_group(context)
+        poses = [light_pose(each) for each in lights]
+        row = rows.row_through([pose["position"] for pose in poses])
+        if row is None:
+            return refuse(self, "These lights do not stand in one row; select those of one row")
+        group = scene.optisense.light_groups[lights[0].optisense.group]
+        first = poses[0]
+        for each in lights:
+            bpy.data.objects.remove(each)
+        made = []
+        for place in row.places(self.count, self.pitch):
+            pose = {**first, "position": [round(float(x), 6) + 0.0 for x in place]}
+            made.append(add_light(scene, group, pose))
+        select_only(*made)
+        ask_for_windows(scene)
+        return {"FINISHED"}
+
+
+class OPTISENSE_OT_solo_group(polls.Designing, bpy.types.Operator):
+    """Show the light of this group alone in the picture, or that of all groups again; the design
+    stays as it is"""
+
+    bl_idname = "optisense.solo_group"
+    bl_label = "Solo"
+    bl_options = {"REGISTER", "UNDO"}
+
+    group: StringProperty(name="Group", description="Whose light is shown")
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        groups = context.scene.optisense.light_groups
+        if self.group not in groups:
+            return refuse(self, f"There is no light group '{self.group}'")
+        alone = [each.name for each in groups if each.shown] == [self.group]
+        for each in groups:
+            each.shown = alone or each.name == self.group
+        if not alone:
+            select_only(*lights_of(context.scene, self.group))
+        return {"FINISHED"}
+
+
+def hide_lights(scene: bpy.types.Scene, group: bpy.types.PropertyGroup) -> None:
+    """Hide the lights of a group in 3D views, or show them, as the group says."""
+    layer = bpy.context.view_layer
+    for each in lights_of(scene, group.name):
+        if layer is not None and each.name in layer.objects:
+            each.hide_set(not group.shown)
+
+
+HOOKS = ((properties.when_group_hidden, hide_lights),)

@@ -1,0 +1,88 @@
+"""Rows of lights as a whole: pitch, count, length; hidden, or alone."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import bpy
+import numpy as np
+import pytest
+from waiting import until
+
+from studio.core import rows
+from studio.lights.choosing import lights_of
+from studio.scene.collections import objects_of, select_only
+from studio.scene.gather import gather_document
+from studio.scene.lamps import light_pose
+from studio.simulate import picture, relight
+
+
+def places(scene: Any, group: str = "red") -> np.ndarray:
+    bpy.context.view_layer.update()
+    return np.array([light_pose(each)["position"] for each in lights_of(scene, group)])
+
+
+def test_a_row_is_found_and_what_is_none_is_not() -> None:
+    way = np.array((0.6, 0.0, 0.8))
+    row = rows.row_through([way * each + (1.0, 2.0, 3.0) for each in (0.0, 2.0, 4.0)])
+    assert row is not None and row.pitch == pytest.approx(2.0)
+    np.testing.assert_allclose(row.along, way, atol=1e-12)
+    np.testing.assert_allclose(row.middle, way * 2.0 + (1.0, 2.0, 3.0))
+    np.testing.assert_allclose(row.places(2, 3.0), [row.middle - 1.5 * way, row.middle + 1.5 * way])
+    assert rows.row_through([(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)]) is None
+    assert rows.row_through([(1, 1, 1), (1, 1, 1)]) is None and rows.row_through([]) is None
+
+
+def test_count_and_pitch_keep_the_middle_and_the_aim(mini: Any) -> None:
+    select_only(*lights_of(mini, "red"))
+    before, was = places(mini), gather_document(mini)["lights"]
+    directions = {tuple(light_pose(each)["direction"]) for each in lights_of(mini, "red")}
+    assert bpy.ops.optisense.arrange_row(count=3, pitch=5.0) == {"FINISHED"}
+    after = places(mini)
+    assert len(after) == 3
+    np.testing.assert_allclose(after.mean(axis=0), before.mean(axis=0), atol=1e-4)
+    np.testing.assert_allclose(np.linalg.norm(np.diff(after, axis=0), axis=1), 5.0, atol=1e-4)
+    assert {tuple(light_pose(each)["direction"]) for each in lights_of(mini, "red")} <= directions
+    now = gather_document(mini)["lights"]
+    assert now["green"] == was["green"] and now["red"]["flux"] == was["red"]["flux"]
+    assert {each.name for each in bpy.context.selected_objects} == {
+        each.name for each in lights_of(mini, "red")
+    }
+
+
+def test_a_length_sets_the_pitch(mini: Any) -> None:
+    select_only(*lights_of(mini, "red"))
+    assert bpy.ops.optisense.arrange_row(count=5, length=10.0) == {"FINISHED"}
+    after = places(mini)
+    assert np.linalg.norm(after[-1] - after[0]) == pytest.approx(10.0, abs=1e-4)
+    select_only(*objects_of(mini, "LIGHT"))
+    with pytest.raises(RuntimeError, match="lights of one row"):
+        bpy.ops.optisense.arrange_row(count=2)
+
+
+def test_a_group_alone_is_what_the_picture_shows(mini: Any) -> None:
+    mini.optisense_simulation.size, mini.optisense_simulation.noise = "160", 50.0
+    mini.optisense_simulation.auto_exposure = False
+    assert bpy.ops.optisense.simulate() == {"FINISHED"}
+    was = gather_document(mini)["lights"]
+
+    def shown() -> np.ndarray:
+        until(lambda: relight._open is None or relight._open.done)
+        image = bpy.data.images[picture.IMAGE]
+        values = np.empty(len(image.pixels), dtype=np.float32)
+        image.pixels.foreach_get(values)
+        return values.reshape(-1, 4)[:, :3].mean(axis=0)
+
+    whole = shown()
+    assert bpy.ops.optisense.solo_group(group="red") == {"FINISHED"}
+    red = shown()
+    assert red[0] > 0.5 * whole[0] and red[1] < 0.5 * whole[1] and red[2] < 0.5 * whole[2]
+    assert all(each.hide_get() == (each.optisense.group != "red")
+               for each in objects_of(mini, "LIGHT"))  # fmt: skip
+    assert gather_document(mini)["lights"] == was  # the design keeps its lights
+    assert bpy.ops.optisense.simulate() == {"FINISHED"}
+    np.testing.assert_allclose(shown(), red, rtol=0.1, atol=0.01)
+    assert bpy.ops.optisense.solo_group(group="red") == {"FINISHED"}
+    np.testing.assert_allclose(shown(), whole, rtol=0.1, atol=0.01)
+    with pytest.raises(RuntimeError, match="no light group 'pink'"):
+        bpy.ops.optisense.solo_group(group="pink")
