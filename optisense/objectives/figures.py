@@ -136,6 +136,27 @@ def draw_projection_warping(score: Score) -> Figure:
     return figure
 
 
+def draw_shadow(score: Score) -> Figure:
+    """The skin that loses red, green or blue light, in that colour, for each place."""
+    maps, places = score.arrays["maps"], score.parts["places"]
+    across = int(np.ceil(len(maps) ** 0.5))
+    down = -(-len(maps) // across)
+    figure = _figure(2.4 * across, 2.1 * down)
+    grid = figure.subplots(down, across, squeeze=False).ravel()
+    for number, (axes, lost) in enumerate(zip(grid, maps, strict=False)):
+        taken = np.nan_to_num(lost)
+        none = ~taken.any(axis=2, keepdims=True)
+        shown = np.where(np.isnan(lost), 0.55, np.where(none, 0.92, 0.85 * taken))
+        axes.imshow(shown)
+        axes.set_title(f"{number + 1}: {100 * places[number]['share']:.1f} %", fontsize=10)
+        axes.set_xticks([])
+        axes.set_yticks([])
+    for axes in grid[len(maps) :]:
+        axes.set_axis_off()
+    figure.suptitle("place and the share of the skin that loses the colours shown", fontsize=11)
+    return figure
+
+
 def draw_depth(score: Score) -> Figure:
     """The depth along a row of each contact, as it is and as it is read."""
     profiles, places = score.arrays["profiles"], score.parts["places"]
@@ -175,6 +196,23 @@ def draw_coverage(score: Score) -> Figure:
     shares.set_ylim(0, 110)
     shares.set_ylabel("seen (%)")
     shares.tick_params(labelsize=8)
+    return figure
+
+
+def draw_sharpness(score: Score) -> Figure:
+    """The width of the finest line that is told apart at each pixel."""
+    detail = score.arrays["detail"]
+    known = detail[np.isfinite(detail)]
+    figure = _figure(9, 4.2)
+    picture, histogram = figure.subplots(1, 2, width_ratios=[2, 1])
+    most = float(np.percentile(known, 99))
+    _map(figure, picture, detail, "width of the finest line (mm)", 0.0, most)
+    weights = np.full(len(known), 100 / len(known))
+    histogram.hist(np.clip(known, 0.0, most), bins=50, range=(0.0, most), weights=weights)
+    histogram.axvline(score.value, color=LINE, lw=1.2)
+    histogram.set_xlabel("width of the finest line (mm)")
+    histogram.set_ylabel("pixels (%)")
+    histogram.set_title(f"mean over the skin {score.value:.3g} mm", fontsize=10)
     return figure
 
 

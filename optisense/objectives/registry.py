@@ -30,7 +30,17 @@ ENTRY_POINTS = "optisense.objectives"
 BUILT_IN = ("rgb2normal", "normdiff", "aoap", "2to3pw")
 """The four objectives of the OptiSense paper."""
 
-FURTHER = ("coverage", "distortion", "bend_radius", "reading", "depth")
+FURTHER = (
+    "coverage",
+    "distortion",
+    "bend_radius",
+    "reading",
+    "depth",
+    "sharpness",
+    "uniformity",
+    "shadow",
+    "power",
+)
 """Objectives of this package beside the paper's."""
 
 CONDITIONS, WATCHED = "conditions", "watched"
@@ -47,6 +57,10 @@ _MODULES = (
     "bend_radius",
     "reading",
     "depth",
+    "sharpness",
+    "uniformity",
+    "shadow",
+    "power",
 )
 """Modules of this package that register objectives."""
 

@@ -28,6 +28,10 @@ JUDGING = {
     "2to3pw": 0.015,
     "reading": 0.5,
     "depth": 0.6,
+    "sharpness": 0.05,
+    "uniformity": 0.02,
+    "shadow": 2.0,
+    "power": 0.0,
 }
 """Processor seconds of the built-in objectives beside rendering."""
 

@@ -55,6 +55,22 @@ class TestDepth(ObjectiveContract):
     objective = "depth"
 
 
+class TestSharpness(ObjectiveContract):
+    objective = "sharpness"
+
+
+class TestUniformity(ObjectiveContract):
+    objective = "uniformity"
+
+
+class TestShadow(ObjectiveContract):
+    objective = "shadow"
+
+
+class TestPower(ObjectiveContract):
+    objective = "power"
+
+
 class TestFromAFile(ObjectiveContract):
     @pytest.fixture(autouse=True)
     def own_file(self, tmp_path: Path) -> Iterator[None]:

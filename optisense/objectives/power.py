@@ -1,0 +1,36 @@
+"""Power: the light of all LEDs."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+from optisense.objectives.registry import objective
+
+if TYPE_CHECKING:
+    from optisense.objectives.evaluation import Evaluation
+
+
+@objective(
+    "power",
+    title="Power",
+    range=(0.0, math.inf),
+    unit="mW",
+    lower_is_better=True,
+    rays_only=True,
+)
+def power(evaluation: Evaluation) -> tuple[float, dict[str, Any]]:
+    """How many mW of light all LEDs of the sensor send out.
+
+    It is their radiant flux; the electrical power is that over the LEDs' efficiency.
+
+    Args:
+        evaluation: the sensor.
+    """
+    lights = evaluation.design.lights
+    groups = {name: group.flux * len(group.lights) for name, group in lights.items()}
+    parts = {
+        "groups": groups,
+        "lights": sum(len(group.lights) for group in lights.values()),
+    }
+    return float(sum(groups.values())), parts

@@ -1,0 +1,79 @@
+"""Sharpness: the smallest detail on the skin that the camera resolves."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from optisense.design.lenses.film import PictureWindow
+from optisense.errors import ObjectiveError
+from optisense.objectives import figures
+from optisense.objectives.distortion import LEAST_FOOTPRINTS, footprints
+from optisense.objectives.registry import objective
+
+if TYPE_CHECKING:
+    from optisense.objectives.evaluation import Evaluation
+
+LEAST_CONTRAST = 0.1
+"""The share of the contrast of fine lines that must be left for them to be told apart: the usual 10
+per cent of a lens's modulation transfer function."""
+
+LINE_OF_BLUR = math.pi / math.sqrt(2.0 * math.log(1.0 / LEAST_CONTRAST))
+"""Width of the finest line, in standard deviations of a Gaussian blur: lines of width w keep
+exp(-(pi s / w)^2 / 2) of their contrast (the Gaussian's Fourier transform at the period 2 w)."""
+
+
+@objective(
+    "sharpness",
+    title="Sharpness",
+    draw=figures.draw_sharpness,
+    beside=("pixel", "blur"),
+    range=(0.0, math.inf),
+    needs=f"{LEAST_FOOTPRINTS} footprints of pixels on the surface",
+    unit="mm",
+    lower_is_better=True,
+    rays_only=True,
+)
+def sharpness(evaluation: Evaluation) -> tuple[float, dict[str, Any], dict[str, Any]]:
+    """How many mm wide the finest lines on the skin are that the camera tells apart.
+
+    A line is at least as wide as the longer side of the footprint of a pixel of the camera, and
+    wide enough for the lens's blur to leave a tenth of the contrast; squares of both add up. The
+    value is the mean over the skin that is seen.
+
+    Args:
+        evaluation: the sensor.
+    """
+    rays = evaluation.judged_rays
+    long, wide = footprints(rays.points, rays.hit)
+    known = np.isfinite(long)
+    count = np.count_nonzero(known)
+    if count < LEAST_FOOTPRINTS:
+        raise ObjectiveError(
+            f"{count} of the {LEAST_FOOTPRINTS} footprints of pixels that it needs lie on the "
+            "sensing surface",
+            hint="Use a higher ray_resolution, or check the camera's position and direction",
+        )
+    across = rays.hit.shape[1]
+    pixel = long.astype(np.float64) * across / evaluation.design.camera.resolution[0]
+    focus = evaluation.model.picture_chain.focus
+    if focus is None:
+        blur = np.zeros_like(pixel)
+    else:
+        blur = focus.in_pixels(PictureWindow.whole(*rays.hit.shape))[:-1, :-1] * long
+    detail = np.hypot(pixel, LINE_OF_BLUR * blur)
+    area = (long * wide)[known].astype(np.float64)
+
+    def mean(values: Any) -> float:
+        return float(np.average(values[known], weights=area))
+
+    parts = {
+        "pixel": mean(pixel),
+        "blur": mean(blur),
+        "finest": float(np.percentile(detail[known], 5.0)),
+        "coarsest": float(np.percentile(detail[known], 95.0)),
+        "footprints": int(count),
+    }
+    return mean(detail), parts, {"detail": detail}

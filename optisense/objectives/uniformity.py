@@ -1,0 +1,55 @@
+"""Uniformity: how evenly each colour lights the untouched skin."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from optisense.errors import ObjectiveError
+from optisense.objectives.registry import no_pixels, objective
+
+if TYPE_CHECKING:
+    from optisense.objectives.evaluation import Evaluation
+
+DIM, BRIGHT = 5.0, 95.0
+"""Percentiles of the pixels that see the skin: what is dim and what is bright. The extremes would
+be single pixels beside a light or in a corner."""
+
+UNLIT = 0.01
+"""The share of the brightest colour's level below which a colour counts as not lit at all."""
+
+COLOURS = ("red", "green", "blue")
+
+
+@objective(
+    "uniformity",
+    title="Uniformity",
+    beside=COLOURS,
+    reads=no_pixels,
+    range=(0.0, 1.0),
+    needs="light on the skin",
+)
+def uniformity(evaluation: Evaluation) -> tuple[float, dict[str, Any], dict[str, Any]]:
+    """How evenly each colour lights the untouched skin: dim over bright, of the least even colour.
+
+    The ratio of the 5th to the 95th percentile of the linear light in the pixels that see the skin,
+    for each of red, green and blue that is lit at all; 1 is even.
+
+    Args:
+        evaluation: the sensor.
+    """
+    evaluation.view.refuse_less(evaluation.settings)
+    image = evaluation.untouched
+    light = image.radiance[np.linalg.norm(image.normals, axis=2) > 0.5].astype(np.float64)
+    dim, bright = np.percentile(light, (DIM, BRIGHT), axis=0)
+    lit = bright > UNLIT * bright.max()
+    if not lit.any():
+        raise ObjectiveError("no light arrives on the skin", hint="Check the lights")
+    ratios = {
+        name: float(low / high)
+        for name, low, high, some in zip(COLOURS, dim, bright, lit, strict=True)
+        if some
+    }
+    least = min(ratios, key=lambda name: ratios[name])
+    return ratios[least], {**ratios, "least_even": least}, {}
