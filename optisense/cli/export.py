@@ -28,6 +28,9 @@ def export(
             show_default=False,
         ),
     ] = None,
+    moulds: Annotated[
+        bool, typer.Option("--moulds", help="Also the moulds in which the gels are cast.")
+    ] = False,
 ) -> None:
     """Export a design to the workshop: its parts in mm, its LEDs and a bill of materials.
 
@@ -54,7 +57,7 @@ def export(
     for note in filter(None, (FORMATS.find(name).note for name in wanted)):
         messages.print(note, style="dim")
     notes: list[str] = []
-    files = write(sensor, out, wanted, notes)
+    files = write(sensor, out, wanted, notes, with_moulds=moulds)
     sheets = [shape.name for shape in shapes(sensor) if not shape.is_solid]
     for file in files:
         output.print(str(file), markup=False)

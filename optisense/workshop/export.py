@@ -12,6 +12,7 @@ from optisense.errors import DesignError
 from optisense.workshop.assembly_files import assembly_files
 from optisense.workshop.bill_of_materials import bill_of_materials
 from optisense.workshop.formats import FORMATS, ShapeFormat
+from optisense.workshop.moulds import moulds
 from optisense.workshop.placement import placement_csv, placements
 from optisense.workshop.shapes import Shape, shapes
 from optisense.writing import written_together
@@ -27,6 +28,8 @@ def export(
     folder: str | Path,
     formats: Sequence[str] = ("stl",),
     notes: list[str] | None = None,
+    *,
+    with_moulds: bool = False,
 ) -> list[Path]:
     """Write the deformed parts, where the LEDs go, files for each board, and the bill of materials.
 
@@ -35,12 +38,14 @@ def export(
     Args:
         formats: names in `FORMATS`.
         notes: takes what is worth telling about the files, a sentence each.
+        with_moulds: whether to write the moulds of the gels, too.
 
     Returns:
         The files, in the order of the parts.
 
     Raises:
-        DesignError: a part has no mesh, or lies outside of the cage that deforms it.
+        DesignError: a part has no mesh, or lies outside of the cage that deforms it; there is no
+            mould of a gel.
         SetupError: a format needs something that is not installed.
         OutputError: there is no such format, or the folder can't be written.
     """
@@ -50,6 +55,13 @@ def export(
     writers: dict[str, Writer] = {}
     for name in dict.fromkeys(formats):
         writers.update(_shape_writers(name, design.name, made))
+    if with_moulds:
+        cast = moulds(made)
+        halves = [half for each in cast for half in each.shapes()]
+        for name in dict.fromkeys(formats) if halves else ():
+            writers.update(_shape_writers(name, f"{design.name}-moulds", halves))
+        if notes is not None:
+            notes += [each.told() for each in cast]
     bill = bill_of_materials(design)
     placed = placements(design)
     for file, text in (

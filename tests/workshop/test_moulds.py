@@ -1,0 +1,165 @@
+"""Moulds: what they leave free is the gel, and they come off it where they say so."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+from typer.testing import CliRunner
+
+from optisense import sensors
+from optisense.cli import app
+from optisense.design import Role, SensorDesign
+from optisense.errors import DesignError
+from optisense.geometry import TriangleMesh
+from optisense.geometry.common_space import as_manifold
+from optisense.workshop.moulds import (
+    CLEARANCE,
+    FUNNEL,
+    PIN,
+    PIN_HEIGHT,
+    SIDES,
+    SPRUE,
+    VENT,
+    WALL,
+    Mould,
+    mould_of,
+    moulds,
+)
+from optisense.workshop.shapes import Shape, shapes
+
+UP = np.array([0.0, 0.0, 1.0])
+ROUND = 0.5 * SIDES * math.sin(2.0 * math.pi / SIDES)  # area of a polygon of radius 1
+
+
+def gel(mesh: trimesh.Trimesh) -> Shape:
+    made = TriangleMesh(np.asarray(mesh.vertices), np.asarray(mesh.faces, dtype=np.int32))
+    return Shape("gel", Role.ELASTOMER, "silicone", made.welded())
+
+
+def cone(low: float, high: float, height: float = 5.0) -> Shape:
+    """A round gel of radii at its bottom and its top."""
+    profile = [[0.0, 0.0], [low, 0.0], [high, height], [0.0, height]]
+    return gel(trimesh.creation.revolve(profile, sections=64))
+
+
+def common(one: TriangleMesh, other: TriangleMesh) -> float:
+    """mm^3 that two bodies share."""
+    return float((as_manifold(one) ^ as_manifold(other)).volume())
+
+
+@pytest.fixture(scope="module")
+def digit() -> SensorDesign:
+    return sensors.digit()
+
+
+@pytest.fixture(scope="module")
+def of_digit(digit: SensorDesign) -> Mould:
+    (made,) = moulds(shapes(digit))
+    return made
+
+
+def test_the_halves_leave_the_gel_free(digit: SensorDesign, of_digit: Mould) -> None:
+    (body,) = [shape for shape in shapes(digit) if shape.role is Role.ELASTOMER]
+    for half in (of_digit.front, of_digit.back):
+        assert half.is_closed and half.volume > 0.0
+        assert common(half, body.mesh) < 1e-6 * half.volume
+    assert common(of_digit.front, of_digit.back) < 1e-6 * of_digit.front.volume
+    # A smaller block around the gel is filled by the halves, but for the gel itself.
+    low, high = body.mesh.bounds
+    block = trimesh.creation.box(bounds=[low - [2, 2, 0], high + [2, 2, 2]])
+    around = gel(block).mesh
+    free = around.volume - common(around, of_digit.front) - common(around, of_digit.back)
+    assert free == pytest.approx(abs(body.mesh.volume), rel=1e-4)
+
+
+def test_the_volumes_are_those_of_box_holes_and_pins() -> None:
+    """A block of 20 x 12 x 4 mm parts at its back."""
+    made = mould_of(gel(trimesh.creation.box((20.0, 12.0, 4.0))), UP)
+    floor = (20.0 + 2.0 * WALL) * (12.0 + 2.0 * WALL)
+    hole = ROUND * (0.5 * PIN + CLEARANCE) ** 2 * (PIN_HEIGHT + CLEARANCE)
+    front = floor * (4.0 + WALL) - 960.0 - 4.0 * hole
+    assert made.front.volume == pytest.approx(front, rel=1e-6)
+    pins = 4.0 * ROUND * (0.5 * PIN) ** 2 * PIN_HEIGHT
+    # The sprue is cut from 1 mm below the mould to 0.08 mm inside the gel.
+    length = WALL + 1.0 + 0.08
+
+    def radius(at: float) -> float:
+        return 0.5 * (FUNNEL + (SPRUE - FUNNEL) * at / length)
+
+    first, last = radius(1.0), radius(1.0 + WALL)
+    funnel = ROUND * WALL * (first**2 + first * last + last**2) / 3.0
+    back = floor * WALL + pins - funnel - ROUND * (0.5 * VENT) ** 2 * WALL
+    assert made.back.volume == pytest.approx(back, rel=1e-6)
+
+
+@pytest.mark.parametrize("lift", [0.5, 3.0, 6.0])
+def test_a_half_with_draft_comes_off(lift: float) -> None:
+    body = cone(8.0, 7.0)
+    made = mould_of(body, UP)
+    assert made.upright == made.undercut == 0.0
+    lifted = made.front.with_vertices(made.front.vertices + lift * UP)
+    assert common(lifted, body.mesh) < 1e-6 * body.mesh.volume
+    assert "draft of 1 degree or more" in made.told()
+
+
+def test_upright_sides_and_undercuts_are_told() -> None:
+    upright = mould_of(cone(8.0, 8.0), UP)
+    side = 2.0 * 64 * 8.0 * math.sin(math.pi / 64) * 5.0
+    assert upright.upright == pytest.approx(side, rel=1e-6)
+    assert upright.undercut == 0.0 and "release agent" in upright.told()
+    narrow = mould_of(cone(8.0, 7.0), -UP)  # pulled the other way, it parts at its front
+    assert narrow.undercut == 0.0
+    waist = [[0.0, 0.0], [8.0, 0.0], [6.0, 2.5], [8.0, 5.0], [0.0, 5.0]]
+    made = mould_of(gel(trimesh.creation.revolve(waist, sections=64)), UP)
+    half_way = 6.0 + 8.0
+    slope = 64 * math.sin(math.pi / 64) * half_way  # sum of the sides of both rings, halved
+    height = math.hypot(2.5, 2.0 * math.cos(math.pi / 64))
+    assert made.undercut == pytest.approx(slope * height, rel=1e-6)
+    assert "undercut" in made.told()
+
+
+def test_a_turned_sensor_has_the_same_mould(of_digit: Mould, digit: SensorDesign) -> None:
+    turn = trimesh.transformations.rotation_matrix(0.7, [1.0, 2.0, 0.5])[:3, :3]
+    made = [
+        Shape(
+            each.name,
+            each.role,
+            each.material,
+            each.mesh.with_vertices(each.mesh.vertices @ turn.T),
+        )
+        for each in shapes(digit)
+    ]
+    (turned,) = moulds(made)
+    np.testing.assert_allclose(turned.pull, turn @ of_digit.pull, atol=1e-9)
+    assert turned.front.volume == pytest.approx(of_digit.front.volume, rel=1e-4)
+    assert turned.upright == pytest.approx(of_digit.upright, rel=1e-3)
+
+
+def test_what_has_no_mould_says_why() -> None:
+    ball = trimesh.creation.icosphere(subdivisions=2)
+    skin = Shape("skin", Role.SENSING_SURFACE, None, gel(ball).mesh)
+    with pytest.raises(DesignError, match="looks to all sides"):
+        moulds([skin, gel(ball)])
+    sheet = TriangleMesh(np.eye(3), np.array([[0, 1, 2]], dtype=np.int32))
+    with pytest.raises(DesignError, match="encloses no volume"):
+        mould_of(Shape("gel", Role.ELASTOMER, None, sheet), UP)
+
+
+def test_the_command_writes_the_halves_and_tells_the_draft(tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    done = CliRunner().invoke(
+        app, ["export", "gelsight-mini", "--moulds", "-f", "stl", "-f", "3mf", "-o", str(out)]
+    )
+    assert done.exit_code == 0, done.output
+    assert "gel-mould: 391 mm^2 of the gel's sides" in done.output
+    names = {file.name for file in out.iterdir()}
+    assert {"gel-mould-front.stl", "gel-mould-back.stl", "gelsight-mini-moulds.3mf"} <= names
+    front = trimesh.load(out / "gel-mould-front.stl")
+    assert front.is_watertight
+    plain = CliRunner().invoke(app, ["export", "gelsight-mini", "-o", str(tmp_path / "plain")])
+    assert plain.exit_code == 0
+    assert not [file for file in (tmp_path / "plain").iterdir() if "mould" in file.name]
