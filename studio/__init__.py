@@ -8,7 +8,7 @@ imports bpy, numpy and the standard library only.
 from __future__ import annotations
 
 from . import registration
-from .engine import catalogue, preferences, session
+from .engine import catalogue, guide, preferences, session
 from .evaluate import live as evaluate_live
 from .evaluate import operator as evaluate_operator
 from .evaluate import prop as evaluate_prop
@@ -29,7 +29,7 @@ from .optimise import operator as optimise_operator
 from .optimise import prop as optimise_prop
 from .optimise import ui as optimise_ui
 from .scene import cages, fields, object_properties, old_files, properties
-from .sensor import cad, starting, workspace
+from .sensor import cad, starting, tour, workspace
 from .sensor import operator as sensor_operator
 from .sensor import ui as sensor_ui
 from .shapes import cage_operator, cage_warnings, reference_operator, skin_operator
@@ -43,6 +43,7 @@ from .simulate import ui as simulate_ui
 MODULES = (
     preferences,
     session,
+    guide,
     catalogue,
     fields,
     properties,
@@ -62,6 +63,7 @@ MODULES = (
     cad,
     sensor_operator,
     workspace,
+    tour,
     reference_operator,
     skin_operator,
     cage_choosing,

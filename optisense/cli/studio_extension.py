@@ -19,6 +19,9 @@ MANIFEST = "blender_manifest.toml"
 OLDEST = (4, 2)
 """The oldest version of Blender that the studio runs in: the first one that has extensions."""
 
+HELP = ("studio", "cages", "library", "simulation", "objectives", "search", "workshop")
+"""Pages of the documentation that come with the extension; its buttons *Help* show them."""
+
 NOT_THERE = "should have been installed but not found"
 """What Blender says when it has installed nothing after all."""
 
@@ -67,6 +70,28 @@ def source_folder() -> Path:
     )
 
 
+def help_pages() -> Iterator[tuple[str, bytes]]:
+    """The pages of the documentation that the extension shows, by their names in the zip.
+
+    They are beside the package in a checkout, else where the wheel put them.
+
+    Raises:
+        SetupError: they are in neither place.
+    """
+    installed = Path(sysconfig.get_path("data")) / "share" / "optisense" / "docs"
+    for name in HELP:
+        file = f"{name}.md"
+        found = [each / file for each in (Path(__file__).parents[2] / "docs", installed)]
+        page = next((each for each in found if each.is_file()), None)
+        if page is None:
+            raise SetupError(
+                f"the page '{file}' of the help is not part of this installation",
+                where=str(installed),
+                hint="Install OptiSense Studio again",
+            )
+        yield f"help/{file}", page.read_bytes()
+
+
 def version_of(folder: Path) -> str:
     """The extension's version, from its manifest."""
     with (folder / MANIFEST).open("rb") as file:
@@ -78,17 +103,19 @@ def write_zip(path: Path) -> None:
 
     Raises:
         OutputError: the file can't be written.
+        SetupError: parts of the extension are not installed.
     """
     folder = source_folder()
     with (
         written_whole(path, "the extension", "Name another file") as temporary,
         zipfile.ZipFile(temporary, "w", zipfile.ZIP_DEFLATED) as archive,
     ):
-        for file in _files(folder):
-            entry = zipfile.ZipInfo(file.relative_to(folder).as_posix(), (2026, 1, 1, 0, 0, 0))
+        content = [(f.relative_to(folder).as_posix(), f.read_bytes()) for f in _files(folder)]
+        for name, data in [*content, *help_pages()]:
+            entry = zipfile.ZipInfo(name, (2026, 1, 1, 0, 0, 0))
             entry.compress_type = zipfile.ZIP_DEFLATED
             entry.external_attr = 0o644 << 16
-            archive.writestr(entry, file.read_bytes())
+            archive.writestr(entry, data)
 
 
 def _files(folder: Path) -> Iterator[Path]:

@@ -7,7 +7,7 @@ import textwrap
 import blf
 import bpy
 
-from . import session
+from . import guide, session
 
 TAB = "OptiSense"
 CHARACTERS = 46
@@ -33,6 +33,10 @@ class SidebarPanel:
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         return context.scene is not None and context.scene.optisense.is_open
+
+    def draw_header_preset(self, context: bpy.types.Context) -> None:
+        """The button at the right end of the panel's head."""
+        guide.draw_buttons(self.layout, self.bl_label)
 
 
 def labelled(layout: bpy.types.UILayout) -> bpy.types.UILayout:

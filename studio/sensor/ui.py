@@ -8,7 +8,7 @@ from ..engine import session
 from ..engine.layout import TAB, SidebarPanel, labelled, paragraph, show_job, show_other_outcomes
 from ..engine.preferences import HOW_TO_GET, engine_command
 from ..looks import footprint
-from . import cad
+from . import cad, tour
 
 
 class OPTISENSE_PT_sensor(SidebarPanel, bpy.types.Panel):
@@ -26,6 +26,7 @@ class OPTISENSE_PT_sensor(SidebarPanel, bpy.types.Panel):
             paragraph(layout, f"No engine was found. {HOW_TO_GET}.", "ERROR")
         elif session.running() is None:
             layout.operator("optisense.start_engine", icon="PLAY")
+        tour.draw(layout, context)
         layout.menu("OPTISENSE_MT_new", icon="FILE_NEW")
         cad.draw(layout)
         row = layout.row(align=True)

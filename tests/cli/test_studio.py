@@ -46,10 +46,22 @@ def test_the_zip_holds_the_extension_and_nothing_else(tmp_path: Path) -> None:
     names = set(zipfile.ZipFile(archive).namelist())
     assert {"blender_manifest.toml", "__init__.py", "core/engine.py"} <= names
     sources = {p.relative_to(ROOT / "studio").as_posix() for p in (ROOT / "studio").rglob("*.py")}
-    assert names == sources | {"blender_manifest.toml"}
+    pages = {f"help/{name}.md" for name in studio_extension.HELP}
+    assert names == sources | {"blender_manifest.toml"} | pages
+    assert archive.stat().st_size < 300_000
+    for each in pages:
+        page = zipfile.ZipFile(archive).read(each)
+        assert page == (ROOT / "docs" / Path(each).name).read_bytes()
     first = archive.read_bytes()
     run("--zip", str(archive))
     assert archive.read_bytes() == first
+
+
+def test_the_wheel_brings_the_help() -> None:
+    wheel = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["hatch"]["build"]
+    brought = wheel["targets"]["wheel"]["shared-data"]
+    for name in studio_extension.HELP:
+        assert brought[f"docs/{name}.md"] == f"share/optisense/docs/{name}.md"
 
 
 def test_the_manifest_is_what_blender_asks_for() -> None:

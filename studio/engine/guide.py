@@ -1,0 +1,115 @@
+"""Help: the page of the documentation that is about a panel, in a window of Blender's own."""
+
+from __future__ import annotations
+
+import bpy
+from bpy.props import StringProperty
+
+from ..core import guide
+from .operators import refuse
+
+NAME = "OptiSense help: "
+
+STEPS = {
+    "Sensor": ("studio", "**1 "),
+    "Shapes": ("studio", "**2 "),
+    "Materials": ("studio", "**3 "),
+    "Lights and Camera": ("studio", "**4 "),
+    "Simulate": ("studio", "**5 "),
+    "Evaluate": ("studio", "**6 "),
+    "Optimise": ("studio", "**7 "),
+    "Report and Export": ("studio", "**8 "),
+    "Cages": ("cages", ""),
+    "Library": ("library", ""),
+    "Simulation": ("simulation", ""),
+    "Objectives": ("objectives", ""),
+    "Search": ("search", ""),
+    "Workshop": ("workshop", ""),
+}
+"""Where there is help on what: the page, and how its paragraph begins."""
+
+MORE = {
+    "Shapes": "Cages",
+    "Materials": "Library",
+    "Simulate": "Simulation",
+    "Evaluate": "Objectives",
+    "Optimise": "Search",
+    "Report and Export": "Workshop",
+}
+"""The page that has more on what a panel is about."""
+
+ABOVE = 2
+"""Lines above the paragraph that the window begins with, so that it is seen where it begins."""
+
+
+def text_of(topic: str) -> tuple[bpy.types.Text, int]:
+    """A page as a text of Blender's, and the line of a topic in it.
+
+    Raises:
+        KeyError: there is no such topic.
+        OSError: the page is not there.
+    """
+    name, begins = STEPS[topic]
+    content = guide.page(name)
+    text = bpy.data.texts.get(NAME + name) or bpy.data.texts.new(NAME + name)
+    text.from_string(content)
+    line = guide.line_of(content, begins) if begins else 0
+    text.cursor_set(line)
+    return text, line
+
+
+class OPTISENSE_OT_help(bpy.types.Operator):
+    """Read what the documentation says of this; it comes with the extension"""
+
+    bl_idname = "optisense.help"
+    bl_label = "Help"
+    bl_options = {"INTERNAL"}
+
+    topic: StringProperty(name="Topic", description="A panel, or a page", default="Sensor")
+
+    @classmethod
+    def description(cls, context: bpy.types.Context, values: bpy.types.OperatorProperties) -> str:
+        return f"Read what the documentation says of: {values.topic}"
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        try:
+            text, line = text_of(self.topic)
+        except KeyError:
+            return refuse(self, f"There is no help on '{self.topic}'")
+        except OSError as error:
+            return refuse(self, f"The help can't be read: {error}")
+        if bpy.app.background:
+            return {"FINISHED"}
+        area = _text_area(context)
+        space = area.spaces.active
+        space.text = text
+        space.show_word_wrap, space.show_line_numbers = True, False
+        space.show_syntax_highlight = False
+        space.top = max(0, line - ABOVE)
+        return {"FINISHED"}
+
+
+def _text_area(context: bpy.types.Context) -> bpy.types.Area:
+    """The window that shows help already, or a new one."""
+    windows = context.window_manager.windows
+    for window in windows:
+        for area in window.screen.areas:
+            if area.type == "TEXT_EDITOR":
+                shown = area.spaces.active.text
+                if shown is not None and shown.name.startswith(NAME):
+                    return area
+    known = set(windows)
+    bpy.ops.wm.window_new()
+    window = next(each for each in context.window_manager.windows if each not in known)
+    area = window.screen.areas[0]
+    area.type = "TEXT_EDITOR"
+    return area
+
+
+def draw_buttons(layout: bpy.types.UILayout, panel: str) -> None:
+    """The help of a panel, and the page that has more, in its head."""
+    row = layout.row(align=True)
+    for topic, icon in ((panel, "QUESTION"), (MORE.get(panel, ""), "TEXT")):
+        if topic in STEPS:
+            button = row.operator("optisense.help", text="", icon=icon, emboss=False)
+            button.topic = topic

@@ -1,0 +1,90 @@
+"""A first tour: five steps from nothing to a picture under other light and its score."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import bpy
+from bpy.props import BoolProperty
+
+from ..engine.layout import paragraph
+from ..scene.collections import objects_of
+
+
+class Step(NamedTuple):
+    """What to do, and whether it is done."""
+
+    text: str
+    is_done: Callable[[bpy.types.Context], bool]
+
+
+STEPS = (
+    Step(
+        "Choose New Sensor > GelSight Mini, just below.",
+        lambda c: c.scene.optisense.is_open,
+    ),
+    Step(
+        "Open the panel Simulate and press Middle: a ball is pressed into the skin.",
+        lambda c: bool(objects_of(c.scene, "CONTACT")),
+    ),
+    Step(
+        "Press Simulate: some seconds later the picture is there that the camera takes.",
+        lambda c: c.window_manager.optisense_picture.shown,
+    ),
+    Step(
+        "Change a flux or a colour under Relight: the picture follows at once.",
+        lambda c: c.window_manager.optisense_picture.is_relit,
+    ),
+    Step(
+        "Open Evaluate, tick AOAP and press Evaluate: the arrow beside the score explains it.",
+        lambda c: bool(c.window_manager.optisense_evaluation.scores),
+    ),
+)
+"""The steps in their order."""
+
+OVER = "That was the tour. The question mark in the head of a panel tells all about it."
+
+
+class OPTISENSE_PG_tour(bpy.types.PropertyGroup):
+    """Where the tour is; never saved."""
+
+    is_on: BoolProperty(name="Tour", description="Show the next step", options={"SKIP_SAVE"})
+
+
+def step_now(context: bpy.types.Context) -> int:
+    """The number of the first step that is not done; as many as there are when all are."""
+    return next(
+        (number for number, step in enumerate(STEPS) if not step.is_done(context)), len(STEPS)
+    )
+
+
+class OPTISENSE_OT_tour(bpy.types.Operator):
+    """Take the tour: five steps to a first picture and its score; or end it"""
+
+    bl_idname = "optisense.tour"
+    bl_label = "Tour"
+    bl_options = {"INTERNAL"}
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        values = context.window_manager.optisense_tour
+        values.is_on = not values.is_on
+        return {"FINISHED"}
+
+
+def draw(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
+    """The step that comes next, or the button that begins the tour where no sensor is open."""
+    if not context.window_manager.optisense_tour.is_on:
+        if not context.scene.optisense.is_open:
+            layout.operator("optisense.tour", text="Take the Tour", icon="INFO")
+        return
+    box = layout.box()
+    number = step_now(context)
+    row = box.row()
+    over = number == len(STEPS)
+    row.label(text="Tour" if over else f"Tour: step {number + 1} of {len(STEPS)}", icon="INFO")
+    row.operator("optisense.tour", text="", icon="X", emboss=False)
+    paragraph(box, OVER if over else STEPS[number].text, boxed=True)
+
+
+PROPERTIES = {"WindowManager": {"optisense_tour": OPTISENSE_PG_tour}}
