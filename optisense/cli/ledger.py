@@ -17,6 +17,7 @@ from optisense.writing import write_text
 
 if TYPE_CHECKING:
     from optisense.optics.ledger import LightLedger
+    from optisense.optics.light_at_camera import CameraLight
     from optisense.optics.place_light import PlaceLight
 
 JSON_FILE, PAGE_FILE = "ledger.json", "ledger.html"
@@ -65,14 +66,15 @@ def ledger(
         if out is not None:
             take_folder(out)
 
-        from optisense.optics import OpticalModel
+        from optisense.optics import OpticalModel, camera_light
         from optisense.report.light_section import LightSection, ledger_page
 
         line.say("following light")
         model = OpticalModel(sensor, variant)
         section = LightSection.of(model, options.photons, options.seed, places)
         found = section.ledger
-    data = found.as_data()
+        seen = camera_light(model, options.photons, options.seed)
+    data = found.as_data() | {"camera": seen.as_data()}
     if places:
         data["places"] = [place.as_data() for place in section.places]
     text = json.dumps(data, indent=2, allow_nan=False)
@@ -82,7 +84,7 @@ def ledger(
     if as_json:
         print(text)
         return
-    _print(found)
+    _print(found, seen)
     for place in section.places:
         _print_place(place)
     if out is not None:
@@ -90,7 +92,7 @@ def ledger(
         output.print(f"page:    {out / PAGE_FILE}", markup=False)
 
 
-def _print(found: LightLedger) -> None:
+def _print(found: LightLedger, seen: CameraLight) -> None:
     groups = list(found.emitted)
     table = table_of("% of the light of", *groups)
     for where in found.places():
@@ -99,6 +101,12 @@ def _print(found: LightLedger) -> None:
             table.add_row(where, *(f"{100 * share:.2f}" for share in shares))
     table.add_row("sum", *(f"{100 * found.closing_sum(group):.2f}" for group in groups))
     table.add_row("emitted (mW)", *(f"{found.emitted[group]:.4g}" for group in groups))
+    # Of a place in the open, the camera's: what escapes has it, so that it is no part of the sum.
+    lens = (f"{1000 * seen.irradiance[group]:.3g}" for group in groups)
+    table.add_row("at the lens (µW/mm²)", *lens)
+    if seen.pupil is not None:
+        inside = (f"{1000 * seen.irradiance[group] * seen.pupil:.3g}" for group in groups)
+        table.add_row("into the lens (µW)", *inside)
     output.print(table)
     worst = max((entry.noise for entry in found.entries), default=0.0)
     output.print(f"noise of a line: at most {100 * worst:.2g} %", style="dim")

@@ -12,11 +12,13 @@ from optisense.lazy_names import load_on_first_use
 if TYPE_CHECKING:
     from optisense.optics.imaging.tactile_image import TactileImage
     from optisense.optics.ledger import LightLedger, light_ledger
+    from optisense.optics.light_at_camera import CameraLight, camera_light
     from optisense.optics.model import OpticalModel, RenderProgress
     from optisense.optics.place_light import PlaceLight, light_at
     from optisense.optics.transport.chief_rays import ChiefRays, RayOutcome
 
 _HOMES = {
+    "CameraLight": ".light_at_camera",
     "ChiefRays": ".transport.chief_rays",
     "LightLedger": ".ledger",
     "OpticalModel": ".model",
@@ -24,11 +26,13 @@ _HOMES = {
     "RayOutcome": ".transport.chief_rays",
     "RenderProgress": ".model",
     "TactileImage": ".imaging.tactile_image",
+    "camera_light": ".light_at_camera",
     "light_at": ".place_light",
     "light_ledger": ".ledger",
 }
 
 __all__ = [
+    "CameraLight",
     "ChiefRays",
     "LightLedger",
     "OpticalModel",
@@ -36,6 +40,7 @@ __all__ = [
     "RayOutcome",
     "RenderProgress",
     "TactileImage",
+    "camera_light",
     "light_at",
     "light_ledger",
 ]

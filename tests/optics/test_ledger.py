@@ -13,7 +13,8 @@ import optisense as ots
 from optisense.cli import app
 from optisense.design.materials import Absorber, Dielectric
 from optisense.errors import RenderError
-from optisense.optics import OpticalModel
+from optisense.optics import OpticalModel, camera_light
+from optisense.optics.camera.projection import RayCamera
 from optisense.optics.ledger import (
     FACETS,
     GIVEN_UP,
@@ -22,6 +23,7 @@ from optisense.optics.ledger import (
     LightLedger,
     light_ledger,
 )
+from optisense.optics.light_at_camera import projected_solid_angles
 
 PHOTONS = 200_000
 
@@ -161,3 +163,28 @@ def test_a_design_whose_lights_are_off_has_an_empty_ledger(tmp_path) -> None:  #
     assert done.exit_code == 0, done.output
     assert json.loads((out / "ledger.json").read_text())["entries"] == []
     assert "<rect" not in (out / "ledger.html").read_text(encoding="utf-8")
+
+
+def test_the_lens_gets_the_light_of_the_picture() -> None:
+    """A square view of 90 degrees has the form factor of a plate over its middle, times pi."""
+    square = RayCamera((0, 0, 0), (0, 0, 1), (0, 1, 0), 90.0, 40, 40)
+    angles = projected_solid_angles(square)
+    closed = 4 / np.pi * np.sqrt(0.5) * np.arctan(np.sqrt(0.5)) * np.pi
+    assert angles.sum() == pytest.approx(closed, rel=3e-4)
+    middle = projected_solid_angles(RayCamera((0, 0, 0), (0, 0, 1), (0, 1, 0), 90.0, 41, 41))
+    assert middle[20, 20] == pytest.approx((2 / 41) ** 2, rel=2e-3)
+
+    design = ots.load("gelsight-mini")
+    design = ots.set_value(
+        design,
+        "camera.blur",
+        {"kind": "defocus", "focal_length": 3.0, "f_number": 2.0, "focus_distance": 20.0},
+    )
+    found = camera_light(OpticalModel(design), 100_000)
+    image = OpticalModel(design).render((), (64, 48), 100_000)
+    view = projected_solid_angles(OpticalModel(design).camera((64, 48)))
+    assert found.pupil == pytest.approx(np.pi / 4 * 1.5**2)
+    for group, layer in image.layers.items():
+        mean = (layer.mean(axis=(0, 1)) * view.sum()).sum()
+        assert found.irradiance[group] == pytest.approx(mean, rel=0.15)
+        assert found.power(group) == pytest.approx(found.irradiance[group] * found.pupil)
