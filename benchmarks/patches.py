@@ -149,8 +149,8 @@ class Patches:
 
 
 def means(image: FloatArray, patch: NDArray[np.integer]) -> FloatArray:
-    """(patches, 3) means of an image (h, w, 3) over patches."""
-    return np.array([image[patch == n].mean(axis=0) for n in range(patch.max() + 1)], dtype=float)
+    """(patches, 3) means of an image (h, w, 3) over the patches that have pixels."""
+    return np.array([image[patch == n].mean(axis=0) for n in np.unique(patch[patch >= 0])])
 
 
 def compare(
@@ -176,7 +176,8 @@ def compare(
     off = mean - whole
     everywhere = truth.batches.mean(axis=0)[patch >= 0].mean(axis=0)
     ratio = images.mean(axis=0)[patch >= 0].mean(axis=0)
-    ratio = ratio / np.where(everywhere > 0, everywhere, 1.0) - 1
+    # A sensor may have no light of a colour.
+    ratio = np.where(everywhere > 0, ratio / np.where(everywhere > 0, everywhere, 1.0) - 1, 0.0)
     found = {
         "rms": float(np.sqrt(max((off**2).mean() - noise - image_noise, 0.0))),
         "worst": float(off.ravel()[np.abs(off).argmax()]),
