@@ -44,7 +44,7 @@ def depth(
     """How many mm the shape is off that a calibrated reader finds on presses new to it.
 
     The normals of the objective `reading` are integrated to depth below the untouched surface. The
-    mean absolute difference is taken over the pixels of a contact, then over places.
+    value is the median over places of the mean absolute difference over the pixels of a contact.
 
     Args:
         evaluation: the sensor.
@@ -73,10 +73,10 @@ def depth(
     parts = {
         "reading_nothing": float(np.mean([place["reading_nothing"] for place in places])),
         "worst_place": max(errors),
-        "median_of_places": float(np.median(errors)),
+        "mean_of_places": float(np.mean(errors)),
         "places": places,
     }
-    return float(np.mean(errors)), parts, {"profiles": maps}
+    return float(np.median(errors)), parts, {"profiles": maps}
 
 
 def _known(evaluation: Evaluation, read: ReadPress) -> tuple[NormalIntegrator, FloatArray]:

@@ -124,11 +124,12 @@ def test_a_press_is_read_by_what_the_others_tell(nine: Callable[..., Presses]) -
     """One place of which the channels are swapped is misread, and the others are not much worse."""
     usual = [lambertian] * 8
     odd = nine(*usual, lambda n: lambertian(n)[:, ::-1])
-    _, parts, _ = reading(odd, camera_noise=0.0)
+    value, parts, _ = reading(odd, camera_noise=0.0)
     errors = [place["error"] for place in parts["places"]]
     assert errors[8] > 15.0
     assert parts["worst_place"] == errors[8]
-    assert parts["median_of_places"] < 5.0
+    assert value == sorted(errors)[4] < 5.0
+    assert parts["mean_of_places"] == pytest.approx(np.mean(errors))
 
 
 def test_colours_that_change_steadily_over_the_picture_are_followed(
