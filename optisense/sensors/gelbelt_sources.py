@@ -31,9 +31,13 @@ def gelbelt_sources(light_design: int) -> dict[str, Provenance]:
         "materials.clear-tape.ior": (assumed, "polypropylene tape, usual value"),
         "materials.air-film.ior": (sourced, f"a thin layer of air is trapped ({paper})"),
         "materials.acrylic.ior": (sourced, "PMMA, Sultanova 2009 at 589 nm"),
-        "parts.gel": (assumed, "3 mm of silicone XP-565, as wide as the window; 36 mm assumed"),
+        "parts.gel": (
+            assumed,
+            "3 mm of silicone XP-565, as wide as the window; 36 mm assumed; drawn as far as a "
+            "quarter turn around each wheel: the belt's way back is left out",
+        ),
         "parts.skin": (assumed, "outer face of the gel where it does not lie on a wheel"),
-        "parts.tape": (assumed, "0.05 mm, usual for clear tape"),
+        "parts.tape": (assumed, "0.05 mm, usual for clear tape; drawn as far as the gel"),
         "parts.film": (assumed, "0.02 mm: any gap of more than some wavelengths does the same"),
         "parts.window": (assumed, "50 x 36 x 6 mm"),
         "parts.wheels": (

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from optisense import library
-from optisense.design import Role, SensorDesign
+from optisense.design import Role, SensorDesign, Status
 from optisense.errors import LibraryError
 from optisense.library import AnyEntry
 from optisense.library.facts import summary
@@ -183,6 +183,7 @@ def _material(design: SensorDesign, shape: Shape) -> Item:
         if medium is not None:
             note = "; ".join(filter(None, [f"index {medium.ior:g}", note]))
     volume = shape.volume
+    note = "; ".join(filter(None, [note, _drawn(design, shape)]))
     return Item(
         kind="material",
         name=name,
@@ -193,6 +194,22 @@ def _material(design: SensorDesign, shape: Shape) -> Item:
         maker=maker,
         note=note,
     )
+
+
+def _drawn(design: SensorDesign, shape: Shape) -> str:
+    """What a maker must know of how a part is drawn: a sheet has no thickness, and what is assumed
+    of it may be made otherwise.
+    """
+    sheet = "" if shape.is_solid else "a sheet without thickness"
+    return "; ".join(filter(None, [sheet, _assumed(design, shape)]))
+
+
+def _assumed(design: SensorDesign, shape: Shape) -> str:
+    """What is assumed of a part; empty where nothing is said to be."""
+    known = design.provenance.get(f"parts.{shape.name}")
+    if known is None or known.status is not Status.ASSUMED or not known.source:
+        return ""
+    return f"assumed: {known.source}"
 
 
 def _coating(design: SensorDesign, coated: Sequence[Shape]) -> list[Item]:
@@ -207,7 +224,7 @@ def _coating(design: SensorDesign, coated: Sequence[Shape]) -> list[Item]:
             used_for=f"{shape.name} ({shape.role.value})",
             description=entry.description if entry is not None else "described in the design",
             maker=(entry.maker or "") if entry is not None else "",
-            note=coating.in_words(),
+            note="; ".join(filter(None, [coating.in_words(), _assumed(design, shape)])),
         )
         for shape in coated
     ]

@@ -7,7 +7,16 @@ import io
 
 import pytest
 
-from optisense.design import Conductor, Dielectric, LightGroup, Part, Role, SensorDesign
+from optisense import sensors
+from optisense.design import (
+    Conductor,
+    Dielectric,
+    LightGroup,
+    Part,
+    Provenance,
+    Role,
+    SensorDesign,
+)
 from optisense.geometry import TriangleMesh
 from optisense.workshop import bill_of_materials
 from optisense.workshop.bill_of_materials import Item
@@ -116,3 +125,15 @@ def test_bars_and_newlines_do_not_break_the_table(flat: SensorDesign) -> None:
     design = flat.copy()
     design.name = "a | b\nc"
     assert bill_of_materials(design).markdown().splitlines()[0].endswith(r"a \| b c")
+
+
+def test_the_bill_tells_what_is_assumed_and_what_is_not_drawn() -> None:
+    belt = items(sensors.gelbelt(), "material")
+    assert "the belt's way back is left out" in belt["gel"].note
+    assert "36 mm assumed" in belt["gel"].note
+    assert belt["far-coat"].unit == "cm^2"
+    assert "a sheet without thickness" in belt["far-coat"].note
+    design = sensors.gelsight_mini().copy()
+    design.provenance["parts.gel"] = Provenance(status="sourced", source="its data sheet")
+    note = items(design, "material")["gel"].note
+    assert "assumed" not in note and "sheet" not in note
