@@ -41,6 +41,8 @@ class GivenContact(BaseModel):
     rotation: float = 0.0
     along: tuple[float, float, float] | None = None
     force: float | None = None
+    shift: tuple[float, float] | None = None
+    twist: float | None = None
 
 
 AnyContact = str | GivenContact
@@ -63,6 +65,8 @@ def contact_of(given: AnyContact) -> Contact:
         rotation=given.rotation,
         along=given.along,
         force=given.force,
+        shift=given.shift or Contact.shift,
+        twist=given.twist or Contact.twist,
     )
 
 
@@ -132,5 +136,7 @@ def plain_contact(contact: Contact, indenter: GivenIndenter) -> dict[str, Any]:
         rotation=contact.rotation,
         along=contact.along,
         force=contact.force,
+        shift=None if contact.shift == Contact.shift else contact.shift,
+        twist=contact.twist or None,
     )
     return given.model_dump(exclude_none=True)

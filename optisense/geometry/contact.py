@@ -38,6 +38,10 @@ class Contact:
             far as the surface allows.
         force: N, along the inward normal, in place of a depth: the elastic gel then decides how
             deep the indenter goes.
+        shift: (2,) mm along u and v that the indenter has moved to this place since it was pressed
+            in; the elastic skin follows as far as friction holds it.
+        twist: degrees about the outward normal, counter-clockwise seen from outside, that it has
+            turned since.
     """
 
     indenter: Indenter
@@ -47,6 +51,8 @@ class Contact:
     rotation: float = 0.0
     along: tuple[float, float, float] | None = None
     force: float | None = None
+    shift: tuple[float, float] = (0.0, 0.0)
+    twist: float = 0.0
 
     def __post_init__(self) -> None:
         if self.at is not None and self.point is not None:
@@ -66,6 +72,11 @@ class Contact:
         if self.force is not None and not (math.isfinite(self.force) and self.force > 0.0):
             raise ContactError(
                 f"the force of a contact is {self.force:g}", hint="give a force above 0, in N"
+            )
+        if len(self.shift) != 2 or not all(map(math.isfinite, (*self.shift, self.twist))):
+            raise ContactError(
+                f"the shift of a contact is {self.shift} and its twist {self.twist:g}",
+                hint="give `shift` as two numbers in mm and `twist` in degrees",
             )
         if not math.isfinite(self.rotation):
             raise ContactError("the rotation of a contact is not finite", hint="give degrees")
@@ -180,20 +191,36 @@ def available_depth(point: ArrayLike, inward: ArrayLike, gel: TriangleMesh) -> f
     return float(hits.distance[leaving][0])
 
 
+def surface_axes(
+    inward: NDArray[np.float64],
+    surface: SensingSurface,
+    along: tuple[float, float, float] | None = None,
+) -> NDArray[np.float64]:
+    """(3, 3): columns x, y, z at a place of a surface; z is outward and x runs along u.
+
+    Args:
+        inward: (3,) unit normal there.
+        surface: the surface.
+        along: direction in the design's frame that x follows instead of u.
+    """
+    z = -inward
+    way = surface.u_axis
+    if along is not None:
+        way = np.asarray(along, dtype=np.float64)
+        way = way / np.linalg.norm(way)
+    x = way - (way @ z) * z
+    if np.linalg.norm(x) < 1e-6:  # the surface has turned by 90 degrees since the origin
+        x = np.cross(surface.v_axis, z)
+    x = x / np.linalg.norm(x)
+    return np.column_stack([x, np.cross(z, x), z])
+
+
 def _axes(
     inward: NDArray[np.float64], surface: SensingSurface, contact: Contact
 ) -> NDArray[np.float64]:
     """(3, 3): columns are the indenter's x, y, z; z is outward, x along u or as told, turned."""
     z = -inward
-    along = surface.u_axis
-    if contact.along is not None:
-        along = np.asarray(contact.along, dtype=np.float64)
-        along = along / np.linalg.norm(along)
-    x = along - (along @ z) * z
-    if np.linalg.norm(x) < 1e-6:  # the surface has turned by 90 degrees since the origin
-        x = np.cross(surface.v_axis, z)
-    x = x / np.linalg.norm(x)
-    y = np.cross(z, x)
+    x, y, _ = surface_axes(inward, surface, contact.along).T
     a = math.radians(contact.rotation)
     return np.column_stack(
         [math.cos(a) * x + math.sin(a) * y, math.cos(a) * y - math.sin(a) * x, z]

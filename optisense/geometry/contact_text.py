@@ -1,6 +1,7 @@
 """Contacts written as text, for the command line.
 
-    contact  = indenter "@" place ":" ( depth | force "N" ) [ ":" rotation ]
+    contact  = indenter "@" place ":" ( depth | force "N" ) [ ":" rotation ] { ";" motion }
+    motion   = "shift=" u "," v  |  "twist=" angle
     indenter = "sphere:" radius
              | "cylinder:" radius [ "," length [ "," angle ] ]
              | "plane" [ ":" tilt_x "," tilt_y [ "," size ] ]
@@ -11,7 +12,8 @@
 
 Lengths are in mm, forces in newtons, angles in degrees; two numbers are surface coordinates, three
 are a point in the frame of the design. Examples: `sphere:1.5@0,0:0.8`, `cylinder:2@1,-3:0.5:90`,
-`plane:0,5@0,0:0.3`, `mesh:screw.stl,1000@2,2:0.4`, `sphere:3@0,0:2N`.
+`plane:0,5@0,0:0.3`, `mesh:screw.stl,1000@2,2:0.4`, `sphere:3@0,0:2N`,
+`sphere:1.5@0,0:0.8;shift=0.2,0;twist=5`.
 """
 
 from __future__ import annotations
@@ -37,6 +39,8 @@ def parse_contact(text: str) -> Contact:
         shape, separator, rest = text.strip().rpartition("@")
         if not separator:
             raise ContactError("there is no '@' before the place", hint=_FORM)
+        rest, *motions = rest.split(";")
+        shift, twist = _motion(motions)
         fields = rest.split(":")
         if len(fields) not in (2, 3):
             raise ContactError("there is no depth after the place", hint=_FORM)
@@ -46,13 +50,47 @@ def parse_contact(text: str) -> Contact:
         indenter = parse_indenter(shape)
         if len(coordinates) == 3:
             x, y, z = coordinates
-            return Contact(indenter, point=(x, y, z), depth=depth, rotation=rotation, force=force)
+            return Contact(
+                indenter,
+                point=(x, y, z),
+                depth=depth,
+                rotation=rotation,
+                force=force,
+                shift=shift,
+                twist=twist,
+            )
         u, v = coordinates
-        return Contact(indenter, at=(u, v), depth=depth, rotation=rotation, force=force)
+        return Contact(
+            indenter,
+            at=(u, v),
+            depth=depth,
+            rotation=rotation,
+            force=force,
+            shift=shift,
+            twist=twist,
+        )
     except ContactError as error:
         raise ContactError(
             error.message, where=f"contact '{text}'", hint=error.hint or _FORM
         ) from error
+
+
+def _motion(words: list[str]) -> tuple[tuple[float, float], float]:
+    """The shift and the twist of words such as `shift=0.2,0`."""
+    shift, twist = Contact.shift, Contact.twist
+    for word in words:
+        name, _, value = word.partition("=")
+        if name.strip() == "shift":
+            u, v = _numbers(value, "the shift", (2,))
+            shift = u, v
+        elif name.strip() == "twist":
+            twist = _numbers(value, "the twist", (1,))[0]
+        else:
+            raise ContactError(
+                f"'{word}' is no motion of a contact",
+                hint="Write ;shift=U,V in mm or ;twist=DEGREES",
+            )
+    return shift, twist
 
 
 def parse_place(text: str) -> tuple[float, float] | tuple[float, float, float]:

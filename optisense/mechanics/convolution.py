@@ -70,6 +70,23 @@ class GridResponse:
             z -= kernels.xz * along_x + kernels.yz * along_y
         return np.stack([self._back(each) for each in (x, y, z)])
 
+    def sideways(self, shear: FloatArray) -> FloatArray:
+        """(2, rows, columns) displacement (mm) along x and y by a shear of this shape (MPa)."""
+        kernels = self._kernels
+        along_x, along_y = self._there(shear[0]), self._there(shear[1])
+        return np.stack(
+            [
+                self._back(kernels.xx * along_x + kernels.xy * along_y),
+                self._back(kernels.xy * along_x + kernels.yy * along_y),
+            ]
+        )
+
+    def largest_sideways(self) -> float:
+        """mm by a shear of 1 MPa: no shear moves more than this over its own size (RMS)."""
+        kernels = self._kernels
+        crossed = np.abs(kernels.xy)
+        return float(max((np.abs(each) + crossed).max() for each in (kernels.xx, kernels.yy)))
+
     def _there(self, load: FloatArray) -> NDArray[np.complex128]:
         return np.asarray(fft.rfft2(load, self._padded))
 

@@ -29,9 +29,14 @@ transform."""
 
 
 class DisplacementField:
-    """Normal displacement around one contact, on a fine grid inside a coarse one.
+    """Displacement around one contact, on a fine grid inside a coarse one.
 
     Between grid points it is a cubic spline, so that slopes are smooth.
+
+    Attributes:
+        place: the grid of the pressure.
+        shear: (2, rows, columns) MPa of a dragged indenter, if it is set before `sideways` is
+            asked for.
     """
 
     def __init__(
@@ -74,6 +79,8 @@ class DisplacementField:
         wide = grid_response((counts[1], counts[0]), step, thickness, elasticity)
         self._coarse = GridSpline(wide.normal(coarse), ends[0][0], ends[1][0], step)
         # What `sideways` needs; it is asked for less often than normal displacements.
+        self.shear: FloatArray | None = None
+        self._ring = ring
         self._loads = (
             (response, np.pad(pressure, ring), (x0, y0, pitch)),
             (wide, coarse, (ends[0][0], ends[1][0], step)),
@@ -119,8 +126,15 @@ class DisplacementField:
     def _sideways_splines(self) -> list[tuple[GridSpline, GridSpline]]:
         """Splines of the displacements along x and along y on the fine and the coarse grid."""
         found = []
-        for response, pressure, start in self._loads:
-            along_x, along_y, _ = response.displacement(pressure)
+        shears: list[FloatArray | None] = [None, None]
+        if self.shear is not None:
+            _, (wide, _, start) = self._loads
+            shears[0] = np.pad(self.shear, ((0, 0), *((self._ring, self._ring),) * 2))
+            shears[1] = np.stack(
+                [binned(s, self.place, start[:2], start[2], wide.shape) for s in self.shear]
+            )
+        for (response, pressure, start), shear in zip(self._loads, shears, strict=True):
+            along_x, along_y, _ = response.displacement(pressure, shear)
             found.append((GridSpline(along_x, *start), GridSpline(along_y, *start)))
         return found
 

@@ -11,12 +11,13 @@ from optisense.design.materials import Dielectric
 from optisense.design.parts import Role
 from optisense.errors import ContactError
 from optisense.geometry import Contact, SensingSurface, TriangleMesh
-from optisense.geometry.contact import available_depth, locate
+from optisense.geometry.contact import available_depth, locate, surface_axes
 from optisense.mechanics.deformed_mesh import SkinMesh, skin_mesh
 from optisense.mechanics.elasticity import Elasticity
-from optisense.mechanics.footprint import DOES_NOT_REACH, footprint
+from optisense.mechanics.footprint import DOES_NOT_REACH, Footprint, footprint
 from optisense.mechanics.gel_patches import GelPatches
 from optisense.mechanics.pressed_skin import PressedSkin, press
+from optisense.mechanics.tangential_contact import Drag
 
 USUAL_GEL = Elasticity(youngs_modulus=0.435, poisson_ratio=0.49, friction=1.0)
 """Elasticity of a gel whose material does not tell: that of the GelSight Mini's. Its modulus was
@@ -73,6 +74,15 @@ def elasticity_in_words(design: SensorDesign) -> str:
             status = known[0].status.value if known else "given"
         words.append(f"{text} ({status})")
     return ", ".join(words)
+
+
+def _drag(contact: Contact, surface: SensingSurface, place: Footprint) -> Drag | None:
+    """The drag of a contact in the frame of its footprint; None if it has none."""
+    if contact.shift == (0.0, 0.0) and contact.twist == 0.0:
+        return None
+    u, v, _ = surface_axes(-place.axes[:, 2], surface).T
+    along = contact.shift[0] * u + contact.shift[1] * v
+    return Drag((place.axes.T @ along)[:2], math.radians(contact.twist))
 
 
 class Gel:
@@ -133,7 +143,11 @@ class Gel:
                 for contact, mesh in zip(contacts, placed, strict=True)
             ]
             patches = [self._patches.around(place) for place in places]
-            self._last = asked, press(places, self._elasticity, patches)
+            drags = [
+                _drag(contact, self._surface, place)
+                for contact, place in zip(contacts, places, strict=True)
+            ]
+            self._last = asked, press(places, self._elasticity, patches, drags)
         return self._last[1]
 
     def mesh(self, contacts: Sequence[Contact]) -> SkinMesh:

@@ -19,6 +19,7 @@ from optisense.mechanics.elasticity import Elasticity
 from optisense.mechanics.footprint import Footprint
 from optisense.mechanics.gel_patch import GelPatch
 from optisense.mechanics.normal_contact import NormalContact, solve_normal_contact
+from optisense.mechanics.tangential_contact import Drag, solve_shear
 
 FloatArray = NDArray[np.float64]
 
@@ -38,11 +39,13 @@ class Pressed:
         place: its grid and overlap.
         pressure: (rows, columns) MPa on this grid.
         field: the displacement that it causes.
+        shear: (2, rows, columns) MPa along x and y of the grid, if the indenter was dragged.
     """
 
     place: Footprint
     pressure: FloatArray
     field: DisplacementField
+    shear: FloatArray | None = None
 
     @property
     def force(self) -> float:
@@ -53,6 +56,22 @@ class Pressed:
     def area(self) -> float:
         """mm^2 of skin that touches."""
         return float((self.pressure > 0.0).sum()) * self.place.pitch**2
+
+    @property
+    def shear_force(self) -> FloatArray:
+        """(3,) N by which the indenter drags the skin, in the design's frame."""
+        if self.shear is None:
+            return np.zeros(3)
+        along = self.shear.sum(axis=(1, 2)) * self.place.pitch**2
+        return np.asarray(self.place.axes[:, :2] @ along)
+
+    @property
+    def torque(self) -> float:
+        """N mm by which the indenter turns the skin, counter-clockwise seen from outside."""
+        if self.shear is None:
+            return 0.0
+        x, y = np.meshgrid(self.place.x, self.place.y)
+        return float((x * self.shear[1] - y * self.shear[0]).sum()) * self.place.pitch**2
 
 
 class SkinDisplacement(NamedTuple):
@@ -97,13 +116,17 @@ class PressedSkin:
     elasticity: Elasticity
 
     def in_numbers(self) -> list[dict[str, float]]:
-        """Depth (mm), force (N), area (mm^2), greatest pressure (MPa) of each contact, for JSON."""
+        """Depth (mm), force (N), area (mm^2), greatest pressure (MPa) of each contact, for JSON.
+
+        Of an indenter that was dragged or turned also the shear force (N) and the torque (N mm).
+        """
         return [
             {
                 "depth_mm": round(float(contact.place.overlap.max()), 6),
                 "force_n": round(contact.force, 6),
                 "area_mm2": round(contact.area, 6),
                 "greatest_pressure_mpa": round(float(contact.pressure.max()), 6),
+                **_shear_in_numbers(contact),
             }
             for contact in self.contacts
         ]
@@ -111,7 +134,8 @@ class PressedSkin:
     def maps(self, points: NDArray[np.floating], inward: NDArray[np.floating]) -> SkinMaps:
         """Pressure, penetration and displacement at points of the deformed skin.
 
-        Displacements along the skin are those of a skin that slides freely along the indenter.
+        Displacements along the skin are those of a skin that slides freely along the indenter
+        while it is pressed in, and then sticks to it as far as friction goes.
 
         Args:
             points: (..., 3) mm, where the skin is; NaN gives NaN.
@@ -159,8 +183,9 @@ def press(
     places: Sequence[Footprint],
     elasticity: Elasticity,
     patches: Sequence[GelPatch | None] | None = None,
+    drags: Sequence[Drag | None] | None = None,
 ) -> PressedSkin:
-    """Press indenters into a gel, without friction.
+    """Press indenters into a gel without friction, and then drag them with friction.
 
     Around each contact the gel is a flat layer of its thickness there, bonded to a rigid base, but
     for what a patch says of its shape. Contacts change each other's overlap until that settles.
@@ -169,6 +194,7 @@ def press(
         places: where each indenter overlaps the undeformed skin.
         elasticity: of the gel.
         patches: the gel's shape around each place; None where it is a flat layer.
+        drags: how each indenter has moved along the skin since; None where it has not.
 
     Raises:
         ContactError: the pressure under an indenter is not found.
@@ -192,7 +218,29 @@ def press(
             contacts[i] = _pressed(place, overlap, elasticity, patch, before)
         if change < SETTLED:
             break
-    return PressedSkin(tuple(each for each in contacts if each is not None), elasticity)
+    done = [each for each in contacts if each is not None]
+    for i, drag in enumerate(drags or ()):
+        if drag is not None:
+            done[i] = _dragged(done[i], drag, elasticity)
+    return PressedSkin(tuple(done), elasticity)
+
+
+def _dragged(contact: Pressed, drag: Drag, elasticity: Elasticity) -> Pressed:
+    place = contact.place
+    response = grid_response(contact.pressure.shape, place.pitch, place.thickness, elasticity)
+    wanted = drag.displacement(place.x, place.y)
+    shear = solve_shear(response, contact.pressure, elasticity.friction, wanted)
+    contact.field.shear = shear
+    return Pressed(place, contact.pressure, contact.field, shear)
+
+
+def _shear_in_numbers(contact: Pressed) -> dict[str, float]:
+    if contact.shear is None:
+        return {}
+    return {
+        "shear_force_n": round(float(np.linalg.norm(contact.shear_force)), 6),
+        "torque_nmm": round(contact.torque, 6),
+    }
 
 
 def _pressed(
