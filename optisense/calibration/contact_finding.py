@@ -49,9 +49,8 @@ FARTHEST = 3.0
 """Radii of the first guess up to which the edge of the contact is looked for."""
 
 LABEL_RANGE = 0.75, 1.3
-"""Radii of a label between which the edge of its contact is looked for. Where light is low, the
-response to steep flanks falls off again inside the contact, and the strongest one is not at its
-edge; labels by hand are off by a tenth."""
+"""Radii of a label between which the edge of its contact is looked for. Labels by hand are off by a
+tenth; a stronger response farther away is something else, or the label is wrong."""
 
 BESIDE = 2.2
 """Radii of a contact within which the skin is drawn along with it."""

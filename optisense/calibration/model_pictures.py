@@ -39,8 +39,8 @@ DOUBTFUL = 0.5
 """Asymmetry from which on the difference of a photograph does not look like that of a ball."""
 
 LABEL_OFF = 0.6
-"""Distance of a label's centre from that of the contact that is found, in radii, and share by which
-it is too small, from which on the label is doubted. Hand labels are off by a tenth."""
+"""Distance of a label's centre from that of the contact that is found, in radii, and share of the
+radii, from which on the label is doubted. Hand labels are off by a tenth."""
 
 
 @dataclass(frozen=True)
@@ -117,10 +117,10 @@ def doubts(photographs: Photographs) -> list[str]:
                     f"{press.name}: its label is {off:.0f} pixels away from the contact that the "
                     "picture shows; check whether it is that of another photograph"
                 )
-        # It may be larger: the strongest response lies inside a contact where light is low.
-        if press.radius is not None and press.radius < seen.radius / (1.0 + LABEL_OFF):
+        labelled = seen.radius if press.radius is None else press.radius
+        if not 1.0 / (1.0 + LABEL_OFF) < labelled / max(seen.radius, 1e-9) < 1.0 + LABEL_OFF:
             found.append(
-                f"{press.name}: its label says a radius of {press.radius:.0f} pixels, and the "
+                f"{press.name}: its label says a radius of {labelled:.0f} pixels, and the "
                 f"picture shows {seen.radius:.0f}"
             )
     if 2 * twice > len(photographs.presses):

@@ -50,7 +50,7 @@ def test_an_odd_response_is_found_to_half_a_pixel(centre: tuple[float, float]) -
 
 
 def test_a_label_leads_past_a_response_that_is_strongest_inside_the_contact() -> None:
-    """As where light is low: flanks beyond a few degrees respond no stronger."""
+    """As if flanks beyond a few degrees responded no stronger."""
     rows, columns = np.mgrid[:120, :160] + 0.5
     x, y = columns - 80.0, rows - 60.0
     away = np.hypot(x, y)
