@@ -28,7 +28,7 @@ LOCK := --universal --python-version 3.11 --generate-hashes --no-emit-index-url 
 .PHONY: help setup demo test quick-test lint types import-rules docs docs-as-typed pytest pytest-long pytest-rest bare-pytest quick-pytest \
     studio-tests test-blender studio-window-test package-test extension setup-blender \
     browser-tests setup-browser \
-    format bench fuzz kill-tests lock clean
+    format bench fuzz kill-tests memory-tests lock clean
 
 help:
 	@echo "make demo     press a ball into a GelSight Mini and write the picture and a report"
@@ -44,6 +44,7 @@ help:
 	@echo "make bench    measure speed and accuracy (minutes)"
 	@echo "make fuzz     look for malformed input that is not refused in words (an hour)"
 	@echo "make kill-tests     kill commands at 200 random moments, and give them again (an hour)"
+	@echo "make memory-tests   the same work hundreds of times in one process, with its memory (an hour)"
 	@echo "make setup    only the set-up: .venv and the libLLVM the renderer needs"
 	@echo "make format   let ruff tidy the code"
 	@echo "make lock     resolve the dependencies anew into requirements.lock"
@@ -169,6 +170,10 @@ fuzz: setup
 KILLS := 200
 kill-tests: setup
 	$(BIN)/python -m tests.kills --kills $(KILLS)
+
+# 500 images, 1,000 scores, 50 designs and 500 rounds of files, each in one process.
+memory-tests: setup
+	for work in images scores designs files; do $(BIN)/python -m tests.memory $$work || exit 1; done
 
 bench: setup
 	$(BIN)/python -m benchmarks

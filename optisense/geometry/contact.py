@@ -18,6 +18,10 @@ from optisense.geometry.surface import SensingSurface, SurfacePoint
 REACH_MARGIN = 0.5
 """An indenter is modelled to this height (mm) above what it can touch."""
 
+LEAST_FORCE, MOST_FORCE = 1e-6, 1e6
+"""N: forces that can be given. The lower is the weight of a grain of sand, the upper that of a
+hundred tons; a gel takes some ten."""
+
 ON_SURFACE = 0.5
 """A contact point given as x, y, z may lie this far (mm) from the sensing surface."""
 
@@ -69,9 +73,10 @@ class Contact:
             raise ContactError(
                 f"the depth of a contact is {self.depth:g}", hint="give a depth above 0, in mm"
             )
-        if self.force is not None and not (math.isfinite(self.force) and self.force > 0.0):
+        if self.force is not None and not LEAST_FORCE <= self.force <= MOST_FORCE:
             raise ContactError(
-                f"the force of a contact is {self.force:g}", hint="give a force above 0, in N"
+                f"the force of a contact is {self.force:g}",
+                hint=f"give a force above 0, in N, from {LEAST_FORCE:g} to {MOST_FORCE:g}",
             )
         if len(self.shift) != 2 or not all(map(math.isfinite, (*self.shift, self.twist))):
             raise ContactError(

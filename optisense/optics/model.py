@@ -18,6 +18,7 @@ from optisense.errors import RenderError
 from optisense.geometry import Contact, TriangleMesh
 from optisense.mechanics import ELASTIC, SKINS, PressedSkin
 from optisense.optics.backend.interrupts import lets_ctrl_c_through
+from optisense.optics.backend.memory import bound_memory
 from optisense.optics.backend.stages import Stage, StageCallback, fraction_done
 from optisense.optics.backend.versions import versions
 from optisense.optics.camera.projection import RayCamera
@@ -86,6 +87,7 @@ class OpticalModel(RayModel):
     @cached_property
     def _store(self) -> CacheStore:
         opaque = [p for p in self._pieces if p.surface.kind is SurfaceKind.OPAQUE]
+        bound_memory()  # of the models before this one
         rays = self.chief_rays((96, 72))
         return CacheStore(
             self.scene,

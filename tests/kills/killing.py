@@ -13,6 +13,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from optisense.errors import OptiSenseError
+
 from .work import GOALS, WORK, half_files, whole_files
 
 LONGEST = 1800.0
@@ -85,15 +87,17 @@ class Target:
 
     def _again(self, out: Path) -> str:
         """Give the command again; what is wrong with how it ended."""
-        begun = out.is_dir() and any(not path.name.startswith(".") for path in out.iterdir())
-        process = self._begin(out, *(self.work.again if begun else ()))
+        process = self._begin(out, *(self.work.again if (out / "study.json").exists() else ()))
         said = process.communicate(timeout=LONGEST)[0]
         if process.returncode and not self._is_whole(out):
             return f"given again, it ends with {process.returncode}: {said[-300:]}"
         return "" if self._is_whole(out) else "given again, it ends with another result"
 
     def _is_whole(self, out: Path) -> bool:
-        return out.is_dir() and bool(self.work.result(out) == self._result) and not strays(out)
+        try:
+            return bool(self.work.result(out) == self._result) and not strays(out)
+        except (OptiSenseError, OSError):
+            return False
 
     def _begin(self, out: Path, *more: str) -> subprocess.Popen[str]:
         stand = {"@OUT": str(out), "@GOALS": str(self._home / "goals.py")}

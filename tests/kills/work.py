@@ -54,16 +54,18 @@ class Work:
 
 
 def _search(method: str, objectives: tuple[str, ...], workers: int, *more: str) -> Work:
+    second = "camera.position.y=-1:1" if method == "gradient" else "coating.specularity=0:1:5"
     return Work(
         ("search", "gelsight-mini", "--method", method, "--seed", "7", *objectives, *more,
-         "--vary", "coating.specularity=0:1:5", "--vary", "camera.position.x=-1:3:4",
+         "--vary", "camera.position.x=-1:3:4",
+         "--vary", second,
          "--workers", str(workers), "--out", "@OUT"),
         ("--resume", "--trust"), lambda folder: trials(folder), workers if workers > 1 else 0,
     )  # fmt: skip
 
 
 NEAR, BRIGHT = ("-b", "@GOALS:nearness"), ("-b", "@GOALS:brightness")
-RAYS = ("-b", "aoap", "--set", "ray_resolution=16x12")
+RAYS = ("-b", "aoap", "--set", "ray_resolution=[16,12]")
 
 WORK: dict[str, Work] = {
     "apply": Work(("apply", str(ASSETS / "study-v1"), "--out", "@OUT")),

@@ -308,6 +308,8 @@ class Store:
     def _row(self, row: Sequence[Any]) -> Row:
         number, generation, place, vector, done, scores, failure, parts, gradient = row[:9]
         with self._readable(f"trial {number}"):
+            if number < 0:
+                raise ValueError("its number is negative")
             outcome = None
             if done:
                 outcome = Outcome(

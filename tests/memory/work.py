@@ -1,0 +1,85 @@
+"""Work to be done again and again, and what of memory and files is in use meanwhile."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import optisense as ots
+from optisense.objectives import evaluate
+from optisense.optics.backend.memory import resident
+from optisense.sensors.registry import SENSORS
+
+RESOLUTION = (24, 18)
+"""Pixels of the pictures: nearly all memory is that of the light."""
+
+PHOTONS = 3000
+"""Photons of the pictures; the memory for their light does not depend on it."""
+
+
+def images() -> Iterator[None]:
+    """Pictures of one sensor with a ball that is another one each time."""
+    model = ots.OpticalModel(ots.load("gelsight-mini"), "llvm")
+    number = 0
+    while True:
+        ball = ots.Sphere(1.0 + 0.001 * (number % 997))
+        at = (float(number % 7 - 3), float(number % 5 - 2))
+        model.render([ots.Contact(ball, at=at, depth=0.3)], RESOLUTION, PHOTONS)
+        number += 1
+        yield
+
+
+def scores() -> Iterator[None]:
+    """A score of a design that is another one each time."""
+    number = 0
+    while True:
+        design = ots.load("gelsight-mini")
+        design.camera.position = (0.001 * (number % 997), *design.camera.position[1:])
+        evaluate(design, "aoap")
+        number += 1
+        yield
+
+
+def designs() -> Iterator[None]:
+    """The built-in sensors in turn, each with a picture."""
+    while True:
+        for name in SENSORS.names():
+            model = ots.OpticalModel(ots.load(name), "llvm")
+            model.render([], RESOLUTION, PHOTONS)
+            yield
+
+
+def files() -> Iterator[None]:
+    """The built-in sensors in turn, saved, opened and checked, with a study and a dataset."""
+    from tempfile import TemporaryDirectory
+
+    from optisense.search import Study
+    from optisense.tasks.dataset import Dataset
+
+    assets = Path(__file__).parents[1] / "assets"
+    while True:
+        with TemporaryDirectory() as folder:
+            ots.save_design(ots.load("gelsight-mini"), Path(folder, "design"))
+            ots.check(ots.load(Path(folder, "design")))
+        study = Study.open(assets / "study-v1")
+        assert study.trials
+        study.close()
+        assert list(Dataset.load(assets / "dataset-v1"))
+        yield
+
+
+WORK: dict[str, Callable[[], Iterator[None]]] = {
+    "images": images,
+    "scores": scores,
+    "designs": designs,
+    "files": files,
+}
+
+
+def measured(name: str, times: int) -> Iterator[tuple[int, float, int]]:
+    """Do a piece of work so often; after each, its number, the MiB in use and the open files."""
+    doing = WORK[name]()
+    for number in range(1, times + 1):
+        next(doing)
+        yield number, resident() / 2**20, len(os.listdir("/proc/self/fd"))  # noqa: PTH208
