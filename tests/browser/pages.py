@@ -4,8 +4,11 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
+
 from optisense.design import Provenance, SensorDesign
 from optisense.geometry import Contact, Sphere
+from optisense.geometry.objects import OBJECTS, ObjectIndenter
 from optisense.objectives import Evaluation, Objective, Score, Settings
 from optisense.objectives.scored import Scored
 from optisense.optics import OpticalModel, TactileImage
@@ -15,9 +18,13 @@ from optisense.report.light_section import LightSection, ledger_page
 from optisense.report.scores import write_score_report
 from optisense.report.study import write_study_report
 from optisense.report.tolerance import write_tolerance_report
+from optisense.report.verification import write_verification_report
 from optisense.search import ToleranceDistribution, search
 from optisense.search.tolerance.analysis import tolerance
 from optisense.sensors import gelsight_mini
+from optisense.tasks import Verification, VerificationSettings
+from optisense.tasks.press_readings import PressPictures
+from optisense.tasks.verification import SensorView
 
 BALL = Contact(Sphere(radius=1.5), at=(0.0, 0.0), depth=0.8)
 EVIL = "</script></table><script>window.ran = 1</script><img src=x onerror='window.ran = 1'> \"'"
@@ -49,7 +56,8 @@ def write_pages(folder: Path) -> dict[str, Path]:
     light = LightSection.of(model, 20_000, at=[(0.0, 0.0)])
     rays = CameraRays.of(model)
     pages = {
-        name: folder / f"{name}.html" for name in ("render", "ledger", "scores", "study", "errors")
+        name: folder / f"{name}.html"
+        for name in ("render", "ledger", "scores", "study", "errors", "verify")
     }
     write_report(pages["render"], design, image, [BALL], light=light, rays=rays)
     pages["ledger"].write_text(ledger_page(design, light), encoding="utf-8")
@@ -70,4 +78,29 @@ def write_pages(folder: Path) -> dict[str, Path]:
 
     errors = {"coating.reflectance.r": ToleranceDistribution(0.3, "uniform")}
     write_tolerance_report(pages["errors"], tolerance(design, red, errors, sensors=60))
+    write_verification_report(pages["verify"], verified(), (np.eye(3), np.eye(3)))
     return pages
+
+
+def verified() -> Verification:
+    """A verification of two small objects by numbers that were made up."""
+    names = tuple(OBJECTS)[:2]
+    before = np.random.default_rng(0).uniform(8.0, 16.0, (len(names), 2, 1))
+    normals = np.zeros((60, 80, 3), np.float32)
+    normals[..., 2] = -1.0
+    angles = np.full((60, 80), np.nan, np.float32)
+    angles[20:30, 30:45] = 12.0
+    seen = PressPictures(np.full((60, 80, 3), 90, np.uint8), normals, normals, angles)
+    view = SensorView(coverage=0.5, detail=0.06, stretching=1.02)
+    return Verification(
+        names=(EVIL, EVIL),
+        settings=VerificationSettings(names, places=2, readers=1),
+        scale=1.0,
+        same_places=True,
+        normals=(before, before - 4.0),
+        depths=(before / 100, before / 100),
+        flat=(20.0, 0.4),
+        views=(view, view),
+        pictures=dict.fromkeys(names, (seen, seen)),
+        contacts={name: [Contact(ObjectIndenter(name), point=(0.0, 0.0, 0.0))] for name in names},
+    )

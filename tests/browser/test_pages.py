@@ -13,7 +13,7 @@ from .conftest import Open
 from .pages import EVIL
 from .visit import DESKTOP, TELEPHONE
 
-KINDS = ["render", "ledger", "scores", "study", "errors"]
+KINDS = ["render", "ledger", "scores", "study", "errors", "verify"]
 CONTROLS = {"button", "slider", "combobox", "checkbox", "link", "textbox", "spinbutton"}
 FOCUSED = """() => {
   const at = document.activeElement;
