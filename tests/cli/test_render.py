@@ -102,6 +102,7 @@ def test_the_report_asks_the_network_for_nothing(folder: Path) -> None:
         "image",
         "image",
         *LAYERS,
+        *2 * LAYERS,  # for the mixer, coarse and fine
         "normals",
         "mask",
         "pressure",
