@@ -11,6 +11,10 @@ if TYPE_CHECKING:
     from optisense.objectives.evaluation import Evaluation
 
 
+USUAL = (66.0, 4.5)
+"""Milliwatts, of the strongest and the weakest lights of a built-in sensor: GelSight360, DIGIT."""
+
+
 @objective(
     "power",
     title="Power",
@@ -18,6 +22,7 @@ if TYPE_CHECKING:
     unit="mW",
     lower_is_better=True,
     rays_only=True,
+    usual=USUAL,
 )
 def power(evaluation: Evaluation) -> tuple[float, dict[str, Any]]:
     """How many mW of light all LEDs of the sensor send out.

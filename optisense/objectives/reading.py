@@ -21,6 +21,10 @@ if TYPE_CHECKING:
     from optisense.objectives.evaluation import Evaluation
 
 
+USUAL = (23.0, 2.8)
+"""Degrees, of the poorest and the best built-in sensor: GelSight360, GelSight Mini."""
+
+
 @objective(
     "reading",
     title="Reading",
@@ -31,6 +35,7 @@ if TYPE_CHECKING:
     needs=f"{LEAST_PRESSES} presses or more, each seen, with {LEAST_PIXELS} pixels",
     unit="degrees",
     lower_is_better=True,
+    usual=USUAL,
 )
 def reading(
     evaluation: Evaluation, *, camera_noise: float = CAMERA_NOISE

@@ -25,6 +25,10 @@ LINE_OF_BLUR = math.pi / math.sqrt(2.0 * math.log(1.0 / LEAST_CONTRAST))
 exp(-(pi s / w)^2 / 2) of their contrast (the Gaussian's Fourier transform at the period 2 w)."""
 
 
+USUAL = (0.27, 0.059)
+"""Millimetres, of the poorest and the best built-in sensor: GelSight360, GelSight Mini."""
+
+
 @objective(
     "sharpness",
     title="Sharpness",
@@ -35,6 +39,7 @@ exp(-(pi s / w)^2 / 2) of their contrast (the Gaussian's Fourier transform at th
     unit="mm",
     lower_is_better=True,
     rays_only=True,
+    usual=USUAL,
 )
 def sharpness(evaluation: Evaluation) -> tuple[float, dict[str, Any], dict[str, Any]]:
     """How many mm wide the finest lines on the skin are that the camera tells apart.
