@@ -104,6 +104,9 @@ class Renderer:
 
         if self._model is None:
             self._model = OpticalModel(design, self.variant)
+        elif _is_another(self._model.design, design):
+            self._model.set_design(design)
+            self._leave(design)
         else:
             self._model.set_design(design)
         return self._model
@@ -124,9 +127,22 @@ class Renderer:
         made: Usual = self._drafts
         return made
 
+    def _leave(self, design: SensorDesign) -> None:
+        """The work went on to another sensor: drafts of the one before are not wanted any more."""
+        from optisense.optics.backend.memory import release_memory
+
+        if self._drafts is not None and _is_another(self._drafts.design, design):
+            self._drafts = None
+        release_memory()
+
     def forget(self) -> None:
         """Drop the models after a failure that nobody foresaw: they may be half made."""
         self._model = self._drafts = None
+
+
+def _is_another(before: SensorDesign, after: SensorDesign) -> bool:
+    """Whether a design is another sensor, and not the same one after an edit."""
+    return before.parts.keys() != after.parts.keys()
 
 
 class Session:

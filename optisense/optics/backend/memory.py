@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import ctypes
+import gc
 import os
+import sys
 from pathlib import Path
 
 import drjit as dr
@@ -20,6 +23,21 @@ def bound_memory() -> None:
     """
     if resident() > MOST_RESIDENT:
         dr.flush_malloc_cache()
+
+
+def release_memory() -> None:
+    """Give back to the system whatever nothing uses any more, freed pages of the C library too.
+
+    It is for work that goes on to another sensor: after GelSight360 and then a Mini, 0.3 GB of 1.1
+    GB stay.
+    """
+    gc.collect()
+    dr.sync_thread()
+    dr.flush_malloc_cache()
+    if sys.platform == "linux":
+        trim = getattr(ctypes.CDLL(None), "malloc_trim", None)  # glibc has it
+        if trim is not None:
+            trim(0)
 
 
 def resident() -> float:
