@@ -114,8 +114,11 @@ def test_what_a_change_of_contact_does_is_known_without_rendering(
     exact = again.pictures(none, 0.0 * amount)
     for index, place in enumerate(seen, start=1):
         near = distances(photographs.background.shape, place) <= 1.6
-        change = ((exact[index] - still[index])[near] ** 2).sum()
-        assert ((rough[index] - exact[index])[near] ** 2).sum() < 0.5 * change
+        change, told = (exact[index] - still[index])[near], (rough[index] - still[index])[near]
+        cosine = (change * told).sum() / np.sqrt((change**2).sum() * (told**2).sum())
+        length = np.sqrt((told**2).sum() / (change**2).sum())
+        assert cosine > 0.6, (cosine, length)
+        assert 0.5 < length < 1.5, (cosine, length)
 
 
 def test_fitted_numbers_become_a_design() -> None:
