@@ -115,9 +115,13 @@ def _pictures(study: Study, count: int, line: ProgressLine) -> dict[int, NDArray
     from optisense.report.trial_pictures import TrialPictures, worth_a_picture
 
     made, found = TrialPictures(study), {}
-    for done, trial in enumerate(worth_a_picture(study, study.trials, count)):
-        line.begin(TRIALS, count, done, text=f"rendering trial {trial.number}")
+    chosen = worth_a_picture(study, study.trials, count)
+    if chosen:
+        line.begin(TRIALS, len(chosen))
+    for done, trial in enumerate(chosen):
+        line.say(f"rendering trial {trial.number}", done, len(chosen))
         picture = made.of(trial)
+        line.advance(done + 1, len(chosen))
         if picture is not None:
             found[trial.number] = picture
     return found

@@ -12,6 +12,7 @@ from optisense.errors import OptiSenseError, SetupError
 from optisense.geometry import Sphere
 from optisense.objectives import Settings
 from optisense.report.study_figures import spread_out
+from optisense.search.evaluation.outcome import rank_of
 from optisense.search.study.study import Study
 from optisense.search.study.trial import Trial
 
@@ -81,5 +82,5 @@ def worth_a_picture(study: Study, trials: Sequence[Trial], count: int) -> list[T
     names = study.settings.names
     fine = [trial for trial in trials if np.isfinite(trial.score)]
     front = spread_out(study.front, names[0], count) if len(names) > 1 else []
-    best = sorted(fine, key=lambda trial: -trial.score)
+    best = sorted(fine, key=lambda trial: rank_of(trial.outcome, names[0]), reverse=True)
     return list({trial.number: trial for trial in (*front, *best)}.values())[:count]

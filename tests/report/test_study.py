@@ -205,3 +205,21 @@ class TestInfluence:
         )
         assert study_figures.correlation_ratio([0, 0, 1, 1], [1, 2, 2, 1]) == 0.0
         assert study_figures.correlation_ratio([0, 1], [3, 3]) == 0.0
+
+
+def test_the_command_renders_the_best_trials(tmp_path: Path) -> None:
+    folder = tmp_path / "study"
+    space = {"camera.fov": (45.0, 55.0, 3)}
+    search(
+        ots.load("gelsight-mini"),
+        space,
+        "aoap",
+        method="grid",
+        settings={"ray_resolution": (64, 48)},
+        out=folder,
+    ).study.close()
+    options = ["--trial-pictures", "2", "--photons", "20000"]
+    done = CliRunner().invoke(app, ["report", str(folder), *options])
+    assert done.exit_code == 0, done.output
+    page = (folder / "report.html").read_text()
+    assert page.count("data:image/") >= 4  # before, after, and two trials
