@@ -24,7 +24,7 @@ from typing import Any
 
 PROTOCOL = 1
 """Version of the protocol that this client speaks; see docs/engine.md."""
-CLIENT = "optisense-blender 0.1.0"
+CLIENT = "optisense-blender 0.2.0"
 SHUTDOWN_SECONDS = 2.0
 """Seconds that the engine may take to end by itself before it is killed."""
 GREETING_SECONDS = 30.0
