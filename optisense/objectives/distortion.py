@@ -22,6 +22,7 @@ from optisense.objectives.registry import objective
 
 if TYPE_CHECKING:
     from optisense.objectives.evaluation import Evaluation
+    from optisense.optics import ChiefRays
 
 MOST_ANISOTROPY = 1e3
 """Largest anisotropy of a footprint. A chief ray that only grazes the surface has an infinitely
@@ -59,15 +60,8 @@ def distortion(evaluation: Evaluation) -> tuple[float, dict[str, Any], dict[str,
         evaluation: the sensor.
     """
     rays = evaluation.judged_rays
-    long, wide = footprints(rays.points, rays.hit)
+    long, wide = seen_footprints(rays)
     known = np.isfinite(long)
-    count = np.count_nonzero(known)
-    if count < LEAST_FOOTPRINTS:
-        raise ObjectiveError(
-            f"{count} of the {LEAST_FOOTPRINTS} footprints of pixels that it needs lie on the "
-            "sensing surface",
-            hint="Use a higher ray_resolution, or check the camera's position and direction",
-        )
     ratio = long / np.maximum(wide, long / MOST_ANISOTROPY)
     anisotropy = ratio[known].astype(np.float64)
     area = (long[known] * wide[known]).astype(np.float64)
@@ -76,11 +70,28 @@ def distortion(evaluation: Evaluation) -> tuple[float, dict[str, Any], dict[str,
         "of_one_pixel_in_20": float(np.percentile(anisotropy, HIGH_SHARE)),
         "mean_length": float(long[known].mean(dtype=np.float64)),
         "mean_width": float(wide[known].mean(dtype=np.float64)),
-        "footprints": int(count),
+        "footprints": int(np.count_nonzero(known)),
         "pixels_that_see_the_surface": float(rays.hit.mean()),
     }
     value = float(np.exp(np.log(anisotropy).mean()))
     return min(max(value, 1.0), MOST_ANISOTROPY), parts, {"anisotropy": ratio}
+
+
+def seen_footprints(rays: ChiefRays) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """Length and width of the footprints of chief rays, as of `footprints`.
+
+    Raises:
+        ObjectiveError: fewer than `LEAST_FOOTPRINTS` lie on the sensing surface.
+    """
+    long, wide = footprints(rays.points, rays.hit)
+    count = np.count_nonzero(np.isfinite(long))
+    if count < LEAST_FOOTPRINTS:
+        raise ObjectiveError(
+            f"{count} of the {LEAST_FOOTPRINTS} footprints of pixels that it needs lie on the "
+            "sensing surface",
+            hint="Use a higher ray_resolution, or check the camera's position and direction",
+        )
+    return long, wide
 
 
 def footprints(

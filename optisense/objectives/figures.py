@@ -201,35 +201,44 @@ def draw_coverage(score: Score) -> Figure:
 
 def draw_sharpness(score: Score) -> Figure:
     """The width of the finest line that is told apart at each pixel."""
-    detail = score.arrays["detail"]
-    known = detail[np.isfinite(detail)]
-    figure = _figure(9, 4.2)
-    picture, histogram = figure.subplots(1, 2, width_ratios=[2, 1])
-    most = float(np.percentile(known, 99))
-    _map(figure, picture, detail, "width of the finest line (mm)", 0.0, most)
-    weights = np.full(len(known), 100 / len(known))
-    histogram.hist(np.clip(known, 0.0, most), bins=50, range=(0.0, most), weights=weights)
-    histogram.axvline(score.value, color=LINE, lw=1.2)
-    histogram.set_xlabel("width of the finest line (mm)")
-    histogram.set_ylabel("pixels (%)")
-    histogram.set_title(f"mean over the skin {score.value:.3g} mm", fontsize=10)
-    return figure
+    title = f"mean over the skin {score.value:.3g} mm"
+    return _map_and_histogram(
+        score, score.arrays["detail"], "width of the finest line (mm)", "pixels (%)", title
+    )
 
 
 def draw_distortion(score: Score) -> Figure:
     """How many times as long as wide the footprint of each pixel is."""
-    anisotropy = score.arrays["anisotropy"]
-    known = anisotropy[np.isfinite(anisotropy)]
+    title = f"geometric mean {score.value:.3g}"
+    label = "length over width of a footprint"
+    values = score.arrays["anisotropy"]
+    return _map_and_histogram(score, values, label, "footprints (%)", title, low=1.0, least=1.5)
+
+
+def _map_and_histogram(
+    score: Score,
+    values: Any,
+    label: str,
+    counted: str,
+    title: str,
+    *,
+    low: float = 0.0,
+    least: float = 0.0,
+) -> Figure:
+    """A map (h, w) of values and their histogram, with a line at the score; `least` is the lowest
+    upper end of the scale, which is else the 99th percentile.
+    """
+    known = values[np.isfinite(values)]
     figure = _figure(9, 4.2)
     picture, histogram = figure.subplots(1, 2, width_ratios=[2, 1])
-    most = max(1.5, float(np.percentile(known, 99)))
-    _map(figure, picture, anisotropy, "length over width of a pixel's footprint", 1.0, most)
+    most = max(least, float(np.percentile(known, 99)))
+    _map(figure, picture, values, label, low, most)
     weights = np.full(len(known), 100 / len(known))
-    histogram.hist(np.clip(known, 1.0, most), bins=50, range=(1.0, most), weights=weights)
+    histogram.hist(np.clip(known, low, most), bins=50, range=(low, most), weights=weights)
     histogram.axvline(score.value, color=LINE, lw=1.2)
-    histogram.set_xlabel("length over width of a footprint")
-    histogram.set_ylabel("footprints (%)")
-    histogram.set_title(f"geometric mean {score.value:.3g}", fontsize=10)
+    histogram.set_xlabel(label)
+    histogram.set_ylabel(counted)
+    histogram.set_title(title, fontsize=10)
     return figure
 
 

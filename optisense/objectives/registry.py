@@ -47,22 +47,8 @@ CONDITIONS, WATCHED = "conditions", "watched"
 """Names under which the store of a study keeps the conditions of its trials, and other scores that
 are watched, beside the parts of each objective; no objective may have them."""
 
-_MODULES = (
-    "rgb2normal",
-    "normdiff",
-    "aoap",
-    "projection_warping",
-    "coverage",
-    "distortion",
-    "bend_radius",
-    "reading",
-    "depth",
-    "sharpness",
-    "uniformity",
-    "shadow",
-    "power",
-)
-"""Modules of this package that register objectives."""
+_MODULES = ("rgb2normal", "normdiff", "aoap", "projection_warping", *FURTHER)
+"""Modules of this package that register objectives; those of further ones have their names."""
 
 UNBOUNDED = (-math.inf, math.inf)
 

@@ -8,9 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from optisense.design.lenses.film import PictureWindow
-from optisense.errors import ObjectiveError
 from optisense.objectives import figures
-from optisense.objectives.distortion import LEAST_FOOTPRINTS, footprints
+from optisense.objectives.distortion import LEAST_FOOTPRINTS, seen_footprints
 from optisense.objectives.registry import objective
 
 if TYPE_CHECKING:
@@ -52,15 +51,8 @@ def sharpness(evaluation: Evaluation) -> tuple[float, dict[str, Any], dict[str, 
         evaluation: the sensor.
     """
     rays = evaluation.judged_rays
-    long, wide = footprints(rays.points, rays.hit)
+    long, wide = seen_footprints(rays)
     known = np.isfinite(long)
-    count = np.count_nonzero(known)
-    if count < LEAST_FOOTPRINTS:
-        raise ObjectiveError(
-            f"{count} of the {LEAST_FOOTPRINTS} footprints of pixels that it needs lie on the "
-            "sensing surface",
-            hint="Use a higher ray_resolution, or check the camera's position and direction",
-        )
     across = rays.hit.shape[1]
     pixel = long.astype(np.float64) * across / evaluation.design.camera.resolution[0]
     focus = evaluation.model.picture_chain.focus
@@ -79,6 +71,6 @@ def sharpness(evaluation: Evaluation) -> tuple[float, dict[str, Any], dict[str, 
         "blur": mean(blur),
         "finest": float(np.percentile(detail[known], 5.0)),
         "coarsest": float(np.percentile(detail[known], 95.0)),
-        "footprints": int(count),
+        "footprints": int(np.count_nonzero(known)),
     }
     return mean(detail), parts, {"detail": detail}

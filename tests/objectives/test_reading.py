@@ -243,4 +243,5 @@ def test_the_exposure_is_that_of_the_untouched_skin() -> None:
     lowered = Settings(**settings, places=PLACES, exposure=evaluation.exposure)
     assert as_set.value > evaluate(Evaluation(sensor, lowered), "reading").value + 2.0
     shared = evaluate(evaluation, "rgb2normal").value  # not changed by what reading exposes
-    assert shared == evaluate(Evaluation(sensor, evaluation.settings), "rgb2normal").value
+    alone = evaluate(Evaluation(sensor, evaluation.settings), "rgb2normal").value
+    assert shared == pytest.approx(alone, rel=1e-4)  # sums of photons differ by their rounding
