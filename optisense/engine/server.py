@@ -34,7 +34,7 @@ from optisense.errors import OptiSenseError, OutputError
 from optisense.untrusted_files import is_folder
 
 FAREWELL = 3.0
-"""Seconds that `shutdown` waits for what is being worked on."""
+"""Seconds that the end of the engine, or of its requests, waits for what is being worked on."""
 
 AT_ONCE = ("hello", "cancel", "shutdown")
 """Requests that wait for nothing."""
@@ -82,7 +82,10 @@ class Engine:
                 line = requests_in.readline(MOST_OF_A_LINE)
             if whole.strip():
                 self._take(whole)
-        self._cancel_all()
+        if self._channel.gone:  # nobody reads the answers
+            self._cancel_all()
+        elif not self._ending:
+            self._give_up_all()
 
     def _take(self, line: bytes) -> None:
         """Begin with a request, or say why not."""
@@ -186,12 +189,16 @@ class Engine:
     def _shutdown(self, request: Request) -> None:
         checked_fields(Fields, request)
         self._ending = True
+        self._give_up_all()
+        self._channel.send(answer(request.id, {}))
+
+    def _give_up_all(self) -> None:
+        """Cancel what is open, and let it answer for `FAREWELL` seconds."""
         self._cancel_all()
         until = time.monotonic() + FAREWELL
         with self._changed:
             while self._open and (left := until - time.monotonic()) > 0:
                 self._changed.wait(left)
-        self._channel.send(answer(request.id, {}))
 
     def _cancel_all(self) -> None:
         with self._changed:
