@@ -17,7 +17,7 @@ from __future__ import annotations
 import math
 import operator
 import re
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 
 from optisense.errors import ObjectiveError
@@ -282,8 +282,3 @@ def _quantity(token: _Token) -> ScoreTerm:
         return ScoreTerm(name.strip().lower(), part.removeprefix("."))
     name, _, part = token.text.partition(".")
     return ScoreTerm(name.lower(), part)
-
-
-def quantities_of(expressions: Sequence[Expression]) -> list[str]:
-    """The objectives in several expressions, each once."""
-    return list(dict.fromkeys(name for each in expressions for name in each.objectives))
