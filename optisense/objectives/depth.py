@@ -16,6 +16,7 @@ from optisense.objectives.reader import (
     LEAST_PIXELS,
     LEAST_PRESSES,
     ReadPress,
+    over_places,
     pixels_to_read,
     read_presses,
 )
@@ -69,14 +70,8 @@ def depth(
             }
         )
         maps.append({"read": _along_middle(read, inside), "true": _along_middle(true, inside)})
-    errors = [place["error"] for place in places]
-    parts = {
-        "reading_nothing": float(np.mean([place["reading_nothing"] for place in places])),
-        "worst_place": max(errors),
-        "mean_of_places": float(np.mean(errors)),
-        "places": places,
-    }
-    return float(np.median(errors)), parts, {"profiles": maps}
+    value, parts = over_places(places)
+    return value, parts, {"profiles": maps}
 
 
 def _known(evaluation: Evaluation, read: ReadPress) -> tuple[NormalIntegrator, FloatArray]:

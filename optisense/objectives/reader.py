@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -112,6 +113,22 @@ def read_presses(evaluation: Evaluation, camera_noise: float = CAMERA_NOISE) -> 
         f"presses read with noise {camera_noise!r}",
         partial(_read, evaluation, camera_noise),
     )
+
+
+def over_places(places: Sequence[Mapping[str, Any]]) -> tuple[float, dict[str, Any]]:
+    """The median of the places' errors, and what they have in common.
+
+    Args:
+        places: with an `error` each, and the one of `reading_nothing`, in one unit.
+    """
+    errors = [place["error"] for place in places]
+    parts = {
+        "reading_nothing": float(np.mean([place["reading_nothing"] for place in places])),
+        "worst_place": max(errors),
+        "mean_of_places": float(np.mean(errors)),
+        "places": places,
+    }
+    return float(np.median(errors)), parts
 
 
 def _read(evaluation: Evaluation, noise: float) -> list[ReadPress]:

@@ -11,6 +11,7 @@ from optisense.objectives.reader import (
     CAMERA_NOISE,
     LEAST_PIXELS,
     LEAST_PRESSES,
+    over_places,
     pixels_to_read,
     read_presses,
 )
@@ -67,12 +68,6 @@ def reading(
             }
         )
         maps.append({"errors": np.where(each.mask, angles, np.nan)})
-    errors = [place["error"] for place in places]
-    parts = {
-        "reading_nothing": float(np.mean([place["reading_nothing"] for place in places])),
-        "level_skin": float(np.mean([place["level_skin"] for place in places])),
-        "worst_place": max(errors),
-        "mean_of_places": float(np.mean(errors)),
-        "places": places,
-    }
-    return float(np.median(errors)), parts, {"maps": maps}
+    value, parts = over_places(places)
+    parts["level_skin"] = float(np.mean([place["level_skin"] for place in places]))
+    return value, parts, {"maps": maps}
