@@ -255,10 +255,10 @@ def judged(
     """
     errors, ratios, cpu = [], [], {}
     if light:
-        model._forget("_store")
+        model.forget_light(guide=True)
     for seed in SEEDS:
         if light and seed == SEEDS[-1]:
-            model._forget("_store")
+            model.forget_light(guide=True)
         began = time.process_time()
         image = model.render([ball], RESOLUTION, PHOTONS, seed=seed, skin=CONFORMING)
         cpu["cpu_s_new_light"] = time.process_time() - began

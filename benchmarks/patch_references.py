@@ -172,17 +172,17 @@ def _sppm_pictures(
         "height": rows.stop - rows.start,
     }
     camera = WindowCamera(**part, whole=whole, left=int(columns.start), top=int(rows.start))
-    scene = model._scenes([contact], [model.place(contact)]).full
+    scene = model.scenes.touched([contact], [model.place(contact)]).full
     guide = model.guide()
-    per_light = max(1, SPPM_PHOTONS // model._emitter_table.count)
+    per_light = max(1, SPPM_PHOTONS // model.scenes.emitter_table.count)
     flux = [model.design.lights[name].channel_flux() for name in model.groups]
     for batch in range(BATCHES):
         found = render_sppm(
             scene,
-            Emission(model._emitter_table, guide, per_light, FIRST_SEED + batch),
+            Emission(model.scenes.emitter_table, guide, per_light, FIRST_SEED + batch),
             camera,
             SPPM_PASSES,
-            coloured=model._coloured,
+            coloured=model.scenes.coloured,
             radius=SPPM_RADIUS,
             samples=SPPM_SAMPLES,
         )

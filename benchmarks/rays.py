@@ -24,7 +24,7 @@ RUNS = 5
 def photon_rates(case: Case) -> dict[str, Any]:
     """Photons and rays a second of the photon pass alone, and the pure ray rate."""
     model = case.model
-    table = model._emitter_table
+    table = model.scenes.emitter_table
     per_light = PHOTONS // table.count
     guide = model.guide()
 

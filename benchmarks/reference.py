@@ -141,15 +141,15 @@ def _one_seed(
         left=int(columns.start),
         top=int(rows.start),
     )
-    table = model._emitter_table
+    table = model.scenes.emitter_table
     per_light = max(1, min(PASS_PHOTONS, photons) // table.count)
     passes = max(1, round(photons / (per_light * table.count)))
     result = render_sppm(
-        model._scenes([ball()], [model.place(ball())]).full,
+        model.scenes.touched([ball()], [model.place(ball())]).full,
         Emission(table, model.guide(), per_light, seed),
         camera,
         passes,
-        coloured=model._coloured,
+        coloured=model.scenes.coloured,
         radius=radius,
     )
     dr.sync_thread()

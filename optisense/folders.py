@@ -45,6 +45,7 @@ SUBFOLDERS = (
     "materials",
     "meshes",
     "radiance",
+    "renderings",
     "units",
 )
 """Where commands write temporary files besides the folder itself."""

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from pydantic import Field, SerializerFunctionWrapHandler, model_serializer, model_validator
 
 from optisense.design.fields import (
+    Colour,
     Count,
     Direction,
     MisfitError,
@@ -50,6 +51,11 @@ class ImagingModel(Model):
     blur: LensBlur | None = Field(default=None, description="of the lens")
     crosstalk: ChannelMatrix | None = Field(
         default=None, description="rows: what R, G, B of the sensor see of R, G, B of the light"
+    )
+    stray_light: Colour | None = Field(
+        default=None,
+        description="what fills the whole sensor alike, such as ambient light that leaks in: R, G, "
+        "B, shares of a full pixel",
     )
     response: CameraResponse | None = Field(
         default=None, description="how light becomes the picture, instead of the usual way"
@@ -133,6 +139,7 @@ class Camera(ImagingModel, Viewpoint):
             shading=self.shading,
             focus=focus,
             crosstalk=self.crosstalk,
+            stray_light=self.stray_light,
             noise=self.noise,
             black_level=self.black_level,
             white_balance=self.white_balance,

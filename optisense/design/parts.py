@@ -9,12 +9,14 @@ from pydantic import Field, model_validator
 
 from optisense.design.fields import (
     DEGREES,
+    MILLIMETRES,
     Direction,
     Fraction,
     MisfitError,
     Model,
     Name,
     Number,
+    Positive,
     RelativePath,
     Vector,
     is_left_out,
@@ -88,6 +90,9 @@ class Part(Model):
     Which roles take which kind of material: elastomer, support and interface a dielectric;
     mirror a conductor or a diffuse one; blocker any opaque one (none absorbs everything);
     sensing_surface none, as it wears the design's coating.
+
+    A mirror, blocker or interface may be an open sheet. Light meets it as it is drawn; `thickness`
+    is for who makes it: the material lies behind the face, where its normals do not look.
     """
 
     role: Role = Field(description="; ".join(role.value for role in Role))
@@ -95,6 +100,12 @@ class Part(Model):
     material: Name | None = Field(default=None, description="one of the materials above")
     priority: Annotated[int, Field(strict=True, ge=-1000, le=1000)] = Field(
         default=0, description="where solids overlap, the higher one counts"
+    )
+    thickness: Positive | None = Field(
+        default=None,
+        exclude_if=is_left_out,
+        description="mm that a sheet is made with, behind the face that is drawn",
+        json_schema_extra=MILLIMETRES,
     )
     faces: dict[Name, FaceFinish] | None = Field(
         default=None,

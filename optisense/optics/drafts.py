@@ -9,29 +9,34 @@ left out) and only loses effect. In contacts it takes few camera samples.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from optisense.design import SensorDesign
-from optisense.geometry import Contact, SensingSurface, TriangleMesh
+from optisense.geometry import Contact, TriangleMesh
 from optisense.geometry.indenter_kinds import FACET_ERROR
 from optisense.optics.imaging.tactile_image import TactileImage
 from optisense.optics.model import OpticalModel
-from optisense.optics.radiance_cache.store import CELL_SIZE, VIEW_MARGIN, CacheStore, PilotScene
-from optisense.optics.scene.emitters import EmitterTable
-from optisense.optics.scene.ray_scene import Piece, RayScene
-from optisense.optics.scene.surfaces import SurfaceKind
+from optisense.optics.radiance_cache.store import CELL_SIZE, VIEW_MARGIN, CacheStore, LitScene
+from optisense.optics.scene.assembly import assemble
+from optisense.optics.scene.ray_scene import Piece
+from optisense.optics.scene.sensor_scenes import SensorScenes
+from optisense.optics.skin_view import VIEW_RESOLUTION, SkinView
 
 DRAFT_CELL_SCALE = 2.4
 """Ratio of a draft's cell size to that of a full image. With as few photons as a draft has, wider
 cells give a picture that is nearer to the full one: 9 % off instead of 14 % with cells half as
 wide. Smoothing them also costs a small part."""
 
+
+PLACED_CONTACTS = 64
+"""Number of contacts whose placed meshes a draft keeps: more than the presses of any objective, and
+about 10 MB of meshes."""
 
 GUIDE_TOLERANCE = 0.5 * VIEW_MARGIN
 """Largest displacement of a vertex (mm) up to which a draft keeps the emission guide that was
@@ -57,41 +62,43 @@ class DraftCacheStore(CacheStore):
     uses_pilot = False  # half of the light's time, for some per cent on flanks of contacts
 
     def __init__(
-        self,
-        scene: RayScene,
-        opaque: list[Piece],
-        table: EmitterTable,
-        seen: NDArray[np.floating],
-        coloured: bool,
-        roughness: float | None,
-        pilot: PilotScene,
-        before: DraftCacheStore | None,
+        self, lit: LitScene, seen: NDArray[np.floating], before: DraftCacheStore | None
     ) -> None:
         """Keep what `CacheStore` keeps; `before` is the store of the design before, if there is
         one.
         """
-        super().__init__(scene, opaque, table, seen, coloured, roughness, pilot)
+        super().__init__(lit, seen)
         self.seen = seen
-        self._learned_on = opaque
+        self._learned_on = lit.opaque
         if before is None:
             return
-        off = _apart(opaque, before._opaque)
+        off = _apart(lit.opaque, before._lit.opaque)
         same_view = seen is before.seen or np.array_equal(seen, before.seen)
-        if off == 0.0 and same_view and table.groups == before._table.groups:
+        if off == 0.0 and same_view and lit.table.groups == before._lit.table.groups:
             self._cells, self._kernels = before._cells, before._kernels
-        if before.aims_at(opaque, table):
+        if before.aims_at(lit):
             self._guide, self._learned_on = before._guide, before._learned_on
 
-    def aims_at(self, opaque: list[Piece], table: EmitterTable) -> bool:
-        """Whether it knows where lights should send photons in a sensor of these surfaces."""
-        known = self._guide is not None and table.count == self._table.count
-        return known and _apart(opaque, self._learned_on) < GUIDE_TOLERANCE
+    def aims_at(self, lit: LitScene) -> bool:
+        """Whether it knows where lights should send photons in this sensor."""
+        known = self._guide is not None and lit.table.count == self._lit.table.count
+        return known and _apart(lit.opaque, self._learned_on) < GUIDE_TOLERANCE
 
-    def light_only(self, groups: Collection[int] | None) -> None:
-        """Trace the light of these groups alone from now on, or of all (None)."""
-        if groups != self.lit:
-            self.forget_light(self._coloured, self._roughness)
-        self.lit = groups
+
+class DraftView(SkinView):
+    """A view for drafts, which keeps where contacts were placed."""
+
+    facet_error = 10 * FACET_ERROR  # still far below a pixel; normals are those of the exact shape
+
+    def __init__(self, design: SensorDesign, scenes: SensorScenes) -> None:
+        """See `SkinView`."""
+        super().__init__(design, scenes)
+        self._placed: Callable[[Contact], TriangleMesh]
+        self._placed = lru_cache(maxsize=PLACED_CONTACTS)(super().place)
+
+    def place(self, contact: Contact) -> TriangleMesh:
+        """See `SkinView`."""
+        return self._placed(contact)
 
 
 class DraftModel(OpticalModel):
@@ -101,43 +108,27 @@ class DraftModel(OpticalModel):
 
     is_draft = True
     bends_media = True
-    facet_error = 10 * FACET_ERROR  # still far below a pixel; normals are those of the exact shape
+    view_type = DraftView
 
     def __init__(self, design: SensorDesign, variant: str = "auto") -> None:
-        """As of `OpticalModel`."""
+        """See `OpticalModel`."""
         self._rest: dict[str, TriangleMesh] = {}
         self._bent: dict[str, TriangleMesh] = {}
         self._before: DraftCacheStore | None = None
-        self._seen: NDArray[np.floating] | None = None
-        self._placed: dict[Contact, TriangleMesh] = {}
-        self._placed_on: SensingSurface | None = None
         self._shown: _Shown | None = None
-        self._pressed: tuple[int, list[TriangleMesh], RayScene] | None = None
         super().__init__(self._straightened(design), variant)
 
     def set_design(self, design: SensorDesign) -> None:
-        """As of `OpticalModel`."""
-        straight, old = self._straightened(design), self.design
-        self._before = self.__dict__.get("_store", self._before)
-        kept = {name: self.__dict__.get(name) for name in ("surface", "_gel", "_fixed")}
-        super().set_design(straight)
-        if not _all_but_lights_same(old, straight):
-            self._seen = None
-            return
-        for name, value in kept.items():  # what the camera sees does not depend on the lights
-            if value is not None:
-                setattr(self, name, value)
+        """See `OpticalModel`."""
+        super().set_design(self._straightened(design))
 
-    def place(self, contact: Contact) -> TriangleMesh:
-        """As of `OpticalModel`."""
-        if self._placed_on is not self.surface:
-            self._placed, self._placed_on = {}, self.surface
-        if contact not in self._placed:
-            self._placed[contact] = super().place(contact)
-        return self._placed[contact]
+    def _view_of(self, design: SensorDesign, scenes: SensorScenes) -> SkinView:
+        if _all_but_lights_same(self.design, design):
+            return self._view  # what the camera sees does not depend on the lights
+        return super()._view_of(design, scenes)
 
     def render(self, contacts: Sequence[Contact] = (), *args: Any, **kwargs: Any) -> TactileImage:
-        """As of `OpticalModel`; layers of light groups whose lights are where they were in the
+        """See `OpticalModel.render`; layers of light groups whose lights are where they were in the
         draft before are taken from it, where all else is the same.
 
         What is missed by that is the shadow of moved lights in the light of the others. The same
@@ -154,14 +145,14 @@ class DraftModel(OpticalModel):
                 self._resolve()
             moved = None
         self._shown = None
-        self._store.light_only(moved)
+        self._store.groups = moved
         image = super().render(contacts, *args, **kwargs)
         kept = [] if moved is None else [n for k, n in enumerate(self.groups) if k not in moved]
         if before is not None:
             for name in kept:
                 image.unit_layers[name] = before.image.unit_layers[name]
             image = self._relit(image)
-        bent = self._parts.media.bent
+        bent = self.scenes.assembly.media.bent
         image.settings |= {"kept_layers": kept, "kept_media": bent}
         if not image.interrupted:
             self._shown = _Shown(asked, self.design, image, bent or bool(kept))
@@ -169,13 +160,10 @@ class DraftModel(OpticalModel):
 
     def _resolve(self) -> None:
         """Resolve media that were only taken along."""
-        if self._parts.media.bent:
-            self._before = self.__dict__.get("_store", self._before)
-            self.bends_media = False
-            try:
-                self._assemble(self._parts)
-            finally:
-                self.bends_media = True
+        if self.scenes.assembly.media.bent:
+            assembly = assemble(self.design, self.scenes.assembly)
+            scenes = SensorScenes(assembly, self.design.coating, self.scenes)
+            self._set(self.design, scenes, self.view_type(self.design, scenes))
 
     def _relit(self, image: TactileImage) -> TactileImage:
         """The same under the design's own lights."""
@@ -183,33 +171,17 @@ class DraftModel(OpticalModel):
             {name: self.design.lights[name].channel_flux() for name in image.unit_layers}
         )
 
-    def _indenters(self, placed: list[TriangleMesh]) -> RayScene:
-        count = len(self._surfaces)  # the indenters' surface is the last
-        if self._pressed is None or self._pressed[:2] != (count, placed):
-            self._pressed = count, placed, super()._indenters(placed)
-        scene = self._pressed[2]
-        scene.table = self._table
-        return scene
+    def _set(self, design: SensorDesign, scenes: SensorScenes, view: SkinView) -> None:
+        if isinstance(self._caches, DraftCacheStore):
+            self._before = self._caches
+        super()._set(design, scenes, view)
 
-    @cached_property
-    def _store(self) -> DraftCacheStore:
-        opaque = [piece for piece in self._pieces if piece.surface.kind is SurfaceKind.OPAQUE]
-        before, seen = self._before, self._seen
-        if seen is None and before is not None and before.aims_at(opaque, self._emitter_table):
-            seen = before.seen
-        if seen is None:
-            rays = self.chief_rays((96, 72))
-            seen = self._seen = rays.points[rays.hit]
-        return DraftCacheStore(
-            self.scene,
-            opaque,
-            self._emitter_table,
-            seen,
-            self._coloured,
-            self._roughness,
-            self._pilot_scene(),
-            before,
-        )
+    def _new_store(self) -> DraftCacheStore:
+        lit, before = LitScene.of(self.scenes), self._before
+        if before is not None and before.aims_at(lit):
+            return DraftCacheStore(lit, before.seen, before)
+        rays = self.chief_rays(VIEW_RESOLUTION)
+        return DraftCacheStore(lit, rays.points[rays.hit], before)
 
     def _straightened(self, design: SensorDesign) -> SensorDesign:
         """The same sensor without cages: its meshes as they are bent, the same objects as before

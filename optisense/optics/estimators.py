@@ -1,4 +1,4 @@
-"""The names of the two ways in which an image is made; see docs/simulation.md."""
+"""The names of the two estimators that render an image; see docs/simulation.md."""
 
 RADIANCE_CACHE = "radiance-cache"
 """Shade camera samples from the radiance cache, which is kept between images: fast, the default."""

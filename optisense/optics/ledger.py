@@ -25,7 +25,7 @@ LEDGER_PHOTONS = 1_000_000
 """Photons of a ledger: shares of a hundredth are then right to some per cent of themselves."""
 
 VIEW_CELL = 0.5
-"""mm: side of the cells of the sensing surface that tell whether the camera looks there."""
+"""mm: side of the cells of the sensing surface by which it is known where the camera looks."""
 
 IN_VIEW = 1.0
 """mm: largest distance from the middle of a cell in view to the nearest point that a ray of a
@@ -185,9 +185,11 @@ def light_ledger(
             f"{photons} photons are too few for {len(lights)} lights",
             hint=f"give at least {100 * len(lights)}",
         )
-    pieces = model._pieces
+    pieces = model.scenes.pieces
     seen = cells_in_view(model) if seen is None else seen
-    bookings = trace_ledger(model.scene, model._emitter_table, len(pieces), seen, photons, seed)
+    bookings = trace_ledger(
+        model.scene, model.scenes.emitter_table, len(pieces), seen, photons, seed
+    )
     entries: list[LedgerEntry] = []
     exits: list[LedgerExit] = []
     emitted = {}

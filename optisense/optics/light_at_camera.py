@@ -27,14 +27,14 @@ class CameraLight:
     Attributes:
         irradiance: mW/mm^2 of each light group on the plane of the lens, from all that the picture
             shows.
-        pupil: mm^2 of the lens's opening; None where the design does not tell its lens.
+        pupil: mm^2 of the lens's opening; None where the design does not give its lens.
     """
 
     irradiance: dict[str, float]
     pupil: float | None
 
     def power(self, group: str) -> float | None:
-        """The mW of a group that the lens lets in; None where the design does not tell its lens."""
+        """The mW of a group that the lens lets in; None where the design does not give its lens."""
         return None if self.pupil is None else self.irradiance[group] * self.pupil
 
     def as_data(self) -> dict[str, Any]:

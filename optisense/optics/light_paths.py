@@ -1,4 +1,4 @@
-"""The ways of typical photons of each light group, and where each ends, for drawing."""
+"""The paths of typical photons of each light group, and where each ends, for drawing."""
 
 from __future__ import annotations
 
@@ -27,11 +27,11 @@ light of one channel, and those of the channels that a group emits are drawn."""
 
 @dataclass(frozen=True)
 class PhotonPath:
-    """The way of one photon.
+    """The path of one photon.
 
     Attributes:
         group: the light group.
-        where: it ends, in the words of the light ledger.
+        where: where it ends, in the words of the light ledger.
         points: (n, 3) float32, mm: the light, the surfaces that the photon meets, and its end. That
             of a photon that escapes is a little outside the sensor.
     """
@@ -47,7 +47,7 @@ def photon_paths(
     seed: int = 0,
     seen: TargetCells | None = None,
 ) -> dict[str, list[PhotonPath]]:
-    """Ways of photons, drawn in proportion to power, of which each stands for an equal share.
+    """Paths of photons, drawn in proportion to power; each stands for an equal share of it.
 
     No contact presses. The number of a group's photons that end at a place is, up to the noise of
     so few, the share that the light ledger has there.
@@ -65,13 +65,13 @@ def photon_paths(
     fewest = min((len(group.lights) for group in lights.values() if group.lights), default=1)
     traced = trace_photon_paths(
         model.scene,
-        model._emitter_table,
+        model.scenes.emitter_table,
         np.array([group.channel_flux() for group in lights.values()]),
         cells_in_view(model) if seen is None else seen,
         CANDIDATES * math.ceil(per_group / fewest),
         seed,
     )
-    words = {(p.surface, int(p.fate)): p.where for p in places_of(model._pieces)}
+    words = {(p.surface, int(p.fate)): p.where for p in places_of(model.scenes.pieces)}
     rng = np.random.default_rng(seed)
     found = {}
     for number, name in enumerate(lights):

@@ -60,7 +60,7 @@ def mirror_problems(design: SensorDesign, views: dict[frozenset[str], float]) ->
 
 
 def views_in_words(views: dict[frozenset[str], float]) -> str:
-    """The ways by which the camera sees the sensing surface, the most used one first."""
+    """The sets of mirrors by which the camera sees the sensing surface, the most used first."""
     told = []
     for way, share in sorted(views.items(), key=lambda each: -each[1]):
         names = " and ".join(f"'{name}'" for name in sorted(way))

@@ -1,19 +1,16 @@
-"""An optical model: a sensor design made ready to render, with its scene, tables, emission guide
-and
-radiance caches kept between images.
-"""
+"""A sensor design made ready to render: its scenes, emission guide and radiance caches."""
 
 from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import cached_property
 
 import drjit as dr
 import numpy as np
 from numpy.typing import NDArray
 
+from optisense.design import SensorDesign
 from optisense.errors import RenderError
 from optisense.geometry import Contact, TriangleMesh
 from optisense.mechanics import ELASTIC, SKINS, PressedSkin
@@ -26,11 +23,11 @@ from optisense.optics.estimators import ESTIMATORS, RADIANCE_CACHE, SPPM
 from optisense.optics.imaging.cached import ImageLayers, PixelImportance, render_cached
 from optisense.optics.imaging.markers import MarkerDots, MarkerPlaces, ink_factor
 from optisense.optics.imaging.tactile_image import RADIANCE_UNIT, TactileImage
-from optisense.optics.radiance_cache.store import CacheStore, PilotScene
+from optisense.optics.radiance_cache.store import CacheStore, LitScene
 from optisense.optics.ray_model import RayModel
-from optisense.optics.scene.bsdf import surface_table
 from optisense.optics.scene.contact_scenes import ContactScenes
-from optisense.optics.scene.surfaces import Region, Surface, SurfaceKind, is_coloured
+from optisense.optics.scene.sensor_scenes import SensorScenes
+from optisense.optics.skin_view import VIEW_RESOLUTION, SkinView
 from optisense.optics.transport.chief_rays import ChiefRays, sees_nothing, trace_chief_rays
 from optisense.optics.transport.emission_guide import EmissionGuide
 from optisense.optics.transport.photons import Emission
@@ -38,12 +35,6 @@ from optisense.quality import PICTURE_PHOTONS, SCORE_PHOTONS, photons_of
 
 MAX_PHOTONS = 512_000_000
 """Number of photons at which tracing ends even if the wanted noise is not reached."""
-
-PILOT_COATING = Surface(
-    SurfaceKind.OPAQUE, alpha=1.0, reflectance=(0.5,) * 3, region=Region.SENSING
-)
-"""The coating that pilot photons meet, whichever the sensor has: grey and diffuse, and neither so
-dark that scattered light would be missing nor so bright that it would prevail."""
 
 SPPM_PASS_PHOTONS = 1_000_000
 """Photons of one pass of the `sppm` estimator."""
@@ -73,7 +64,7 @@ class RenderProgress:
 class OpticalModel(RayModel):
     """A sensor whose image can be rendered, again and again.
 
-    The scene of the sensor itself, the photon guide and the radiance cache are made once; a
+    The scene of the sensor itself, the emission guide and the radiance cache are made once; a
     contact adds only its own surface, a light's flux or colour only scales its layer, a
     coating's specularity only rewrites its row of the surface table.
     """
@@ -84,39 +75,36 @@ class OpticalModel(RayModel):
     listener: Callable[[RenderProgress], None] | None = None
     """Called with the progress of images for which `render` is given nobody else."""
 
-    @cached_property
+    _caches: CacheStore | None = None
+    """The radiance caches, once they are asked for."""
+
+    @property
     def _store(self) -> CacheStore:
-        opaque = [p for p in self._pieces if p.surface.kind is SurfaceKind.OPAQUE]
-        bound_memory()  # of the models before this one
-        rays = self.chief_rays((96, 72))
-        return CacheStore(
-            self.scene,
-            opaque,
-            self._emitter_table,
-            rays.points[rays.hit],
-            self._coloured,
-            self._roughness,
-            self._pilot_scene(),
-        )
+        if self._caches is None:
+            bound_memory()  # of the models before this one
+            self._caches = self._new_store()
+        return self._caches
 
-    def _pilot_scene(self) -> PilotScene:
-        """The sensor with `PILOT_COATING`."""
-        surfaces = [
-            PILOT_COATING if surface.region is not Region.OTHER else surface
-            for surface in self._surfaces
-        ]
-        scene = self.scene.with_table(surface_table(surfaces))
-        return PilotScene(scene, any(is_coloured(surface) for surface in surfaces))
+    def _new_store(self) -> CacheStore:
+        rays = self.chief_rays(VIEW_RESOLUTION)
+        return CacheStore(LitScene.of(self.scenes), rays.points[rays.hit])
 
-    def _recoat(self) -> None:
-        super()._recoat()
-        if "_store" in self.__dict__:
-            self._store.forget_light(self._coloured, self._roughness)
+    def _set(self, design: SensorDesign, scenes: SensorScenes, view: SkinView) -> None:
+        if self._caches is not None:
+            if scenes.assembly is not self.scenes.assembly or view is not self._view:
+                self._caches = None
+            elif scenes is not self.scenes:
+                self._caches = self._caches.coated(LitScene.of(scenes))
+        super()._set(design, scenes, view)
 
-    def forget_light(self) -> None:
-        """Drop the radiance caches (hundreds of MB); the next image traces its light anew."""
-        if "_store" in self.__dict__:
-            self._store.forget_light(self._coloured, self._roughness)
+    def forget_light(self, guide: bool = False) -> None:
+        """Drop the radiance caches (hundreds of MB); the next image traces its light anew.
+
+        Args:
+            guide: drop the emission guide and the surface cells as well.
+        """
+        if self._caches is not None:
+            self._caches = None if guide else self._caches.coated(LitScene.of(self.scenes))
             dr.flush_malloc_cache()
 
     def guide(self) -> EmissionGuide:
@@ -139,13 +127,13 @@ class OpticalModel(RayModel):
         partial: bool = True,
         skin: str = ELASTIC,
     ) -> TactileImage:
-        """What the camera sees while ``contacts`` press in.
+        """Render what the camera sees while ``contacts`` press into the skin.
 
         Args:
             contacts: indenters, places and depths; none for the untouched sensor.
             resolution: (width, height) pixels; the camera's own by default.
-            photons: to trace in all: a number or a level of `optisense.quality`; normal if no other
-                limit is given.
+            photons: to trace in all, as a number or a level of `optisense.quality`; normal if no
+                other limit is given.
             noise: per cent; trace until the relative RMS noise of the light on the sensing
                 surface is this small.
             seconds: stop tracing in time to be ready then.
@@ -199,9 +187,9 @@ class OpticalModel(RayModel):
         pressed = None
         if contacts and skin == ELASTIC:
             pressed = self.pressed(contacts, placed)
-            scenes = self._elastic_scenes(contacts, placed)
+            scenes = self._deformed_scenes(contacts, placed)
         else:
-            scenes = self._scenes(contacts, placed)
+            scenes = self.scenes.touched(contacts, placed)
         rays = trace_chief_rays(scenes.full, camera)
         if not rays.hit.any():
             raise sees_nothing(rays)
@@ -224,8 +212,8 @@ class OpticalModel(RayModel):
                 scenes,
                 camera,
                 rays,
-                self._parts.emitters,
-                self._parts.light_areas,
+                self.scenes.assembly.emitters,
+                self.scenes.assembly.light_areas,
                 seed,
                 only_contacts,
                 pixel_importance,
@@ -310,8 +298,8 @@ class OpticalModel(RayModel):
     ) -> ImageLayers:
         from optisense.optics.imaging.sppm import render_sppm
 
-        per_light = max(1, SPPM_PASS_PHOTONS // self._emitter_table.count)
-        emitted = per_light * self._emitter_table.count
+        per_light = max(1, SPPM_PASS_PHOTONS // self.scenes.emitter_table.count)
+        emitted = per_light * self.scenes.emitter_table.count
         passes = max(1, -(-(photons or 16 * SCORE_PHOTONS) // emitted))
 
         def stop(done: int) -> bool:
@@ -320,10 +308,10 @@ class OpticalModel(RayModel):
 
         result = render_sppm(
             scenes.full,
-            Emission(self._emitter_table, self.guide(), per_light, seed),
+            Emission(self.scenes.emitter_table, self.guide(), per_light, seed),
             camera,
             passes,
-            coloured=self._coloured,
+            coloured=self.scenes.coloured,
             stop=stop,
         )
         return ImageLayers.from_sppm(result, rays, began)

@@ -1,4 +1,4 @@
-"""The light at a place of the sensing surface: how much, of which groups, on which ways, whence.
+"""The light at a place of the sensing surface: its power, light groups, paths and directions.
 
 It answers why a place is as bright or as dark as it is, nothing pressed in.
 """
@@ -31,11 +31,11 @@ Place = tuple[float, float] | tuple[float, float, float]
 """mm, coordinates on the sensing surface, or a point in the frame of the design."""
 
 PLACE_RADIUS = 1.0
-"""mm: photons that land so near a place tell its light. A million photons on GelSight Mini then
-bring some thousand landings; light varies by some per cent over such a disc."""
+"""mm: photons that land within this radius count as its light. A million photons on GelSight Mini
+then bring some thousand landings; light varies by some per cent over such a disc."""
 
 AREA_STEP = 0.02
-"""mm: distance of the samples that tell the area of skin within the disc, to about 0.2 %."""
+"""mm: distance of the samples that measure the area of skin within the disc, to about 0.2 %."""
 
 WAY_WORDS = {
     LightWay.REFRACTED: "refracted only",
@@ -44,7 +44,7 @@ WAY_WORDS = {
     LightWay.SCATTERED_BY_PARTS: "scattered by other parts",
     LightWay.SCATTERED_BY_COATING: "scattered by the coating elsewhere",
 }
-"""What pages and tables call the ways, from the plainest to the longest."""
+"""Names of the kinds of light paths in pages and tables, from the shortest to the longest path."""
 
 
 @dataclass(frozen=True)
@@ -91,7 +91,7 @@ class PlaceLight:
         at: mm, the place as it was asked for.
         point: (3,) mm, in the design's frame.
         groups: by light group; groups that are off are left out.
-        photons: that were followed.
+        photons: number of photons that were followed.
     """
 
     at: Place
@@ -155,7 +155,9 @@ def light_at(
     up *= np.sign(up @ model.surface.v_axis)
     disc = Disc(place.point, place.inward, right, up, PLACE_RADIUS)
     seen = cells_in_view(model) if seen is None else seen
-    landed, in_view = trace_to_place(model.scene, model._emitter_table, disc, seen, photons, seed)
+    landed, in_view = trace_to_place(
+        model.scene, model.scenes.emitter_table, disc, seen, photons, seed
+    )
     area = _area_within(model.sensing.triangles, disc)
     view_area = float(seen.cells.areas[np.asarray(seen.flags) != 0].sum())
     groups = {}

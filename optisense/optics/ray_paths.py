@@ -1,4 +1,4 @@
-"""The ways of chief rays from the camera to where they end, for drawing."""
+"""The paths of chief rays from the camera to where they end, for drawing."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ class RayPaths:
 def trace_paths(
     model: OpticalModel, resolution: tuple[int, int], contacts: Sequence[Contact] = ()
 ) -> RayPaths:
-    """The way of the ray through the middle of each pixel, row by row.
+    """The path of the ray through the middle of each pixel, row by row.
 
     Args:
         model: a sensor.
@@ -53,10 +53,10 @@ def trace_paths(
         RenderError: the resolution makes no sense.
     """
     camera = model.camera(resolution)
-    scene = model._fine.scene
+    scene = model.scenes.fine.scene
     if contacts:
         placed = [model.place(contact) for contact in contacts]
-        scene = model._sensor_pieces(fine=True).with_indenters(placed)
+        scene = model.scenes.with_indenters(placed)
     index = dr.arange(mi.UInt32, camera.width * camera.height)
     origin, direction = camera.rays(
         mi.Float(index % camera.width) + 0.5, mi.Float(index // camera.width) + 0.5

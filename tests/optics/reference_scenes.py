@@ -16,7 +16,7 @@ from optisense.optics.camera.projection import RayCamera
 from optisense.optics.imaging.cached import render_cached
 from optisense.optics.imaging.sppm import render_sppm
 from optisense.optics.mitsuba_export import PATH_DEPTH, Colour, mitsuba_scene
-from optisense.optics.radiance_cache.store import CacheStore
+from optisense.optics.radiance_cache.store import CacheStore, LitScene
 from optisense.optics.scene.contact_scenes import ContactScenes
 from optisense.optics.scene.emitters import (
     Emitter,
@@ -91,14 +91,14 @@ class ReferenceScene:
         opaque = [i for i, s in enumerate(surfaces) if s.kind is SurfaceKind.OPAQUE]
         rays = trace_chief_rays(scene, self.camera, np.zeros(len(scene.faces), dtype=np.int64))
         lobes = [surfaces[i].alpha for i in opaque if surfaces[i].specularity > 0]
-        store = CacheStore(
+        lit = LitScene(
             scene,
             [self.pieces[i] for i in opaque],
             self.table(),
-            rays.points[rays.hit],
             self._coloured(),
             min(lobes, default=None),
         )
+        store = CacheStore(lit, rays.points[rays.hit])
         light = store.field(
             seed, photons, None, None, 2 * photons, 0.0, lambda stage, part, traced, noise: None
         )

@@ -27,7 +27,7 @@ def test_merged_beams_give_the_picture_of_all_bins(
     merged = model.render(**size)
     count = len(field_of(model).beams.ways)
     monkeypatch.setattr(beams, "STRONG_SHARE", -1.0)
-    model._store.forget_light(model._coloured, model._roughness)
+    model.forget_light()
     apart = model.render(**size)
     assert len(field_of(model).beams.ways) > 1.1 * count
     for group, layer in apart.layers.items():

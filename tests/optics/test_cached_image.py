@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
+from scipy import ndimage
 
-from optisense import Contact, OpticalModel, Plane
+from optisense import Contact, OpticalModel, Plane, Sphere
 from optisense.optics.imaging import cached
 from optisense.sensors import build
 
@@ -49,3 +51,23 @@ def test_an_untouched_gel_has_less_grain_than_one_camera_sample_a_pixel_would_sh
     finally:
         cached._grainy = usual
     assert often < 0.9 * once  # the rest is noise of photons
+
+
+def test_the_skin_beside_a_contact_has_the_light_that_the_contact_reflects_to_it(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    model = OpticalModel(build("gelsight-mini"), "llvm")
+    ball = Contact(Sphere(radius=1.5), at=(0.0, 0.0), depth=0.8)
+    ring = np.zeros((120, 160), dtype=bool)
+
+    def light() -> float:
+        image = model.render([ball], (160, 120), 100_000, skin="conforming")
+        if not ring.any():
+            away = ndimage.distance_transform_edt(~image.contact_mask)
+            ring[(away > 4.5) & (away <= 12)] = True
+        return float(image.radiance[ring].mean())
+
+    usual = light()
+    monkeypatch.setattr(cached, "BESIDE_RANGE", 0.0)
+    # A ball that rises 0.8 mm over skin 1 mm away fills about 1 % of its cosine-weighted view.
+    assert 1.002 < usual / light() < 1.01

@@ -82,15 +82,15 @@ def test_few_photons_show_what_a_moved_light_does(
 def test_a_contact_is_placed_anew_where_it_or_the_surface_moved(
     draft: DraftModel, mini: SensorDesign, moved: SensorDesign
 ) -> None:
-    placed, fixed = draft.place(PRESS[0]), draft._fixed
+    placed, fixed = draft.place(PRESS[0]), draft.scenes.fixed.scene
     draft.set_design(moved)
-    assert draft.place(PRESS[0]) is placed and draft._fixed is fixed
+    assert draft.place(PRESS[0]) is placed and draft.scenes.fixed.scene is fixed
     aside = ots.Contact(ots.Sphere(radius=1.5), at=(2, 0), depth=0.6)
     shift = draft.place(aside).bounds - placed.bounds
     np.testing.assert_allclose(np.linalg.norm(shift, axis=1), 2.0, atol=1e-6)
     draft.set_design(ots.set_value(mini, "cages.skin.points[14].z", 1.0))
     assert draft.place(PRESS[0]).bounds[1, 2] > placed.bounds[1, 2] + 0.1
-    assert draft._fixed is not fixed
+    assert draft.scenes.fixed.scene is not fixed
 
 
 def test_a_moved_camera_or_a_bent_skin_makes_anew_what_depends_on_it(

@@ -100,11 +100,11 @@ def test_a_model_takes_on_another_roughness_and_paint() -> None:
     design = mini("guide", {"edge": {**RIGHT, "roughness": 0.3}}, black=BLACK)
     model = OpticalModel(design)
     model.update("parts.guide.faces.edge.roughness", 0.1)
-    assert [p.surface.alpha for p in model._pieces if p.name.endswith(":guide.edge")] == [0.1]
+    assert [p.surface.alpha for p in model.scenes.pieces if p.name.endswith(":guide.edge")] == [0.1]
     model.update("parts.guide.faces", {"edge": {**RIGHT, "paint": "black"}})
-    assert [p.name for p in model._pieces if "guide.edge" in p.name] == ["guide.edge"]
+    assert [p.name for p in model.scenes.pieces if "guide.edge" in p.name] == ["guide.edge"]
     model.update("parts.guide.faces", None)
-    assert not [p.name for p in model._pieces if "guide.edge" in p.name]
+    assert not [p.name for p in model.scenes.pieces if "guide.edge" in p.name]
 
 
 def test_frost_spreads_light_and_black_paint_takes_it() -> None:
@@ -130,4 +130,4 @@ def test_drafts_have_the_same_faces() -> None:
     moved = ots.set_value(design, "parts.guide.faces.edge.roughness", 0.2)
     draft.set_design(moved)
     draft.render(resolution=SIZE, photons=100_000)
-    assert [p.surface.alpha for p in draft._pieces if p.name.endswith(":guide.edge")] == [0.2]
+    assert [p.surface.alpha for p in draft.scenes.pieces if p.name.endswith(":guide.edge")] == [0.2]

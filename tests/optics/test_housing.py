@@ -71,11 +71,11 @@ def sphere(reflectance: float | None, coating: float = 0.0) -> SensorDesign:
 
 def landed(model: OpticalModel) -> float:
     """The share of the lamp's light that lands on the sensing surface."""
-    emission = Emission(model._emitter_table, uniform_guide(1), PHOTONS, 1)
+    emission = Emission(model.scenes.emitter_table, uniform_guide(1), PHOTONS, 1)
     found = trace_photons(model.scene, emission, coloured=False)
     place = np.asarray(found.place)[: 4 * found.count].reshape(-1, 4)
     surface = place[:, 3].copy().view(np.uint32) >> SURFACE_SHIFT
-    skin = [k for k, p in enumerate(model._pieces) if p.surface.region is Region.SENSING]
+    skin = [k for k, p in enumerate(model.scenes.pieces) if p.surface.region is Region.SENSING]
     return float(np.asarray(found.power)[: found.count][np.isin(surface, skin)].sum())
 
 

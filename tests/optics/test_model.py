@@ -168,9 +168,9 @@ def test_a_model_that_became_another_design_sees_what_a_new_model_of_it_sees() -
         ("coating.specularity", 0.7, False),
     ):
         start = set_value(start, path, value)
-        media = used._parts.media
+        media = used.scenes.assembly.media
         used.set_design(start)
-        assert (used._parts.media is not media) == resolved_anew
+        assert (used.scenes.assembly.media is not media) == resolved_anew
         fresh = OpticalModel(start, "llvm")
         got, expected = used.chief_rays(PIXELS), fresh.chief_rays(PIXELS)
         assert np.array_equal(got.outcome, expected.outcome)

@@ -87,7 +87,7 @@ def test_twicing_undoes_most_of_the_blur_and_leaves_even_light_even(kernels) -> 
     both = kernels.smoothing(5_000_000, corrected=True)
     truth = within_cells(cells.centres, SIZE)
     once = both.kernel.matrix @ (truth * cells.areas[:, None])
-    twice = both.correction.matrix @ once
+    twice = both.correction @ once
     middle = np.hypot(*cells.centres[:, :2].T) < 1.0
     plain, sharp = (
         float((as_read(each, cells.centres, SIZE) / truth - 1)[middle].mean())
@@ -95,7 +95,7 @@ def test_twicing_undoes_most_of_the_blur_and_leaves_even_light_even(kernels) -> 
     )
     assert plain < -0.01
     assert abs(sharp) < AT_DEFAULT
-    even = both.correction.matrix @ (both.kernel.matrix @ cells.areas[:, None])
+    even = both.correction @ (both.kernel.matrix @ cells.areas[:, None])
     assert even == pytest.approx(np.ones_like(even), rel=1e-6)
 
 

@@ -11,7 +11,7 @@ from reference_scenes import diffuse_coating, quad
 from optisense.geometry import Sphere
 from optisense.optics.camera.projection import RayCamera
 from optisense.optics.imaging.cached import render_cached
-from optisense.optics.radiance_cache.store import CacheStore
+from optisense.optics.radiance_cache.store import CacheStore, LitScene
 from optisense.optics.scene.contact_scenes import ContactScenes
 from optisense.optics.scene.emitters import Emitter, EmitterShape, emitter_table
 from optisense.optics.scene.ray_scene import Piece, RayScene
@@ -53,7 +53,7 @@ def skin() -> Piece:
 
 
 def store(scene: RayScene, lamp: Emitter, seen: NDArray[np.floating]) -> CacheStore:
-    return CacheStore(scene, [skin()], emitter_table([lamp], 1), seen, False)
+    return CacheStore(LitScene(scene, [skin()], emitter_table([lamp], 1), False), seen)
 
 
 def irradiance(points: NDArray[np.floating], normals: NDArray[np.floating]) -> NDArray[np.float64]:

@@ -4,7 +4,7 @@ In the order of a real camera:
 
 1. the lens: blur;
 2. the sensor: crosstalk between the channels, the shading by lens and pixels, which is measured of
-   each channel, overexposure (`CameraResponse`), noise, black level;
+   each channel, overexposure (`CameraResponse`), stray light, noise, black level;
 3. its processor: the black level is subtracted, the shading corrected, the colours are balanced and
    mixed by a matrix, levels are clipped, and the tone curve gives what is stored.
 
@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import map_coordinates
 
-from optisense.design.fields import PositiveRGB
+from optisense.design.fields import Colour, PositiveRGB
 from optisense.design.lenses.blur import LEAST_WIDTH, LensBlur, LensView, blurred, reach_of
 from optisense.design.lenses.film import PictureWindow, film_places
 from optisense.design.lenses.shading import LensShading
@@ -89,6 +89,7 @@ class PictureChain:
         focus: the blur of its lens.
         crosstalk: how much of the R, G and B of the light each channel of the sensor sees.
         shading: how dim each channel is by place, and how much its processor corrects of it.
+        stray_light: what fills the whole sensor alike, R, G and B, shares of a full pixel.
         noise: of its sensor.
         black_level: of its sensor, and what is subtracted.
         white_balance: gains of R, G and B.
@@ -100,6 +101,7 @@ class PictureChain:
     focus: SoftFocus | None = None
     crosstalk: ChannelMatrix | None = None
     shading: LensShading | None = None
+    stray_light: Colour | None = None
     noise: SensorNoise | None = None
     black_level: BlackLevel | None = None
     white_balance: PositiveRGB | None = None
@@ -109,8 +111,9 @@ class PictureChain:
     @property
     def is_plain(self) -> bool:
         """Whether the response alone makes the picture, but for its tone curve."""
-        stages = (self.shading, self.focus, self.crosstalk, self.noise, self.black_level)
-        return all(each is None for each in (*stages, self.white_balance, self.colour_matrix))
+        lens = (self.shading, self.focus, self.crosstalk, self.stray_light)
+        sensor = (self.noise, self.black_level, self.white_balance, self.colour_matrix)
+        return all(each is None for each in (*lens, *sensor))
 
     def without_noise(self) -> PictureChain:
         """The same camera without noise, as the mean of many pictures has none."""
@@ -157,6 +160,8 @@ class PictureChain:
 
     def _read(self, level: FloatArray, window: PictureWindow, seed: NoiseSeed) -> FloatArray:
         """What the sensor gives of filled pixels, less the black level."""
+        if self.stray_light is not None:
+            level = level + np.array(self.stray_light, dtype=np.float32)
         if self.noise is not None:
             normal = normal_numbers(seed, window.height, window.width)[window.box]
             level = self.noise.add(level, normal)

@@ -18,7 +18,7 @@ Value = TypeVar("Value")
 
 
 def gathered(value: Value, lanes: mi.UInt32) -> Value:
-    """Some lanes of an array, or of a dataclass of arrays, in which what is None stays so."""
+    """Some lanes of an array, or of each array of a dataclass; fields that are None stay None."""
     if value is None:
         return value
     if is_dataclass(value) and not isinstance(value, type):

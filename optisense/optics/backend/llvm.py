@@ -220,7 +220,7 @@ def _library_files() -> Iterator[Path]:
 
 
 def _version_of(path: Path) -> tuple[int, int] | None:
-    """Version of the libLLVM at a resolved path, None when it can't be told."""
+    """Version of the libLLVM at a resolved path, None if it cannot be found out."""
     match = _VERSION_IN_NAME.match(path.name) or _VERSION_IN_FOLDER.search(str(path.parent))
     if match and path.name.startswith("libLLVM"):
         return int(match[1]), int(match[2] or 0)

@@ -41,7 +41,7 @@ def release_memory() -> None:
 
 
 def resident() -> float:
-    """Bytes of memory that this process takes up; infinity where the system does not tell."""
+    """Bytes of memory that this process takes up; infinity where the system does not report it."""
     try:
         pages = int(Path("/proc/self/statm").read_text().split()[1])
     except (OSError, ValueError, IndexError):

@@ -1,4 +1,4 @@
-"""The stages of a render, which progress tells of."""
+"""The stages of a render, as progress reports name them."""
 
 from __future__ import annotations
 

@@ -21,7 +21,7 @@ from optisense.optics.imaging.film import Film
 from optisense.optics.imaging.pixel_interpolation import agreed, between_rays, fill
 from optisense.optics.radiance_cache.beams import cull_beams
 from optisense.optics.radiance_cache.cache import RadianceCache
-from optisense.optics.radiance_cache.shading import shade
+from optisense.optics.radiance_cache.shading import beside_contacts, shade
 from optisense.optics.radiance_cache.thrown_back import thrown_back
 from optisense.optics.scene.contact_scenes import ContactScenes
 from optisense.optics.scene.emitters import Emitter
@@ -75,12 +75,23 @@ with the light that it throws back: 2 mm on GelSight Mini."""
 THROWN_RAYS = 8
 """Rays of a pixel that look for it in an image `REFERENCE_WIDTH` wide, and more in smaller ones:
 few of them end where a contact mirrors a lamp."""
+BROAD_THROWN_RAYS = 1
+"""The same for lobes that are not narrower than most lamps, to which little is thrown back, from
+everywhere."""
 LEAST_LEFT = 0.5
 """Share of a pixel's light that is left where contacts hide what would throw light back: beyond it,
 it is the noise of a few bright rays."""
 THROWN_REACH = 1.0 / 40.0
 """Over how many pixels of skin that light is averaged, as a fraction of the image width: half a
 millimetre on GelSight Mini. A lobe of alpha 0.05 spreads it over 1 to 2 mm."""
+
+BESIDE_RANGE = 0.1
+"""Distance from a contact, as a fraction of the image width, within which the skin is shaded with
+light that the contact reflects to it: 2 mm on GelSight Mini. It is half a per cent of a diffuse
+coating's light there; to narrow lobes, single rays of it would be bright blotches."""
+BESIDE_DIRECTIONS = 2
+"""Directions of a pixel that look for it in an image `REFERENCE_WIDTH` wide, and more in smaller
+ones. It is averaged over `THROWN_REACH`, which leaves noise of some tenths of a per cent."""
 
 PixelImportance = Callable[[ChiefRays], NDArray[np.bool_] | NDArray[np.floating]]
 """A function of the chief rays that gives the importance (h, w) of each contact pixel to a score,
@@ -170,7 +181,8 @@ def _thrown_layers(
         return None
     width, height = camera.width, camera.height
     film = Film(width * height, field.groups)
-    rays = max(THROWN_RAYS, round(THROWN_RAYS * (REFERENCE_WIDTH / width) ** 2))
+    least = THROWN_RAYS if field.narrow_lobes else BROAD_THROWN_RAYS
+    rays = max(least, round(least * (REFERENCE_WIDTH / width) ** 2))
     pixel, _ = _repeated(where, 1)
     first = dr.zeros(mi.UInt32, dr.width(pixel))
     film.count(pixel)
@@ -182,6 +194,32 @@ def _thrown_layers(
         if found is not None:
             film.add(*found)
     return film.spread_layers(width, height, skin, max(2, round(THROWN_REACH * width)))
+
+
+def _beside_layers(
+    field: RadianceCache,
+    scenes: ContactScenes,
+    camera: RayCamera,
+    where: NDArray[np.bool_],
+    seed: int,
+) -> NDArray[np.float32] | None:
+    """(groups, h, w, 3) light that contacts reflect to the skin ``where`` beside them, averaged
+    over it; None where there is none.
+    """
+    if scenes.indenters is None or np.count_nonzero(where) < 2:
+        return None
+    width, height = camera.width, camera.height
+    film = Film(width * height, field.groups)
+    directions = max(BESIDE_DIRECTIONS, round(BESIDE_DIRECTIONS * (REFERENCE_WIDTH / width) ** 2))
+    pixel, _ = _repeated(where, 1)
+    first = dr.zeros(mi.UInt32, dr.width(pixel))
+    film.count(pixel)
+    for channel in scenes.full.channels:
+        spots = film_samples(pixel, width, first, seed_of(seed, 3))
+        own = seed_of(seed, 10)
+        main, _ = find_visible_points(scenes.full, camera, pixel, first, spots, own, True, channel)
+        film.add(main, beside_contacts(field, scenes, main, directions))
+    return film.spread_layers(width, height, where, max(2, round(THROWN_REACH * width)))
 
 
 def render_cached(
@@ -243,7 +281,7 @@ def render_cached(
     near = np.zeros_like(mask)
     samples = [1]
     bent = region_image == Region.BENT
-    thrown = None
+    thrown = beside = None
     if mask.any() or bent.any():
         distance = ndimage.distance_transform_edt(~mask) if mask.any() else np.full(mask.shape, 2.0)
         near = bent | (distance <= max(2.0, RIM_WIDTH * width))
@@ -265,6 +303,10 @@ def render_cached(
         dr.eval(pixel, number)
         sample(pixel, number, True)
         samples = [1, outer, inner]
+        if not (draft or only_contacts or field.narrow_lobes):
+            skin = region_image == Region.SENSING
+            ring = skin & ~near & (distance <= BESIDE_RANGE * width)
+            beside = _beside_layers(field, scenes, camera, ring, seed)
         if field.metallic and not draft:
             lit = mask if only_contacts else rays.hit & (distance <= THROWN_RANGE * width)
             thrown = _thrown_layers(field, scenes, camera, lit, lit & ~mask, seed)
@@ -314,6 +356,8 @@ def render_cached(
         if reflections is None:
             reflections = mirrored.layers(width, height)
         layers = film.layers(width, height) + reflections
+    if beside is not None:
+        layers = layers + beside
     if thrown is not None:
         # A contact also hides skin that would throw light back, but never much of all light.
         layers = np.maximum(layers + thrown, layers * LEAST_LEFT)

@@ -18,11 +18,12 @@ from numpy.typing import ArrayLike, NDArray
 
 from optisense.design.responses import PictureChain
 from optisense.design.responses.electronics import NoiseSeed
-from optisense.errors import RenderError
+from optisense.errors import OutputError, RenderError
 from optisense.geometry import TriangleMesh
 from optisense.mechanics import PressedSkin, SkinMaps
 from optisense.optics.camera.response import picture
 from optisense.optics.imaging.markers import MarkerPlaces
+from optisense.untrusted_files import read_json
 from optisense.writing import inside, remove_own_page, written_together
 
 RADIANCE_UNIT = "mW/(mm^2 sr)"
@@ -192,9 +193,9 @@ def _marker_table(markers: MarkerPlaces) -> str:
 def _layers_before(folder: Path) -> set[str]:
     """The layers that an earlier image wrote into a folder, by its run.json."""
     try:
-        names = json.loads((folder / "run.json").read_text(encoding="utf-8"))["layers"]
+        names = read_json(folder / "run.json", OutputError)["layers"]
         return {name for name in names if re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9_-]*", name)}
-    except (OSError, ValueError, LookupError, TypeError):
+    except (OutputError, LookupError, TypeError):
         return set()
 
 
@@ -212,6 +213,9 @@ def _bitmap(values: NDArray[Any], path: Path) -> None:
     try:
         bitmap.write(str(path))
     except RuntimeError as error:
-        raise OSError(errno.EIO, str(error), str(path)) from error
+        full = os.strerror(errno.ENOSPC) in str(error)  # it has words only, and no number
+        number = errno.ENOSPC if full else errno.EIO
+        said = os.strerror(number) if full else str(error)
+        raise OSError(number, said, str(path)) from error
     if path.stat().st_size == 0:  # it says nothing when the disk is full
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(path))

@@ -28,6 +28,9 @@ DIRECTIONS = 4
 """Directions per camera sample in which interreflected light is looked for. The lobes of the places
 seen are summed over all light, so that fewer directions will do than where one ray stands for the
 light of a place."""
+BROAD_DIRECTIONS = 2
+"""The same for lobes that are not narrower than most lamps: the light in a contact of GelSight Mini
+of specularity 0.6 has 2.24 % of noise then instead of 2.16 %, at a million photons."""
 MAX_BOUNCES = 4
 """Largest number of reflections inside a contact; of a metal ball's light, less than a thousandth
 goes on."""
@@ -67,8 +70,9 @@ def glossily_interreflected(
     lanes = dr.width(at.seen.pixel)
     totals = [dr.zeros(mi.Float, 3 * lanes) for _ in range(field.groups)]
     dr.eval(at)
-    lane = dr.arange(mi.UInt32, lanes * DIRECTIONS)
-    owner = lane // DIRECTIONS
+    directions = DIRECTIONS if field.narrow_lobes else BROAD_DIRECTIONS
+    lane = dr.arange(mi.UInt32, lanes * directions)
+    owner = lane // directions
     table = scenes.full.table
     first = dr.gather(VisiblePoints, at.seen, owner)
     looking = ShadingPoints(
@@ -81,8 +85,8 @@ def glossily_interreflected(
         raised=dr.gather(mi.Bool, at.raised, owner),
     )
     looking.seen.pixel = owner
-    looking.seen.number = looking.seen.number * DIRECTIONS + lane % DIRECTIONS
-    looking.seen.weight = mi.Color3f(1 / DIRECTIONS)
+    looking.seen.number = looking.seen.number * directions + lane % directions
+    looking.seen.weight = mi.Color3f(1 / directions)
     for _ in range(MAX_BOUNCES):
         seen = _places_seen(scenes, looking)
         if seen is None:

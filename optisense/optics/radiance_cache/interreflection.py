@@ -100,7 +100,7 @@ def _sample(
 
 
 def interreflected(
-    field: RadianceCache, scenes: ContactScenes, at: ShadingPoints
+    field: RadianceCache, scenes: ContactScenes, at: ShadingPoints, directions: int = DIRECTIONS
 ) -> list[mi.Color3f]:
     """Radiance towards the camera that points reflect of interreflected light, one colour per
     group.
@@ -109,6 +109,7 @@ def interreflected(
         field: the radiance cache.
         scenes: the scenes of the image, with indenters.
         at: the points.
+        directions: in which each looks for it.
     """
-    directions = dr.opaque(mi.UInt32, DIRECTIONS)
-    return _sample(field.cells, field.irradiance, field.groups, scenes, at, directions)
+    count = dr.opaque(mi.UInt32, directions)
+    return _sample(field.cells, field.irradiance, field.groups, scenes, at, count)

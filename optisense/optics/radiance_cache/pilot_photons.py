@@ -1,4 +1,4 @@
-"""What the photons of the pilot pass tell about the light, before any image."""
+"""The photons of the pilot pass, and what is estimated from them before any image."""
 
 from __future__ import annotations
 

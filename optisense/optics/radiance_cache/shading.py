@@ -109,3 +109,28 @@ def shade(
     hidden = sum_hidden(culled_beams, totals, indenters.scene, at, shadow_rays)
     # Where all is hidden, the sum of the shares may be a little more than all.
     return [dr.maximum(one - other, 0) for one, other in zip(totals, hidden, strict=True)]
+
+
+def beside_contacts(
+    field: RadianceCache, scenes: ContactScenes, points: VisiblePoints, directions: int
+) -> list[mi.Color3f]:
+    """Radiance of points on the undeformed skin that indenters have reflected to it, one colour per
+    group.
+
+    Args:
+        field: the radiance cache.
+        scenes: the scenes of the image, with indenters.
+        points: the points.
+        directions: in which each looks for it; metal coatings have a number of their own.
+    """
+    table = scenes.full.table
+    cell, shift, active = interpolating_cell(
+        field.cells, points.point, points.valid, points.series, points.number
+    )
+    coating = coating_of(table, points.surface, active, field.metallic)
+    start = leave(points.point, points.face_normal, points.face_normal)
+    at = ShadingPoints(points, coating, start, cell, shift, active, mi.Bool(False))
+    if field.metallic:
+        at.raised = dr.full(mi.Bool, False, dr.width(points.pixel))
+        return glossily_interreflected(field, scenes, at)
+    return interreflected(field, scenes, at, directions)

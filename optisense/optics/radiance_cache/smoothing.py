@@ -92,7 +92,7 @@ class Smoothing:
 
     kernel: WeightedSums
     blur: csr_matrix
-    correction: WeightedSums | None
+    correction: csr_matrix | None
 
 
 class Kernels:
@@ -163,10 +163,10 @@ class Kernels:
             self._known = {key: Smoothing(WeightedSums.of(matrix), blur, twice)}
         return self._known[key]
 
-    def _twice(self, blur: csr_matrix) -> WeightedSums:
+    def _twice(self, blur: csr_matrix) -> csr_matrix:
         near = diags(self.near.astype(np.float64))
         again = near @ blur @ diags(self.cells.areas)
-        return WeightedSums.of((identity(self.cells.cells) + near - again).tocsr())
+        return (identity(self.cells.cells) + near - again).tocsr()
 
     def _blur(self, radii: FloatArray) -> csr_matrix:
         return kernel_matrix(self.cells, np.sqrt(radii**2 + CELL_BLUR * self._size**2))

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Collection
+from copy import copy
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple, Self
 
 import mitsuba as mi
 import numpy as np
@@ -20,6 +21,7 @@ from optisense.optics.radiance_cache.pilot_photons import PilotPhotons
 from optisense.optics.radiance_cache.smoothing import Kernels
 from optisense.optics.scene.emitters import EmitterTable
 from optisense.optics.scene.ray_scene import Piece, RayScene
+from optisense.optics.scene.sensor_scenes import SensorScenes
 from optisense.optics.scene.surface_cells import SurfaceCells, build_cells, cells_near
 from optisense.optics.transport.emission_guide import EmissionGuide, learn_guide, uniform_guide
 from optisense.optics.transport.photons import (
@@ -40,7 +42,7 @@ PILOT_PHOTONS = 300_000
 CELL_SIZE = 0.5
 """Side (mm) of the surface cells; larger where the tally would exceed `MAX_TALLY_BYTES`."""
 PILOT_CELL_SIZE = 1.0
-"""Side (mm) of the cells that tell whether a pilot photon lands where the camera looks."""
+"""Side (mm) of the cells that decide whether a pilot photon lands where the camera looks."""
 MAX_TALLY_BYTES = 375e6
 """Memory (bytes) that the tally of one seed may take. Cells are made larger to stay below it."""
 MAX_FINE_TALLY_BYTES = 750e6
@@ -58,6 +60,15 @@ GRAZING_SHARE_LIMIT = 0.25
 well."""
 
 
+class _Traced(NamedTuple):
+    """Which photons a cache holds the light of: the traced light groups (None for all), the seed,
+    and the photons of each light in a pass."""
+
+    groups: frozenset[int] | None
+    seed: int
+    per_light: int
+
+
 @dataclass
 class _Running:
     tally: CacheTally
@@ -65,18 +76,41 @@ class _Running:
 
 
 @dataclass(frozen=True)
-class PilotScene:
-    """What pilot photons fly through.
+class LitScene:
+    """A sensor without contacts, as photons meet it.
 
     Attributes:
-        scene: the sensor without contacts, with any coating: where photons first land does not
-            depend on it. If it is always the same one, neither do images depend on the coating
-            that a sensor had when its guide was learned.
-        coloured: whether its surfaces are coloured.
+        scene: its surfaces.
+        opaque: its opaque pieces.
+        table: the lights.
+        coloured: whether surfaces are coloured.
+        roughness: GGX alpha of the sharpest metallic lobe of a coating; None without metal.
+        pilot: what pilot photons fly through; the scene itself if None. Where photons first land
+            does not depend on the coating. If pilot photons always meet the same one, neither do
+            images depend on the coating that a sensor had when its guide was learned.
+        pilot_coloured: whether the surfaces of that are coloured.
     """
 
     scene: RayScene
+    opaque: list[Piece]
+    table: EmitterTable
     coloured: bool
+    roughness: float | None = None
+    pilot: RayScene | None = None
+    pilot_coloured: bool = False
+
+    @classmethod
+    def of(cls, scenes: SensorScenes) -> LitScene:
+        """The sensor of these scenes."""
+        return cls(
+            scenes.full,
+            scenes.opaque,
+            scenes.emitter_table,
+            scenes.coloured,
+            scenes.roughness,
+            scenes.pilot,
+            scenes.pilot_coloured,
+        )
 
 
 class CacheStore:
@@ -88,67 +122,46 @@ class CacheStore:
     uses_pilot = True
     """Whether the photons that teach the guide also tell how light falls: indenters are then lit
     from a field above the surface where it grazes, and kernels are narrower where it varies."""
-    lit: Collection[int] | None = None
+    groups: frozenset[int] | None = None
     """The light groups whose light is traced; all where it is None."""
 
-    def __init__(
-        self,
-        scene: RayScene,
-        opaque: list[Piece],
-        table: EmitterTable,
-        seen: NDArray[np.floating],
-        coloured: bool,
-        roughness: float | None = None,
-        pilot: PilotScene | None = None,
-    ) -> None:
+    def __init__(self, lit: LitScene, seen: NDArray[np.floating]) -> None:
         """Keep what the caches depend on; nothing is traced yet.
 
         Args:
-            scene: the sensor without contacts.
-            opaque: its opaque pieces.
-            table: the lights.
+            lit: the sensor.
             seen: (n, 3) mm, points that the camera sees.
-            coloured: whether surfaces are coloured.
-            roughness: GGX alpha of the sharpest metallic lobe of a coating; None without metal.
-            pilot: what pilot photons fly through; the scene itself if None.
         """
-        self._pilot_scene = PilotScene(scene, coloured) if pilot is None else pilot
+        self._lit = lit
         self._seen = seen
-        self._scene = scene
-        self._table = table
-        self._coloured = coloured
-        self._roughness = roughness
-        self._opaque = opaque
         self._guide: EmissionGuide | None = None
         self._pilot: PilotPhotons | None = None
         self._above: FluxLayer | None = None
         self._cells: SurfaceCells | None = None
         self._kernels: Kernels | None = None
-        self._running: dict[tuple[int, int], _Running] = {}
-        self._done: dict[tuple[int, int, int], RadianceCache] = {}
+        self._running: dict[_Traced, _Running] = {}
+        self._done: dict[tuple[_Traced, int], RadianceCache] = {}
 
-    def forget_light(self, coloured: bool, roughness: float | None = None) -> None:
-        """Drop the caches, as surfaces reflect in another way now. The guide stays, and so do the
-        cells, unless other colours or lobes call for other sizes.
+    def coated(self, lit: LitScene) -> Self:
+        """The store of the same sensor with another coating, and without any light. It takes over
+        the guide, and the cells unless other colours or lobes call for other sizes.
         """
-        bins = self._directions
-        coloured_before = self._coloured
-        self._coloured = coloured
-        self._roughness = roughness
-        if coloured != coloured_before or self._directions != bins:
-            self._cells = self._above = self._kernels = None
-        self._running.clear()
-        self._done.clear()
+        other = copy(self)
+        other._lit = lit
+        other._running, other._done = {}, {}
+        if lit.coloured != self._lit.coloured or other._directions != self._directions:
+            other._cells = other._above = other._kernels = None
+        return other
 
     @property
     def _directions(self) -> DirectionBins:
         """The direction bins that the coating calls for."""
-        return DirectionBins.for_coating(self._roughness, self._curved and not self._grazes)
+        return DirectionBins.for_coating(self._lit.roughness, self._curved and not self._grazes)
 
     @cached_property
     def _curved(self) -> bool:
         """Whether surfaces are curved, and get direction bins of their own."""
-        return self.tells_curved and any(piece.normals is not None for piece in self._opaque)
+        return self.tells_curved and any(piece.normals is not None for piece in self._lit.opaque)
 
     @property
     def _flux_layer(self) -> FluxLayer | None:
@@ -180,14 +193,14 @@ class CacheStore:
     def guide(self) -> EmissionGuide:
         """The emission guide, learned from a pilot pass on first use."""
         if self._guide is None:
-            lights = self._table.count
+            lit, lights = self._lit, self._lit.table.count
             cells, near = self._target
             per_light = max(1, PILOT_PHOTONS // lights)
             arrived, landed = trace_pilot(
-                self._pilot_scene.scene,
-                Emission(self._table, uniform_guide(lights), per_light, seed_of(0, 1)),
+                lit.scene if lit.pilot is None else lit.pilot,
+                Emission(lit.table, uniform_guide(lights), per_light, seed_of(0, 1)),
                 TargetCells(cells, mi.UInt32(near.astype(np.uint32))),
-                self._pilot_scene.coloured,
+                lit.coloured if lit.pilot is None else lit.pilot_coloured,
             )
             self._guide = learn_guide(arrived, lights, per_light)
             if self.uses_pilot:
@@ -198,7 +211,7 @@ class CacheStore:
     def _opaque_mesh(self) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
         """Vertices (mm) and faces of all opaque surfaces."""
         vertices, faces, start = [], [], 0
-        for piece in self._opaque:
+        for piece in self._lit.opaque:
             vertices.append(np.asarray(piece.vertices, dtype=np.float64))
             faces.append(np.asarray(piece.faces, dtype=np.int64) + start)
             start += len(piece.vertices)
@@ -220,7 +233,7 @@ class CacheStore:
             a, b, c = (points[triangles[:, k]] for k in range(3))
             area = np.linalg.norm(np.cross(b - a, c - a), axis=1).sum() / 2
             directions = self._directions
-            entry = directions.count * self._table.groups * (36 if self._coloured else 20)
+            entry = directions.count * self._lit.table.groups * (36 if self._lit.coloured else 20)
             if self._grazes:
                 entry *= 2
             most = MAX_FINE_TALLY_BYTES if directions.fine else MAX_TALLY_BYTES
@@ -237,7 +250,7 @@ class CacheStore:
             area = float(rough.areas[where].sum())
             landed, pilot_density = None, 0.0
             if self._used_pilot is not None and self._seen_pilot is not None:
-                landed = self._used_pilot.landed(cells, self._table.groups)
+                landed = self._used_pilot.landed(cells, self._lit.table.groups)
                 pilot_density = len(self._seen_pilot.powers) / area
             self._kernels = Kernels(
                 cells,
@@ -251,7 +264,7 @@ class CacheStore:
 
     def _lamp_distance(self, points: NDArray[np.floating]) -> NDArray[np.floating]:
         """(n,) mm from points to the nearest lamp's window."""
-        lamps = self._table.emitters
+        lamps = self._lit.table.emitters
         places = np.array([lamp.position for lamp in lamps])
         nearest, which = cKDTree(places).query(points)
         half = np.array([max(lamp.size) / 2 for lamp in lamps])
@@ -283,15 +296,15 @@ class CacheStore:
         Returns:
             The cache, and whether Ctrl-C ended the tracing early.
         """
-        lights = self._table.count
+        lights = self._lit.table.count
         # A pass costs a little by itself, so few photons are one.
         size = photons if photons is not None and photons < MAX_SINGLE_PASS else PASS_PHOTONS
         per_light = max(1, size // lights)
         wanted = None if photons is None else max(1, round(photons / (per_light * lights)))
         cap = max(1, most // (per_light * lights))
-        key = (seed, per_light)
+        key = _Traced(self.groups, seed, per_light)
         if wanted is not None and noise is None and seconds is None:
-            done = self._done.get((*key, wanted))
+            done = self._done.get((key, wanted))
             if done is not None:
                 return done, False
         if self._guide is None:
@@ -303,9 +316,9 @@ class CacheStore:
             running = _Running(
                 CacheTally(
                     self.kernels,
-                    self._table.groups,
-                    self._coloured,
-                    self._roughness is not None,
+                    self._lit.table.groups,
+                    self._lit.coloured,
+                    self._lit.roughness is not None,
                     self._flux_layer,
                     self._directions,
                 ),
@@ -323,16 +336,16 @@ class CacheStore:
                 started = time.perf_counter()
                 tally.add(
                     trace_photons(
-                        self._scene,
+                        self._lit.scene,
                         Emission(
-                            self._table,
+                            self._lit.table,
                             self.guide,
                             per_light,
                             seed_of(seed, 2),
                             first=tally.passes * per_light,
-                            groups=self.lit,
+                            groups=self.groups,
                         ),
-                        coloured=self._coloured,
+                        coloured=self._lit.coloured,
                         flux_layer=self._flux_layer,
                     )
                 )
@@ -355,7 +368,7 @@ class CacheStore:
             if tally.passes < 1 or not partial:
                 raise
             interrupted = True
-        name = (*key, tally.passes)
+        name = (key, tally.passes)
         if interrupted or name not in self._done:
             on_stage(Stage.SMOOTHING, 1.0, tally.photons, reached)
             light = tally.smoothed()

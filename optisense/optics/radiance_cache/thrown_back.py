@@ -1,4 +1,4 @@
-"""Light that contacts throw back to metal coatings by way of the interfaces.
+"""Light that contacts reflect to metal coatings through the interfaces.
 
 The radiance cache is that of the undeformed skin. A metallic coating mirrors the faces of gel and
 glass in front of it, and these mirror the contacts. So a few rays are drawn from the lobes of each

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
 
 import numpy as np
@@ -210,7 +210,7 @@ def _reflecting(kind: SurfaceKind, reflection: Reflection, region: Region) -> Su
 
 def indenter_piece(mesh: TriangleMesh, coating: Surface) -> Piece:
     """An indenter that carries the coating."""
-    surface = Surface(**{**coating.__dict__, "region": Region.INDENTER})
+    surface = replace(coating, region=Region.INDENTER)
     return Piece("indenter", mesh.vertices, mesh.faces, surface, mesh.normals)
 
 

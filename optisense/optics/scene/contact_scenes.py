@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import mitsuba as mi
@@ -52,20 +53,12 @@ class SensorPieces:
     surfaces: list[Surface]
     table: mi.Float
 
-    def with_indenters(self, placed: list[TriangleMesh], robust: bool = False) -> RayScene:
+    def with_indenters(self, placed: Sequence[TriangleMesh]) -> RayScene:
         """The sensor and coated indenters; the surface that a ray meets first is the one seen."""
         count = len(self.pieces)
-        pieces, numbers = self._indenters(placed)
-        return RayScene([*self.pieces, *pieces], [*range(count), *numbers], self.table, robust)
-
-    def indenters(self, placed: list[TriangleMesh]) -> RayScene:
-        """The indenters alone."""
-        return RayScene(*self._indenters(placed), self.table)
-
-    def _indenters(self, placed: list[TriangleMesh]) -> tuple[list[Piece], list[int]]:
-        number = len(self.pieces)
-        pieces = [indenter_piece(mesh, self.surfaces[number]) for mesh in placed]
-        return pieces, [number] * len(pieces)
+        pieces = [indenter_piece(mesh, self.surfaces[count]) for mesh in placed]
+        numbers = [*range(count), *[count] * len(pieces)]
+        return RayScene([*self.pieces, *pieces], numbers, self.table, robust=True)
 
     def with_skin(
         self,

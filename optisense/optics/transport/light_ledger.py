@@ -27,7 +27,7 @@ from optisense.optics.transport.photon_map import GROUP_MASK
 from optisense.optics.transport.photons import Emission, TargetCells, launch
 
 PASS_PHOTONS = 1_000_000
-"""Number of photons of one pass, between which progress is told and Ctrl-C obeyed."""
+"""Number of photons of one pass; progress is reported and Ctrl-C obeyed between passes."""
 
 BATCHES = 16
 """Independent parts of the photons, whose spread gives the noise of the sums."""
@@ -133,7 +133,7 @@ def _side_of(normal: mi.Vector3f) -> mi.UInt32:
 
 
 def _is_interface(step: Interaction) -> mi.Bool:
-    """Whether light meets a surface that tells which medium it is in."""
+    """Whether light meets a surface from which its medium is known."""
     return step.hit.valid & step.goes_on & ~step.scattered
 
 

@@ -1,4 +1,4 @@
-"""The ways of single photons from the lights to their ends, for drawing.
+"""The paths of single photons from the lights to their ends, for drawing.
 
 Photons go as those of the light ledger, but they carry all their power to one end: what a photon of
 the ledger loses at a place is the probability that one of these ends there.
@@ -151,7 +151,7 @@ def trace_photon_paths(
     per_light: int,
     seed: int = 0,
 ) -> TracedPhotons:
-    """Send single photons from all lights, and write down their ways.
+    """Trace single photons from all lights, and record their paths.
 
     Args:
         scene: the sensor.

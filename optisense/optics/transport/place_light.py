@@ -1,4 +1,4 @@
-"""Photons that land at one place of the sensing surface: on which ways, and from where.
+"""Photons that land at one place of the sensing surface: their paths and directions.
 
 Photons fly as those of a picture do. What lands within a disc is summed up by what it has met on
 its way and by the direction that it comes from.

@@ -1,4 +1,4 @@
-"""Where chief rays of neighbouring pixels part ways, and what parts them.
+"""Where chief rays of neighbouring pixels take different paths, and what separates them.
 
 Between two pixels whose rays take different ways there is a boundary in the picture: the edge of a
 part, or of another part in front of it, a line where two parts meet, or the limit of total
@@ -80,7 +80,7 @@ class Edges:
 
 @dataclass(frozen=True)
 class Stop:
-    """A surface on the way of rays, all arrays as long as there are rays.
+    """A surface on the path of rays, all arrays as long as there are rays.
 
     Attributes:
         origin, direction: of the ray that arrives here.

@@ -258,7 +258,7 @@ class DifferentiableRays:
         weight: FloatArray | None = None,
         points: FloatArray | None = None,
     ) -> RayGradient:
-        """Derivatives of a number by shapes and camera, given those by what rays do; once only.
+        """Derivatives of a number by shapes and camera, given those by what rays do.
 
         Args:
             cosine, weight: (k,), points: (k, 3): derivatives of the number by these; None for 0.
@@ -272,7 +272,11 @@ class DifferentiableRays:
         if weight is not None and self.edges is not None:
             sides = [np.where(there, weight[number], 0.0) for there, number in self._sides]
             loss += dr.sum(self._value * floats(self._per_value * (sides[0] - sides[1])))
-        dr.backward(loss)
+        # What was recorded is kept for the next number, whose derivatives begin at 0 again.
+        dr.clear_grad(self._vertices)
+        for value in self._pose.numbers():
+            dr.clear_grad(value)
+        dr.backward(loss, flags=dr.ADFlag.ClearInterior)
         moved = np.asarray(dr.grad(self._vertices), dtype=np.float64).reshape(-1, 3)
         parts = {}
         for piece, start in zip(self._pieces, self._starts[:-1], strict=True):

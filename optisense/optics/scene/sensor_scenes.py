@@ -1,0 +1,228 @@
+"""The ray scenes of one sensor: the whole, parts of it, and with contacts pressed in."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from functools import cached_property, lru_cache
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+
+from optisense.design.materials import CoatingModel
+from optisense.geometry import Contact, TriangleMesh
+from optisense.mechanics import PressedSkin, SkinMesh
+from optisense.optics.scene.assembly import Assembly, coating_surface, indenter_piece
+from optisense.optics.scene.bsdf import surface_table
+from optisense.optics.scene.contact_scenes import ContactScenes, SensorPieces, bounding_ball
+from optisense.optics.scene.emitters import EmitterTable, emitter_table
+from optisense.optics.scene.fine_scene import FineScene, fine_scene
+from optisense.optics.scene.ray_scene import Piece, RayScene
+from optisense.optics.scene.surfaces import Region, Surface, SurfaceKind, is_coloured
+
+PILOT_COATING = Surface(
+    SurfaceKind.OPAQUE, alpha=1.0, reflectance=(0.5,) * 3, region=Region.SENSING
+)
+"""The coating that pilot photons meet, whichever the sensor has: grey and diffuse, and neither so
+dark that scattered light would be missing nor so bright that it would prevail."""
+
+
+class _Shapes:
+    """The ray scenes of an assembly's shapes, each built when it is first asked for.
+
+    Their tables of surfaces are those of the first coating; who uses a scene gives it the table of
+    the coating that is meant (`RayScene.with_table`), which copies no shape.
+    """
+
+    def __init__(self, assembly: Assembly, table: mi.Float, before: _Shapes | None) -> None:
+        self._pieces, self._fine_pieces, self._table = assembly.pieces, assembly.fine, table
+        numbers = [i for i, p in enumerate(self._pieces) if p.surface.kind is SurfaceKind.OPAQUE]
+        self.opaque = [self._pieces[i] for i in numbers]
+        self._opaque_numbers = numbers
+        same = (
+            before is not None
+            and before._opaque_numbers == numbers
+            and all(a is b for a, b in zip(before.opaque, self.opaque, strict=True))
+        )
+        # Scenes that depend on no other shapes are handed on from sensor to sensor.
+        self.fixed: Callable[[], RayScene]
+        self.indenters: Callable[[int, tuple[TriangleMesh, ...]], RayScene]
+        if before is not None and same:
+            self.fixed = before.fixed
+        else:
+            opaque = self.opaque
+            self.fixed = lru_cache(maxsize=1)(lambda: RayScene(opaque, numbers, table))
+        self.indenters = lru_cache(maxsize=1)(_indenters) if before is None else before.indenters
+
+    @cached_property
+    def full(self) -> RayScene:
+        return RayScene(self._pieces, table=self._table)
+
+    @cached_property
+    def watched(self) -> RayScene:
+        return RayScene(self._pieces, table=self._table, robust=True)
+
+    @cached_property
+    def fine(self) -> FineScene:
+        fine = self._fine_pieces
+        return fine_scene([fine.get(i, p) for i, p in enumerate(self._pieces)], self._table)
+
+
+class SensorScenes:
+    """A sensor's surfaces and lights as rays meet them. It never changes: a sensor with another
+    coating has another object (`coated`), which shares the shapes.
+
+    Attributes:
+        assembly: the surfaces, lights and media.
+        surfaces: those of the assembly's pieces, then the coating where indenters touch it, and
+            where it is bent beside them.
+        table: of these surfaces, on the device.
+        coloured: whether any of them is coloured.
+        roughness: GGX alpha of the sharpest metallic lobe; None without metal.
+    """
+
+    _shapes: _Shapes
+
+    def __init__(
+        self, assembly: Assembly, coating: CoatingModel, before: SensorScenes | None = None
+    ) -> None:
+        """Prepare the scenes, of which each is built when it is first asked for.
+
+        Args:
+            assembly: of the design.
+            coating: of its sensing surface.
+            before: the scenes of a similar design, from which those of the same shapes are taken.
+        """
+        self.assembly = assembly
+        self.surfaces = [
+            coating_surface(coating, assembly.ior_before, Region.SENSING)
+            if piece.surface.region is Region.SENSING
+            else piece.surface
+            for piece in assembly.pieces
+        ]
+        self.surfaces += [
+            coating_surface(coating, assembly.ior_before, region)
+            for region in (Region.INDENTER, Region.BENT)
+        ]
+        self.table = surface_table(self.surfaces)
+        self.coloured = any(is_coloured(surface) for surface in self.surfaces)
+        metallic = [
+            surface.alpha
+            for surface in self.surfaces
+            if surface.kind is SurfaceKind.OPAQUE and surface.specularity > 0
+        ]
+        self.roughness = min(metallic, default=None)
+        known = None if before is None else before._shapes
+        same = before is not None and before.assembly is assembly
+        self._shapes = known if known and same else _Shapes(assembly, self.table, known)
+
+    def coated(self, coating: CoatingModel) -> SensorScenes:
+        """The same sensor with another coating."""
+        return SensorScenes(self.assembly, coating, self)
+
+    @property
+    def pieces(self) -> list[Piece]:
+        """All fixed surfaces; flat faces in as few triangles as will do."""
+        return self.assembly.pieces
+
+    @property
+    def opaque(self) -> list[Piece]:
+        """The opaque ones of them."""
+        return self._shapes.opaque
+
+    @cached_property
+    def full(self) -> RayScene:
+        """All that light meets in the sensor, nothing pressed in."""
+        return self._shapes.full.with_table(self.table)
+
+    @cached_property
+    def watched(self) -> RayScene:
+        """The same for the camera: a ray that slips through is a black pixel, while of photons it
+        is one in millions, and they take a third longer where none does."""
+        return self._shapes.watched.with_table(self.table)
+
+    @cached_property
+    def fixed(self) -> RayScene:
+        """The opaque surfaces."""
+        return self._shapes.fixed().with_table(self.table)
+
+    @cached_property
+    def fine(self) -> FineScene:
+        """The sensor with every triangle of its sensing surface."""
+        fine = self._shapes.fine
+        return fine._replace(scene=fine.scene.with_table(self.table))
+
+    @cached_property
+    def pilot(self) -> RayScene:
+        """The sensor with `PILOT_COATING`."""
+        return self.full.with_table(surface_table(self._pilot_surfaces))
+
+    @cached_property
+    def pilot_coloured(self) -> bool:
+        """Whether the sensor with `PILOT_COATING` is coloured."""
+        return any(is_coloured(surface) for surface in self._pilot_surfaces)
+
+    @property
+    def _pilot_surfaces(self) -> list[Surface]:
+        return [
+            surface if surface.region is Region.OTHER else PILOT_COATING
+            for surface in self.surfaces
+        ]
+
+    @cached_property
+    def emitter_table(self) -> EmitterTable:
+        """The lights, on the device."""
+        return emitter_table(self.assembly.emitters, len(self.assembly.groups))
+
+    def with_indenters(self, placed: Sequence[TriangleMesh]) -> RayScene:
+        """The sensor with every triangle of its sensing surface, and coated indenters.
+
+        Args:
+            placed: their meshes, in the design's frame.
+        """
+        pieces = SensorPieces(self.fine.pieces, self.surfaces, self.table)
+        return pieces.with_indenters(placed)
+
+    def touched(self, contacts: Sequence[Contact], placed: Sequence[TriangleMesh]) -> ContactScenes:
+        """The scenes of an image in which the skin takes the shape of what touches it.
+
+        Args:
+            contacts: what presses; none for the untouched sensor.
+            placed: their meshes, in the design's frame.
+        """
+        if not contacts:
+            return ContactScenes(self.watched, self.fixed, None, mi.Float())
+        balls = np.stack([bounding_ball(mesh.vertices) for mesh in placed])
+        indenters = self._shapes.indenters(len(self.pieces), tuple(placed))
+        return ContactScenes(
+            self._sensor_pieces.with_indenters(placed),
+            self.fixed,
+            indenters.with_table(self.table),
+            mi.Float(balls.ravel().astype(np.float32)),
+            all(getattr(contact.indenter, "convex", False) for contact in contacts),
+            self._absorption(),
+        )
+
+    def deformed(self, mesh: SkinMesh, pressed: PressedSkin) -> ContactScenes:
+        """The scenes of an image with a deformed skin in the place of the sensing surface.
+
+        Args:
+            mesh: the deformed skin.
+            pressed: what deforms it.
+        """
+        return self._sensor_pieces.with_skin(mesh, pressed, self.fixed, self._absorption())
+
+    @property
+    def _sensor_pieces(self) -> SensorPieces:
+        return SensorPieces(self.pieces, self.surfaces, self.table)
+
+    def _absorption(self) -> mi.Color3f | None:
+        """Coefficient of the gel before the sensing surface; None where it is clear."""
+        absorption = self.assembly.absorption_before
+        return dr.opaque(mi.Color3f, absorption) if max(absorption) > 0.0 else None
+
+
+def _indenters(number: int, placed: tuple[TriangleMesh, ...]) -> RayScene:
+    """Indenters alone, whose coating has this number in the table of surfaces."""
+    pieces = [indenter_piece(mesh, PILOT_COATING) for mesh in placed]
+    return RayScene(pieces, [number] * len(pieces))

@@ -1,0 +1,129 @@
+"""What the camera of a sensor sees with nothing pressed in, and where contacts touch that."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cached_property, partial
+
+import numpy as np
+
+from optisense.design import SensorDesign
+from optisense.design.lens_checks import fold_problems
+from optisense.design.problems import raise_problems
+from optisense.errors import RenderError
+from optisense.geometry import Contact, Indenter, SensingSurface, Sphere, TriangleMesh, nine_places
+from optisense.geometry.contact import place_on_gels
+from optisense.geometry.indenter_kinds import FACET_ERROR
+from optisense.mechanics import Gel, elasticity_of, refuse_loose_gel
+from optisense.optics.camera.projection import RayCamera
+from optisense.optics.scene.sensor_scenes import SensorScenes
+from optisense.optics.transport.chief_rays import (
+    ChiefRays,
+    pixel_areas,
+    sees_nothing,
+    trace_chief_rays,
+)
+
+LEAST_SEEN = 9
+"""Number of chief rays that must arrive for nine contacts to be placed: one each."""
+
+VIEW_RESOLUTION = (96, 72)
+"""Pixels (width, height) of the chief rays that show which part of the surface the camera sees."""
+
+
+def ray_camera(design: SensorDesign, resolution: tuple[int, int] | None = None) -> RayCamera:
+    """The design's camera, at another resolution (width, height) if asked.
+
+    Raises:
+        RenderError: the resolution is below one pixel.
+        DesignError: the lens folds the picture over itself.
+    """
+    camera = design.camera
+    width, height = camera.resolution if resolution is None else resolution
+    if width < 1 or height < 1:
+        raise RenderError(f"the resolution is {width}x{height}", hint="give e.g. 320x240")
+    raise_problems(fold_problems(camera, design.where("camera", "distortion")), "camera")
+    return RayCamera(
+        position=camera.position,
+        direction=camera.direction,
+        up=camera.up,
+        fov=camera.fov,
+        width=int(width),
+        height=int(height),
+        equidistant=camera.projection == "equidistant",
+        distortion=camera.distortion,
+    )
+
+
+class SkinView:
+    """The undeformed sensing surface as the camera sees it, and its gel. It never changes: another
+    shape or camera has another view.
+    """
+
+    facet_error = FACET_ERROR
+    """mm, how far indenters' meshes may be off their exact shapes."""
+
+    def __init__(self, design: SensorDesign, scenes: SensorScenes) -> None:
+        """Prepare the view of a sensor with these scenes; nothing is traced yet."""
+        self._design = design
+        self._scenes = scenes
+
+    def chief_rays(self, resolution: tuple[int, int]) -> ChiefRays:
+        """Where each pixel looks in the untouched sensor."""
+        fine = self._scenes.fine
+        return trace_chief_rays(
+            fine.scene, ray_camera(self._design, resolution), fine.sensing_faces
+        )
+
+    @cached_property
+    def surface(self) -> SensingSurface:
+        """The sensing surface with coordinates in mm; (0, 0) is where the camera's axis meets it,
+        or the middle of what is seen.
+
+        Raises:
+            RenderError: the camera sees nothing of the sensing surface.
+        """
+        axes = self._design.camera.axes()
+        # Of a lens without distortion, which may show its axis beside the picture's middle.
+        straight = replace(ray_camera(self._design, (3, 3)), distortion=None)
+        rays = trace_chief_rays(self._scenes.fine.scene, straight)
+        if rays.hit[1, 1]:
+            origin = rays.points[1, 1].astype(float)
+        else:
+            fine = self.chief_rays((64, 48))
+            if not fine.hit.any():
+                raise sees_nothing(fine)
+            origin = np.median(fine.points[fine.hit].astype(float), axis=0)
+        return SensingSurface(self._scenes.assembly.sensing, origin, axes[0], axes[1])
+
+    @cached_property
+    def gel(self) -> Gel:
+        """The gel, into which contacts are pressed."""
+        assembly, elasticity = self._scenes.assembly, elasticity_of(self._design)
+        check = partial(refuse_loose_gel, self._design)
+        return Gel(self.surface, assembly.sensing, assembly.gels, elasticity, self.place, check)
+
+    def place(self, contact: Contact) -> TriangleMesh:
+        """The part of an indenter that can touch, where a contact puts it in the design's frame.
+
+        Raises:
+            ContactError: the contact is off the surface or deeper than the gel, or no depth takes
+                its force.
+        """
+        contact = self.gel.at_depth(contact)
+        return place_on_gels(contact, self.surface, self._scenes.assembly.gels, self.facet_error)
+
+    def nine_contacts(self, indenter: Indenter | None, depth: float) -> list[Contact]:
+        """One contact at each of nine places; see `RayModel.nine_contacts`."""
+        rays = self.chief_rays(VIEW_RESOLUTION)
+        if rays.hit.sum() < LEAST_SEEN:
+            raise sees_nothing(rays)
+        points = rays.points[rays.hit].astype(np.float64)
+        # Each pixel stands for the area that its solid angle cuts out of the surface.
+        weights = pixel_areas(rays)[rays.hit]
+        chosen = nine_places(points, weights)
+        ball = indenter if indenter is not None else Sphere(radius=1.5)
+        return [
+            Contact(ball, point=(float(p[0]), float(p[1]), float(p[2])), depth=depth)
+            for p in points[chosen]
+        ]
