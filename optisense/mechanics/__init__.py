@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 from optisense.lazy_names import load_on_first_use
 
 if TYPE_CHECKING:
+    from optisense.mechanics.attachment import is_attached, refuse_loose_gel
     from optisense.mechanics.deformed_mesh import SkinMesh, SkinState, skin_mesh
     from optisense.mechanics.elasticity import Elasticity, youngs_modulus_of_shore_a
     from optisense.mechanics.gel import Gel, elasticity_in_words, elasticity_of
@@ -30,6 +31,8 @@ _HOMES = {
     "SkinState": ".deformed_mesh",
     "elasticity_in_words": ".gel",
     "elasticity_of": ".gel",
+    "is_attached": ".attachment",
+    "refuse_loose_gel": ".attachment",
     "skin_mesh": ".deformed_mesh",
     "youngs_modulus_of_shore_a": ".elasticity",
 }
@@ -47,6 +50,8 @@ __all__ = [
     "SkinState",
     "elasticity_in_words",
     "elasticity_of",
+    "is_attached",
+    "refuse_loose_gel",
     "skin_mesh",
     "youngs_modulus_of_shore_a",
 ]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +13,16 @@ from optisense.mechanics.elasticity import Elasticity
 from optisense.mechanics.layer import LoadKernels, SquareLoad
 
 FloatArray = NDArray[np.float64]
+
+ODD = {
+    "zz": (False, False),
+    "xz": (True, False),
+    "yz": (False, True),
+    "xx": (False, False),
+    "yy": (False, False),
+    "xy": (True, True),
+}
+"""Whether each of `LoadKernels` changes its sign with that of x, and with that of y."""
 
 
 class GridResponse:
@@ -38,20 +49,33 @@ class GridResponse:
         # An odd number of offsets, -(n - 1) to n - 1, fits twice the size.
         self._padded = fft.next_fast_len(2 * shape[0]), fft.next_fast_len(2 * shape[1], real=True)
 
-    @cached_property
-    def _offsets(self) -> tuple[FloatArray, FloatArray]:
-        rows, columns = (
-            fft.ifftshift(np.arange(size) - size // 2) * self.pitch for size in self._padded
-        )
-        return np.broadcast_to(columns, self._padded), np.broadcast_to(rows[:, None], self._padded)
+    def _quadrant(self) -> tuple[FloatArray, FloatArray]:
+        """Offsets (mm) along x and y from 0 on; kernels are even or odd in each."""
+        rows, columns = (np.arange(size // 2 + 1) * self.pitch for size in self._padded)
+        shape = len(rows), len(columns)
+        return np.broadcast_to(columns, shape), np.broadcast_to(rows[:, None], shape)
+
+    def _spectrum(
+        self, quadrant: FloatArray, odd_in_x: bool = False, odd_in_y: bool = False
+    ) -> NDArray[np.complex128]:
+        """The transform of a kernel that is known for offsets from 0 on."""
+        offset = [fft.ifftshift(np.arange(size) - size // 2) for size in self._padded]
+        whole = quadrant[np.ix_(np.abs(offset[0]), np.abs(offset[1]))]
+        if odd_in_x:
+            whole *= np.sign(offset[1])
+        if odd_in_y:
+            whole *= np.sign(offset[0])[:, None]
+        return np.asarray(fft.rfft2(whole))
 
     @cached_property
     def _pressure_kernel(self) -> NDArray[np.complex128]:
-        return np.asarray(fft.rfft2(self._load.pressed_in(*self._offsets)))
+        return self._spectrum(self._load.pressed_in(*self._quadrant()))
 
     @cached_property
     def _kernels(self) -> LoadKernels:
-        return LoadKernels(*(fft.rfft2(each) for each in self._load.kernels(*self._offsets)))
+        quadrant = self._load.kernels(*self._quadrant())._asdict()
+        spectra: list[Any] = [self._spectrum(quadrant[name], *odd) for name, odd in ODD.items()]
+        return LoadKernels(*spectra)
 
     def normal(self, pressure: FloatArray) -> FloatArray:
         """Normal displacement (mm), into the layer, by a pressure (MPa) on each square."""

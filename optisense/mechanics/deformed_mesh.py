@@ -18,6 +18,10 @@ FloatArray = NDArray[np.float64]
 EDGE_IN_CONTACT = 1.5
 """Greatest edge length in a contact, in distances of the points of its grid. Shading normals vary
 smoothly over triangles, so that their facets are not seen."""
+EDGE_AT_RIM = 0.6
+"""The same within `RIM` of a contact's rim, where slopes jump: coarser ones show it as a saw."""
+RIM = 1.5
+"""Distance from the rim, in distances of grid points, within which triangles are finer."""
 GROWTH = 0.3
 """Increase of the greatest edge length with the distance from a contact: displacements change over
 lengths of about that distance."""
@@ -145,9 +149,10 @@ def _wanted(points: FloatArray, pressed: PressedSkin) -> FloatArray:
     for contact in pressed.contacts:
         place = contact.place
         away = _distance(points, contact)
-        length = np.minimum(
-            EDGE_IN_CONTACT * place.pitch + GROWTH * away, LONGEST_EDGE * place.thickness
-        )
+        local = place.local(points)
+        at_rim = contact.field.distance_from_rim(local[:, 0], local[:, 1]) < RIM * place.pitch
+        finest = np.where(at_rim, EDGE_AT_RIM, EDGE_IN_CONTACT) * place.pitch
+        length = np.minimum(finest + GROWTH * away, LONGEST_EDGE * place.thickness)
         result = np.minimum(result, np.where(away < DECAY * place.thickness, length, np.inf))
     return result
 

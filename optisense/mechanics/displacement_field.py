@@ -16,13 +16,17 @@ from optisense.mechanics.height_map import slopes
 FloatArray = NDArray[np.float64]
 
 RING = 1.0
-"""Width of the fine grid around a footprint, over the footprint's shorter side."""
+"""Width of the fine grid around a footprint, over the footprint's shorter side or, if that is less,
+the gel's thickness; displacements vary slowly farther out."""
 DECAY = 6.0
 """Distance from a footprint, in thicknesses, beyond which displacements are left out. They are less
 than 0.3 % of those at half a thickness there, for any Poisson ratio."""
 COARSE_POINTS = 20
 """Points of the coarse grid for one thickness; it shows bulges, which are as wide as the gel is
 thick."""
+COARSE_STEP = 16
+"""Step in which the number of points of the coarse grid along a side grows, so that contacts of
+other sizes find its kernels made."""
 MAX_COARSE = 400
 """Largest number of points of the coarse grid along a side, which bounds the time of its
 transform."""
@@ -60,7 +64,7 @@ class DisplacementField:
         self.place, self._overlap = place, overlap
         pitch, thickness = place.pitch, place.thickness
         rows, columns = place.overlap.shape
-        ring = int(np.ceil(RING * min(rows, columns)))
+        ring = int(np.ceil(RING * min(rows, columns, thickness / pitch)))
         shape = rows + 2 * ring, columns + 2 * ring
         response = grid_response(shape, pitch, thickness, elasticity)
         fine = response.normal(np.pad(pressure, ring))
@@ -74,7 +78,8 @@ class DisplacementField:
         reach = DECAY * thickness
         ends = [(g[0] - reach, g[-1] + reach) for g in (place.x, place.y)]
         step = max(step, pitch, max(b - a for a, b in ends) / MAX_COARSE)
-        counts = [int(np.ceil((b - a) / step)) + 1 for a, b in ends]
+        needed = [int(np.ceil((b - a) / step)) + 1 for a, b in ends]
+        counts = [COARSE_STEP * int(np.ceil(n / COARSE_STEP)) for n in needed]
         coarse = binned(pressure, place, (ends[0][0], ends[1][0]), step, (counts[1], counts[0]))
         wide = grid_response((counts[1], counts[0]), step, thickness, elasticity)
         self._coarse = GridSpline(wide.normal(coarse), ends[0][0], ends[1][0], step)
@@ -173,6 +178,17 @@ class DisplacementField:
         beyond = np.hypot(x - self.place.x[columns], y - self.place.y[rows])
         return self._away[rows, columns] + np.where(beyond > self.place.pitch, beyond, 0.0)
 
+    def distance_from_rim(self, x: FloatArray, y: FloatArray) -> FloatArray:
+        """The same from the rim of the contact, on either side of it."""
+        rows, columns, _ = self._cells(x, y)
+        return np.maximum(self.distance(x, y), self._depth[rows, columns])
+
+    @cached_property
+    def _depth(self) -> FloatArray:
+        """(rows, columns) mm from points of the contact to the nearest one beside it."""
+        inside = distance_transform_edt(np.pad(self._touching, 1))[1:-1, 1:-1]
+        return np.asarray(inside) * self.place.pitch
+
     @cached_property
     def _away(self) -> FloatArray:
         return np.asarray(distance_transform_edt(~self._touching)) * self.place.pitch
@@ -224,7 +240,7 @@ class GridSpline:
         return (x - self._start[0]) / self._pitch, (y - self._start[1]) / self._pitch
 
 
-@lru_cache(maxsize=24)
+@lru_cache(maxsize=48)
 def grid_response(
     shape: tuple[int, int], pitch: float, thickness: float, elasticity: Elasticity
 ) -> GridResponse:

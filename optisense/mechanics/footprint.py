@@ -23,14 +23,21 @@ POINTS_ACROSS = 64
 contact radius to 0.2 %."""
 FINEST_PITCH = 0.01
 """mm; least distance of grid points: a tenth of the finest textures that cameras resolve."""
+COARSEST_PITCH = 0.1
+"""mm; greatest distance of grid points: one and a half pixels of a usual picture, so that rims of
+wide contacts are not seen to be made of squares."""
 MAX_POINTS = 480
 """Most grid points along a side; an iteration takes about 40 ms then."""
 NO_OVERLAP = -1e3
 """mm; the overlap where there is no skin or no indenter: a gap that nothing closes."""
 DOES_NOT_REACH = "an indenter does not reach the sensing surface"
 """What is said where nothing overlaps."""
-LEAST_POINTS = 4
-"""Grid points along a side: an overlap finer than the grid still has a point to each side."""
+PITCHES_PER_OCTAVE = 8
+"""Pitches between one and its double. With few pitches and sizes of grids, presses of other depths
+find their kernels made; a press then takes half the time."""
+POINTS_STEP = 4
+"""Step in which the number of grid points along a side grows; the least number, too: an overlap
+finer than the grid still has a point to each side."""
 SEARCH_POINTS = 96
 """Grid points along a side when the extent of the overlap is looked for."""
 
@@ -101,15 +108,22 @@ def footprint(
         for grid, some in ((x, columns), (y, rows))
     ]
     sizes = [MARGIN * (b - a) for a, b in spans]
-    pitch = max(min(sizes) / POINTS_ACROSS, max(sizes) / MAX_POINTS, FINEST_PITCH)
+    pitch = min(min(sizes) / POINTS_ACROSS, COARSEST_PITCH)
+    pitch = _step_below(max(pitch, max(sizes) / MAX_POINTS, FINEST_PITCH))
     x, y = (
         (a + b) / 2 + pitch * (np.arange(n) - (n - 1) / 2)
         for (a, b), n in (
-            (span, max(math.ceil(size / pitch), LEAST_POINTS))
+            (span, POINTS_STEP * max(math.ceil(size / pitch / POINTS_STEP), 1))
             for span, size in zip(spans, sizes, strict=True)
         )
     )
     return Footprint(spot.point, axes, x, y, _overlap(body, plane, x, y), thickness)
+
+
+def _step_below(pitch: float) -> float:
+    """The nearest pitch (mm) on the ladder of `PITCHES_PER_OCTAVE` that is not greater."""
+    step = math.floor(PITCHES_PER_OCTAVE * math.log2(pitch / FINEST_PITCH) + 1e-9)
+    return float(FINEST_PITCH * 2.0 ** (step / PITCHES_PER_OCTAVE))
 
 
 def _overlap(body: TriangleMesh, skin: TriangleMesh, x: FloatArray, y: FloatArray) -> FloatArray:

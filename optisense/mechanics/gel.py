@@ -5,13 +5,15 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import lru_cache
 
 from optisense.design import SensorDesign
 from optisense.design.materials import Dielectric
 from optisense.design.parts import Role
 from optisense.errors import ContactError
-from optisense.geometry import Contact, SensingSurface, TriangleMesh
+from optisense.geometry import Contact, MeshIndenter, SensingSurface, TriangleMesh
 from optisense.geometry.contact import available_depth, locate, surface_axes
+from optisense.mechanics.contact_checks import refuse_holes, refuse_shared_skin
 from optisense.mechanics.deformed_mesh import SkinMesh, skin_mesh
 from optisense.mechanics.elasticity import Elasticity
 from optisense.mechanics.footprint import DOES_NOT_REACH, Footprint, footprint
@@ -24,7 +26,7 @@ USUAL_GEL = Elasticity(youngs_modulus=0.435, poisson_ratio=0.49, friction=1.0)
 fitted to measured forces (the FEATS project: Neo-Hooke, C10 = 0.0725 MPa, so E = 6 C10). The
 Poisson ratio and the friction are assumptions, usual for silicone and for a matt coating."""
 
-DEEPEST_SHARE = 0.7
+DEEPEST_SHARE = 0.6
 """Share of the gel's thickness up to which a depth is looked for that takes a given force. At half
 of it, linear elasticity says little already."""
 LEAST_DEPTH = 1e-4
@@ -33,6 +35,10 @@ LEAST_FORCE_SHARE = 1e-6
 """Share of the wanted force that stands for none, in logarithms."""
 FORCE_TOLERANCE = 2e-4
 """Relative error of the depth at which a wanted force counts as found: 0.03 % of the force."""
+
+KEPT_DEPTHS = 256
+"""Number of contacts whose depths, found for their forces, a gel keeps; a contact is a few
+numbers."""
 
 USUAL_THICKNESS = 4.0
 """mm; thickness of the gel in designs without an elastomer, about that of a GelSight Mini."""
@@ -98,6 +104,7 @@ class Gel:
         elastomers: Sequence[TriangleMesh],
         elasticity: Elasticity,
         place: Callable[[Contact], TriangleMesh],
+        check: Callable[[], None] | None = None,
     ) -> None:
         """Take a sensor's gel.
 
@@ -108,12 +115,14 @@ class Gel:
             elasticity: of the gel.
             place: gives the mesh of an indenter where a contact presses it in, in the design's
                 frame.
+            check: called before the first press; raises if the gel can't be pressed at all.
         """
+        self._check = check
         self._surface, self._skin, self._elastomers = surface, skin, elastomers
         self._elasticity, self._place = elasticity, place
         self._last: tuple[tuple[Contact, ...], PressedSkin] | None = None
         self._mesh: tuple[PressedSkin, SkinMesh] | None = None
-        self._depths: dict[Contact, Contact] = {}
+        self._depths = lru_cache(maxsize=KEPT_DEPTHS)(self._depth_found)
         self._patches = GelPatches(skin, elastomers, elasticity.poisson_ratio)
 
     def pressed(
@@ -126,9 +135,13 @@ class Gel:
             placed: their meshes, if they are known.
 
         Raises:
-            ContactError: an indenter does not reach the surface, no depth takes its force, or its
-                pressure is not found.
+            ContactError: an indenter does not reach the surface or has a hole where it touches,
+                two of them share skin, no depth takes a force, a pressure is not found, or nothing
+                holds the gel.
         """
+        if self._check is not None:
+            self._check()
+            self._check = None
         asked = tuple(contacts)
         if self._last is None or self._last[0] != asked:
             if placed is None:
@@ -142,6 +155,11 @@ class Gel:
                 )
                 for contact, mesh in zip(contacts, placed, strict=True)
             ]
+            for number, (place, mesh) in enumerate(zip(places, placed, strict=True)):
+                if isinstance(contacts[number].indenter, MeshIndenter):
+                    refuse_holes(place, mesh)
+                for other in places[:number]:
+                    refuse_shared_skin(place, other)
             patches = [self._patches.around(place) for place in places]
             drags = [
                 _drag(contact, self._surface, place)
@@ -167,11 +185,11 @@ class Gel:
         """
         if contact.force is None:
             return contact
-        if contact not in self._depths:
-            self._depths[contact] = self._depth_found(contact, contact.force)
-        return self._depths[contact]
+        return self._depths(contact)
 
-    def _depth_found(self, contact: Contact, wanted: float) -> Contact:
+    def _depth_found(self, contact: Contact) -> Contact:
+        wanted = contact.force
+        assert wanted is not None
         limit = DEEPEST_SHARE * self._thickness(contact)
 
         def at(depth: float) -> Contact:
@@ -188,8 +206,9 @@ class Gel:
         if (greatest := force(limit)) < wanted:
             raise ContactError(
                 f"a force of {wanted:g} N would press an indenter deeper than "
-                f"{100 * DEEPEST_SHARE:.0f} % of the gel, which takes {greatest:.3g} N",
-                hint="press with less force",
+                f"{100 * DEEPEST_SHARE:.0f} % of the gel, which is {limit:.2f} mm and takes "
+                f"{greatest:.3g} N there",
+                hint=f"give a force up to {greatest:.3g} N",
             )
 
         # Forces of smooth indenters grow about as depth^1.5; the root is found in logarithms.

@@ -51,6 +51,7 @@ class GelColumns:
     Attributes:
         x, y: (columns,) and (rows,), the grid.
         solid: (rows, columns) where there is a column.
+        cells: (rows - 1, columns - 1) where there are four columns around a body of gel.
         held: (rows, columns) columns at which the gel goes on and is taken to be at rest.
         top: (rows, columns, 3) points of the skin.
         inward: (rows, columns, 3) unit normals of the skin, into the gel.
@@ -62,6 +63,7 @@ class GelColumns:
     x: FloatArray
     y: FloatArray
     solid: BoolArray
+    cells: BoolArray
     held: BoolArray
     top: FloatArray
     inward: FloatArray
@@ -116,14 +118,26 @@ def gel_columns(
     bodies = [mesh.transformed(pose) for mesh in elastomers]
     length[there] = _lengths(top[there], inward[there], bodies, THICKEST * thickness)
     fits = there & (length > THINNEST * thickness) & np.isfinite(length)
-    solid = _around_the_middle(fits & ~steep)
-    if solid is None:
+    good = fits & ~steep
+    cells = good[:-1, :-1] & good[:-1, 1:] & good[1:, :-1] & good[1:, 1:]
+    cells &= ~_folded(top, inward, np.where(good, length, 0.0))
+    found = _around_the_middle(cells)
+    if found is None:
         return None
+    solid, cells = found
     goes_on = np.pad(np.zeros_like(solid), 1, constant_values=True)
     goes_on[1:-1, 1:-1] = fits & steep
     held = solid & ndimage.binary_dilation(goes_on, np.ones((3, 3)))[1:-1, 1:-1]
     return GelColumns(
-        x, y, solid, held, top, inward, length, _uneven(thickness, loaded, top, length, solid, held)
+        x,
+        y,
+        solid,
+        cells,
+        held,
+        top,
+        inward,
+        length,
+        _uneven(thickness, loaded, top, length, solid, held),
     )
 
 
@@ -202,9 +216,31 @@ def _lengths(
     return result
 
 
-def _around_the_middle(good: BoolArray) -> BoolArray | None:
-    """The columns of whole cells that hang together with the middle; None if there are none."""
-    cells = good[:-1, :-1] & good[:-1, 1:] & good[1:, :-1] & good[1:, 1:]
+def _folded(top: FloatArray, inward: FloatArray, length: FloatArray) -> BoolArray:
+    """(rows - 1, columns - 1) cells whose columns cross, as some do where the skin ends.
+
+    A cell is whole where its area, seen along its columns, has one sign at all its corners, on the
+    skin and on the base.
+    """
+    folded = np.zeros((top.shape[0] - 1, top.shape[1] - 1), dtype=bool)
+    for share in (0.0, 1.0):
+        at = top + share * length[..., None] * inward
+        low, right = at[:-1, :-1], at[:-1, 1:]
+        left, high = at[1:, :-1], at[1:, 1:]
+        corners = (
+            (right - low, left - low, inward[:-1, :-1]),
+            (right - low, high - right, inward[:-1, 1:]),
+            (high - left, left - low, inward[1:, :-1]),
+            (high - left, high - right, inward[1:, 1:]),
+        )
+        for along, across, way in corners:
+            volume = -np.einsum("rci,rci->rc", np.cross(along, across), way)
+            folded |= ~(volume > 0.0)
+    return folded
+
+
+def _around_the_middle(cells: BoolArray) -> tuple[BoolArray, BoolArray] | None:
+    """The cells that hang together with the middle and their columns; None if there are none."""
     labels, count = ndimage.label(cells)
     if count == 0:
         return None
@@ -212,11 +248,11 @@ def _around_the_middle(good: BoolArray) -> BoolArray | None:
     middle = (np.array(cells.shape) - 1) / 2
     nearest = int(np.argmin((rows - middle[0]) ** 2 + (columns - middle[1]) ** 2))
     chosen = labels == labels[rows[nearest], columns[nearest]]
-    solid = np.zeros_like(good)
+    solid = np.zeros((cells.shape[0] + 1, cells.shape[1] + 1), dtype=bool)
     for row in (slice(None, -1), slice(1, None)):
         for column in (slice(None, -1), slice(1, None)):
             solid[row, column] |= chosen
-    return solid
+    return solid, chosen
 
 
 def _uneven(

@@ -158,7 +158,7 @@ class GelPatch:
         """(cells, 4) columns at the corners, x running first."""
         n = self._number
         corners = np.stack([n[:-1, :-1], n[:-1, 1:], n[1:, :-1], n[1:, 1:]], axis=2)
-        return corners[(corners >= 0).all(axis=2)]
+        return corners[self.columns.cells]
 
     @cached_property
     def _elements(self) -> IntArray:

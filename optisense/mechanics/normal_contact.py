@@ -34,7 +34,10 @@ class NormalContact(NamedTuple):
 
 
 def solve_normal_contact(
-    response: GridResponse, overlap: FloatArray, start: FloatArray | None = None
+    response: GridResponse,
+    overlap: FloatArray,
+    start: FloatArray | None = None,
+    tolerance: float = TOLERANCE,
 ) -> NormalContact:
     """Pressure that keeps the skin from entering an indenter.
 
@@ -48,6 +51,7 @@ def solve_normal_contact(
         overlap: (rows, columns) mm, how far the undeformed skin lies inside the indenter; negative
             where there is a gap.
         start: pressure to begin with.
+        tolerance: in place of `TOLERANCE`, of pressures that others follow.
 
     Raises:
         ContactError: the iteration does not converge.
@@ -70,8 +74,8 @@ def solve_normal_contact(
         square = float((residual**2).sum())
         if (
             iteration > 1
-            and np.abs(residual).max() <= TOLERANCE * deepest
-            and gap.min() >= -TOLERANCE * deepest
+            and np.abs(residual).max() <= tolerance * deepest
+            and gap.min() >= -tolerance * deepest
         ):
             return NormalContact(pressure, displacement, iteration - 1)
         way = np.where(touching, residual + (square / before if goes_on else 0.0) * way, 0.0)
@@ -85,7 +89,35 @@ def solve_normal_contact(
         if not goes_on:
             pressure = np.where(entering, -step * gap, pressure)
         displacement = response.normal(pressure)
+    rest = max(float(np.abs(residual).max()), -float(gap.min()))
     raise ContactError(
-        f"the pressure under an indenter is not found in {MAX_ITERATIONS} iterations",
+        f"the pressure under an indenter is not found in {MAX_ITERATIONS} iterations; {rest:.2g} "
+        f"mm of gap or overlap remain, where {tolerance * deepest:.2g} mm would do",
         hint="press less deep, or check the indenter's shape for spikes",
     )
+
+
+def contact_area(pressure: FloatArray, pitch: float) -> float:
+    """The area (mm^2) that is pressed on, to a fraction of the grid's squares.
+
+    Pressure of smooth contacts falls to 0 as the square root of the distance from the rim, so its
+    square is followed to 0 beyond the outermost points, along rows and along columns. Where it
+    does not fall, as at the edge of a flat punch, squares count whole.
+
+    Args:
+        pressure: (rows, columns) MPa.
+        pitch: mm, side of a square.
+    """
+    touching = pressure > 0.0
+    square = np.pad(pressure, 1) ** 2
+    count = float(touching.sum())
+    beyond = 0.0
+    for axis in (0, 1):
+        for way in (1, -1):
+            before, after = (np.roll(square, step, axis)[1:-1, 1:-1] for step in (way, -way))
+            last = touching & (after == 0.0)
+            here = square[1:-1, 1:-1][last]
+            fall = before[last] - here
+            reach = np.divide(here, fall, out=np.full_like(here, 0.5), where=fall > 0.0)
+            beyond += float((np.clip(reach, 0.0, 1.0) - 0.5).sum())
+    return (count + 0.5 * beyond) * pitch**2

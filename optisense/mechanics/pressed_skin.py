@@ -18,13 +18,24 @@ from optisense.mechanics.displacement_field import (
 from optisense.mechanics.elasticity import Elasticity
 from optisense.mechanics.footprint import Footprint
 from optisense.mechanics.gel_patch import GelPatch
-from optisense.mechanics.normal_contact import NormalContact, solve_normal_contact
+from optisense.mechanics.normal_contact import (
+    TOLERANCE,
+    NormalContact,
+    contact_area,
+    solve_normal_contact,
+)
 from optisense.mechanics.tangential_contact import Drag, solve_shear
 
 FloatArray = NDArray[np.float64]
 
 SETTLED = 1e-4
 """Change of the displacements that contacts cause each other (mm) at which they are settled."""
+FIRST_TOLERANCE = 0.01
+"""Tolerance of pressures that are solved before anything of the gel's shape is known; see
+`normal_contact.TOLERANCE`."""
+ROUGH_SHARE = 0.02
+"""Tolerance of a pressure over the last change of what the gel's shape gives, in mm: each turn is
+solved a little better than the next one changes it."""
 MAX_TURNS = 12
 """Turns in which pressure and the gel's shape are matched; each is several times nearer."""
 MAX_SWEEPS = 8
@@ -55,7 +66,7 @@ class Pressed:
     @property
     def area(self) -> float:
         """mm^2 of skin that touches."""
-        return float((self.pressure > 0.0).sum()) * self.place.pitch**2
+        return contact_area(self.pressure, self.place.pitch)
 
     @property
     def shear_force(self) -> FloatArray:
@@ -252,7 +263,8 @@ def _pressed(
 ) -> Pressed:
     """One contact; what the gel's shape changes is found in turns with the pressure."""
     pressure = None if before is None else before.pressure
-    solved = _solve(place, overlap, elasticity, pressure)
+    rough = TOLERANCE if patch is None else FIRST_TOLERANCE
+    solved = _solve(place, overlap, elasticity, pressure, rough)
     if patch is None:
         field = DisplacementField(place, overlap, solved.pressure, elasticity)
         return Pressed(place, solved.pressure, field)
@@ -260,6 +272,7 @@ def _pressed(
     columns = patch.columns
     start = columns.x[0], columns.y[0]
     beyond = np.zeros(overlap.shape)
+    deepest = float(overlap.max())
     for _ in range(MAX_TURNS):
         coarse = binned(solved.pressure, place, start, columns.pitch, columns.solid.shape)
         force = coarse * columns.pitch**2 / elasticity.shear_modulus
@@ -267,7 +280,8 @@ def _pressed(
         found = spline.at(x, y)[0].reshape(overlap.shape)
         change = float(np.abs(found - beyond).max())
         beyond = found
-        solved = _solve(place, overlap - beyond, elasticity, solved.pressure)
+        rough = max(TOLERANCE, min(FIRST_TOLERANCE, ROUGH_SHARE * change / deepest))
+        solved = _solve(place, overlap - beyond, elasticity, solved.pressure, rough)
         if change < SETTLED:
             break
     field = DisplacementField(place, overlap - beyond, solved.pressure, elasticity, spline)
@@ -275,10 +289,14 @@ def _pressed(
 
 
 def _solve(
-    place: Footprint, overlap: FloatArray, elasticity: Elasticity, start: FloatArray | None
+    place: Footprint,
+    overlap: FloatArray,
+    elasticity: Elasticity,
+    start: FloatArray | None,
+    tolerance: float,
 ) -> NormalContact:
     response = grid_response(overlap.shape, place.pitch, place.thickness, elasticity)
-    return solve_normal_contact(response, overlap, start)
+    return solve_normal_contact(response, overlap, start, tolerance)
 
 
 def _caused_by(others: list[Pressed], place: Footprint) -> FloatArray:

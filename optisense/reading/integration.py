@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -63,9 +64,18 @@ class GridIntegrator:
 
         Slopes off the mask are not read.
         """
-        x = 0.5 * (slope_x[:, :-1] + slope_x[:, 1:])[self._across]
-        y = 0.5 * (slope_y[:-1] + slope_y[1:])[self._down]
-        values = self._solve(self._steps.T @ np.concatenate([x, y]))  # type: ignore[operator]
+        return self.from_steps(
+            0.5 * (slope_x[:, :-1] + slope_x[:, 1:]), 0.5 * (slope_y[:-1] + slope_y[1:])
+        )
+
+    def from_steps(self, across: FloatArray, down: FloatArray) -> FloatArray:
+        """Values (h, w) from their steps to the next pixel: (h, w - 1) along rows, and (h - 1, w)
+        along columns; NaN off the mask.
+
+        Steps to or from pixels off the mask are not read.
+        """
+        wanted = np.concatenate([across[self._across], down[self._down]])
+        values = self._solve(self._steps.T @ wanted)  # type: ignore[operator]
         size = np.bincount(self._part, minlength=self._parts)
         mean = np.bincount(self._part, values, self._parts) / np.maximum(size, 1)
         result = np.full(self.mask.shape, np.nan)
@@ -78,13 +88,16 @@ class NormalIntegrator:
 
     What is integrated is not a height over a plane but t, how far back along its own ray (in the
     gel, a straight line) each pixel's surface lies: the surface is p(t) = p0 - t d, where p0 is
-    the untouched point and d the ray's direction. Going one pixel on, p must stay in the surface
-    whose normal is n, so p' . n = 0, and with p' = p0' - t' d - t d'
+    the untouched point and d the ray's direction. From one pixel to the next,
+    the step between the two lies in the surface, so it is square to its normal n. With t and d in
+    the middle of both pixels, and D for what changes from one to the other,
 
-        t' = (p0' - t d') . n / (d . n).
+        D t = (D p0 - t D d) . n / (d . n),
 
+    as the mean of what the normals of both pixels give, which is exact for quadratic surfaces.
     Perspective, refraction and curvature are all in p0 and d, which chief rays give; t on the
-    right is taken from the round before, first 0.
+    right is taken from the round before, first 0. Only neighbours that are both seen make a step,
+    so that nothing is read beyond the border of the view.
     """
 
     def __init__(self, untouched: UntouchedSurface) -> None:
@@ -100,26 +113,57 @@ class NormalIntegrator:
         """
         untouched = self._untouched
         normal = np.asarray(normals, dtype=np.float64)
-        facing = np.einsum("...i,...i", untouched.directions, normal)
-        facing = np.minimum(facing, -np.cos(np.radians(STEEPEST)))
-        points = _pixel_steps(untouched.points)
-        turns = _pixel_steps(untouched.directions)
+        steps = [_Steps.between(untouched, normal, axis) for axis in (1, 0)]
         back = np.zeros(untouched.seen.shape)
         for _ in range(ROUNDS):
-            x, y = (
-                np.einsum("...i,...i", point - back[..., None] * turn, normal) / facing
-                for point, turn in zip(points, turns, strict=True)
-            )
-            back = self._grid.integrate(x, y)
+            across, down = (each.of(back) for each in steps)
+            back = self._grid.from_steps(across, down)
             back = np.nan_to_num(back - np.median(back[_border(untouched.seen)]))
         surface = untouched.points - back[..., None] * untouched.directions
         surface[~untouched.seen] = np.nan
         return untouched.depth(surface)
 
 
-def _pixel_steps(values: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Derivatives of (h, w, 3) values a pixel, along columns and along rows."""
-    return np.gradient(values, axis=1), np.gradient(values, axis=0)
+class _Steps(NamedTuple):
+    """How far back along its ray the surface goes from each pixel to the next along an axis.
+
+    Attributes:
+        axis: 0 along columns, 1 along rows.
+        rise: mm, of a surface that is not moved.
+        turn: what the change of the ray's direction adds to it, for each mm back.
+    """
+
+    axis: int
+    rise: FloatArray
+    turn: FloatArray
+
+    @staticmethod
+    def between(untouched: UntouchedSurface, normal: FloatArray, axis: int) -> _Steps:
+        """The steps along an axis of a surface with these unit normals (h, w, 3)."""
+        ways = _middle(untouched.directions, axis)
+        changes = [np.diff(each, axis=axis) for each in (untouched.points, untouched.directions)]
+        found = []
+        for here in _neighbours(normal, axis):
+            facing = np.einsum("...i,...i", ways, here)
+            facing = np.minimum(facing, -np.cos(np.radians(STEEPEST)))
+            found.append([np.einsum("...i,...i", each, here) / facing for each in changes])
+        rise, turn = (0.5 * (one + other) for one, other in zip(*found, strict=True))
+        return _Steps(axis, rise, turn)
+
+    def of(self, back: FloatArray) -> FloatArray:
+        """mm, where the surface is about `back` (h, w) mm back."""
+        return self.rise - _middle(back, self.axis) * self.turn
+
+
+def _middle(values: FloatArray, axis: int) -> FloatArray:
+    """The means of neighbours along an axis."""
+    before, after = _neighbours(values, axis)
+    return 0.5 * (before + after)
+
+
+def _neighbours(values: FloatArray, axis: int) -> tuple[FloatArray, FloatArray]:
+    """The values before and after each step along an axis."""
+    return (values[:, :-1], values[:, 1:]) if axis else (values[:-1], values[1:])
 
 
 def _border(mask: NDArray[np.bool_]) -> NDArray[np.bool_]:

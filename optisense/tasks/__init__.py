@@ -11,6 +11,7 @@ from optisense.lazy_names import load_on_first_use
 
 if TYPE_CHECKING:
     from optisense.tasks.ball_force import BallForce
+    from optisense.tasks.ball_shear import BallShear
     from optisense.tasks.calibration import CalibratedSensor, ReconstructionSettings
     from optisense.tasks.cylinder_radius import CylinderRadius
     from optisense.tasks.dataset import Dataset, Sample
@@ -31,6 +32,7 @@ _HOMES = {
     "CalibratedSensor": ".calibration",
     "ContactDraw": ".draws",
     "BallForce": ".ball_force",
+    "BallShear": ".ball_shear",
     "CylinderRadius": ".cylinder_radius",
     "Dataset": ".dataset",
     "DatasetSettings": ".generation",
@@ -52,6 +54,7 @@ _HOMES = {
 
 __all__ = [
     "BallForce",
+    "BallShear",
     "CalibratedSensor",
     "ContactDraw",
     "CylinderRadius",

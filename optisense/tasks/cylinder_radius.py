@@ -11,6 +11,12 @@ from numpy.typing import NDArray
 
 from optisense.errors import TaskError
 from optisense.geometry import Contact, Cylinder
+from optisense.tasks.ball_press import (
+    SPREAD_FEATURES,
+    place_aside,
+    spread_of_colours,
+    try_corners,
+)
 
 if TYPE_CHECKING:
     from optisense.optics import OpticalModel, TactileImage
@@ -42,7 +48,7 @@ class CylinderRadius:
     name: ClassVar[str] = "cylinder-radius"
     unit: ClassVar[str] = "mm"
     targets: ClassVar[tuple[str, ...]] = ("radius",)
-    features: ClassVar[tuple[str, ...]] = ("spread_red", "spread_green", "spread_blue")
+    features: ClassVar[tuple[str, ...]] = SPREAD_FEATURES
     width: ClassVar[int] = 96
     contact_only: ClassVar[bool] = True
 
@@ -59,19 +65,17 @@ class CylinderRadius:
         Raises:
             ContactError: one is off the surface or deeper than the gel.
         """
-        for radius in (self.least, self.most):
-            for u in (-self.aside, self.aside):
-                for v in (-self.aside, self.aside):
-                    model.place(Contact(Cylinder(radius), at=(u, v), depth=self.depth))
+        thinnest, thickest = Cylinder(self.least), Cylinder(self.most)
+        try_corners(model, [thinnest, thickest], self.aside, self.depth)
 
     def contact(
         self, model: OpticalModel, rng: np.random.Generator
     ) -> tuple[Contact, Sequence[float]]:
         """A cylinder of random radius."""
         radius = float(rng.uniform(self.least, self.most))
-        u, v = rng.uniform(-self.aside, self.aside, 2).tolist()
+        at = place_aside(rng, self.aside)
         turn = float(rng.uniform(-self.turn, self.turn))
-        contact = Contact(Cylinder(radius), at=(u, v), depth=self.depth, rotation=turn)
+        contact = Contact(Cylinder(radius), at=at, depth=self.depth, rotation=turn)
         return contact, (radius,)
 
     def measure(self, picture: NDArray[np.uint8], image: TactileImage) -> Sequence[float]:
@@ -82,5 +86,4 @@ class CylinderRadius:
                 f"only {inside.sum()} pixels show the contact",
                 hint="Use a higher resolution, or look at where the camera looks",
             )
-        spread: list[float] = picture[inside].std(axis=0, dtype=np.float64).tolist()
-        return spread
+        return spread_of_colours(picture[inside])

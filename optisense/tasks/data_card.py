@@ -11,6 +11,7 @@ from optisense.tasks.dataset import Dataset
 from optisense.tasks.parquet import FOLDER
 from optisense.tasks.splits import SPLITS
 from optisense.text import markdown
+from optisense.untrusted_files import MOST_TEXT, read_bytes
 from optisense.writing import write_text
 
 CARD = "README.md"
@@ -54,7 +55,7 @@ def write_card(dataset: Dataset, licence: str | None = None) -> Path | None:
     check_licence(licence)
     path = dataset.folder / CARD
     if path.exists():
-        before = path.read_text(encoding="utf-8", errors="replace")
+        before = read_bytes(path, MOST_TEXT, TaskError, "the card").decode("utf-8", "replace")
         if OURS not in before:
             return None
         known = re.search(rf"^license: ({LICENCE.pattern})$", before, re.MULTILINE)

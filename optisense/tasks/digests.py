@@ -8,6 +8,7 @@ from typing import Any
 
 from optisense.design import SensorDesign
 from optisense.errors import TaskError
+from optisense.untrusted_files import MOST_MESH, MOST_STEP, read_bytes
 
 
 def design_values(design: SensorDesign) -> dict[str, Any]:
@@ -39,7 +40,4 @@ def file_digest(path: Path) -> str:
     Raises:
         TaskError: it can't be read.
     """
-    try:
-        return _digest(path.read_bytes())
-    except OSError as error:
-        raise TaskError(f"can't read the mesh: {error.strerror}", where=str(path)) from error
+    return _digest(read_bytes(path, max(MOST_MESH, MOST_STEP), TaskError, "the mesh"))

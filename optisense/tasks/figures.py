@@ -76,8 +76,9 @@ def draw_reconstruction(result: ReconstructionResult, axes: FloatArray) -> Figur
             if colours:
                 figure.colorbar(shown, ax=cell, shrink=0.8)
         line[0].set_ylabel(name)
-        line[3].set_xlabel(f"{each.normal_error:.1f}° on average")
-        line[5].set_xlabel(f"off by {each.depth_error:.3f} mm on average")
+        ring = "" if np.isnan(each.ring_normal_error) else f", {each.ring_normal_error:.1f}° beside"
+        line[3].set_xlabel(f"{each.normal_error:.1f}° in the contact{ring}")
+        line[5].set_xlabel(f"off by {each.depth_error:.3f} mm in the contact")
     for cell, title in zip(grid[0], (*titles, "true depth (mm)", "read depth (mm)"), strict=True):
         cell.set_title(title, fontsize=10)
     figure.suptitle(

@@ -6,7 +6,8 @@ other things, read their normals and integrate them to depth.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+import math
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import asdict, dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -59,7 +60,8 @@ class Reconstruction:
     """One object as it is and as it was read; arrays are (h, w, ...).
 
     normals, true_normals, untouched_normals: unit, inward, in the design's frame. depth,
-    true_depth: mm along the inward normal. mask: the contact, whose pixels the errors count.
+    true_depth: mm along the inward normal. mask: the contact, as far as its skin is seen untouched,
+    too; the errors count its pixels.
     """
 
     picture: NDArray[np.uint8]
@@ -91,8 +93,18 @@ class Reconstruction:
         """mm, the mean absolute difference over the contact."""
         return float(np.abs(self.depth - self.true_depth)[self.mask].mean())
 
-    def to_dict(self) -> dict[str, float]:
-        """The errors, beside those of reading nothing, ready for JSON."""
+    @property
+    def ring_normal_error(self) -> float:
+        """Degrees, the mean over the ring; NaN where there is none."""
+        return _mean(self.angles, self.ring)
+
+    @property
+    def ring_depth_error(self) -> float:
+        """mm, the mean absolute difference over the ring; NaN where there is none."""
+        return _mean(np.abs(self.depth - self.true_depth), self.ring)
+
+    def to_dict(self) -> dict[str, float | None]:
+        """The errors, beside those of reading nothing, ready for JSON; None where no ring is."""
         inside = self.mask
         nothing = angles_between(self.untouched_normals, self.true_normals)
         return {
@@ -104,9 +116,23 @@ class Reconstruction:
             "deepest": float(self.true_depth[inside].max()),
             "deepest_read": float(self.depth[inside].max()),
             "contact_pixels": int(inside.sum()),
-            "ring_normal_error": float(self.angles[self.ring].mean()) if self.ring.any() else 0.0,
+            "ring_normal_error": json_ready(self.ring_normal_error),
+            "ring_normal_error_of_reading_nothing": json_ready(_mean(nothing, self.ring)),
+            "ring_depth_error": json_ready(self.ring_depth_error),
+            "ring_depth_error_of_reading_nothing": json_ready(_mean(self.true_depth, self.ring)),
             "ring_pixels": int(self.ring.sum()),
         }
+
+
+def _mean(values: FloatArray, where: NDArray[np.bool_]) -> float:
+    """The mean absolute value of some pixels; NaN if there are none."""
+    return float(np.abs(values[where]).mean()) if where.any() else float("nan")
+
+
+def _mean_of_known(values: Iterable[float]) -> float:
+    """The mean without NaN; NaN if there is nothing else."""
+    known = [value for value in values if not math.isnan(value)]
+    return float(np.mean(known)) if known else float("nan")
 
 
 @dataclass(frozen=True)
@@ -128,6 +154,16 @@ class ReconstructionResult:
         """mm."""
         return float(np.mean([each.depth_error for each in self.objects.values()]))
 
+    @property
+    def ring_normal_error(self) -> float:
+        """Degrees, over the objects that have a ring; NaN if none has, as of a conforming skin."""
+        return _mean_of_known(each.ring_normal_error for each in self.objects.values())
+
+    @property
+    def ring_depth_error(self) -> float:
+        """mm, over the same objects."""
+        return _mean_of_known(each.ring_depth_error for each in self.objects.values())
+
     def to_dict(self) -> dict[str, Any]:
         """All errors and settings, ready for JSON."""
         return {
@@ -135,6 +171,8 @@ class ReconstructionResult:
             "design": self.design,
             "normal_error": self.normal_error,
             "depth_error": self.depth_error,
+            "ring_normal_error": json_ready(self.ring_normal_error),
+            "ring_depth_error": json_ready(self.ring_depth_error),
             "units": {"normal_error": "degrees", "depth_error": "mm"},
             "objects": {name: each.to_dict() for name, each in self.objects.items()},
             "fitted_pixels": self.fitted_pixels,
@@ -186,7 +224,9 @@ def reconstruct_one(
         TaskError: the camera does not see it.
     """
     image, picture = sensor.look(contact, number)
-    if image.contact_mask.sum() < LEAST_PIXELS:
+    # At the border of the view a contact shows where the untouched skin does not.
+    mask = image.contact_mask & sensor.untouched.seen
+    if mask.sum() < LEAST_PIXELS:
         raise TaskError(f"the camera does not see {name}", hint="Place it where it looks")
     normals, depth = sensor.read(picture)
     return Reconstruction(
@@ -196,5 +236,5 @@ def reconstruct_one(
         untouched_normals=sensor.untouched.normals,
         depth=depth,
         true_depth=sensor.untouched.image_depth(image).astype(np.float64),
-        mask=image.contact_mask,
+        mask=mask,
     )

@@ -11,6 +11,7 @@ from optisense.mechanics import Elasticity, Gel, gel_patches, point_load
 from optisense.mechanics.gel_columns import gel_columns
 from optisense.mechanics.gel_patch import GelPatch
 from optisense.mechanics.hexahedra import CORNERS, stiffnesses
+from optisense.sensors import load
 from optisense.sensors.shapes import revolve
 
 GEL = Elasticity(1.0, 0.49)
@@ -154,6 +155,22 @@ def test_columns_of_a_dome_yield_to_each_others_loads_alike():
     matrix = np.array([[each[tuple(middle + o)] for o in offsets] for each in found])
     assert np.abs(matrix).max() > 2e-3
     assert matrix == pytest.approx(matrix.T, abs=0.05 * np.abs(matrix).max())
+
+
+@pytest.mark.parametrize("at", [(5.0, 0.1), (4.9, 3.8)])
+def test_a_gel_that_ends_in_a_round_rim_is_pressed_beside_its_middle(at):
+    # Where DIGIT's skin ends, columns along its normals cross; the cells between them are left out.
+    design = load("digit")
+    meshes = design.deformed_meshes()
+    skin, body = meshes["skin"], meshes["gel"]
+    top = skin.vertices[np.argmax(skin.vertices[:, 2])]
+    surface = SensingSurface(skin, top, (1, 0, 0), (0, 1, 0))
+    gel = Gel(surface, skin, [body], GEL, lambda contact: place(contact, surface, body))
+    forces = [
+        gel.pressed([Contact(Sphere(1.5), at=spot, depth=0.3)]).contacts[0].force
+        for spot in ((0.0, 0.0), at)
+    ]
+    assert forces[1] == pytest.approx(forces[0], rel=0.1)
 
 
 def test_a_dome_is_softer_than_a_flat_gel_of_its_thickness(monkeypatch):

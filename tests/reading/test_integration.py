@@ -94,6 +94,16 @@ def test_a_pressed_ball_comes_back(radius: float, pinhole: float) -> None:
     assert np.abs(got - expected)[touched].mean() < 0.006
 
 
+def test_nothing_beyond_the_border_of_the_view_is_read() -> None:
+    """Untouched skin is level whatever stands in the pixels that miss it."""
+    whole = rays(8.0, 12.0)
+    x, y = grid()
+    seen = (np.hypot(x, y) < 40) & (np.abs(x - 5) > 2)
+    points = np.where(seen[..., None], whole.points, 0.0)
+    untouched = UntouchedSurface(points, whole.normals, whole.directions, seen)
+    assert np.abs(NormalIntegrator(untouched).depths(whole.normals)[seen]).max() < 1e-4
+
+
 def test_depth_on_a_cylinder_is_the_distance_from_it() -> None:
     untouched = rays(8.0, 12.0)
     depth = np.linspace(-0.3, 1.0, SHAPE[1])[None, :]

@@ -9,10 +9,18 @@ import numpy as np
 import pytest
 
 from optisense import OpticalModel, load
+from optisense.design import Markers
 from optisense.design.colour import srgb_curve
 from optisense.errors import ContactError, TaskError
 from optisense.geometry import Contact, Cylinder
-from optisense.tasks import BallForce, CylinderRadius, Misalignment, SampleSettings, perceive
+from optisense.tasks import (
+    BallForce,
+    BallShear,
+    CylinderRadius,
+    Misalignment,
+    SampleSettings,
+    perceive,
+)
 from optisense.tasks.misalignment import plane_contact
 from optisense.tasks.perception import collect
 
@@ -171,6 +179,23 @@ def test_a_force_is_read_from_the_spread(mini: OpticalModel) -> None:
         BallForce(least=0.5, most=0.4)
     with pytest.raises(ContactError, match="thick"):
         perceive(BallForce(most=5.0), mini, settings)
+
+
+def test_the_mean_motion_of_dots_in_pictures_tells_the_shear(mini: OpticalModel) -> None:
+    with pytest.raises(TaskError, match="the design has none"):
+        perceive(BallShear(), mini, SampleSettings(count=10))
+    design = mini.design.copy()
+    design.markers = Markers(grid=(7, 5), pitch=2.4, radius=0.5)
+    dotted = OpticalModel(design)
+    samples = collect(BallShear(), dotted, SampleSettings(count=8, photons=60_000))
+    along, down = samples.features[:, 0], samples.features[:, 1]
+    shear_u, shear_v = samples.targets.T
+    # Far from the ball dots move in proportion to the force; v points up and rows run down.
+    assert np.corrcoef(along, shear_u)[0, 1] > 0.95
+    assert np.corrcoef(down, shear_v)[0, 1] < -0.95
+    assert np.abs(samples.targets).max() > 0.1
+    with pytest.raises(TaskError, match="makes no sense"):
+        BallShear(farthest=0.0)
 
 
 @pytest.mark.slow

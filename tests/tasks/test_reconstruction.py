@@ -33,10 +33,26 @@ def test_known_lights_give_known_shapes_back(method: str, degrees: float, lamber
         assert values["normal_error_of_reading_nothing"] > 12, name
         assert values["ring_pixels"] > 100, name
         assert values["ring_normal_error"] < 2 * degrees, name
+        assert values["ring_depth_error"] < values["ring_depth_error_of_reading_nothing"], name
         # What is read where nothing touches is the skin that bends there.
         outside = ~each.mask & np.isfinite(each.true_depth)
         # Small errors of the slope add up along a cylinder's ring.
         assert np.abs(each.depth - each.true_depth)[outside].mean() < 0.05, name
+
+
+def test_the_ring_is_scored_beside_the_contact_and_a_conforming_skin_has_none(
+    lambertian: Any,
+) -> None:
+    ball = {"ball": Contact(Sphere(3.0), at=(0, 0), depth=0.6)}
+    few = LAMBERTIAN | {"presses": 3}
+    result = reconstruct(lambertian, ReconstructionSettings(**few), ball)
+    each = result.objects["ball"]
+    off = np.abs(each.depth - each.true_depth)
+    assert result.ring_normal_error == pytest.approx(each.angles[each.ring].mean())
+    assert result.ring_depth_error == pytest.approx(off[each.ring].mean())
+    assert not (each.ring & each.mask).any()
+    stiff = reconstruct(lambertian, ReconstructionSettings(**few, skin="conforming"), ball)
+    assert stiff.to_dict()["ring_normal_error"] is None
 
 
 def test_true_depth_and_normals_are_those_of_the_ball(lambertian: Any) -> None:

@@ -1,0 +1,54 @@
+"""Whether something holds a gel: a gel that is bonded to nothing resists no press."""
+
+from __future__ import annotations
+
+from optisense.design import SensorDesign
+from optisense.design.parts import Role
+from optisense.errors import ContactError
+from optisense.geometry import TriangleMesh
+from optisense.geometry.coincidence import boxes_overlap, find_coincident
+from optisense.geometry.meeting import find_meeting, resting_on
+
+GLUE = 0.05
+"""mm; a part whose faces are this near to a gel's holds it: as thick as a film of glue, and more
+than the faces of two models of one curved surface differ by."""
+
+
+def is_attached(design: SensorDesign) -> bool:
+    """Whether a part of a design touches its gel, other than the skin."""
+    meshes = design.deformed_meshes()
+    gels = [meshes[name] for name in design.parts_of(Role.ELASTOMER)]
+    others = [
+        meshes[name]
+        for name, part in design.parts.items()
+        if part.role not in (Role.ELASTOMER, Role.SENSING_SURFACE, Role.INDENTER)
+    ]
+    return any(_hold_each_other(gel, other) for gel in gels for other in others)
+
+
+def refuse_loose_gel(design: SensorDesign) -> None:
+    """Raise if a design has a gel that no part holds.
+
+    Raises:
+        ContactError: nothing touches the gel but the skin.
+    """
+    names = design.parts_of(Role.ELASTOMER)
+    if names and not is_attached(design):
+        raise ContactError(
+            f"the gel ('{names[0]}') is attached to nothing: no part touches it but the skin, so "
+            "it resists no press",
+            where=design.where("parts", names[0]),
+            hint=f"Add a support that lies on its far side, to {GLUE:g} mm, or take the conforming "
+            "skin (--skin conforming)",
+        )
+
+
+def _hold_each_other(gel: TriangleMesh, other: TriangleMesh) -> bool:
+    if not boxes_overlap(gel, other, -GLUE):
+        return False
+    return (
+        len(find_coincident(gel, other, GLUE, facing=False).pairs) > 0
+        or len(resting_on(gel, other)) > 0
+        or len(resting_on(other, gel)) > 0
+        or find_meeting(gel, other) is not None
+    )

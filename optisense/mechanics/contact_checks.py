@@ -1,0 +1,74 @@
+"""Contacts that no elastic skin can take: two indenters in one place, and a hole that touches."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from optisense.errors import ContactError
+from optisense.geometry import TriangleMesh
+from optisense.mechanics.footprint import Footprint
+
+FloatArray = NDArray[np.float64]
+
+SHALLOWEST = 1e-3
+"""mm; how far skin lies inside both of two indenters before they count as overlapping."""
+
+
+def refuse_shared_skin(one: Footprint, other: Footprint) -> None:
+    """Raise if two indenters overlap where they meet the undeformed skin.
+
+    Raises:
+        ContactError: a piece of skin lies inside both.
+    """
+    x, y = np.meshgrid(one.x, one.y)
+    inside = one.overlap > SHALLOWEST
+    flat = np.column_stack([x[inside], y[inside], np.zeros(int(inside.sum()))])
+    there = other.local(one.origin + flat @ one.axes.T)
+    near = np.abs(there[:, 2]) < min(one.thickness, other.thickness)
+    if (_overlap_at(other, there[near]) > SHALLOWEST).any():
+        raise ContactError(
+            "two contacts overlap: their indenters are in one another where they meet the skin",
+            where="at ({:.2f}, {:.2f}, {:.2f}) and ({:.2f}, {:.2f}, {:.2f}) mm".format(
+                *other.origin, *one.origin
+            ),
+            hint="move them apart, or join them to one mesh",
+        )
+
+
+def refuse_holes(place: Footprint, indenter: TriangleMesh) -> None:
+    """Raise if a mesh ends where it touches the skin; one that is open elsewhere does no harm.
+
+    Args:
+        place: of the contact.
+        indenter: its mesh where it is pressed in, in the design's frame.
+
+    Raises:
+        ContactError: an edge of a single face lies inside the undeformed skin.
+    """
+    whole = indenter.welded()
+    ends = np.sort(whole.faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
+    edges, times = np.unique(ends, axis=0, return_counts=True)
+    local = place.local(whole.vertices[edges[times == 1]].mean(axis=1))
+    touching = (local[:, 2] < -SHALLOWEST) & (_overlap_at(place, local) > SHALLOWEST)
+    if touching.any():
+        raise ContactError(
+            f"an indenter has a hole where it touches the skin: {int(touching.sum())} edges there "
+            "have one face only",
+            where="at ({:.2f}, {:.2f}, {:.2f}) mm".format(*place.origin),
+            hint="close the mesh; it may be open only above the skin",
+        )
+
+
+def _overlap_at(place: Footprint, local: FloatArray) -> FloatArray:
+    """(n,) the greatest overlap (mm) at the grid points around points of a contact's frame."""
+    column = np.floor((local[:, 0] - place.x[0]) / place.pitch).astype(np.int64)
+    row = np.floor((local[:, 1] - place.y[0]) / place.pitch).astype(np.int64)
+    rows, columns = place.overlap.shape
+    inside = (column >= 0) & (column < columns - 1) & (row >= 0) & (row < rows - 1)
+    found = np.full(len(local), -np.inf)
+    some = row[inside], column[inside]
+    found[inside] = np.max(
+        [place.overlap[some[0] + up, some[1] + right] for up in (0, 1) for right in (0, 1)], axis=0
+    )
+    return found

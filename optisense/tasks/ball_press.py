@@ -1,0 +1,82 @@
+"""Balls pressed near the middle of a sensor, as several tasks press them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from optisense.errors import TaskError
+from optisense.geometry import Contact, Indenter, Sphere
+
+if TYPE_CHECKING:
+    from optisense.optics import OpticalModel
+
+SPREAD_FEATURES = ("spread_red", "spread_green", "spread_blue")
+"""Names of what `spread_of_colours` gives."""
+
+
+def spread_of_colours(pixels: NDArray[np.uint8]) -> Sequence[float]:
+    """The standard deviation of each channel over pixels (..., 3), in levels of 255."""
+    spread: list[float] = pixels.reshape(-1, 3).std(axis=0, dtype=np.float64).tolist()
+    return spread
+
+
+def place_aside(rng: np.random.Generator, aside: float) -> tuple[float, float]:
+    """A place (u, v) mm drawn evenly from a square of half this side around the middle."""
+    u, v = rng.uniform(-aside, aside, 2).tolist()
+    return u, v
+
+
+def try_corners(
+    model: OpticalModel, indenters: Iterable[Indenter], aside: float, depth: float
+) -> None:
+    """Place indenters at the corners of the square from which `place_aside` draws.
+
+    Raises:
+        ContactError: one is off the surface or deeper than the gel.
+    """
+    for indenter in indenters:
+        for u in (-aside, aside):
+            for v in (-aside, aside):
+                model.place(Contact(indenter, at=(u, v), depth=depth))
+
+
+@dataclass(frozen=True)
+class BallPress:
+    """A ball pressed near the middle of a sensor.
+
+    Attributes:
+        radius: mm, of the ball.
+        least, most: mm; the depth is drawn evenly in between.
+        aside: mm; the place is drawn evenly from a square of half this side around the middle.
+    """
+
+    radius: float = 3.0
+    least: float = 0.1
+    most: float = 1.0
+    aside: float = 1.0
+
+    def __post_init__(self) -> None:
+        if not (self.radius > 0 and 0 < self.least < self.most and self.aside >= 0):
+            raise TaskError(
+                f"a ball of {self.radius:g} mm and depths of {self.least:g} to {self.most:g} make "
+                "no sense",
+                hint="Give a radius above 0 mm, and depths above 0 mm, the smaller first",
+            )
+
+    def check(self, model: OpticalModel) -> None:
+        """Try the deepest press at the corners of the square.
+
+        Raises:
+            ContactError: one is off the surface or deeper than the gel.
+        """
+        try_corners(model, [Sphere(self.radius)], self.aside, self.most)
+
+    def ball(self, rng: np.random.Generator) -> Contact:
+        """A ball at a random place and depth."""
+        depth = float(rng.uniform(self.least, self.most))
+        return Contact(Sphere(self.radius), at=place_aside(rng, self.aside), depth=depth)

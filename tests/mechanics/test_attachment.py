@@ -1,0 +1,53 @@
+"""A gel that nothing holds is told before it is pressed."""
+
+import pytest
+
+from optisense.design import Part
+from optisense.design.parts import Role
+from optisense.errors import ContactError
+from optisense.geometry import Contact, Sphere, TriangleMesh
+from optisense.mechanics import is_attached, refuse_loose_gel
+from optisense.optics.ray_model import RayModel
+from optisense.sensors import load
+
+SENSORS = (
+    "gelsight-mini",
+    "gelsight-mini-cylindrical",
+    "gelsight-mini-spherical",
+    "gelbelt",
+    "gelsight360",
+    "gelsight-svelte",
+    "digit",
+)
+
+
+@pytest.mark.parametrize("name", SENSORS)
+def test_gels_of_real_sensors_are_held(name):
+    assert is_attached(load(name))
+
+
+def loose(gap):
+    """The Mini with nothing but a plate behind its gel, at a distance in mm."""
+    design = load("gelsight-mini")
+    for name in design.parts_of(Role.SUPPORT):
+        del design.parts[name], design.meshes[name]
+    low, high = design.meshes["gel"].bounds
+    plate = TriangleMesh.box((low[0], low[1], low[2] - gap - 1.0), (high[0], high[1], low[2] - gap))
+    design.parts["plate"] = Part(role=Role.SUPPORT, material="acrylic", mesh="meshes/plate.obj")
+    design.meshes["plate"] = plate
+    return design
+
+
+def test_a_plate_holds_a_gel_only_where_it_touches_it():
+    assert is_attached(loose(0.0))
+    assert not is_attached(loose(1.0))
+    with pytest.raises(ContactError, match=r"'gel'.* is attached to nothing"):
+        refuse_loose_gel(loose(1.0))
+
+
+def test_a_loose_gel_takes_a_conforming_contact_only():
+    model = RayModel(loose(1.0))
+    ball = Contact(Sphere(1.5), at=(0.0, 0.0), depth=0.5)
+    assert model.chief_rays((32, 24), [ball], "conforming").contact_mask.any()
+    with pytest.raises(ContactError, match="attached to nothing"):
+        model.pressed([ball])
