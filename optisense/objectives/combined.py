@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -11,13 +10,12 @@ from optisense.errors import ObjectiveError
 from optisense.near import suggestion
 from optisense.objectives import figures
 from optisense.objectives.expressions import Expression, ScoreTerm
-from optisense.objectives.registry import Objective, find, names
+from optisense.objectives.named import is_plain
+from optisense.objectives.registry import Objective, find
 from optisense.objectives.scoring import run_objective
 
 if TYPE_CHECKING:
     from optisense.objectives.evaluation import Evaluation
-
-_ARITHMETIC = re.compile(r"[-+*/().,'\"\s]")
 
 
 @dataclass(frozen=True)
@@ -181,40 +179,3 @@ def goal_of(wanted: str | Objective) -> Objective:
     if not found.lower_is_better:
         return found
     return combined(Expression.parse(f"-'{found.name}'"), {found.name: found})
-
-
-def is_plain(text: str) -> bool:
-    """Whether a text is the name of an objective, or of a Python file, and no expression."""
-    file = text.rpartition(":")[0] or text
-    return (
-        file.endswith(".py")
-        or _ARITHMETIC.search(text.strip()) is None
-        or text.strip().lower() in names()
-    )
-
-
-def named_in(texts: Iterable[str]) -> list[str]:
-    """The names of the objectives in names and expressions, each once; files as they are.
-
-    Raises:
-        ObjectiveError: an expression can't be read.
-    """
-    found: dict[str, None] = {}
-    for text in texts:
-        inner = (text,) if is_plain(text) else Expression.parse(text).objectives
-        found |= dict.fromkeys(inner)
-    return list(found)
-
-
-def are_rays_only(texts: Iterable[str]) -> bool:
-    """Whether all objectives trace chief rays only, as far as their names tell.
-
-    An objective in a user's file counts as one that renders: no file is run to find out.
-
-    Raises:
-        ObjectiveError: an expression can't be read, or an objective is unknown.
-    """
-    inner = named_in(texts)
-    return all(not name.endswith(".py") and ".py:" not in name for name in inner) and all(
-        find(name).rays_only for name in inner
-    )

@@ -32,7 +32,7 @@ LEAST_FOOTPRINTS = 100
 """Number of footprints that must lie on the surface: a mean over fewer says little of a camera."""
 
 HIGH_SHARE = 95.0
-"""Percentile of the anisotropy that is told beside its mean: one footprint in twenty is longer."""
+"""Percentile of the anisotropy reported beside its mean: one footprint in twenty is longer."""
 
 
 USUAL = (1.24, 1.01)

@@ -6,7 +6,7 @@ import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
 from functools import partial
-from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar, cast
+from typing import TYPE_CHECKING, Any, TypeVar, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +22,12 @@ from optisense.objectives.exposure import exposure_for
 from optisense.objectives.frames import frame_of, nearest_press
 from optisense.objectives.press import Press
 from optisense.objectives.settings import VIEW_ACROSS, Settings, size_for
+from optisense.objectives.unexposed import (
+    UnexposedPress,
+    are_apart,
+    box_around,
+    radiance_in,
+)
 from optisense.objectives.view import View, view_of
 from optisense.quality import SCORE_PHOTONS
 
@@ -36,10 +42,6 @@ ProgressCallback = Callable[[float, str], None]
 Reads = Callable[[Press], NDArray[np.float64]]
 """The pixels (h, w) of a press, not exposed, that objectives read: 1 one by one, less where a part
 of the camera samples will do."""
-
-
-GAP = 0.5
-"""mm that must be free between contacts which share an image."""
 
 
 class Evaluation:
@@ -237,7 +239,9 @@ class Evaluation:
         before = self.model.chief_rays(self.resolution).normals
         dark = np.broadcast_to(np.float32(0.0), before.shape)
         frames = [frame_of(contact, surface) for contact in contacts]
-        together = self.settings.together and self._are_apart([each["place"] for each in frames])
+        together = self.settings.together and are_apart(
+            [each["place"] for each in frames], self.settings.radius, self.settings.depth
+        )
         groups = [contacts] if together else [[contact] for contact in contacts]
         part = (1.0 - self._first_image) / len(groups)
 
@@ -304,10 +308,10 @@ class Evaluation:
         usual = usual_score(self.design, BUILT_IN[:1], self.settings)
         return self._once("first image", lambda: usual.share_of_first_image)
 
-    def _unexposed(self) -> list[_Unexposed]:
+    def _unexposed(self) -> list[UnexposedPress]:
         self.untouched  # noqa: B018  light is traced for it, which progress counts first
         return [
-            _Unexposed(press, image.contact_mask, _radiance(image, image.contact_mask))
+            UnexposedPress(press, image.contact_mask, radiance_in(image, image.contact_mask))
             for press, image in self.each_press()
         ]
 
@@ -364,7 +368,7 @@ class Evaluation:
         response = self._untouched_response(factor, noisy=True).copy()
         if touched.any():
             reach = camera.reach(touched.shape[1])
-            changed, needed = _around(touched, reach), _around(touched, 2 * reach)
+            changed, needed = box_around(touched, reach), box_around(touched, 2 * reach)
             part = untouched[needed].copy()
             part[touched[needed]] = radiance
             inner = tuple(
@@ -374,13 +378,6 @@ class Evaluation:
             window = PictureWindow.part(touched.shape, needed)
             response[changed] = camera.respond(part * exposure, window, seed)[inner]
         return response
-
-    def _are_apart(self, places: Sequence[NDArray[np.float64]]) -> bool:
-        radius, depth = self.settings.radius, self.settings.depth
-        width = 2.0 * np.sqrt(depth * (2.0 * radius - depth)) + GAP
-        points = np.array(places)
-        distances = np.linalg.norm(points[:, None] - points, axis=2)
-        return bool((distances + np.eye(len(points)) * 2 * width > width).all())
 
     def _render(
         self,
@@ -416,29 +413,3 @@ class Evaluation:
             skin=self.settings.skin,
         )
         return image
-
-
-class _Unexposed(NamedTuple):
-    """A press with the n pixels of (h, w) that contacts touch in its image, and the radiance (n, 3)
-    there."""
-
-    press: Press
-    touched: NDArray[np.bool_]
-    radiance: NDArray[np.float32]
-
-
-def _radiance(image: TactileImage, where: NDArray[np.bool_]) -> NDArray[np.float32]:
-    """(n, 3): `image.radiance` of the n pixels of a mask alone."""
-    total = np.zeros((np.count_nonzero(where), 3), dtype=np.float32)
-    for layer in image.layers.values():
-        total += layer[where]
-    return total
-
-
-def _around(mask: NDArray[np.bool_], reach: int) -> tuple[slice, slice]:
-    """Rows and columns of a mask's true pixels and of those within `reach` of them."""
-    rows, columns = (np.flatnonzero(mask.any(axis=axis)) for axis in (1, 0))
-    return (
-        slice(max(0, rows[0] - reach), rows[-1] + 1 + reach),
-        slice(max(0, columns[0] - reach), columns[-1] + 1 + reach),
-    )

@@ -6,11 +6,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from optisense.objectives.score import Score
-
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+
+    from optisense.objectives.score import Score
 
 DOT = "#1f6fb2"
 LINE = "#c0392b"
@@ -200,7 +200,7 @@ def draw_coverage(score: Score) -> Figure:
 
 
 def draw_sharpness(score: Score) -> Figure:
-    """The width of the finest line that is told apart at each pixel."""
+    """The width of the finest line that is resolved at each pixel."""
     title = f"mean over the skin {score.value:.3g} mm"
     return _map_and_histogram(
         score, score.arrays["detail"], "width of the finest line (mm)", "pixels (%)", title

@@ -11,6 +11,7 @@ from types import ModuleType
 from typing import Any
 
 from optisense.errors import ObjectiveError
+from optisense.untrusted_files import MOST_PROGRAM, read_bytes
 
 
 def run_file(path: Path) -> dict[str, Any]:
@@ -27,12 +28,7 @@ def run_file(path: Path) -> dict[str, Any]:
         raise ObjectiveError(f"there is no file '{path}'", hint="Give FILE.py:FUNCTION")
     whole = Path(os.path.realpath(path))
     name = f"optisense_user_{path.stem}_{hashlib.sha256(str(whole).encode()).hexdigest()[:8]}"
-    try:
-        source = whole.read_bytes()
-    except OSError as error:
-        raise ObjectiveError(
-            f"the file can't be read: {error.strerror}", where=str(path)
-        ) from error
+    source = read_bytes(whole, MOST_PROGRAM, ObjectiveError)
     module = ModuleType(name)
     module.__file__ = str(whole)
     sys.modules[name] = module

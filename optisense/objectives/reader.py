@@ -176,7 +176,7 @@ class _KnownPress:
 
     @classmethod
     def of(cls, press: Press) -> _KnownPress:
-        """What a press's images tell.
+        """What is measured in a press's images.
 
         Raises:
             ObjectiveError: the contact has too few pixels.

@@ -40,6 +40,9 @@ FURTHER = (
     "uniformity",
     "shadow",
     "power",
+    "draft",
+    "clearance",
+    "cage_roughness",
 )
 """Objectives of this package beside the paper's."""
 

@@ -1,4 +1,4 @@
-"""Scoring a sensor by objectives: what goes wrong with one is told, and the rest goes on."""
+"""Scoring a sensor by several objectives; an error in one does not stop the others."""
 
 from __future__ import annotations
 

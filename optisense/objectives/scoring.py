@@ -1,4 +1,4 @@
-"""Scoring a sensor by one objective: what goes wrong is told in the score."""
+"""Scoring a sensor by one objective; an error is recorded in the score."""
 
 from __future__ import annotations
 

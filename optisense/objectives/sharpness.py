@@ -41,7 +41,7 @@ USUAL = (0.27, 0.059)
     usual=USUAL,
 )
 def sharpness(evaluation: Evaluation) -> tuple[float, dict[str, Any], dict[str, Any]]:
-    """How many mm wide the finest lines on the skin are that the camera tells apart.
+    """The width in mm of the finest lines on the skin that the camera resolves.
 
     A line is at least as wide as the longer side of the footprint of a pixel of the camera, and
     wide enough for the lens's blur to leave a tenth of the contrast; squares of both add up. The

@@ -1,4 +1,4 @@
-"""AOAP and 2to3PW as smooth functions of chief rays, with their derivatives.
+"""Scores by chief rays as smooth functions of these, with their derivatives.
 
 The scores themselves jump when a ray begins or ceases to arrive. Here each ray has a weight, the
 area of the picture that it stands for, which changes smoothly when the boundary beside it moves
@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from optisense.objectives.aoap import COVERAGE_WEIGHT
+from optisense.objectives.distortion import MOST_ANISOTROPY
 from optisense.objectives.projection_warping import MOST_EVEN
 
 FloatArray = NDArray[np.float64]
@@ -57,16 +58,24 @@ def smooth_aoap(rays: Rays, *, coverage_weight: float = COVERAGE_WEIGHT) -> Slop
     of the surface's triangles that are seen.
     """
     count = rays.codes.size
+    seen = smooth_coverage(rays)
+    value = float((rays.cosine * rays.weight).sum() / count) + coverage_weight * seen.value
+    by_weight = rays.cosine / count + coverage_weight * seen.weight
+    assert seen.points is not None
+    return Slopes(value, rays.weight / count, by_weight, coverage_weight * seen.points)
+
+
+def smooth_coverage(rays: Rays) -> Slopes:
+    """The part of the surface's triangles that are seen, as the integral of their number for each
+    mm² over what is seen.
+    """
     triangles = _PixelTriangles(rays)
-    density = coverage_weight * triangles.mean_of_corners(rays.density)
-    value = float((rays.cosine * rays.weight).sum() / count)
-    value += float((density * triangles.weight * triangles.area).sum())
-    by_weight = rays.cosine / count + triangles.by_weight(density * triangles.area)
+    density = triangles.mean_of_corners(rays.density)
+    value = float((density * triangles.weight * triangles.area).sum())
     # What lies within the view is seen before and after, however the points on it move: only where
     # points at its border move does more come into view. Around all others these sums vanish.
-    moved = triangles.by_points(triangles.weight)
-    by_points = coverage_weight * rays.density[:, None] * moved
-    return Slopes(value, rays.weight / count, by_weight, by_points)
+    by_points = rays.density[:, None] * triangles.by_points(triangles.weight)
+    return Slopes(value, None, triangles.by_weight(density * triangles.area), by_points)
 
 
 def smooth_projection_warping(rays: Rays) -> Slopes:
@@ -90,9 +99,55 @@ def smooth_projection_warping(rays: Rays) -> Slopes:
     return Slopes(mean / spread, None, slopes, triangles.by_points(by_area))
 
 
+def smooth_distortion(rays: Rays) -> Slopes:
+    """The weighted geometric mean of the anisotropies of footprints between four neighbours."""
+    corners = _quads(rays.codes)
+    if not len(corners):
+        return Slopes(1.0, None, np.zeros_like(rays.weight), None)
+    top_left, top_right, low_left, low_right = (rays.points[corners[:, k]] for k in range(4))
+    across = 0.5 * (top_right - top_left + low_right - low_left)
+    along = 0.5 * (low_left - top_left + low_right - top_right)
+    a, b, c = ((u * v).sum(axis=1) for u, v in ((across, across), (across, along), (along, along)))
+    middle, half = 0.5 * (a + c), 0.5 * (a - c)
+    apart = np.hypot(half, b)
+    # The logarithm of the ratio of the roots of both eigenvalues of [[a, b], [b, c]]. Round
+    # footprints have no slope, and grazing ones the largest ratio that the score knows.
+    least = (1.0 - 2.0 / (1.0 + MOST_ANISOTROPY**2)) * middle
+    inner = np.minimum(apart, least)
+    ratio = 0.5 * np.log((middle + inner) / np.maximum(middle - inner, 1e-300))
+    count = np.bincount(corners.ravel(), minlength=len(rays.weight))
+    # Footprints that a ray has, as a part of the one that a pixel stands for.
+    share = 1.0 / np.maximum(count, 1)
+    weight = 1.0 + ((rays.weight - 1.0) * share)[corners].sum(axis=1)
+    total = max(float(weight.sum()), 1e-12)
+    mean = float((weight * ratio).sum()) / total
+    value = float(np.exp(mean))
+
+    free = (apart < least) & (apart > 1e-9 * middle)
+    square = np.where(free, middle**2 - apart**2, 1.0)
+    by_middle = np.where(free, -apart / square, 0.0)
+    by_apart = np.where(free, middle / square, 0.0)
+    length = np.where(free, apart, 1.0)
+    by_a = 0.5 * by_middle + by_apart * 0.5 * half / length
+    by_c = 0.5 * by_middle - by_apart * 0.5 * half / length
+    by_b = by_apart * b / length
+    scale = (value * weight / total)[:, None]
+    by_across = scale * (2.0 * by_a[:, None] * across + by_b[:, None] * along)
+    by_along = scale * (2.0 * by_c[:, None] * along + by_b[:, None] * across)
+    points = np.zeros_like(rays.points)
+    for corner, (right, down) in enumerate(((-1, -1), (1, -1), (-1, 1), (1, 1))):
+        np.add.at(points, corners[:, corner], 0.5 * (right * by_across + down * by_along))
+    weights = np.zeros_like(rays.weight)
+    for corner in range(4):
+        np.add.at(weights, corners[:, corner], value * (ratio - mean) / total)
+    return Slopes(value, None, weights * share, points)
+
+
 SMOOTH: dict[str, Callable[..., Slopes]] = {
     "aoap": smooth_aoap,
     "2to3pw": smooth_projection_warping,
+    "coverage": smooth_coverage,
+    "distortion": smooth_distortion,
 }
 """Smoothed objectives by name. Settings of the objective that count here are keyword arguments."""
 
@@ -141,6 +196,16 @@ class _PixelTriangles:
         for own in range(3):
             np.add.at(weights, self._corners[:, own], by_weight)
         return weights * self._share
+
+
+def _quads(codes: NDArray[np.uint32]) -> NDArray[np.int64]:
+    """(q, 4) numbers of arriving rays: four neighbours that arrive the same way, row by row."""
+    number = np.cumsum(codes.ravel() > 0).reshape(codes.shape) - 1
+    before, after = slice(None, -1), slice(1, None)
+    corners = [(before, before), (before, after), (after, before), (after, after)]
+    first = codes[:-1, :-1]
+    same = (first > 0) & np.logical_and.reduce([first == codes[each] for each in corners])
+    return np.stack([number[each][same] for each in corners], axis=1).astype(np.int64)
 
 
 def _same_way(codes: NDArray[np.uint32]) -> NDArray[np.int64]:

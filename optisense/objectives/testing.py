@@ -13,7 +13,7 @@ from __future__ import annotations
 import io
 import json
 import math
-from functools import cache
+from functools import cache, lru_cache
 from typing import TYPE_CHECKING, Any
 
 from optisense.objectives.evaluation import Evaluation
@@ -41,7 +41,7 @@ def gelsight_mini() -> OpticalModel:
     return OpticalModel(load("gelsight-mini"))
 
 
-@cache
+@lru_cache(maxsize=4)
 def evaluation(seed: int = 0) -> Evaluation:
     """Small images of it."""
     settings = Settings(resolution=PIXELS, ray_resolution=PIXELS, photons=PHOTONS, seed=seed)
@@ -72,7 +72,7 @@ ODD_CAMERAS = (
 """A spot of the skin, the skin as a spot, seen from far away, from behind, from inside the gel."""
 
 
-@cache
+@lru_cache(maxsize=len(ODD_CAMERAS))
 def odd_evaluation(path: str, value: float) -> Evaluation:
     """A GelSight Mini with one number of its camera changed."""
     from optisense.design import set_value

@@ -1,4 +1,4 @@
-"""How long a score usually takes, so that a time left can be told before any is measured."""
+"""How long a score usually takes, to estimate the time left before any score is measured."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 from optisense.design import SensorDesign
-from optisense.objectives.combined import are_rays_only, named_in
+from optisense.objectives.named import are_rays_only, named_in
 from optisense.objectives.settings import Settings, size_for
 from optisense.quality import SCORE_PHOTONS, photons_of
 from optisense.usual_times import LOADING, UsualTimes

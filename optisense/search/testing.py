@@ -49,7 +49,7 @@ LANDSCAPES: dict[str, Landscape] = {
 """Scores that methods have stumbled over."""
 
 MANY = 50
-"""Spaces of more parameters are searched by one score only: others tell nothing new."""
+"""Spaces of more parameters are searched by one score only: others would test nothing new."""
 
 
 @cache
@@ -73,13 +73,17 @@ def general_spaces() -> dict[str, dict[str, object]]:
     others = [f"camera.position.{axis}" for axis in "xyz"]
     others += [f"coating.{what}.{channel}" for what in ("eta", "k") for channel in "rgb"]
     others += ["camera.fov"]
-    hundred = {path: get_value(design, path) for path in [*lights, *others]}
+    # The lights stand beside the light guide, and none may be moved into it.
+    hundred = {
+        path: (get_value(design, path), 0.1 if ".position." in path else 0.4)
+        for path in [*lights, *others]
+    }
     colour = ["red", "green", "blue"]
     return {
         "one number": {"camera.fov": (40.0, 60.0, 7)},
         "two numbers": {"coating.specularity": (0.0, 1.0, 3), "camera.position.x": (-1.0, 3.0, 5)},
         "100 numbers": {
-            path: (float(now) - 0.4, float(now) + 0.4) for path, now in hundred.items()
+            path: (float(now) - half, float(now) + half) for path, (now, half) in hundred.items()
         },
         "one whole number": {"camera.resolution[0]": (318, 322)},
         "one choice": {"lights.red.colour": colour},

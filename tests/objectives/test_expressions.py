@@ -11,15 +11,9 @@ import pytest
 from optisense import evaluate
 from optisense.errors import ObjectiveError
 from optisense.objectives import Objective, find
-from optisense.objectives.combined import (
-    are_rays_only,
-    combined,
-    goal_of,
-    named_in,
-    objective_of,
-    resolve,
-)
+from optisense.objectives.combined import combined, goal_of, objective_of, resolve
 from optisense.objectives.expressions import MOST_CHARACTERS, Expression, ScoreTerm
+from optisense.objectives.named import are_rays_only, named_in
 from optisense.objectives.testing import evaluation
 from optisense.objectives.usual_score import usual_score
 

@@ -190,10 +190,11 @@ def test_a_wrong_value_in_the_store_is_told(
         "drop table trials",
         "drop table facts",
         "update fresh_scores set scores = x'00'",
+        "update fresh_scores set conditions = '[1]'",
     ],
 )
 def test_any_other_damage_is_told(statement: str, study: Path, tmp_path: Path) -> None:
-    spoilt(study, "insert into fresh_scores values (1, 7, ?, null)", bytes(8))
+    spoilt(study, "insert into fresh_scores values (1, 7, ?, null, null)", bytes(8))
     spoilt(study, statement)
     assert optisense("apply", study, "--out", tmp_path / "better")[0] == 2
 

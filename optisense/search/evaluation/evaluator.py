@@ -6,7 +6,7 @@ import math
 import os
 import re
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from typing import Any, Protocol
 
 import numpy as np
@@ -29,6 +29,7 @@ from optisense.search.evaluation.views import SameMirrors, least_skin, may_chang
 from optisense.search.space.buildable import (
     BentPartsRest,
     LightsRest,
+    LightsStayOut,
     PartsRest,
     SolidsStay,
     StaysInSize,
@@ -49,6 +50,9 @@ Goal = str | Objective | DesignFunction
 RELIT = re.compile(r"^lights\..*\.(flux|colour)(\W|$)")
 """Parameters that change how light of a group counts, and no ray."""
 
+
+PLACED = re.compile(r"^lights\..*\b(shift|turn|position)\b")
+"""Parameters that move lights."""
 
 WATCHES = ("coverage", "distortion")
 """Objectives by rays that are scored with every trial where the view may change, so that a search
@@ -210,15 +214,28 @@ class DesignEvaluator:
         """An outcome without scores; `began` by `time.perf_counter`."""
         return Outcome.of_failure(self.names, reason, time.perf_counter() - began)
 
-    def objective_scores(self, design: SensorDesign, seed: int) -> Mapping[str, Score]:
-        """Scores by the objectives, plain functions left out; a quicker way may stand in here."""
+    def objective_scores(
+        self, design: SensorDesign, seed: int, only: Collection[str] | None = None
+    ) -> Mapping[str, Score]:
+        """Scores by the objectives, plain functions left out; a quicker way may stand in here.
+
+        Args:
+            design: what is scored.
+            seed: of the objectives.
+            only: names of those that are wanted; all if None.
+        """
         settings = dict(self.settings)
         if self._asks_view and "least_skin" not in settings:
             if self._least_skin is None:
                 self._least_skin = least_skin(self.space.design, self.keeper)
             settings["least_skin"] = self._least_skin
         model = self.keeper.model(design)
-        return evaluate(model, self._ready(), progress=self._progress, seed=seed, **settings)
+        wanted = self._ready()
+        if only is not None:
+            wanted = [each for each in wanted if each.name in only]
+            shared, own = split_settings(settings, self._ready())
+            settings = {**shared, **{k: v for each in wanted for k, v in own[each.name].items()}}
+        return evaluate(model, wanted, progress=self._progress, seed=seed, **settings)
 
     def _score(
         self, design: SensorDesign, seed: int
@@ -259,6 +276,8 @@ class DesignEvaluator:
             self.kept.append(BentPartsRest(design))
         if apart and (moved or bends):
             self.kept.append(StaysInSize(design))
+        if apart and (moved or bends or any(PLACED.search(name) for name in names)):
+            self.kept.append(LightsStayOut(design))
         if any(name.startswith("materials.") for name in names):
             self.kept.append(SolidsStay(design))
         if self.renders and may_change_view(names) and design.parts_of(Role.MIRROR):

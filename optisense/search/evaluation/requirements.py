@@ -17,8 +17,9 @@ from functools import lru_cache
 
 from optisense.errors import ObjectiveError, SearchError
 from optisense.near import suggestion
-from optisense.objectives.combined import named_in, objective_of
+from optisense.objectives.combined import objective_of
 from optisense.objectives.expressions import Expression, marked
+from optisense.objectives.named import named_in
 from optisense.objectives.registry import Objective, names
 
 ROUNDING = 1e-9
@@ -106,16 +107,34 @@ def requirements_of(texts: Iterable[str]) -> list[Requirement]:
     """Several conditions as they are written, each once.
 
     Raises:
-        SearchError: one is no condition, names no objective, or contradicts another.
+        SearchError: one is no condition, names no objective, contradicts another, or can be met by
+            nothing.
     """
     found = list(dict.fromkeys(Requirement.parse(text) for text in texts))
     for each in found:
-        each.objective()
+        _refuse_impossible(each)
     for low in (each for each in found if each.at_least):
         for high in (each for each in found if not each.at_least):
             if low.quantity == high.quantity and low.limit > high.limit:
                 raise SearchError(f"nothing can meet both '{low}' and '{high}'")
     return found
+
+
+def _refuse_impossible(wanted: Requirement) -> None:
+    """Refuse a limit beyond the range of what it limits, as far as no setting moves that range.
+
+    Raises:
+        SearchError: nothing can meet the condition, or it names no objective.
+    """
+    measured = wanted.objective()
+    if callable(measured.range):
+        return
+    low, high = measured.bounds()
+    if (wanted.limit > high) if wanted.at_least else (wanted.limit < low):
+        raise SearchError(
+            f"nothing can meet '{wanted}': {wanted.quantity} is {low:g} to {high:g}",
+            hint="Give a limit within this range",
+        )
 
 
 @lru_cache(maxsize=256)

@@ -4,15 +4,18 @@ from __future__ import annotations
 
 import math
 import time
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from optisense.errors import OptiSenseError
 from optisense.objectives.evaluation import ProgressCallback
+from optisense.objectives.registry import CONDITIONS
 from optisense.objectives.usual_score import UsualTrials
 from optisense.search.evaluation.evaluator import DesignEvaluator
 from optisense.search.evaluation.outcome import Outcome
+from optisense.search.evaluation.requirements import Requirement
 from optisense.search.space.manufacturing import (
     SAMPLES,
     BoundManufacturingErrors,
@@ -28,6 +31,8 @@ LOW, MIDDLE, HIGH = 0.1, 0.5, 0.9
 
 class RobustEvaluator:
     """Scores a point by the tenth percentile (P10) over sensors with manufacturing errors.
+
+    A condition is met where nine of ten such sensors meet it.
 
     All points are tried with the same errors, so that they are compared fairly.
     """
@@ -87,6 +92,10 @@ class RobustEvaluator:
                 "p90": _or_none(high),
                 "samples": [_or_none(value) for value in values],
             }
+        if self.usual.requirements:
+            parts[CONDITIONS] = {
+                str(each): _or_none(_reached(each, found)) for each in self.usual.requirements
+            }
         failure = None
         if any(math.isnan(value) for value in scores.values()):
             reasons = [outcome.failure for outcome in found if outcome.failure]
@@ -99,6 +108,15 @@ class RobustEvaluator:
             shares = latin_hypercube(self.samples, bound.size, self.seed)
             self._drawn[bound.size] = bound.errors(shares)
         return self._drawn[bound.size]
+
+
+def _reached(wanted: Requirement, found: Sequence[Outcome]) -> float:
+    """What nine of ten manufactured sensors reach of a quantity that a condition limits: its tenth
+    percentile where it may not be too low, else its ninetieth; NaN where too many have none.
+    """
+    measured = [outcome.conditions.get(str(wanted)) for outcome in found]
+    values = np.array([math.nan if value is None else value for value in measured])
+    return percentile(values, LOW) if wanted.at_least else -percentile(-values, LOW)
 
 
 def percentile(values: ArrayLike, share: float) -> float:

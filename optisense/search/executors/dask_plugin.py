@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from distributed import WorkerPlugin
 
-from optisense.search.executors.remote import forget, remember
+from optisense.search.executors.remote_worker import forget, remember
 
 if TYPE_CHECKING:
     from distributed import Worker

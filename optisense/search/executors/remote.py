@@ -3,11 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-import os
-import pickle
 import re
-import socket
-import threading
 from concurrent.futures import Executor, Future
 from typing import Any
 
@@ -18,6 +14,7 @@ from optisense.errors import SetupError
 from optisense.search.evaluation.evaluator import Evaluator
 from optisense.search.evaluation.outcome import Outcome
 from optisense.search.executors.base import Runner, packed
+from optisense.search.executors.remote_worker import work_out
 
 CONNECT_SECONDS = 10.0
 """Seconds that a Dask scheduler may take to answer; one in the same network answers within a
@@ -35,11 +32,6 @@ HOW_TO_START = (
     "Start one with `dask scheduler` on one machine and `dask worker ADDRESS --nthreads 1` on each "
     "that shall work"
 )
-
-_evaluators: dict[str, Evaluator] = {}
-_blobs: dict[str, bytes] = {}
-_one_at_a_time = threading.Lock()
-"""An evaluator keeps one model and serves one trial at a time, whatever threads a worker has."""
 
 
 class ExecutorRunner(Runner):
@@ -110,42 +102,6 @@ class DaskRunner(Runner):
         self._client.close(timeout=CONNECT_SECONDS)
 
 
-def work_out(key: str, blob: bytes | None, vector: NDArray[np.float64], seed: int) -> Outcome:
-    """Work out a trial in whatever process this is called.
-
-    Args:
-        key: of the evaluator.
-        blob: the evaluator, or None where it came before.
-        vector, seed: the trial.
-    """
-    with _one_at_a_time:
-        if key not in _evaluators:
-            known = blob if blob is not None else _blobs.get(key)
-            if known is None:
-                raise SetupError("a worker has not been given what to work out")
-            evaluator = pickle.loads(known)
-            if getattr(evaluator, "renders", True):
-                from optisense.optics.backend.threads import use_threads
-
-                use_threads(1)
-            _evaluators.clear()
-            _evaluators[key] = evaluator
-        outcome = _evaluators[key](vector, seed)
-    object.__setattr__(outcome, "worker", _own_name())
-    return outcome
-
-
-def remember(key: str, blob: bytes) -> None:
-    """Keep an evaluator for `work_out` in this process."""
-    _blobs[key] = blob
-
-
-def forget(key: str) -> None:
-    """Drop an evaluator again."""
-    _blobs.pop(key, None)
-    _evaluators.pop(key, None)
-
-
 def _connect(address: str) -> Any:
     """A client of the scheduler there.
 
@@ -194,8 +150,3 @@ def _settle(done: Future[Outcome], future: Future[Outcome]) -> None:
         future.set_result(Outcome({}, "its workers died again and again"))
     else:
         future.set_exception(error)
-
-
-def _own_name() -> str:
-    """The machine and the process that work a trial out."""
-    return f"{socket.gethostname()}:{os.getpid()}"

@@ -1,4 +1,4 @@
-"""Ways to search, by name: each proposes points and is told their scores."""
+"""Search methods by name: each proposes points and receives their scores."""
 
 from optisense.search.methods.base import Method, Problem, values_to_maximise
 from optisense.search.methods.registry import find, make, names, register

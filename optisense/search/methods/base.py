@@ -1,4 +1,4 @@
-"""What a search method is: it proposes points generation by generation and is told the scores.
+"""The base class of search methods, which propose points and receive their scores, by generation.
 
 A method must be a function of its problem, its options and what it was told, and of nothing else:
 a study that was killed is resumed by telling a new instance again what the old one knew. So no

@@ -14,18 +14,17 @@ import time
 import zlib
 from collections.abc import Iterator, Sequence
 from enum import Enum
-from inspect import signature
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from optisense.design import SensorDesign
-from optisense.errors import NoDerivativeError, OptiSenseError
-from optisense.objectives.smooth import SMOOTH, Slopes
+from optisense.errors import NoDerivativeError, ObjectiveError, OptiSenseError
 from optisense.search.evaluation.evaluator import DesignEvaluator
 from optisense.search.evaluation.outcome import Outcome
 from optisense.search.methods.base import FloatArray
 from optisense.search.methods.jacobian import Jacobian, holds, jacobian
+from optisense.search.methods.smooth_scores import SmoothScore
 from optisense.search.space.search_space import BoundSpace
 
 if TYPE_CHECKING:
@@ -57,6 +56,9 @@ than the search, and the differences that it then used were those of kinks and l
 SMOOTHED = "smoothed"
 """Key of the smoothed score among an outcome's parts."""
 
+LIMITED = "smoothed_limited"
+"""Key among an outcome's parts of the smoothed values of what conditions limit, in their order."""
+
 GRADIENT_BY = "gradient_by"
 """Key of where the gradient comes from among an outcome's parts: `RAYS` or `DIFFERENCES`."""
 
@@ -65,6 +67,7 @@ GRADIENT_HOLDS = "gradient_holds"
 two steps. Where it does not, the score has no derivative at this scale."""
 
 RAYS, DIFFERENCES = "derivatives of rays", "differences of scores"
+LAYERS = "differences of scores of relit pictures"
 
 
 class Agreement(Enum):
@@ -76,12 +79,18 @@ class Agreement(Enum):
 
 
 class CheckedSlope(NamedTuple):
-    """The smoothed score at a point, its gradient (n,) by the coordinates, where that comes from
-    (`RAYS` or `DIFFERENCES`), and whether it holds; None where that was not looked at.
+    """What is known around a point.
+
+    Attributes:
+        values: (1 + m,) the smoothed score, and the smoothed value of what each condition limits;
+            the exact ones where there is no smooth form.
+        gradients: (1 + m, n) of these by the coordinates.
+        source: where they come from: `RAYS`, `DIFFERENCES` or `LAYERS`.
+        holds: whether the score's one holds; None where that was not looked at.
     """
 
-    value: float
-    gradient: FloatArray
+    values: FloatArray
+    gradients: FloatArray
     source: str
     holds: bool | None
 
@@ -97,15 +106,35 @@ class _Check(NamedTuple):
 
 
 class SlopeEvaluator:
-    """Scores a point as usual, and adds the smoothed score and its gradient."""
+    """Scores a point as usual, and adds the smoothed score and its gradient, and those of what the
+    conditions of the search limit.
+    """
 
     def __init__(
-        self, usual: DesignEvaluator, parts: list[str], objective: str, resolution: int
+        self,
+        usual: DesignEvaluator,
+        parts: list[str],
+        objective: str,
+        resolution: int,
+        layers: bool = False,
     ) -> None:
+        """Nothing is traced yet.
+
+        Args:
+            usual: scores points.
+            parts: that points move.
+            objective: which score is climbed.
+            resolution: rays across the image.
+            layers: `usual` relights layers, so that all gradients are differences of its scores.
+        """
         self.usual = usual
         self.parts = parts
         self.objective = objective
         self.resolution = resolution
+        self.layers = layers
+        limited = [each.objective().name for each in usual.requirements]
+        self.wanted = [objective, *limited]
+        self._smooth = [None if layers else SmoothScore.of(name) for name in self.wanted]
         self._jacobian: Jacobian | None = None
         self._contradicted: bool | None = None
 
@@ -120,51 +149,66 @@ class SlopeEvaluator:
         except OptiSenseError as error:
             return self.usual.failed(str(error), began)
         parts = dict(outcome.parts)
-        facts = {SMOOTHED: found.value, GRADIENT_BY: found.source}
+        facts: dict[str, Any] = {SMOOTHED: float(found.values[0]), GRADIENT_BY: found.source}
+        if len(found.values) > 1:
+            facts[LIMITED] = found.values[1:].tolist()
         if found.holds is not None:
             facts[GRADIENT_HOLDS] = found.holds
         parts[self.objective] = {**parts.get(self.objective, {}), **facts}
         seconds = outcome.seconds + time.perf_counter() - began
-        return Outcome(outcome.scores, None, parts, seconds, found.gradient)
+        return Outcome(outcome.scores, None, parts, seconds, found.gradients.ravel())
+
+    def usual_trials(self) -> None:
+        """Nobody knows what gradients take before the first one was made."""
 
     def checked_slope(self, vector: FloatArray, seed: int) -> CheckedSlope:
         """The smoothed score at a point (n,), and a gradient that has been compared with the score.
 
         Derivatives of rays are used unless steady differences of the score contradict them: where
         the score itself is unsteady, those of the smoothed score are as good as any, and cost less.
-        Where none contradicts them at the start, they are trusted everywhere.
+        Where none contradicts them at the start, they are trusted everywhere. What conditions limit
+        is differentiated in the same way, without a check.
 
         Raises:
             OptiSenseError: the design can't be built, or no ray arrives.
         """
+        if self.layers:
+            gradients = self._all_differences(vector, seed, self.wanted)
+            return CheckedSlope(self._values(vector, seed), gradients, LAYERS, None)
         if self.usual.space.size > FEW:
             try:
                 return self._by_rays(vector, seed)
             except (NoDerivativeError, _ContradictedError):
                 pass
-        gradient = self.differences(vector, seed)
-        steady = self.steady(vector, gradient, seed)
-        return CheckedSlope(self._smoothed(vector), gradient, DIFFERENCES, steady)
+        gradients = self._all_differences(vector, seed, self.wanted)
+        steady = self.steady(vector, gradients[0], seed)
+        return CheckedSlope(self._values(vector, seed), gradients, DIFFERENCES, steady)
 
     def _by_rays(self, vector: FloatArray, seed: int) -> CheckedSlope:
-        """The smoothed score at a point (n,) and its gradient by derivatives of rays.
+        """The smoothed score at a point (n,) and its gradient by derivatives of rays; what has no
+        smooth form by differences.
 
         Raises:
             NoDerivativeError: a part moves by which rays have no derivative.
             _ContradictedError: differences of the true score contradict the gradient.
             OptiSenseError: the design can't be built, or no ray arrives.
         """
-        slopes, gradient = self.slope(vector)
+        values, gradients = self._slopes(vector)
         holds = None
         at_start = np.array_equal(vector, self.usual.space.start)
         if at_start or self._contradicted_at_start(seed):
-            found = self.agreement(vector, gradient, seed)
+            found = self.agreement(vector, gradients[0], seed)
             if at_start:
                 self._contradicted = found is Agreement.DIFFERS
             if found is Agreement.DIFFERS:
                 raise _ContradictedError
             holds = found is Agreement.HOLDS
-        return CheckedSlope(slopes.value, gradient, RAYS, holds)
+        rough = [k for k, smooth in enumerate(self._smooth) if smooth is None]
+        if rough:
+            names = [self.wanted[k] for k in rough]
+            gradients[rough] = self._all_differences(vector, seed, names)
+            values[rough] = self._exact(self.usual.space.apply(vector), seed, names)
+        return CheckedSlope(values, gradients, RAYS, holds)
 
     def _contradicted_at_start(self, seed: int) -> bool:
         """Whether differences contradict derivatives of rays at the start; looked at once."""
@@ -178,18 +222,26 @@ class SlopeEvaluator:
                 self._contradicted = self.agreement(start, gradient, seed) is Agreement.DIFFERS
         return self._contradicted
 
-    def slope(self, vector: FloatArray) -> tuple[Slopes, FloatArray]:
+    def slope(self, vector: FloatArray) -> tuple[float, FloatArray]:
         """The smoothed score at a point (n,), and its gradient (n,) by derivatives of rays.
 
         Raises:
             NoDerivativeError: a part moves by which rays have no derivative.
             OptiSenseError: the design can't be built, or no ray arrives.
         """
+        values, gradients = self._slopes(vector)
+        return float(values[0]), gradients[0]
+
+    def _slopes(self, vector: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """The smoothed values (1 + m,) at a point, and their gradients (1 + m, n) by derivatives of
+        rays; NaN where there is no smooth form.
+
+        Raises:
+            NoDerivativeError, OptiSenseError: as of `slope`.
+        """
         space = self.usual.space
         design = space.apply(vector)
         rays = self._rays(design, self.parts)
-        slopes = SMOOTH[self.objective](rays, **self._settings())
-        back = rays.pull_back(slopes.cosine, slopes.weight, slopes.points)
         # The Jacobian of the start serves all points where shapes move linearly. It may not be
         # that of whichever point came first: a study that is resumed would differ in rounding.
         if self._jacobian is None:
@@ -197,10 +249,18 @@ class SlopeEvaluator:
         moves = self._jacobian
         if not holds(moves, space, design, vector):
             moves = jacobian(space, np.array(vector, dtype=np.float64), self.parts)
-        gradient = moves.camera @ back.camera
-        for name, slope in moves.parts.items():
-            gradient = gradient + np.tensordot(slope, back.parts[name], axes=2)
-        return slopes, gradient
+        values = np.full(len(self.wanted), np.nan)
+        gradients = np.full((len(self.wanted), space.size), np.nan)
+        for number, smooth in enumerate(self._smooth):
+            if smooth is None:
+                continue
+            slopes = smooth.slopes(rays, self.usual.settings)
+            back = rays.pull_back(slopes.cosine, slopes.weight, slopes.points)
+            gradient = moves.camera @ back.camera
+            for name, slope in moves.parts.items():
+                gradient = gradient + np.tensordot(slope, back.parts[name], axes=2)
+            values[number], gradients[number] = slopes.value, gradient
+        return values, gradients
 
     def agreement(self, vector: FloatArray, gradient: FloatArray, seed: int) -> Agreement:
         """How derivatives (n,) compare with central differences of the true score over `STEP` and
@@ -253,19 +313,30 @@ class SlopeEvaluator:
         """(n,) gradient of the true score at a point (n,) by central differences over `STEP`; 0
         for coordinates by which there is no score on one of the sides.
         """
+        return self._all_differences(vector, seed, self.wanted[:1])[0]
+
+    def _all_differences(self, vector: FloatArray, seed: int, names: Sequence[str]) -> FloatArray:
+        """(k, n) the same of several objectives."""
         space = self.usual.space
-        gradient = np.zeros(space.size)
+        gradients = np.zeros((len(names), space.size))
         for number, span in enumerate(space.upper - space.lower):
             way = np.zeros(space.size)
             way[number] = span
-            found = self._difference(vector, way, STEP, seed)
-            gradient[number] = 0.0 if found is None else found / span
-        return gradient
+            found = self._changes(vector, way, STEP, seed, names)
+            gradients[:, number] = 0.0 if found is None else found / span
+        return gradients
 
     def _difference(
         self, vector: FloatArray, way: FloatArray, step: float, seed: int
     ) -> float | None:
-        """How the true score changes along `way` (n,), for a whole one, over `step` of it to both
+        """How the true score changes along `way`; see `_changes`."""
+        found = self._changes(vector, way, step, seed, self.wanted[:1])
+        return None if found is None else float(found[0])
+
+    def _changes(
+        self, vector: FloatArray, way: FloatArray, step: float, seed: int, names: Sequence[str]
+    ) -> FloatArray | None:
+        """(k,) how objectives change along `way` (n,), for a whole one, over `step` of it to both
         sides, or as far as the bounds allow; None if that is less than half of a step in all, or
         if there is no score on one of the sides.
         """
@@ -277,27 +348,42 @@ class SlopeEvaluator:
         for side in (room[0], -room[1]):
             point = np.clip(vector + side * way, space.lower, space.upper)
             try:
-                score = self.usual.objective_scores(space.apply(point), seed)[self.objective]
+                found.append(self._exact(space.apply(point), seed, names))
             except OptiSenseError:
                 return None
-            if score.failure is not None:
-                return None
-            found.append(score.value)
-        return (found[0] - found[1]) / sum(room)
+        return np.asarray((found[0] - found[1]) / sum(room))
 
-    def _smoothed(self, vector: FloatArray) -> float:
-        rays = self._rays(self.usual.space.apply(vector), ())
-        return SMOOTH[self.objective](rays, **self._settings()).value
+    def _exact(self, design: SensorDesign, seed: int, names: Sequence[str]) -> FloatArray:
+        """(k,) the values of objectives.
+
+        Raises:
+            OptiSenseError: the design can't be built, or has no such value.
+        """
+        scores = self.usual.objective_scores(design, seed, names)
+        for name in names:
+            failure = scores[name].failure
+            if failure is not None:
+                raise ObjectiveError(failure)
+        return np.array([scores[name].value for name in names])
+
+    def _values(self, vector: FloatArray, seed: int) -> FloatArray:
+        """(1 + m,) smoothed values at a point; exact ones where there is no smooth form."""
+        design = self.usual.space.apply(vector)
+        values = np.full(len(self.wanted), np.nan)
+        if any(smooth is not None for smooth in self._smooth):
+            rays = self._rays(design, ())
+            for number, smooth in enumerate(self._smooth):
+                if smooth is not None:
+                    values[number] = smooth.slopes(rays, self.usual.settings).value
+        rough = [k for k, smooth in enumerate(self._smooth) if smooth is None]
+        if rough:
+            values[rough] = self._exact(design, seed, [self.wanted[k] for k in rough])
+        return values
 
     def _rays(self, design: SensorDesign, moving: Sequence[str]) -> DifferentiableRays:
         width, height = design.camera.resolution
         size = self.resolution, max(1, round(self.resolution * height / width))
         return self.usual.keeper.model(design).differentiable_rays(moving, size)
-
-    def _settings(self) -> dict[str, Any]:
-        """The objective's own settings that its smoothed form knows too."""
-        known = signature(SMOOTH[self.objective]).parameters
-        return {name: value for name, value in self.usual.settings.items() if name in known}
 
     def __getstate__(self) -> dict[str, object]:
         return {**self.__dict__, "_jacobian": None}

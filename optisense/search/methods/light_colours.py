@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 import re
 from collections import OrderedDict
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -91,7 +91,9 @@ class RelitEvaluator(DesignEvaluator):
         )
         self._lit: OrderedDict[int, _Lit] = OrderedDict()
 
-    def objective_scores(self, design: SensorDesign, seed: int) -> Mapping[str, Score]:
+    def objective_scores(
+        self, design: SensorDesign, seed: int, only: Collection[str] | None = None
+    ) -> Mapping[str, Score]:
         """See `DesignEvaluator.objective_scores`."""
         if seed not in self._lit:
             while len(self._lit) >= KEPT_SEEDS:
@@ -99,7 +101,7 @@ class RelitEvaluator(DesignEvaluator):
             model = self.keeper.model(self.space.prepared)
             self._lit[seed] = _Lit(model, self._ready(), self.settings, seed, self._progress)
         self._lit.move_to_end(seed)
-        return self._lit[seed].scores(design)
+        return self._lit[seed].scores(design, only)
 
     def usual_trials(self) -> UsualTrials | None:
         """See `DesignEvaluator.usual_trials`; a trial renders nothing, and designs share the light
@@ -132,11 +134,13 @@ class _Lit:
         model.forget_light()  # the layers hold all that is needed of it
         self._objectives = objectives
 
-    def scores(self, design: SensorDesign) -> dict[str, Score]:
-        """One score for each objective."""
+    def scores(self, design: SensorDesign, only: Collection[str] | None = None) -> dict[str, Score]:
+        """One score for each objective, or for each of those that are wanted."""
         cut, whole = (self._relighting.lit(design, whole=each) for each in (False, True))
         found = {}
         for each in self._objectives:
+            if only is not None and each.name not in only:
+                continue
             if _reads_contacts_only(each):
                 score = run_objective(each, cut, self._own[each.name])
                 found[each.name] = _without_details(score)
@@ -158,8 +162,10 @@ def _without_details(score: Score) -> Score:
     """A score with its main numbers only, because thousands of scores are stored."""
     if score.failure is not None:
         return score
-    parts = {name: score.parts[name] for name in score.shown}
-    parts["places"] = [place["score"] for place in score.parts["places"]]
+    parts: dict[str, Any] = {name: score.parts[name] for name in score.shown}
+    places = [place.get("score", place.get("error")) for place in score.parts.get("places", ())]
+    if places:
+        parts["places"] = places
     return replace(score, parts=parts, arrays={})
 
 

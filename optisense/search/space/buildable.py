@@ -16,6 +16,7 @@ from optisense.design.cage_checks import contact_problems
 from optisense.design.material_checks import is_gas
 from optisense.geometry import TriangleMesh
 from optisense.geometry.coincidence import find_coincident
+from optisense.geometry.containment import inside
 from optisense.geometry.meeting import CONTACT, near_surface
 from optisense.geometry.surface import closest_points
 from optisense.search.space.constraints import same_shape
@@ -36,8 +37,9 @@ PLASTIC = (0.7548776662466927, 0.5698402909980532)
 evenly over a square (Roberts, "The unreasonable effectiveness of quasirandom sequences", 2018)."""
 
 LIGHT_SEAT = 0.1
-"""mm: a light that is no farther from an opaque part sits on it. Lights of the built-in sensors are
-0.01 mm off their boards, and 0.2 mm or more off the transparent parts into which they shine."""
+"""mm: a light that is no farther from an opaque part sits on it, and one that is no deeper in a
+part lies against its face. Lights of the built-in sensors are 0.01 mm off their boards, and 0.2 mm
+or more off the transparent parts into which they shine."""
 
 
 REACH_OUT = 0.25
@@ -180,6 +182,47 @@ class LightsRest:
                         f"that the search starts from, and here it is {off:.2g} mm off"
                     )
         return None
+
+
+class LightsStayOut:
+    """No light may come to be inside of a part in which it is not at the start.
+
+    A light in the acrylic of a tray is brighter than one in front of it, but there is no room for
+    an LED. Lights that are cast into a part from the beginning, as those of GelSight360, are left
+    alone.
+    """
+
+    def __init__(self, design: SensorDesign) -> None:
+        """Look at the design that the search starts from."""
+        self._always = self._within(design)
+
+    def __call__(self, design: SensorDesign) -> str | None:
+        """Which light is inside of which part, or None."""
+        for group, index, part in sorted(self._within(design) - self._always):
+            place = np.array(design.lights[group].lights[index].position)
+            mesh = design.deformed_meshes()[part]
+            deep = float(np.linalg.norm(closest_points(mesh, place) - place, axis=1).min())
+            if deep > LIGHT_SEAT:
+                return (
+                    f"light {index} of group '{group}' is {deep:.2g} mm inside part '{part}', "
+                    "where no light can be, and is outside of it in the design that the search "
+                    "starts from"
+                )
+        return None
+
+    def _within(self, design: SensorDesign) -> set[tuple[str, int, str]]:
+        """Group, number and part of lights that are inside of a closed part."""
+        found = set()
+        meshes = design.deformed_meshes()
+        for part, mesh in meshes.items():
+            if design.parts[part].role is Role.INDENTER or not mesh.is_closed:
+                continue
+            for group, lights in design.lights.items():
+                places = np.array([light.position for light in lights.lights])
+                if len(places):
+                    within = np.flatnonzero(inside(places, mesh))
+                    found |= {(group, int(index), part) for index in within}
+        return found
 
 
 class BentPartsRest:

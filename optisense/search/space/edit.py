@@ -59,10 +59,8 @@ class Edit:
 def _rebuilt(value: Any, node: Node, values: Sequence[Any]) -> Any:
     """A copy of the containers on the way; everything else is shared."""
     if isinstance(value, BaseModel):
-        held = value.__dict__
-        return value.model_copy(
-            update={str(step): _below(held[str(step)], node[step], values) for step in node}
-        )
+        update = {str(step): _below(getattr(value, str(step)), node[step], values) for step in node}
+        return value.model_copy(update=update)
     if isinstance(value, dict):
         return {**value, **{step: _below(value[step], node[step], values) for step in node}}
     items = list(value)

@@ -16,12 +16,12 @@ from __future__ import annotations
 import re
 from typing import Any
 
-import yaml
-
+from optisense.design.yaml_reader import parse_yaml
 from optisense.errors import SearchError
 from optisense.near import suggestion
 from optisense.search.space.manufacturing import ManufacturingErrors, ToleranceDistribution
 from optisense.search.space.parameters import Around, CagePoints, Choice, Continuous, Specification
+from optisense.text import brief
 
 EXAMPLE = "Write PATH=LOW:HIGH, such as coating.specularity=0:1, or PATH=NAME,NAME"
 OPTIONS = ("symmetry", "axes", "points")
@@ -127,11 +127,12 @@ def _indices(text: str) -> tuple[int, ...]:
 
 def _options(text: str) -> list[Any]:
     try:
-        options = yaml.safe_load(text)
-    except yaml.YAMLError:
-        options = None
-    if not isinstance(options, list):
-        raise SearchError(f"'{text}' is not a list")
+        data, _ = parse_yaml(f"options: {text}", "the options", SearchError)
+    except SearchError as error:
+        raise SearchError(f"'{brief(text)}' is not a list: {error.message}") from None
+    options = data.pop("options")
+    if data or not isinstance(options, list):
+        raise SearchError(f"'{brief(text)}' is not a list")
     return options
 
 

@@ -1,4 +1,4 @@
-"""Whether what a search varies can change what it maximises, told before hours are spent."""
+"""Checks, before a search begins, that what it varies can change what it maximises."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import re
 from collections.abc import Iterable
 
 from optisense.errors import OptiSenseError
-from optisense.objectives.combined import are_rays_only
+from optisense.objectives.named import are_rays_only
 
 _NO_RAY_TURNS = re.compile(
     r"coating\..+"

@@ -1,6 +1,7 @@
 """Which trial is the best, and what is said where several share the best score.
 
-A trial that breaks a condition of the study is never the best.
+A trial that breaks a condition of the study is never the best. Where trials were scored again with
+fresh seeds, the means over these decide whether it does.
 
 The rule: the highest score by fresh seeds where some trials were scored so, else the highest score
 by the study's seed. Of trials that share it the one nearest to the start is the best, since it
@@ -46,15 +47,17 @@ def best_of(trials: Sequence[Trial]) -> Trial | None:
     if again:
         # `min` keeps the first of equals, and `fine` is in the order of the rule.
         return min(again, key=lambda trial: (-trial.fresh_score(), -trial.score))
+    if any(trial.fresh for trial in trials):
+        return None  # what was scored again breaks conditions, and little is known of the others
     return fine[0] if fine else None
 
 
 def nearest(trials: Sequence[Trial]) -> Trial | None:
     """The trial that breaks the conditions least, with the highest score of equals; None where a
-    trial meets them or none has a score.
+    trial is the best or none has a score.
     """
-    scored = [trial for trial in trials if math.isfinite(trial.score)]
-    if not scored or any(trial.is_feasible for trial in scored):
+    scored = [trial for trial in trials if math.isfinite(trial.score) and not trial.is_feasible]
+    if not scored or best_of(trials) is not None:
         return None
     return min(scored, key=lambda trial: (trial.breach, -trial.score, trial.number))
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 from optisense.objectives.combined import objective_of
 from optisense.objectives.registry import WATCHED
@@ -17,11 +17,15 @@ WORSE = 0.1
 no more than what rounding of pixels and triangles changes."""
 
 
-def unmet(outcome: Outcome) -> list[str]:
-    """The conditions that an outcome breaks, each with its value: ``coverage >= 0.6 (is 0.52)``."""
+def unmet(conditions: Mapping[str, float | None]) -> list[str]:
+    """The conditions that are broken, each with its value: ``coverage >= 0.6 (is 0.52)``.
+
+    Args:
+        conditions: the value of the limited quantity, by the text of each condition.
+    """
     return [
         f"{text} (is {_shown(value)})"
-        for text, value in outcome.conditions.items()
+        for text, value in conditions.items()
         if Requirement.parse(text).breach(math.nan if value is None else value) > 0.0
     ]
 
@@ -56,15 +60,16 @@ def condition_note(trials: Sequence[Trial]) -> str | None:
     """
     close = nearest(trials)
     if close is not None:
+        again = " with fresh seeds" if close.fresh else ""
         return (
-            "no trial meets all conditions, so none is the best; trial "
-            f"{close.number} comes nearest: {', '.join(unmet(close.outcome))}. Raise the budget, "
-            "widen the bounds, or relax the conditions"
+            f"no trial meets all conditions{again}, so none is "
+            f"the best; trial {close.number} comes nearest: {', '.join(unmet(close.conditions))}. "
+            "Raise the budget, widen the bounds, or relax the conditions"
         )
     start = next((trial for trial in trials if trial.is_start), None)
     if start is None or start.is_feasible:
         return None
-    return f"the start breaks conditions, which is allowed: {', '.join(unmet(start.outcome))}"
+    return f"the start breaks conditions, which is allowed: {', '.join(unmet(start.conditions))}"
 
 
 def lost(best: Outcome, start: Outcome) -> dict[str, tuple[float, float]]:

@@ -127,7 +127,9 @@ class StudyRun:
         self._best = self._start_score = math.nan
         self._told = time.monotonic()
         self._stage = START_STAGE
-        self._time_left = time_left or TimeLeft(stages(self.limit, self._usual))
+        plain = self._evaluator is usual or settings.errors is not None
+        steps = stages(self.limit, self._usual, plain_trials=plain)
+        self._time_left = time_left or TimeLeft(steps)
         self._fresh_done = self._fresh_count = 0
         self._fresh_seeds: set[int] = set()
         self._again = 1.0
@@ -428,4 +430,4 @@ def _nearest_note(outcome: Outcome | None) -> str:
     """What the trial that comes nearest to meeting all conditions lacks; nothing if one does."""
     if outcome is None or outcome.is_feasible:
         return ""
-    return ", ".join(unmet(outcome))
+    return ", ".join(unmet(outcome.conditions))

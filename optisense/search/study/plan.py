@@ -22,6 +22,7 @@ from optisense.search.space.constraints import Constraint, UserRule
 from optisense.search.space.manufacturing import SAMPLES, ManufacturingErrors
 from optisense.search.space.search_space import SearchSpace
 from optisense.search.study.settings import StudySettings
+from optisense.untrusted_files import MOST_PROGRAM, read_bytes
 
 ONLY_HERE = "function:"
 """Begins the name of a goal or rule that is a function of the program and in no file."""
@@ -59,12 +60,6 @@ class Plan:
         bound = self.space.bind(design)
         settings = dict(self.settings or {})
         requirements = requirements_of(self.requirements)
-        if requirements and self.errors is not None:
-            raise SearchError(
-                "conditions can't be kept by sensors with manufacturing errors",
-                hint="Leave out --error, and look at the winner with `optisense tolerance`; or "
-                "leave out --require",
-            )
         measured = [goal_of(goal) for goal in self.goals if isinstance(goal, str | Objective)]
         measured += [each.objective() for each in requirements]
         if any(each.rays_only for each in measured):
@@ -153,7 +148,7 @@ def file_prints(references: Sequence[str]) -> dict[str, str]:
     """The SHA-256 of each user's Python file that is named, by its path."""
     paths = [each.rpartition(":")[0] or each for each in references]
     return {
-        path: hashlib.sha256(Path(path).read_bytes()).hexdigest()
+        path: hashlib.sha256(read_bytes(Path(path), MOST_PROGRAM, SearchError)).hexdigest()
         for path in paths
         if path.endswith(".py") and Path(path).is_file()
     }

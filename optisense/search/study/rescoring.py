@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -25,6 +26,10 @@ mean is known."""
 MOST = 5
 """Largest number of trials that are scored again, which bounds the time that a search takes at its
 end."""
+
+MOST_BROKEN = 20
+"""Largest number of trials that are scored again for as long as each breaks a condition with fresh
+seeds: scores beside a limit break it by luck in about half of the cases."""
 
 _FRESH = 0xF2E5
 """A number that is mixed into a study's seed, so that fresh seeds have nothing in common with those
@@ -52,14 +57,16 @@ def rescore(study: Study, work: Work) -> None:
         _score([*start, *_spread_out(study)], seeds, work)
         return
     best = -math.inf
-    for number, trial in enumerate(others[:MOST]):
-        if trial.score <= best:
-            return  # even with its luck it is not better
+    if start and not others and study.settings.requirements:
+        _score(start, seeds, work)
+    for number, trial in enumerate(others[:MOST_BROKEN]):
+        if trial.score <= best or (number >= MOST and best > -math.inf):
+            return  # even with its luck it is not better, or enough were scored
         scored = [trial, *start] if number == 0 else [trial]
         rivals = others[number + 1 : MOST]
-        means = _score(scored, seeds, work, [each.score for each in rivals], best)
-        if math.isfinite(means[0]):
-            best = max(best, means[0])
+        again = _score(scored, seeds, work, [each.score for each in rivals], best)[0]
+        if again.is_feasible and math.isfinite(again.fresh_score()):
+            best = max(best, again.fresh_score())
 
 
 def _score(
@@ -68,8 +75,8 @@ def _score(
     work: Work,
     rivals: Sequence[float] = (),
     best: float = -math.inf,
-) -> list[float]:
-    """The mean over fresh seeds of each trial; one seed suffices where it changes nothing.
+) -> list[Trial]:
+    """The trials with what fresh seeds give; one seed suffices where it changes nothing.
 
     Args:
         trials: to score.
@@ -91,19 +98,20 @@ def _score(
         for trial in trials
         for seed in seeds[1:]
         if seed not in fresh[trial.number]
-        and dict(fresh[trial.number][seeds[0]].scores) != dict(trial.scores)
+        and not _alike(fresh[trial.number][seeds[0]], trial.outcome)
     ]
     told = fresh[trials[0].number][seeds[0]].scores.get(trials[0].objective, math.nan)
     later = _likely(rivals, max(best, told) if math.isfinite(told) else best)
     outcomes_of_more = work(more, 0, len(seeds) * later) if more else []
     for (trial, seed), outcome in zip(more, outcomes_of_more, strict=True):
         fresh[trial.number][seed] = outcome
-    return [
-        float(
-            np.mean([o.scores.get(trial.objective, math.nan) for o in fresh[trial.number].values()])
-        )
-        for trial in trials
-    ]
+    return [replace(trial, fresh=fresh[trial.number]) for trial in trials]
+
+
+def _alike(one: Outcome, other: Outcome) -> bool:
+    """Whether two seeds give the same scores and the same values of what conditions limit."""
+    same = dict(one.conditions) == dict(other.conditions)
+    return same and dict(one.scores) == dict(other.scores)
 
 
 def _likely(rivals: Sequence[float], best: float) -> float:

@@ -12,8 +12,18 @@ USUAL_FRESH = 9
 trial, and for one that might be better."""
 
 
-def stages(limit: int, usual: UsualTrials | None, workers: int = 1) -> list[TimedStep]:
-    """The stages of a search of so many trials, with what their scores usually take, if known."""
+def stages(
+    limit: int, usual: UsualTrials | None, workers: int = 1, *, plain_trials: bool = True
+) -> list[TimedStep]:
+    """The stages of a search of so many trials, with what their scores usually take, if known.
+
+    Args:
+        limit: trials of the search, at most.
+        usual: seconds that scores usually take.
+        workers: processes that score.
+        plain_trials: whether trials are scored as usual; else their times, such as those with
+            derivatives, do not tell how fast this machine is.
+    """
     if usual is None:
         return [
             TimedStep(START_STAGE),
@@ -22,7 +32,7 @@ def stages(limit: int, usual: UsualTrials | None, workers: int = 1) -> list[Time
         ]
     return [
         TimedStep(START_STAGE, 1, usual.first * workers),  # on a share of the processors
-        TimedStep(TRIALS, limit, usual.trial),
+        TimedStep(TRIALS, limit, usual.trial, gauges=plain_trials),
         TimedStep(FRESH, USUAL_FRESH, usual.fresh),
     ]
 

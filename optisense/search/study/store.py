@@ -57,6 +57,7 @@ create table fresh_scores (
     seed integer not null,
     scores blob not null,
     failure text,
+    conditions text,
     primary key (number, seed)
 ) without rowid;
 """
@@ -154,6 +155,8 @@ class Store:
                 )
             with _told(self.path):
                 self._connect("rw")
+                if not _has_conditions(self._writer):
+                    self._writer.execute("alter table fresh_scores add column conditions text")
 
     def only_read(self) -> None:
         """Close the file for writing; the write-ahead log is merged into it."""
@@ -248,8 +251,15 @@ class Store:
         """Write what a trial scores with another seed."""
         with _told(self.path):
             self._writer.execute(
-                "insert or replace into fresh_scores values (?, ?, ?, ?)",
-                (number, seed, self._packed(outcome.scores), outcome.failure),
+                "insert or replace into fresh_scores (number, seed, scores, failure, conditions) "
+                "values (?, ?, ?, ?, ?)",
+                (
+                    number,
+                    seed,
+                    self._packed(outcome.scores),
+                    outcome.failure,
+                    json.dumps(dict(outcome.conditions)) if outcome.conditions else None,
+                ),
             )
 
     def rows(self, generation: int | None = None) -> list[Row]:
@@ -268,11 +278,16 @@ class Store:
         """What trials score with other seeds, by number and seed."""
         found: dict[int, dict[int, Outcome]] = {}
         with self._read() as db:
-            rows = db.execute("select number, seed, scores, failure from fresh_scores").fetchall()
-        for number, seed, scores, failure in rows:
+            conditions = "conditions" if _has_conditions(db) else "null"
+            rows = db.execute(
+                f"select number, seed, scores, failure, {conditions} from fresh_scores"
+            ).fetchall()
+        for number, seed, scores, failure, kept in rows:
             with self._readable(f"a fresh score of trial {number}"):
                 why = None if failure is None else str(failure)
-                found.setdefault(number, {})[int(seed)] = Outcome(self._unpacked(scores), why)
+                parts = _objects({CONDITIONS: json.loads(kept)}) if kept else {}
+                outcome = Outcome(self._unpacked(scores), why, parts)
+                found.setdefault(number, {})[int(seed)] = outcome
         return found
 
     def check_points(self, size: int) -> None:
@@ -355,6 +370,13 @@ class Store:
             raise
 
 
+def _has_conditions(db: sqlite3.Connection) -> bool:
+    """Whether fresh scores have a column for conditions, which those of 0.2.0 do not."""
+    return any(
+        column[1] == "conditions" for column in db.execute("pragma table_info(fresh_scores)")
+    )
+
+
 def _objects(parts: Any) -> dict[str, Any]:
     """Parts of scores as they were read from JSON.
 
@@ -370,7 +392,7 @@ def _objects(parts: Any) -> dict[str, Any]:
 
 
 def damaged(what: str, path: Path | None, why: str) -> SearchError:
-    """What a user is told of a store that holds something else than it should."""
+    """The error for a store that does not hold what it should."""
     return SearchError(
         f"{what} can't be read: {why}",
         where=None if path is None else str(path),

@@ -357,7 +357,8 @@ def _shown(name: str) -> tuple[str, ...]:
     """The parts that an objective wants to be seen with its value; none of those of a user's own,
     whose file is not run to look at a study.
     """
-    from optisense.objectives.combined import is_plain, objective_of
+    from optisense.objectives.combined import objective_of
+    from optisense.objectives.named import is_plain
     from optisense.objectives.registry import BUILT_IN, FURTHER
 
     try:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from optisense.design import SensorDesign
 from optisense.objectives.score import deviation_of
 from optisense.search.evaluation.outcome import Outcome
+from optisense.search.evaluation.requirements import breach_of
 from optisense.search.space.search_space import BoundSpace
 
 
@@ -65,18 +66,24 @@ class Trial:
 
     @property
     def conditions(self) -> Mapping[str, float | None]:
-        """The value of the limited quantity, by the text of each condition of the study."""
-        return self.outcome.conditions
+        """The value of the limited quantity, by the text of each condition of the study.
+
+        Means over fresh seeds where the trial was scored with these, as of its score.
+        """
+        if not self.fresh:
+            return self.outcome.conditions
+        again = [outcome.conditions for outcome in self.fresh.values()]
+        return {text: _mean([each.get(text) for each in again]) for text in again[0]}
 
     @property
     def breach(self) -> float:
         """How far it breaks the conditions of the study; 0 where it meets them."""
-        return self.outcome.breach
+        return breach_of(self.conditions) if self.fresh else self.outcome.breach
 
     @property
     def is_feasible(self) -> bool:
         """Whether it meets all conditions of the study."""
-        return self.outcome.is_feasible
+        return self.breach == 0.0
 
     @property
     def values(self) -> dict[str, float | int | str]:
@@ -108,3 +115,9 @@ class Trial:
         name = objective or self.objective
         values = [outcome.scores.get(name, math.nan) for outcome in self.fresh.values()]
         return deviation_of(values) if np.isfinite(values).all() else math.nan
+
+
+def _mean(values: Sequence[float | None]) -> float | None:
+    """The mean; None where one was not measured."""
+    known = [value for value in values if value is not None]
+    return float(np.mean(known)) if len(known) == len(values) else None

@@ -15,6 +15,9 @@ from collections.abc import Iterable
 from contextlib import suppress
 from pathlib import Path
 
+from optisense.errors import SearchError
+from optisense.untrusted_files import MOST_PROGRAM, read_bytes
+
 
 def file_of(reference: str) -> Path | None:
     """The Python file of an objective or rule as a study names it; None for other names."""
@@ -49,8 +52,8 @@ def _note(reference: str) -> str:
     """A line: the print of the file as it is now, and the reference without line breaks."""
     file = file_of(reference)
     try:
-        content = b"" if file is None else file.read_bytes()
-    except OSError:
+        content = b"" if file is None else read_bytes(file, MOST_PROGRAM, SearchError)
+    except SearchError:
         content = b""
     return f"{hashlib.sha256(content).hexdigest()} {reference!r}"
 

@@ -41,7 +41,7 @@ LEAST_ROWS = 8
 """Each row is one sensor, and one more for each source of error."""
 
 NOISE_SEEDS = 3
-"""Seeds with which the design as it is is scored again, to tell noise from tolerance."""
+"""Seeds with which the design as it is is scored again, to separate noise from tolerance."""
 
 OWN_SCORES = 1 + NOISE_SEEDS
 """Scores of the design as it is, which come before those of manufactured sensors."""

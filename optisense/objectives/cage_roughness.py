@@ -1,0 +1,62 @@
+"""Cage roughness: how unevenly the control points of cages are moved."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from optisense.errors import ObjectiveError
+from optisense.geometry.cage import Resolution, cage_points
+from optisense.objectives.registry import objective
+
+if TYPE_CHECKING:
+    from optisense.objectives.evaluation import Evaluation
+
+
+@objective(
+    "cage_roughness",
+    title="Cage roughness",
+    range=(0.0, math.inf),
+    unit="mm",
+    lower_is_better=True,
+    rays_only=True,
+)
+def cage_roughness(evaluation: Evaluation) -> tuple[float, dict[str, Any]]:
+    """How unevenly the control points of cages are moved, in mm.
+
+    By how much the way of a control point differs from the mean way of its two neighbours, along
+    each axis of the lattice: the root mean square over all points with two neighbours. 0 where the
+    lattice is moved, stretched or sheared as a whole, since that bends nothing. The value is that
+    of the roughest cage; `largest` is the largest such difference.
+
+    Args:
+        evaluation: the sensor.
+    """
+    found, largest = {}, 0.0
+    for name, cage in evaluation.design.cages.items():
+        moved = cage.current_points() - cage_points(np.array(cage.box), cage.resolution)
+        uneven = unevenness(moved, cage.resolution)
+        found[name] = float(np.sqrt((uneven**2).mean())) if len(uneven) else 0.0
+        largest = max(largest, float(uneven.max(initial=0.0)))
+    if not found:
+        raise ObjectiveError("the design has no cage", hint="Make a cage with optisense cage")
+    return max(found.values()), {"of_cages": found, "largest": largest}
+
+
+def unevenness(moved: NDArray[np.float64], resolution: Resolution) -> NDArray[np.float64]:
+    """(k,) mm between the way of a control point and the mean way of its neighbours.
+
+    Args:
+        moved: (nx * ny * nz, 3) mm, the way of each point.
+        resolution: points along x, y and z.
+    """
+    ways = moved.reshape(*resolution, 3)
+    found = [
+        0.5 * np.linalg.norm(np.diff(ways, 2, axis=axis), axis=-1).ravel()
+        for axis in range(3)
+        if resolution[axis] > 2
+    ]
+    return np.concatenate(found) if found else np.zeros(0)

@@ -1,0 +1,49 @@
+"""The objectives that a text names, by name, expression or file; none of them is run."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+
+from optisense.objectives.expressions import Expression
+from optisense.objectives.registry import find, names
+
+_ARITHMETIC = re.compile(r"[-+*/().,'\"\s]")
+"""Characters of which an expression has at least one, and a name none."""
+
+
+def is_plain(text: str) -> bool:
+    """Whether a text is the name of an objective, or of a Python file, and no expression."""
+    file = text.rpartition(":")[0] or text
+    return (
+        file.endswith(".py")
+        or _ARITHMETIC.search(text.strip()) is None
+        or text.strip().lower() in names()
+    )
+
+
+def named_in(texts: Iterable[str]) -> list[str]:
+    """The names of the objectives in names and expressions, each once; files as they are.
+
+    Raises:
+        ObjectiveError: an expression can't be read.
+    """
+    found: dict[str, None] = {}
+    for text in texts:
+        inner = (text,) if is_plain(text) else Expression.parse(text).objectives
+        found |= dict.fromkeys(inner)
+    return list(found)
+
+
+def are_rays_only(texts: Iterable[str]) -> bool:
+    """Whether all objectives trace chief rays only, as far as their names show.
+
+    An objective in a user's file counts as one that renders: no file is run to find out.
+
+    Raises:
+        ObjectiveError: an expression can't be read, or an objective is unknown.
+    """
+    inner = named_in(texts)
+    return all(not name.endswith(".py") and ".py:" not in name for name in inner) and all(
+        find(name).rays_only for name in inner
+    )

@@ -1,0 +1,123 @@
+"""Where the gradient of a search comes from, and gradients by differences of trials."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from enum import Enum
+from typing import NamedTuple
+
+import numpy as np
+
+from optisense.errors import ObjectiveError, SearchError
+from optisense.objectives.named import are_rays_only
+from optisense.search.evaluation.evaluator import RELIT
+from optisense.search.evaluation.outcome import Outcome
+from optisense.search.evaluation.requirements import Requirement
+from optisense.search.methods.base import FloatArray, Problem
+from optisense.search.methods.checked_slopes import STEP
+from optisense.search.methods.jacobian import moving_parts
+from optisense.search.methods.smooth_scores import SmoothScore
+
+
+class GradientSource(Enum):
+    """Where gradients come from."""
+
+    RAYS = "derivatives of rays"
+    LAYERS = "relit pictures"
+    TRIALS = "differences of trials"
+
+
+class LocalValues(NamedTuple):
+    """What is known around a point: values (1 + m,) of the score and of what conditions limit, and
+    their gradients (1 + m, n) by shares of the ranges.
+    """
+
+    values: FloatArray
+    gradients: FloatArray
+
+
+class PointsWantedError(Exception):
+    """Ends a run of the optimiser at points (k, n) whose scores are not known yet."""
+
+    def __init__(self, points: FloatArray) -> None:
+        super().__init__()
+        self.points = points
+
+
+def source_of(problem: Problem) -> GradientSource:
+    """Where the gradients of a problem come from.
+
+    Raises:
+        SearchError: a parameter is a choice or a whole number, or none changes the score.
+    """
+    space, objective = problem.space, problem.objectives[0]
+    for number in np.flatnonzero(space.whole):
+        raise SearchError(
+            "a choice or a whole number has no gradient",
+            where=space.names[number],
+            hint="Search it with --method grid, or vary it with cma-es",
+        )
+    try:
+        rays_only = are_rays_only([objective])
+    except ObjectiveError:  # a function of the program
+        return GradientSource.TRIALS
+    if not rays_only:
+        relit = all(RELIT.search(name) for name in space.names)
+        return GradientSource.LAYERS if relit else GradientSource.TRIALS
+    moving_parts(space)  # says which parameter changes no ray
+    return GradientSource.TRIALS if SmoothScore.of(objective) is None else GradientSource.RAYS
+
+
+class TrialDifferences:
+    """Central differences of trials over `STEP` of the ranges, or over as much as bounds allow."""
+
+    def __init__(self, problem: Problem, requirements: Sequence[Requirement]) -> None:
+        """What is differentiated: the first objective, and what conditions limit."""
+        self._space, self._objective = problem.space, problem.objectives[0]
+        self._span = problem.space.upper - problem.space.lower
+        self._requirements = requirements
+
+    def around(self, point: FloatArray, known: Mapping[bytes, Outcome]) -> LocalValues | None:
+        """What is known around a point (n,); None where it has no score. Where a point beside it
+        has none, the difference is taken to the other side only.
+
+        Raises:
+            PointsWantedError: the point or points beside it must be scored first.
+        """
+        sides = self._beside(point)
+        wanted = [each for each in (point, *sides) if each.tobytes() not in known]
+        if wanted:
+            raise PointsWantedError(np.array(wanted))
+        values = self._exact(known[point.tobytes()])
+        if values is None:
+            return None
+        gradients = np.zeros((len(values), self._space.size))
+        for number, span in enumerate(self._span):
+            ends = []
+            for side in sides[2 * number : 2 * number + 2]:
+                exact = self._exact(known[side.tobytes()])
+                place = (side[number] - point[number]) / span
+                ends.append((0.0, values) if exact is None else (place, exact))
+            (high, above), (low, below) = ends
+            if high > low:
+                gradients[:, number] = (above - below) / (high - low)
+        return LocalValues(values, gradients)
+
+    def _beside(self, point: FloatArray) -> list[FloatArray]:
+        """Two points (n,) for each parameter, above and below, within the bounds."""
+        found = []
+        for number, span in enumerate(self._span):
+            low, high = self._space.lower[number], self._space.upper[number]
+            for way in (STEP, -STEP):
+                side = point.copy()
+                side[number] = np.clip(point[number] + way * span, low, high)
+                found.append(side)
+        return found
+
+    def _exact(self, outcome: Outcome) -> FloatArray | None:
+        """(1 + m,) the score and what conditions limit; None where one is missing."""
+        limited = [outcome.conditions.get(str(each)) for each in self._requirements]
+        values = [outcome.scores.get(self._objective, np.nan), *limited]
+        if any(value is None or not np.isfinite(value) for value in values):
+            return None
+        return np.array(values, dtype=np.float64)
