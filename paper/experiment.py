@@ -20,12 +20,12 @@ from optisense.writing import write_json, write_text, written_whole
 from paper.bench import Bench
 from paper.claims import Claim, Table
 from paper.errors import ExperimentError
+from paper.text import PICTURE, RESULT, TEXT, chapter
 from paper.unit import Record, Unit
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-RESULT, PICTURE, TEXT = "result.json", "picture.png", "text.md"
 DOTS_PER_INCH = 80
 """Resolution of the experiments' figures, which keeps each below 100 kB."""
 
@@ -174,8 +174,6 @@ def write(
     Raises:
         OutputError: they can't be written.
     """
-    from paper.text import chapter
-
     with written_whole(folder / PICTURE, "a picture") as temporary:
         experiment.draw(dict(result["numbers"]), pictures).savefig(temporary, dpi=DOTS_PER_INCH)
     write_text(folder / TEXT, chapter(experiment, result, PICTURE))

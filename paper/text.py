@@ -15,6 +15,9 @@ from paper.errors import ExperimentError
 if TYPE_CHECKING:
     from paper.experiment import Experiment
 
+RESULT, PICTURE, TEXT = "result.json", "picture.png", "text.md"
+"""The files of an experiment in its folder."""
+
 MOST_GAPS = 6
 """Number of gaps that the text tells one by one; the rest is counted."""
 
@@ -83,8 +86,6 @@ def read_result(folder: Path) -> dict[str, Any]:
     Raises:
         ExperimentError: there is none, or it can't be read.
     """
-    from paper.experiment import RESULT
-
     path = folder / RESULT
     try:
         read: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
@@ -107,8 +108,6 @@ def write_page(page: Path, results: Path, experiments: list[Experiment]) -> None
         ExperimentError: an experiment has no result.
         OutputError: something can't be written.
     """
-    from paper.experiment import PICTURE, RESULT
-
     beside = page.with_suffix("")
     beside.mkdir(parents=True, exist_ok=True)
     chapters, rows, counts = [], [], dict.fromkeys((AGREES, DISAGREES, OPEN), 0)

@@ -1,11 +1,13 @@
 #!/bin/sh
 # Set up a Blender with a window, in a place of its own, for the test that drives it by mouse and
 # keys: .blender-window/blender. Its packages come from Debian (13, where this system's own Blender
-# is too old) and are unpacked there, so that nothing of this system changes and no root is needed.
+# is too old; or another release that is named, in .blender-window-RELEASE: sid has the newest
+# Blender) and are unpacked there, so that nothing of this system changes and no root is needed.
 # Only the virtual display and what moves its mouse are installed as usual, if they are not there.
 set -eu
 cd "$(dirname "$0")/.."
-place=$(pwd)/.blender-window
+release=${1:-trixie}
+place=$(pwd)/.blender-window${1:+-$1}
 unset PYTHONHOME PYTHONPATH VIRTUAL_ENV
 
 say() { printf '%s\n' "$*"; }
@@ -40,7 +42,7 @@ mirror=$(apt-get --print-uris update 2>/dev/null |
 [ -n "$mirror" ] || mirror=http://deb.debian.org/debian
 keys=/usr/share/keyrings/debian-archive-keyring.gpg
 [ -f "$keys" ] || fail "type: sudo apt-get install debian-archive-keyring"
-echo "deb [signed-by=$keys] $mirror trixie main" > "$place/sources.list"
+echo "deb [signed-by=$keys] $mirror $release main" > "$place/sources.list"
 
 # An apt of its own, which believes that nothing is installed.
 own_apt() {

@@ -11,17 +11,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from optisense.calibration.comparing import Comparison, usable
+from optisense.calibration.families import USUAL
 from optisense.calibration.gauss_newton import LayeredFit, Solution
+from optisense.calibration.kept_renderings import KEPT_NOWHERE, KeptRenderings
 from optisense.calibration.layered_pictures import LayeredPictures, layered_pictures
-from optisense.calibration.model_pictures import (
-    SeenContact,
-    check_shape,
-    matched_exposure,
-    model_pictures,
-)
+from optisense.calibration.model_pictures import matched_exposure, model_pictures
 from optisense.calibration.photographs import Photographs
-from optisense.calibration.quantities import FAMILIES, FitQuantity, designed, quantities_of
-from optisense.calibration.realism import Realism, realism
+from optisense.calibration.quantities import designed, quantities_of
+from optisense.calibration.quantity import FitQuantity
+from optisense.calibration.reading_both_ways import realism_and_readings
+from optisense.calibration.realism import Realism
+from optisense.calibration.seen_contacts import SeenContact, check_shape
 from optisense.design import Provenance, SensorDesign, Status, set_value
 from optisense.errors import CalibrationError
 from optisense.near import suggestion
@@ -75,7 +75,7 @@ class CalibrationSettings:
     """How a design is fitted.
 
     Attributes:
-        families: what may change, of `quantities.FAMILIES`.
+        families: what may change, of `families.FAMILIES`.
         asked: path, least and largest value of further numbers of the design.
         rounds: of rendering and fitting.
         photons: of the light of the fit; that of the comparison has as many or more.
@@ -84,7 +84,7 @@ class CalibrationSettings:
         held_out: names of the presses that are held out; every third one if None.
     """
 
-    families: tuple[str, ...] = tuple(FAMILIES)
+    families: tuple[str, ...] = USUAL
     asked: tuple[tuple[str, float, float], ...] = ()
     rounds: int = ROUNDS
     photons: int = FIT_PHOTONS
@@ -139,8 +139,9 @@ class Calibration:
 
     def of_presses(self, found: Realism, *, held_out: bool) -> Realism:
         """The figures of the presses that were held out, or of those that were not."""
-        chosen = [p for p in found.presses if (p.name in self.held_out) == held_out]
-        return replace(found, presses=tuple(chosen))
+        presses = [p for p in found.presses if (p.name in self.held_out) == held_out]
+        readings = [r for r in found.readings if (r.name in self.held_out) == held_out]
+        return replace(found, presses=tuple(presses), readings=tuple(readings))
 
     def as_data(self) -> dict[str, Any]:
         """All numbers and figures, ready for JSON."""
@@ -169,6 +170,7 @@ def calibrate(
     settings: CalibrationSettings | None = None,
     *,
     variant: str = "auto",
+    kept: KeptRenderings = KEPT_NOWHERE,
     progress: Progress = lambda what, done, count: None,
 ) -> Calibration:
     """Fit a design to photographs of a real sensor.
@@ -178,11 +180,13 @@ def calibrate(
         photographs: of the sensor.
         settings: what may change, and how; the usual ones if None.
         variant: of the renderer.
+        kept: renderings of an earlier run that ended before it was done, which need not be made
+            again, and where those of this one are kept.
         progress: called before each rendering and each step of the fit.
 
     Raises:
         CalibrationError: there are too few photographs, or they do not fit the design.
-        OptiSenseError: the design can't be rendered.
+        OptiSenseError: the design can't be rendered, or a rendering not be kept.
     """
     from optisense.optics import OpticalModel
 
@@ -193,12 +197,13 @@ def calibrate(
     notes += _refuse_too_few(full, chosen, held_out)
     model = OpticalModel(design, variant)
     check_shape(full, model)
-    fit = _Fit(design, model, full, seen, chosen, chosen_settings, progress)
+    fit = _Fit(design, model, full, seen, chosen, chosen_settings, kept, progress)
     solution = fit.run()
     held = tuple(full.presses[index].name for index in fit.held_out)
     notes += fit.doubts(solution)
     fitted, exposure = _with_exposure(design, chosen, solution.steps, fit.exposure)
-    fitted = _marked(fitted, chosen, solution, full)
+    numbers = _numbers(chosen, solution, fitted)
+    fitted = _marked(fitted, chosen, numbers, full)
     places = fit.places(fitted, exposure)
     comparisons = []
     for each, factor in ((design, None), (fitted, exposure)):
@@ -206,14 +211,20 @@ def calibrate(
         model.set_design(each)
         photons = max(chosen_settings.photons, FIT_PHOTONS)
         shown = model_pictures(
-            model, full, places, photons=photons, seed=chosen_settings.seed, exposure=factor
+            model,
+            full,
+            places,
+            photons=photons,
+            seed=chosen_settings.seed,
+            exposure=factor,
+            kept=kept,
         )
-        figures = realism(full, places, shown)
+        figures = realism_and_readings(model, full, places, shown)
         comparisons.append(Comparison(full, tuple(places), shown, figures, ()))
     return Calibration(
         design=fitted,
         exposure=exposure,
-        numbers=_numbers(chosen, solution, fitted, design),
+        numbers=numbers,
         alike=_alike(chosen, solution),
         before=comparisons[0],
         after=comparisons[1],
@@ -233,10 +244,11 @@ class _Fit:
         seen: list[SeenContact],
         chosen: list[FitQuantity],
         settings: CalibrationSettings,
+        kept: KeptRenderings,
         progress: Progress,
     ) -> None:
         self._design, self._model, self._settings = design, model, settings
-        self._chosen, self._progress = chosen, progress
+        self._chosen, self._kept, self._progress = chosen, kept, progress
         self._small = photographs.scaled(FIT_WIDTH)
         factor = self._small.size[0] / photographs.size[0]
         self._factor = factor
@@ -293,8 +305,9 @@ class _Fit:
             for _ in range(2):
                 seen = [self._seen[index] for index in self.held_out]
                 layers = layered_pictures(
-                    self._model, small, seen, self._settings.photons, self._settings.seed
-                )
+                    self._model, small, seen, self._settings.photons, self._settings.seed,
+                    kept=self._kept,
+                )  # fmt: skip
                 none: FloatArray = np.zeros(0)
                 fit = LayeredFit(small, seen, layers, [], exposure, none, {})
                 found = fit.solve(none, np.zeros((len(seen), 3)))
@@ -325,7 +338,7 @@ class _Fit:
         self._model.set_design(designed(self._design, moved, steps[self._rendering]))
         return layered_pictures(
             self._model, small, seen, self._settings.photons, self._settings.seed,
-            None if contacts is None else contacts.contacts,
+            None if contacts is None else contacts.contacts, self._kept,
         )  # fmt: skip
 
     def _slopes(
@@ -344,7 +357,7 @@ class _Fit:
             if each.value(float(other[number])) == each.value(float(steps[number])):
                 other[number] -= 2.0 * DIFFERENCE
             size = float(other[number] - steps[number])
-            same = None if each.path.startswith("camera.") else layers
+            same = None if each.moves_contacts else layers
             moved = self._layers(small, seen, other, same)
             pairs = zip(
                 [moved.background, *moved.presses], [layers.background, *layers.presses],
@@ -418,7 +431,7 @@ def _with_exposure(
 def _marked(
     fitted: SensorDesign,
     chosen: Sequence[FitQuantity],
-    solution: Solution,
+    numbers: Sequence[FittedNumber],
     photographs: Photographs,
 ) -> SensorDesign:
     """The design whose fitted numbers say so, with the fingerprints of the photographs."""
@@ -428,31 +441,21 @@ def _marked(
     )
     known = dict(fitted.provenance)
     texts: dict[str, list[str]] = {}
-    deviations = np.sqrt(np.maximum(np.diag(solution.covariance), 0.0))
-    for each, step, deviation in zip(chosen, solution.steps, deviations, strict=True):
-        error = abs(each.slope(float(step))) * float(deviation)
-        texts.setdefault(_home(each.path), []).append(f"{each.words} ± {error:.2g} {each.unit}")
+    for quantity, each in zip(chosen, numbers, strict=True):
+        said = f"{each.words} {each.after:.4g} ± {each.uncertainty:.2g} {each.unit}".strip()
+        texts.setdefault(quantity.home or each.path, []).append(said)
     for path, words in texts.items():
         known[path] = Provenance(
             status=Status.CALIBRATED,
             source=f"fitted to {len(photographs.presses)} photographed presses and a background: "
-            + "; ".join(word.strip() for word in words)
+            + "; ".join(words)
             + f". SHA-256 of the photographs begin with {prints}",
         )
     return fitted.model_copy(update={"provenance": known})
 
 
-def _home(path: str) -> str:
-    """The path under which the origin of a fitted number is written."""
-    if path.startswith("camera.across."):
-        return "camera.position"
-    if path.startswith("camera."):
-        return ".".join(path.split("[")[0].split(".")[:2])
-    return path
-
-
 def _numbers(
-    chosen: Sequence[FitQuantity], solution: Solution, fitted: SensorDesign, design: SensorDesign
+    chosen: Sequence[FitQuantity], solution: Solution, fitted: SensorDesign
 ) -> tuple[FittedNumber, ...]:
     deviations = np.sqrt(np.maximum(np.diag(solution.covariance), 0.0))
     found = []

@@ -6,15 +6,11 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-from optisense.calibration.model_pictures import (
-    ModelPictures,
-    SeenContact,
-    doubts,
-    model_pictures,
-    seen_contacts,
-)
+from optisense.calibration.model_pictures import ModelPictures, model_pictures
 from optisense.calibration.photographs import Photographs
-from optisense.calibration.realism import Realism, realism
+from optisense.calibration.reading_both_ways import realism_and_readings
+from optisense.calibration.realism import Realism
+from optisense.calibration.seen_contacts import SeenContact, doubts, seen_contacts
 from optisense.errors import CalibrationError
 from optisense.quality import PICTURE_PHOTONS
 
@@ -91,5 +87,5 @@ def compare(
     """
     kept, seen, notes = usable(photographs, refine=refine)
     pictures = model_pictures(model, kept, seen, photons=photons, seed=seed, progress=progress)
-    figures = realism(kept, seen, pictures)
+    figures = realism_and_readings(model, kept, seen, pictures)
     return Comparison(kept, tuple(seen), pictures, figures, tuple(notes))

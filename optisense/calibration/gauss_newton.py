@@ -15,10 +15,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from optisense.calibration.layered_pictures import LayeredPictures, contact_slopes
-from optisense.calibration.model_pictures import SeenContact, levels_of
+from optisense.calibration.model_pictures import levels_of
 from optisense.calibration.photographs import Photographs
-from optisense.calibration.quantities import FitQuantity, chain_with, power_factors
+from optisense.calibration.quantities import chain_with, power_factors
+from optisense.calibration.quantity import FitQuantity
 from optisense.calibration.realism import distances
+from optisense.calibration.seen_contacts import SeenContact
 
 FloatArray = NDArray[np.float64]
 

@@ -9,15 +9,17 @@ a ball's surface grows with the distance from its middle.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from optisense.calibration.model_pictures import SeenContact, contact_of
+from optisense.calibration.kept_renderings import KEPT_NOWHERE, KeptRenderings
 from optisense.calibration.photographs import Photographs
+from optisense.calibration.seen_contacts import SeenContact, contact_of
 from optisense.mechanics import ELASTIC
 
 if TYPE_CHECKING:
@@ -54,6 +56,8 @@ def layered_pictures(
     photons: int,
     seed: int,
     contacts: Sequence[Contact] | None = None,
+    kept: KeptRenderings = KEPT_NOWHERE,
+    progress: Callable[[int], None] = lambda done: None,
 ) -> LayeredPictures:
     """Render the background and the presses of photographs as layers.
 
@@ -61,13 +65,15 @@ def layered_pictures(
         model: of the sensor.
         photographs: whose size and presses are taken.
         seen: where each of them shows its contact.
-        photons: of the light.
+        photons: of the light that all pictures share.
         seed: of the light.
         contacts: what presses, where that is known already.
+        kept: renderings that need not be made again.
+        progress: called with the number of pictures that are done.
 
     Raises:
         CalibrationError: a contact is not on the skin.
-        OptiSenseError: the model can't be rendered.
+        OptiSenseError: the model can't be rendered, or a rendering not be kept.
     """
     if contacts is None:
         rays = model.chief_rays(photographs.size)
@@ -75,21 +81,33 @@ def layered_pictures(
             contact_of(press, place, model, rays)
             for press, place in zip(photographs.presses, seen, strict=True)
         ]
-    pictures = []
-    for pressed in [(), *((contact,) for contact in contacts)]:
-        image = model.render(
+    pictures: list[FloatArray] = []
+    for number, pressed in enumerate([(), *((contact,) for contact in contacts)]):
+        progress(number)
+        layers = kept.layers(
+            model.design,
             pressed,
-            resolution=photographs.size,
-            photons=photons,
-            seed=seed,
-            partial=False,
-            skin=ELASTIC,
+            (photographs.size, photons, seed),
+            partial(_rendered, model, pressed, photographs.size, photons, seed),
         )
-        pictures.append(np.stack(list(image.layers.values())))
+        pictures.append(np.stack(list(layers.values())))
     return LayeredPictures(
-        tuple(image.layers), pictures[0], tuple(pictures[1:]), image.chain.without_noise(),
-        tuple(contacts),
+        tuple(model.design.lights), pictures[0], tuple(pictures[1:]),
+        model.picture_chain.without_noise(), tuple(contacts),
     )  # fmt: skip
+
+
+def _rendered(
+    model: OpticalModel,
+    pressed: Sequence[Contact],
+    size: tuple[int, int],
+    photons: int,
+    seed: int,
+) -> dict[str, FloatArray]:
+    image = model.render(
+        pressed, resolution=size, photons=photons, seed=seed, partial=False, skin=ELASTIC
+    )
+    return {name: np.asarray(layer, dtype=np.float32) for name, layer in image.layers.items()}
 
 
 def contact_slopes(layers: LayeredPictures, index: int, seen: SeenContact) -> FloatArray:

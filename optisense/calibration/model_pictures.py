@@ -3,57 +3,29 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import map_coordinates
 from scipy.optimize import minimize_scalar
 
-from optisense.calibration.contact_finding import find_another, find_contact
-from optisense.calibration.photographs import PhotographedPress, Photographs
-from optisense.errors import CalibrationError, ContactError
-from optisense.geometry import Contact, Sphere
-from optisense.mechanics import ELASTIC
+from optisense.calibration.kept_renderings import KEPT_NOWHERE, KeptRenderings
+from optisense.calibration.layered_pictures import layered_pictures
+from optisense.calibration.photographs import Photographs
+from optisense.calibration.seen_contacts import SeenContact, check_shape
+from optisense.errors import CalibrationError
+from optisense.geometry import Contact
 
 if TYPE_CHECKING:
     from optisense.design.responses import PictureChain
-    from optisense.optics import ChiefRays, OpticalModel, TactileImage
+    from optisense.optics import OpticalModel
 
 FloatArray = NDArray[np.float64]
 
-DEPTH_STEPS = 4
-"""Steps in which the depth of a ball is found that gives a contact of a radius; each one shrinks
-the error several times, and the first is off by at most a third."""
-
-RADIUS_ERROR = 0.01
-"""Relative error of a contact's radius at which the search for its depth ends; the grid on which
-the skin's pressure is computed shows contacts to about 1 %."""
-
 WIDEST_RANGE = 4.0
 """Exposures are looked for within this factor of the first guess, whose error is far smaller."""
-
-DOUBTFUL = 0.5
-"""Asymmetry from which on the difference of a photograph does not look like that of a ball."""
-
-LABEL_OFF = 0.6
-"""Distance of a label's centre from that of the contact that is found, in radii, and share of the
-radii, from which on the label is doubted. Hand labels are off by a tenth."""
-
-
-@dataclass(frozen=True)
-class SeenContact:
-    """Where a photograph shows a contact.
-
-    Attributes:
-        centre: column and row of its middle, pixels from the left and top edge.
-        radius: pixels.
-    """
-
-    centre: tuple[float, float]
-    radius: float
 
 
 @dataclass(frozen=True)
@@ -73,165 +45,15 @@ class ModelPictures:
     contacts: tuple[Contact, ...]
 
 
-def seen_contacts(photographs: Photographs, *, refine: bool = True) -> list[SeenContact | None]:
-    """Where each photograph shows its contact.
-
-    Args:
-        photographs: with labels or without.
-        refine: whether to look for contacts that are labelled too, near their labels; hand labels
-            are off by pixels.
-
-    Returns:
-        None for a photograph that shows no contact.
-    """
-    found: list[SeenContact | None] = []
-    for press in photographs.presses:
-        centre, radius = press.centre, press.radius
-        if centre is not None and radius is not None and not refine:
-            found.append(SeenContact(centre, radius))
-            continue
-        seen = find_contact(press.picture, photographs.background, centre, radius)
-        found.append(None if seen is None else SeenContact(seen.centre, seen.radius))
-    return found
-
-
-def doubts(photographs: Photographs) -> list[str]:
-    """What is doubtful about presses: no contact to be seen, or labels that contradict it."""
-    found = []
-    twice = 0
-    for press in photographs.presses:
-        seen = find_contact(press.picture, photographs.background)
-        if seen is not None:
-            wide = replace(seen, radius=max(seen.radius, press.radius or 0.0))
-            other = find_another(press.picture, photographs.background, wide)
-            twice += other is not None and other.asymmetry < DOUBTFUL
-        if seen is None:
-            found.append(f"{press.name}: no contact is to be seen; it is left out")
-            continue
-        if seen.asymmetry > DOUBTFUL:
-            found.append(f"{press.name}: what is to be seen does not look like a ball")
-        if press.centre is not None:
-            off = math.dist(press.centre, seen.centre)
-            if off > LABEL_OFF * max(seen.radius, press.radius or 0.0):
-                found.append(
-                    f"{press.name}: its label is {off:.0f} pixels away from the contact that the "
-                    "picture shows; check whether it is that of another photograph"
-                )
-        labelled = seen.radius if press.radius is None else press.radius
-        if not 1.0 / (1.0 + LABEL_OFF) < labelled / max(seen.radius, 1e-9) < 1.0 + LABEL_OFF:
-            found.append(
-                f"{press.name}: its label says a radius of {labelled:.0f} pixels, and the "
-                f"picture shows {seen.radius:.0f}"
-            )
-    if 2 * twice > len(photographs.presses):
-        found.append(
-            "the background: it seems to show a contact, as most photographs show two; take one "
-            "with nothing pressed in"
-        )
-    return found
-
-
-def check_shape(photographs: Photographs, model: OpticalModel) -> None:
-    """Check that photographs have the shape of the model's pictures.
-
-    Raises:
-        CalibrationError: they are wider or narrower.
-    """
-    width, height = photographs.size
-    own_width, own_height = model.design.camera.resolution
-    if abs(width * own_height / (height * own_width) - 1.0) > 1.5 / min(width, height):
-        raise CalibrationError(
-            f"the photographs have {width} x {height} pixels, and the design's camera "
-            f"{own_width} x {own_height}, another shape",
-            hint="Crop the photographs as the camera of the design is cropped, or set "
-            "camera.resolution to their shape",
-        )
-
-
-def contact_of(
-    press: PhotographedPress, seen: SeenContact, model: OpticalModel, rays: ChiefRays
-) -> Contact:
-    """What presses into a model so that it touches where a photograph shows a contact.
-
-    Args:
-        press: whose ball presses.
-        seen: where.
-        model: of the sensor.
-        rays: its chief rays, at the photograph's size.
-
-    Raises:
-        CalibrationError: the contact is not on the skin, too wide for the ball, or too deep.
-    """
-    size = min(np.sort(np.ptp(gel.vertices, axis=0))[1] for gel in model.gels)
-    if press.diameter > 2.0 * size:
-        raise CalibrationError(
-            f"the ball's diameter is {press.diameter:g} mm, and the gel is {size:.0f} mm wide",
-            where=press.name,
-            hint="Give the ball's diameter in mm",
-        )
-    point, scale = place_on_skin(seen.centre, rays, press.name)
-    ball, wanted = 0.5 * press.diameter, seen.radius * scale
-    if wanted >= ball:
-        raise CalibrationError(
-            f"the contact has a radius of {wanted:.2f} mm, and the ball one of {ball:g} mm",
-            where=press.name,
-            hint="Check the ball's diameter, the label, and what width of the skin the camera sees",
-        )
-    depth = wanted**2 / ball  # Hertz
-    for _ in range(DEPTH_STEPS):
-        contact = Contact(Sphere(ball), point=point, depth=depth)
-        try:
-            area = model.pressed([contact]).contacts[0].area
-        except ContactError as error:
-            raise CalibrationError(
-                f"a ball of {press.diameter:g} mm can't be pressed in there: {error.message}",
-                where=press.name,
-                hint="Check the ball's diameter and the label; leave this photograph out",
-            ) from None
-        ratio = wanted / math.sqrt(max(area, 1e-6) / math.pi)
-        if abs(ratio - 1.0) < RADIUS_ERROR:
-            break
-        depth *= min(max(ratio, 0.5), 2.0) ** 2
-    return Contact(Sphere(ball), point=point, depth=depth)
-
-
-def place_on_skin(
-    centre: tuple[float, float], rays: ChiefRays, name: str
-) -> tuple[tuple[float, float, float], float]:
-    """The point of the skin, mm, that a place of the picture shows, and mm for a pixel there.
-
-    Raises:
-        CalibrationError: the camera sees no skin there.
-    """
-    column, row = centre[0] - 0.5, centre[1] - 0.5
-    steps = np.array([[0.0, 0.0], [-1.0, 0.0], [1.0, 0.0], [0.0, -1.0], [0.0, 1.0]])
-    columns, rows = column + steps[:, 0], row + steps[:, 1]
-    points = np.stack(
-        [map_coordinates(rays.points[..., axis], [rows, columns], order=1) for axis in range(3)],
-        axis=1,
-    ).astype(np.float64)
-    height, width = rays.hit.shape
-    inside = 1.0 <= column <= width - 2.0 and 1.0 <= row <= height - 2.0
-    if not inside or not rays.hit[round(row), round(column)] or not np.isfinite(points).all():
-        raise CalibrationError(
-            f"the model's camera sees no skin at column {centre[0]:.0f}, row {centre[1]:.0f}",
-            where=name,
-            hint="Check the label and the design's camera",
-        )
-    across = 0.5 * float(np.linalg.norm(points[2] - points[1]))
-    down = 0.5 * float(np.linalg.norm(points[4] - points[3]))
-    x, y, z = points[0].tolist()
-    return (x, y, z), math.sqrt(across * down)
-
-
 def model_pictures(
     model: OpticalModel,
     photographs: Photographs,
-    seen: list[SeenContact],
+    seen: Sequence[SeenContact],
     *,
     photons: int,
     seed: int = 0,
     exposure: float | None = None,
+    kept: KeptRenderings = KEPT_NOWHERE,
     progress: Callable[[int], None] = lambda done: None,
 ) -> ModelPictures:
     """Render the background and the presses of photographs.
@@ -243,6 +65,7 @@ def model_pictures(
         photons: of the light that all pictures share.
         seed: of the light.
         exposure: factor on the radiance; what brings the background closest if None.
+        kept: renderings that need not be made again.
         progress: called with the number of pictures that are done.
 
     Raises:
@@ -251,29 +74,12 @@ def model_pictures(
         OptiSenseError: the design can't be rendered.
     """
     check_shape(photographs, model)
-    rays = model.chief_rays(photographs.size)
-    contacts = tuple(
-        contact_of(press, place, model, rays)
-        for press, place in zip(photographs.presses, seen, strict=True)
-    )
-    images: list[TactileImage] = []
-    for number, pressed in enumerate([(), *((contact,) for contact in contacts)]):
-        progress(number)
-        images.append(
-            model.render(
-                pressed,
-                resolution=photographs.size,
-                photons=photons,
-                seed=seed,
-                partial=False,
-                skin=ELASTIC,
-            )
-        )
-    chain = images[0].chain.without_noise()
+    layers = layered_pictures(model, photographs, seen, photons, seed, kept=kept, progress=progress)
+    background, *presses = (each.sum(axis=0) for each in (layers.background, *layers.presses))
     if exposure is None:
-        exposure = matched_exposure(images[0].radiance, chain, photographs.background)
-    pictures = [levels_of(image.radiance, chain, exposure) for image in images]
-    return ModelPictures(exposure, pictures[0], tuple(pictures[1:]), contacts)
+        exposure = matched_exposure(background, layers.chain, photographs.background)
+    pictures = [levels_of(each, layers.chain, exposure) for each in (background, *presses)]
+    return ModelPictures(exposure, pictures[0], tuple(pictures[1:]), layers.contacts)
 
 
 def levels_of(radiance: NDArray[np.floating], chain: PictureChain, exposure: float) -> FloatArray:

@@ -9,6 +9,7 @@ bare background reaches 0.975 there.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -16,8 +17,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter
 
-from optisense.calibration.model_pictures import ModelPictures, SeenContact
+from optisense.calibration.model_pictures import ModelPictures
 from optisense.calibration.photographs import Photographs
+from optisense.calibration.seen_contacts import SeenContact
 
 FloatArray = NDArray[np.float64]
 
@@ -74,6 +76,26 @@ class PressRealism:
 
 
 @dataclass(frozen=True)
+class ReadBothWays:
+    """What readers read in one contact that were calibrated on the other's pictures.
+
+    Attributes:
+        name: of the photograph.
+        radius: of the ball that a reader calibrated on the model reads in the photograph, over what
+            it is.
+        degrees: mean angle between those normals and the ball's.
+        radius_back, degrees_back: the same of a reader that is calibrated on the photographs, in
+            the model's picture.
+    """
+
+    name: str
+    radius: float
+    degrees: float
+    radius_back: float
+    degrees_back: float
+
+
+@dataclass(frozen=True)
 class BackgroundRealism:
     """How far the model's untouched picture is from the real one, for R, G and B.
 
@@ -99,22 +121,31 @@ class Realism:
         background: of the untouched sensor.
         presses: of each press.
         exposure: of the model's pictures.
+        readings: of each press; none where there are too few to calibrate a reader.
     """
 
     background: BackgroundRealism
     presses: tuple[PressRealism, ...]
     exposure: float
+    readings: tuple[ReadBothWays, ...] = ()
 
     def median(self, name: str) -> float:
         """The median over the presses of one of their figures."""
         return float(np.median([getattr(press, name) for press in self.presses]))
+
+    def median_reading(self, name: str) -> float:
+        """The median over the presses of one of the figures of readings; NaN without readings."""
+        values = [getattr(each, name) for each in self.readings]
+        return float(np.median(values)) if values else math.nan
 
     def as_data(self) -> dict[str, Any]:
         """All figures, ready for JSON."""
         return asdict(self)
 
 
-def realism(photographs: Photographs, seen: list[SeenContact], pictures: ModelPictures) -> Realism:
+def realism(
+    photographs: Photographs, seen: Sequence[SeenContact], pictures: ModelPictures
+) -> Realism:
     """Compare a model's pictures with photographs.
 
     Args:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from functools import cache
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -134,7 +134,7 @@ def kind_named(text: str) -> Kind:
     raise LibraryError(f"the library has no kind '{text}'", hint=suggestion(text, KINDS))
 
 
-@cache
+@lru_cache(maxsize=len(KINDS))
 def _built_in(kind: Kind) -> dict[str, AnyEntry]:
     """All built-in entries of a kind by name; lights and cameras have a file each, materials and
     coatings share one."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 
 from optisense.calibration.calibrating import Calibration
@@ -24,6 +25,14 @@ FIGURES = {
     "far": "far field, levels",
 }
 """Figures of presses whose medians the page shows, and in words."""
+
+READINGS = {
+    "radius": "ball read by the model's reader, times",
+    "degrees": "normals read by it off, degrees",
+    "radius_back": "ball read by the photographs' reader in the model, times",
+    "degrees_back": "normals read by it off, degrees",
+}
+"""Figures of readings whose medians the page shows, and in words."""
 
 
 def write_calibration(path: str | Path, found: Calibration) -> Path:
@@ -106,6 +115,9 @@ def summary_rows(found: Calibration) -> list[tuple[str, ...]]:
         (words, *("" if each is None else f"{each.median(name):.3f}" for each in columns))
         for name, words in FIGURES.items()
     ]
+    for name, words in READINGS.items():
+        values = [math.nan if each is None else each.median_reading(name) for each in columns]
+        rows.append((words, *("" if math.isnan(value) else f"{value:.2f}" for value in values)))
     ratios = [side.realism.background.ratio for side in (found.before, found.after)]
     rows.append(("background, dB", *(f"{ratio:.1f}" for ratio in ratios), "", ""))
     return rows

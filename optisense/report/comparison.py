@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from optisense.calibration.comparing import Comparison
-from optisense.calibration.realism import PATCH, PressRealism, distances
+from optisense.calibration.realism import PATCH, PressRealism, Realism, distances
 from optisense.design import SensorDesign
 from optisense.report.drawing import figure_uri, new_figure
 from optisense.report.files import page
@@ -69,6 +69,7 @@ def render_comparison(design: SensorDesign, found: Comparison) -> str:
         channels=channel_rows(found),
         presses=[press_section(found, index) for index in range(len(figures.presses))],
         rows=[press_row(press) for press in figures.presses],
+        readings=reading_rows(figures),
         contrast=f"{CONTRAST:g}",
         patch=f"{PATCH:g}",
     )
@@ -112,6 +113,20 @@ def press_row(press: PressRealism) -> tuple[str, ...]:
         " / ".join(f"{turn:.0f}" for turn in press.turn),
         " / ".join(f"{gain:.2f}" for gain in press.gain),
     )
+
+
+def reading_rows(found: Realism) -> list[tuple[str, ...]]:
+    """What is read in each contact by readers that were calibrated on the other's pictures."""
+    return [
+        (
+            each.name,
+            f"{each.radius:.2f}",
+            f"{each.degrees:.1f}",
+            f"{each.radius_back:.2f}",
+            f"{each.degrees_back:.1f}",
+        )
+        for each in found.readings
+    ]
 
 
 def press_section(found: Comparison, index: int) -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""The way of a belt, put together from straight runs and bends, and its parallel curves."""
+"""The path of a belt, put together from straight runs and bends, and its parallel curves."""
 
 from __future__ import annotations
 
@@ -105,6 +105,24 @@ def mirrored_and_joined(left: FloatArray, right: FloatArray) -> FloatArray:
     """Two halves (n, 2) that begin at x = 0 as one curve from left to right; `left` is given as
     if it lay on the right."""
     return np.concatenate([left[:0:-1] * (-1.0, 1.0), right])
+
+
+def way_back(left: BeltHalf, right: BeltHalf, radius: float) -> tuple[float, float]:
+    """How a belt closes behind its two wheels, which turn it by a quarter each before.
+
+    Args:
+        left: as if it lay on the right.
+        radius: mm, of the inner face around both wheels.
+
+    Returns:
+        mm: the length of the inner face that is drawn, and of the straight run of the way back;
+        this one and half a turn around a wheel are what is left out.
+    """
+    (x0, z0), (x1, z1) = left.bends[max(left.bends)], right.bends[max(right.bends)]
+    drawn = sum(
+        float(np.linalg.norm(np.diff(half.points, axis=0), axis=1).sum()) for half in (left, right)
+    )
+    return drawn, math.hypot(x1 + x0, z1 - z0)
 
 
 def _normal(angle: float) -> FloatArray:

@@ -26,7 +26,14 @@ from optisense.design import (
     SensorDesign,
 )
 from optisense.geometry import TriangleMesh
-from optisense.sensors.belt_path import BeltHalf, Bend, Straight, mirrored_and_joined, trace
+from optisense.sensors.belt_path import (
+    BeltHalf,
+    Bend,
+    Straight,
+    mirrored_and_joined,
+    trace,
+    way_back,
+)
 from optisense.sensors.dimensions import (
     Positive,
     PositiveCount,
@@ -42,7 +49,7 @@ from optisense.sensors.gelbelt_checks import (
     check_numbers,
     check_wheels,
 )
-from optisense.sensors.gelbelt_sources import gelbelt_sources
+from optisense.sensors.gelbelt_sources import LeftOut, gelbelt_sources
 from optisense.sensors.led_flux import nominal_flux
 from optisense.sensors.shapes import ribbon, rod, row_of_lights, strip
 
@@ -230,7 +237,10 @@ def gelbelt(
             direction=(0.0, 0.0, 1.0),
             up=(0.0, 1.0, 0.0),
         ),
-        provenance=gelbelt_sources(light_design),
+        provenance=gelbelt_sources(
+            light_design,
+            _left_out(left, plain, wheel_radius, (tape_thickness, gel_thickness), half[1]),
+        ),
     )
     design.meshes.update(
         _belt(left, plain, (tape_thickness, gel_thickness), half[1], tessellation),
@@ -244,6 +254,22 @@ def gelbelt(
         del design.provenance["parts.film"], design.provenance[f"materials.{FILM}.ior"]
     describe_changes(design, gelbelt, given, said=("light_design",))
     return design
+
+
+def _left_out(
+    left: BeltHalf, right: BeltHalf, radius: float, layers: tuple[float, float], half_width: float
+) -> LeftOut:
+    """The belt's way back, which no light takes and which is not drawn."""
+    tape, gel = layers
+    drawn, run = way_back(left, right, radius)
+    inner, outer = radius + tape, radius + tape + gel
+    half_turn = 0.5 * math.pi * (outer**2 - inner**2)
+    return LeftOut(
+        length=math.pi * radius + run,
+        whole=drawn + math.pi * radius + run,
+        gel=2.0 * half_width * (half_turn + gel * run),
+        coat=2.0 * half_width * (math.pi * outer + run),
+    )
 
 
 def _aimed(

@@ -2,11 +2,31 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 from optisense.design import Provenance, Status
 
 
-def gelbelt_sources(light_design: int) -> dict[str, Provenance]:
+@dataclass(frozen=True)
+class LeftOut:
+    """What is not drawn of a belt: its way back behind the wheels.
+
+    Attributes:
+        length: mm, along the inner face.
+        whole: mm, the inner face all around.
+        gel: mm^3.
+        coat: mm^2, of the outer face.
+    """
+
+    length: float
+    whole: float
+    gel: float
+    coat: float
+
+
+def gelbelt_sources(light_design: int, left_out: LeftOut) -> dict[str, Provenance]:
     """The provenance of a GelBelt with one of its light designs."""
+    way_back = f"{left_out.length:.0f} of {left_out.whole:.0f} mm along the inner face"
     assumed, sourced, derived = Status.ASSUMED, Status.SOURCED, Status.DERIVED
     paper = "OptiSense paper, GelBelt"
     where = {
@@ -34,10 +54,19 @@ def gelbelt_sources(light_design: int) -> dict[str, Provenance]:
         "parts.gel": (
             assumed,
             "3 mm of silicone XP-565, as wide as the window; 36 mm assumed; drawn as far as a "
-            "quarter turn around each wheel: the belt's way back is left out",
+            f"quarter turn around each wheel: the belt's way back is left out, {way_back}; it "
+            f"takes {left_out.gel / 1000.0:.1f} cm^3 more",
         ),
-        "parts.skin": (assumed, "outer face of the gel where it does not lie on a wheel"),
-        "parts.tape": (assumed, "0.05 mm, usual for clear tape; drawn as far as the gel"),
+        "parts.skin": (
+            assumed,
+            "outer face of the gel where it does not lie on a wheel; far-coat has the rest that is "
+            f"drawn, and the belt's way back takes {left_out.coat / 100.0:.0f} cm^2 more",
+        ),
+        "parts.tape": (
+            assumed,
+            "0.05 mm, usual for clear tape; drawn as far as the gel: the belt takes "
+            f"{left_out.whole:.0f} mm of it",
+        ),
         "parts.film": (assumed, "0.02 mm: any gap of more than some wavelengths does the same"),
         "parts.window": (assumed, "50 x 36 x 6 mm"),
         "parts.wheels": (

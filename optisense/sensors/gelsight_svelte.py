@@ -37,7 +37,7 @@ from optisense.sensors.dimensions import (
 )
 from optisense.sensors.led_flux import balanced_flux
 from optisense.sensors.shapes import ribbon, row_of_lights, strip
-from optisense.sensors.svelte_body import check_mirrors, housing
+from optisense.sensors.svelte_body import LED, check_mirrors, housing, led_covers
 from optisense.sensors.svelte_profile import (
     CurvedMirror,
     FlatMirror,
@@ -48,7 +48,6 @@ from optisense.sensors.svelte_sources import provenance
 
 NAME = "gelsight-svelte"
 GEL, MIRROR = "silicone-xp565", "mirror-silver"
-LED = "smd-3528"
 
 VIEWS = ("m2", "palm")
 
@@ -77,6 +76,8 @@ def gelsight_svelte(
     m1_sagitta: Positive = 5.5,
     m1_width: Positive = 22.0,
     m1_grid: tuple[int, int] = (168, 45),
+    mirror_thickness: Positive = 1.0,
+    wall_thickness: Positive = 1.0,
     clearance: Positive = 0.5,
     m2_bottom: tuple[float, float] = (16.7, -2.8),
     m2_tilt: float = 22.4,
@@ -108,6 +109,9 @@ def gelsight_svelte(
         m1_sagitta: mm, how far the middle of M1 lies behind the chord between its ends.
         m1_width: mm.
         m1_grid: vertices of M1 along and across the finger.
+        mirror_thickness: mm that M1 and M2 are made with, behind their faces; light sees the faces.
+        wall_thickness: mm that body, side walls and LED covers are made with, outside of their
+            inner faces.
         clearance: mm, between the most curved M1 and the skin.
         m2_bottom: (x, z) mm, the end of M2 at the base.
         m2_tilt: degrees, of M2 from the z axis, its upper end towards the palm.
@@ -155,7 +159,7 @@ def gelsight_svelte(
     m2 = FlatMirror.facing(m2_bottom, m2_tilt, m2_length, inner)
     check_mirrors(m1, m1_sagitta, m2, gel_outline)
     widths = (gel_width, max(m1_width, m2_width))
-    body = housing(palm, inner, back_outline, m1, most, m2, widths, led_gap)
+    walls = housing(palm, back_outline, m1, most, m2, widths, led_gap, wall_thickness)
     low, high = m2.seen_between()
     if view == "palm":
         low = m2.angle_of(m1.curve(m1_sagitta)[0])
@@ -169,9 +173,23 @@ def gelsight_svelte(
         parts={
             "skin": Part(role=Role.SENSING_SURFACE, mesh="meshes/skin.obj"),
             "gel": Part(role=Role.ELASTOMER, mesh="meshes/gel.obj", material=GEL, priority=1),
-            "M1": Part(role=Role.MIRROR, mesh="meshes/M1.obj", material=MIRROR),
-            "M2": Part(role=Role.MIRROR, mesh="meshes/M2.obj", material=MIRROR),
-            "body": Part(role=Role.BLOCKER, mesh="meshes/body.obj"),
+            "M1": Part(
+                role=Role.MIRROR,
+                mesh="meshes/M1.obj",
+                material=MIRROR,
+                thickness=mirror_thickness,
+            ),
+            "M2": Part(
+                role=Role.MIRROR,
+                mesh="meshes/M2.obj",
+                material=MIRROR,
+                thickness=mirror_thickness,
+            ),
+            "body": Part(role=Role.BLOCKER, mesh="meshes/body.obj", thickness=wall_thickness),
+            **{
+                name: Part(role=Role.BLOCKER, mesh=f"meshes/{name}.obj", thickness=wall_thickness)
+                for name in ("side-walls", "led-covers")
+            },
         },
         lights=_lights(
             palm, gel_thickness, gel_width, leds_per_side, led_pitch, led_gap, led_flux, tip_leds
@@ -190,7 +208,8 @@ def gelsight_svelte(
         gel=strip(palm.points, inner, 0.5 * gel_width, rows),
         M1=ribbon(m1.curve(0.0, m1_grid[0]), 0.5 * m1_width, m1_grid[1] - 1).flipped(),
         M2=ribbon(m2.ends()[::-1], 0.5 * m2_width, 1).flipped(),
-        body=body,
+        **walls,
+        **{"led-covers": led_covers(palm, inner, widths, led_gap)},
     )
     design.cages = {"M1": _mirror_cage(design.meshes["M1"], m1, most, m1_sagitta / most)}
     design.provenance = provenance(tip_leds > 0)

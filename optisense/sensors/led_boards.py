@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from optisense.design import AreaEmitter, Light, LightGroup
 from optisense.geometry import TriangleMesh
+from optisense.sensors.led_flux import package
 
 COLOURS = {"R": (1.0, 0.0, 0.0), "G": (0.0, 1.0, 0.0), "B": (0.0, 0.0, 1.0)}
 BOARDS = 4
@@ -18,8 +19,6 @@ BOARDS = 4
 LED_MODEL = "smd-0805"
 LED = (1.25, 2.0)
 """mm, width (along the radius) and length of the emitting window."""
-LED_HEIGHT = 0.8
-"""Height in mm by which an LED of the package 0805 stands off its board."""
 WINDOW_GAP = 0.01
 """mm between an LED's body and the window in front of it: wide enough not to count as contact."""
 WALL_MARGIN = 0.15
@@ -28,6 +27,11 @@ RING_HEIGHT = 0.3
 """mm, z of the windows of a ring of LEDs at the foot of the wall."""
 
 FloatArray = NDArray[np.float64]
+
+
+def led_height() -> float:
+    """mm by which an LED stands off its board: the height of its package in the library."""
+    return package(LED_MODEL)[2]
 
 
 @dataclass(frozen=True)
@@ -63,7 +67,7 @@ class LedBoards:
     @property
     def _window(self) -> float:
         """mm from the middle of a board to the windows of its LEDs."""
-        return 0.5 * self.thickness + LED_HEIGHT + WINDOW_GAP
+        return 0.5 * self.thickness + led_height() + WINDOW_GAP
 
     def _heights(self) -> FloatArray:
         """(leds,) mm, z of the middle of the LEDs."""
@@ -72,7 +76,7 @@ class LedBoards:
 
     def mesh(self) -> TriangleMesh:
         """The boards and the bodies of the LEDs on them: closed boxes that touch."""
-        across, half = 0.5 * self.thickness, self._half_depth
+        across, half, high = 0.5 * self.thickness, self._half_depth, led_height()
         top = self.bottom + self.height
         bodies = [
             TriangleMesh.box(
@@ -81,9 +85,9 @@ class LedBoards:
         ]
         inner, outer = self.radius - 0.5 * LED[0], self.radius + 0.5 * LED[0]
         for z in self._heights():
-            for y in (-across - LED_HEIGHT, across):
+            for y in (-across - high, across):
                 low = (inner, y, z - 0.5 * LED[1])
-                bodies.append(TriangleMesh.box(low, (outer, y + LED_HEIGHT, z + 0.5 * LED[1])))
+                bodies.append(TriangleMesh.box(low, (outer, y + high, z + 0.5 * LED[1])))
         return TriangleMesh.joined(
             [body.transformed(_turned(board)) for board in range(BOARDS) for body in bodies]
         )

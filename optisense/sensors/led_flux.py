@@ -1,4 +1,5 @@
-"""How brightly the LEDs of the built-in sensors shine where no source says it."""
+"""How large the LEDs of the built-in sensors are, and how brightly they shine where no source says
+it."""
 
 from __future__ import annotations
 
@@ -29,6 +30,13 @@ def balanced_flux(model: str) -> float:
 def nominal_flux(model: str, colour: str) -> float:
     """The radiant flux (mW) of one colour ("red", ...) of an LED at its nominal current."""
     return _nominal(model)[colour]
+
+
+def package(model: str) -> tuple[float, float, float]:
+    """mm: width, length and height of an LED's body, as the library has them."""
+    entry = library.entry("light", model)
+    assert isinstance(entry, LightEntry) and entry.package is not None
+    return entry.package
 
 
 def _nominal(model: str) -> dict[str, float]:

@@ -10,11 +10,12 @@ import shapely
 
 from optisense.errors import DesignError
 from optisense.geometry import TriangleMesh
+from optisense.sensors.led_flux import package
 from optisense.sensors.shapes import ribbon
 from optisense.sensors.svelte_profile import CurvedMirror, FlatMirror, FloatArray, Palm, Points
 
-LED_HEIGHT = 1.9
-"""mm behind an LED's window: the height of its package."""
+LED = "smd-3528"
+"""The light of the library that stands beside the gel."""
 
 BEHIND_M2 = 1.0
 """Distance in mm between mirror M2 and the body behind it; no light passes there."""
@@ -56,25 +57,25 @@ def check_mirrors(
 
 def housing(
     palm: Palm,
-    inner: FloatArray,
     back_outline: Points,
     m1: CurvedMirror,
     most: float,
     m2: FlatMirror,
     widths: tuple[float, float],
     led_gap: float,
-) -> TriangleMesh:
-    """Walls around everything but the palm, and a frame along both sides of the gel that hides
-    the LEDs beside it from the camera; a sheet that absorbs light.
+    wall_thickness: float,
+) -> dict[str, TriangleMesh]:
+    """Walls around everything but the palm: `body`, the back and the base, and `side-walls`; sheets
+    that absorb light, with their normals to the inside.
 
     Args:
         palm: the coated face.
-        inner: (n, 2) mm, the inner face of the gel.
         back_outline: (x, z) mm from base to tip.
         m1, most: the curved mirror and its largest sagitta, mm.
         m2: the flat mirror.
         widths: mm, of the gel and of the widest mirror.
-        led_gap: mm; the walls leave room for the LEDs beside the gel.
+        led_gap: mm.
+        wall_thickness: mm.
 
     Raises:
         DesignError: the outline crosses itself, or a mirror or the camera is not inside.
@@ -86,21 +87,41 @@ def housing(
     base = np.concatenate([palm.points[:1], behind[::-1], bottom, back[:1]])
     outline = np.concatenate([palm.points, rest[-2::-1], base[-2:0:-1]])
     _check_inside(outline, m1, most, m2)
-    gel_half = 0.5 * widths[0]
-    half = max(gel_half + led_gap + LED_HEIGHT, 0.5 * widths[1] + BESIDE_MIRROR)
-    frame = np.concatenate([palm.points, inner[::-1], palm.points[:1]])
-    rim = ribbon(frame, 0.5 * (half - gel_half), 1)
+    half = _half_width(widths, led_gap)
+    # The sides stand between back and base, which reach as far as their outer faces.
+    wide = half + wall_thickness
+    around = TriangleMesh.joined(
+        [ribbon(rest, wide, 1).flipped(), ribbon(base, wide, 1).flipped()]
+    ).welded()
+    sides = TriangleMesh.joined([_wall(outline, half), _wall(outline, -half).flipped()])
+    return {"body": around, "side-walls": sides}
+
+
+def led_covers(
+    palm: Palm, inner: FloatArray, widths: tuple[float, float], led_gap: float
+) -> TriangleMesh:
+    """A channel along each side of the gel that hides the LEDs in it from the camera; a sheet that
+    absorbs light, with its normals to the LEDs.
+
+    Args:
+        palm: the coated face.
+        inner: (n, 2) mm, the inner face of the gel.
+        widths: mm, of the gel and of the widest mirror.
+        led_gap: mm.
+    """
+    gel_half, half = 0.5 * widths[0], _half_width(widths, led_gap)
+    channel = np.concatenate([palm.points, inner[::-1], palm.points[:1]])
+    side = ribbon(channel, 0.5 * (half - gel_half), 1)
     beside = np.array([0.0, 0.5 * (half + gel_half), 0.0])
     return TriangleMesh.joined(
-        [
-            ribbon(rest, half, 1),
-            ribbon(base, half, 1),
-            rim.with_vertices(rim.vertices + beside),
-            rim.with_vertices(rim.vertices - beside),
-            _wall(outline, half),
-            _wall(outline, -half),
-        ]
+        [side.with_vertices(side.vertices + beside), side.with_vertices(side.vertices - beside)]
     ).welded()
+
+
+def _half_width(widths: tuple[float, float], led_gap: float) -> float:
+    """mm from the middle of the finger to the inside of its walls, which leave room for the LEDs
+    beside the gel."""
+    return max(0.5 * widths[0] + led_gap + package(LED)[2], 0.5 * widths[1] + BESIDE_MIRROR)
 
 
 def _check_inside(outline: FloatArray, m1: CurvedMirror, most: float, m2: FlatMirror) -> None:
@@ -129,7 +150,7 @@ def _check_inside(outline: FloatArray, m1: CurvedMirror, most: float, m2: FlatMi
 
 
 def _wall(outline: FloatArray, y: float) -> TriangleMesh:
-    """The outline's flat inside at one y."""
+    """The outline's flat inside at one y; its normal is -y."""
     turned = outline if shapely.LinearRing(outline).is_ccw else outline[::-1]
     faces = np.asarray(manifold3d.triangulate([turned]))
     return TriangleMesh(

@@ -41,11 +41,20 @@ def provenance(tip: bool) -> dict[str, Provenance]:
             f"lower end (16.7, -2.8), 22.4 degrees from the z axis: {ANIMATION}; as much of its "
             "24.3 mm as sees M1 past the gel; 18 mm wide (assumed)",
         ),
+        "parts.M1.thickness": (assumed, "1 mm, usual for mirrors of plastic sheet"),
+        "parts.M2.thickness": (assumed, "1 mm, as M1"),
+        "parts.body.thickness": (assumed, "1 mm, usual for printed shells of this size"),
+        "parts.side-walls.thickness": (assumed, "1 mm, as the body"),
+        "parts.led-covers.thickness": (assumed, "1 mm, as the body"),
+        "parts.led-covers": (
+            assumed,
+            "channels along both sides of the gel, without which the camera would see the LEDs",
+        ),
         "parts.body": (
             derived,
-            f"outline of the back: {ANIMATION}; base and side walls assumed; a sheet that "
-            "absorbs all light",
+            f"outline of the back: {ANIMATION}; the base is assumed; absorbs all light",
         ),
+        "parts.side-walls": (assumed, "flat, as wide apart as mirrors and LEDs need"),
         "cages.M1.c_min": (derived, "flat (OptiSense paper), through the middle of the arc"),
         "cages.M1.c_max": (
             derived,

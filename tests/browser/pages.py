@@ -2,10 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
+from optisense.calibration.calibrating import Calibration, FittedNumber
+from optisense.calibration.comparing import Comparison
+from optisense.calibration.model_pictures import ModelPictures
+from optisense.calibration.photographs import PhotographedPress, Photographs
+from optisense.calibration.realism import realism
+from optisense.calibration.seen_contacts import SeenContact
 from optisense.design import Provenance, SensorDesign
 from optisense.geometry import Contact, Sphere
 from optisense.geometry.objects import OBJECTS, ObjectIndenter
@@ -13,7 +20,9 @@ from optisense.objectives import Evaluation, Objective, Score, Settings
 from optisense.objectives.scored import Scored
 from optisense.optics import OpticalModel, TactileImage
 from optisense.report import write_report
+from optisense.report.calibration import write_calibration
 from optisense.report.camera_rays import CameraRays
+from optisense.report.comparison import write_comparison
 from optisense.report.light_section import LightSection, ledger_page
 from optisense.report.scores import write_score_report
 from optisense.report.study import write_study_report
@@ -79,7 +88,44 @@ def write_pages(folder: Path) -> dict[str, Path]:
     errors = {"coating.reflectance.r": ToleranceDistribution(0.3, "uniform")}
     write_tolerance_report(pages["errors"], tolerance(design, red, errors, sensors=60))
     write_verification_report(pages["verify"], verified(), (np.eye(3), np.eye(3)))
+    return {**pages, **write_photograph_pages(folder, design)}
+
+
+def write_photograph_pages(folder: Path, design: SensorDesign) -> dict[str, Path]:
+    """The pages of `compare` and `calibrate`, of pictures that were made up."""
+    before, after = compared(1.5), compared(1.1)
+    number = FittedNumber("lights.red.flux", EVIL, "mW", 1.0, 1.2, 0.05, True)
+    found = Calibration(
+        design=design,
+        exposure=1.0,
+        numbers=(number, replace(number, determined=False)),
+        alike=((EVIL, EVIL, 0.97),),
+        before=before,
+        after=after,
+        held_out=(f"1 {EVIL}",),
+        notes=(EVIL,),
+    )
+    pages = {name: folder / f"{name}.html" for name in ("comparison", "calibration")}
+    write_comparison(pages["comparison"], design, after)
+    write_calibration(pages["calibration"], found)
     return pages
+
+
+def compared(gain: float) -> Comparison:
+    """Two photographs of balls, and a model that brightens more than they do."""
+    rows, columns = np.mgrid[:60, :80]
+    away = np.hypot(columns - 40.0, rows - 30.0)
+    slope = np.where(away < 10.0, columns - 40.0, 0.0)[..., None] * (4.0, -3.0, 2.0)
+    noise = np.random.default_rng(0).normal(0.0, 1.0, (60, 80, 3))
+    ground = np.full((60, 80, 3), 90, np.uint8)
+    picture = np.clip(np.round(90.0 + slope + noise), 0, 255).astype(np.uint8)
+    presses = tuple(PhotographedPress(f"{k} {EVIL}", picture, 6.35) for k in range(2))
+    photographs = Photographs(ground, presses)
+    seen = [SeenContact((40.0, 30.0), 10.0)] * 2
+    model = 90.0 + gain * slope
+    pictures = ModelPictures(1.0, np.full((60, 80, 3), 92.0), (model, model), (BALL, BALL))
+    figures = realism(photographs, seen, pictures)
+    return Comparison(photographs, tuple(seen), pictures, figures, (EVIL,))
 
 
 def verified() -> Verification:

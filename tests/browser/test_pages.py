@@ -13,7 +13,9 @@ from .conftest import Open
 from .pages import EVIL
 from .visit import DESKTOP, TELEPHONE
 
-KINDS = ["render", "ledger", "scores", "study", "errors", "verify"]
+KINDS = [
+    "render", "ledger", "scores", "study", "errors", "verify", "comparison", "calibration",
+]  # fmt: skip
 CONTROLS = {"button", "slider", "combobox", "checkbox", "link", "textbox", "spinbutton"}
 FOCUSED = """() => {
   const at = document.activeElement;

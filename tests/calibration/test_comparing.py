@@ -15,13 +15,14 @@ from typer.testing import CliRunner
 import optisense as ots
 from optisense.calibration import Photographs, compare, save_photographs
 from optisense.calibration.contact_finding import find_contact
-from optisense.calibration.model_pictures import SeenContact, contact_of, doubts, seen_contacts
+from optisense.calibration.reading_both_ways import read_both_ways
 from optisense.calibration.realism import similarity
+from optisense.calibration.seen_contacts import SeenContact, contact_of, doubts, seen_contacts
 from optisense.cli import app
 from optisense.design import set_value
 from optisense.errors import CalibrationError
 
-from .conftest import PHOTONS, PLACES
+from .conftest import PHOTONS, PLACES, SIZE
 
 if TYPE_CHECKING:
     from optisense.optics import OpticalModel
@@ -182,3 +183,41 @@ def test_the_command_says_what_is_wrong(photographs: Photographs, tmp_path: Path
     run = CliRunner().invoke(app, ["compare", "gelsight-mini", str(tmp_path)])
     assert run.exit_code == 2
     assert "there is no background.png" in run.output
+
+
+def test_found_contacts_are_told_and_shown_for_correction(
+    photographs: Photographs, tmp_path: Path
+) -> None:
+    save_photographs(tmp_path / "photos", photographs)
+    page = tmp_path / "contacts.html"
+    run = CliRunner().invoke(app, ["contacts", str(tmp_path / "photos"), "--out", str(page)])
+    assert run.exit_code == 0, run.output
+    text = page.read_text("utf-8")
+    found = json.loads(text.split('id="contacts-data">')[1].split("</script>")[0])
+    assert [each["file"] for each in found] == [press.name for press in photographs.presses]
+    assert all(each["used"] for each in found)
+    assert f"{found[0]['column']:.1f}" in run.output
+
+
+def test_readers_of_pictures_that_are_alike_read_each_others_balls(
+    mini: OpticalModel, photographs: Photographs
+) -> None:
+    """Of a model's own pictures the balls are read as large as they are; stronger ones are not."""
+    found = compare(mini, photographs, photons=PHOTONS, seed=5)
+    assert [each.name for each in found.realism.readings] == [
+        press.name for press in photographs.presses
+    ]
+    assert found.realism.median_reading("radius") == pytest.approx(1.0, abs=0.15)
+    assert found.realism.median_reading("radius_back") == pytest.approx(1.0, abs=0.15)
+    assert found.realism.median_reading("degrees") < 8.0
+    weaker = found.pictures.background
+    half = replace(
+        found.pictures,
+        presses=tuple(0.5 * (each + weaker) for each in found.pictures.presses),
+    )
+    rays, axes = mini.chief_rays(SIZE), mini.design.camera.axes()
+    read = read_both_ways(photographs, found.seen, half, rays, axes, 2.0)
+    # Tilts of what is photographed look too steep to a reader of weaker responses.
+    assert np.median([each.radius for each in read]) < 0.93
+    assert np.median([each.radius_back for each in read]) > 1.07
+    assert read_both_ways(photographs.subset([0, 1]), found.seen[:2], half, rays, axes, 2.0) == ()

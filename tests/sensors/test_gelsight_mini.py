@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from importlib.resources import as_file, files
 from pathlib import Path
 from typing import Any
 
@@ -11,9 +12,12 @@ import pytest
 
 import optisense
 from optisense import library, sensors
+from optisense.calibration.model_pictures import levels_of, matched_exposure
 from optisense.design import SensorDesign, save_design
-from optisense.errors import DesignError
+from optisense.errors import CalibrationError, DesignError
 from optisense.library import LightEntry
+from optisense.picture_files import read_picture
+from optisense.report.real_sensor import BALL_PLACE, PICTURE
 
 FIELD_OF_VIEW = (18.6, 14.3)
 """mm on the gel, by the maker's datasheet."""
@@ -174,3 +178,41 @@ class TestLoad:
         design.lights["red"].model = "smd-3529"
         with pytest.raises(DesignError, match="Did you mean 'smd-3528'"):
             sensors.check(design)
+
+
+class TestFitted:
+    """The Mini that was fitted to photographs of a real unit."""
+
+    def test_what_was_fitted_says_so(self) -> None:
+        design = sensors.gelsight_mini_fitted()
+        fitted = {p for p, known in design.provenance.items() if known.status == "calibrated"}
+        assert fitted >= {f"lights.{name}.flux" for name in design.lights}
+        assert fitted >= {"camera.fov", "camera.position", "camera.tone_curve", "camera.shading"}
+        assert fitted >= {"parts.guide.faces", "parts.tray.faces", "camera.stray_light"}
+        for path in fitted:
+            assert "GelSLAM" in design.provenance[path].source
+        assert design.provenance["parts.tray"].status == "sourced"
+
+    def test_it_sees_as_much_of_the_skin_as_photographs_show(self) -> None:
+        model = optisense.OpticalModel(sensors.gelsight_mini_fitted())
+        points = model.chief_rays((160, 120)).points
+        seen = np.linalg.norm(points[60, -1] - points[60, 0]) * 160 / 159
+        assert seen == pytest.approx(20.3, rel=0.025)
+
+    def test_its_background_is_that_of_a_real_unit(self) -> None:
+        """28 dB away from the ball of a published picture, where the ideal one has far less."""
+        with as_file(files("optisense.report") / "real" / PICTURE) as path:
+            real = read_picture(path, CalibrationError).astype(np.float64)
+        real = real.reshape(120, 2, 160, 2, 3).mean(axis=(1, 3))
+        rows, columns = np.mgrid[:120, :160] + 0.5
+        away = np.hypot(columns - BALL_PLACE[0] / 2, rows - BALL_PLACE[1] / 2) > 45.0
+        ratios = []
+        for name in ("gelsight-mini-fitted", "gelsight-mini"):
+            model = optisense.OpticalModel(sensors.build(name))
+            image = model.render(resolution=(160, 120), photons=200_000)
+            chain = image.chain.without_noise()
+            exposure = matched_exposure(image.radiance, chain, np.round(real).astype(np.uint8))
+            error = levels_of(image.radiance, chain, exposure) - real
+            ratios.append(20.0 * math.log10(255.0 / math.sqrt((error[away] ** 2).mean())))
+        assert ratios[0] > 28.0, ratios
+        assert ratios[1] < ratios[0] - 8.0, ratios

@@ -10,7 +10,7 @@ import numpy as np
 
 from optisense.errors import DesignError, MeshError
 from optisense.geometry import TriangleMesh
-from optisense.geometry.mesh_files import FORMATS, load_mesh
+from optisense.geometry.mesh_files import FORMATS
 from optisense.geometry.step import SUFFIXES as STEP_FORMATS
 from optisense.geometry.step import read_step
 from optisense.near import near_match
@@ -122,7 +122,7 @@ def _mesh(path: Path) -> TriangleMesh:
             hint="In the CAD tool: export STL, OBJ, PLY or STEP",
         )
     try:
-        return load_mesh(path)
+        return TriangleMesh.load(path)
     except MeshError as error:
         if "no triangles" not in error.message:
             raise

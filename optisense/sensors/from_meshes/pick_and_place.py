@@ -13,6 +13,7 @@ from pathlib import Path
 
 from optisense.errors import DesignError
 from optisense.sensors.from_meshes.recipe_parts import MM_PER, Units
+from optisense.untrusted_files import MOST_BOARD, read_bytes
 
 NAMES = {
     "designator": ("designator", "ref", "refdes", "reference", "partdesignator"),
@@ -78,9 +79,7 @@ def read_pick_and_place(path: Path, units: Units | None = None) -> dict[str, Boa
 
 
 def _lines(path: Path) -> list[str]:
-    if not path.is_file():
-        raise DesignError("there is no such file", where=str(path), hint="Check the path")
-    data = path.read_bytes()
+    data = read_bytes(path, MOST_BOARD, DesignError, "the pick-and-place file")
     coding = "utf-16" if data[:2] in (b"\xff\xfe", b"\xfe\xff") else "utf-8-sig"
     try:
         return data.decode(coding).splitlines()

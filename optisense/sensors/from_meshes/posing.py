@@ -25,7 +25,7 @@ from optisense.sensors.from_meshes.surfaces import chosen, pick
 from optisense.sensors.from_meshes.touching import refuse_contact_with_lamps
 
 LITTLE_SEEN = 0.5
-"""A camera that sees less of the sensing surface is told."""
+"""Share of the sensing surface below which a warning says how little the camera sees."""
 
 
 def place_lights(bench: RecipeState, name: str, choice: LightChoice) -> LightGroup:
@@ -109,7 +109,7 @@ def _note_crowded(bench: RecipeState, name: str, group: LightGroup) -> None:
 
 
 def place_camera(bench: RecipeState) -> Camera:
-    """The camera; tells when it sees little of the sensing surface.
+    """The camera; warns when it sees little of the sensing surface.
 
     Raises:
         DesignError: it can't look there.
@@ -161,7 +161,7 @@ def place_camera(bench: RecipeState) -> Camera:
 
 
 def check_places(bench: RecipeState, camera: Camera, groups: dict[str, LightGroup]) -> None:
-    """No camera and no light may lie in a face; those inside a transparent solid are told.
+    """No camera and no light may lie in a face; those inside a transparent solid give a warning.
 
     Raises:
         DesignError: one lies in a face.

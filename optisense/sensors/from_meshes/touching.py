@@ -81,7 +81,7 @@ def _priorities(recipe: Recipe, order: list[str]) -> dict[str, int]:
 
 
 def _settle(recipe: Recipe, result: Contacts, fixed: str, mover: str) -> None:
-    """Close the gap between two solids and tell overlaps."""
+    """Close the gap between two solids, and report overlaps."""
     if result.priorities[mover] > result.priorities[fixed]:
         fixed, mover = mover, fixed
     one, other = result.meshes[fixed], result.meshes[mover]

@@ -1,0 +1,323 @@
+"""The families of numbers that a calibration may fit, each with its plausible ranges."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+
+from optisense.calibration import body_changes
+from optisense.calibration.quantity import FitQuantity
+from optisense.design import SensorDesign, set_value
+from optisense.design.lenses.radial_shading import RadialShading
+from optisense.design.materials import Coating, Dielectric
+from optisense.design.materials.gel_elasticity import MAX_POISSON_RATIO
+from optisense.design.parts import Role
+from optisense.design.responses.gamma_curve import GammaCurve
+
+POWER_RANGE = 0.7
+"""Plausible range of the logarithm of a light group's power: LEDs of one type differ by a factor of
+two, and what drives them is not published."""
+
+MIX_RANGE = 0.5
+"""Plausible range of an entry of the colour matrix off its diagonal; those of published camera
+tunings reach 1."""
+
+GAMMA_START, GAMMA_RANGE = 1.8, 0.4
+"""Exponent of the tone curve to start from, and the plausible range of its logarithm: cameras of
+sensors lie between linear (1) and sRGB (about 2.2)."""
+
+DARK_RANGE = 0.05
+"""Plausible range of the level of a channel in the dark, a share of full: black levels
+of published camera tunings are 0.06 and less."""
+
+FALLOFF_START, FALLOFF_RANGE = 0.2, 0.3
+"""Share of the light that the lens loses in the picture's corners: start and plausible range."""
+
+SHADING_POWER, SHADING_RANGE = 2.0, 0.4
+"""Power of the distance with which the loss grows, to start from, and the plausible range of its
+logarithm: lenses alone lose with the square or faster, and light guides add to it."""
+
+FIELD_RANGE = 0.08
+"""Plausible range of the logarithm of the field of view: views of one type of sensor differ by a
+tenth."""
+
+PLACE_RANGE = 0.8
+"""mm, plausible range of the camera's place across its axis; it is glued in by hand."""
+
+LIGHT_PLACE_RANGE = 0.7
+"""mm, plausible range of a light group's place along the camera's axis: half an LED's package."""
+
+LIGHT_TILT_RANGE = 8.0
+"""Degrees, plausible range of the tilt of a light group, which is soldered flat or not."""
+
+WIDTH_RANGE = 0.3
+"""Plausible range of the logarithm of the width of the emission: windows of one package differ by a
+third."""
+
+THICKNESS_RANGE = 0.05
+"""Plausible range of the logarithm of a gel's thickness; GelSight states 5 % for its Mini."""
+
+POISSON_RANGE = 0.01
+"""Plausible range of a gel's Poisson ratio; silicones lie between 0.48 and 0.4999."""
+
+SPECULAR_RANGE = 0.1
+"""Plausible range of a coating's specularity, of which makers tell words only."""
+
+REFLECTANCE_RANGE = 0.3
+"""Plausible range of the logarithm of a coating's reflectance: paints of one grey differ by a
+third."""
+
+ROUGH_START, ROUGH_RANGE = 0.1, 0.2
+"""GGX alpha of edges that are polished by flame or cut by laser, to start from, and the plausible
+range; ground edges have about 0.4."""
+
+INDEX_RANGE = 0.015
+"""Plausible range of a refractive index; the literature's of one silicone differ by up to 0.04."""
+
+_LETTERS = "RGB"
+
+
+@dataclass(frozen=True)
+class Family:
+    """Numbers that are fitted together or not at all.
+
+    Attributes:
+        words: what they are.
+        of: the numbers of a design.
+        usual: whether they are fitted unless they are kept; others only if they are asked for.
+    """
+
+    words: str
+    of: Callable[[SensorDesign], list[FitQuantity]]
+    usual: bool = True
+
+
+def _powers(design: SensorDesign) -> list[FitQuantity]:
+    return [
+        FitQuantity(
+            f"lights.{name}.flux", f"power of the {name} lights", "mW", group.flux,
+            1e-3 * group.flux, min(1e6, 1e3 * group.flux), POWER_RANGE, True,
+        )
+        for name, group in design.lights.items()
+        if group.flux > 0.0
+    ]  # fmt: skip
+
+
+def _colours(design: SensorDesign) -> list[FitQuantity]:
+    matrix = np.eye(3) if design.camera.colour_matrix is None else design.camera.colour_matrix
+    return [
+        FitQuantity(
+            f"camera.colour_matrix[{row}][{column}]",
+            f"share of {_LETTERS[column]} in the picture's {_LETTERS[row]}",
+            "", float(matrix[row][column]), -4.0, 4.0, MIX_RANGE, home="camera.colour_matrix",
+        )
+        for row in range(3)
+        for column in range(3)
+        if row != column
+    ]  # fmt: skip
+
+
+def _tone(design: SensorDesign) -> list[FitQuantity]:
+    curve = design.camera.tone_curve
+    start = curve.gamma if isinstance(curve, GammaCurve) else GAMMA_START
+    return [
+        FitQuantity(
+            "camera.tone_curve.gamma", "exponent of the tone curve", "", start, 0.5, 5.0,
+            GAMMA_RANGE, True, home="camera.tone_curve",
+        )
+    ]  # fmt: skip
+
+
+def _black(design: SensorDesign) -> list[FitQuantity]:
+    start = design.camera.stray_light or (0.0, 0.0, 0.0)
+    return [
+        FitQuantity(
+            f"camera.stray_light[{channel}]", f"level of {letter} in the dark", "",
+            start[channel], 0.0, 0.5, DARK_RANGE, home="camera.stray_light",
+        )
+        for channel, letter in enumerate(_LETTERS)
+    ]  # fmt: skip
+
+
+def _shading(design: SensorDesign) -> list[FitQuantity]:
+    shading = design.camera.shading
+    start, power = FALLOFF_START, SHADING_POWER
+    if isinstance(shading, RadialShading):
+        start, power = shading.falloff, shading.power
+    return [
+        FitQuantity(
+            "camera.shading.falloff", "dimming of the picture's corners", "", start, 0.0, 0.95,
+            FALLOFF_RANGE, home="camera.shading",
+        ),
+        FitQuantity(
+            "camera.shading.power", "power with which it grows outwards", "", power, 1.0, 8.0,
+            SHADING_RANGE, True, home="camera.shading",
+        ),
+    ]  # fmt: skip
+
+
+def _view(design: SensorDesign) -> list[FitQuantity]:
+    fov = design.camera.fov
+    most = 175.0 if design.camera.projection == "perspective" else 360.0
+    field = FitQuantity(
+        "camera.fov", "field of view", "degrees", fov, 0.3 * fov, min(most, 3.0 * fov),
+        FIELD_RANGE, True, True, True,
+    )  # fmt: skip
+    across = [
+        FitQuantity(
+            f"camera.across.{axis}", f"place of the camera {words}", "mm", 0.0, -10.0, 10.0,
+            PLACE_RANGE, False, True, True, partial(_across, number), "camera.position",
+        )
+        for number, (axis, words) in enumerate(
+            (("right", "to the picture's right"), ("up", "to its top"))
+        )
+    ]  # fmt: skip
+    return [field, *across]
+
+
+def _across(axis: int, design: SensorDesign, amount: float) -> SensorDesign:
+    moved = np.array(design.camera.position) + amount * design.camera.axes()[axis]
+    return set_value(design, "camera.position", tuple(moved.tolist()))
+
+
+def _lights(design: SensorDesign) -> list[FitQuantity]:
+    found = []
+    for name in design.lights:
+        found += [
+            FitQuantity(
+                f"lights.{name}.along", f"place of the {name} lights towards the skin", "mm",
+                0.0, -2.0, 2.0, LIGHT_PLACE_RANGE, False, True, False,
+                _of_group(body_changes.with_lights_moved, name), f"lights.{name}",
+            ),
+            FitQuantity(
+                f"lights.{name}.tilt", f"tilt of the {name} lights towards the skin", "degrees",
+                0.0, -40.0, 40.0, LIGHT_TILT_RANGE, False, True, False,
+                _of_group(body_changes.with_lights_tilted, name), f"lights.{name}",
+            ),
+        ]  # fmt: skip
+    return found
+
+
+def _of_group(
+    change: Callable[[SensorDesign, str, float], SensorDesign], group: str
+) -> Callable[[SensorDesign, float], SensorDesign]:
+    return lambda design, value: change(design, group, value)
+
+
+def _emission(design: SensorDesign) -> list[FitQuantity]:
+    if not body_changes.widens(design):
+        return []
+    return [
+        FitQuantity(
+            "lights.emission", "width of the emission of all lights, times", "", 1.0, 0.3, 1.5,
+            WIDTH_RANGE, True, True, False, body_changes.with_emission_width, "lights",
+        )
+    ]  # fmt: skip
+
+
+def _gel(design: SensorDesign) -> list[FitQuantity]:
+    found = []
+    thickness = body_changes.flat_gel_thickness(design)
+    if thickness is not None:
+        name = design.parts_of(Role.ELASTOMER)[0]
+        found.append(
+            FitQuantity(
+                f"parts.{name}.thickness", "thickness of the gel", "mm", thickness,
+                0.7 * thickness, 1.4 * thickness, THICKNESS_RANGE, True, True, True,
+                body_changes.with_gel_thickness, f"parts.{name}",
+            )
+        )  # fmt: skip
+    for name in sorted({design.parts[part].material or "" for part in _gels(design)}):
+        material = design.materials.get(name)
+        if isinstance(material, Dielectric) and material.elasticity is not None:
+            path = f"materials.{name}.elasticity.poisson_ratio"
+            found.append(
+                FitQuantity(
+                    path, "Poisson ratio of the gel", "", material.elasticity.poisson_ratio, 0.4,
+                    MAX_POISSON_RATIO, POISSON_RANGE, False, True, True,
+                )
+            )  # fmt: skip
+    return found
+
+
+def _gels(design: SensorDesign) -> list[str]:
+    return design.parts_of(Role.ELASTOMER)
+
+
+def _coating(design: SensorDesign) -> list[FitQuantity]:
+    coating = design.coating
+    if not isinstance(coating, Coating):
+        return []
+    brightest = max(coating.reflectance)
+    found = [
+        FitQuantity(
+            "coating.specularity", "specularity of the coating", "", coating.specularity, 0.0, 1.0,
+            SPECULAR_RANGE, renders=True,
+        )
+    ]  # fmt: skip
+    if brightest > 0.0:
+        found.append(
+            FitQuantity(
+                "coating.brightness", "reflectance of the coating, times", "", 1.0, 0.2,
+                1.0 / brightest, REFLECTANCE_RANGE, True, True, False,
+                body_changes.with_reflectance, "coating.reflectance",
+            )
+        )  # fmt: skip
+    return found
+
+
+def _edges(design: SensorDesign) -> list[FitQuantity]:
+    parts = body_changes.edge_parts(design)
+    if not parts:
+        return []
+
+    def rough(changed: SensorDesign, value: float) -> SensorDesign:
+        return body_changes.with_edge_roughness(changed, parts, value)
+
+    return [
+        FitQuantity(
+            f"parts.{parts[0]}.edges", "roughness (GGX alpha) of the edges of rigid parts", "",
+            ROUGH_START, 0.0, 1.0, ROUGH_RANGE, False, True, False, rough,
+            f"parts.{parts[0]}.faces",
+        )
+    ]  # fmt: skip
+
+
+def _indices(design: SensorDesign) -> list[FitQuantity]:
+    return [
+        FitQuantity(
+            f"materials.{name}.ior", f"refractive index of {name}", "", material.ior, 1.3, 1.7,
+            INDEX_RANGE, False, True, True,
+        )
+        for name, material in design.materials.items()
+        if isinstance(material, Dielectric) and 1.3 < material.ior < 1.7  # not air
+    ]  # fmt: skip
+
+
+FAMILIES = {
+    "powers": Family("power of each light group", _powers),
+    "colours": Family("colour matrix of the camera", _colours),
+    "tone": Family("exponent of the tone curve", _tone),
+    "black": Family("level of each channel in the dark: black level and stray light", _black),
+    "shading": Family("dimming of the picture's corners", _shading),
+    "view": Family("field of view and place of the camera across its axis", _view),
+    "lights": Family("place and tilt of each light group, along the camera's axis", _lights, False),
+    "emission": Family("width of the emission of lights", _emission, False),
+    "edges": Family("roughness of the edges of rigid transparent parts", _edges, False),
+    "coating": Family("specularity and reflectance of the coating", _coating, False),
+    "gel": Family("thickness of a flat gel, and Poisson ratio", _gel, False),
+    "indices": Family("refractive indices", _indices, False),
+}
+"""What may be fitted without being asked for by path."""
+
+USUAL = tuple(name for name, family in FAMILIES.items() if family.usual)
+"""What is fitted unless it is kept."""
+
+
+def chosen_families(keep: Sequence[str], also: Sequence[str]) -> tuple[str, ...]:
+    """The usual families but those that are kept, and those that are asked for besides."""
+    wanted = {*USUAL, *also} - {*keep}
+    return tuple(name for name in FAMILIES if name in wanted)

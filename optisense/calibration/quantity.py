@@ -1,0 +1,62 @@
+"""One number that a calibration fits."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+from optisense.design import SensorDesign
+
+LARGEST_POWER = 20.0
+"""Largest logarithm of the factor on a number's start, so that no trial step overflows; the limits
+of each number are far narrower."""
+
+
+@dataclass(frozen=True)
+class FitQuantity:
+    """One number that is fitted.
+
+    Attributes:
+        path: of the design, or a name that looks like one where several of its values follow from
+            the number.
+        words: what it is, to be read.
+        unit: of the number; empty if it has none.
+        start: value before the fit.
+        low, high: limits.
+        spread: plausible range about the start, of its logarithm if `logarithmic`.
+        logarithmic: whether it varies by factors.
+        renders: whether a change needs a new rendering.
+        moves_contacts: whether balls must be pressed in anew after a change, so that they touch
+            where the photographs show them.
+        change: the design with a value of the number; None where it is the value at `path`.
+        home: path under which the design says where the number is from; `path` if empty.
+    """
+
+    path: str
+    words: str
+    unit: str
+    start: float
+    low: float
+    high: float
+    spread: float
+    logarithmic: bool = False
+    renders: bool = False
+    moves_contacts: bool = False
+    change: Callable[[SensorDesign, float], SensorDesign] | None = field(
+        default=None, repr=False, compare=False
+    )
+    home: str = ""
+
+    def value(self, step: float) -> float:
+        """The number at so many plausible ranges from its start."""
+        if self.logarithmic:
+            power = min(max(self.spread * step, -LARGEST_POWER), LARGEST_POWER)
+            found = self.start * math.exp(power)
+        else:
+            found = self.start + self.spread * step
+        return min(max(found, self.low), self.high)
+
+    def slope(self, step: float) -> float:
+        """How the number changes for one plausible range."""
+        return self.spread * (self.value(step) if self.logarithmic else 1.0)

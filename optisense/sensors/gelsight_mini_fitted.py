@@ -1,0 +1,56 @@
+"""GelSight Mini as photographs of a real unit show it.
+
+`optisense calibrate` has fitted the powers of the lights, the camera's view and its processing to
+published photographs; `scripts/fitted_mini.py` does it again. The numbers are in a YAML file beside
+this module.
+"""
+
+from __future__ import annotations
+
+from importlib.resources import as_file, files
+
+from optisense.design import Provenance, SensorDesign, Status, set_value
+from optisense.design.yaml_reader import read_yaml
+from optisense.sensors.gelsight_mini import NAME, gelsight_mini
+
+FITTED_NUMBERS = "gelsight_mini_fitted.yaml"
+"""Name of the file with the value at each fitted path, and where it is from."""
+
+VIEW_WIDTH = 20.3
+"""mm of the skin that pictures of real units show across, from the size of balls in them; the
+maker's datasheet says 18.6."""
+
+GUIDE_SIZE = 28.23, 23.73
+"""mm, of a light guide as large as the tray: with one as large as the gel, pictures have a green
+border that no real unit shows."""
+
+
+def before_the_fit() -> SensorDesign:
+    """The design that the fit starts from: a flat GelSight Mini with a wide view and guide."""
+    design = gelsight_mini(view_width=VIEW_WIDTH, guide_size=GUIDE_SIZE)
+    design.name = f"{NAME}-fitted"
+    design.description = "GelSight Mini, flat gel, fitted to photographs of a real unit"
+    assumed = Status.ASSUMED
+    width, height = GUIDE_SIZE
+    design.provenance["parts.guide"] = Provenance(
+        status=assumed,
+        source=f"{width:g} x {height:g} x 4 mm acrylic, as large as the tray: so photographs show "
+        "no green border",
+    )
+    return design
+
+
+def gelsight_mini_fitted() -> SensorDesign:
+    """A GelSight Mini whose light and camera are those of a real unit.
+
+    Its camera mixes colours, has a tone curve, a level in the dark and dark corners. So its
+    pictures look like those of the unit, and scores that judge pictures differ from those of
+    `gelsight_mini`, whose camera is ideal.
+    """
+    design = before_the_fit()
+    with as_file(files("optisense.sensors") / FITTED_NUMBERS) as path:
+        fitted, _ = read_yaml(path)
+    for place, entry in fitted.items():
+        design = set_value(design, place, entry["value"])
+        design.provenance[place] = Provenance(status=Status.CALIBRATED, source=entry["source"])
+    return design

@@ -1,0 +1,76 @@
+"""What a calibration may change in the bodies of sensors, and how."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import optisense as ots
+from optisense.calibration.families import FAMILIES, USUAL
+from optisense.calibration.quantities import designed, quantities_of
+from optisense.design import SensorDesign, get_value
+from optisense.sensors import check, gelsight_mini
+
+BODY = [name for name in FAMILIES if name not in USUAL]
+
+
+def changed(design: SensorDesign, family: str, word: str, value: float) -> SensorDesign:
+    """The design with one number of a family, found by a word of its description."""
+    each = next(q for q in quantities_of(design, [family]) if word in q.words)
+    step = np.log(value / each.start) if each.logarithmic else value - each.start
+    return designed(design, [each], np.array([step / each.spread]))
+
+
+@pytest.mark.parametrize("name", ["gelsight-mini", "gelbelt", "gelsight360", "gelsight-svelte"])
+def test_every_family_leaves_a_sensor_that_can_be_simulated(name: str) -> None:
+    design = ots.load(name)
+    before = design.model_dump()
+    chosen = quantities_of(design, list(FAMILIES))
+    assert {each.path.split(".")[0] for each in chosen} >= {"lights", "camera", "materials"}
+    made = designed(design, chosen, np.full(len(chosen), 0.3))
+    assert check(made) == check(design)
+    for each in chosen:
+        if each.change is None:
+            assert get_value(made, each.path) == pytest.approx(each.value(0.3))
+    assert design.model_dump() == before
+    assert all(each.low <= each.start <= each.high for each in chosen)
+    assert all(each.renders for each in quantities_of(design, BODY))
+
+
+def test_lights_move_along_the_axis_of_the_camera_and_tilt_towards_the_skin() -> None:
+    design = gelsight_mini()
+    moved = changed(design, "lights", "place of the red", 0.5).lights["red"].lights
+    for one, other in zip(design.lights["red"].lights, moved, strict=True):
+        assert np.subtract(other.position, one.position) == pytest.approx([0.0, 0.0, 0.5])
+    tilted = changed(design, "lights", "tilt of the green", 20.0).lights["green"].lights
+    cosine, sine = np.cos(np.radians(20.0)), np.sin(np.radians(20.0))
+    assert tilted[0].direction == pytest.approx((cosine, 0.0, sine))
+
+
+def test_edges_are_those_towards_the_sides_of_the_picture() -> None:
+    made = changed(gelsight_mini(), "edges", "roughness", 0.4)
+    for name in ("guide", "tray"):
+        faces = made.parts[name].faces
+        assert faces is not None
+        assert set(faces) == {"edge-right", "edge-left", "edge-top", "edge-bottom"}
+        assert {face.roughness for face in faces.values()} == {0.4}
+
+
+def test_a_thicker_gel_keeps_its_base() -> None:
+    design = gelsight_mini()
+    made = changed(design, "gel", "thickness", 4.5)
+    gel = made.deformed_meshes()["gel"].bounds
+    assert gel[:, 2] == pytest.approx([-4.25, 0.25])
+    assert made.deformed_meshes()["skin"].bounds[:, 2] == pytest.approx([0.25, 0.25])
+    bent = quantities_of(ots.load("gelsight-mini-spherical"), ["gel"])
+    assert [each.words for each in bent] == ["Poisson ratio of the gel"]
+
+
+def test_emission_and_coating_change_by_factors() -> None:
+    design = gelsight_mini()
+    wide = changed(design, "emission", "width", 0.5)
+    emitter = wide.lights["blue"].emitter
+    assert emitter is not None
+    assert emitter.size == pytest.approx((1.2, 1.2))  # type: ignore[attr-defined]
+    dark = changed(design, "coating", "reflectance", 0.6)
+    assert dark.coating.reflectance == pytest.approx((0.3, 0.3, 0.3))  # type: ignore[attr-defined]
