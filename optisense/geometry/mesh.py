@@ -11,12 +11,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from optisense.errors import MeshError
+from optisense.geometry.grid_welding import WELD_DISTANCE, welded
+from optisense.geometry.mesh_files import obj_text, read_mesh
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int32]
-
-WELD_DISTANCE = 1e-6
-"""Vertices closer than this (mm) count as one when edges are compared."""
 
 CREASE = 40.0
 """Degrees; sharper edges than this stay sharp in shading unless something else is asked."""
@@ -67,9 +66,7 @@ class TriangleMesh:
         Raises:
             MeshError: the file is missing, of another format, or malformed.
         """
-        from optisense.geometry.mesh_files import load_mesh
-
-        return load_mesh(Path(path))
+        return TriangleMesh(*read_mesh(Path(path)))
 
     @staticmethod
     def box(
@@ -113,8 +110,6 @@ class TriangleMesh:
 
     def save_obj(self, path: str | Path) -> None:
         """Write a Wavefront OBJ file; every coordinate survives the round trip."""
-        from optisense.geometry.mesh_files import obj_text
-
         Path(path).write_text(obj_text(self), encoding="ascii")
 
     # ---- measuring
@@ -224,21 +219,7 @@ class TriangleMesh:
 
         Shading normals are dropped.
         """
-        cells = np.round(self.vertices / distance).astype(np.int64)
-        order = np.lexsort(cells.T)  # several times faster than to sort whole rows
-        begins = np.ones(len(cells), dtype=bool)
-        begins[1:] = (np.diff(cells[order], axis=0) != 0).any(axis=1)
-        first = order[begins]
-        rank = np.argsort(np.argsort(first))  # keep the vertices in their old order
-        faces = np.empty(len(cells), dtype=np.int64)
-        faces[order] = rank[np.cumsum(begins) - 1]
-        faces = faces[self.faces]
-        whole = (
-            (faces[:, 0] != faces[:, 1])
-            & (faces[:, 1] != faces[:, 2])
-            & (faces[:, 2] != faces[:, 0])
-        )
-        return TriangleMesh(self.vertices[np.sort(first)], faces[whole])
+        return TriangleMesh(*welded(self.vertices, self.faces, distance))
 
     def wound_like_normals(self) -> TriangleMesh:
         """Faces turned over where they look away from their shading normals."""

@@ -8,13 +8,17 @@ from __future__ import annotations
 
 import warnings
 from pathlib import Path
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from optisense.errors import MeshError
-from optisense.geometry.mesh import TriangleMesh
+from optisense.geometry.grid_welding import WELD_DISTANCE, welded
 from optisense.untrusted_files import MOST_MESH, read_bytes
+
+if TYPE_CHECKING:
+    from optisense.geometry.mesh import TriangleMesh
 
 FORMATS = (".obj", ".stl", ".ply")
 
@@ -31,8 +35,22 @@ MOST_CORNERS = 10_000
 """Corners of one face; CAD programs write faces of a few hundred."""
 
 
-def load_mesh(path: Path) -> TriangleMesh:
-    """See `TriangleMesh.load`."""
+class MeshArrays(NamedTuple):
+    """What a mesh file holds; `TriangleMesh.load` makes a mesh of it.
+
+    Attributes:
+        vertices: (n, 3) float64, in the unit of the file.
+        faces: (m, 3) rows of `vertices`.
+        normals: (n, 3) of the vertices, or None.
+    """
+
+    vertices: NDArray[np.float64]
+    faces: NDArray[np.int32]
+    normals: NDArray[np.float64] | None = None
+
+
+def read_mesh(path: Path) -> MeshArrays:
+    """The arrays of a mesh file; raises as `TriangleMesh.load`."""
     suffix = path.suffix.lower()
     if suffix not in FORMATS:
         raise MeshError(
@@ -80,7 +98,7 @@ def _refuse_many(triangles: int, path: Path) -> None:
         )
 
 
-def _faces_twice(mesh: TriangleMesh) -> int:
+def _faces_twice(mesh: MeshArrays) -> int:
     """How many faces there are besides the first ones of the same corners, wound the same way."""
     if len(mesh.faces) <= MOST_TWICE:
         return 0
@@ -138,23 +156,26 @@ def _refuse_cut_off_stl(data: bytes, path: Path) -> None:
     _refuse_many(count, path)
 
 
-def _load_with_trimesh(data: bytes, path: Path, suffix: str) -> TriangleMesh:
+def _load_with_trimesh(data: bytes, path: Path, suffix: str) -> MeshArrays:
     import io
 
     import trimesh
 
     try:
         loaded = trimesh.load_mesh(io.BytesIO(data), file_type=suffix[1:], process=False)
-        mesh = TriangleMesh(np.asarray(loaded.vertices), np.asarray(loaded.faces))
+        vertices = np.asarray(loaded.vertices, dtype=np.float64).reshape(-1, 3)
+        faces = np.asarray(loaded.faces, dtype=np.int32).reshape(-1, 3)
     except Exception as error:  # trimesh raises many kinds on malformed files
         raise MeshError(
             f"the mesh file is malformed: {error}", where=str(path), hint="export it again"
         ) from error
-    near = bool((np.abs(mesh.vertices) <= FARTHEST).all())  # others are refused, with their place
-    return mesh.welded() if suffix == ".stl" and near else mesh
+    near = bool((np.abs(vertices) <= FARTHEST).all())  # others are refused, with their place
+    if suffix == ".stl" and near:
+        vertices, faces = welded(vertices, faces, WELD_DISTANCE)
+    return MeshArrays(vertices, faces)
 
 
-def _parse_plain_obj(data: bytes) -> TriangleMesh | None:
+def _parse_plain_obj(data: bytes) -> MeshArrays | None:
     """A file of triangles in the form that `obj_text` and most programs give it, read at once:
     many times faster. None if anything is out of the ordinary; it is read line by line then.
     """
@@ -196,10 +217,10 @@ def _parse_plain_obj(data: bytes) -> TriangleMesh | None:
     if triangles.min() < 1 or triangles.max() > len(vertices) or (numbers < 1).any():
         return None
     own = apart and len(normals) == len(vertices) and bool((numbers[:, :, 1] == triangles).all())
-    return TriangleMesh(vertices, (triangles - 1).astype(np.int32), directions if own else None)
+    return MeshArrays(vertices, (triangles - 1).astype(np.int32), directions if own else None)
 
 
-def _parse_obj(data: bytes, path: Path) -> TriangleMesh:
+def _parse_obj(data: bytes, path: Path) -> MeshArrays:
     positions: list[list[float]] = []
     normals: list[list[float]] = []
     polygons: list[list[int]] = []
@@ -232,7 +253,7 @@ def _parse_obj(data: bytes, path: Path) -> TriangleMesh:
     vertices = np.array(positions, dtype=np.float64).reshape(-1, 3)
     faces = _triangulated(polygons, vertices)
     keep_normals = own_normals and len(normals) == len(vertices) > 0
-    return TriangleMesh(vertices, faces, np.array(normals) if keep_normals else None)
+    return MeshArrays(vertices, faces, np.array(normals) if keep_normals else None)
 
 
 def _corner(word: str, n_vertices: int, n_normals: int) -> tuple[int, int]:

@@ -6,15 +6,22 @@ calls used are the same in the releases of Open CASCADE from 7.8 to 8.
 
 from __future__ import annotations
 
+import json
+import os
 import re
+import subprocess
+import sys
+import tempfile
 from collections.abc import Iterator
 from dataclasses import dataclass
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from optisense.errors import MeshError, SetupError
+from optisense import errors
+from optisense.errors import MeshError, OptiSenseError, SetupError
 from optisense.geometry.mesh import TriangleMesh
 from optisense.geometry.welding import merged_vertices
 from optisense.untrusted_files import MOST_STEP, check_size
@@ -31,6 +38,12 @@ BEND = 6.0
 _WELD = 1e-5
 """Distance in mm within which vertices of neighbouring faces are one; Open CASCADE's triangles meet
 to this."""
+
+BODIES, WRONG = "bodies.npz", "wrong.json"
+"""Files in the folder: what was found, or what is wrong."""
+
+READER = "optisense.geometry.step_process"
+"""The module that is run as the process that reads a file."""
 
 
 @dataclass(frozen=True)
@@ -75,11 +88,63 @@ def no_step(error: ImportError, action: str, instead: str, where: Path | None = 
 def read_step(path: str | Path) -> list[StepBody]:
     """All bodies of a STEP file, in its order, each where its assembly puts it.
 
+    Another process reads it (`optisense.geometry.step_process`), as some malformed files crash Open
+    CASCADE.
+
     Raises:
         SetupError: the extra is not installed.
         MeshError: the file is missing, is not STEP, or holds no faces.
     """
     path = Path(path)
+    if find_spec("OCP") is None:
+        raise no_step(ImportError("OCP"), "reading", "export STL files from the CAD tool", path)
+    check_size(path, MOST_STEP, MeshError, "the STEP file")
+    return _read_apart(path)
+
+
+def _read_apart(path: Path) -> list[StepBody]:
+    """The bodies of a STEP file, read by a process of its own.
+
+    Raises:
+        SetupError: Open CASCADE can't be imported there.
+        MeshError: the file can't be read, or the process has ended over it.
+    """
+    with tempfile.TemporaryDirectory(prefix="optisense-") as folder:
+        search = os.pathsep.join(each or str(Path.cwd()) for each in sys.path)
+        done = subprocess.run(
+            [sys.executable, "-m", READER, str(path.absolute()), folder],
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+            env={**os.environ, "PYTHONPATH": search},
+        )
+        wrong = Path(folder, WRONG)
+        if wrong.exists():
+            told = json.loads(wrong.read_text(encoding="utf-8"))
+            kind: type[OptiSenseError] = getattr(errors, told.pop("kind"))
+            raise kind(told.pop("message"), **told)
+        if done.returncode:
+            raise MeshError(
+                "reading the STEP file has failed: it is damaged, or takes too much time or memory",
+                where=str(path),
+                hint="In the CAD tool: export it again as STEP AP214 or AP242, or as STL",
+            )
+        with np.load(Path(folder, BODIES), allow_pickle=False) as found:
+            return [
+                StepBody(
+                    str(name), TriangleMesh(found[f"vertices{n}"], found[f"faces{n}"]), bool(solid)
+                )
+                for n, (name, solid) in enumerate(zip(found["names"], found["solids"], strict=True))
+            ]
+
+
+def bodies_of(path: Path) -> list[StepBody]:
+    """The same, read in this process.
+
+    Raises:
+        SetupError: Open CASCADE can't be imported.
+        MeshError: the file is not STEP, or holds no faces.
+    """
     try:
         from OCP.STEPCAFControl import STEPCAFControl_Reader
         from OCP.TCollection import TCollection_ExtendedString
@@ -87,7 +152,6 @@ def read_step(path: str | Path) -> list[StepBody]:
         from OCP.XCAFDoc import XCAFDoc_DocumentTool
     except ImportError as error:
         raise no_step(error, "reading", "export STL files from the CAD tool", path) from error
-    check_size(path, MOST_STEP, MeshError, "the STEP file")
     quiet()
     reader = STEPCAFControl_Reader()
     reader.SetNameMode(True)

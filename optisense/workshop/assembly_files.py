@@ -9,14 +9,20 @@ from __future__ import annotations
 import csv
 import io
 from collections.abc import Iterable, Sequence
-from itertools import pairwise
 
 import numpy as np
 
 from optisense.design import SensorDesign
 from optisense.text import cell
 from optisense.workshop.boards import axes_at_rest, boards_of
-from optisense.workshop.placement import Placement, digits, light_entry, typical_colour
+from optisense.workshop.dxf import closed, dxf
+from optisense.workshop.placement import (
+    Placement,
+    digits,
+    light_entry,
+    typical_colour,
+    what_to_order,
+)
 
 MARGIN = 1.0
 """mm of board around the bodies of its LEDs in the outline, which has no other source."""
@@ -101,7 +107,8 @@ def _bom(design: SensorDesign, leds: Sequence[Placement]) -> str:
         colour = typical_colour(design.lights[name])
         words = " ".join(filter(None, [own[0].model, colour[0] if colour else name]))
         designators = ",".join(led.designator for led in own)
-        rows.append((cell(words), designators, _footprint(design, own[0]), cell(own[0].part)))
+        number = cell(what_to_order(design.lights[name]))
+        rows.append((cell(words), designators, _footprint(design, own[0]), number))
     return _table(("Comment", "Designator", "Footprint", "Part number"), rows)
 
 
@@ -118,10 +125,4 @@ def _outline(design: SensorDesign, leds: Sequence[Placement]) -> str:
     reach = max(max(_body(design, led)) for led in leds) / 2.0 + MARGIN
     places = np.array([led.on_board for led in leds])
     (x0, y0), (x1, y1) = places.min(axis=0) - reach, places.max(axis=0) + reach
-    corners = [(x0, y0), (x1, y0), (x1, y1), (x0, y1), (x0, y0)]
-    lines = ["0", "SECTION", "2", "ENTITIES"]
-    for (ax, ay), (bx, by) in pairwise(corners):
-        lines += ["0", "LINE", "8", "Edge.Cuts"]
-        for code, value in ((10, ax), (20, ay), (30, 0.0), (11, bx), (21, by), (31, 0.0)):
-            lines += [str(code), digits(float(value), 4)]
-    return "\n".join([*lines, "0", "ENDSEC", "0", "EOF", ""])
+    return dxf(closed("Edge.Cuts", [(x0, y0), (x1, y0), (x1, y1), (x0, y1)]))

@@ -13,7 +13,7 @@ from optisense.errors import LibraryError
 from optisense.library import AnyEntry
 from optisense.library.facts import summary
 from optisense.text import cell, markdown
-from optisense.workshop.placement import light_entry, typical_colour
+from optisense.workshop.placement import light_entry, typical_colour, what_to_order
 from optisense.workshop.shapes import Shape, shapes
 
 MM2_PER_CM2, MM3_PER_CM3 = 100.0, 1000.0
@@ -34,7 +34,7 @@ class Item:
         used_for: the light group, or the part.
         description: what it is.
         maker: who sells it, "" where unknown.
-        part: the maker's order number, "" where unknown.
+        part: the maker's order number, or what will do where none is known.
         package: mm, width x length x height of a light, "" where unknown.
         note: what to mind.
         designators: of lights, as in the tables of places; such as D1-D5.
@@ -129,7 +129,9 @@ def _lights(design: SensorDesign) -> list[Item]:
             note = f"{colour[0]}, {note}"
             if colour[1].flux is not None:
                 at = f" at {colour[1].current:g} mA" if colour[1].current else ""
-                note += f"; nominal {colour[1].flux:g} mW{at}"
+                known = entry.source(f"flux.{colour[0]}") if entry is not None else None
+                assumed = known is not None and known.status is Status.ASSUMED
+                note += f"; nominal {colour[1].flux:g} mW{at}{' (assumed)' if assumed else ''}"
                 times = group.flux / colour[1].flux
                 if times > OVERDRIVEN:
                     note += f": {times:.2g} times its nominal flux is asked of it"
@@ -142,7 +144,7 @@ def _lights(design: SensorDesign) -> list[Item]:
                 used_for=name,
                 description=description,
                 maker=(entry.maker or "") if entry is not None else "",
-                part=(colour[1].part or "") if colour is not None else "",
+                part=what_to_order(group),
                 package=" x ".join(f"{length:g}" for length in package) if package else "",
                 note=note,
                 designators=f"D{first}" if first == count else f"D{first}-D{count}",
@@ -201,12 +203,16 @@ def _drawn(design: SensorDesign, shape: Shape) -> str:
     of it may be made otherwise.
     """
     sheet = "" if shape.is_solid else "a sheet without thickness"
-    return "; ".join(filter(None, [sheet, _assumed(design, shape)]))
+    if shape.thickness is not None:
+        path = f"parts.{shape.name}.thickness"
+        assumed = _assumed(design, path)
+        sheet = f"a sheet, made {shape.thickness:g} mm thick" + (f" ({assumed})" if assumed else "")
+    return "; ".join(filter(None, [sheet, _assumed(design, f"parts.{shape.name}")]))
 
 
-def _assumed(design: SensorDesign, shape: Shape) -> str:
-    """What is assumed of a part; empty where nothing is said to be."""
-    known = design.provenance.get(f"parts.{shape.name}")
+def _assumed(design: SensorDesign, path: str) -> str:
+    """What is assumed of a part or a number of it; empty where nothing is said to be."""
+    known = design.provenance.get(path)
     if known is None or known.status is not Status.ASSUMED or not known.source:
         return ""
     return f"assumed: {known.source}"
@@ -224,7 +230,9 @@ def _coating(design: SensorDesign, coated: Sequence[Shape]) -> list[Item]:
             used_for=f"{shape.name} ({shape.role.value})",
             description=entry.description if entry is not None else "described in the design",
             maker=(entry.maker or "") if entry is not None else "",
-            note="; ".join(filter(None, [coating.in_words(), _assumed(design, shape)])),
+            note="; ".join(
+                filter(None, [coating.in_words(), _assumed(design, f"parts.{shape.name}")])
+            ),
         )
         for shape in coated
     ]

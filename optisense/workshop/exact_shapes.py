@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -30,6 +30,10 @@ from optisense.workshop.recognised import (
 )
 from optisense.workshop.shapes import Shape
 
+SAME_PLACE = 0.1
+"""mm by which the ends of a body and of its mesh may differ along x, y or z; a plate on the wrong
+side of its sheet is off by a thickness, half a millimetre at least."""
+
 FloatArray = NDArray[np.float64]
 
 WORTH_IT = 60
@@ -48,7 +52,32 @@ def exact_body(shape: Shape) -> Any | None:
     if len(shape.mesh.faces) < WORTH_IT:
         return None
     body = _body(shape)
-    return body if body is not None and _agrees(body, shape) else None
+    if body is not None and _agrees(body, shape):
+        return body
+    if shape.sheet is not None and shape.thickness is not None:
+        for body in _plates(shape.sheet, shape.thickness):
+            if _agrees(body, shape):
+                return body
+    return None
+
+
+def _plates(sheet: Shape, thickness: float) -> Iterator[Any]:
+    """What Open CASCADE makes of a sheet by a parallel surface on either side, mitred."""
+    from OCP.BRepOffset import BRepOffset_MakeOffset, BRepOffset_Skin
+    from OCP.GeomAbs import GeomAbs_Intersection
+    from OCP.TopAbs import TopAbs_SOLID
+
+    surface = exact_body(sheet)
+    if surface is None:
+        return
+    for offset in (thickness, -thickness):
+        maker = BRepOffset_MakeOffset()
+        maker.Initialize(
+            surface, offset, SEWN, BRepOffset_Skin, False, False, GeomAbs_Intersection, True
+        )
+        maker.MakeThickSolid()
+        if maker.IsDone() and maker.Shape().ShapeType() == TopAbs_SOLID:
+            yield maker.Shape()
 
 
 def _body(shape: Shape) -> Any | None:
@@ -267,6 +296,8 @@ def _agrees(body: Any, shape: Shape) -> bool:
     if not BRepCheck_Analyzer(body).IsValid():
         return False
     cut = triangles(body, chord=0.02, bend=15.0)
+    if np.abs(cut.bounds - shape.mesh.bounds).max() > SAME_PLACE:
+        return False
     if shape.is_solid:
         found, wanted = cut.volume, abs(shape.mesh.volume)
     else:

@@ -11,9 +11,11 @@ from optisense.design import SensorDesign
 from optisense.errors import DesignError
 from optisense.workshop.assembly_files import assembly_files
 from optisense.workshop.bill_of_materials import bill_of_materials
+from optisense.workshop.drawings import cut_file, drawing
 from optisense.workshop.formats import FORMATS, ShapeFormat
 from optisense.workshop.moulds import moulds
 from optisense.workshop.placement import placement_csv, placements
+from optisense.workshop.plates import plates
 from optisense.workshop.shapes import Shape, shapes
 from optisense.writing import written_together
 
@@ -31,7 +33,8 @@ def export(
     *,
     with_moulds: bool = False,
 ) -> list[Path]:
-    """Write the deformed parts, where the LEDs go, files for each board, and the bill of materials.
+    """Write the deformed parts, drawings of plates, where the LEDs go, files for each board, and
+    the bill of materials.
 
     Nothing appears under its own name before everything is written.
 
@@ -62,6 +65,10 @@ def export(
             writers.update(_shape_writers(name, f"{design.name}-moulds", halves))
         if notes is not None:
             notes += [each.told() for each in cast]
+    for plate in plates(made):
+        writers[f"{plate.name}-cut.dxf"] = _bytes_writer(cut_file(plate).encode("ascii"))
+        sheet = drawing(plate, design.name)
+        writers[f"{plate.name}-drawing.svg"] = _bytes_writer(sheet.encode("utf-8"))
     bill = bill_of_materials(design)
     placed = placements(design)
     for file, text in (

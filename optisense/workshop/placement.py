@@ -102,6 +102,22 @@ def typical_colour(group: LightGroup) -> tuple[str, TypicalLight] | None:
     return None
 
 
+def what_to_order(group: LightGroup) -> str:
+    """The order number of a group's light, or in words what will do in its place."""
+    number = part_number(group)
+    if number:
+        return number
+    entry, known = light_entry(group), typical_colour(group)
+    words = ["no order number known: any LED"]
+    if known is not None:
+        words[0] = f"no order number known: any {known[0]} LED"
+    if entry is not None and entry.package is not None:
+        words.append("of {:g} x {:g} x {:g} mm".format(*entry.package))
+    if known is not None and known[1].wavelength is not None:
+        words.append(f"with a dominant wavelength of {known[1].wavelength:g} nm")
+    return " ".join(words)
+
+
 def light_entry(group: LightGroup) -> LightEntry | None:
     """The library's entry of a group's light, None where it has none that can be read."""
     try:

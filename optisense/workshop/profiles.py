@@ -91,7 +91,7 @@ def _arc_end(corners: FloatArray, start: int) -> int:
     """
     if start + 2 >= len(corners):
         return start
-    centre = _centre(*corners[start : start + 3])
+    centre = centre_of(*corners[start : start + 3])
     if centre is None:
         return start
     radius = float(np.linalg.norm(corners[start] - centre))
@@ -108,7 +108,7 @@ def _arc_end(corners: FloatArray, start: int) -> int:
     return end
 
 
-def _centre(a: FloatArray, b: FloatArray, c: FloatArray) -> FloatArray | None:
+def centre_of(a: FloatArray, b: FloatArray, c: FloatArray) -> FloatArray | None:
     """Of the circle through three points, None where they lie on one line."""
     ab, ac = b - a, c - a
     twice = 2.0 * (ab[0] * ac[1] - ab[1] * ac[0])

@@ -153,13 +153,14 @@ def drawn_out(mesh: TriangleMesh) -> DrawnOut | None:
     A box is one, too; the axis with the most corners around it counts.
     """
     for axis in (2, 1, 0):
-        found = _drawn_along(mesh, axis)
+        found = drawn_along(mesh, axis)
         if found is not None:
             return found
     return None
 
 
-def _drawn_along(mesh: TriangleMesh, axis: int) -> DrawnOut | None:
+def drawn_along(mesh: TriangleMesh, axis: int) -> DrawnOut | None:
+    """The outline that was drawn out along one axis; None if there is none."""
     normals = np.abs(mesh.face_normals[:, axis])
     areas = mesh.face_areas > 0.0
     upright = normals < 1e-5
@@ -198,7 +199,7 @@ def _drawn_along(mesh: TriangleMesh, axis: int) -> DrawnOut | None:
     if abs(drawn - float(mesh.face_areas[walls].sum())) > 1e-6 * max(drawn, 1.0):
         return None
     closed = all((outline[0] == outline[-1]).all() for outline in outlines)
-    if mesh.is_closed != (closed and bool(caps.any())):
+    if mesh.is_closed != (closed and bool(caps.any())) or (caps.any() and not mesh.is_closed):
         return None
     outlines.sort(key=lambda outline: -float(np.prod(np.ptp(outline, axis=0))))
     return DrawnOut(axis, low, high, outlines)

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from optisense.design import Cage, Role, SensorDesign
 from optisense.errors import DesignError
 from optisense.geometry import TriangleMesh
+from optisense.workshop.thickened import thickened
 
 AIR = 1.0
 """Refractive index of a part that is not made but left free."""
@@ -23,6 +24,8 @@ class Shape:
         mesh: mm, in the frame of the design; corners that coincide are one vertex.
         rest: the mesh before its cage bent it, None where none does.
         cage: that bends it.
+        thickness: mm that a sheet is made with, None where it is none or that is not said.
+        sheet: the shape of such a sheet without its thickness.
     """
 
     name: str
@@ -31,6 +34,8 @@ class Shape:
     mesh: TriangleMesh
     rest: TriangleMesh | None = None
     cage: Cage | None = None
+    thickness: float | None = None
+    sheet: Shape | None = None
 
     @property
     def is_solid(self) -> bool:
@@ -53,6 +58,8 @@ def is_air(design: SensorDesign, name: str) -> bool:
 def shapes(design: SensorDesign) -> list[Shape]:
     """All parts of a design but its indenters and those of air, in their current shape.
 
+    Sheets have the thickness that the design says they are made with.
+
     Raises:
         DesignError: a part has no mesh, or lies outside of the cage that deforms it.
     """
@@ -72,5 +79,16 @@ def shapes(design: SensorDesign) -> list[Shape]:
             mesh = mesh.flipped()
         cage = next((each for each in design.cages.values() if name in each.parts), None)
         rest = None if cage is None else design.meshes[name].welded()
-        found.append(Shape(name, part.role, part.material, mesh, rest, cage))
+        shape = Shape(name, part.role, part.material, mesh, rest, cage)
+        found.append(_as_made(shape, part.thickness))
     return found
+
+
+def _as_made(shape: Shape, thickness: float | None) -> Shape:
+    """A sheet as the plate that it is made of, where the design says how thick that is."""
+    if thickness is None or shape.is_solid or shape.role is Role.SENSING_SURFACE:
+        return shape
+    plate = thickened(shape.mesh, thickness)
+    if plate is None:
+        return shape
+    return Shape(shape.name, shape.role, shape.material, plate, thickness=thickness, sheet=shape)

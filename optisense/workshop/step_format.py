@@ -46,6 +46,7 @@ def write_step(path: Path, shapes: Sequence[Shape], title: str = "sensor") -> li
         OutputError: it can't be written.
     """
     require_step()
+    from OCP.Interface import Interface_Static
     from OCP.STEPCAFControl import STEPCAFControl_Writer
     from OCP.STEPControl import STEPControl_AsIs
     from OCP.TCollection import TCollection_ExtendedString
@@ -75,6 +76,8 @@ def write_step(path: Path, shapes: Sequence[Shape], title: str = "sensor") -> li
         colours.SetColor(label, _colour(shape), XCAFDoc_ColorGen)
     tool.UpdateAssemblies()
     writer = STEPCAFControl_Writer()
+    # Without curves in the parameters of surfaces, which readers work out, files are half as large.
+    Interface_Static.SetIVal_s("write.surfacecurve.mode", 0)
     writer.SetNameMode(True)
     writer.SetColorMode(True)
     transferred = writer.Transfer(document, STEPControl_AsIs)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
+import math
 
 import pytest
 
@@ -35,7 +36,29 @@ def test_lights_are_counted_by_model_and_group(flat: SensorDesign) -> None:
     assert lights["red"].name == "smd-3528"
     assert lights["red"].package == "2.8 x 3.5 x 1.9"
     assert lights["red"].part == "DL-TOP3528SRC-1SR120"
-    assert lights["green"].part == ""
+    assert lights["green"].part == "Everlight 67-21/GHC-BV1/2T"
+    assert lights["green"].note.endswith("nominal 2.3 mW at 20 mA (assumed)")
+    assert "(assumed)" not in lights["red"].note
+
+
+def test_where_no_order_number_is_known_the_bill_says_what_will_do(flat: SensorDesign) -> None:
+    design = flat.copy()
+    design.lights["red"].model = "chanzon-5730"
+    design.lights["blue"].model = "our-own"
+    lights = items(design, "light")
+    assert lights["red"].part == (
+        "no order number known: any red LED of 5.7 x 3 x 0.9 mm "
+        "with a dominant wavelength of 622 nm"
+    )
+    assert lights["blue"].part == "no order number known: any LED"
+
+
+@pytest.mark.parametrize("name", sensors.SENSORS.names())
+def test_every_light_of_a_built_in_sensor_can_be_ordered(name: str) -> None:
+    lights = items(sensors.build(name), "light")
+    assert lights
+    for item in lights.values():
+        assert item.part and "no order number" not in item.part
 
 
 def test_a_light_that_must_give_more_than_it_can_is_remarked_on(flat: SensorDesign) -> None:
@@ -129,6 +152,15 @@ def test_bars_and_newlines_do_not_break_the_table(flat: SensorDesign) -> None:
 
 def test_the_bill_tells_what_is_assumed_and_what_is_not_drawn() -> None:
     belt = items(sensors.gelbelt(), "material")
+    # Half a turn around a wheel of 25 mm, and the straight run between wheels whose axes are apart
+    # by dx and dz: gel of 3 mm on tape of 0.05 mm, 36 mm wide.
+    low, high = sensors.gelbelt(light_design=1).meshes["wheels"].bounds
+    run = high[0] - low[0] - 2 * (25.0 - 0.02)
+    assert run == pytest.approx(90.0, abs=0.1)
+    volume = 36.0 * (math.pi / 2 * (28.05**2 - 25.05**2) + 3.0 * run) / 1000.0
+    plain = items(sensors.gelbelt(light_design=1), "material")["gel"].note
+    assert f"way back is left out, {math.pi * 25.0 + run:.0f} of" in plain
+    assert f"it takes {volume:.1f} cm^3 more" in plain
     assert "the belt's way back is left out" in belt["gel"].note
     assert "36 mm assumed" in belt["gel"].note
     assert belt["far-coat"].unit == "cm^2"
@@ -137,3 +169,12 @@ def test_the_bill_tells_what_is_assumed_and_what_is_not_drawn() -> None:
     design.provenance["parts.gel"] = Provenance(status="sourced", source="its data sheet")
     note = items(design, "material")["gel"].note
     assert "assumed" not in note and "sheet" not in note
+
+
+def test_a_sheet_is_billed_by_the_thickness_that_it_is_made_with() -> None:
+    materials = items(sensors.gelsight_svelte(mirror_thickness=2.0), "material")
+    m2 = materials["M2"]
+    assert (m2.quantity, m2.unit) == (pytest.approx(2 * 0.32674, rel=1e-3), "cm^3")
+    assert m2.note.startswith("a sheet, made 2 mm thick")
+    assert "(assumed: " in materials["body"].note
+    assert not any("without thickness" in item.note for item in materials.values())

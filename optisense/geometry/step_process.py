@@ -1,0 +1,62 @@
+"""The process in which Open CASCADE reads a STEP file, for `optisense.geometry.step.read_step`.
+
+Open CASCADE is compiled code that some malformed files crash, or keep busy without an end, and an
+exception can't be made of either. So it reads in a process of its own, whose end is only the end of
+reading that file. ``python -m optisense.geometry.step_process FILE FOLDER`` is that process: it
+writes what it has found, or what is wrong with the file, into the folder.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from optisense.errors import OptiSenseError
+from optisense.geometry.step import BODIES, WRONG, bodies_of
+
+LONGEST = 600
+"""Seconds of the processor for one file: the largest STEP files of sensors take about a minute."""
+
+MOST_MEMORY = 16 * 2**30
+"""Bytes of address space for one file: 64 MiB of STEP take some 4 GiB."""
+
+
+def main() -> int:
+    """Read a file and write what it holds; 1 where it can't be read."""
+    path, folder = Path(sys.argv[1]), Path(sys.argv[2])
+    _bound()
+    try:
+        bodies = bodies_of(path)
+    except OptiSenseError as error:
+        told: dict[str, str | None] = {"kind": type(error).__name__, "message": error.message}
+        told |= {"where": error.where, "hint": error.hint}
+        (folder / WRONG).write_text(json.dumps(told), encoding="utf-8")
+        return 1
+    arrays: dict[str, Any] = {}
+    for number, body in enumerate(bodies):
+        arrays[f"vertices{number}"] = body.mesh.vertices
+        arrays[f"faces{number}"] = body.mesh.faces
+    names = np.array([body.name for body in bodies], dtype=str)
+    np.savez(folder / BODIES, names=names, solids=[body.solid for body in bodies], **arrays)
+    return 0
+
+
+def _bound() -> None:
+    """Bound the time and the memory of this process, where the system can."""
+    with suppress(ImportError, ValueError, OSError):
+        import resource
+
+        resource.setrlimit(resource.RLIMIT_CPU, (LONGEST, LONGEST + 10))
+        resource.setrlimit(resource.RLIMIT_AS, (MOST_MEMORY, MOST_MEMORY))
+        resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+
+
+if __name__ == "__main__":
+    # Without the interpreter's own end, which takes down what may be half made.
+    os._exit(main())

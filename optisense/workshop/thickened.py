@@ -1,0 +1,98 @@
+"""Sheets as the plates that they are made of: the face of a design, and material behind it."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
+
+from optisense.geometry import TriangleMesh
+from optisense.geometry.common_space import as_manifold
+
+FloatArray = NDArray[np.float64]
+
+LONGEST_MITRE = 3.0
+"""Times the thickness that a corner of the far face may lie off the near one; the mitre of two
+faces that stand at 40 degrees to one another is 2.9 times as long."""
+
+SAME_NORMAL = 1e-9
+"""Squared share of the largest singular value below which normals count as dependent: two faces at
+less than 0.002 degrees to one another are one plane."""
+
+
+def thickened(mesh: TriangleMesh, thickness: float) -> TriangleMesh | None:
+    """The plate behind a sheet; None where no closed plate comes of it.
+
+    The sheet stays the plate's near face, to which its normals point. The far face is parallel to
+    it, mitred at edges. Pieces that meet in an edge of more than two faces are made one by one and
+    joined.
+
+    Args:
+        mesh: open, with corners that coincide as one vertex.
+        thickness: mm.
+    """
+    plates = [_plate(mesh.with_faces(mesh.faces[piece]).compacted(), thickness)
+              for piece in _pieces(mesh)]  # fmt: skip
+    if len(plates) == 1:
+        return plates[0] if plates[0].is_closed and plates[0].volume > 0.0 else None
+    solids = [as_manifold(plate) for plate in plates]
+    if any(solid.is_empty() for solid in solids):
+        return None
+    whole = solids[0]
+    for solid in solids[1:]:
+        whole += solid
+    joined = whole.to_mesh64()
+    return TriangleMesh(
+        np.asarray(joined.vert_properties, dtype=np.float64)[:, :3],
+        np.asarray(joined.tri_verts, dtype=np.int32),
+    )
+
+
+def _pieces(mesh: TriangleMesh) -> list[NDArray[np.int64]]:
+    """The faces of each piece: joined where exactly two faces, wound alike, share an edge."""
+    ends = np.concatenate([mesh.faces[:, [0, 1]], mesh.faces[:, [1, 2]], mesh.faces[:, [2, 0]]])
+    owner = np.tile(np.arange(len(mesh.faces)), 3)
+    _, inverse, counts = np.unique(
+        np.sort(ends, axis=1), axis=0, return_inverse=True, return_counts=True
+    )
+    inverse = np.asarray(inverse).reshape(-1)
+    order = np.argsort(inverse, kind="stable")
+    starts = np.concatenate([[0], np.cumsum(counts)[:-1]])[counts == 2]
+    one, other = order[starts], order[starts + 1]
+    alike = ends[one, 0] == ends[other, 1]  # each runs along the edge the other way
+    pairs = owner[one[alike]], owner[other[alike]]
+    shape = (len(mesh.faces), len(mesh.faces))
+    matrix = coo_matrix((np.ones(int(alike.sum())), pairs), shape)
+    number, labels = connected_components(matrix, directed=False)
+    return [np.flatnonzero(labels == label) for label in range(number)]
+
+
+def _plate(mesh: TriangleMesh, thickness: float) -> TriangleMesh:
+    """The closed plate of one piece."""
+    count = len(mesh.vertices)
+    far = mesh.vertices + _offsets(mesh, thickness)
+    ends = np.concatenate([mesh.faces[:, [0, 1]], mesh.faces[:, [1, 2]], mesh.faces[:, [2, 0]]])
+    _, inverse, counts = np.unique(
+        np.sort(ends, axis=1), axis=0, return_inverse=True, return_counts=True
+    )
+    a, b = ends[counts[np.asarray(inverse).reshape(-1)] == 1].T
+    walls = np.concatenate([np.stack([b, a, a + count], 1), np.stack([b, a + count, b + count], 1)])
+    faces = np.concatenate([mesh.faces, mesh.faces[:, ::-1] + count, walls])
+    return TriangleMesh(np.concatenate([mesh.vertices, far]), faces)
+
+
+def _offsets(mesh: TriangleMesh, thickness: float) -> FloatArray:
+    """(n, 3) mm from each vertex to the far face, which is `thickness` behind the plane of each of
+    its faces, as nearly as that can be."""
+    result = np.empty_like(mesh.vertices)
+    normals = mesh.face_normals
+    corners = mesh.faces.reshape(-1)
+    order = np.argsort(corners, kind="stable")
+    bounds = np.searchsorted(corners[order], np.arange(len(mesh.vertices) + 1))
+    for vertex in range(len(mesh.vertices)):
+        own = normals[order[bounds[vertex] : bounds[vertex + 1]] // 3]
+        way = np.linalg.lstsq(own, np.full(len(own), -thickness), rcond=SAME_NORMAL**0.5)[0]
+        length = float(np.linalg.norm(way))
+        result[vertex] = way * min(1.0, LONGEST_MITRE * thickness / max(length, 1e-12))
+    return result

@@ -1,0 +1,124 @@
+"""Drawings of plates, read back by number."""
+
+from __future__ import annotations
+
+import math
+import xml.etree.ElementTree as ElementTree
+from pathlib import Path
+
+import numpy as np
+import pytest
+import shapely
+import trimesh
+
+from optisense import sensors
+from optisense.design import Role
+from optisense.geometry import TriangleMesh
+from optisense.workshop import export
+from optisense.workshop.drawings import cut_file, drawing
+from optisense.workshop.plates import Circle, plates
+from optisense.workshop.shapes import Shape, shapes
+
+SVG = "{http://www.w3.org/2000/svg}"
+
+
+def entities(text: str) -> list[dict[str, str]]:
+    """The entities of a DXF drawing, by group code."""
+    lines = text.split("\n")
+    found: list[dict[str, str]] = []
+    for code, value in zip(lines[::2], lines[1::2], strict=False):
+        if code == "0":
+            found.append({})
+        found[-1][code] = value
+    return [each for each in found if each["0"] in {"LINE", "ARC", "CIRCLE"}]
+
+
+def enclosed(found: list[dict[str, str]]) -> float:
+    """mm2 within lines and arcs that join into one outline."""
+    parts = []
+    for each in found:
+        if each["0"] == "LINE":
+            parts.append([(float(each["10"]), float(each["20"])),
+                          (float(each["11"]), float(each["21"]))])  # fmt: skip
+        elif each["0"] == "ARC":
+            start, end = float(each["50"]), float(each["51"])
+            angle = np.radians(np.linspace(start, end + 360.0 * (end < start), 2001))
+            centre, radius = (float(each["10"]), float(each["20"])), float(each["40"])
+            parts.append([(centre[0] + radius * math.cos(a), centre[1] + radius * math.sin(a))
+                          for a in angle])  # fmt: skip
+    merged = shapely.line_merge(shapely.set_precision(shapely.MultiLineString(parts), 1e-3))
+    assert merged.geom_type == "LineString" and merged.is_ring, "one closed outline"
+    return float(shapely.Polygon(merged).area)
+
+
+def texts(svg: str) -> list[str]:
+    return [each.text or "" for each in ElementTree.fromstring(svg).iter(f"{SVG}text")]
+
+
+@pytest.fixture(scope="module")
+def files(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
+    folder = tmp_path_factory.mktemp("digit")
+    return {file.name: file for file in export(sensors.digit(), folder, [])}
+
+
+def test_the_acrylic_of_digit_is_cut_along_its_arcs(files: dict[str, Path]) -> None:
+    """18.3 x 25 mm with a half round end of radius 9.15 and corners of 0.5 mm."""
+    found = entities(files["acrylic-cut.dxf"].read_text())
+    assert {each["8"] for each in found} == {"CUT"}
+    radii = [float(each["40"]) for each in found if each["0"] == "ARC"]
+    assert sorted(radii) == [0.5, 0.5, 9.15]
+    area = 18.3 * (25.0 - 9.15) + math.pi / 2 * 9.15**2 - 2 * (1 - math.pi / 4) * 0.5**2
+    assert enclosed(found) == pytest.approx(area, rel=1e-4)
+
+
+def test_the_sheet_has_three_views_and_all_dimensions(files: dict[str, Path]) -> None:
+    svg = files["acrylic-drawing.svg"].read_text(encoding="utf-8")
+    assert {"25", "18.3", "6.15", "R9.15", "R0.5"} <= set(texts(svg))
+    assert "acrylic: 1 x 6.15 mm, acrylic" in texts(svg)
+    root = ElementTree.fromstring(svg)
+    assert root.attrib["width"] == f"{float(root.attrib['viewBox'].split()[2]):.2f}mm", "1:1"
+    closed = [each.attrib["d"] for each in root.iter(f"{SVG}path")
+              if each.attrib["class"] == "edge" and each.attrib["d"].endswith("Z")]  # fmt: skip
+    assert len(closed) == 3
+    boxes = [np.array([p.split()[:2] for p in d.removesuffix(" Z")[2:].split(" L ")], float)
+             for d in closed[1:]]  # fmt: skip
+    sides = [sorted(np.ptp(box, axis=0).tolist()) for box in boxes]
+    assert sides[0] == pytest.approx([6.15, 25.0], abs=2e-3)
+    assert sides[1] == pytest.approx([6.15, 18.3], abs=2e-3)
+
+
+def test_holes_have_diameters_and_places() -> None:
+    ring = trimesh.creation.annulus(r_min=3.0, r_max=10.0, height=2.0, sections=48)
+    mesh = TriangleMesh(ring.vertices, ring.faces).welded()
+    (plate,) = plates([Shape("ring", Role.BLOCKER, None, mesh)])
+    assert [type(each) for each in plate.outlines] == [Circle, Circle]
+    assert [each.radius for each in plate.outlines if isinstance(each, Circle)] == pytest.approx(
+        [10.0, 3.0]
+    )
+    told = texts(drawing(plate, "a <design>"))
+    assert "⌀6 at (10, 10)" in told and "a <design>; mm, 1:1" in told
+    assert [each["0"] for each in entities(cut_file(plate))] == ["CIRCLE", "CIRCLE"]
+
+
+def test_edges_behind_a_plate_are_hidden() -> None:
+    """A trapezium whose long side is in front: its corners behind are dashed in that view."""
+    outline = [(0.0, 0.0), (30.0, 0.0), (20.0, 10.0), (5.0, 10.0)]
+    solid = trimesh.creation.extrude_polygon(shapely.Polygon(outline), 2.0)
+    (plate,) = plates([Shape("it", Role.SUPPORT, None, TriangleMesh(solid.vertices, solid.faces))])
+    root = ElementTree.fromstring(drawing(plate, "it"))
+    hidden = [
+        each.attrib["d"] for each in root.iter(f"{SVG}path") if each.attrib["class"] == "hidden"
+    ]
+    assert len(hidden) == 2
+
+
+def test_which_parts_are_plates() -> None:
+    mini = {each.name: each for each in plates(shapes(sensors.gelsight_mini()))}
+    assert {name: each.thickness for name, each in mini.items()} == pytest.approx(
+        {"tray": 1.0, "guide": 4.0}
+    )
+    svelte = {each.name: each for each in plates(shapes(sensors.gelsight_svelte(m1_grid=(20, 5))))}
+    assert svelte["side-walls"].count == 2
+    assert sorted(svelte["M2"].size) == pytest.approx([18.0, 18.1524], abs=1e-3), "tilted"
+    boards = [each for each in plates(shapes(sensors.gelsight360())) if "boards" in each.name]
+    assert [each.count for each in boards] == [4]
