@@ -12,6 +12,19 @@ import signal
 from types import FrameType
 from typing import NoReturn
 
+_begun = False
+
+
+def begin() -> None:
+    """From here on, work is done that a signal may have to wait for: called as a command begins."""
+    global _begun
+    _begun = True
+
+
+def has_begun() -> bool:
+    """Whether `begin` was called."""
+    return _begun
+
 
 def leave_on_signals() -> None:
     """From here on, Ctrl-C and SIGTERM end the process with 130 or 143 and one word.

@@ -46,6 +46,12 @@ MOST_TEXT = 16 * MEBIBYTE
 MOST_JSON = 16 * MEBIBYTE
 """Bytes of a file of JSON: a study that varies a thousand parameters has 1 MiB."""
 
+MOST_BOARD = 16 * MEBIBYTE
+"""Bytes of a pick-and-place file: a board with 10,000 parts has 1 MiB."""
+
+MOST_PROGRAM = 16 * MEBIBYTE
+"""Bytes of a user's Python file; such files have some KiB."""
+
 MOST_TABLE = 512 * MEBIBYTE
 """Bytes of a CSV table: a dataset of a million samples has 300 MiB."""
 

@@ -7,14 +7,14 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from optisense.cli.compare import PhotosArgument
-from optisense.cli.console import ends_well, messages, output, table_of
+from optisense.cli.compare import PhotosArgument, reading_lines
+from optisense.cli.console import EXIT_INTERRUPTED, ends_well, messages, output, table_of
 from optisense.cli.options import DesignArgument, VariantOption
 from optisense.cli.output_folder import take_folder
 from optisense.cli.progress import progress_line
 from optisense.commands.comparing import CalibrateOptions
 from optisense.time_left import TimedStep
-from optisense.writing import write_json
+from optisense.writing import write_json, written_together
 
 if TYPE_CHECKING:
     from optisense.calibration.calibrating import Calibration
@@ -40,26 +40,30 @@ def calibrate(
     """Fit a design to photographs of the real sensor.
 
     Writes the fitted design, calibration.json and calibration.html into the folder. Some
-    presses are held out of the fit and only judged.
+    presses are held out of the fit and only judged. Renderings are kept in the folder until the
+    end: the same command goes on where an interrupted one was.
     """
     with progress_line(TimedStep(LOADING, 1, 3.0), TimedStep(FITTING, 20, 100.0)) as line:
         line.begin(LOADING)
         from optisense.calibration import read_photographs
         from optisense.calibration.calibrating import CalibrationSettings
         from optisense.calibration.calibrating import calibrate as fit_design
-        from optisense.calibration.quantities import FAMILIES
+        from optisense.calibration.families import FAMILIES, chosen_families
+        from optisense.calibration.kept_renderings import KeptRenderings
         from optisense.report.calibration import write_calibration
         from optisense.sensors import load, save_design
 
-        unknown = [name for name in options.keep if name not in FAMILIES]
-        if unknown:
-            raise typer.BadParameter(
-                f"'{unknown[0]}' is none of " + ", ".join(FAMILIES), param_hint="--keep"
-            )
+        for option, names in (("--keep", options.keep), ("--also", options.also)):
+            for name in names:
+                if name not in FAMILIES:
+                    raise typer.BadParameter(
+                        f"'{name}' is none of " + ", ".join(FAMILIES), param_hint=option
+                    )
         asked = tuple(_asked(text) for text in options.fit)
         sensor = load(design)
         photographs = read_photographs(photos, options.ball)
         take_folder(out)
+        kept = KeptRenderings(out)
         line.begin(FITTING)
 
         def told(what: str, done: int, count: int) -> None:
@@ -67,24 +71,31 @@ def calibrate(
             line.time_left.advance(done)
             line.say(what, done, count)
 
-        found = fit_design(
-            sensor,
-            photographs,
-            CalibrationSettings(
-                families=tuple(name for name in FAMILIES if name not in options.keep),
-                asked=asked,
-                rounds=options.rounds,
-                photons=options.photons,
-                seed=options.seed,
-                refine=not options.as_labelled,
-                held_out=tuple(options.hold_out) or None,
-            ),
-            variant=variant,
-            progress=told,
-        )
-        save_design(found.design, out)
-        write_json(out / JSON_FILE, found.as_data())
-        write_calibration(out / PAGE_FILE, found)
+        try:
+            found = fit_design(
+                sensor,
+                photographs,
+                CalibrationSettings(
+                    families=chosen_families(options.keep, options.also),
+                    asked=asked,
+                    rounds=options.rounds,
+                    photons=options.photons,
+                    seed=options.seed,
+                    refine=not options.as_labelled,
+                    held_out=tuple(options.hold_out) or None,
+                ),
+                variant=variant,
+                kept=kept,
+                progress=told,
+            )
+        except KeyboardInterrupt:
+            messages.print("interrupted: the same command goes on with what is rendered")
+            raise typer.Exit(EXIT_INTERRUPTED) from None
+        with written_together("the calibration") as stage:
+            write_calibration(stage(out / PAGE_FILE), found)
+            write_json(stage(out / JSON_FILE), found.as_data())
+            save_design(found.design, out)
+        kept.remove()
     for note in (*found.before.notes, *found.notes):
         messages.print(f"note: {note}", markup=False)
     print_calibration(found)
@@ -115,6 +126,8 @@ def print_calibration(found: Calibration) -> None:
         chosen = found.of_presses(side.realism, held_out=held)
         table.add_row(name, *_figures(chosen))
     output.print(table)
+    for line in reading_lines(found.of_presses(found.after.realism, held_out=held)):
+        output.print(line)
     output.print(f"exposure of the photographs: {found.exposure:.4g}")
 
 

@@ -65,7 +65,7 @@ def _describe(design: SensorDesign) -> None:
     """Print what the design is made of, and how much of it the camera sees."""
     from optisense.design.camera_checks import view_shares
     from optisense.design.parts import Role
-    from optisense.mechanics import elasticity_in_words
+    from optisense.mechanics import elasticity_in_words, is_attached
 
     output.print(design.name, style="bold", markup=False)
     if design.description:
@@ -104,6 +104,9 @@ def _describe(design: SensorDesign) -> None:
         )
     if design.parts_of(Role.ELASTOMER):
         output.print(f"elasticity  {elasticity_in_words(design)}", markup=False)
+        if not is_attached(design):
+            told = "odd: the gel is attached to nothing; its elastic skin can't be pressed"
+            output.print(told, style="yellow")
     assumed = sum(entry.status == "assumed" for entry in design.provenance.values())
     if assumed:
         output.print(f"{assumed} of its values are marked as assumed.", style="yellow")

@@ -23,6 +23,7 @@ _HOMES = {
     "report": "report",
     "tolerance": "tolerance",
     "ledger": "ledger",
+    "contacts": "contacts",
     "compare": "compare",
     "calibrate": "calibrate",
     "export": "export",

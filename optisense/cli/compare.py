@@ -16,6 +16,7 @@ from optisense.time_left import TimedStep
 
 if TYPE_CHECKING:
     from optisense.calibration.comparing import Comparison
+    from optisense.calibration.realism import Realism
 
 PICTURES, WRITING = "rendering the presses", "writing the page"
 """Steps of the progress line."""
@@ -88,6 +89,20 @@ def compare(
         output.print(f"page: {out}", markup=False)
 
 
+def reading_lines(found: Realism) -> list[str]:
+    """What readers read that were calibrated on the other's pictures, in words."""
+    if not found.readings:
+        return []
+    return [
+        f"a reader calibrated on {one} reads the balls {found.median_reading(radius):.2f} times as "
+        f"large as they are in {other}, and normals {found.median_reading(degrees):.1f} degrees off"
+        for one, other, radius, degrees in (
+            ("the model", "the photographs", "radius", "degrees"),
+            ("the photographs", "the model", "radius_back", "degrees_back"),
+        )
+    ]
+
+
 def print_comparison(found: Comparison) -> None:
     """A table of the presses, and one of the background."""
     table = table_of("press", "unexplained", "contact", "ring", "far field", "similarity")
@@ -112,3 +127,5 @@ def print_comparison(found: Comparison) -> None:
         f"{found.realism.exposure:.4g}",
         style="dim",
     )
+    for line in reading_lines(found.realism):
+        output.print(line)

@@ -19,6 +19,7 @@ import typer
 from rich.console import Console, ConsoleOptions, RenderableType
 from rich.segment import Segment
 
+from optisense import starting
 from optisense.cli.from_options import with_options
 from optisense.errors import OptiSenseError, OutputError, SetupError
 from optisense.text import visible
@@ -102,10 +103,8 @@ def ends_well(command: Callable[_P, _R]) -> Callable[..., _R]:
 
     @functools.wraps(command)
     def run(*args: _P.args, **kwargs: _P.kwargs) -> _R:
-        from optisense.cli import stopping
-
         try:
-            stopping.begin()
+            starting.begin()
             with ExitStack() as ending:
                 before = _ending.set(ending)
                 ending.callback(_ending.reset, before)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 
+from optisense import starting
 from optisense.cli import stopping
 from optisense.cli.console import EXIT_INTERRUPTED, messages
 
@@ -18,5 +19,5 @@ def engine() -> None:
         )
     from optisense.engine.server import serve
 
-    stopping.begin()
+    starting.begin()
     serve(lambda: stopping.exit_code(EXIT_INTERRUPTED))

@@ -35,7 +35,7 @@ def with_options(command: Callable[..., Any]) -> Callable[..., Any]:
     def run(**given: Any) -> Any:
         for name, model in models.items():
             values = {field: given.pop(field) for field in model.model_fields}
-            given[name] = _model(model, values)
+            given[name] = options_of(model, values)
         return command(**given)
 
     run.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
@@ -102,7 +102,7 @@ def _flags(name: str, written: Written) -> tuple[str, ...]:
     return written.flags or ("--" + name.replace("_", "-"),)
 
 
-def _model(model: type[CommandOptions], values: dict[str, Any]) -> CommandOptions:
+def options_of(model: type[CommandOptions], values: dict[str, Any]) -> CommandOptions:
     """The options as given; those that were left out keep the model's defaults.
 
     Raises:

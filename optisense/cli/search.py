@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import sys
+import time
 from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -25,6 +26,13 @@ from optisense.commands.searching import SearchOptions
 if TYPE_CHECKING:
     from optisense.cli.progress import ProgressLine
     from optisense.search import Study
+
+VERIFIED_FROM = 300.0
+"""Seconds of a search from which on it ends with a quick verification where nothing else is asked
+for: that takes half a minute on two idle cores, which is little beside five minutes."""
+
+VERIFY_FOLDER = "verify"
+"""Name of the folder in that of a study for what a search verifies at its end."""
 
 
 @ends_well
@@ -62,6 +70,16 @@ def search(
         ),
     ] = False,
     variant: VariantOption = "auto",
+    verify: Annotated[
+        bool | None,
+        typer.Option(
+            "--verify/--no-verify",
+            help="Whether to tell at the end, with `optisense verify --quick`, if the best design "
+            f"reads better than the start; when left out, after {VERIFIED_FROM / 60:.0f} minutes "
+            "of searching or more.",
+            show_default=False,
+        ),
+    ] = None,
     as_json: Annotated[
         bool, typer.Option("--json", help="Print the result as JSON instead of text.")
     ] = False,
@@ -77,6 +95,7 @@ def search(
         return
     if out is None:
         raise typer.BadParameter("name a folder for the study", param_hint="--out")
+    began = time.monotonic()
 
     with ExitStack() as stack:
         # It may ask whether code is trusted, so it comes before the progress.
@@ -97,6 +116,8 @@ def search(
                 told=stopping.say,
                 time_left=line.time_left,
             )
+        best = result.study.best
+        better = best is not None and not best.is_start
         if as_json:
             print(json.dumps(summary(result), indent=2, allow_nan=False))
         else:
@@ -107,6 +128,36 @@ def search(
             markup=False,
         )
         raise typer.Exit(EXIT_INTERRUPTED)
+    long = time.monotonic() - began >= VERIFIED_FROM
+    if better and not as_json and (long if verify is None else verify):
+        _verify(out, variant)
+
+
+def _verify(study: Path, variant: str) -> None:
+    """Tell whether the best design of a study reads better than its start, in the study's folder.
+
+    What fails there is told, and the search is none the worse for it.
+    """
+    from optisense.cli.verify import compare, print_comparison
+    from optisense.commands.sampling import VerifyOptions
+    from optisense.errors import OptiSenseError
+
+    folder = study / VERIFY_FOLDER
+    output.print(f"Does it read better? A quick look; in full: optisense verify {study}")
+    try:
+        print_comparison(
+            compare(
+                str(study),
+                None,
+                "best",
+                VerifyOptions.model_validate({"quick": True}),
+                folder,
+                variant,
+            ),
+            folder,
+        )
+    except OptiSenseError as error:
+        messages.print(f"it can't be verified: {error}", style="yellow", markup=False)
 
 
 def _begun(out: Path, design: str | None, options: SearchOptions, line: ProgressLine) -> Study:

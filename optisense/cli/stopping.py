@@ -46,7 +46,6 @@ class _State:
     """The signals that this process has received, and what a first one waits for."""
 
     def __init__(self) -> None:
-        self.begun = False
         self.signals = 0
         self.repeated = 0
         self.terminated = False
@@ -108,11 +107,6 @@ def watch() -> None:
     threading.Thread(target=_answer, args=(reader,), name="signals", daemon=True).start()
 
 
-def begin() -> None:
-    """From here on, Ctrl-C is a KeyboardInterrupt: called as a command begins its work."""
-    _state.begun = True
-
-
 def over(code: int) -> None:
     """From here on, a signal ends the process at once, with the code of the finished command."""
     for number in (signal.SIGINT, signal.SIGTERM):
@@ -121,8 +115,9 @@ def over(code: int) -> None:
 
 
 def _interrupt(number: int, frame: FrameType | None) -> None:
-    """Ctrl-C: a KeyboardInterrupt, unless it would come out of an import."""
-    if not _state.begun:
+    """Ctrl-C: a KeyboardInterrupt once a command has begun, unless it would come out of an
+    import."""
+    if not starting.has_begun():
         starting.leave(signal.SIGTERM if _state.terminated else signal.SIGINT)
     if _imports(frame):
         timer = threading.Timer(AGAIN, _repeat)

@@ -139,6 +139,31 @@ def force(
 
 @task_app.command()
 @ends_well
+def shear(
+    design: DesignArgument,
+    ball: Annotated[float, typer.Option(min=0.1, metavar="MM", help="Radius of the ball.")] = 3.0,
+    depth: Annotated[
+        float, typer.Option(min=0.41, metavar="MM", help="The deepest press; the least is 0.4 mm.")
+    ] = 1.0,
+    drag: Annotated[
+        float, typer.Option(min=0.01, metavar="MM", help="The longest way that it is dragged.")
+    ] = 0.4,
+    *,
+    options: SampleOptions,
+    out: OutOption = None,
+    as_json: JsonOption = False,
+    variant: VariantOption = "auto",
+) -> None:
+    """The shear force of a dragged ball, from the motion of the markers in the picture."""
+
+    def task() -> PerceptionTask:
+        return tasks.BallShear(radius=ball, most=depth, farthest=drag)
+
+    _perceive(design, {"shear": task}, options, out, as_json, variant)
+
+
+@task_app.command()
+@ends_well
 def snr(
     design: DesignArgument,
     *,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
@@ -29,19 +30,34 @@ def print_perception(results: Iterable[PerceptionResult]) -> None:
 
 
 def print_reconstruction(result: ReconstructionResult) -> None:
-    """A row for each object, and their mean."""
-    heads = ("normals off by", "of reading nothing", "depth off by", "deepest", "read")
-    table = table_of("object", *heads)
+    """A row for each object, and their mean: degrees of normals, and mm of depths."""
+    heads = ("normals off (°)", "if flat (°)", "ring (°)", "depth off (mm)", "ring (mm)")
+    table = table_of("object", *heads, "deepest (mm)", "read (mm)")
+    table.columns[0].overflow = "fold"  # long names go on in the next line
+    table.columns[0].no_wrap = False
     for name, each in result.objects.items():
         values = each.to_dict()
         table.add_row(
             name,
-            f"{values['normal_error']:.1f} degrees",
-            f"{values['normal_error_of_reading_nothing']:.1f} degrees",
-            f"{values['depth_error']:.3f} mm",
-            f"{values['deepest']:.2f} mm",
-            f"{values['deepest_read']:.2f} mm",
+            f"{each.normal_error:.1f}",
+            f"{values['normal_error_of_reading_nothing']:.1f}",
+            _or_none(each.ring_normal_error, ".1f"),
+            f"{each.depth_error:.3f}",
+            _or_none(each.ring_depth_error, ".3f"),
+            f"{values['deepest']:.2f}",
+            f"{values['deepest_read']:.2f}",
         )
-    means = f"{result.normal_error:.1f} degrees", "", f"{result.depth_error:.3f} mm"
+    means = (
+        f"{result.normal_error:.1f}",
+        "",
+        _or_none(result.ring_normal_error, ".1f"),
+        f"{result.depth_error:.3f}",
+        _or_none(result.ring_depth_error, ".3f"),
+    )
     table.add_row("mean", *means, "", "", style="bold")
     output.print(table)
+
+
+def _or_none(value: float, digits: str) -> str:
+    """A number; a dash where there is none."""
+    return "-" if math.isnan(value) else f"{value:{digits}}"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 import typer
 
@@ -13,7 +13,7 @@ from optisense.cli.options import VariantOption, out_option
 from optisense.cli.output_folder import take_folder
 from optisense.cli.progress import ProgressLine, progress_line
 from optisense.cli.sampling import BUILDING, LOADING, loading_steps, sample_steps, shown_samples
-from optisense.cli.verify_result import print_verification
+from optisense.cli.verify_result import conditions_of, print_conditions, print_verification
 from optisense.commands.sampling import VerifyOptions
 from optisense.time_left import TimedStep
 from optisense.usual_times import UsualTimes
@@ -22,6 +22,7 @@ from optisense.writing import write_text
 if TYPE_CHECKING:
     from optisense.design import SensorDesign
     from optisense.optics import OpticalModel
+    from optisense.tasks import Verification
 
 JSON_FILE = "verify.json"
 REPORT_FILE = "verify.html"
@@ -69,6 +70,44 @@ def verify(
     Both are calibrated with balls, and screws, coins, letters and other things are then pressed
     into both at the same places. The errors of what is read of them decide.
     """
+    compared = compare(first, second, trial, options, out, variant)
+    if as_json:
+        print(json.dumps(compared.to_dict(), indent=2, allow_nan=False))
+        return
+    print_comparison(compared, out)
+
+
+class Compared(NamedTuple):
+    """What came of a comparison.
+
+    Attributes:
+        found: what both sensors read.
+        conditions: those of the study, as of `conditions_of`.
+    """
+
+    found: Verification
+    conditions: list[dict[str, Any]]
+
+    def to_dict(self) -> dict[str, Any]:
+        """Ready for JSON."""
+        plain = self.found.to_dict()
+        return {**plain, "conditions": self.conditions} if self.conditions else plain
+
+
+def compare(
+    first: str,
+    second: str | None,
+    trial: str,
+    options: VerifyOptions,
+    out: Path | None,
+    variant: str,
+) -> Compared:
+    """Compare two designs, or a trial of a study with its start; see `verify`.
+
+    Raises:
+        OptiSenseError: there are no two designs, or one can't be read.
+        typer.BadParameter: only one design is named.
+    """
     count = options.pictures()
     with progress_line(*loading_steps(LIBRARIES_TIME), *_steps(options, UsualTimes.here())) as line:
         line.begin(LOADING)
@@ -82,7 +121,7 @@ def verify(
         ]
         for design, label in zip(designs, SIDES, strict=True):
             _expect(line, options, design, label)
-        from optisense.tasks import verify as compare
+        from optisense.tasks import verify as compared_by_objects
 
         shown: dict[int, Any] = {}
 
@@ -92,18 +131,22 @@ def verify(
                 shown[side] = shown_samples(line, models[side], SIDES[side], after)
             shown[side](done, count)
 
-        found = compare((models[0], models[1]), settings, names, show)
+        found = compared_by_objects((models[0], models[1]), settings, names, show)
+        compared = Compared(found, conditions_of(first, trial) if second is None else [])
         if out is not None:
             from optisense.report.verification import write_verification_report
 
-            text = json.dumps(found.to_dict(), indent=2, allow_nan=False)
+            text = json.dumps(compared.to_dict(), indent=2, allow_nan=False)
             write_text(out / JSON_FILE, text + "\n")
             first_axes, second_axes = (design.camera.axes() for design in designs)
             write_verification_report(out / REPORT_FILE, found, (first_axes, second_axes))
-    if as_json:
-        print(json.dumps(found.to_dict(), indent=2, allow_nan=False))
-        return
-    print_verification(found)
+    return compared
+
+
+def print_comparison(compared: Compared, out: Path | None) -> None:
+    """What both sensors read, whether conditions are kept, and what was written."""
+    print_verification(compared.found)
+    print_conditions(compared.conditions)
     if out is not None:
         for name in (JSON_FILE, REPORT_FILE):
             output.print(f"written: {out / name}", markup=False)

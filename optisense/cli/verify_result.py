@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from optisense.cli.console import output, table_of
 
@@ -40,3 +40,40 @@ def print_verification(found: Verification) -> None:
     for note in found.notes():
         output.print(f"note: {note}", markup=False, style="yellow")
     output.print(f"{found.in_words()}.", markup=False)
+
+
+def conditions_of(folder: str, which: str) -> list[dict[str, Any]]:
+    """The conditions of a study: each with the value of the start and that of a trial, which are
+    None where nothing was measured, and whether the trial keeps it.
+
+    Raises:
+        SearchError: there is no such study or trial.
+    """
+    from optisense.search import Study
+    from optisense.search.study.conditions import margins
+
+    study = Study.open(folder)
+    try:
+        chosen, start = study.trial(which), study.start
+        before = {} if start is None else dict(start.conditions)
+        return [
+            {"condition": text, "start": before.get(text), "trial": value, "margin": margin}
+            for text, value, margin in margins(chosen)
+        ]
+    finally:
+        study.close()
+
+
+def print_conditions(conditions: list[dict[str, Any]]) -> None:
+    """Whether the trial of a study keeps the conditions of the search, beside the start."""
+    if not conditions:
+        return
+    table = table_of("condition", "start", "trial", "margin")
+    for each in conditions:
+        values = [
+            "not measured" if each[name] is None else f"{each[name]:.4g}"
+            for name in ("start", "trial", "margin")
+        ]
+        broken = each["margin"] is None or each["margin"] < 0.0
+        table.add_row(each["condition"], *values[:2], "broken" if broken else values[2])
+    output.print(table)

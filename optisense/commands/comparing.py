@@ -42,6 +42,11 @@ class CalibrateOptions(PhotographOptions):
         description="What stays as it is: powers, colours, tone, black, shading or view. May be "
         "given several times.",
     )
+    also: Annotated[list[str], Written("NAME")] = Field(
+        [],
+        description="What may change besides: lights, emission, edges, coating, gel or indices. "
+        "May be given several times.",
+    )
     fit: Annotated[list[str], Written("PATH=LO:HI")] = Field(
         [],
         description="A further number of the design that may change, and its range. May be given "

@@ -12,6 +12,7 @@ from optisense.engine.failures import Cancelled
 from optisense.engine.files import Files
 from optisense.engine.jobs import Job
 from optisense.engine.search_process import SearchProcess, is_running
+from optisense.engine.trial_rows import trial_row
 from optisense.time_left import TimedStep, TimeLeft
 
 if TYPE_CHECKING:
@@ -145,7 +146,6 @@ class Following:
 
     def _tell(self, study: Study, row: Row, is_best: bool) -> None:
         from optisense.engine.designing import bent_shapes
-        from optisense.engine.searching import trial_row
 
         trial = study.trial_of(row)
         shapes = bent_shapes(trial.design, self._files, study.space.design) if is_best else {}

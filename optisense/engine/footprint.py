@@ -1,4 +1,4 @@
-"""The request about the camera's footprint: where on the sensing surface its pixels look."""
+"""Requests about the skin: where on it the camera looks, and where its markers are."""
 
 from __future__ import annotations
 
@@ -48,4 +48,25 @@ def footprint(session: Session, fields: FootprintGrid, job: Job) -> dict[str, An
         "size": [fields.columns, rows],
         "skin": view.skin,
         "picture": view.picture,
+    }
+
+
+@handles("markers", OfDesign, Lane.RENDER)
+def markers(session: Session, fields: OfDesign, job: Job) -> dict[str, Any]:
+    """Where the dots that are printed on the skin lie."""
+    from optisense.optics.imaging.markers import MarkerDots
+
+    files = session.files(fields, job.id)
+    design = design_of(session, fields, job)
+    if design.markers is None:
+        return {"files": {}, "count": 0, "radius": 0.0}
+    model = session.renderer.draft_model(design)
+    dots = MarkerDots.on(design.markers, model.surface)
+    return {
+        "files": {
+            "points": files.array("markers.points.npy", dots.points.astype(np.float32)),
+            "normals": files.array("markers.normals.npy", dots.normals.astype(np.float32)),
+        },
+        "count": len(dots.points),
+        "radius": dots.radius,
     }

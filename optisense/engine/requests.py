@@ -74,6 +74,7 @@ def _load() -> None:
     for module in (
         "rendering",
         "footprint",
+        "fitting",
         "placing",
         "designing",
         "cad",

@@ -14,6 +14,7 @@ from typing import Any
 from optisense import errors
 from optisense.errors import OptiSenseError, SearchError
 from optisense.folders import holder_of
+from optisense.untrusted_files import read_json
 
 PROCESS_FILE = "process.json"
 """File in the study's folder while one of these processes runs it; it tells how to end the
@@ -116,8 +117,8 @@ def stop_other(folder: Path) -> bool:
     if holder is None:
         return False
     try:
-        number = int(json.loads((folder / PROCESS_FILE).read_text(encoding="utf-8"))["pid"])
-    except (OSError, ValueError, KeyError, TypeError):
+        number = int(read_json(folder / PROCESS_FILE, SearchError)["pid"])
+    except (SearchError, ValueError, LookupError, TypeError):
         number = None
     if number != holder.process or holder.is_elsewhere:
         raise SearchError(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -21,10 +20,11 @@ from optisense.engine.requests import Lane, handles
 from optisense.engine.scoring import own_objectives
 from optisense.engine.search_process import SearchProcess, is_running, stop_other
 from optisense.engine.session import Session
+from optisense.engine.trial_rows import curve_row, finite, trial_row
 from optisense.sensors import save_design
 
 if TYPE_CHECKING:
-    from optisense.search import Study, Trial
+    from optisense.search import Study
     from optisense.search.space.search_space import BoundSpace
 
 
@@ -79,7 +79,7 @@ class Apply(OneTrial):
 
 @handles("methods", Fields, Lane.QUICK)
 def methods(session: Session, fields: Fields, job: Job) -> dict[str, Any]:
-    """Ways to search."""
+    """The search methods, by name."""
     from optisense.search.methods import find, names
 
     return {"methods": [{"name": name, "summary": find(name).summary} for name in names()]}
@@ -201,7 +201,7 @@ def trial(session: Session, fields: OneTrial, job: Job) -> dict[str, Any]:
         design = design_of_trial(study, chosen)
         return {
             **trial_row(study, chosen),
-            "fresh_scores": {name: _finite(chosen.fresh_score(name)) for name in chosen.scores},
+            "fresh_scores": {name: finite(chosen.fresh_score(name)) for name in chosen.scores},
             "data": design.model_dump(mode="json"),
             "folder": str(_absolute(fields.study) / "design"),
             "shapes": bent_shapes(design, files, study.space.design),
@@ -218,34 +218,6 @@ def apply(session: Session, fields: Apply, job: Job) -> dict[str, Any]:
         chosen = study.trial(fields.trial)
         save_design(design_of_trial(study, chosen), folder, new=True)
         return {"folder": str(folder), "number": chosen.number}
-
-
-def curve_row(trial: Trial) -> dict[str, Any]:
-    """A point of the curve of scores."""
-    return {
-        "number": trial.number,
-        "start": trial.is_start,
-        "scores": {name: _finite(value) for name, value in trial.scores.items()},
-        "failure": trial.failure,
-        "feasible": trial.failure is None and trial.is_feasible,
-    }
-
-
-def trial_row(study: Study, trial: Trial) -> dict[str, Any]:
-    """A trial without its design."""
-    from optisense.search.study.conditions import margins
-    from optisense.search.study.study import beside
-
-    return {
-        **curve_row(trial),
-        "values": trial.values,
-        "vector": trial.vector,
-        "beside": beside(study, trial),
-        "conditions": [
-            {"condition": text, "value": value, "margin": margin}
-            for text, value, margin in margins(trial)
-        ],
-    }
 
 
 @contextmanager
@@ -282,7 +254,3 @@ def _parameters(bound: BoundSpace) -> list[dict[str, Any]]:
             }
         )
     return rows
-
-
-def _finite(value: float) -> float | None:
-    return value if math.isfinite(value) else None

@@ -63,7 +63,7 @@ def test_a_command_does_not_wait_for_the_others() -> None:
 @pytest.mark.parametrize(
     ("arguments", "needless"),
     [
-        (["check", "gelsight-mini"], {"drjit", "mitsuba", "scipy.spatial", "jinja2"}),
+        (["check", "gelsight-mini"], {"drjit", "mitsuba", "scipy.optimize", "jinja2"}),
         (
             # Beside a GelSight Mini's picture the report presses a ball, as a real one was pressed.
             ["render", "gelbelt", "--resolution=40x30", "--photons=20000", "--out=here"],

@@ -27,6 +27,7 @@ def test_all_that_a_workshop_needs(tmp_path: Path) -> None:
     assert code == 0, text
     assert {file.name for file in out.iterdir()} == {
         "skin.stl", "gel.stl", "tray.stl", "guide.stl", "gelsight-mini.3mf",
+        "tray-drawing.svg", "tray-cut.dxf", "guide-drawing.svg", "guide-cut.dxf",
         "pick-and-place.csv", "bill-of-materials.csv", "bill-of-materials.md",
         *(f"board-{board}{end}" for board in (1, 2, 3)
           for end in (".pos", "-cpl.csv", "-bom.csv", ".dxf")),

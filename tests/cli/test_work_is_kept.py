@@ -312,23 +312,56 @@ def test_looking_at_a_study_leaves_its_folder_as_it_was(study: Path) -> None:
     assert sorted(study.iterdir()) == before
 
 
+@contextlib.contextmanager
+def small_disk(place: Path, size: str) -> Iterator[Path]:
+    """A file system in memory that holds so much."""
+    place.mkdir()
+    mount = ["mount", "-t", "tmpfs", "-o", f"size={size}", "tmpfs", str(place)]
+    if subprocess.run(mount, capture_output=True).returncode:
+        pytest.skip("only root can make a small file system")
+    try:
+        yield place
+    finally:
+        subprocess.run(["umount", "--lazy", str(place)], check=True)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["new", "gelsight-mini"],
+        ["export", "gelsight-mini", "--out"],
+        ["render", "gelsight-mini", "--photons", 1000, "--resolution", "64x48", "--out"],
+    ],
+    ids=lambda words: words[0],
+)
+def test_a_full_disk_leaves_nothing_half(words: list[object], tmp_path: Path) -> None:
+    with small_disk(tmp_path / "disk", "48k") as disk:
+        code, said = ran(*words, disk / "out")
+        assert code == 1, said
+        assert "No space left on device" in said and "unexpected" not in said
+        assert not [path for path in disk.rglob("*") if path.is_file()]
+
+
+@pytest.mark.slow
+def test_a_read_only_folder_is_told_before_the_work(tmp_path: Path) -> None:
+    with read_only(tmp_path):
+        for words in (["export", "gelsight-mini", "--out"], ["dataset", "gelsight-mini", "--out"]):
+            code, said = ran(*words, tmp_path / "out")
+            assert code == 1, said
+            assert "can't be written" in said and "tracing" not in said
+
+
 @pytest.mark.slow
 def test_a_full_disk_is_told_as_it_is(tmp_path: Path) -> None:
     """On a file system of 2 MB: first too small for a study, then for all of its trials."""
-    disk = tmp_path / "disk"
-    disk.mkdir()
-    made = subprocess.run(
-        ["mount", "-t", "tmpfs", "-o", "size=2m", "tmpfs", str(disk)], capture_output=True
-    )
-    if made.returncode:
-        pytest.skip("only root can make a small file system")
     design = ots.load("gelsight-mini")
     space = SearchSpace({"coating.specularity": (0.0, 1.0)})
 
     def brightness(design: ots.SensorDesign) -> float:
         return design.coating.specularity
 
-    try:
+    with small_disk(tmp_path / "disk", "2m") as disk:
         mine = disk / "mine.txt"
         mine.write_text("m" * 1_950_000)
         with pytest.raises(OptiSenseError) as told:
@@ -345,8 +378,6 @@ def test_a_full_disk_is_told_as_it_is(tmp_path: Path) -> None:
         assert f"keeps its {finished} finished trials" in str(told.value.hint)
         assert finished > 10
         assert mine.read_text() == "mine"
-    finally:
-        subprocess.run(["umount", "--lazy", str(disk)], check=True)
 
 
 @pytest.mark.slow

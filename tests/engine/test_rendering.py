@@ -257,3 +257,13 @@ def test_contacts_that_no_pixel_sees_are_told(engine: Any) -> None:
     distance = np.linalg.norm(np.load(result["files"]["points"])[mask], axis=1)
     assert mask.any() and distance.max() < 3.0  # all that is touched lies in the middle
     assert result["unseen"] == [0]
+
+
+def test_markers_lie_on_the_skin(engine: Any) -> None:
+    dots = {"radius": 0.4, "grid": [3, 2], "pitch": 2.0}
+    marked = {"from": "gelsight-mini", "set": {"markers": dots}}
+    found = engine.ask("markers", design=marked)
+    points = np.load(found["files"]["points"])
+    assert found["count"] == len(points) == 6 and found["radius"] == 0.4
+    np.testing.assert_allclose(points[:, 2], 0.0, atol=1e-5)
+    assert engine.ask("markers", design="gelsight-mini")["count"] == 0

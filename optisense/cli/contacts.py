@@ -1,0 +1,48 @@
+"""``optisense contacts``: the contacts in photographs, to correct them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from optisense.cli.compare import PhotosArgument
+from optisense.cli.console import ends_well, messages, output, table_of
+from optisense.commands.comparing import PhotographOptions
+
+
+@ends_well
+def contacts(
+    photos: PhotosArgument,
+    out: Annotated[Path, typer.Option("--out", "-o", metavar="FILE", help="The page to write.")],
+    *,
+    options: PhotographOptions,
+) -> None:
+    """Find the contacts in photographs of a real sensor, to correct them on a page.
+
+    On the page, circles can be dragged, and its button saves presses.csv.
+    """
+    if out.is_dir():
+        raise typer.BadParameter(f"'{out}' is a folder", param_hint="--out")
+    from optisense.calibration import read_photographs
+    from optisense.calibration.seen_contacts import doubts, seen_contacts
+    from optisense.cli.output_folder import ensure_writable
+    from optisense.report.contacts import write_contacts
+
+    photographs = read_photographs(photos, options.ball).scaled()
+    ensure_writable(out.parent)
+    found = seen_contacts(photographs, refine=not options.as_labelled)
+    notes = [*photographs.warnings(), *doubts(photographs)]
+    write_contacts(out, photos.name, photographs, found, notes)
+    for note in notes:
+        messages.print(f"note: {note}", markup=False)
+    table = table_of("press", "column", "row", "radius (pixels)")
+    for press, place in zip(photographs.presses, found, strict=True):
+        if place is None:
+            table.add_row(press.name, "none", "", "")
+            continue
+        numbers = (*place.centre, place.radius)
+        table.add_row(press.name, *(f"{value / photographs.scale:.1f}" for value in numbers))
+    output.print(table)
+    output.print(f"page: {out}", markup=False)

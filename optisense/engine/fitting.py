@@ -1,0 +1,113 @@
+"""The request that fits a design to photographs of the real sensor."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+from optisense.calibration.families import FAMILIES, USUAL, chosen_families
+from optisense.commands.comparing import CalibrateOptions
+from optisense.engine.failures import ProtocolError
+from optisense.engine.jobs import Job
+from optisense.engine.protocol import Fields
+from optisense.engine.rendering import OfDesign, design_of
+from optisense.engine.requests import Lane, handles
+from optisense.engine.session import Session
+from optisense.folders import hold
+from optisense.writing import write_json
+
+
+class Calibrate(OfDesign, CalibrateOptions):
+    """See docs/engine.md."""
+
+    photos: str
+    to: str
+
+
+class Nothing(Fields):
+    """See docs/engine.md."""
+
+
+@handles("calibration_families", Nothing, Lane.QUICK)
+def calibration_families(session: Session, fields: Nothing, job: Job) -> dict[str, Any]:
+    """What a calibration fits without being asked."""
+    return {"families": [{"name": name, "words": FAMILIES[name].words} for name in USUAL]}
+
+
+@handles("calibrate", Calibrate, Lane.RENDER)
+def calibrate(session: Session, fields: Calibrate, job: Job) -> dict[str, Any]:
+    """Fit a design to photographs; writes the fitted design and its page."""
+    from optisense.calibration import read_photographs
+    from optisense.calibration.calibrating import CalibrationSettings
+    from optisense.calibration.calibrating import calibrate as fit_design
+    from optisense.report.calibration import write_calibration
+    from optisense.sensors import save_design
+
+    for where, names in (("keep", fields.keep), ("also", fields.also)):
+        for name in names:
+            if name not in FAMILIES:
+                raise ProtocolError(
+                    f"nothing is called '{name}'", where=where, hint="Use " + ", ".join(FAMILIES)
+                )
+    design = design_of(session, fields, job)
+    session.designs.must_be_sound(design)
+    job.progress(0.0, "reading the photographs")
+    photographs = read_photographs(Path(fields.photos), fields.ball)
+    folder = Path(fields.to)
+    give_back = hold(folder)
+    try:
+
+        def told(what: str, done: int, count: int) -> None:
+            job.progress(min(done / max(count, 1), 1.0), what)
+
+        found = fit_design(
+            design,
+            photographs,
+            CalibrationSettings(
+                families=chosen_families(fields.keep, fields.also),
+                asked=tuple(_asked(text) for text in fields.fit),
+                rounds=fields.rounds,
+                photons=fields.photons,
+                seed=fields.seed,
+                refine=not fields.as_labelled,
+                held_out=tuple(fields.hold_out) or None,
+            ),
+            variant=session.renderer.variant,
+            progress=told,
+        )
+        save_design(found.design, folder)
+        write_json(folder / "calibration.json", found.as_data())
+        page = folder / "calibration.html"
+        write_calibration(page, found)
+    finally:
+        give_back()
+    held = bool(found.held_out)
+    return {
+        "folder": str(folder),
+        "page": str(page),
+        "numbers": [asdict(each) for each in found.numbers],
+        "held_out": list(found.held_out),
+        "unexplained": [
+            found.of_presses(side.realism, held_out=held).median("unexplained")
+            for side in (found.before, found.after)
+        ],
+        "notes": [*found.before.notes, *found.notes],
+    }
+
+
+def _asked(text: str) -> tuple[str, float, float]:
+    """A further number that may change.
+
+    Raises:
+        ProtocolError: it is no PATH=LO:HI.
+    """
+    path, equals, given = text.partition("=")
+    low, colon, high = given.partition(":")
+    try:
+        if not (equals and colon and path.strip()):
+            raise ValueError
+        return path.strip(), float(low), float(high)
+    except ValueError:
+        hint = "Write PATH=LO:HI, such as camera.fov=45:60"
+        raise ProtocolError(f"'{text}' is no range", where="fit", hint=hint) from None

@@ -1,0 +1,42 @@
+"""Trials of a search as rows of answers and events."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from optisense.search import Study, Trial
+
+
+def curve_row(trial: Trial) -> dict[str, Any]:
+    """A point of the curve of scores."""
+    return {
+        "number": trial.number,
+        "start": trial.is_start,
+        "scores": {name: finite(value) for name, value in trial.scores.items()},
+        "failure": trial.failure,
+        "feasible": trial.failure is None and trial.is_feasible,
+    }
+
+
+def trial_row(study: Study, trial: Trial) -> dict[str, Any]:
+    """A trial without its design."""
+    from optisense.search.study.conditions import margins
+    from optisense.search.study.study import beside
+
+    return {
+        **curve_row(trial),
+        "values": trial.values,
+        "vector": trial.vector,
+        "beside": beside(study, trial),
+        "conditions": [
+            {"condition": text, "value": value, "margin": margin}
+            for text, value, margin in margins(trial)
+        ],
+    }
+
+
+def finite(value: float) -> float | None:
+    """A number as JSON can hold it: None where it is infinite or no number."""
+    return value if math.isfinite(value) else None
