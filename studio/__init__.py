@@ -8,7 +8,10 @@ imports bpy, numpy and the standard library only.
 from __future__ import annotations
 
 from . import registration
+from .calibrate import operator as calibrate_operator
+from .calibrate import ui as calibrate_ui
 from .engine import catalogue, guide, preferences, session
+from .evaluate import ledger
 from .evaluate import live as evaluate_live
 from .evaluate import operator as evaluate_operator
 from .evaluate import prop as evaluate_prop
@@ -17,10 +20,10 @@ from .export import operator as export_operator
 from .export import ui as export_ui
 from .lights import choosing as light_choosing
 from .lights import operator as light_operator
+from .lights import row_gizmo, snapping, windows
 from .lights import rows as light_rows
 from .lights import ui as light_ui
-from .lights import windows
-from .looks import drawing, footprint, section
+from .looks import drawing, footprint, glass, markers, section
 from .materials import gallery
 from .materials import operator as material_operator
 from .materials import ui as material_ui
@@ -74,13 +77,19 @@ MODULES = (
     light_choosing,
     section,
     drawing,
+    glass,
     footprint,
+    markers,
     light_operator,
     light_rows,
+    row_gizmo,
+    snapping,
     windows,
     simulate_operator,
     evaluate_operator,
     evaluate_live,
+    ledger,
+    calibrate_operator,
     optimise_operator,
     offering,
     export_operator,
@@ -92,6 +101,7 @@ MODULES = (
     evaluate_ui,
     optimise_ui,
     export_ui,
+    calibrate_ui,
     starting,
 )
 

@@ -85,24 +85,6 @@ def window(shape: str, size: tuple[float, float]) -> NDArray[np.float32]:
     return np.concatenate([rim, middle], axis=1).reshape(-1, 3)
 
 
-def nearness(points: ArrayLike, seen: ArrayLike, reach: float) -> NDArray[np.float32]:
-    """(n,) 1 where a point (n, 3) is nearer than `reach` to one of those seen (m, 3), else 0."""
-    from_points = np.asarray(points, dtype=np.float32)
-    to = np.asarray(seen, dtype=np.float32)
-    if not len(to):
-        return np.zeros(len(from_points), dtype=np.float32)
-    found = np.empty(len(from_points), dtype=np.float32)
-    for start in range(0, len(from_points), PIECE):
-        piece = from_points[start : start + PIECE]
-        apart = ((piece[:, None] - to[None]) ** 2).sum(axis=2).min(axis=1)
-        found[start : start + PIECE] = apart < reach * reach
-    return found
-
-
-PIECE = 1024
-"""Points that are compared with all others at once: some megabytes."""
-
-
 def grid_quads(
     points: NDArray[np.float32], hit: NDArray[np.bool_]
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:

@@ -14,6 +14,9 @@ FloatArray = NDArray[np.float64]
 OFF_LINE = 0.1
 """How far lights of one row stand beside its line at most, as a share of its length."""
 
+SHORTEST = 1e-6
+"""mm: shorter edges have no direction, and places that are nearer to one another are one."""
+
 
 @dataclass(frozen=True)
 class Row:
@@ -56,6 +59,35 @@ def row_through(positions: Sequence[Sequence[float]]) -> Row | None:
         return None
     middle = places.mean(axis=0) + (shares.min() + shares.max()) / 2 * axes[0]
     return Row(middle, along, length / (len(places) - 1))
+
+
+def nearest_edge(row: Row, edges: FloatArray) -> tuple[FloatArray, FloatArray] | None:
+    """Return the place (3,) on the edge nearest to a row's middle, and that edge's way (3,).
+
+    Edges of no length are none. Where several meet at that place, the one counts that runs most
+    along the row.
+
+    Args:
+        row: of lights.
+        edges: (n, 2, 3) mm, their ends.
+
+    Returns:
+        mm and a unit vector that runs with the row, not against it; None without edges.
+    """
+    ways = edges[:, 1] - edges[:, 0]
+    lengths = np.linalg.norm(ways, axis=1)
+    kept = lengths > SHORTEST
+    if not kept.any():
+        return None
+    starts, lengths = edges[kept, 0].astype(np.float64), lengths[kept].astype(np.float64)
+    ways = ways[kept] / lengths[:, None]
+    shares = np.clip(((row.middle - starts) * ways).sum(axis=1), 0.0, lengths)
+    places = starts + shares[:, None] * ways
+    away = np.linalg.norm(places - row.middle, axis=1)
+    near = np.flatnonzero(away <= away.min() + SHORTEST)
+    best = near[np.argmax(np.abs(ways[near] @ row.along))]
+    along = ways[best] * (1.0 if ways[best] @ row.along >= 0.0 else -1.0)
+    return places[best], along
 
 
 def row_on_face(

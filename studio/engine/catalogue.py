@@ -42,8 +42,12 @@ def refresh(engine: Engine) -> None:
         ("sensors", "sensors"),
         ("objectives", "objectives"),
         ("methods", "methods"),
+        ("calibration_families", "families"),
     ):
-        engine.send(what, on_result=lambda result, name=name: _keep(name, result[name]))
+        engine.send(
+            what,
+            on_result=lambda result, what=what, name=name: _keep(what, result[name]),
+        )
     engine.send("kinds", on_result=schema.learn)
     for kind in LIBRARY_KINDS:
         refresh_library(engine, kind)

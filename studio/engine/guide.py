@@ -19,6 +19,8 @@ STEPS = {
     "Evaluate": ("studio", "**6 "),
     "Optimise": ("studio", "**7 "),
     "Report and Export": ("studio", "**8 "),
+    "Calibrate": ("studio", "**9 "),
+    "Photographs": ("calibration", ""),
     "Cages": ("cages", ""),
     "Library": ("library", ""),
     "Simulation": ("simulation", ""),
@@ -35,6 +37,7 @@ MORE = {
     "Evaluate": "Objectives",
     "Optimise": "Search",
     "Report and Export": "Workshop",
+    "Calibrate": "Photographs",
 }
 """The page that has more on what a panel is about."""
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import shlex
 import shutil
+from collections.abc import Callable
 from pathlib import Path
 
 import bpy
@@ -14,12 +15,13 @@ PACKAGE = __package__.rpartition(".")[0]
 ENVIRONMENT = "OPTISENSE_ENGINE"
 
 
-def _changed(values: bpy.types.AddonPreferences, context: bpy.types.Context) -> None:
-    """Start the engine that is named now, unless the one before is at work."""
-    from . import session
+when_changed: list[Callable[[], None]] = []
+"""Called when another engine is named."""
 
-    if hasattr(bpy.types.WindowManager, "optisense") and not session.is_busy():
-        session.restart()
+
+def _changed(values: bpy.types.AddonPreferences, context: bpy.types.Context) -> None:
+    for each in when_changed:
+        each()
 
 
 class OPTISENSE_AP_preferences(bpy.types.AddonPreferences):

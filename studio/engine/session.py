@@ -12,7 +12,7 @@ import bpy
 from bpy.props import BoolProperty, FloatProperty, StringProperty
 
 from ..core.engine import Answer, Engine, EngineError, Request
-from .preferences import HOW_TO_GET, engine_command
+from .preferences import HOW_TO_GET, engine_command, when_changed
 
 TICK, BRISK = 0.05, 0.01
 """Seconds between two looks at the engine: as a rule, and while it owes an answer."""
@@ -323,7 +323,16 @@ def _undone(*_: Any) -> None:
 
 
 PROPERTIES = {"WindowManager": {"optisense": OPTISENSE_PG_session}}
+
+
+def _another_engine_is_named() -> None:
+    """Start the engine that is named now, unless the one before is at work."""
+    if not is_busy():
+        restart()
+
+
 HOOKS = (
+    (when_changed, _another_engine_is_named),
     (bpy.app.handlers.load_pre, _loading),
     (bpy.app.handlers.undo_post, _undone),
     (bpy.app.handlers.redo_post, _undone),

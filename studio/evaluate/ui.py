@@ -8,7 +8,7 @@ from ..core import scores
 from ..engine import catalogue
 from ..engine.layout import SidebarPanel, lines_of, paragraph, show_job, show_outcome
 from ..simulate.picture import file_icon
-from . import figures
+from . import figures, ledger
 
 TITLE, VALUE = 0.28, 0.78
 """Share of a score's line that its title has, and share of the rest that value and change have; the
@@ -57,6 +57,7 @@ class OPTISENSE_PT_evaluate(SidebarPanel, bpy.types.Panel):
             row.operator("optisense.hide_rays", icon="X")
         if values.rays:
             paragraph(layout, values.rays)
+        ledger.draw(layout)
 
 
 def _strip(layout: bpy.types.UILayout, values: bpy.types.PropertyGroup) -> None:

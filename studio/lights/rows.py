@@ -20,7 +20,7 @@ from .windows import ask_for_windows
 _setting = False
 
 
-def _of_one_group(context: bpy.types.Context) -> list[bpy.types.Object]:
+def of_one_group(context: bpy.types.Context) -> list[bpy.types.Object]:
     """The selected lights, in the order of the design; none where they are of several groups."""
     chosen = [each for each in objects_of(context.scene, "LIGHT") if each.select_get()]
     return chosen if len({each.optisense.group for each in chosen}) == 1 else []
@@ -70,11 +70,11 @@ class OPTISENSE_OT_arrange_row(polls.Checked, bpy.types.Operator):
     checks = (
         polls.has_design,
         polls.in_object_mode,
-        polls.needing(_of_one_group, "Select the lights of one row: click on their group"),
+        polls.needing(of_one_group, "Select the lights of one row: click on their group"),
     )
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
-        poses = [light_pose(each) for each in _of_one_group(context)]
+        poses = [light_pose(each) for each in of_one_group(context)]
         self.count = len(poses)
         row = rows.row_through([pose["position"] for pose in poses])
         self.pitch = row.pitch if row is not None and len(poses) > 1 else self.pitch
@@ -86,7 +86,7 @@ class OPTISENSE_OT_arrange_row(polls.Checked, bpy.types.Operator):
             column.prop(self, name)
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        scene, lights = context.scene, _of_one_group(context)
+        scene, lights = context.scene, of_one_group(context)
         poses = [light_pose(each) for each in lights]
         row = rows.row_through([pose["position"] for pose in poses])
         if row is None:

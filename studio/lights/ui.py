@@ -9,6 +9,7 @@ import bpy
 from ..engine.layout import SidebarPanel, labelled
 from ..scene.cameras import imaging
 from ..scene.collections import objects_of
+from . import snapping
 
 
 class OPTISENSE_UL_light_groups(bpy.types.UIList):
@@ -49,6 +50,9 @@ class OPTISENSE_PT_lights(SidebarPanel, bpy.types.Panel):
         row = layout.row(align=True)
         row.operator("optisense.arrange_row", icon="MOD_ARRAY")
         row.operator("optisense.set_group", icon="GROUP")
+        row = layout.row(align=True)
+        row.operator("optisense.snap_row", icon="SNAP_EDGE")
+        row.operator("optisense.snap_moves", icon="SNAP_ON", depress=snapping.is_on(scene))
         cameras = objects_of(scene, "CAMERA")
         if cameras:
             _camera(layout.box(), cameras[0].optisense)

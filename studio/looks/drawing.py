@@ -15,14 +15,14 @@ from ..scene.collections import objects_of
 from ..scene.lamps import lamp_colour, window
 from .section import plane
 
-LINE = (0.02, 0.02, 0.03)
-"""Linear red, green and blue of outlines: nearly black, so that they are seen on every material."""
+LINE = (0.62, 0.68, 0.75)
+"""Red, green and blue of outlines: as bright as the rims of glass."""
 
 BEAM, WIDEST_BEAM = 3.0, 25.0
 """mm and degrees: how long and how wide the beam of a lamp is drawn at most; a wider one would hide
 the sensor."""
 
-BEAM_OPACITY, OUTLINE_OPACITY = 0.25, 0.55
+BEAM_OPACITY, OUTLINE_OPACITY = 0.3, 0.35
 """Of a beam where it leaves the lamp, and of an outline; 1 hides what is behind."""
 
 WINDOW_OPACITY = 0.8
@@ -87,9 +87,9 @@ def _draw() -> None:
             if part.visible_get() and part.mode != "EDIT":
                 draw_lines(cut_lines(scene, outline(part)), (*LINE, OUTLINE_OPACITY))
         gpu.state.depth_mask_set(False)
-        _draw_lamps(scene)
         for each in when_drawing:
             each(scene)
+        _draw_lamps(scene)
     finally:
         gpu.state.depth_mask_set(True)
         gpu.state.depth_test_set("NONE")
@@ -118,7 +118,11 @@ def _draw_lamps(scene: bpy.types.Scene) -> None:
         red, green, blue, _ = lamp_colour(group)
         gpu.state.depth_test_set("NONE")  # lamps stand in housings
         places = np.concatenate([in_world(face, each.matrix_world) for each in lamps])
-        draw_faces(places, np.tile((red, green, blue, WINDOW_OPACITY), (len(places), 1)))
+        lit = np.array(
+            [(red, green, blue), (red, green, blue), np.array((red, green, blue)) * 0.4 + 0.6]
+        )
+        colours = np.column_stack([lit, [WINDOW_OPACITY] * 3])
+        draw_faces(places, np.tile(colours, (len(places) // 3, 1)))
         places = np.concatenate([in_world(sides, each.matrix_world) for each in lamps])
         colours = np.empty((len(places), 4), dtype=np.float32)
         colours[:] = (red, green, blue, BEAM_OPACITY)

@@ -24,6 +24,9 @@ MARGIN = 1e-3
 """mm: at the slider's ends the plane lies so far beyond the sensor, and cuts nothing or all off."""
 
 
+when_markers_asked: list[Callable[[], None]] = []
+"""Called when the markers are shown or hidden."""
+
 when_footprint_asked: list[Callable[[], None]] = []
 """Called when the camera's footprint is switched on or off."""
 
@@ -34,6 +37,11 @@ def _changed(values: bpy.types.PropertyGroup, context: bpy.types.Context) -> Non
 
 def _footprint_asked(values: bpy.types.PropertyGroup, context: bpy.types.Context) -> None:
     for each in when_footprint_asked:
+        each()
+
+
+def _markers_asked(values: bpy.types.PropertyGroup, context: bpy.types.Context) -> None:
+    for each in when_markers_asked:
         each()
 
 
@@ -58,6 +66,10 @@ class OPTISENSE_PG_looks(bpy.types.PropertyGroup):
         "follows the camera, mirrors and the skin",
         update=_footprint_asked,
     )
+    markers: BoolProperty(
+        name="Markers", default=True, update=_markers_asked,
+        description="Draw the dots that are printed on the skin",
+    )  # fmt: skip
 
 
 def bounds(scene: bpy.types.Scene) -> tuple[Vector, Vector] | None:

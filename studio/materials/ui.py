@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import bpy
 
 from ..engine.layout import SidebarPanel, labelled, show_job, show_outcome
+from ..looks import markers
 from ..simulate.picture import file_icon
 from . import gallery
 from .operator import KEEPING
@@ -43,6 +46,20 @@ class OPTISENSE_PT_materials(SidebarPanel, bpy.types.Panel):
             _part(layout.box(), context, active.optisense)
 
 
+def _markers(layout: bpy.types.UILayout, values: dict[str, Any] | None) -> None:
+    row = layout.row(align=True)
+    if values is None:
+        text = "No markers"
+    elif values.get("grid"):
+        text = f"Markers: {values['grid'][0]} x {values['grid'][1]}, {values['pitch']:g} mm apart"
+    else:
+        text = f"Markers: {len(values['places'])}"
+    row.label(text=text)
+    row.operator("optisense.set_markers", text="Change")
+    if values is not None:
+        row.operator("optisense.remove_markers", text="", icon="X")
+
+
 def _part(
     layout: bpy.types.UILayout, context: bpy.types.Context, own: bpy.types.PropertyGroup
 ) -> None:
@@ -51,6 +68,7 @@ def _part(
     if own.role == "sensing_surface":
         layout.label(text=f"Coating: {design.coating.library or 'own'}")
         design.coating.draw(column)
+        _markers(layout, markers.of_design(context.scene))
     else:
         column.prop_search(own, "material", design, "materials")
         material = design.materials.get(own.material)

@@ -166,7 +166,15 @@ def contact_values(
         own = values.shape is not None and not values.file
         file = write(mesh_of(values.shape)) if own else absolute_file(values)
         indenter.update(file=file, scale=short(values.scale))
+    given: dict[str, Any] = {}
+    if values.press_by == "FORCE":
+        given["force"] = short(values.force)
+    if any(values.shift):
+        given["shift"] = [short(value) for value in values.shift]
+    if values.twist:
+        given["twist"] = short(values.twist)
     return {
+        **given,
         "indenter": indenter,
         "point": [round(short(value), 6) + 0.0 for value in place],
         "depth": short(values.depth),

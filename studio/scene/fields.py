@@ -30,6 +30,9 @@ NUMBERS = ("pair", "triple", "colour")
 WHAT = "A number of the lamp, material or coating; the button beside it says which"
 
 _filling = False
+MOST_LISTS = 256
+"""Lists of choices that are kept at once: far more than one panel of Blender shows."""
+
 _items: dict[Any, Items] = {}
 """Choices of menus; Blender needs their texts to be kept."""
 
@@ -61,6 +64,8 @@ def _changed(field: bpy.types.PropertyGroup, context: bpy.types.Context) -> None
 
 def kept_items(items: Items) -> Items:
     """The same choices as an object that stays, as Blender asks for."""
+    while len(_items) > MOST_LISTS:
+        _items.pop(next(iter(_items)))
     return _items.setdefault(tuple(items), items)
 
 

@@ -153,7 +153,7 @@ def material_values(
 
 
 def _part(name: str, part: bpy.types.Object, before: dict[str, Any]) -> dict[str, Any]:
-    """A part; frosted and painted faces are as the design file had them."""
+    """A part; its thickness, and frosted and painted faces, are as the design file had them."""
     own = part.optisense
     values: dict[str, Any] = {"role": own.role, "mesh": own.mesh_file}
     if name != own.key or not own.mesh_file:
@@ -161,7 +161,10 @@ def _part(name: str, part: bpy.types.Object, before: dict[str, Any]) -> dict[str
     if own.material and own.role != "sensing_surface":
         values["material"] = own.material
     values["priority"] = own.priority
-    faces = before.get(own.key, {}).get("faces")
+    known = before.get(own.key, {})
+    if known.get("thickness") is not None:
+        values["thickness"] = known["thickness"]
+    faces = known.get("faces")
     if faces is not None and own.role in HAVE_FACES:
         values["faces"] = faces
     return values

@@ -49,6 +49,16 @@ INDENTERS: Items = [
     ("mesh", "Mesh", "A mesh file; its lowest point touches first"),
 ]
 
+PRESSING: Items = [
+    ("DEPTH", "Depth", "It is pressed in by mm"),
+    ("FORCE", "Force", "It is pressed in by newtons, as deep as the elastic gel lets it"),
+]
+
+SKINS: Items = [
+    ("elastic", "Elastic", "The gel deforms around contacts as well; forces are known"),
+    ("conforming", "Conforming", "The skin takes the shape of what presses, and no force is known"),
+]
+
 LOOKS: dict[str, tuple[float, float, float, float]] = {
     "sensing_surface": (0.55, 0.57, 0.6, 0.5),
     "elastomer": (0.95, 0.62, 0.35, 0.16),

@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
+import math
+
 import bpy
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..core.mesh_file import Mesh
 from ..core.numbers import joined, kept_array, split
+
+SHARP = math.radians(30.0)
+"""Angle between two faces from which the edge between them is drawn: a cylinder of 13 sides or more
+is drawn round."""
 
 REST = "optisense_rest"
 NORMAL = "optisense_normal"
@@ -21,6 +27,7 @@ def new_mesh(name: str, mesh: Mesh) -> bpy.types.Mesh:
     if mesh.normals is not None:
         remember(made, NORMAL, mesh.normals)
     made.update()
+    made.set_sharp_from_angle(angle=SHARP)
     return made
 
 

@@ -135,6 +135,24 @@ class OPTISENSE_PG_object(bpy.types.PropertyGroup):
     rotation: FloatProperty(
         name="Rotation", description="Degrees about the outward normal", update=_contact_changed
     )
+    press_by: EnumProperty(
+        name="Press by", items=kinds.PRESSING, update=_contact_changed,
+        description="What is given: how deep it is, or how hard it presses",
+    )  # fmt: skip
+    force: FloatProperty(
+        name="Force", description="N, along the inward normal; it is drawn as if it were at the "
+        "depth that was given last", min=0.001, max=1000.0, default=1.0, precision=3,
+        update=_contact_changed,
+    )  # fmt: skip
+    shift: FloatVectorProperty(
+        name="Shift", description="mm along the skin by which it is dragged after it was pressed "
+        "in: the skin sticks to it as far as friction goes", size=2, min=-100.0, max=100.0,
+        precision=3, update=_contact_changed,
+    )  # fmt: skip
+    twist: FloatProperty(
+        name="Twist", description="Degrees about the outward normal by which it is turned after "
+        "it was pressed in", min=-180.0, max=180.0, update=_contact_changed,
+    )  # fmt: skip
 
 
 PROPERTIES = {"Object": {"optisense": OPTISENSE_PG_object}}

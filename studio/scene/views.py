@@ -3,8 +3,12 @@
 from __future__ import annotations
 
 import bpy
-from bpy_extras.view3d_utils import region_2d_to_location_3d
 from mathutils import Vector
+
+from ..core.fitting import fitted
+
+SENSOR = 72.0
+"""mm: the larger side of a 3D view's picture behind a lens of `space.lens`, as Blender takes it."""
 
 
 def show_design(scene: bpy.types.Scene) -> None:
@@ -39,18 +43,30 @@ def _view_all(area: bpy.types.Area, region: bpy.types.Region) -> None:
         bpy.ops.view3d.view_all()
     finally:
         looks.smooth_view = smooth
+    left, right = 0, region.width
     bar = next((each for each in area.regions if each.type == "UI"), None)
-    view = area.spaces.active.region_3d
-    if bar is None or bar.width <= 1 or not bpy.context.preferences.system.use_region_overlap:
+    overlaps = bpy.context.preferences.system.use_region_overlap
+    if bar is not None and bar.width > 1 and overlaps:
+        if bar.x > region.x:
+            right -= bar.width
+        else:
+            left += bar.width
+    _fit(area.spaces.active, region, (left, right))
+
+
+def _fit(space: bpy.types.SpaceView3D, region: bpy.types.Region, free: tuple[float, float]) -> None:
+    """Let what a perspective view shows fill it between two places, pixels from its left."""
+    view = space.region_3d
+    corners = [
+        each.matrix_world @ Vector(corner)
+        for each in bpy.context.view_layer.objects
+        if each.visible_get()
+        for corner in each.bound_box
+    ]
+    if bpy.app.background or not corners or view.view_perspective != "PERSP":
         return
-    free = max(region.width - bar.width, 1)
-    side = 1.0 if bar.x > region.x else -1.0
-    view.view_distance *= max(1.0, min(region.width, region.height) / free)
+    size = (region.width, region.height)
+    focal = max(size) * space.lens / SENSOR
+    found = fitted(corners, view.view_rotation.to_matrix().transposed(), focal, size, free)
+    view.view_location, view.view_distance = found.location, found.distance
     view.update()
-    middle = Vector((region.width / 2, region.height / 2))
-    beside = middle + Vector((side * bar.width / 2, 0.0))
-    here, there = (
-        region_2d_to_location_3d(region, view, each, view.view_location)
-        for each in (middle, beside)
-    )
-    view.view_location += there - here

@@ -7,7 +7,7 @@ import bpy
 from ..engine import session
 from ..engine.layout import TAB, SidebarPanel, labelled, paragraph, show_job, show_other_outcomes
 from ..engine.preferences import HOW_TO_GET, engine_command
-from ..looks import footprint
+from ..looks import footprint, markers
 from . import cad, tour
 
 
@@ -43,7 +43,10 @@ class OPTISENSE_PT_sensor(SidebarPanel, bpy.types.Panel):
             if not show_job(layout, "Checking"):
                 layout.operator("optisense.check", icon="CHECKMARK")
             _looks(layout.row(align=True), context.scene.optisense_looks)
-            layout.prop(context.scene.optisense_looks, "footprint")
+            row = layout.row()
+            row.prop(context.scene.optisense_looks, "footprint")
+            if markers.of_design(context.scene):
+                row.prop(context.scene.optisense_looks, "markers")
             text = footprint.told(context.scene)
             if text:
                 paragraph(layout, text, "CAMERA_DATA")

@@ -21,7 +21,7 @@ def warm_up(scene: bpy.types.Scene) -> Request | None:
         engine = session.engine()
         if _open is not None:
             engine.cancel(_open)
-        _open = engine.send("warm", design=handing.design(scene), contacts=True)
+        _open = engine.send("warm", design=handing.design(scene), contacts=True, drafts=True)
     except EngineError:  # simulating will say it
         return None
     return _open

@@ -72,6 +72,7 @@ def _ask() -> None:
                 design=design,
                 contacts=contacts,
                 draft=True,
+                skin=scene.optisense_simulation.skin,
                 exposure=exposure(scene),
                 files=["pixels"],
                 name=NAME,

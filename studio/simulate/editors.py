@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import bpy
 
+from ..engine.layout import TAB
 from . import picture
 
 SOON = 0.05
@@ -11,6 +12,11 @@ SOON = 0.05
 
 WAIT = 0.2
 """Seconds until an area that was made or changed has its size."""
+
+_fitted: dict[int, tuple[int, ...]] = {}
+"""By editor: its size and that of its picture, in pixels, when the picture was made to fit."""
+
+_handle: object | None = None
 
 
 def can_show(operator: type[bpy.types.Operator], context: bpy.types.Context) -> bool:
@@ -66,4 +72,34 @@ def _fit(name: str) -> None:
                     bpy.ops.image.view_all(fit_view=True)
 
 
+def _fit_when_resized() -> None:
+    """In the workspace OptiSense a picture always fits: also one that was there before its editor,
+    and in an editor that was made larger or smaller. Drawing itself may not change the view."""
+    context = bpy.context
+    image = context.space_data.image
+    if context.workspace is None or context.workspace.name != TAB or image is None:
+        return
+    size = (context.region.width, context.region.height, *image.size)
+    if _fitted.get(context.area.as_pointer()) != size:
+        _fitted[context.area.as_pointer()] = size
+        name = image.name
+        bpy.app.timers.register(lambda: _fit(name), first_interval=0.0)
+
+
 HOOKS = ((picture.when_resized, _fit_soon),)
+
+
+def register() -> None:
+    global _handle
+    if not bpy.app.background:
+        _handle = bpy.types.SpaceImageEditor.draw_handler_add(
+            _fit_when_resized, (), "WINDOW", "POST_PIXEL"
+        )
+
+
+def unregister() -> None:
+    global _handle
+    if _handle is not None:
+        bpy.types.SpaceImageEditor.draw_handler_remove(_handle, "WINDOW")
+    _handle = None
+    _fitted.clear()

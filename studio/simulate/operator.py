@@ -18,6 +18,7 @@ from . import editors, picture, requests, viewing
 
 SHAPE = (
     "radius", "length", "size", "file", "shape", "scale", "depth", "rotation", "indenter",
+    "press_by", "force", "twist",
 )  # fmt: skip
 """What a contact is like, wherever it is."""
 
@@ -191,7 +192,7 @@ class OPTISENSE_OT_nine_contacts(polls.Checked, bpy.types.Operator):
             return {"depth": 0.3}
         values = active.optisense
         found = {field: getattr(values, field) for field in SHAPE}
-        return found | {"tilt": tuple(values.tilt)}
+        return found | {"tilt": tuple(values.tilt), "shift": tuple(values.shift)}
 
 
 class OPTISENSE_OT_clear_contacts(polls.Checked, bpy.types.Operator):

@@ -11,6 +11,7 @@ from bpy.props import (
     StringProperty,
 )
 
+from ..scene import kinds
 from .exposing import exposure_changed
 
 SIZES = [
@@ -49,6 +50,10 @@ class OPTISENSE_PG_simulation(bpy.types.PropertyGroup):
         description="Factor from radiance to the brightness of the picture",
         update=exposure_changed,
     )  # fmt: skip
+    skin: EnumProperty(
+        name="Skin", items=kinds.SKINS, default="elastic",
+        description="How the skin gives way to contacts",
+    )  # fmt: skip
     seed: IntProperty(
         name="Seed", min=0, max=2**31 - 1,
         description="Of the noise: the same seed gives the same picture",
@@ -71,6 +76,9 @@ class OPTISENSE_PG_picture(bpy.types.PropertyGroup):
         description="It is a picture of the sensor that was open before", options={"SKIP_SAVE"}
     )
     summary: StringProperty(options={"SKIP_SAVE"})
+    presses: StringProperty(
+        description="Force and pressure of each contact, one a line", options={"SKIP_SAVE"}
+    )
     file: StringProperty(options={"SKIP_SAVE"})
 
 

@@ -28,6 +28,7 @@ def fields(scene: bpy.types.Scene) -> dict[str, Any]:
         "contacts": handing.contacts(scene),
         "noise": round(settings.noise, 3),
         "seed": settings.seed,
+        "skin": settings.skin,
         "exposure": exposure(scene),
         "files": ["picture", "pixels"],
         "name": LATEST,
@@ -51,6 +52,7 @@ def take(result: dict[str, Any], *, draft: bool) -> None:
     now.is_relit = now.is_before = False
     now.file = result["files"].get("picture", "")
     now.summary = summary(result)
+    now.presses = presses(result, [each.name for each in pressing(scene)])
     if not all(group.shown for group in scene.optisense.light_groups):
         relight.wanted()
     _tell_unseen(result.get("unseen") or [])
@@ -68,6 +70,26 @@ def _tell_unseen(numbers: list[int]) -> None:
             f"The camera does not see {names} (selected): move it to where the camera looks, "
             "which Show Chief Rays draws"
         )
+
+
+def presses(result: dict[str, Any], names: list[str]) -> str:
+    """Force, pressure and area of each contact of a whole picture, one line each.
+
+    Args:
+        result: the engine's answer.
+        names: of the contacts, in the order in which the engine was told of them.
+    """
+    rows = [] if result.get("draft") else (result.get("settings") or {}).get("presses") or []
+    lines = []
+    for name, row in zip(names, rows, strict=False):
+        text = (
+            f"{name}: {row['force_n']:.3g} N at {row['depth_mm']:.3g} mm, up to "
+            f"{1000 * row['greatest_pressure_mpa']:.3g} kPa on {row['area_mm2']:.3g} mm²"
+        )
+        if "shear_force_n" in row:
+            text += f"; dragged with {row['shear_force_n']:.3g} N, {row['torque_nmm']:.3g} N mm"
+        lines.append(text)
+    return "\n".join(lines)
 
 
 def summary(result: dict[str, Any]) -> str:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import bpy
 
 from ..engine import session
-from ..engine.layout import TAB, SidebarPanel, labelled, show_job, show_outcome
+from ..engine.layout import TAB, SidebarPanel, labelled, paragraph, show_job, show_outcome
 from ..scene.contacts import pressing
 from . import picture
 
@@ -48,6 +48,8 @@ class OPTISENSE_PT_simulate(SidebarPanel, bpy.types.Panel):
             layout.label(text="Picture of the sensor that was open before", icon="INFO")
         kind = "Draft, " if now.is_draft else "Relit, " if now.is_relit else ""
         layout.label(text=kind + now.summary)
+        for line in now.presses.splitlines():
+            paragraph(layout, line, "FORCE_FORCE")
         layout.operator("optisense.show_picture", icon="IMAGE_DATA")
         _light_levels(layout, scene)
 
@@ -56,6 +58,7 @@ def _settings(column: bpy.types.UILayout, settings: bpy.types.PropertyGroup) -> 
     """How pictures are made; always as high, so that nothing below moves."""
     column.prop(settings, "size")
     column.prop(settings, "noise", text="Noise (%)")
+    column.prop(settings, "skin")
     row = column.row(align=True, heading="Exposure")
     row.prop(settings, "auto_exposure", text="Automatic")
     factor = row.row()
@@ -77,8 +80,14 @@ def _contact(column: bpy.types.UILayout, values: bpy.types.PropertyGroup) -> Non
         if not values.file:
             column.prop(values, "shape")
         column.prop(values, "scale")
-    column.prop(values, "depth", text="Depth (mm)")
+    column.row().prop(values, "press_by", expand=True)
+    if values.press_by == "FORCE":
+        column.prop(values, "force", text="Force (N)")
+    else:
+        column.prop(values, "depth", text="Depth (mm)")
     column.prop(values, "rotation", text="Rotation (°)")
+    column.prop(values, "shift", text="Drag (mm)")
+    column.prop(values, "twist", text="Twist (°)")
 
 
 def _light_levels(layout: bpy.types.UILayout, scene: bpy.types.Scene) -> None:

@@ -57,7 +57,7 @@ def test_a_contact_that_the_camera_does_not_see_is_selected_and_said(mini: Any) 
     assert bpy.ops.optisense.simulate() == {"FINISHED"}
     assert list(bpy.context.selected_objects) == [corner]
     assert f"does not see {corner.name}" in session.state().note
-    corner.location = (0.0, 0.0, 0.0)
+    corner.location = (4.0, 3.0, 0.0)
     assert bpy.ops.optisense.simulate() == {"FINISHED"}
     assert "does not see" not in session.state().note
 

@@ -23,6 +23,7 @@ STEPS = [
     "Evaluate",
     "Optimise",
     "Report and Export",
+    "Calibrate",
 ]
 
 

@@ -11,6 +11,8 @@ from waiting import until
 
 from studio.core import rows
 from studio.lights.choosing import lights_of
+from studio.lights.row_gizmo import frame
+from studio.looks.drawing import outline
 from studio.scene.collections import objects_of, select_only
 from studio.scene.gather import gather_document
 from studio.scene.lamps import light_pose
@@ -86,3 +88,54 @@ def test_a_group_alone_is_what_the_picture_shows(mini: Any) -> None:
     np.testing.assert_allclose(shown(), whole, rtol=0.1, atol=0.01)
     with pytest.raises(RuntimeError, match="no light group 'pink'"):
         bpy.ops.optisense.solo_group(group="pink")
+
+
+def test_the_nearest_edge_is_met_where_it_is_nearest_and_runs_with_the_row() -> None:
+    row = rows.row_through([(-2.0, 1.0, 0.5), (0.0, 1.0, 0.5), (2.0, 1.0, 0.5)])
+    edges = np.array([
+        [(5.0, 0.0, 0.0), (-5.0, 0.0, 0.0)],  # below the row, and against it
+        [(0.0, 9.0, 0.0), (0.0, 9.0, 0.0)],  # of no length
+        [(0.0, 7.0, 0.0), (0.0, 9.0, 0.0)],
+    ])  # fmt: skip
+    place, along = rows.nearest_edge(row, edges)
+    assert place == pytest.approx((0.0, 0.0, 0.0)) and along == pytest.approx((1.0, 0.0, 0.0))
+    corner = np.array([[(0.0, 0.0, 0.0), (0.0, 0.0, 9.0)], [(0.0, 0.0, 0.0), (3.0, 0.0, 0.0)]])
+    far = rows.row_through([(-9.0, -1.0, -1.0), (-5.0, -1.0, -1.0)])
+    assert rows.nearest_edge(far, corner)[1] == pytest.approx((1.0, 0.0, 0.0))
+    assert rows.nearest_edge(row, edges[1:2]) is None
+
+
+def test_a_row_is_snapped_to_an_edge_of_the_gel(mini: Any) -> None:
+    lights = lights_of(mini, mini.optisense.light_groups[0].name)
+    select_only(*lights)
+    before = [light_pose(each) for each in lights]
+    assert bpy.ops.optisense.snap_row() == {"FINISHED"}
+    bpy.context.view_layer.update()
+    after = [light_pose(each) for each in lights]
+    places = np.array([pose["position"] for pose in after])
+    shifts = np.linalg.norm(np.diff(places, axis=0), axis=1)
+    was = np.linalg.norm(np.diff([pose["position"] for pose in before], axis=0), axis=1)
+    assert shifts == pytest.approx(was, abs=1e-4), "the pitch stays"
+    ends = np.concatenate([outline(each) for each in objects_of(mini, "PART")]).reshape(-1, 2, 3)
+    middle = places.mean(axis=0)
+    ways = ends[:, 1] - ends[:, 0]
+    share = ((middle - ends[:, 0]) * ways).sum(axis=1) / (ways**2).sum(axis=1)
+    near = ends[:, 0] + np.clip(share, 0, 1)[:, None] * ways
+    assert np.linalg.norm(near - middle, axis=1).min() < 1e-3
+
+
+def test_moves_are_caught_by_edges_and_free_again(mini: Any) -> None:
+    bpy.ops.optisense.snap_moves()
+    assert mini.tool_settings.use_snap and "EDGE" in mini.tool_settings.snap_elements
+    bpy.ops.optisense.snap_moves()
+    assert not mini.tool_settings.use_snap
+
+
+def test_the_frame_of_a_row_follows_it_and_its_light(mini: Any) -> None:
+    lights = lights_of(mini, mini.optisense.light_groups[0].name)
+    found = np.array(frame(lights))
+    pose, last = light_pose(lights[0]), light_pose(lights[-1])
+    along = np.subtract(last["position"], pose["position"])
+    assert abs(found[:3, 0] @ along) == pytest.approx(np.linalg.norm(along), rel=1e-3)
+    assert found[:3, 2] == pytest.approx(-np.array(pose["direction"]), abs=1e-3)
+    assert np.linalg.det(found[:3, :3]) == pytest.approx(1.0, abs=1e-5)

@@ -191,6 +191,19 @@ class Bench(Sidebar):
         chosen = self.see("[each.name for each in scene().objects if each.select_get()]")
         assert name in chosen, f"a click on '{name}' selected: {', '.join(chosen) or 'nothing'}"
 
+    def drag(self, start: tuple[float, float], end: tuple[float, float], *, steps: int = 8) -> None:
+        """Press the mouse's button somewhere, move it in steps as a hand does, and let it go."""
+        self.desktop.move(*start)
+        self.drawn()
+        self.desktop.press(True)
+        for step in range(1, steps + 1):
+            x, y = (a + (b - a) * step / steps for a, b in zip(start, end, strict=True))
+            self.desktop.move(x, y)
+            self.see("1")
+        self.drawn()
+        self.desktop.press(False)
+        self.drawn()
+
     def over_view(self) -> None:
         """Put the mouse over the 3D view, for keys that are meant for it."""
         left, top, width, height = self.see("place('VIEW_3D', 'WINDOW')")

@@ -50,6 +50,10 @@ class Desktop:
         time.sleep(0.05)
         self._do("click", "--repeat", times, "--delay", 60, button)
 
+    def press(self, down: bool) -> None:
+        """Press the mouse's left button without letting it go, or let it go."""
+        self._do("mousedown" if down else "mouseup", 1)
+
     def hold(self, key: str, down: bool) -> None:
         """Press a key without letting it go, or let it go."""
         self._do("keydown" if down else "keyup", key)

@@ -19,7 +19,7 @@ BESIDE = 5
 HEAD = 28
 """Pixels from the head of a closed panel to the next one."""
 
-PANELS = 8
+PANELS = 9
 """Of the tab, where a sensor is open."""
 
 SCROLLED_TO = "region('VIEW_3D', 'UI').view2d.region_to_view(0, 0)[1]"

@@ -1,0 +1,1 @@
+"""Fitting a sensor to photographs of the real one."""

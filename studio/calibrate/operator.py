@@ -1,0 +1,146 @@
+"""Fit the sensor to photographs of the real one, and open the fitted design."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import bpy
+from bpy.props import BoolProperty, EnumProperty, FloatProperty, StringProperty
+
+from ..core.engine import EngineError
+from ..engine import catalogue, polls, session
+from ..engine.operators import fail, refuse, start_with_design
+from ..scene.paths import absolute, suggested
+from ..sensor.opening import open_source
+
+TITLE = "Calibrating"
+
+
+def _families(values: Any, context: bpy.types.Context | None) -> list[tuple[str, str, str, int]]:
+    global _items
+    rows = catalogue.entries("calibration_families")
+    _items = [
+        (row["name"], row["name"].capitalize(), f"Fit the {row['words']}", 1 << number)
+        for number, row in enumerate(rows)
+    ]
+    return _items
+
+
+_items: list[tuple[str, str, str, int]] = []
+
+
+class OPTISENSE_PG_calibration(bpy.types.PropertyGroup):
+    """What a calibration is asked for, and what came of the last one."""
+
+    photos: StringProperty(
+        name="Photographs", subtype="DIR_PATH", options={"SKIP_SAVE"},
+        description="A folder with background.png and presses.csv (file and diameter of the ball "
+        "in mm), one of the gs_sdk tools, or one with Taxim's dataPack.npz",
+    )  # fmt: skip
+    kept: EnumProperty(
+        name="Keep", items=_families, options={"ENUM_FLAG", "SKIP_SAVE"},
+        description="What stays as it is in the design",
+    )  # fmt: skip
+    ball: FloatProperty(
+        name="Ball (mm)", min=0.0, max=1000.0, precision=2, options={"SKIP_SAVE"},
+        description="Diameter of the ball, where the folder does not say it; 0 is as it says",
+    )  # fmt: skip
+    as_labelled: BoolProperty(
+        name="Take Labels as They Are", options={"SKIP_SAVE"},
+        description="Take labelled contacts as they are, instead of looking for them nearby",
+    )  # fmt: skip
+    result: StringProperty(description="What came of it, in lines", options={"SKIP_SAVE"})
+    folder: StringProperty(description="The fitted design", options={"SKIP_SAVE"})
+    page: StringProperty(description="The page about it", options={"SKIP_SAVE"})
+
+
+def _values(context: bpy.types.Context) -> OPTISENSE_PG_calibration:
+    return context.window_manager.optisense_calibration
+
+
+class OPTISENSE_OT_keep_family(bpy.types.Operator):
+    """Let a calibration change this, or keep it as the design has it"""
+
+    bl_idname = "optisense.keep_family"
+    bl_label = "May Change"
+
+    family: StringProperty(name="What", description="Of the numbers that can be fitted")
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        values = _values(context)
+        if self.family not in [each[0] for each in _families(values, context)]:
+            return refuse(self, f"There is nothing called '{self.family}' to fit")
+        values.kept = set(values.kept) ^ {self.family}
+        return {"FINISHED"}
+
+
+class OPTISENSE_OT_calibrate(polls.Checked, bpy.types.Operator):
+    """Fit the sensor to the photographs; the fitted design goes to a folder of its own"""
+
+    bl_idname = "optisense.calibrate"
+    bl_label = "Calibrate"
+
+    checks = (
+        *polls.ASKING,
+        polls.needing(lambda c: _values(c).photos, "Choose the folder of the photographs first"),
+    )
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        values = _values(context)
+        photos = absolute(values.photos)
+        if not photos.is_dir():
+            return refuse(self, f"{photos} is no folder")
+        to = Path(suggested(context.scene, "-calibrated"))
+        if to.exists():
+            numbers = (to.with_name(f"{to.name}-{number}") for number in range(2, 1000))
+            to = next(each for each in numbers if not each.exists())
+        values.result = values.folder = values.page = ""
+        ball = {"ball": round(values.ball, 4)} if values.ball > 0.0 else {}
+        return start_with_design(
+            self, context, TITLE, "calibrate", _take, photos=str(photos), to=str(to),
+            keep=sorted(values.kept), as_labelled=values.as_labelled, **ball,
+        )  # fmt: skip
+
+
+def _take(result: dict[str, Any]) -> None:
+    values = _values(bpy.context)
+    values.folder, values.page = result["folder"], result["page"]
+    values.result = "\n".join(words(result))
+    session.state().note = f"The fitted design is in {result['folder']}"
+    session.state().written = result["page"]
+
+
+def words(result: dict[str, Any]) -> list[str]:
+    """What a calibration has found, a line each."""
+    before, after = (100.0 * each for each in result["unexplained"])
+    held = "presses held out" if result["held_out"] else "fitted presses"
+    lines = [f"Not explained of {held}: {before:.0f} % before, {after:.0f} % after"]
+    for row in result["numbers"]:
+        doubt = "" if row["determined"] else ", not determined"
+        lines.append(
+            f"{row['words']}: {row['before']:.4g} → {row['after']:.4g} ± "
+            f"{row['uncertainty']:.2g} {row['unit']}".rstrip()
+            + doubt
+        )
+    return lines
+
+
+class OPTISENSE_OT_open_calibrated(polls.Checked, bpy.types.Operator):
+    """Open the design that was fitted, in place of this one"""
+
+    bl_idname = "optisense.open_calibrated"
+    bl_label = "Open Fitted Design"
+
+    checks = (polls.is_idle, polls.needing(lambda c: _values(c).folder, "Calibrate first"))
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        folder = _values(context).folder
+        try:
+            open_source(context.scene, folder, folder, wait=bpy.app.background)
+        except EngineError as error:
+            return fail(self, error)
+        return {"FINISHED"}
+
+
+PROPERTIES = {"WindowManager": {"optisense_calibration": OPTISENSE_PG_calibration}}

@@ -1,0 +1,208 @@
+"""Markers, the dots that are printed on the skin: drawn on it, and changed as numbers."""
+
+from __future__ import annotations
+
+import json
+import math
+from typing import Any
+
+import bpy
+import numpy as np
+from bpy.props import FloatProperty, IntProperty
+from numpy.typing import NDArray
+
+from ..core.engine import EngineError, Request
+from ..engine import handing, polls, session
+from ..engine.layout import labelled
+from ..engine.operators import ChoosingProperties
+from . import drawing, footprint, section
+
+KINDS = ("PART", "CAGE")
+
+INK = (0.02, 0.02, 0.025, 0.9)
+"""Red, green, blue and opacity of a drawn dot: nearly black, as most inks are."""
+
+SIDES = 20
+"""Corners of a drawn dot, which looks round."""
+
+LIFT = 0.03
+"""mm: how far beside the skin dots are drawn, on both sides, so that it does not hide them."""
+
+_shown: dict[str, Any] = {}
+_open: Request | None = None
+_wanted = False
+
+
+def of_design(scene: bpy.types.Scene) -> dict[str, Any] | None:
+    """The markers of a scene's design as its file has them; None where it has none."""
+    text = scene.optisense.document
+    return json.loads(text).get("markers") if text else None
+
+
+def is_on(scene: bpy.types.Scene | None) -> bool:
+    """Whether a scene shows markers."""
+    return (
+        scene is not None
+        and scene.optisense.is_open
+        and scene.optisense_looks.markers
+        and of_design(scene) is not None
+    )
+
+
+def wanted() -> None:
+    """Something changed that markers depend on; asked at the next look at the engine."""
+    global _wanted
+    _wanted = True
+    if not is_on(bpy.context.scene):
+        _shown.clear()
+        session.redraw()
+
+
+def _ask() -> None:
+    global _open, _wanted
+    scene = bpy.context.scene
+    if not _wanted or not is_on(scene) or session.is_busy():
+        return
+    if _open is not None and not _open.done:
+        return
+    _wanted = False
+    try:
+        design = handing.design(scene)
+    except EngineError:  # the buttons say that
+        return
+    _open = session.ask("markers", _take, lambda _: None, design=design, name="markers")
+
+
+def _take(result: dict[str, Any]) -> None:
+    _shown.clear()
+    if result["count"]:
+        points = np.load(result["files"]["points"])
+        normals = np.load(result["files"]["normals"])
+        _shown["corners"] = discs(points, normals, result["radius"])
+        surface = footprint.sensing_surface(bpy.context.scene)
+        _shown["of"] = None if surface is None else surface.as_pointer()
+    session.redraw()
+
+
+def discs(
+    points: NDArray[np.float32], normals: NDArray[np.float32], radius: float
+) -> NDArray[np.float32]:
+    """(3 n, 3) mm, corners of triangles that fill a disc at each point (k, 3), on both sides."""
+    helper = np.where(np.abs(normals[:, :1]) < 0.9, [[1.0, 0.0, 0.0]], [[0.0, 1.0, 0.0]])
+    one = np.cross(normals, helper)
+    one /= np.maximum(np.linalg.norm(one, axis=1, keepdims=True), 1e-9)
+    two = np.cross(normals, one)
+    turns = np.linspace(0.0, math.tau, SIDES + 1)
+    rim = radius * (np.cos(turns)[:, None, None] * one + np.sin(turns)[:, None, None] * two)
+    middle = np.broadcast_to(points, (SIDES, *points.shape))
+    flat = np.stack([middle, points + rim[:-1], points + rim[1:]], axis=2)
+    lift = LIFT * normals[None, :, None]
+    found = np.concatenate([(flat + side * lift).reshape(-1, 3) for side in (1.0, -1.0)])
+    return found.astype(np.float32)
+
+
+def _draw(scene: bpy.types.Scene) -> None:
+    surface = footprint.sensing_surface(scene)
+    if not is_on(scene) or surface is None or not surface.visible_get():
+        return
+    if _shown.get("of") == surface.as_pointer():
+        corners = footprint.cut_faces(scene, _shown["corners"])
+        drawing.draw_faces(corners, np.tile(np.float32(INK), (len(corners), 1)))
+
+
+class OPTISENSE_OT_set_markers(polls.Designing, ChoosingProperties, bpy.types.Operator):
+    """Print a grid of dots on the skin; they move with it, and the picture shows that"""
+
+    bl_idname = "optisense.set_markers"
+    bl_label = "Markers"
+    bl_options = {"REGISTER", "UNDO"}
+
+    columns: IntProperty(name="Columns", min=1, max=200, default=9, description="Dots along u")
+    rows: IntProperty(name="Rows", min=1, max=200, default=7, description="Dots along v")
+    pitch: FloatProperty(
+        name="Pitch (mm)", min=0.01, max=1000.0, default=2.0, precision=3,
+        description="mm between neighbours",
+    )  # fmt: skip
+    radius: FloatProperty(
+        name="Radius (mm)", min=0.001, max=1000.0, default=0.4, precision=3,
+        description="mm, of a dot",
+    )  # fmt: skip
+
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        now = of_design(context.scene) or {}
+        if now.get("grid"):
+            (self.columns, self.rows), self.pitch = now["grid"], now["pitch"]
+            self.radius = now["radius"]
+        return context.window_manager.invoke_props_dialog(self)
+
+    def draw(self, context: bpy.types.Context) -> None:
+        column = labelled(self.layout)
+        for name in ("columns", "rows", "pitch", "radius"):
+            column.prop(self, name)
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        now = of_design(context.scene) or {}
+        now.pop("places", None)
+        grid = {"grid": [self.columns, self.rows], "pitch": round(self.pitch, 4)}
+        _set(context.scene, {**now, **grid, "radius": round(self.radius, 4)})
+        return {"FINISHED"}
+
+
+class OPTISENSE_OT_remove_markers(polls.Designing, bpy.types.Operator):
+    """Leave the skin without dots"""
+
+    bl_idname = "optisense.remove_markers"
+    bl_label = "Remove Markers"
+    bl_options = {"REGISTER", "UNDO"}
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        _set(context.scene, None)
+        return {"FINISHED"}
+
+
+def _set(scene: bpy.types.Scene, values: dict[str, Any] | None) -> None:
+    document = json.loads(scene.optisense.document)
+    document.pop("markers", None)
+    if values is not None:
+        document["markers"] = values
+    scene.optisense.document = json.dumps(document)
+    wanted()
+
+
+@bpy.app.handlers.persistent
+def _changed(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
+    global _wanted
+    if _wanted or not is_on(scene):
+        return
+    for update in depsgraph.updates:
+        item = update.id.original
+        if isinstance(item, bpy.types.Object) and item.optisense.kind in KINDS:
+            _wanted = True
+            return
+
+
+@bpy.app.handlers.persistent
+def _again(*_: Any) -> None:
+    wanted()
+
+
+def _leave() -> None:
+    if _open is not None:
+        _open.ignore()
+    _shown.clear()
+
+
+HOOKS = (
+    (section.when_markers_asked, wanted),
+    (drawing.when_drawing, _draw),
+    (session.when_ticking, _ask),
+    (session.when_leaving, _leave),
+    (bpy.app.handlers.depsgraph_update_post, _changed),
+    (bpy.app.handlers.load_post, _again),
+    (bpy.app.handlers.undo_post, _again),
+    (bpy.app.handlers.redo_post, _again),
+)
+
+
+def unregister() -> None:
+    _leave()
