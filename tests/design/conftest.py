@@ -94,7 +94,10 @@ def full_data() -> dict[str, object]:
                 },
             },
             "wall": {"role": "blocker", "mesh": "meshes/deep/wall.obj", "material": "black"},
-            "mirror": {"role": "mirror", "mesh": "meshes/mirror.obj", "material": "silver"},
+            "mirror": {
+                "role": "mirror", "mesh": "meshes/mirror.obj", "material": "silver",
+                "thickness": 0.75,
+            },
         },
         "lights": {
             "red": {"model": "smd-3528", "colour": [1, 0, 0.5], "flux": 12.5, "lights": [light]},
@@ -133,6 +136,7 @@ def full_data() -> dict[str, object]:
                 "kind": "defocus", "focal_length": 1.6, "f_number": 2.2, "focus_distance": 25,
             },
             "crosstalk": [[0.8, 0.1, 0.1], [0.2, 0.7, 0.1], [0, 0.2, 0.8]],
+            "stray_light": [0.01, 0.02, 0.005],
             "noise": {"full_well": 4865.7, "read_noise": 2, "gain": 1.5, "binning": 4},
             "black_level": {"level": 0.0625, "subtracted": 0.9},
             "white_balance": [1.6, 1, 1.5],

@@ -138,6 +138,17 @@ def test_black_that_is_subtracted_is_0_and_black_that_is_not_is_the_level() -> N
         assert chain.respond(bright) == pytest.approx(1.0)
 
 
+def test_stray_light_fills_the_whole_sensor_alike_and_is_not_dimmed_by_the_lens() -> None:
+    stray = (0.02, 0.05, 0.04)
+    chain = PictureChain(shading=RadialShading(falloff=0.9), stray_light=stray)
+    assert not chain.is_plain
+    dark = chain.respond(field(0.0, 0.0, 0.0))
+    assert dark == pytest.approx(np.broadcast_to(stray, dark.shape))
+    lit, shaded = field(0.3, 0.3, 0.3), PictureChain(shading=RadialShading(falloff=0.9))
+    added = chain.respond(lit) - shaded.respond(lit)
+    assert added == pytest.approx(np.broadcast_to(stray, dark.shape), abs=1e-6)
+
+
 def test_without_a_black_level_noise_in_the_dark_is_cut_off_at_0() -> None:
     """The mean of the positive part of a normal distribution is its deviation over sqrt(2 pi)."""
     noise = SensorNoise(full_well=1000.0, read_noise=10.0)

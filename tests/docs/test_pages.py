@@ -49,3 +49,24 @@ def test_the_reference_lists_every_public_name() -> None:
     for package in packages:  # the site shows what `dir` tells, also of names imported on first use
         module = importlib.import_module(package)
         assert set(getattr(module, "__all__", [])) <= set(dir(module)), package
+
+
+def test_documents_and_examples_import_public_modules_only() -> None:
+    """`docs/api.md` says which modules are public; nobody is shown another one."""
+    text = (ROOT / "docs" / "api.md").read_text(encoding="utf-8")
+    public = set(re.findall(r"^\.\. automodule:: (\S+)$", text, re.MULTILINE))
+    public |= set(re.findall(r"^\| `(optisense\.\S+)` \|", text, re.MULTILINE))
+    assert len(public) > 20
+    code = [
+        (page, block.text) for page in PAGES for block in blocks(page) if block.language == "python"
+    ]
+    code += [(file, file.read_text("utf-8")) for file in (ROOT / "examples").glob("*.py")]
+    imported = [
+        (page.name, module)
+        for page, text in code
+        for module in re.findall(r"^\s*(?:from|import) (optisense\.[\w.]+)", text, re.MULTILINE)
+    ]
+    assert len(imported) > 20
+    assert [each for each in imported if each[1] not in public] == []
+    for module in public:
+        importlib.import_module(module)

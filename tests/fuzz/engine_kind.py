@@ -19,7 +19,7 @@ from hypothesis import strategies as st
 from optisense.engine import requests
 
 from .cases import Case
-from .kinds import ASSETS, DESIGN, kind
+from .kinds import ASSETS, DESIGN, RefusedError, kind
 from .strategies import from_schema, spoilt, spoilt_bytes
 
 ANSWER_TIME = 60.0
@@ -175,7 +175,3 @@ def ask_engine(folder: Path) -> None:
         error = answer["error"]
         assert error["kind"] != "InternalError", error["message"]
         raise RefusedError(error["message"])
-
-
-class RefusedError(Exception):
-    """The engine has refused a request in words."""

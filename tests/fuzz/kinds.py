@@ -25,16 +25,18 @@ from optisense import library
 from optisense.calibration import read_photographs
 from optisense.design import SensorDesign, check_design, save_design
 from optisense.design.ies import read_ies
-from optisense.geometry import TriangleMesh, parse_contact
+from optisense.geometry import TriangleMesh
+from optisense.geometry.step import read_step
 from optisense.library.reading import KINDS as ENTRY_KINDS
 from optisense.library.reading import read_entry
 from optisense.library.tuning import read_tuning
-from optisense.search import SearchSpace, Study
-from optisense.search.space.text import parse_errors, parse_vary
+from optisense.search import Study
 from optisense.search.study.applied import design_of
+from optisense.search.study.settings import StudySettings
 from optisense.sensors.from_meshes.building import design_from_meshes
 from optisense.sensors.from_meshes.recipe import Recipe
 from optisense.tasks.dataset import Dataset
+from optisense.tasks.dataset import _Info as DatasetInfo
 
 from .cases import Case, read_case
 from .strategies import Schema, spoilt, spoilt_bytes, strange_numbers, strange_texts
@@ -60,6 +62,10 @@ class InputKind:
 
 
 KINDS: dict[str, InputKind] = {}
+
+
+class RefusedError(Exception):
+    """What was given is refused in words, by other means than an `OptiSenseError`."""
 
 
 def kind(name: str, cases: st.SearchStrategy[Case], weight: float = 1.0) -> Any:
@@ -128,7 +134,7 @@ def _stl(mesh: TriangleMesh) -> bytes:
 
 def _ascii_stl(mesh: TriangleMesh) -> bytes:
     lines = ["solid gel"]
-    for triangle in mesh.triangles[:40]:
+    for triangle in mesh.triangles:
         corners = [f"vertex {x!r} {y!r} {z!r}" for x, y, z in triangle.tolist()]
         lines += ["facet normal 0 0 1", "outer loop", *corners, "endloop", "endfacet"]
     return "\n".join([*lines, "endsolid gel", ""]).encode()
@@ -180,6 +186,16 @@ def read_mesh(folder: Path) -> None:
         mesh = TriangleMesh.load(path)
         mesh.validate("sheet", closed=False)
         mesh.validate("solid", closed=True)
+
+
+STEP = (ASSETS / "box.step").read_bytes()
+
+
+@kind("step", _with_file({}, "box.step", spoilt_bytes(STEP)), 2.0)
+def read_step_file(folder: Path) -> None:
+    """Read the bodies of a STEP file, where the extra for it is installed."""
+    for body in read_step(folder / "box.step"):
+        body.mesh.validate("body", closed=False)
 
 
 IES = (LIBRARY / "lights" / "osram-topled-black-30.ies").read_bytes()
@@ -245,7 +261,10 @@ TUNING = {
 }
 
 
-@kind("tuning", _document({"camera.json": _json(TUNING)}, "camera.json", None, _json, json.loads))
+TUNING_CASE = {"camera.json": _json(TUNING)}
+
+
+@kind("tuning", _document(TUNING_CASE, "camera.json", None, _json, json.loads))
 def read_camera_tuning(folder: Path) -> None:
     """Read a tuning file of libcamera."""
     read_tuning(folder / "camera.json")
@@ -259,16 +278,26 @@ parts:
   plate: {file: plate.stl, role: support}
 lights:
   red: {model: smd-3528, colour: red, row: {part: plate, side: +y, count: 4, pitch: 4.5}}
+  blue: {model: smd-3528, colour: blue, from: {file: board.csv, only: D*, origin: [0, 0, 1]}}
 camera: {model: pi-v2}
 """
 BLOCK = {
     "gel.stl": _stl(TriangleMesh.box((-10, -8, 0), (10, 8, 4))),
     "plate.stl": _stl(TriangleMesh.box((-12, -10, -3), (12, 10, 0))),
+    "board.csv": b"""\
+Designator,Mid X,Mid Y,Rotation,Layer
+D1,-4.5mm,11mm,90,top
+D2,4.5mm,11mm,90,top
+R1,100mil,2.5mm,0,bottom
+""",
     "sensor.yaml": RECIPE,
 }
 
 
-@kind("recipe", _document(BLOCK, "sensor.yaml", Recipe.model_json_schema(), _yaml, yaml.safe_load))
+@kind("recipe", _mostly(
+    _document(BLOCK, "sensor.yaml", Recipe.model_json_schema(), _yaml, yaml.safe_load),
+    _with_file(BLOCK, "board.csv", spoilt_bytes(BLOCK["board.csv"])),
+))  # fmt: skip
 def read_recipe_file(folder: Path) -> None:
     """Make a sensor of CAD files by a recipe."""
     design_from_meshes(folder / "sensor.yaml")
@@ -310,7 +339,7 @@ def _spoilt_rows(draw: st.DrawFn) -> Case:
 
 
 @kind("study", st.one_of(
-    _document(STUDY, "study.json", None, _json, json.loads),
+    _document(STUDY, "study.json", TypeAdapter(StudySettings).json_schema(), _json, json.loads),
     _spoilt_rows(),
     _with_file(STUDY, "trials.sqlite", spoilt_bytes(STUDY["trials.sqlite"])),
 ), 3.0)  # fmt: skip
@@ -356,7 +385,7 @@ def _spoilt_arrays(draw: st.DrawFn) -> Case:
 
 
 @kind("dataset", st.one_of(
-    _document(DATASET, "dataset.json", None, _json, json.loads),
+    _document(DATASET, "dataset.json", DatasetInfo.model_json_schema(), _json, json.loads),
     _spoilt_arrays(),
     *[_with_file(DATASET, name, spoilt_bytes(DATASET[name])) for name in (
         "metadata.csv", "failures.csv", "background.npz", "arrays/000000.npz", "images/000000.png",
@@ -376,7 +405,7 @@ def read_dataset(folder: Path) -> None:
 def _photographs() -> Case:
     """A folder of photographs in each of the layouts that are read."""
     picture = io.BytesIO()
-    grey = np.full((32, 40, 3), 90, np.uint8)
+    grey = np.full((48, 60, 3), 90, np.uint8)
     Image.fromarray(grey).save(picture, format="PNG")
     label, pack = io.BytesIO(), io.BytesIO()
     np.savez(label, center=np.array([12, 14]), radius=np.array(5))
@@ -405,77 +434,18 @@ def read_photograph_folders(folder: Path) -> None:
     for name in ("own", "sdk", "taxim"):
         found = read_photographs(folder / name, 4.0)
         assert all(press.picture.shape == found.background.shape for press in found.presses)
-        found.scaled(36).warnings()
+        found.scaled(40).warnings()
 
 
-# ---- texts
-
-CONTACTS = (
-    "sphere:1.5@0,0:0.8", "cylinder:2@1,-3:0.5:90", "plane:0,5@0,0:0.3", "sphere:3@0,0:2N",
-    "mesh:screw.stl,1000@2,2:0.4", "sphere:1@0,0,5:0.5", "cylinder:2,10,3@0,0:0.2",
-)  # fmt: skip
-VARIED = (
-    "coating.specularity=0:1", "camera.position.x=+-2:5", "camera.fov=40,45,50",
-    "cages.bend.points=+-1/symmetry=x/axes=xz/points=0,2,6-8", "parts.gel.material=[gel, white]",
-    "camera.position.z=+-0.2",
-)  # fmt: skip
-
-
-@st.composite
-def _spoilt_texts(draw: st.DrawFn, texts: tuple[str, ...]) -> Case:
-    """A text with numbers, words or letters changed."""
-    text = draw(st.sampled_from(texts))
-    for _ in range(draw(st.integers(1, 3))):
-        at = draw(st.integers(0, len(text)))
-        end = at + draw(st.integers(0, 4))
-        text = text[:at] + str(draw(strange_texts | strange_numbers)) + text[end:]
-    return {"text": text.encode("utf-8", "replace")}
-
-
-def _text(folder: Path) -> str:
-    return (folder / "text").read_bytes().decode("utf-8", "replace")
-
-
-@kind("contact", _spoilt_texts(CONTACTS))
-def read_contact(folder: Path) -> None:
-    """Read what presses, and where."""
-    parse_contact(_text(folder))
-
-
-@cache
-def _sensor() -> Any:
-    from optisense.optics.ray_model import RayModel
-
-    return RayModel(ots.load("gelsight-mini"), "llvm")
-
-
-@st.composite
-def _presses(draw: st.DrawFn) -> Case:
-    """A contact whose text is right, with numbers of any size."""
-    size = st.floats(1e-6, 1e3) | strange_numbers
-    near = st.floats(-12.0, 12.0) | strange_numbers
-    shape = draw(st.sampled_from(["sphere:{}", "cylinder:{}", "cylinder:{},{}", "plane:{},{}",
-                                  "cylinder:{},{},{}", "plane:{},{},{}"]))  # fmt: skip
-    shape = shape.format(*(draw(size) for _ in range(3)))
-    depth = draw(st.floats(1e-6, 4.0) | size)
-    unit = draw(st.sampled_from(["", "", "N"]))
-    return {"text": f"{shape}@{draw(near)},{draw(near)}:{depth}{unit}".encode()}
-
-
-@kind("press", _presses())
-def press(folder: Path) -> None:
-    """Press it into the elastic skin of a GelSight Mini."""
-    contact = parse_contact(_text(folder))
-    mesh = _sensor().place(contact)
-    assert np.isfinite(mesh.vertices).all()
-    pressed = _sensor().pressed([contact])
-    assert np.isfinite(pressed.contacts[0].force).all()
-
-
-@kind("search-space", _spoilt_texts(VARIED))
-def read_space(folder: Path) -> None:
-    """Read what a search varies, and bind it to a design."""
-    text = _text(folder)
-    path, specification = parse_vary(text)
-    SearchSpace({path: specification}).bind(ots.load(ASSETS / "design-v1"))
-    parse_errors([text])
+WHOLE: dict[str, Case] = {
+    "design": DESIGN,
+    "mesh": MESHES,
+    "step": {"box.step": STEP},
+    "ies": {"lamp.ies": IES},
+    "tuning": TUNING_CASE,
+    "recipe": BLOCK,
+    "study": STUDY,
+    "dataset": DATASET,
+    "photographs": PHOTOGRAPHS,
+}
+"""What is spoilt, as it is before."""

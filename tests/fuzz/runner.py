@@ -1,8 +1,9 @@
 """``python -m tests.fuzz --minutes 60``: malformed input of every kind, for as long as asked.
 
 Each kind has a process of its own, which is ended where one case takes too long or too much
-memory. The table that is printed at the end counts, for each kind, the cases, how many were read
-as they are, refused in words, and what went wrong; cases that went wrong are kept under --keep.
+memory. The kinds come in turn, a few minutes at a time, and each one's time counts from its first
+case. The table that is printed counts, for each kind, the cases, how many were read as they are,
+refused in words, and what went wrong; cases that went wrong are kept under --keep.
 """
 
 from __future__ import annotations
@@ -20,6 +21,7 @@ import time
 import traceback
 import warnings
 from collections import Counter
+from collections.abc import Mapping
 from multiprocessing.connection import Connection
 from pathlib import Path
 
@@ -37,6 +39,14 @@ ENGINE_TIME = 90.0
 MEMORY = 6 * 2**30
 """Bytes of address space that a process may have; an ordinary one has some 2 GiB."""
 
+ROUND = 20.0
+"""Minutes that all kinds together get before the first one's turn comes again; a process of a kind
+starts in some seconds."""
+
+START_TIME = 300.0
+"""Seconds in which a process of the fuzzer must begin its first case; it imports first, which takes
+some seconds where nothing else runs."""
+
 MOST_STILLBORN = 5
 """Processes of the fuzzer that end, or take too long, before their first case: on a busy machine
 one may."""
@@ -47,14 +57,10 @@ Found = tuple[str, str, Case]
 
 def one_case(kind: str, case: Case, folder: Path) -> str:
     """What came of a case: read, refused, or what went wrong and where."""
-    import importlib
-
     from optisense.errors import OptiSenseError
 
-    from .kinds import KINDS
-
-    importlib.import_module("tests.fuzz.engine_kind")
-    from .engine_kind import RefusedError
+    from .every_kind import KINDS
+    from .kinds import RefusedError
 
     write_case(case, folder)
     try:
@@ -72,13 +78,13 @@ def one_case(kind: str, case: Case, folder: Path) -> str:
     return "read"
 
 
-def _work(kind: str, seed: int, end: float, channel: Connection, folder: Path) -> None:
-    """Make cases and try them until the time is over; runs in a process of its own."""
+def _work(kind: str, seed: int, seconds: float, channel: Connection, folder: Path) -> None:
+    """Make cases and try them for a time; runs in a process of its own."""
     from hypothesis import HealthCheck, Phase, given, settings
     from hypothesis import seed as seeded
 
     from .engine_kind import ENGINE
-    from .kinds import KINDS
+    from .every_kind import KINDS
 
     sys.stderr = open(os.devnull, "w")  # noqa: SIM115, PTH123
     os.chdir(folder.parent)
@@ -86,6 +92,8 @@ def _work(kind: str, seed: int, end: float, channel: Connection, folder: Path) -
 
     class Over(BaseException):
         pass
+
+    end = time.time() + seconds
 
     def run(seed_now: int) -> None:
         @seeded(seed_now)
@@ -119,28 +127,30 @@ def _work(kind: str, seed: int, end: float, channel: Connection, folder: Path) -
 
 def fuzz(kind: str, seconds: float, seed: int) -> tuple[Counter[str], dict[str, Case]]:
     """Try cases of a kind for a time; how often each outcome was, and a case of each fault."""
-    counts: Counter[str] = Counter()
-    faults: dict[str, Case] = {}
-    end = time.time() + seconds
     from .engine_kind import busy
 
+    counts: Counter[str] = Counter()
+    faults: dict[str, Case] = {}
     stillborn = 0
-    while time.time() < end:
+    while seconds > 0.0:
         home = Path(tempfile.mkdtemp(prefix="optisense-fuzz-"))
         ours, theirs = multiprocessing.get_context("spawn").Pipe(duplex=False)
         child = multiprocessing.get_context("spawn").Process(
-            target=_work, args=(kind, seed, end, theirs, home / "case")
+            target=_work, args=(kind, seed, seconds, theirs, home / "case")
         )
         child.start()
         theirs.close()
-        over, began = False, time.time() + 60.0  # it imports first
+        over, begun = False, False
+        began = first = time.time()
         try:
             while not over:
                 limit = ENGINE_TIME * busy() if kind == "engine" else PATIENCE * CASE_TIME
+                limit = limit if begun else START_TIME * busy()
                 if not ours.poll(max(began + limit - time.time(), 0.0)):
                     raise TimeoutError
                 outcome, case = ours.recv()
                 began = time.time()
+                first, begun = first if begun else began, True
                 over = outcome == "over"
                 if outcome == "failed":
                     raise RuntimeError(case[""].decode())
@@ -154,7 +164,7 @@ def fuzz(kind: str, seconds: float, seed: int) -> tuple[Counter[str], dict[str, 
                 child.join()
                 late = child.exitcode == -signal.SIGXCPU
             what = "takes too long" if late else "the process has ended"
-            if (home / "case").exists():
+            if begun and (home / "case").exists():
                 counts[what] += 1
                 faults.setdefault(what, read_case(home / "case"))
             elif (stillborn := stillborn + 1) > MOST_STILLBORN:
@@ -165,13 +175,13 @@ def fuzz(kind: str, seconds: float, seed: int) -> tuple[Counter[str], dict[str, 
             child.join()
             shutil.rmtree(home, ignore_errors=True)
         seed += 100_000
+        seconds = 0.0 if over else seconds - (time.time() - first if begun else 0.0)
     return counts, faults
 
 
 def main() -> int:
     """Run from the command line; 1 where something went wrong."""
-    from . import engine_kind  # noqa: F401
-    from .kinds import KINDS
+    from .every_kind import KINDS
 
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0] if __doc__ else "")
     parser.add_argument("--minutes", type=float, default=60.0, help="in all")
@@ -182,17 +192,29 @@ def main() -> int:
     given = parser.parse_args()
     names = given.kind or list(KINDS)
     total = sum(KINDS[name].weight for name in names)
-    rows = {}
-    print(f"{'kind':<14}{'cases':>9}{'read':>9}{'refused':>9}{'wrong':>7}", flush=True)
-    for name in names:
-        seconds = given.minutes * 60.0 * KINDS[name].weight / total
-        counts, faults = fuzz(name, seconds, given.seed)
-        rows[name] = dict(counts)
-        wrong = {what: number for what, number in counts.items() if what not in ("read", "refused")}
-        print(f"{name:<14}{sum(counts.values()):>9}{counts['read']:>9}{counts['refused']:>9}"
-              f"{sum(wrong.values()):>7}", flush=True)  # fmt: skip
-        for what, number in sorted(wrong.items(), key=lambda each: -each[1]):
-            print(f"    {number:>6}  {what}  {keep_case(name, faults[what], given.keep)}")
-    if given.json:
-        given.json.write_text(json.dumps(rows, indent=1) + "\n")
+    rounds = max(1, round(given.minutes / ROUND))
+    rows: dict[str, Counter[str]] = {name: Counter() for name in names}
+    for turn in range(rounds):
+        print(f"round {turn + 1} of {rounds}", flush=True)
+        for name in names:
+            seconds = given.minutes * 60.0 / rounds * KINDS[name].weight / total
+            counts, faults = fuzz(name, seconds, given.seed + 1_000_000 * turn)
+            rows[name] += counts
+            for what in sorted(faults):
+                place = keep_case(name, faults[what], given.keep)
+                print(f"    {name}: {counts[what]} times {what}: {place}", flush=True)
+            if given.json:
+                given.json.write_text(json.dumps(rows, indent=1) + "\n")
+        print_table(rows)
     return int(any(set(each) - {"read", "refused"} for each in rows.values()))
+
+
+def print_table(rows: Mapping[str, Counter[str]]) -> None:
+    """Say how many cases of each kind there were so far, and what came of them."""
+    print(f"{'kind':<14}{'cases':>9}{'read':>9}{'refused':>9}{'wrong':>7}")
+    for name, counts in rows.items():
+        fine = counts["read"], counts["refused"]
+        print(
+            f"{name:<14}{counts.total():>9}{fine[0]:>9}{fine[1]:>9}{counts.total() - sum(fine):>7}"
+        )
+    sys.stdout.flush()

@@ -11,7 +11,8 @@ from hypothesis import HealthCheck, Phase, given, settings
 
 from .cases import FOUND, Case, keep_case, kept_cases, read_case
 from .engine_kind import ENGINE
-from .kinds import KINDS
+from .every_kind import KINDS
+from .kinds import WHOLE
 from .runner import one_case
 
 SECONDS = 4.0
@@ -70,6 +71,12 @@ def test_what_was_found_once_is_refused_in_words(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     assert one_case(kind, read_case(folder), tmp_path / "case") in ("read", "refused")
+
+
+@pytest.mark.parametrize("kind", sorted(WHOLE))
+def test_what_is_spoilt_can_be_read_before(kind: str, tmp_path: Path) -> None:
+    """Otherwise each case would be refused for a reason that is not its own."""
+    assert one_case(kind, WHOLE[kind], tmp_path / "case") == "read"
 
 
 def test_each_kept_case_is_of_a_kind() -> None:

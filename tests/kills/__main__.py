@@ -26,12 +26,13 @@ def main() -> int:
     parser.add_argument("--json", type=Path, help="write the counts here, too")
     given = parser.parse_args()
     names = given.only or list(WORK)
-    each = -(-given.kills // len(names))
+    shares = sum(WORK[name].share for name in names)
     rows = {}
     print(f"{'command':<20}{'killed':>8}{'too late':>10}{'wrong':>7}", flush=True)
     with tempfile.TemporaryDirectory(prefix="optisense-kills-") as home:
         for number, name in enumerate(names):
-            report = kill_repeatedly(name, each, given.seed, Path(home, str(number)))
+            kills = round(given.kills * WORK[name].share / shares)
+            report = kill_repeatedly(name, kills, given.seed, Path(home, str(number)))
             wrong = len(report.wrong)
             print(f"{name:<20}{report.killed:>8}{report.late:>10}{wrong:>7}", flush=True)
             for line in report.wrong:

@@ -10,11 +10,15 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 from optisense.errors import OptiSenseError
 
+from .agreement import agrees
+from .cluster import Cluster
 from .work import GOALS, WORK, half_files, whole_files
 
 LONGEST = 1800.0
@@ -51,6 +55,8 @@ class Target:
         self.work, self._home, self._runs = WORK[name], home, 0
         home.mkdir(parents=True, exist_ok=True)
         (home / "goals.py").write_text(GOALS)
+        self.work.prepare(home)
+        self._cluster = Cluster(home) if self.work.cluster else None
         out = home / "whole"
         process = self._begin(out)
         _until_it_writes(process, out)
@@ -59,10 +65,16 @@ class Target:
         self.writes_for = time.monotonic() - began
         if process.returncode:
             raise RuntimeError(f"{name} has failed: {said}")
-        self._result, self._files = self.work.result(out), whole_files(out)
+        self._result = self.work.result(out)
+        self._files = whole_files(out, self.work.varying)
 
     def kill_once(self, chance: random.Random, report: Report) -> None:
-        """Kill it, one time in eight while it starts, else while it writes; then give it again."""
+        """Kill it, one time in eight while it starts, else while it writes; then give it again.
+
+        Of a command with workers one kill in two takes only the command, so that its workers are
+        left; of one on a Dask cluster one in two takes only the worker, another comes in its
+        place, and the command ends as if nothing had been.
+        """
         self._runs += 1
         out = self._home / str(self._runs)
         process = self._begin(out)
@@ -70,37 +82,71 @@ class Target:
         if not starting:
             _until_it_writes(process, out)
         moment = chance.uniform(0.0, self.writes_for)
-        time.sleep(moment)
-        alone = bool(self.work.workers) and chance.random() < 0.5
-        (process.kill if alone else lambda: _kill_group(process))()
-        process.communicate()
-        late = process.returncode == 0
+        began = time.monotonic()
+        with suppress(subprocess.TimeoutExpired):
+            process.wait(moment)
+            self.writes_for = time.monotonic() - began  # it was over sooner than the others
+        half = chance.random() < 0.5
+        when = f"{'start' if starting else 'writing'} + {moment:.3f} s"
+        if self._cluster is not None and half:
+            late = process.poll() is not None
+            self._cluster.replace_worker()
+            said = process.communicate(timeout=LONGEST)[0]
+            other = self._difference(out)
+            if process.returncode or other:
+                code = process.returncode
+                report.wrong.append(
+                    f"{when}, of a worker: ends with {code}, {other}: {said[-300:]}"
+                )
+        else:
+            alone = bool(self.work.workers) and half
+            (process.kill if alone else lambda: _kill_group(process))()
+            process.communicate()
+            late = process.returncode == 0
+            wrong = half_files(out, self._files) if out.is_dir() else []
+            report.wrong += [f"{when}: {each}" for each in wrong]
+            if not late:
+                amiss = self._again(out)
+                report.wrong += [f"{when}: {amiss}"] if amiss else []
         report.late += late
         report.killed += not late
-        when = f"{'start' if starting else 'writing'} + {moment:.3f} s"
-        wrong = half_files(out, self._files) if out.is_dir() else []
-        report.wrong += [f"{when}: {each}" for each in wrong]
-        if not late:
-            wrong = self._again(out)
-            report.wrong += [f"{when}: {wrong}"] if wrong else []
         shutil.rmtree(out, ignore_errors=True)
+
+    def end(self) -> None:
+        """End the cluster, if there is one."""
+        if self._cluster is not None:
+            self._cluster.end()
 
     def _again(self, out: Path) -> str:
         """Give the command again; what is wrong with how it ended."""
         process = self._begin(out, *(self.work.again if (out / "study.json").exists() else ()))
         said = process.communicate(timeout=LONGEST)[0]
-        if process.returncode and not self._is_whole(out):
-            return f"given again, it ends with {process.returncode}: {said[-300:]}"
-        return "" if self._is_whole(out) else "given again, it ends with another result"
+        other = self._difference(out)
+        if process.returncode and other:
+            return f"given again, it ends with {process.returncode} ({other}): {said[-300:]}"
+        return f"given again, it ends with another result: {other}" if other else ""
 
-    def _is_whole(self, out: Path) -> bool:
+    def _difference(self, out: Path) -> str:
+        """In what a result is another one than that of the command that was not killed."""
         try:
-            return bool(self.work.result(out) == self._result) and not strays(out)
-        except (OptiSenseError, OSError):
+            found = self.work.result(out)
+        except (OptiSenseError, OSError) as error:
+            return str(error)
+        if left := strays(out):
+            return f"files of nobody: {left}"
+        names = sorted({*found, *self._result})
+        return ", ".join(name for name in names if not self._same(name, found))
+
+    def _same(self, name: str, found: dict[str, Any]) -> bool:
+        if name not in found or name not in self._result:
             return False
+        one, other = self._result[name], found[name]
+        return agrees(name, one, other) if isinstance(one, bytes) else bool(one == other)
 
     def _begin(self, out: Path, *more: str) -> subprocess.Popen[str]:
         stand = {"@OUT": str(out), "@GOALS": str(self._home / "goals.py")}
+        if self._cluster is not None:
+            stand["@CLUSTER"] = self._cluster.address
         words = [*self.work.words, *more]
         for name, value in stand.items():
             words = [word.replace(name, value) for word in words]
@@ -134,10 +180,16 @@ def _kill_group(process: subprocess.Popen[str]) -> None:
 def kill_repeatedly(
     name: str, kills: int, seed: int, home: Path, told: Callable[[Report], None] = lambda _: None
 ) -> Report:
-    """Kill a command at so many moments; what came of it."""
+    """Kill a command at so many moments before its end; what came of it.
+
+    Where every second kill comes after the end, there are fewer.
+    """
     chance, report = random.Random(f"{seed} {name}"), Report()
     target = Target(name, home)
-    for _ in range(kills):
-        target.kill_once(chance, report)
-        told(report)
+    try:
+        while report.killed < kills and report.killed + report.late < 2 * kills:
+            target.kill_once(chance, report)
+            told(report)
+    finally:
+        target.end()
     return report

@@ -4,8 +4,12 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import mitsuba as mi
+import numpy as np
 import pytest
+from PIL import Image
 
+from .agreement import agrees
 from .killing import kill_repeatedly
 from .work import half_files, whole_files
 
@@ -21,6 +25,28 @@ def test_it_leaves_nothing_half_and_ends_as_if_it_had_not_been_killed(
     report = kill_repeatedly(name, 1, SEED, tmp_path)
     assert report.wrong == []
     assert report.killed + report.late == 1
+
+
+def test_pictures_agree_up_to_rounding(tmp_path: Path) -> None:
+    light = np.random.default_rng(1).uniform(0.0, 1.0, (20, 30, 3)).astype(np.float32)
+
+    def written(name: str, values: np.ndarray) -> bytes:
+        path = tmp_path / name
+        if path.suffix == ".npy":
+            np.save(path, values)
+        elif path.suffix == ".png":
+            Image.fromarray((255 * values).astype(np.uint8)).save(path)
+        else:
+            mi.Bitmap(values).write(str(path))
+        return path.read_bytes()
+
+    for name in ("a.npy", "a.exr", "a.png"):
+        whole = written(name, light)
+        assert agrees(name, whole, written(name, light * np.float32(1 + 1e-6)))
+        assert not agrees(name, whole, written(name, light[::-1].copy()))
+        assert not agrees(name, whole, whole[: len(whole) // 2])
+        assert not agrees(name, whole, written(name, light[:-1]))
+    assert not agrees("a.csv", b"1\n", b"2\n")
 
 
 def test_half_files_are_found(tmp_path: Path) -> None:

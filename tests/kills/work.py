@@ -13,7 +13,12 @@ from typing import Any
 import numpy as np
 import yaml
 
+import optisense as ots
+from optisense.calibration import photograph_model, save_photographs
+from optisense.calibration.kept_renderings import FOLDER
 from optisense.search import Study
+
+from .agreement import agrees
 
 ASSETS = Path(__file__).parents[1] / "assets"
 
@@ -32,8 +37,17 @@ def brightness(evaluation):
 SMALL = ("--photons", "3000", "--resolution", "24x18", "--variant", "llvm")
 """Renders in which nearly all time is compilation."""
 
+PLACES = [(-4.0, 2.0), (3.0, -2.0), (0.5, 3.0), (-1.0, -3.0)]
+"""mm, where the balls press in photographs."""
+
 NAMES_WITH_TIMES = ("run.json", "report.html", "dataset.json", "trials.sqlite")
 """Files of results that also tell when and how fast they came about."""
+
+FITTED = ("design.yaml", "calibration.json", "calibration.html")
+"""Files of a fit, whose numbers differ in their last digits: threads add up light in any order."""
+
+DIGITS = 4
+"""Significant digits to which the numbers of two fitted designs agree; they differ in the tenth."""
 
 
 @dataclass(frozen=True)
@@ -45,51 +59,120 @@ class Work:
         again: what is added when it is given once more.
         result: what must be equal of what is in the folder, however often it was killed.
         workers: how many processes of its own the command has.
+        cluster: whether a Dask worker works its trials out, and is killed in turn with the command;
+            ``@CLUSTER`` stands for the address of the scheduler.
+        prepare: makes what the command reads, in the folder that it runs in.
+        varying: names of files whose content is another one each time, so only its form counts.
+        share: of the kills, relative to others; commands that take long get fewer.
     """
 
     words: tuple[str, ...]
     again: tuple[str, ...] = ()
-    result: Callable[[Path], Any] = lambda folder: whole_files(folder)
+    result: Callable[[Path], dict[str, Any]] = lambda folder: whole_files(folder)
     workers: int = 0
+    cluster: bool = False
+    prepare: Callable[[Path], None] = lambda home: None
+    varying: tuple[str, ...] = NAMES_WITH_TIMES
+    share: float = 1.0
 
 
 def _search(method: str, objectives: tuple[str, ...], workers: int, *more: str) -> Work:
     second = "camera.position.y=-1:1" if method == "gradient" else "coating.specularity=0:1:5"
+    cluster = "--cluster" in more
     return Work(
         ("search", "gelsight-mini", "--method", method, "--seed", "7", *objectives, *more,
          "--vary", "camera.position.x=-1:3:4",
          "--vary", second,
-         "--workers", str(workers), "--out", "@OUT"),
+         *(() if cluster else ("--workers", str(workers))), "--out", "@OUT"),
         ("--resume", "--trust"), lambda folder: trials(folder), workers if workers > 1 else 0,
+        cluster,
     )  # fmt: skip
 
 
 NEAR, BRIGHT = ("-b", "@GOALS:nearness"), ("-b", "@GOALS:brightness")
+CLUSTER = ("--cluster", "@CLUSTER")
 RAYS = ("-b", "aoap", "--set", "ray_resolution=[16,12]")
 
 WORK: dict[str, Work] = {
     "apply": Work(("apply", str(ASSETS / "study-v1"), "--out", "@OUT")),
     "export": Work(("export", "gelsight-mini", "--out", "@OUT")),
     "grid": _search("grid", NEAR, 1, "--budget", "20"),
+    "grid, 2 workers": _search("grid", NEAR, 2, "--budget", "20"),
+    "grid, Dask": _search("grid", NEAR, 1, "--budget", "20", *CLUSTER),
     "cma-es": _search("cma-es", NEAR, 1, "--budget", "30"),
     "cma-es, 2 workers": _search("cma-es", NEAR, 2, "--budget", "30"),
+    "cma-es, Dask": _search("cma-es", NEAR, 1, "--budget", "30", *CLUSTER),
     "pareto": _search("pareto", NEAR + BRIGHT, 1, "--budget", "30"),
     "pareto, 2 workers": _search("pareto", NEAR + BRIGHT, 2, "--budget", "30"),
     "gradient": _search("gradient", RAYS, 1, "--budget", "12"),
-    "dataset": Work(("dataset", "gelsight-mini", "--count", "4", *SMALL, "--out", "@OUT")),
+    "gradient, 2 workers": _search("gradient", RAYS, 2, "--budget", "12"),
+    "dataset": Work(
+        ("dataset", "gelsight-mini", "--count", "4", *SMALL, "--out", "@OUT"), share=0.7
+    ),
     "render": Work(("render", "gelsight-mini", *SMALL, "--out", "@OUT")),
+    "calibrate": Work(
+        (
+            "calibrate",
+            "gelsight-mini",
+            "photographs",
+            "--as-labelled",
+            "--keep",
+            "view",
+            "--rounds",
+            "1",
+            "--photons",
+            "3000",
+            "--variant",
+            "llvm",
+            "--out",
+            "@OUT",
+        ),
+        result=lambda folder: fit(folder),
+        prepare=lambda home: photograph(home / "photographs"),
+        varying=FITTED,
+        share=0.7,
+    ),
 }
 
 
-def whole_files(folder: Path) -> dict[str, bytes | None]:
-    """What is in the files of a folder by their paths; None for those that tell times, too."""
+def photograph(folder: Path) -> None:
+    """Make photographs of a sensor that is a little unlike the built-in one."""
+    design = ots.load("gelsight-mini")
+    design.lights["red"].flux *= 1.2
+    balls = [ots.Contact(ots.Sphere(3.0), at=place, depth=0.6) for place in PLACES]
+    model = ots.OpticalModel(design, "llvm")
+    save_photographs(
+        folder, photograph_model(model, balls, resolution=(48, 36), photons=20_000, seed=5)
+    )
+
+
+def whole_files(
+    folder: Path, varying: tuple[str, ...] = NAMES_WITH_TIMES
+) -> dict[str, bytes | None]:
+    """What is in the files of a folder by their paths; None for those that vary."""
     return {
-        path.relative_to(folder).as_posix(): (
-            None if path.name in NAMES_WITH_TIMES else path.read_bytes()
-        )
+        path.relative_to(folder).as_posix(): (None if path.name in varying else path.read_bytes())
         for path in sorted(folder.rglob("*"))
         if path.is_file() and not _of_the_store(path)
     }
+
+
+def fit(folder: Path) -> dict[str, Any]:
+    """The design that was fitted, to some digits; and which values and files there are besides."""
+    told = json.loads((folder / "calibration.json").read_text(encoding="utf-8"))
+    design = rounded(ots.load(folder).model_dump(mode="json", exclude={"provenance"}))
+    return {"files": sorted(whole_files(folder)), "design": design, "told": sorted(told)}
+
+
+def rounded(value: Any) -> Any:
+    """Plain data with all numbers to `DIGITS`."""
+    if isinstance(value, float):
+        return float(f"{value:.{DIGITS}g}")
+    if isinstance(value, dict):
+        return {key: rounded(each) for key, each in value.items()}
+    if isinstance(value, list | tuple):
+        return [rounded(each) for each in value]
+    return value
 
 
 def trials(folder: Path) -> dict[str, Any]:
@@ -107,7 +190,8 @@ def trials(folder: Path) -> dict[str, Any]:
 def half_files(folder: Path, whole: dict[str, bytes | None]) -> list[str]:
     """Files that look whole and are not, after a kill.
 
-    A file whose name begins with a dot is a temporary one. A table to which lines are added has
+    A file whose name begins with a dot is a temporary one. Renderings that a calibration keeps must
+    be whole. A table to which lines are added has
     whole lines; any other is as in the result of a command that was not killed.
 
     Args:
@@ -120,8 +204,9 @@ def half_files(folder: Path, whole: dict[str, bytes | None]) -> list[str]:
         hidden = any(part.startswith(".") for part in path.relative_to(folder).parts)
         if hidden or not path.is_file() or _of_the_store(path):
             continue
-        wrong = _wrong(path, whole.get(name, b""))
-        if name not in whole or wrong:
+        kept = path.parent.name == FOLDER  # for the next run, until the calibration has ended
+        wrong = _wrong(path, None if kept else whole.get(name, b""))
+        if wrong or (name not in whole and not kept):
             odd.append(f"{name}: {wrong or 'is not in the result'}")
     return odd
 
@@ -146,7 +231,7 @@ def _wrong(path: Path, whole: bytes | None) -> str:
         return f"can't be read: {error}"
     if whole is None or path.name == "study.json":
         return "" if path.suffix != ".html" or data.rstrip().endswith(b"</html>") else "is cut off"
-    return "" if data == whole else "has other content"
+    return "" if agrees(path.name, data, whole) else "has other content"
 
 
 def _of_the_store(path: Path) -> bool:

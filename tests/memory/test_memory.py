@@ -16,28 +16,30 @@ import pytest
 import optisense as ots
 from optisense.optics.backend import memory
 
-SLACK = 48.0
-"""MiB by which the use of memory may grow after the first rounds, for what is compiled later."""
+from .work import wrong
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("work", "times", "first"), [("images", 18, 8), ("files", 14, 5)])
-def test_work_done_again_takes_no_more_memory(work: str, times: int, first: int) -> None:
+@pytest.mark.parametrize(("work", "times"), [("images", 14), ("scores", 14), ("files", 10)])
+def test_work_done_again_takes_no_more_memory(work: str, times: int) -> None:
     done = subprocess.run(
         [sys.executable, "-m", "tests.memory", work, "--times", str(times)],
         capture_output=True,
         text=True,
         cwd=Path(__file__).parents[2],
     )
-    assert done.returncode == 0, done.stderr
-    rows = [line.split() for line in done.stdout.splitlines()[1:]]
-    later = [row for row in rows if int(row[0]) >= first]
-    assert len(later) > 5
-    use = [float(row[1]) for row in later]
-    assert use[-1] - use[0] < SLACK, done.stdout
-    assert len({row[2] for row in later}) == 1, done.stdout
+    assert done.returncode == 0, done.stdout + done.stderr
+
+
+def test_growth_is_found() -> None:
+    steady = [(n, 300.0, 6) for n in range(1, 20)]
+    assert wrong("images", steady) == ""
+    assert "MiB more" in wrong("images", [(n, 300.0 + 5 * n, 6) for n in range(1, 20)])
+    assert wrong("files", [*steady, (20, 300.0, 7)]) == "files stay open"
+    assert "more than 3600" in wrong("designs", [*steady, (20, 3700.0, 6)])
+    assert wrong("scores", steady[:3]) == "too few rounds to tell"
 
 
 @pytest.mark.slow

@@ -11,6 +11,16 @@ from optisense.objectives import evaluate
 from optisense.optics.backend.memory import resident
 from optisense.sensors.registry import SENSORS
 
+SLACK = 48.0
+"""MiB by which the use of memory may grow after the first rounds, for what is compiled later."""
+
+MOST_IN_USE = 3600.0
+"""MiB that a process may take up that goes from sensor to sensor: the 2 GiB from which on freed
+memory is given back (`optisense.optics.backend.memory`), and the light of one more sensor."""
+
+FIRST = {"images": 8, "scores": 8, "designs": 7, "files": 5}
+"""Rounds of each piece of work until all that is kept is there; of designs, each sensor once."""
+
 RESOLUTION = (24, 18)
 """Pixels of the pictures: nearly all memory is that of the light."""
 
@@ -83,3 +93,20 @@ def measured(name: str, times: int) -> Iterator[tuple[int, float, int]]:
     for number in range(1, times + 1):
         next(doing)
         yield number, resident() / 2**20, len(os.listdir("/proc/self/fd"))  # noqa: PTH208
+
+
+def wrong(name: str, rows: list[tuple[int, float, int]]) -> str:
+    """What is not as it must be in the rows of `measured`; empty where all is well.
+
+    Memory may not grow by more than `SLACK` after the first rounds, nor beyond `MOST_IN_USE` where
+    sensors come in turn; the number of open files may not grow at all.
+    """
+    later = [row for row in rows if row[0] >= FIRST[name]]
+    use = [mebibytes for _, mebibytes, _ in later]
+    if not later:
+        return "too few rounds to tell"
+    if max(files for _, _, files in later) > later[0][2]:
+        return "files stay open"
+    if name == "designs":
+        return f"more than {MOST_IN_USE:.0f} MiB" if max(use) > MOST_IN_USE else ""
+    return f"more than {SLACK:.0f} MiB more" if max(use) - use[0] > SLACK else ""

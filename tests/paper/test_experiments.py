@@ -13,7 +13,8 @@ import pytest
 from optisense.objectives.score import json_ready
 from paper import EXPERIMENTS, Experiment, Finding, Record, find, write_page
 from paper.errors import ExperimentError
-from paper.experiment import PICTURE, RESULT, TEXT, gaps, write
+from paper.experiment import gaps, write
+from paper.text import PICTURE, RESULT, TEXT
 
 Answered = Callable[..., tuple[Finding, list[Record]]]
 """See conftest.py."""

@@ -1,0 +1,85 @@
+"""Whether two files say the same: pictures up to rounding, all others byte by byte.
+
+The same seed gives the same picture up to rounding, as threads add up light in any order.
+"""
+
+from __future__ import annotations
+
+import io
+from pathlib import PurePath
+from typing import Any
+
+import mitsuba as mi
+import numpy as np
+from PIL import Image
+
+TOLERANCE = 1e-3
+"""Mean difference of two arrays, of the largest value, that rounding makes at most. Rays that it
+sends another way change some pixels; pictures of two seeds differ a hundred times more."""
+
+
+def agrees(name: str, one: bytes | None, other: bytes | None) -> bool:
+    """Whether the contents of a file of this name are the same in two results."""
+    if one == other:
+        return True
+    if one is None or other is None:
+        return False
+    try:
+        first, second = (_arrays(PurePath(name).suffix, each) for each in (one, other))
+    except Exception:  # each of the libraries raises its own for a file that is cut off
+        return False
+    return (
+        bool(first)
+        and first.keys() == second.keys()
+        and all(_near(first[key], second[key]) for key in first)
+    )
+
+
+def _arrays(suffix: str, data: bytes) -> dict[str, Any]:
+    """The arrays in a file by their names; none of a file that holds none."""
+    if suffix == ".png":
+        return {"": np.asarray(Image.open(io.BytesIO(data)), dtype=float)}
+    if suffix == ".npy":
+        return {"": np.load(io.BytesIO(data))}
+    if suffix == ".npz":
+        with np.load(io.BytesIO(data)) as file:
+            return dict(file)
+    if suffix == ".exr":
+        if not _whole_exr(data):
+            raise ValueError("the EXR file is cut off")
+        stream = mi.MemoryStream()
+        stream.write(data)
+        stream.seek(0)
+        return {"": np.array(mi.Bitmap(stream), dtype=float)}
+    return {}
+
+
+def _whole_exr(data: bytes) -> bool:
+    """Whether an EXR file of one part has all blocks of pixels that its table of offsets names.
+
+    Mitsuba's reader leaves the pixels of missing blocks as whatever the memory held before, which
+    may be the whole picture. The layout is that of "OpenEXR File Layout" (openexr.com): magic
+    number and version (8 bytes), attributes (name, type, size, value) ended by a zero byte, the
+    offset of each block, and the blocks (line number, size, pixels).
+    """
+    at = 8
+    while data[at] != 0:
+        for _ in ("name", "type"):
+            at = data.index(b"\0", at) + 1
+        at += 4 + int.from_bytes(data[at : at + 4], "little")
+    table = at + 1
+    first = int.from_bytes(data[table : table + 8], "little")
+    offsets = np.frombuffer(data[table:first], "<u8")
+    last = int(offsets.max())
+    return last + 8 + int.from_bytes(data[last + 4 : last + 8], "little") == len(data)
+
+
+def _near(one: Any, other: Any) -> bool:
+    if one.shape != other.shape or one.dtype != other.dtype:
+        return False
+    first, second = one.astype(float), other.astype(float)
+    if not np.array_equal(np.isfinite(first), np.isfinite(second)):
+        return False
+    known = np.isfinite(first)
+    off = np.abs(first[known] - second[known])
+    return not off.size or bool(off.mean() <= TOLERANCE * np.abs(first[known]).max(initial=0.0))
