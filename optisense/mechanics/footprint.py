@@ -73,7 +73,11 @@ class Footprint:
 
 
 def footprint(
-    indenter: TriangleMesh, skin: TriangleMesh, spot: SurfacePoint, thickness: float
+    indenter: TriangleMesh,
+    skin: TriangleMesh,
+    spot: SurfacePoint,
+    thickness: float,
+    points_across: int = POINTS_ACROSS,
 ) -> Footprint:
     """The overlap of a placed indenter with the skin.
 
@@ -83,6 +87,8 @@ def footprint(
         skin: the undeformed sensing surface, in the same frame.
         spot: where the contact sits.
         thickness: mm, of the gel there.
+        points_across: grid points across the shorter side of the overlap, where neither of the
+            bounds on their distance holds.
 
     Raises:
         ContactError: they do not overlap.
@@ -108,7 +114,7 @@ def footprint(
         for grid, some in ((x, columns), (y, rows))
     ]
     sizes = [MARGIN * (b - a) for a, b in spans]
-    pitch = min(min(sizes) / POINTS_ACROSS, COARSEST_PITCH)
+    pitch = min(min(sizes) / points_across, COARSEST_PITCH)
     pitch = _step_below(max(pitch, max(sizes) / MAX_POINTS, FINEST_PITCH))
     x, y = (
         (a + b) / 2 + pitch * (np.arange(n) - (n - 1) / 2)

@@ -16,7 +16,7 @@ from optisense.geometry.contact import available_depth, locate, surface_axes
 from optisense.mechanics.contact_checks import refuse_holes, refuse_shared_skin
 from optisense.mechanics.deformed_mesh import SkinMesh, skin_mesh
 from optisense.mechanics.elasticity import Elasticity
-from optisense.mechanics.footprint import DOES_NOT_REACH, Footprint, footprint
+from optisense.mechanics.footprint import DOES_NOT_REACH, POINTS_ACROSS, Footprint, footprint
 from optisense.mechanics.gel_patches import GelPatches
 from optisense.mechanics.pressed_skin import PressedSkin, press
 from optisense.mechanics.tangential_contact import Drag
@@ -42,6 +42,14 @@ numbers."""
 
 USUAL_THICKNESS = 4.0
 """mm; thickness of the gel in designs without an elastomer, about that of a GelSight Mini."""
+
+COARSE_POINTS_ACROSS = 24
+"""Grid points across the shorter side of a contact that is pressed in coarsely. The contact radius
+of a ball is then right to about 1 %, a fraction of a pixel of a draft."""
+COARSE_THICKNESS = 0.1
+"""mm; step of the thicknesses of layers that contacts are pressed into coarsely. The kernels of a
+thickness take a tenth of a second to make, and a skin that is bent by little keeps them; forces
+change by 1 to 2 % from step to step."""
 
 
 def elasticity_of(design: SensorDesign) -> Elasticity:
@@ -105,6 +113,7 @@ class Gel:
         elasticity: Elasticity,
         place: Callable[[Contact], TriangleMesh],
         check: Callable[[], None] | None = None,
+        coarse: bool = False,
     ) -> None:
         """Take a sensor's gel.
 
@@ -116,14 +125,16 @@ class Gel:
             place: gives the mesh of an indenter where a contact presses it in, in the design's
                 frame.
             check: called before the first press; raises if the gel can't be pressed at all.
+            coarse: press in a third of the time, for drafts: on coarser grids, and into a flat
+                layer as thick as the gel is under the contact.
         """
-        self._check = check
+        self._check, self._coarse = check, coarse
         self._surface, self._skin, self._elastomers = surface, skin, elastomers
         self._elasticity, self._place = elasticity, place
         self._last: tuple[tuple[Contact, ...], PressedSkin] | None = None
         self._mesh: tuple[PressedSkin, SkinMesh] | None = None
         self._depths = lru_cache(maxsize=KEPT_DEPTHS)(self._depth_found)
-        self._patches = GelPatches(skin, elastomers, elasticity.poisson_ratio)
+        self._patches = GelPatches(skin, () if coarse else elastomers, elasticity.poisson_ratio)
 
     def pressed(
         self, contacts: Sequence[Contact], placed: Sequence[TriangleMesh] | None = None
@@ -151,7 +162,8 @@ class Gel:
                     mesh,
                     self._surface.mesh,
                     locate(contact, self._surface),
-                    self._thickness(contact),
+                    self._layer(contact),
+                    COARSE_POINTS_ACROSS if self._coarse else POINTS_ACROSS,
                 )
                 for contact, mesh in zip(contacts, placed, strict=True)
             ]
@@ -222,6 +234,13 @@ class Gel:
         if excess(low) >= 0.0:
             return at(LEAST_DEPTH)
         return at(math.exp(float(brentq(excess, low, high, xtol=FORCE_TOLERANCE))))
+
+    def _layer(self, contact: Contact) -> float:
+        """mm, thickness of the layer that a contact is pressed into."""
+        thickness = self._thickness(contact)
+        if not self._coarse:
+            return thickness
+        return COARSE_THICKNESS * max(1, round(thickness / COARSE_THICKNESS))
 
     def _thickness(self, contact: Contact) -> float:
         """mm of gel under a contact."""

@@ -4,7 +4,7 @@ designs.
 What a changed design makes new costs more than the light of a small picture, so a draft keeps the
 shapes of cages that did not move, contacts where the surface did not move, the cells of surfaces
 that did not move, and the emission guide, which stays right for lights that moved (no direction is
-left out) and only loses effect. In contacts it takes few camera samples.
+left out) and only loses effect. Contacts are pressed in coarsely and get few camera samples.
 """
 
 from __future__ import annotations
@@ -89,6 +89,7 @@ class DraftView(SkinView):
     """A view for drafts, which keeps where contacts were placed."""
 
     facet_error = 10 * FACET_ERROR  # still far below a pixel; normals are those of the exact shape
+    coarse = True
 
     def __init__(self, design: SensorDesign, scenes: SensorScenes) -> None:
         """See `SkinView`."""

@@ -62,6 +62,8 @@ class SkinView:
 
     facet_error = FACET_ERROR
     """mm, how far indenters' meshes may be off their exact shapes."""
+    coarse = False
+    """Whether contacts are pressed in roughly, as drafts have them."""
 
     def __init__(self, design: SensorDesign, scenes: SensorScenes) -> None:
         """Prepare the view of a sensor with these scenes; nothing is traced yet."""
@@ -100,8 +102,16 @@ class SkinView:
     def gel(self) -> Gel:
         """The gel, into which contacts are pressed."""
         assembly, elasticity = self._scenes.assembly, elasticity_of(self._design)
-        check = partial(refuse_loose_gel, self._design)
-        return Gel(self.surface, assembly.sensing, assembly.gels, elasticity, self.place, check)
+        check = None if self.coarse else partial(refuse_loose_gel, self._design)
+        return Gel(
+            self.surface,
+            assembly.sensing,
+            assembly.gels,
+            elasticity,
+            self.place,
+            check,
+            self.coarse,
+        )
 
     def place(self, contact: Contact) -> TriangleMesh:
         """The part of an indenter that can touch, where a contact puts it in the design's frame.

@@ -61,49 +61,82 @@ class SensorPieces:
         return RayScene([*self.pieces, *pieces], numbers, self.table, robust=True)
 
     def with_skin(
-        self,
-        mesh: SkinMesh,
-        pressed: PressedSkin,
-        fixed: RayScene,
-        absorption: mi.Color3f | None,
+        self, skin: SkinShapes, fixed: RayScene, absorption: mi.Color3f | None
     ) -> ContactScenes:
         """The sensor with a deformed skin in the place of its sensing surface.
 
         Args:
-            mesh: the deformed skin.
-            pressed: what deforms it.
+            skin: the deformed skin.
             fixed: the opaque surfaces with nothing pressed in.
             absorption: of the gel, as in `ContactScenes`.
         """
         others = [i for i, p in enumerate(self.pieces) if p.surface.region is not Region.SENSING]
-        sensing = next(i for i, p in enumerate(self.pieces) if p.surface.region is Region.SENSING)
-        count = len(self.pieces)
-        numbers = {
-            SkinState.RESTING: sensing,
-            SkinState.TOUCHING: count,
-            SkinState.BENT: count + 1,
-        }
-        skin = {}
-        for state, number in numbers.items():
-            part = mesh.part(state)
-            if part is not None:
-                surface = self.surfaces[number]
-                skin[state] = Piece("skin", part.vertices, part.faces, surface, part.normals)
-        raised = [state for state in skin if state is not SkinState.RESTING]
-        balls = _balls(mesh.part(SkinState.TOUCHING, SkinState.BENT), pressed)
         return ContactScenes(
             RayScene(
-                [*(self.pieces[i] for i in others), *skin.values()],
-                [*others, *(numbers[state] for state in skin)],
+                [*(self.pieces[i] for i in others), *skin.pieces],
+                [*others, *skin.numbers],
                 self.table,
                 robust=True,
             ),
             fixed,
-            RayScene([skin[s] for s in raised], [numbers[s] for s in raised], self.table)
-            if raised
-            else None,
-            mi.Float(balls.ravel().astype(np.float32)),
+            None if skin.raised is None else skin.raised.with_table(self.table),
+            skin.balls,
             absorption=absorption,
+        )
+
+    @property
+    def skin_surfaces(self) -> tuple[tuple[int, Surface], ...]:
+        """The surface of a deformed skin, and its number, in each `SkinState`."""
+        count = len(self.pieces)
+        sensing = next(i for i, p in enumerate(self.pieces) if p.surface.region is Region.SENSING)
+        numbers = {
+            SkinState.RESTING: sensing,
+            SkinState.BENT: count + 1,
+            SkinState.TOUCHING: count,
+        }
+        return tuple((numbers[state], self.surfaces[numbers[state]]) for state in SkinState)
+
+
+@dataclass(frozen=True)
+class SkinShapes:
+    """A deformed skin, made ready for ray tracing. It depends on no other part of the sensor.
+
+    Attributes:
+        pieces: its parts, one for each state that there is.
+        numbers: their surfaces' numbers.
+        raised: the parts that are touched or bent; None without any. It has no table of its own.
+        balls: a bounding ball around each contact, as in `ContactScenes`.
+    """
+
+    pieces: list[Piece]
+    numbers: list[int]
+    raised: RayScene | None
+    balls: mi.Float
+
+    @classmethod
+    def of(
+        cls, mesh: SkinMesh, pressed: PressedSkin, surfaces: tuple[tuple[int, Surface], ...]
+    ) -> SkinShapes:
+        """Prepare a skin.
+
+        Args:
+            mesh: the deformed skin.
+            pressed: what deforms it.
+            surfaces: those of each state (`SensorPieces.skin_surfaces`).
+        """
+        skin = {}
+        for state, (_, surface) in zip(SkinState, surfaces, strict=True):
+            part = mesh.part(state)
+            if part is not None:
+                skin[state] = Piece("skin", part.vertices, part.faces, surface, part.normals)
+        numbers = {state: surfaces[state][0] for state in skin}
+        raised = [state for state in skin if state is not SkinState.RESTING]
+        balls = _balls(mesh.part(SkinState.TOUCHING, SkinState.BENT), pressed)
+        return cls(
+            list(skin.values()),
+            list(numbers.values()),
+            RayScene([skin[s] for s in raised], [numbers[s] for s in raised]) if raised else None,
+            mi.Float(balls.ravel().astype(np.float32)),
         )
 
 

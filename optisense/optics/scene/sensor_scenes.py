@@ -14,7 +14,12 @@ from optisense.geometry import Contact, TriangleMesh
 from optisense.mechanics import PressedSkin, SkinMesh
 from optisense.optics.scene.assembly import Assembly, coating_surface, indenter_piece
 from optisense.optics.scene.bsdf import surface_table
-from optisense.optics.scene.contact_scenes import ContactScenes, SensorPieces, bounding_ball
+from optisense.optics.scene.contact_scenes import (
+    ContactScenes,
+    SensorPieces,
+    SkinShapes,
+    bounding_ball,
+)
 from optisense.optics.scene.emitters import EmitterTable, emitter_table
 from optisense.optics.scene.fine_scene import FineScene, fine_scene
 from optisense.optics.scene.ray_scene import Piece, RayScene
@@ -47,12 +52,17 @@ class _Shapes:
         # Scenes that depend on no other shapes are handed on from sensor to sensor.
         self.fixed: Callable[[], RayScene]
         self.indenters: Callable[[int, tuple[TriangleMesh, ...]], RayScene]
+        self.skin: Callable[[SkinMesh, PressedSkin, tuple[tuple[int, Surface], ...]], SkinShapes]
         if before is not None and same:
             self.fixed = before.fixed
         else:
             opaque = self.opaque
             self.fixed = lru_cache(maxsize=1)(lambda: RayScene(opaque, numbers, table))
-        self.indenters = lru_cache(maxsize=1)(_indenters) if before is None else before.indenters
+        if before is None:
+            self.indenters = lru_cache(maxsize=1)(_indenters)
+            self.skin = lru_cache(maxsize=1)(SkinShapes.of)
+        else:
+            self.indenters, self.skin = before.indenters, before.skin
 
     @cached_property
     def full(self) -> RayScene:
@@ -210,7 +220,9 @@ class SensorScenes:
             mesh: the deformed skin.
             pressed: what deforms it.
         """
-        return self._sensor_pieces.with_skin(mesh, pressed, self.fixed, self._absorption())
+        pieces = self._sensor_pieces
+        skin = self._shapes.skin(mesh, pressed, pieces.skin_surfaces)
+        return pieces.with_skin(skin, self.fixed, self._absorption())
 
     @property
     def _sensor_pieces(self) -> SensorPieces:
