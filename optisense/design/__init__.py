@@ -3,7 +3,7 @@
 A design is a folder with `design.yaml` and `meshes/`. Nothing here renders.
 """
 
-from optisense.design.addressing import get_value, numbers, parse_path, set_value
+from optisense.design.addressing import get_value, numbers, parse_path, set_value, set_values
 from optisense.design.cage import Cage, Point, Share
 from optisense.design.cage_checks import cage_problems
 from optisense.design.cage_edit import (
@@ -70,5 +70,6 @@ __all__ = [
     "save_design",
     "set_range",
     "set_value",
+    "set_values",
     "settle_cage",
 ]

@@ -8,7 +8,7 @@ Grammar: names and list indices, as in `coating.specularity`, `lights.red.flux`,
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 from pydantic import BaseModel, ValidationError
@@ -42,17 +42,27 @@ def set_value(design: SensorDesign, path: str, value: object) -> SensorDesign:
     Raises:
         DesignError: the path leads nowhere, or the value does not fit there.
     """
-    get_value(design, path)  # names the near match when there is no such value
+    return set_values(design, {path: value})
+
+
+def set_values(design: SensorDesign, values: Mapping[str, object]) -> SensorDesign:
+    """A new design with all these values by their paths, checked once with all of them.
+
+    Raises:
+        DesignError: a path leads nowhere, or the values do not fit there.
+    """
     data = design.model_dump(mode="json")
-    target: Any = data
-    steps = parse_path(path)
-    for step in steps[:-1]:
-        target = target[_key(target, step)]
-    target[_key(target, steps[-1])] = _plain(value)
+    for path, value in values.items():
+        get_value(design, path)  # names the near match when there is no such value
+        target: Any = data
+        *way, last = parse_path(path)
+        for step in way:
+            target = target[_key(target, step)]
+        target[_key(target, last)] = _plain(value)
     try:
         return design._replaced(data)
     except ValidationError as error:
-        raise design_error(error, data, where=path) from None
+        raise design_error(error, data, where=", ".join(values)) from None
 
 
 def numbers(design: SensorDesign) -> Iterator[tuple[str, float]]:

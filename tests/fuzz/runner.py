@@ -65,7 +65,8 @@ def one_case(kind: str, case: Case, folder: Path) -> str:
     write_case(case, folder)
     try:
         with warnings.catch_warnings():
-            warnings.simplefilter("error", RuntimeWarning)  # NumPy's, which a user would see
+            for each in (RuntimeWarning, UserWarning):  # NumPy's and others', which users would see
+                warnings.simplefilter("error", each)
             KINDS[kind].read(folder)
     except (OptiSenseError, RefusedError):
         return "refused"

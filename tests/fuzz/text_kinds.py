@@ -34,7 +34,10 @@ CONTACTS = (
 VARIED = (
     "coating.specularity=0:1", "camera.position.x=+-2:5", "camera.fov=40,45,50",
     "cages.bend.points=+-1/symmetry=x/axes=xz/points=0,2,6-8", "parts.gel.material=[gel, white]",
-    "camera.position.z=+-0.2", "parts.gel.material=[[gel, 1], [white, {a: 2}]]",
+    "camera.position.z=+-0.2", "parts.gel.role=[elastomer, support]",
+    "camera.noise=[null, {gain: 1}]",
+    "coating=[{library: a}, {library: b, reflectance: [1, 1, 1], eta: [1, 1, 1], k: [1, 1, 1]}]",
+    "parts.gel.material=[[gel, 1], [white, {a: 2}]]",
 )  # fmt: skip
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from optisense import library, sensors
-from optisense.design import SensorDesign, add_cage, get_value
+from optisense.design import Role, SensorDesign, add_cage, get_value
 from optisense.design.cage import as_array
 from optisense.errors import DesignError, OptiSenseError, SearchError
 from optisense.search import Around, CagePoints, Choice, Integer, SearchSpace
@@ -239,6 +239,17 @@ class TestChoices:
         space = SearchSpace({"coating.specularity": Choice([0.1, 0.7])}).bind(mini)
         assert space.apply([1]).coating.specularity == 0.7
         assert space.values([1]) == {"coating.specularity": "0.7"}
+
+    @pytest.mark.filterwarnings("error::UserWarning")
+    def test_options_become_what_their_field_holds(self, mini: SensorDesign) -> None:
+        """Also where nothing but the coating is varied, whose numbers need no check."""
+        space = SearchSpace({"parts.gel.role": ["elastomer", "support"]}).bind(mini)
+        assert space.apply([1]).parts["gel"].role is Role.SUPPORT
+        own = mini.coating.model_dump(mode="json")
+        coatings = Choice([own, {**own, "library": "mine"}], labels=["own", "mine"])
+        assert SearchSpace({"coating": coatings}).bind(mini).apply([1]).coating.library == "mine"
+        with pytest.raises(DesignError, match="should be a valid number"):
+            SearchSpace({"camera.fov": Choice(["wide", 40])}).bind(mini)
 
 
 class TestBadInput:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from pydantic import ValidationError
 
-from optisense.design import SensorDesign
+from optisense.design import SensorDesign, get_value, set_values
 from optisense.design.problems import design_error
 from optisense.errors import OptiSenseError, SearchError
 from optisense.search.space.constraints import Constraint
@@ -216,6 +216,9 @@ class BoundSpace:
         for number, variable in self._first:
             design = variable.apply(design, self._option(number, point))
         design = self._edit.apply(design, self._targets(point))
+        if self._chosen:
+            options = {path: self._option(number, point) for path, number in self._chosen}
+            design = set_values(design, options)
         for number, variable in self._moves:
             design = variable.apply(design, float(point[number]))
         if self._types:
@@ -227,9 +230,9 @@ class BoundSpace:
         return design if self._sure else checked(design)
 
     def _targets(self, point: FloatArray) -> list[Any]:
-        """The values of all direct targets, in the order of the edit's paths."""
+        """The numbers of all direct targets, in the order of the edit's paths."""
         numbers: list[Any] = (point[self._source] * self._scale + self._offset).tolist()
-        for position, number in self._named:
+        for position, number in self._integers:
             numbers[position] = self._option(number, point)
         return numbers
 
@@ -239,16 +242,25 @@ class BoundSpace:
         return kind.options[place] if isinstance(kind, Choice) else place
 
     def _plan(self) -> None:
-        """Look up all places once, so that applying a point is quick."""
+        """Look up all places once, so that applying a point is quick.
+
+        Options are whatever people wrote: they are set with a check, which makes them what their
+        field holds.
+        """
         paths: list[str] = []
         source: list[int] = []
         scale: list[float] = []
         offset: list[float] = []
-        self._named: list[tuple[int, int]] = []
+        self._integers: list[tuple[int, int]] = []
+        self._chosen: list[tuple[str, int]] = []
         for number, parameter in enumerate(self.parameters):
             for target in parameter.targets:
-                if not isinstance(parameter.kind, Continuous):
-                    self._named.append((len(paths), number))
+                if isinstance(parameter.kind, Choice):
+                    get_value(self.prepared, target.path)
+                    self._chosen.append((target.path, number))
+                    continue
+                if isinstance(parameter.kind, Integer):
+                    self._integers.append((len(paths), number))
                 paths.append(target.path)
                 source.append(number)
                 scale.append(target.scale)
