@@ -71,9 +71,9 @@ def ledger(
 
         line.say("following light")
         model = OpticalModel(sensor, variant)
-        section = LightSection.of(model, options.photons, options.seed, places)
-        found = section.ledger
         seen = camera_light(model, options.photons, options.seed)
+        section = LightSection.of(model, options.photons, options.seed, places, seen)
+        found = section.ledger
     data = found.as_data() | {"camera": seen.as_data()}
     if places:
         data["places"] = [place.as_data() for place in section.places]
@@ -101,12 +101,9 @@ def _print(found: LightLedger, seen: CameraLight) -> None:
             table.add_row(where, *(f"{100 * share:.2f}" for share in shares))
     table.add_row("sum", *(f"{100 * found.closing_sum(group):.2f}" for group in groups))
     table.add_row("emitted (mW)", *(f"{found.emitted[group]:.4g}" for group in groups))
-    # Of a place in the open, the camera's: what escapes has it, so that it is no part of the sum.
-    lens = (f"{1000 * seen.irradiance[group]:.3g}" for group in groups)
-    table.add_row("at the lens (µW/mm²)", *lens)
-    if seen.pupil is not None:
-        inside = (f"{1000 * seen.irradiance[group] * seen.pupil:.3g}" for group in groups)
-        table.add_row("into the lens (µW)", *inside)
+    # Light at the lens is no part of the sum: most of it goes on and is counted where it ends.
+    for title, values in seen.as_text().items():
+        table.add_row(title, *(values[group] for group in groups))
     output.print(table)
     worst = max((entry.noise for entry in found.entries), default=0.0)
     output.print(f"noise of a line: at most {100 * worst:.2g} %", style="dim")

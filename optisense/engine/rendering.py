@@ -234,7 +234,7 @@ def report(session: Session, fields: Report, job: Job) -> dict[str, Any]:
 @handles("ledger", Ledger, Lane.RENDER)
 def ledger(session: Session, fields: Ledger, job: Job) -> dict[str, Any]:
     """Where the light of each group goes, and why it is bright or dark at places of the skin."""
-    from optisense.optics import light_at, light_ledger
+    from optisense.optics import camera_light, light_at, light_ledger
     from optisense.optics.ledger import cells_in_view
 
     design = design_of(session, fields, job)
@@ -244,6 +244,7 @@ def ledger(session: Session, fields: Ledger, job: Job) -> dict[str, Any]:
     job.progress(0.2, "following light")
     seen = cells_in_view(model)
     found = light_ledger(model, fields.photons, fields.seed, seen).as_data()
+    found["camera"] = camera_light(model, fields.photons, fields.seed).as_data()
     places = []
     for number, place in enumerate(fields.at):
         job.progress(0.3 + 0.7 * number / len(fields.at), "following light to places")

@@ -37,6 +37,20 @@ class CameraLight:
         """The mW of a group that the lens lets in; None where the design does not give its lens."""
         return None if self.pupil is None else self.irradiance[group] * self.pupil
 
+    def as_text(self) -> dict[str, dict[str, str]]:
+        """Numbers of each group as text, under a title with their unit."""
+        rows = {
+            "at the lens (µW/mm²)": {
+                group: f"{1000 * value:.3g}" for group, value in self.irradiance.items()
+            }
+        }
+        if self.pupil is not None:
+            rows["into the lens (µW)"] = {
+                group: f"{1000 * value * self.pupil:.3g}"
+                for group, value in self.irradiance.items()
+            }
+        return rows
+
     def as_data(self) -> dict[str, Any]:
         """As plain numbers and names, to be written as JSON."""
         return {

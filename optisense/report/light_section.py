@@ -19,6 +19,7 @@ from optisense.report.scene_view import scene_data
 if TYPE_CHECKING:
     from optisense.optics import OpticalModel
     from optisense.optics.ledger import LightLedger
+    from optisense.optics.light_at_camera import CameraLight
     from optisense.optics.light_paths import PhotonPath
     from optisense.optics.place_light import Place, PlaceLight
 
@@ -61,11 +62,13 @@ class LightSection:
         ledger: where the light of each group goes.
         paths: typical photons of each group.
         places: the light at places of the skin.
+        camera: the light that reaches the camera, where it is known.
     """
 
     ledger: LightLedger
     paths: Mapping[str, Sequence[PhotonPath]]
     places: Sequence[PlaceLight] = ()
+    camera: CameraLight | None = None
 
     @staticmethod
     def of(
@@ -73,6 +76,7 @@ class LightSection:
         photons: int | None = None,
         seed: int = 0,
         at: Sequence[Place] = (),
+        camera: CameraLight | None = None,
     ) -> LightSection:
         """Follow the light of a model.
 
@@ -81,6 +85,7 @@ class LightSection:
             photons: of the ledger; as many as suit a drawing if left out.
             seed: another one gives other photons.
             at: places of the skin that are looked at, as of `optisense.optics.light_at`.
+            camera: the light that reaches the camera, to be shown as well.
 
         Raises:
             ContactError: a place is off the surface.
@@ -95,7 +100,7 @@ class LightSection:
         seen = cells_in_view(model)
         ledger = light_ledger(model, number, seed, seen)
         places = [light_at(model, place, number, seed, seen) for place in at]
-        return LightSection(ledger, photon_paths(model, seed=seed, seen=seen), places)
+        return LightSection(ledger, photon_paths(model, seed=seed, seen=seen), places, camera)
 
     @cached_property
     def colours(self) -> dict[str, str]:
@@ -117,6 +122,10 @@ class LightSection:
             "groups": groups,
             "bars": [self._bar(group, design) for group in groups],
             "rows": self._rows(),
+            "lens": {
+                title: [values[group] for group in groups]
+                for title, values in (self.camera.as_text() if self.camera else {}).items()
+            },
             "faces": {
                 face: [_percent(share) for share in shares]
                 for face, shares in self.ledger.faces(LEAST_DRAWN).items()

@@ -26,6 +26,7 @@ def told(ledger: dict[str, Any]) -> list[tuple[str, list[tuple[str, str]]]]:
         rest = sum(row["share"] for row in rows) - sum(row["share"] for row in shown)
         if rest >= LEAST:
             lines.append(("Elsewhere", per_cent(rest)))
+        lines.append(("At the lens", f"{1000 * ledger['camera']['irradiance'][group]:.3g} µW/mm²"))
         found.append((f"{group}: {emitted:.3g} mW", lines))
     return found
 

@@ -95,6 +95,7 @@ def test_where_light_goes_and_why_it_is_dark_somewhere(engine: Any) -> None:
     assert middle["point"] == pytest.approx([0.0, 0.0, 0.0], abs=1e-6)
     brought = [place["groups"]["red"]["of_mean_in_view"] for place in (corner, middle)]
     assert brought[0] < brought[1]
+    assert all(value > 0.0 for value in found["ledger"]["camera"]["irradiance"].values())
     assert "off the sensing surface" in engine.refused("ledger", at=[[60, 0]], **few)["message"]
 
 
