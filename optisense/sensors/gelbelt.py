@@ -91,6 +91,7 @@ def gelbelt(
     gel_thickness: Positive = 3.0,
     tape_thickness: Positive = 0.05,
     film_thickness: float = 0.02,
+    coat_thickness: Positive = 0.1,
     wheel_radius: Positive = 25.0,
     wheel_distance: Positive = 90.0,
     roller_radius: Positive = 1.0,
@@ -122,6 +123,7 @@ def gelbelt(
         tape_thickness: mm, of the clear tape on the inner face of the belt.
         film_thickness: mm of air between tape and acrylic, and between tape and wheels; 0 lets
             the tape lie on the acrylic in optical contact.
+        coat_thickness: mm that the black coat of the belt is made with; light sees its inner face.
         wheel_radius: mm.
         wheel_distance: mm, between the wheels' axes in light designs 1 and 2.
         roller_radius: mm, of the small roller of light design 3.
@@ -223,7 +225,12 @@ def gelbelt(
             "film": Part(role=Role.SUPPORT, mesh="meshes/film.obj", material=FILM),
             "window": Part(role=Role.SUPPORT, mesh="meshes/window.obj", material=WINDOW),
             "wheels": Part(role=Role.BLOCKER, mesh="meshes/wheels.obj", material=BLACK),
-            "far-coat": Part(role=Role.BLOCKER, mesh="meshes/far-coat.obj", material=BLACK),
+            "far-coat": Part(
+                role=Role.BLOCKER,
+                mesh="meshes/far-coat.obj",
+                material=BLACK,
+                thickness=coat_thickness,
+            ),
         },
         lights={
             name: LightGroup(model=LED, colour=colour, flux=flux, lights=lights)

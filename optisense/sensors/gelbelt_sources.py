@@ -78,6 +78,7 @@ def gelbelt_sources(light_design: int, left_out: LeftOut) -> dict[str, Provenanc
             assumed,
             "black, and drawn for a quarter turn only: light that gets there does not come back",
         ),
+        "parts.far-coat.thickness": (assumed, "0.1 mm, usual for a sprayed coat of silicone"),
         "lights.red": (assumed, row),
         "lights.green": (assumed, row),
         "lights.blue": (assumed, row),

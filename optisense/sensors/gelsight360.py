@@ -71,6 +71,7 @@ def gelsight360(
     board_bottom: float = 2.0,
     board_height: Positive = 12.0,
     board_thickness: Positive = 1.0,
+    base_thickness: Positive = 2.0,
     leds_per_group: PositiveCount = 4,
     base_leds: PositiveCount = 12,
     led_flux: float | None = None,
@@ -103,6 +104,7 @@ def gelsight360(
         board_bottom: mm, z of the boards' lower edge.
         board_height: mm.
         board_thickness: mm, without LEDs.
+        base_thickness: mm that the black bottom is made with, below its face; light sees the face.
         leds_per_group: LEDs on each face of a board.
         base_leds: LEDs of the ring; a multiple of 4.
         led_flux: mW, radiant, of each LED; None takes what its weakest colour gives (library).
@@ -161,7 +163,12 @@ def gelsight360(
             "gel": Part(role=Role.ELASTOMER, mesh="meshes/gel.obj", material=GEL),
             "shell": Part(role=Role.SUPPORT, mesh="meshes/shell.obj", material=EPOXY),
             "boards": Part(role=Role.BLOCKER, mesh="meshes/boards.obj", material=BLACK),
-            "base": Part(role=Role.BLOCKER, mesh="meshes/base.obj", material=BLACK),
+            "base": Part(
+                role=Role.BLOCKER,
+                mesh="meshes/base.obj",
+                material=BLACK,
+                thickness=base_thickness,
+            ),
         },
         lights=lights,
         camera=Camera(
@@ -333,6 +340,7 @@ def _provenance(base_ring: str) -> dict[str, Provenance]:
             "equal pairs (GRRGGRRG); 12 x 1 mm and their place in the wall are assumed",
         ),
         "parts.base": (assumed, "black where shell and gel end"),
+        "parts.base.thickness": (assumed, "2 mm, usual for printed rings of this size"),
         "camera.position": (assumed, "pupil in the plane where shell and gel end"),
         "camera.projection": (assumed, "equidistant, usual for fisheye lenses"),
         "camera.fov": (

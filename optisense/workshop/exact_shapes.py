@@ -31,8 +31,11 @@ from optisense.workshop.recognised import (
 from optisense.workshop.shapes import Shape
 
 SAME_PLACE = 0.1
-"""mm by which the ends of a body and of its mesh may differ along x, y or z; a plate on the wrong
-side of its sheet is off by a thickness, half a millimetre at least."""
+"""mm by which the ends of a body and of its mesh may differ along x, y or z."""
+
+RIGHT_SIDE = 0.5
+"""Share of a plate's thickness by which its ends may differ from those of its mesh, where that is
+less: a plate on the wrong side of its sheet is off by the whole thickness."""
 
 FloatArray = NDArray[np.float64]
 
@@ -296,7 +299,8 @@ def _agrees(body: Any, shape: Shape) -> bool:
     if not BRepCheck_Analyzer(body).IsValid():
         return False
     cut = triangles(body, chord=0.02, bend=15.0)
-    if np.abs(cut.bounds - shape.mesh.bounds).max() > SAME_PLACE:
+    near = SAME_PLACE if shape.thickness is None else min(SAME_PLACE, RIGHT_SIDE * shape.thickness)
+    if np.abs(cut.bounds - shape.mesh.bounds).max() > near:
         return False
     if shape.is_solid:
         found, wanted = cut.volume, abs(shape.mesh.volume)

@@ -163,8 +163,12 @@ def test_the_bill_tells_what_is_assumed_and_what_is_not_drawn() -> None:
     assert f"it takes {volume:.1f} cm^3 more" in plain
     assert "the belt's way back is left out" in belt["gel"].note
     assert "36 mm assumed" in belt["gel"].note
-    assert belt["far-coat"].unit == "cm^2"
-    assert "a sheet without thickness" in belt["far-coat"].note
+    assert belt["far-coat"].unit == "cm^3"
+    assert "a sheet, made 0.1 mm thick (assumed: 0.1 mm, usual for" in belt["far-coat"].note
+    sheet = sensors.gelbelt()
+    sheet.parts["far-coat"].thickness = None
+    line = items(sheet, "material")["far-coat"]
+    assert line.unit == "cm^2" and "a sheet without thickness" in line.note
     design = sensors.gelsight_mini().copy()
     design.provenance["parts.gel"] = Provenance(status="sourced", source="its data sheet")
     note = items(design, "material")["gel"].note

@@ -47,6 +47,27 @@ def test_three_sheets_that_meet_in_one_edge_are_joined() -> None:
     assert plate.volume == pytest.approx(2.0 * (10.0 + 4.0))
 
 
+def test_only_the_skins_of_built_in_sensors_have_no_thickness() -> None:
+    for name in sensors.SENSORS.names():
+        sheets = [shape for shape in shapes(sensors.build(name)) if not shape.is_solid]
+        assert [shape.name for shape in sheets] == ["skin"], name
+
+
+def test_the_base_of_a_round_fingertip_lies_below_its_face() -> None:
+    (base,) = (s for s in shapes(sensors.gelsight360(base_thickness=3.0)) if s.name == "base")
+    assert base.volume == pytest.approx(3.0 * np.pi * (14.0**2 - 8.5**2), rel=5e-3)
+    np.testing.assert_allclose(base.mesh.bounds[:, 2], [-3.0, 0.0], atol=1e-9)
+
+
+def test_the_black_coat_lies_outside_of_the_belt() -> None:
+    made = {shape.name: shape for shape in shapes(sensors.gelbelt(coat_thickness=0.4))}
+    assert made["far-coat"].volume == pytest.approx(
+        0.4 * sensors.gelbelt().deformed_meshes()["far-coat"].area, rel=0.01
+    )
+    outside = made["far-coat"].mesh.bounds[1] - made["gel"].mesh.bounds[1]
+    np.testing.assert_allclose(outside, [0.4, 0.0, 0.4], atol=2e-3)
+
+
 def test_the_sheets_of_svelte_are_plates_behind_their_faces() -> None:
     design = sensors.gelsight_svelte()
     drawn = design.deformed_meshes()
