@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import shapely
 from numpy.typing import NDArray
 from scipy.interpolate import make_interp_spline
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
 
 from optisense.design import Cage
 from optisense.geometry import TriangleMesh
@@ -54,14 +57,14 @@ def exact_body(shape: Shape) -> Any | None:
     """
     if len(shape.mesh.faces) < WORTH_IT:
         return None
-    body = _body(shape)
-    if body is not None and _agrees(body, shape):
-        return body
     if shape.sheet is not None and shape.thickness is not None:
+        # First from the sheet: corners of the far face that end an arc are not mitred as the
+        # others are, and lie on another circle.
         for body in _plates(shape.sheet, shape.thickness):
             if _agrees(body, shape):
                 return body
-    return None
+    body = _body(shape)
+    return body if body is not None and _agrees(body, shape) else None
 
 
 def _plates(sheet: Shape, thickness: float) -> Iterator[Any]:
@@ -70,17 +73,37 @@ def _plates(sheet: Shape, thickness: float) -> Iterator[Any]:
     from OCP.GeomAbs import GeomAbs_Intersection
     from OCP.TopAbs import TopAbs_SOLID
 
-    surface = exact_body(sheet)
-    if surface is None:
-        return
+    surfaces = [exact_body(piece) for piece in _apart(sheet)]
     for offset in (thickness, -thickness):
-        maker = BRepOffset_MakeOffset()
-        maker.Initialize(
-            surface, offset, SEWN, BRepOffset_Skin, False, False, GeomAbs_Intersection, True
-        )
-        maker.MakeThickSolid()
-        if maker.IsDone() and maker.Shape().ShapeType() == TopAbs_SOLID:
-            yield maker.Shape()
+        made = []
+        for surface in surfaces:
+            if surface is None:
+                return
+            maker = BRepOffset_MakeOffset()
+            maker.Initialize(
+                surface, offset, SEWN, BRepOffset_Skin, False, False, GeomAbs_Intersection, True
+            )
+            maker.MakeThickSolid()
+            if maker.IsDone() and maker.Shape().ShapeType() == TopAbs_SOLID:
+                made.append(maker.Shape())
+        if len(made) == len(surfaces):
+            yield made[0] if len(made) == 1 else compound(made)
+
+
+def _apart(sheet: Shape) -> list[Shape]:
+    """The pieces of a sheet that do not touch one another."""
+    mesh = sheet.mesh
+    ends = np.concatenate([mesh.faces[:, :2], mesh.faces[:, 1:]])
+    size = len(mesh.vertices)
+    links = coo_matrix((np.ones(len(ends)), (ends[:, 0], ends[:, 1])), (size, size))
+    number, labels = connected_components(links, directed=False)
+    if number == 1:
+        return [sheet]
+    owner = labels[mesh.faces[:, 0]]
+    return [
+        replace(sheet, mesh=mesh.with_faces(mesh.faces[owner == k]).compacted())
+        for k in np.unique(owner)
+    ]
 
 
 def _body(shape: Shape) -> Any | None:
