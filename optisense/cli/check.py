@@ -19,7 +19,7 @@ MOST_TOLD = 40
 
 @ends_well
 def check(design: DesignArgument, contact: ContactOption = None) -> None:
-    """Check a design, and whether contacts fit on it, without rendering."""
+    """Check a design, and whether contacts can press its skin, without rendering."""
     contacts = parse_contacts(contact)
 
     from optisense import sensors
@@ -37,8 +37,7 @@ def check(design: DesignArgument, contact: ContactOption = None) -> None:
         from optisense.optics import OpticalModel
 
         model = OpticalModel(sensor)
-        for each in contacts:
-            model.place(each)
+        model.pressed(contacts, [model.place(each) for each in contacts])
         word = "contact fits" if len(contacts) == 1 else "contacts fit"
         output.print(f"{len(contacts)} {word} on the sensing surface.")
     output.print("The design is in order.", style="green")

@@ -148,6 +148,13 @@ def test_a_contact_that_does_not_fit_is_bad_input(contact: str, complaint: str) 
     assert complaint in text
 
 
+def test_contacts_that_the_skin_can_not_take_are_bad_input() -> None:
+    contacts = ("--contact", "sphere:1.5@0,0:0.5", "--contact", "sphere:1.5@1,0:0.5")
+    code, text = run("check", "gelsight-mini", *contacts)
+    assert code == 2
+    assert "two contacts overlap" in text
+
+
 def test_a_contact_that_fits_passes() -> None:
     code, text = run("check", "gelsight-mini", "--contact", "sphere:1.5@2,1:0.8")
     assert code == 0, text
