@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import cached_property, lru_cache
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +13,9 @@ from optisense.mechanics.convolution import GridResponse
 from optisense.mechanics.elasticity import Elasticity
 from optisense.mechanics.footprint import NO_OVERLAP, Footprint
 from optisense.mechanics.height_map import slopes
+
+if TYPE_CHECKING:
+    from optisense.mechanics.gel_patch import GelPatch
 
 FloatArray = NDArray[np.float64]
 
@@ -50,6 +54,7 @@ class DisplacementField:
         pressure: FloatArray,
         elasticity: Elasticity,
         beyond: GridSpline | None = None,
+        patch: GelPatch | None = None,
     ) -> None:
         """Sum what a pressure does.
 
@@ -59,8 +64,10 @@ class DisplacementField:
             pressure: (rows, columns) MPa.
             elasticity: of the gel.
             beyond: what the gel yields beyond a flat layer; `overlap` is less this as well.
+            patch: the shape of the gel that this comes from.
         """
-        self._beyond = beyond
+        self._beyond, self._patch = beyond, patch
+        self._shear_modulus = elasticity.shear_modulus
         self.place, self._overlap = place, overlap
         pitch, thickness = place.pitch, place.thickness
         rows, columns = place.overlap.shape
@@ -125,7 +132,19 @@ class DisplacementField:
             if where.any():
                 for k, spline in enumerate(splines):
                     result[k, where] = spline.at(x[where], y[where])[0]
+        if self._patch is not None:
+            known = self._sideways_beyond[0].holds(x, y)
+            for k, spline in enumerate(self._sideways_beyond):
+                result[k, known] += spline.at(x[known], y[known])[0]
         return result
+
+    @cached_property
+    def _sideways_beyond(self) -> tuple[GridSpline, GridSpline]:
+        """What the shape of the gel adds to displacements along x and y."""
+        assert self._patch is not None
+        shear = np.zeros((2, *self._pressure.shape)) if self.shear is None else self.shear
+        loads = np.concatenate([shear, self._pressure[None]])
+        return sideways_beyond(self._patch, loads, self.place, self._shear_modulus)
 
     @cached_property
     def _sideways_splines(self) -> list[tuple[GridSpline, GridSpline]]:
@@ -269,3 +288,21 @@ def binned(
             weights = weight_y[:, None] * weight_x[None, :]
             np.add.at(result, np.ix_(rows, columns), share * weights * pressure)
     return result
+
+
+def sideways_beyond(
+    patch: GelPatch, loads: FloatArray, place: Footprint, shear_modulus: float
+) -> tuple[GridSpline, GridSpline]:
+    """Splines of what the shape of a gel adds to displacements along x and y, in mm.
+
+    Args:
+        patch: the gel's shape.
+        loads: (3, rows, columns) MPa along x and y and into the gel.
+        place: the grid of the loads.
+        shear_modulus: MPa.
+    """
+    columns = patch.columns
+    start = columns.x[0], columns.y[0]
+    coarse = np.stack([binned(a, place, start, columns.pitch, columns.solid.shape) for a in loads])
+    along_x, along_y = patch.sideways(coarse * columns.pitch**2 / shear_modulus)
+    return GridSpline(along_x, *start, columns.pitch), GridSpline(along_y, *start, columns.pitch)

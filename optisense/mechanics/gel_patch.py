@@ -19,7 +19,8 @@ from scipy import ndimage
 from optisense.mechanics import point_load
 from optisense.mechanics.gel_columns import LAYERS, GelColumns
 from optisense.mechanics.hexahedra import face_points, stiffnesses
-from optisense.mechanics.layer import FARTHEST, layer_correction
+from optisense.mechanics.layer import FARTHEST, layer_correction, surface_displacement
+from optisense.mechanics.point_load import INTO
 
 if TYPE_CHECKING:
     from scipy.sparse import csc_matrix
@@ -71,6 +72,8 @@ class GelPatch:
         self._fixed[columns.held[rows, cols]] = True
         room = np.array(loaded) + columns.pitch
         self._sources = np.flatnonzero((np.abs(self._top[:, :2]) <= room).all(axis=1))
+        self._known_sides: dict[int, FloatArray] = {}
+        self._known_beside: dict[int, FloatArray] = {}
 
     def correction(self, force: FloatArray) -> FloatArray:
         """What the gel yields beyond a flat layer, along the normal of the tangent plane.
@@ -82,28 +85,77 @@ class GelPatch:
         Returns:
             (rows, columns) mm into the gel, times MPa over MPa: as of a shear modulus of 1.
         """
-        loads = self._on_sources(force)
-        rest = self._solve(self._right_sides @ loads)
+        loads = self._on_sources(force[None])[0] / -self._inward[self._sources, 2]
+        rest = self._solve(self._right_sides(INTO) @ loads)
         upright = -self._inward[:, 2]
         inside = np.einsum("ci,ci->c", rest, self._inward) / upright
-        found = inside + self._beside @ loads
+        return self._on_grid(inside + self._beside @ loads)
+
+    def sideways(self, force: FloatArray) -> FloatArray:
+        """What the skin moves along the tangent plane beyond that of a flat layer.
+
+        Args:
+            force: (3, rows, columns) on the columns, along x and y of the contact's frame and into
+                the gel: N over the shear modulus in MPa. Those along x and y push along the skin,
+                the others along its normals.
+
+        Returns:
+            (2, rows, columns) mm along x and y, as of a shear modulus of 1.
+        """
+        given = self._on_sources(force)
+        normals = self._inward[self._sources]
+        along = np.column_stack([given[0], given[1], np.zeros(len(normals))])
+        along[:, 2] = -(along * normals).sum(axis=1) / normals[:, 2]
+        loads = np.einsum("si,sik->ks", along, self._frames)
+        loads[INTO] = given[2] / -normals[:, 2]
+        axes = [axis for axis in range(3) if loads[axis].any()]
+        if not axes:
+            return np.zeros((2, *self.columns.solid.shape))
+        rest = self._solve(np.sum([self._right_sides(a) @ loads[a] for a in axes], axis=0))
+        beside = np.sum([self._beside_along(a) @ loads[a] for a in axes], axis=0)
+        return np.stack([self._on_grid(each) for each in rest[:, :2].T + beside])
+
+    def _beside_along(self, axis: int) -> FloatArray:
+        """(2, columns, sources) along x and y of the half-spaces less the flat layer.
+
+        Args:
+            axis: of the forces, in the frames of the sources.
+        """
+        if axis not in self._known_beside:
+            moved = self._in_frame(
+                point_load.displacements(self._offsets(self._top), self._nu, axis)
+            )
+            x, y = np.moveaxis(self._apart, 2, 0) / self._thickness
+            moved[((x == 0.0) & (y == 0.0)).T] = 0.0
+            # The flat layer carries forces along normals by their share along its own.
+            share = self._frames[:, :, axis].T.copy()
+            share[slice(0, 2) if axis == INTO else 2] = 0.0
+            share[2] = -share[2]
+            flat = surface_displacement(x, y, self._nu) / self._thickness
+            into = np.einsum("kacs,as->kcs", flat, share)
+            self._known_beside[axis] = np.transpose(moved[:, :, :2], (2, 1, 0)) - into
+        return self._known_beside[axis]
+
+    def _on_grid(self, values: FloatArray) -> FloatArray:
+        """(rows, columns) of (columns,), as the nearest where there is none; 0 at the rim."""
         result = np.zeros(self.columns.solid.shape)
-        result[self.columns.solid] = found
+        result[self.columns.solid] = values
         nearest = ndimage.distance_transform_edt(
             ~self.columns.solid, return_distances=False, return_indices=True
         )
         return np.asarray(result[tuple(nearest)] * self._fade)
 
     def _on_sources(self, force: FloatArray) -> FloatArray:
-        """(sources,) forces along the skin's normals; those beside columns go to the nearest."""
+        """(n, sources) of forces (n, rows, columns); those beside columns go to the nearest."""
         from scipy.spatial import cKDTree
 
-        rows, cols = np.nonzero(force)
+        rows, cols = np.nonzero(force.any(axis=0))
         points = np.column_stack([self.columns.x[cols], self.columns.y[rows]])
         _, nearest = cKDTree(self._top[self._sources, :2]).query(points)
-        loads = np.zeros(len(self._sources))
-        np.add.at(loads, nearest, force[rows, cols])
-        return np.asarray(loads / -self._inward[self._sources, 2])
+        loads = np.zeros((len(force), len(self._sources)))
+        for one, given in zip(loads, force, strict=True):
+            np.add.at(one, nearest, given[rows, cols])
+        return loads
 
     @cached_property
     def _fade(self) -> FloatArray:
@@ -124,16 +176,19 @@ class GelPatch:
         upright = -self._inward[:, 2]
         into = np.einsum("sni,ni->ns", moved, self._inward) / upright[:, None]
         source = self._sources
-        apart = np.hypot(
-            self._top[:, None, 0] - self._top[None, source, 0],
-            self._top[:, None, 1] - self._top[None, source, 1],
-        )
+        apart = np.hypot(*np.moveaxis(self._apart, 2, 0))
         itself = np.arange(len(self._top))[:, None] == source
         flat = (1.0 - self._nu) / (2.0 * np.pi) / np.where(itself, np.inf, apart)
         far = np.minimum(apart / self._thickness, FARTHEST)
         flat = flat + layer_correction(far, self._nu) / self._thickness
         # The layer is loaded along its normal: by the share of the force that lies along it.
         return np.asarray(np.where(itself, 0.0, into) - flat * upright[source])
+
+    @property
+    def _apart(self) -> FloatArray:
+        """(columns, sources, 2) mm from sources to columns in the tangent plane."""
+        at = self._top[:, :2]
+        return np.asarray(at[:, None] - at[None, self._sources])
 
     def _offsets(self, points: FloatArray) -> FloatArray:
         """(sources, n, 3) points as the half-space of each source sees them."""
@@ -201,20 +256,26 @@ class GelPatch:
         moved[self._free] = self._factor.solve(right_side)
         return np.asarray(moved.reshape(-1, LAYERS + 1, 3)[:, 0])
 
-    @cached_property
-    def _right_sides(self) -> FloatArray:
-        """(free, sources): what cancels the half-spaces on the base and on free faces."""
+    def _right_sides(self, axis: int) -> FloatArray:
+        """(free, sources): what cancels the half-spaces on the base and on free faces.
+
+        Args:
+            axis: of the forces, in the frames of the sources.
+        """
+        if axis in self._known_sides:
+            return self._known_sides[axis]
         fixed = np.flatnonzero(self._fixed.ravel())
         moved = self._in_frame(
-            point_load.displacements(self._offsets(self._nodes[fixed]), self._nu)
+            point_load.displacements(self._offsets(self._nodes[fixed]), self._nu, axis)
         )
         columns = (3 * fixed[:, None] + np.arange(3)).ravel()
         coupling = self._matrix[self._free][:, columns]
         result = coupling @ moved.reshape(len(moved), -1).T
         loads = np.zeros((3 * len(self._nodes), len(self._sources)))
         for corners, outward_sign in (self._skin_faces(), self._side_faces()):
-            self._cancel(loads, corners, outward_sign)
-        return np.asarray(result + loads[self._free])
+            self._cancel(loads, corners, outward_sign, axis)
+        self._known_sides[axis] = np.asarray(result + loads[self._free])
+        return self._known_sides[axis]
 
     def _skin_faces(self) -> tuple[IntArray, FloatArray]:
         """(faces, 4) nodes, and the sign that turns their normals outward."""
@@ -242,14 +303,14 @@ class GelPatch:
         nodes = np.concatenate([base + 1, base], axis=2).reshape(-1, 4)
         return nodes, np.repeat(sign_of, LAYERS)
 
-    def _cancel(self, loads: FloatArray, faces: IntArray, signs: FloatArray) -> None:
+    def _cancel(self, loads: FloatArray, faces: IntArray, signs: FloatArray, axis: int) -> None:
         """Add the forces that cancel the half-spaces' stresses on faces."""
         if not len(faces):
             return
         points, normals, weights = face_points(self._nodes[faces])
         normals = normals * signs[:, None, None]
         offsets = self._offsets(points.reshape(-1, 3))
-        stress = point_load.stresses(offsets, self._nu)
+        stress = point_load.stresses(offsets, self._nu, axis)
         out = np.einsum("nk,ski->sni", normals.reshape(-1, 3), self._frames)
         push = self._in_frame(np.einsum("snij,snj->sni", stress, out))
         blind = np.linalg.norm(offsets, axis=2) < BLIND * self.columns.pitch

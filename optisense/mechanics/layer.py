@@ -144,6 +144,38 @@ def layer_correction(distance: FloatArray, poisson_ratio: float) -> FloatArray:
     return np.asarray(_corrections(poisson_ratio).normal(distance))
 
 
+def surface_displacement(x: FloatArray, y: FloatArray, poisson_ratio: float) -> FloatArray:
+    """Displacement along the surface of a bonded layer by point forces.
+
+    At the force itself the infinite part, which is the half-space's, is left out.
+
+    Args:
+        x, y: (...) thicknesses from the force, along the surface.
+        poisson_ratio: below 0.5.
+
+    Returns:
+        (2, 3, ...) mm along x and y by 1 N along x, along y and into the layer, for a thickness of
+        1 mm and a shear modulus of 1 MPa.
+    """
+    nu, splines = poisson_ratio, _corrections(poisson_ratio)
+    r = np.hypot(x, y)
+    inverse = np.divide(1.0, r, out=np.zeros_like(r), where=r > 0.0)
+    cosine, sine = x * inverse, y * inverse
+    far = np.minimum(r, FARTHEST)
+    isotropic, quadrupole = splines.isotropic(far), splines.quadrupole(far)
+    cross = splines.cross(far) - (1.0 - 2.0 * nu) / (4.0 * np.pi) * inverse
+    scale = inverse / (2.0 * np.pi)
+    alike = (1.0 - nu) * scale + isotropic
+    twice = cosine**2 - sine**2
+    mixed = (nu * scale + 2.0 * quadrupole) * cosine * sine
+    return np.stack(
+        [
+            [alike + nu * scale * cosine**2 + quadrupole * twice, mixed, cross * cosine],
+            [mixed, alike + nu * scale * sine**2 - quadrupole * twice, cross * sine],
+        ]
+    )
+
+
 class LoadKernels(NamedTuple):
     """Displacements (mm) at points by unit loads (1 MPa) on a square around the origin.
 

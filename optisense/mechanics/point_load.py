@@ -1,6 +1,7 @@
 """A force on the surface of a half-space: displacements and stresses inside it.
 
-The solution is Boussinesq's (Johnson, Contact Mechanics, 1985, section 3.2).
+The solutions are Boussinesq's for a force into it and Cerruti's for one along its surface (Johnson,
+Contact Mechanics, 1985, sections 3.2 and 3.6).
 """
 
 from __future__ import annotations
@@ -14,13 +15,24 @@ NEAREST_SQUARE = 1e-12
 """mm^2; squared distances are kept above it, so that the point of the load itself gives numbers."""
 
 
-def displacements(offsets: FloatArray, poisson_ratio: float) -> FloatArray:
-    """(..., 3) mm by a force of 1 N along z, for a shear modulus of 1 MPa.
+INTO = 2
+"""Axis of a force into the half-space; those of forces along its surface are 0 and 1."""
+SWAPPED = [1, 0, 2]
+"""Axes after x and y have changed places: a force along y is one along x seen so."""
+
+
+def displacements(offsets: FloatArray, poisson_ratio: float, axis: int = INTO) -> FloatArray:
+    """(..., 3) mm by a force of 1 N along an axis, for a shear modulus of 1 MPa.
 
     Args:
         offsets: (..., 3) mm from the load; z points into the half-space.
         poisson_ratio: of the half-space.
+        axis: of the force.
     """
+    if axis == 1:
+        return displacements(offsets[..., SWAPPED], poisson_ratio, 0)[..., SWAPPED]
+    if axis == 0:
+        return _displacements_along(offsets, poisson_ratio)
     x, y, z = np.moveaxis(offsets, -1, 0)
     r = np.sqrt(np.maximum(x**2 + y**2 + z**2, NEAREST_SQUARE))
     loss = 1.0 - 2.0 * poisson_ratio
@@ -29,8 +41,24 @@ def displacements(offsets: FloatArray, poisson_ratio: float) -> FloatArray:
     return np.stack([x * sideways, y * sideways, inward], axis=-1) / (4.0 * np.pi)
 
 
-def gradients(offsets: FloatArray, poisson_ratio: float) -> FloatArray:
+def _displacements_along(offsets: FloatArray, poisson_ratio: float) -> FloatArray:
+    """`displacements` by a force along x."""
+    x, y, z = np.moveaxis(offsets, -1, 0)
+    r, s = _distances(x, y, z)
+    loss = 1.0 - 2.0 * poisson_ratio
+    along = 1.0 / r + x**2 / r**3 + loss * (1.0 / s - x**2 / (r * s**2))
+    across = x * y / r**3 - loss * x * y / (r * s**2)
+    inward = x * z / r**3 + loss * x / (r * s)
+    return np.stack([along, across, inward], axis=-1) / (4.0 * np.pi)
+
+
+def gradients(offsets: FloatArray, poisson_ratio: float, axis: int = INTO) -> FloatArray:
     """(..., 3, 3) derivatives of `displacements`: row i has those of component i by x, y and z."""
+    if axis == 1:
+        found = gradients(offsets[..., SWAPPED], poisson_ratio, 0)
+        return np.asarray(found[..., SWAPPED, :][..., SWAPPED])
+    if axis == 0:
+        return _gradients_along(offsets, poisson_ratio)
     x, y, z = np.moveaxis(offsets, -1, 0)
     r = np.sqrt(np.maximum(x**2 + y**2 + z**2, NEAREST_SQUARE))
     nu = poisson_ratio
@@ -49,9 +77,35 @@ def gradients(offsets: FloatArray, poisson_ratio: float) -> FloatArray:
     return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2) / (4.0 * np.pi)
 
 
-def stresses(offsets: FloatArray, poisson_ratio: float) -> FloatArray:
-    """(..., 3, 3) MPa of a force of 1 N along z; they do not depend on the shear modulus."""
-    slopes = gradients(offsets, poisson_ratio)
+def _gradients_along(offsets: FloatArray, poisson_ratio: float) -> FloatArray:
+    """`gradients` of a force along x."""
+    x, y, z = np.moveaxis(offsets, -1, 0)
+    r, s = _distances(x, y, z)
+    # What depends on the Poisson ratio is the gradient of p = x / (r + z), with its last component
+    # turned round. These are the second derivatives of p.
+    near, far = 1.0 / (r**3 * s**2), 2.0 / (r**2 * s**3)
+    both = near + far
+    xx = x * (x**2 * both - 3.0 / (r * s**2))
+    xy = y * (x**2 * both - 1.0 / (r * s**2))
+    yy = x * (y**2 * both - 1.0 / (r * s**2))
+    mixed = 1.0 / (r**3 * s) + 1.0 / (r**2 * s**2)
+    xz, yz = x**2 * mixed - 1.0 / (r * s), x * y * mixed
+    zz = x * (z / (r**3 * s) + 1.0 / (r**2 * s))
+    rows = [[xx, xy, xz], [xy, yy, yz], [-xz, -yz, -zz]]
+    result = np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
+    result *= 1.0 - 2.0 * poisson_ratio
+    at = np.stack([x, y, z], axis=-1)
+    cubed = (r**3)[..., None]
+    result[..., 0, :] -= at / cubed
+    result[..., :, 0] += at / cubed
+    result += (x / r**3)[..., None, None] * np.eye(3)
+    result -= (3.0 * x / r**5)[..., None, None] * at[..., :, None] * at[..., None, :]
+    return np.asarray(result / (4.0 * np.pi))
+
+
+def stresses(offsets: FloatArray, poisson_ratio: float, axis: int = INTO) -> FloatArray:
+    """(..., 3, 3) MPa of a force of 1 N along an axis; they do not depend on the shear modulus."""
+    slopes = gradients(offsets, poisson_ratio, axis)
     strains = slopes + np.swapaxes(slopes, -1, -2)  # twice
     dilatation = np.trace(slopes, axis1=-2, axis2=-1)
     share = 2.0 * poisson_ratio / (1.0 - 2.0 * poisson_ratio)
@@ -61,3 +115,9 @@ def stresses(offsets: FloatArray, poisson_ratio: float) -> FloatArray:
 def _inverse_product(r: FloatArray, z: FloatArray) -> FloatArray:
     """1 / (r (r + z)), bounded above the surface, on the axis of the load."""
     return 1.0 / (r * np.maximum(r + z, 0.1 * r))
+
+
+def _distances(x: FloatArray, y: FloatArray, z: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """r and r + z, bounded at the load and above the surface, on the axis of the load."""
+    r = np.sqrt(np.maximum(x**2 + y**2 + z**2, NEAREST_SQUARE))
+    return r, np.maximum(r + z, 0.1 * r)

@@ -14,6 +14,7 @@ from optisense.mechanics.displacement_field import (
     GridSpline,
     binned,
     grid_response,
+    sideways_beyond,
 )
 from optisense.mechanics.elasticity import Elasticity
 from optisense.mechanics.footprint import Footprint
@@ -232,15 +233,31 @@ def press(
     done = [each for each in contacts if each is not None]
     for i, drag in enumerate(drags or ()):
         if drag is not None:
-            done[i] = _dragged(done[i], drag, elasticity)
+            patch = None if patches is None else patches[i]
+            done[i] = _dragged(done[i], drag, elasticity, patch)
     return PressedSkin(tuple(done), elasticity)
 
 
-def _dragged(contact: Pressed, drag: Drag, elasticity: Elasticity) -> Pressed:
+def _dragged(
+    contact: Pressed, drag: Drag, elasticity: Elasticity, patch: GelPatch | None
+) -> Pressed:
+    """A contact after a drag; what the gel's shape changes is found in turns with the shear."""
     place = contact.place
     response = grid_response(contact.pressure.shape, place.pitch, place.thickness, elasticity)
     wanted = drag.displacement(place.x, place.y)
     shear = solve_shear(response, contact.pressure, elasticity.friction, wanted)
+    x, y = (each.ravel() for each in np.meshgrid(place.x, place.y))
+    beyond = np.zeros_like(wanted)
+    for _ in range(MAX_TURNS if patch is not None and shear.any() else 0):
+        assert patch is not None
+        loads = np.concatenate([shear, np.zeros((1, *place.overlap.shape))])
+        splines = sideways_beyond(patch, loads, place, elasticity.shear_modulus)
+        found = np.stack([each.at(x, y)[0] for each in splines]).reshape(wanted.shape)
+        change = float(np.abs(found - beyond).max())
+        beyond = found
+        shear = solve_shear(response, contact.pressure, elasticity.friction, wanted - beyond, shear)
+        if change < SETTLED:
+            break
     contact.field.shear = shear
     return Pressed(place, contact.pressure, contact.field, shear)
 
@@ -284,7 +301,7 @@ def _pressed(
         solved = _solve(place, overlap - beyond, elasticity, solved.pressure, rough)
         if change < SETTLED:
             break
-    field = DisplacementField(place, overlap - beyond, solved.pressure, elasticity, spline)
+    field = DisplacementField(place, overlap - beyond, solved.pressure, elasticity, spline, patch)
     return Pressed(place, solved.pressure, field)
 
 

@@ -42,7 +42,11 @@ class Drag(NamedTuple):
 
 
 def solve_shear(
-    response: GridResponse, pressure: FloatArray, friction: float, wanted: FloatArray
+    response: GridResponse,
+    pressure: FloatArray,
+    friction: float,
+    wanted: FloatArray,
+    start: FloatArray | None = None,
 ) -> FloatArray:
     """The shear on a skin that sticks to an indenter where friction holds it, and slips elsewhere.
 
@@ -57,6 +61,7 @@ def solve_shear(
         pressure: (rows, columns) MPa.
         friction: coefficient.
         wanted: (2, rows, columns) mm along x and y by which the indenter has moved.
+        start: (2, rows, columns) MPa to begin with.
 
     Returns:
         (2, rows, columns) MPa on the skin.
@@ -68,6 +73,8 @@ def solve_shear(
     shear = np.zeros_like(wanted)
     if not limit.any() or not wanted.any():
         return shear
+    if start is not None:
+        shear = _within(start, limit)
     step = 1.0 / response.largest_sideways()
     ahead, momentum = shear, 1.0
     for _ in range(MAX_ITERATIONS):

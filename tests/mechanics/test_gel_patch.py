@@ -38,10 +38,10 @@ def dome(radius, thickness, opening=1.2, rings=24, segments=48):
     return skin, body
 
 
-def pressed(skin, body, radius=1.5, depth=0.8, at=(0.0, 0.0)):
+def pressed(skin, body, radius=1.5, depth=0.8, at=(0.0, 0.0), **motion):
     surface = SensingSurface(skin, (0, 0, 0), (1, 0, 0), (0, 1, 0))
     gel = Gel(surface, skin, [body], GEL, lambda contact: place(contact, surface, body))
-    return gel.pressed([Contact(Sphere(radius), at=at, depth=depth)]).contacts[0]
+    return gel.pressed([Contact(Sphere(radius), at=at, depth=depth, **motion)]).contacts[0]
 
 
 def patch_at(skin, body, thickness, loaded=(2.0, 2.0), nu=0.49):
@@ -75,18 +75,22 @@ def test_a_point_load_is_carried_by_every_plane_below_it(nu):
     assert surface[:, :, 2] == pytest.approx(0.0, abs=1e-12)
 
 
-def test_derivatives_of_a_point_load_are_its_differences():
+@pytest.mark.parametrize("axis", [0, 1, 2])
+def test_derivatives_of_a_point_load_are_its_differences(axis):
     points = np.random.default_rng(0).uniform(0.1, 1.0, (20, 3))
     steps = 1e-5 * np.eye(3)
     differences = np.stack(
         [
-            point_load.displacements(points + step, 0.45)
-            - point_load.displacements(points - step, 0.45)
+            point_load.displacements(points + step, 0.45, axis)
+            - point_load.displacements(points - step, 0.45, axis)
             for step in steps
         ],
         axis=-1,
     )
-    assert point_load.gradients(points, 0.45) == pytest.approx(differences / 2e-5, abs=1e-6)
+    found = point_load.gradients(points, 0.45, axis)
+    assert found == pytest.approx(differences / 2e-5, abs=1e-6)
+    surface = point_load.stresses(np.array([[0.3, -0.2, 0.0], [2.0, 1.0, 0.0]]), 0.45, axis)
+    assert surface[:, :, 2] == pytest.approx(0.0, abs=1e-12)
 
 
 def test_elements_resist_strains_and_nothing_else():
@@ -126,6 +130,31 @@ def test_a_flat_gel_is_the_same_by_both_solvers(monkeypatch, thickness, depth):
     assert elements.force != flat.force
 
 
+def test_a_flat_gel_is_dragged_and_turned_alike_by_both_solvers(monkeypatch):
+    body, motion = layer(50.0, 50.0, 4.25), {"shift": (0.05, 0.1), "twist": 3.0}
+    flat = pressed(*body, **motion)
+    monkeypatch.setattr(gel_patches, "FLAT", -1.0)
+    elements = pressed(*body, **motion)
+    assert elements.shear_force == pytest.approx(flat.shear_force, rel=0.005, abs=1e-3)
+    assert elements.torque == pytest.approx(flat.torque, rel=0.005)
+    x, y = np.array([0.0, 2.5, 3.0]), np.array([0.0, 0.5, -2.0])
+    moved = flat.field.sideways(x, y)
+    assert moved[:, 0] == pytest.approx(motion["shift"], rel=0.01)
+    assert elements.field.sideways(x, y) == pytest.approx(moved, abs=0.002)
+    assert elements.torque != flat.torque
+
+
+@pytest.mark.parametrize("shape", ["dome", "side"])
+def test_a_gel_that_is_curved_or_ends_resists_a_drag_less(monkeypatch, shape):
+    body = dome(14.0, 3.0) if shape == "dome" else layer(25.25, 20.75, 4.25)
+    at = (0.0, 0.0) if shape == "dome" else (10.5, 0.0)
+    elements = pressed(*body, at=at, shift=(0.2, 0.0))
+    monkeypatch.setattr(gel_patches, "FLAT", math.inf)
+    flat = pressed(*body, at=at, shift=(0.2, 0.0))
+    low, high = (0.85, 0.95) if shape == "dome" else (0.7, 0.9)
+    assert low < elements.shear_force[0] / flat.shear_force[0] < high
+
+
 def test_free_sides_make_a_pad_softer(monkeypatch):
     monkeypatch.setattr(gel_patches, "FLAT", -1.0)
     wide = pressed(*layer(50.0, 50.0, 4.25)).force
@@ -145,6 +174,20 @@ def test_a_thick_dome_takes_the_force_and_radius_of_hertz():
     hertz = 4.0 / 3.0 * GEL.plane_modulus * math.sqrt(radius) * 0.05**1.5
     assert contact.force == pytest.approx(hertz, rel=0.03)
     assert math.sqrt(contact.area / math.pi) == pytest.approx(math.sqrt(radius * 0.05), rel=0.02)
+
+
+def test_shear_on_a_dome_does_the_same_work_on_other_shear():
+    patch = patch_at(*dome(14.0, 3.0), 3.0)
+    middle = np.array(patch.columns.solid.shape) // 2
+    spots = [(0, (0, 0)), (1, (0, 1)), (0, (2, -1)), (1, (-2, 0))]
+    found = []
+    for axis, offset in spots:
+        force = np.zeros((3, *patch.columns.solid.shape))
+        force[(axis, *(middle + offset))] = 1.0
+        found.append(patch.sideways(force))
+    matrix = np.array([[each[(a, *(middle + o))] for a, o in spots] for each in found])
+    assert np.abs(matrix).max() > 2e-3
+    assert matrix == pytest.approx(matrix.T, abs=0.05 * np.abs(matrix).max())
 
 
 def test_columns_of_a_dome_yield_to_each_others_loads_alike():
