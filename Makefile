@@ -25,7 +25,7 @@ WINDOW_STAMP := .blender-window/.set-up
 
 LOCK := --universal --python-version 3.11 --generate-hashes --no-emit-index-url --upgrade
 
-.PHONY: help setup demo test quick-test lint types import-rules docs docs-as-typed pytest pytest-long pytest-rest bare-pytest quick-pytest \
+.PHONY: help setup demo test quick-test lint types import-rules docs docs-as-typed pytest pytest-docs pytest-rest bare-pytest quick-pytest \
     studio-tests test-blender studio-window-test package-test extension setup-blender \
     browser-tests setup-browser \
     format bench fuzz kill-tests memory-tests lock clean
@@ -60,12 +60,13 @@ demo: setup
 	@$(BIN)/optisense render gelsight-mini --contact sphere:1.5@0,0:0.8 --out demo-output
 	@printf '\nThat was the demo. What to try next:\n'; sh scripts/next_steps.sh
 
-# Each of these runs whatever becomes of the others; a summary at the end says what failed. Most of
-# the time one thread works, so the two lots together take little longer than the longer one.
-CHECKS := pytest-long
-CHECKS_BESIDE := lint types import-rules docs pytest-rest bare-pytest studio-tests
+# Each of these runs whatever becomes of the others, two at a time; a summary at the end says what
+# failed. Those that take longest begin first.
+LOTS := search optics tasks objectives
+CHECKS := $(LOTS:%=pytest-%) studio-tests pytest-docs pytest-rest types lint import-rules docs \
+    bare-pytest
 test: setup
-	@MAKE="$(MAKE)" sh scripts/run_checks.sh $(CHECKS) --beside $(CHECKS_BESIDE)
+	@MAKE="$(MAKE)" sh scripts/run_checks.sh $(CHECKS)
 
 quick-test: setup
 	@MAKE="$(MAKE)" sh scripts/run_checks.sh lint quick-pytest
@@ -91,13 +92,15 @@ docs-as-typed: setup
 pytest: setup
 	$(BIN)/python -m pytest
 
-# The same in two lots that take about equally long with what runs beside them.
-LONG := tests/optics tests/objectives tests/search tests/sensors tests/tasks tests/paper tests/docs
-pytest-long: setup
-	$(BIN)/python -m pytest $(wildcard $(LONG))
+# The same in lots, which `make test` runs two at a time.
+pytest-docs: setup
+	$(BIN)/python -m pytest tests/docs
 
 pytest-rest: setup
-	$(BIN)/python -m pytest $(LONG:%=--ignore=%)
+	$(BIN)/python -m pytest $(LOTS:%=--ignore=tests/%) --ignore=tests/docs
+
+$(LOTS:%=pytest-%): pytest-%: setup
+	$(BIN)/python -m pytest tests/$*
 
 # What guards most for its time: shapes and design files, light against closed forms, a render from
 # start to end, finding objectives, search spaces, and the talk with the engine.

@@ -1,48 +1,51 @@
 #!/bin/sh
-# Run the named targets of the Makefile one after another, each whatever became of those before,
-# and say at the end which passed. Those named after `--beside` run at the same time; what they
-# print follows at the end. The exit status is 1 if one failed.
+# Run the named targets of the Makefile, two at a time in the given order, each whatever became of
+# the others, and say at the end which passed. What a target prints follows when it has ended, so
+# that the lines of two targets do not mix. The exit status is 1 if one failed.
 set -u
 cd "$(dirname "$0")/.."
 make=${MAKE:-make}
 folder=$(mktemp -d)
 trap 'rm -rf "$folder"' EXIT
-# What runs beside the others does not hear Ctrl-C: the shell hides it from background jobs.
-trap 'printf "\nInterrupted.\n" >&2; cat "$folder"/*.told >&2; trap "" TERM; kill 0; exit 130' INT
+# Background jobs do not hear Ctrl-C: the shell hides it from them.
+trap 'printf "\nInterrupted.\n" >&2; cat "$folder"/*.outcome >&2; trap "" TERM; kill 0; exit 130' INT
 
-run() { # a name for the file of what came of them, and targets
-    told=$folder/$1.told
-    shift
-    : >"$told"
-    for check in "$@"; do
-        if [ "$check" = studio-tests ] && why=$(sh scripts/setup_blender.sh --why-not) \
-            && [ -n "$why" ]
-        then
-            printf '%-13s NOT RUN: %s\n' "$check" "$why" >>"$told"
-            continue
-        fi
-        printf '\n== %s\n' "$check"
+# Most of the time one thread works: two targets take little longer than the longer one alone.
+at_a_time=2
+
+check() { # one target: what it prints, its outcome, and its turn for the next one
+    name=$1
+    : >"$folder/$name.log"
+    if [ "$name" = studio-tests ] && why=$(sh scripts/setup_blender.sh --why-not) && [ -n "$why" ]
+    then
+        printf '%-16s NOT RUN: %s\n' "$name" "$why" >"$folder/$name.outcome"
+    else
         began=$(date +%s)
         result=FAILED
-        $make --no-print-directory "$check" && result=passed
-        printf '%-13s %s, %s s\n' "$check" "$result" "$(($(date +%s) - began))" >>"$told"
-    done
+        $make --no-print-directory "$name" >"$folder/$name.log" 2>&1 && result=passed
+        printf '%-16s %s, %s s\n' "$name" "$result" "$(($(date +%s) - began))" \
+            >"$folder/$name.outcome"
+    fi
+    # One write for the whole text, which that of another target does not divide.
+    printf '\n== %s\n%s\n%s\n' "$name" "$(cat "$folder/$name.log")" "$(cat "$folder/$name.outcome")"
+    echo >&3
 }
 
-first=
-while [ $# -gt 0 ] && [ "$1" != --beside ]; do
-    first="$first $1"
-    shift
+mkfifo "$folder/turns"
+exec 3<>"$folder/turns"
+turn=0
+while [ "$turn" -lt "$at_a_time" ]; do
+    echo >&3
+    turn=$((turn + 1))
 done
-if [ $# -gt 0 ]; then
-    shift
-    run second "$@" >"$folder/second.log" 2>&1 &
-fi
-run first $first
+for name in "$@"; do
+    read -r _ <&3
+    printf '%s begins\n' "$name"
+    check "$name" &
+done
 wait
-[ ! -f "$folder/second.log" ] || cat "$folder/second.log"
 
 printf '\n== Summary\n'
-cat "$folder"/*.told
-failed=$(cat "$folder"/*.told | grep -c ' FAILED, ') || true
+for name in "$@"; do cat "$folder/$name.outcome"; done
+failed=$(cat "$folder"/*.outcome | grep -c ' FAILED, ') || true
 [ "$failed" -eq 0 ] || { echo "$failed checks failed." >&2; exit 1; }
