@@ -54,15 +54,28 @@ class RayCamera:
         right = right / np.linalg.norm(right)
         return np.stack([right, np.cross(right, forward), forward])
 
-    def pose(self) -> Pose:
-        """Place, axes and field of view on the device."""
-        right, up, forward = (mi.Vector3f(*map(float, row)) for row in self.axes())
-        position = mi.Point3f(*map(float, self.position))
-        numbers = () if self.distortion is None else self.distortion.coefficients()
-        lens = tuple(mi.Float(each) for each in numbers)
-        pose = Pose(position, right, up, forward, mi.Float(self.fov), lens)
-        dr.make_opaque(*pose.numbers())  # no part of kernels, which serve every camera
-        return pose
+    def pose(self, rays: int = 1) -> Pose:
+        """Place, axes and field of view on the device.
+
+        Args:
+            rays: entries of each number. One serves all rays; as many as there are rays have
+                derivatives that are summed afterwards, and not amid them, where each sum would
+                compile all that leads to it once more.
+        """
+
+        def number(value: float) -> mi.Float:
+            return dr.opaque(mi.Float, float(value), rays)  # no part of kernels: they serve all
+
+        right, up, forward = (mi.Vector3f(*map(number, row)) for row in self.axes())
+        lens = () if self.distortion is None else self.distortion.coefficients()
+        return Pose(
+            mi.Point3f(*map(number, self.position)),
+            right,
+            up,
+            forward,
+            number(self.fov),
+            tuple(map(number, lens)),
+        )
 
     def rays(
         self, x: mi.Float, y: mi.Float, pose: Pose | None = None

@@ -9,6 +9,7 @@ in the picture are found between pixels (`ray_edges`), and how they move is part
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import drjit as dr
 import mitsuba as mi
@@ -20,7 +21,7 @@ from optisense.geometry import TriangleMesh
 from optisense.geometry.mesh import CREASE
 from optisense.geometry.shading_normals import smooth_corners
 from optisense.optics.backend.arrays import floats, indices
-from optisense.optics.camera.projection import RayCamera
+from optisense.optics.camera.projection import Pose, RayCamera
 from optisense.optics.scene.bsdf import refract
 from optisense.optics.scene.ray_scene import Piece, RayScene, leave
 from optisense.optics.scene.surfaces import Region
@@ -97,16 +98,19 @@ class DifferentiableRays:
         self.edges = find_edges(self._scene, camera, codes)
         self._vertices = floats(self._scene.vertices)
         self._faces = indices(self._scene.faces)
-        self._pose = camera.pose()
         turning = self._boundary_slopes()
-        dr.enable_grad(self._vertices, *self._pose.numbers())
+        self._poses = [camera.pose(int(self.hit.sum()))]
+        if self.edges is not None:
+            self._poses.append(camera.pose(len(self.edges.x)))
+        self._inputs = [*self._numbers(), *([self._vertices] if moving else [])]
+        dr.enable_grad(*self._inputs)
         self._normals = self._vertex_normals()
         self._record(x[self.hit.ravel()], y[self.hit.ravel()])
         self.weight = self._record_edges(*turning)
 
     def _record(self, x: NDArray[np.floating], y: NDArray[np.floating]) -> None:
         """Rays that arrive, as functions of what moves."""
-        origin, direction = self._camera.rays(floats(x), floats(y), self._pose)
+        origin, direction = self._camera.rays(floats(x), floats(y), self._poses[0])
         cosine = dr.zeros(mi.Float, len(x))
         arrived_at = dr.zeros(mi.Point3f, len(x))
         face = dr.zeros(mi.UInt32, len(x))
@@ -168,10 +172,11 @@ class DifferentiableRays:
         self._normals = self._vertex_normals()
         x, y = floats(self.edges.x), floats(self.edges.y)
         dr.enable_grad(x, y)
-        dr.backward(dr.sum(self._boundary(x, y)))
-        return tuple(np.asarray(dr.grad(v), dtype=np.float64) for v in (x, y))  # type: ignore[return-value]
+        dr.backward(dr.sum(self._boundary(x, y, self._camera.pose())))
+        by_x, by_y = (np.asarray(each, dtype=np.float64) for each in _evaluated([x, y]))
+        return by_x, by_y
 
-    def _boundary(self, x: mi.Float, y: mi.Float) -> mi.Float:
+    def _boundary(self, x: mi.Float, y: mi.Float, pose: Pose) -> mi.Float:
         """A function of film positions (and of all that moves) that is 0 on the boundaries."""
         edges = self.edges
         assert edges is not None
@@ -183,7 +188,7 @@ class DifferentiableRays:
         )
         value = dr.zeros(mi.Float, len(edges.x))
         # Up to the surface that parts two rays both take the same way as the one between them.
-        origin, direction = self._camera.rays(x, y, self._pose)
+        origin, direction = self._camera.rays(x, y, pose)
         for number, stop in enumerate(walk(self._scene, origin, direction)):
             here = depth == number
             _, shading, start, onward, _ = self._follow(stop, origin, direction)
@@ -225,7 +230,7 @@ class DifferentiableRays:
         edges = self.edges
         if edges is None:
             return weight
-        self._value = self._boundary(floats(edges.x), floats(edges.y))
+        self._value = self._boundary(floats(edges.x), floats(edges.y), self._poses[1])
         square = by_x**2 + by_y**2
         along = np.where(edges.along_x, by_x, by_y)
         known = (edges.cause != Cause.UNKNOWN) & np.isfinite(square) & (square > 0)
@@ -273,18 +278,23 @@ class DifferentiableRays:
             sides = [np.where(there, weight[number], 0.0) for there, number in self._sides]
             loss += dr.sum(self._value * floats(self._per_value * (sides[0] - sides[1])))
         # What was recorded is kept for the next number, whose derivatives begin at 0 again.
-        dr.clear_grad(self._vertices)
-        for value in self._pose.numbers():
+        for value in self._inputs:
             dr.clear_grad(value)
         dr.backward(loss, flags=dr.ADFlag.ClearInterior)
-        moved = np.asarray(dr.grad(self._vertices), dtype=np.float64).reshape(-1, 3)
+        slopes = [np.asarray(each, dtype=np.float64) for each in _evaluated(self._inputs)]
         parts = {}
         for piece, start in zip(self._pieces, self._starts[:-1], strict=True):
             sheet = self._sheets.get(piece.name)
             if sheet is not None:
-                parts[piece.name] = sheet.gathered(moved[start : start + len(piece.vertices)])
-        camera = [np.ravel(np.asarray(dr.grad(value))) for value in self._pose.numbers()]
-        return RayGradient(parts, np.concatenate(camera).astype(np.float64))
+                moved = slopes[-1].reshape(-1, 3)[start : start + len(piece.vertices)]
+                parts[piece.name] = sheet.gathered(moved)
+        count = len(self._numbers())
+        camera = np.concatenate([np.atleast_2d(each).sum(axis=1) for each in slopes[:count]])
+        return RayGradient(parts, camera.reshape(len(self._poses), -1).sum(axis=0))
+
+    def _numbers(self) -> list[mi.Float | mi.Point3f | mi.Vector3f]:
+        """The numbers of the camera's poses."""
+        return [value for pose in self._poses for value in pose.numbers()]
 
 
 @dataclass(frozen=True)
@@ -341,6 +351,14 @@ def _hit(
     blended = dr.normalize(na * (1 - u - v) + nb * u + nc * v)
     blended = dr.mulsign(blended, dr.dot(dr.detach(blended), dr.detach(normal)))
     return mi.Point3f(point), normal, dr.select(smooth, blended, normal)
+
+
+def _evaluated(inputs: list[Any]) -> list[Any]:
+    """The gradients of inputs, computed together: by kernels of their own, each would do the work
+    of all, and compiling one takes seconds."""
+    slopes = [dr.grad(value) for value in inputs]
+    dr.eval(slopes)
+    return slopes
 
 
 def _smooth_normals(vertices: mi.Float, corners: mi.UInt32, count: int) -> mi.Float:
