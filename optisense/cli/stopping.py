@@ -96,11 +96,15 @@ def watch() -> None:
     """Answer signals in this process from here on: called once, by the command line's start.
 
     SIGTERM then stops a command as Ctrl-C does. A SIGINT that is ignored, as of programs that a
-    shell runs in the background, stays so.
+    shell runs in the background, stays so: this process no longer gets any, and what stops a
+    command at Ctrl-C is there for SIGTERM.
     """
     reader, writer = os.pipe()
     os.set_blocking(writer, False)
-    if signal.getsignal(signal.SIGINT) is not signal.SIG_IGN:
+    ignored = signal.getsignal(signal.SIGINT) is signal.SIG_IGN
+    if ignored and sys.platform != "win32":
+        signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT])
+    if not ignored or sys.platform != "win32":
         signal.signal(signal.SIGINT, _interrupt)
     signal.signal(signal.SIGTERM, _terminate)
     signal.set_wakeup_fd(writer, warn_on_full_buffer=False)

@@ -42,6 +42,8 @@ def main() -> None:
     given = parser.parse_args()
     # The engine stops a search by this signal, whatever the shell that started it arranged.
     signal.signal(signal.SIGINT, signal.default_int_handler)
+    if sys.platform != "win32":
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, [signal.SIGINT])
     channel = Channel.of_standard_output()
     working = threading.Event()
     threading.Thread(target=_listen, args=(given.go_on, working), daemon=True).start()

@@ -146,6 +146,22 @@ def test_a_command_ends_with_the_code_of_its_signal(number: signal.Signals, code
         assert child.stderr.read() == "interrupted\n"
 
 
+def in_the_background(program: str) -> str:
+    """A program as a shell begins it in the background: Ctrl-C is ignored."""
+    return program.replace("signal.default_int_handler", "signal.SIG_IGN")
+
+
+def test_where_ctrl_c_is_ignored_sigterm_ends_a_command_and_ctrl_c_does_not() -> None:
+    with ready(in_the_background(COMMAND)) as child:
+        child.send_signal(signal.SIGINT)
+        with pytest.raises(subprocess.TimeoutExpired):
+            child.wait(0.3)
+        child.send_signal(signal.SIGTERM)
+        assert child.wait() == 143
+        assert child.stderr is not None
+        assert child.stderr.read() == "interrupted\n"
+
+
 SIGNALS = pytest.mark.parametrize(
     ("number", "code"), [(int(signal.SIGINT), 130), (int(signal.SIGTERM), 143)]
 )
@@ -172,6 +188,14 @@ def test_a_signal_while_python_imports_ends_the_command_in_a_word(
     child = ended(IMPORTING.format(module=module, number=int(number), words=words))
     assert child.stderr == "interrupted\n"
     assert child.returncode == 128 + number
+
+
+def test_sigterm_amid_an_import_is_not_lost_where_ctrl_c_is_ignored() -> None:
+    number, words = int(signal.SIGTERM), ["ledger", "gelsight-mini"]
+    program = IMPORTING.format(module="drjit.ast", number=number, words=words)
+    child = ended(in_the_background(program))
+    assert child.stderr == "interrupted\n"
+    assert child.returncode == 143
 
 
 def test_ctrl_c_in_code_that_is_executed_gives_the_usual_code() -> None:
