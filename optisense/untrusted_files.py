@@ -255,7 +255,11 @@ def read_arrays(
             unpacked = sum(member.file_size for member in archive.infolist())
         _refuse_size(unpacked, most, path, error, what)
         with np.load(io.BytesIO(data), allow_pickle=False) as file:
-            return {name: file[name] for name in file.files}
+            arrays = {name: file[name] for name in file.files}
+        for name, array in arrays.items():
+            if not isinstance(array, np.ndarray):  # NumPy returns what is no array as bytes
+                raise ValueError(f"'{brief(name)}' is no array")
+        return arrays
     except OptiSenseError:
         raise
     except Exception as found:  # zipfile, zlib and NumPy raise many kinds on malformed files

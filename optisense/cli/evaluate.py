@@ -65,9 +65,8 @@ def evaluate(
     settings, seeds = options.for_objectives(), options.seeds
 
     interrupted = False
-    with progress_line(
-        *_steps(seeds, photons_of(settings.get("photons") or SCORE_PHOTONS))
-    ) as line:
+    photons = photons_of(settings.get("photons") or SCORE_PHOTONS)
+    with progress_line(*_steps(seeds, photons)) as line:
         line.begin(LOADING)
         from optisense.objectives import BUILT_IN, Settings
         from optisense.objectives.combined import resolve

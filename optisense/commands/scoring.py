@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Annotated, Any
 
 from annotated_types import Ge, Le
-from pydantic import Field
+from pydantic import AfterValidator, Field
 
 from optisense.commands.options import (
     MOST_THINGS,
@@ -16,15 +16,26 @@ from optisense.commands.options import (
     Seed,
     Written,
 )
-from optisense.quality import LEVELS
+from optisense.quality import LEVELS, photons_of
 
 ScorePhotons = Annotated[Photons, Written(f"N|{LEVELS}", usual="fine, 5 million", is_text=True)]
+
+
+def _with_photons(settings: dict[str, Any]) -> dict[str, Any]:
+    """Settings whose photons, if there are any, are a number."""
+    given = settings.get("photons")
+    return settings if given is None else {**settings, "photons": photons_of(given)}
+
+
+ObjectiveSettings = Annotated[
+    NamedValues, AfterValidator(_with_photons), Written("NAME=VALUE", ("--set",))
+]
 
 
 class ScoreOptions(CommandOptions):
     """How the images and rays of objectives are made."""
 
-    settings: Annotated[NamedValues, Written("NAME=VALUE", ("--set",))] = Field(
+    settings: ObjectiveSettings = Field(
         {},
         description="A setting of the objectives, such as depth=0.5, noise=0.2 or photons=1000000. "
         "May be given several times.",

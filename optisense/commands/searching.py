@@ -8,7 +8,7 @@ from annotated_types import Ge, Le
 from pydantic import Field
 
 from optisense.commands.options import MOST_THINGS, CommandOptions, NamedValues, Seed, Written
-from optisense.commands.scoring import ScoreOptions
+from optisense.commands.scoring import ObjectiveSettings, ScoreOptions
 
 if TYPE_CHECKING:
     from optisense.search import Plan
@@ -49,9 +49,7 @@ class SearchOptions(CommandOptions):
     seed: Annotated[Seed, Written("N", usual="0")] | None = Field(
         None, description="The same seed gives the same search."
     )
-    settings: Annotated[NamedValues, Written("NAME=VALUE", ("--set",))] = Field(
-        {}, description=ScoreSettings.description
-    )
+    settings: ObjectiveSettings = Field({}, description=ScoreSettings.description)
     options: Annotated[NamedValues, Written("NAME=VALUE", ("--option",))] = Field(
         {},
         description="An option of the method, such as sigma=0.1 or population=20. May be given "

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 from typing import Any
 
@@ -153,6 +154,8 @@ def _inside(folder: Path, relative: str, where: str) -> Path:
 
 
 def _hint_of_siblings(path: Path) -> str:
+    if os.path.lexists(path):
+        return "What has this name is no regular file"
     try:
         near = near_match(path.name, [sibling.name for sibling in path.parent.iterdir()])
     except OSError:

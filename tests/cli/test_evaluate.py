@@ -113,6 +113,7 @@ def test_a_failure_is_told_the_rest_goes_on_and_the_exit_code_is_1(tmp_path: Pat
         (("--set", "depth"), "NAME=VALUE"),
         (("--set", "depth=[1"), "can't be read"),
         (("--set", "depth=9"), "9"),
+        (("--set", "photons=1e30"), "more than 10,000,000,000"),
         (("--set", "dept=0.2"), "Did you mean 'depth'"),
         (("--resolution", "wide"), "WIDTHxHEIGHT"),
         (("--seeds", "0"), "seeds"),

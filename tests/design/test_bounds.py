@@ -105,7 +105,7 @@ SPOILT = {
     "large mesh": (replaced(MESH, sparse), "has 8,192 MiB; at most 128 MiB"),
     "large lamp": (replaced(LAMP, sparse), "has 8,192 MiB; at most 16 MiB"),
     "no file": (replaced(MESH, lambda path: path.symlink_to(path.name)), "there is no file"),
-    "a folder": (replaced(MESH, Path.mkdir), "there is no file"),
+    "a folder": (replaced(MESH, Path.mkdir), "What has this name is no regular file"),
     "a pipe": (replaced(MESH, os.mkfifo), "there is no file"),
     "a device": (replaced(MESH, lambda path: path.symlink_to("/dev/zero")), "leads out of"),
     "design loop": (

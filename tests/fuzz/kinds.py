@@ -7,10 +7,10 @@ import json
 import sqlite3
 import struct
 import tempfile
+import zipfile
 from collections.abc import Callable
 from contextlib import closing, suppress
 from dataclasses import dataclass
-from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -356,37 +356,41 @@ def read_study(folder: Path) -> None:
 DATASET = read_case(ASSETS / "dataset-v1")
 
 
-@cache
-def _arrays(name: str) -> dict[str, Any]:
-    with np.load(io.BytesIO(DATASET[name])) as file:
-        return dict(file)
-
-
 @st.composite
-def _spoilt_arrays(draw: st.DrawFn) -> Case:
-    """Arrays of other names, shapes, types or values."""
-    name = draw(st.sampled_from(["background.npz", "arrays/000000.npz"]))
-    arrays = dict(_arrays(name))
+def _spoilt_arrays(draw: st.DrawFn, case: Case) -> Case:
+    """Arrays of other names, shapes, types or values, or members that are no arrays."""
+    name = draw(st.sampled_from([name for name in case if name.endswith(".npz")]))
+    with np.load(io.BytesIO(case[name])) as file:
+        arrays = dict(file)
     key = draw(st.sampled_from(sorted(arrays)))
     change: Callable[[Any], Any] = draw(st.sampled_from([
-        lambda a: a[:1], lambda a: a[..., 0], lambda a: a.astype("U4"), lambda a: a.astype(complex),
-        lambda a: np.full(a.shape, np.nan), lambda a: a * 1e308, lambda a: a.T, lambda a: a[:0],
-        lambda a: np.array(None), lambda a: a.astype("f2"), lambda a: np.zeros((3, 3)),
-        lambda a: None,
+        lambda a: np.atleast_1d(a)[:1], lambda a: np.atleast_1d(a)[..., :0], lambda a: a.T,
+        lambda a: a.astype("U4"), lambda a: a.astype(complex), lambda a: a.astype("f2"),
+        lambda a: np.full(a.shape, np.nan), lambda a: a * 1e308, lambda a: -a.astype(float),
+        lambda a: np.array(None), lambda a: np.zeros((3, 3)), lambda a: a[None], lambda a: None,
+        lambda a: np.full(a.shape, np.datetime64("NaT")), _member, _member,
     ]))  # fmt: skip
-    changed = change(arrays[key])
-    if changed is None:
-        del arrays[key]
-    else:
-        arrays[key] = changed
+    changed = change(arrays.pop(key))
     buffer = io.BytesIO()
-    np.savez_compressed(buffer, **arrays)
-    return {**DATASET, name: buffer.getvalue()}
+    with np.errstate(all="ignore"):
+        arrays |= {key: changed} if isinstance(changed, np.ndarray) else {}
+        np.savez_compressed(buffer, **arrays)
+    if isinstance(changed, bytes):
+        with zipfile.ZipFile(buffer, "a") as archive:
+            archive.writestr(key + ".npy", draw(spoilt_bytes(changed)))
+    return {**case, name: buffer.getvalue()}
+
+
+def _member(array: Any) -> bytes:
+    """An array as a member of an NPZ file has it."""
+    buffer = io.BytesIO()
+    np.save(buffer, array)
+    return buffer.getvalue()
 
 
 @kind("dataset", st.one_of(
     _document(DATASET, "dataset.json", DatasetInfo.model_json_schema(), _json, json.loads),
-    _spoilt_arrays(),
+    _spoilt_arrays(DATASET),
     *[_with_file(DATASET, name, spoilt_bytes(DATASET[name])) for name in (
         "metadata.csv", "failures.csv", "background.npz", "arrays/000000.npz", "images/000000.png",
     )],
@@ -428,6 +432,7 @@ PHOTOGRAPHS = _photographs()
 
 @kind("photographs", st.one_of(
     *[_with_file(PHOTOGRAPHS, name, spoilt_bytes(PHOTOGRAPHS[name])) for name in PHOTOGRAPHS],
+    _spoilt_arrays(PHOTOGRAPHS), _spoilt_arrays(PHOTOGRAPHS),
 ))  # fmt: skip
 def read_photograph_folders(folder: Path) -> None:
     """Read the folders of all layouts."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import zipfile
 from pathlib import Path
 
 import numpy as np
@@ -40,6 +41,18 @@ def test_a_row_leads_nowhere_else(way: str, kind: str, whole: Path) -> None:
         link.unlink()
         table.write_text(before)
     assert Dataset.load(whole)[0].image.shape == (18, 24, 3)
+
+
+def test_a_member_that_is_no_array_is_refused(whole: Path) -> None:
+    file = whole / "arrays" / "000000.npz"
+    before = file.read_bytes()
+    try:
+        with zipfile.ZipFile(file, "a") as archive:
+            archive.writestr("depth_of_a_stranger.npy", b"no array")
+        with pytest.raises(TaskError, match="'depth_of_a_stranger' is no array"):
+            Dataset.load(whole)[0]
+    finally:
+        file.write_bytes(before)
 
 
 @pytest.mark.parametrize("name", ["images", "arrays", "radiance"])
