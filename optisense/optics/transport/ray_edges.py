@@ -1,4 +1,4 @@
-"""Where chief rays of neighbouring pixels take different paths, and what separates them.
+"""Boundaries between pixels whose chief rays take different paths, and their causes.
 
 Between two pixels whose rays take different ways there is a boundary in the picture: the edge of a
 part, or of another part in front of it, a line where two parts meet, or the limit of total
@@ -42,7 +42,7 @@ ROUNDING = 1e-4
 
 
 class Cause(IntEnum):
-    """What parts two neighbouring rays."""
+    """The cause that separates two neighbouring rays."""
 
     UNKNOWN = 0  # e.g. a part thinner than the two rays' distance
     EDGE = 1  # of the triangle that the ray meets which is stopped first
@@ -126,7 +126,7 @@ def walk(scene: RayScene, origin: mi.Point3f, direction: mi.Vector3f) -> list[St
             step.sensed,
             step.ray.active,
         )
-        dr.eval(stop.__dict__, step.ray)
+        dr.eval(stop, step.ray)
         stops.append(stop)
         ray = step.ray
     return stops
