@@ -73,7 +73,7 @@ class LedgerEntry:
 
 @dataclass(frozen=True)
 class LedgerExit:
-    """What of a group's light escapes through the faces of a part that look one way.
+    """Light of a group that escapes through the faces of a part with one orientation.
 
     Attributes:
         group: the light group.
@@ -94,13 +94,13 @@ class LedgerExit:
 
     @property
     def face(self) -> str:
-        """In words."""
+        """The faces by their name, as text."""
         return f"{self.part}, {self.side}"
 
 
 @dataclass(frozen=True)
 class LightLedger:
-    """Where the light goes.
+    """The balance of each light group's power: the places where its light ends.
 
     Attributes:
         emitted: mW of each light group.
@@ -253,7 +253,7 @@ def cells_in_view(model: OpticalModel) -> TargetCells:
 
 @dataclass(frozen=True)
 class LedgerPlace:
-    """What a row of the ledger's sums stands for.
+    """The meaning of a row of the ledger's sums.
 
     Attributes:
         surface: its number; the one after the last stands for the lights themselves.

@@ -1,4 +1,4 @@
-"""How much light reaches the camera: what a lens gathers from the picture that it sees."""
+"""The power that reaches the camera: the light that its lens gathers from the scene."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ class CameraLight:
         return rows
 
     def as_data(self) -> dict[str, Any]:
-        """As plain numbers and names, to be written as JSON."""
+        """The values as plain numbers and names, to be written as JSON."""
         return {
             "units": {"irradiance": "mW/mm^2", "area": "mm^2", "power": "mW"},
             "irradiance": self.irradiance,

@@ -42,7 +42,7 @@ SPPM_PASS_PHOTONS = 1_000_000
 
 @dataclass(frozen=True)
 class RenderProgress:
-    """How far a render is.
+    """The progress of a render.
 
     Attributes:
         stage: what is being done.

@@ -49,7 +49,7 @@ WAY_WORDS = {
 
 @dataclass(frozen=True)
 class GroupLight:
-    """What one light group brings to a place.
+    """The light that one light group brings to a place.
 
     Attributes:
         irradiance: mW/mm^2 on the skin, over all channels and lights of the group.
@@ -100,7 +100,7 @@ class PlaceLight:
     photons: int
 
     def as_data(self) -> dict[str, Any]:
-        """As plain numbers and names, to be written as JSON."""
+        """The values as plain numbers and names, to be written as JSON."""
         return {
             "units": {"irradiance": "mW/mm^2", "length": "mm", "angle": "degree"},
             "at": list(self.at),

@@ -1,4 +1,4 @@
-"""What the camera of a sensor sees with nothing pressed in, and where contacts touch that."""
+"""The camera's view of the untouched sensor, and the places where contacts touch it."""
 
 from __future__ import annotations
 

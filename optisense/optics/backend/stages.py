@@ -7,7 +7,7 @@ from enum import Enum
 
 
 class Stage(Enum):
-    """What is being done; its value says it in words."""
+    """A stage of a render; its value is the name that users see."""
 
     PREPARING = "preparing the scene"
     PILOT = "tracing pilot photons"

@@ -1,4 +1,4 @@
-"""How many threads the renderer may use in this process."""
+"""The number of threads that the renderer may use in this process."""
 
 from __future__ import annotations
 

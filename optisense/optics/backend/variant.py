@@ -26,7 +26,7 @@ VARIANTS = {"llvm": "llvm_ad_rgb", "cuda": "cuda_ad_rgb"}
 
 @dataclass(frozen=True)
 class KernelTest:
-    """What came of compiling and running a tiny kernel in a child process."""
+    """The result of compiling and running a tiny kernel in a child process."""
 
     variant: str
     passed: bool

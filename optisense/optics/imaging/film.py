@@ -1,4 +1,4 @@
-"""Where the light of camera samples is added up, a layer for each light group."""
+"""The film: sums of the light of camera samples, with a layer for each light group."""
 
 from __future__ import annotations
 

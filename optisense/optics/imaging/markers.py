@@ -31,7 +31,7 @@ no displacement, and the other side of a thin sensor must not count."""
 
 @dataclass(frozen=True, eq=False)
 class MarkerPlaces:
-    """Where a picture shows the markers.
+    """Positions of the markers in a picture.
 
     Attributes:
         coordinates: (n, 2) u, v on the undeformed surface, mm; markers beyond its edge are absent.

@@ -33,10 +33,10 @@ REPORT_FILE = "report.html"
 """The page that `optisense render` writes beside an image."""
 
 PRESSURE_FILE = "pressure.npy"
-"""What `TactileImage.save` writes of the pressure on an elastic skin: (h, w) float32, MPa."""
+"""The file of `TactileImage.save` with the pressure on an elastic skin: (h, w) float32, MPa."""
 
 MARKERS_FILE = "markers.csv"
-"""What `TactileImage.save` writes of markers: a row for each, empty where it is not seen."""
+"""The file of `TactileImage.save` with a row for each marker, empty where it is not seen."""
 
 MARKER_COLUMNS = "u,v,column_before,row_before,column_after,row_after,dx,dy,dz"
 """Columns of `MARKERS_FILE`: mm on the undeformed surface, pixels from the upper left, mm."""

@@ -112,7 +112,7 @@ class RadianceCache:
 
 @dataclass
 class BinnedLight:
-    """What of a radiance cache points on and near indenters read.
+    """The part of a radiance cache that points on and near indenters read.
 
     Attributes:
         cells, centres, irradiance, groups, coloured, narrow_lobes: as in `RadianceCache`.

@@ -81,7 +81,7 @@ class WeightedSums:
 
 @dataclass
 class Smoothing:
-    """What is applied to tallied light.
+    """The smoothing that is applied to tallied light.
 
     Attributes:
         kernel: from mW on cells to mW/mm^2.

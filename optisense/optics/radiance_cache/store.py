@@ -61,7 +61,7 @@ well."""
 
 
 class _Traced(NamedTuple):
-    """Which photons a cache holds the light of: the traced light groups (None for all), the seed,
+    """The photons whose light a cache holds: the traced light groups (None for all), the seed,
     and the photons of each light in a pass."""
 
     groups: frozenset[int] | None

@@ -274,7 +274,7 @@ def _piece(name: str, mesh: TriangleMesh, surface: Surface) -> Piece:
 
 @dataclass(frozen=True)
 class _Lamp:
-    """What all lights of a group have in common; ``area`` mm^2 is that of the window."""
+    """Properties that all lights of a group share; ``area`` is that of the window in mm^2."""
 
     intensity: Intensity | None
     exponent: float

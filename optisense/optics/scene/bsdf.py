@@ -1,4 +1,4 @@
-"""What happens to light at a surface: refraction, mirror reflection, and the coating's blend of
+"""Scattering of light at a surface: refraction, mirror reflection, and the coating's blend of
 two lobes.
 
 The coating is ``(1 - s)`` times a Lambertian lobe of its reflectance plus ``s`` times a

@@ -1,4 +1,4 @@
-"""Which optical medium lies on either side of each face of touching, nested solids.
+"""The optical media on both sides of each face of touching, nested solids.
 
 A user brings closed solids (gel, acrylic, a film of air) that touch, nest or overlap; a renderer
 needs each boundary once, with the medium before and behind it. The way there:

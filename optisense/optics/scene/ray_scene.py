@@ -109,8 +109,9 @@ class Ray:
 
 @dataclass
 class SurfaceHit:
-    """Where rays met a surface. ``normal`` is the face normal, ``shading_normal`` the smooth
-    one.
+    """Intersections of rays with a surface.
+
+    ``normal`` is the face normal, ``shading_normal`` the smooth one.
     """
 
     valid: mi.Bool

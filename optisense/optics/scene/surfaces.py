@@ -11,7 +11,7 @@ precision, a hundredth of the thinnest film that a design holds (0.02 mm)."""
 
 
 class SurfaceKind(IntEnum):
-    """What light does at a surface."""
+    """The kind of interaction of light with a surface."""
 
     DIELECTRIC = 0  # refracts and reflects (smooth, or rough with GGX)
     OPAQUE = 1  # reflects off a blend of a diffuse and a metallic lobe; photons are stored here
@@ -21,7 +21,7 @@ class SurfaceKind(IntEnum):
 
 
 class Region(IntEnum):
-    """What an opaque surface is to the sensor."""
+    """The function of an opaque surface in the sensor."""
 
     OTHER = 0
     SENSING = 1

@@ -1,4 +1,4 @@
-"""How far away the skin appears to the camera, through all that bends its rays.
+"""The apparent distance of the skin from the camera, after all reflections and refractions.
 
 A lens sees a point from all over its pupil. Seen from a place beside the pupil's middle, the point
 appears in another direction; the nearer it is, the more. How much is found with two rays more per

@@ -23,7 +23,7 @@ from optisense.optics.transport.interact import LobeSample, Path, interact
 
 @dataclass
 class PathEnd:
-    """Where paths from the camera end.
+    """End points of paths from the camera.
 
     Attributes:
         valid: whether on an opaque surface.

@@ -29,7 +29,7 @@ surfaces' numbers differ by a multiple of it are told as one."""
 
 
 class RayOutcome(IntEnum):
-    """What became of a chief ray."""
+    """The outcome of a chief ray."""
 
     HIT = 0  # reached the sensing surface (or an indenter pressed into it)
     ESCAPED = 1  # left the sensor

@@ -34,7 +34,7 @@ photons' light gets so far."""
 
 
 class Path(Enum):
-    """What a ray is, and so what it carries and which lobe it follows."""
+    """The kind of a ray, which decides the quantity it carries and the lobe it follows."""
 
     PHOTON = 0  # carries power; a lobe is drawn, and opaque surfaces scatter
     CAMERA = 1  # carries radiance; goes through every interface that is not totally reflecting
@@ -80,7 +80,7 @@ class Lobe:
 
 @dataclass
 class Interaction:
-    """What a ray does at the next surface that it meets.
+    """The interaction of a ray with the next surface that it meets.
 
     Attributes:
         hit: where that is.
@@ -127,7 +127,7 @@ class Interaction:
 
 @dataclass
 class _Media:
-    """What is absorbed around a surface that rays meet.
+    """Absorption coefficients on both sides of a surface that rays meet.
 
     Attributes:
         known: whether the surface tells its media; elsewhere light stays in the one it is in.

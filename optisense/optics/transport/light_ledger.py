@@ -34,7 +34,7 @@ BATCHES = 16
 
 
 class Fate(IntEnum):
-    """What becomes of light, in the order of a surface's rows in the ledger."""
+    """The fate of light, in the order of a surface's rows in the ledger."""
 
     ABSORBED = 0  # by the surface, where the camera does not look
     SEEN = 1  # by the surface, where the camera looks
@@ -46,12 +46,12 @@ class Fate(IntEnum):
 FATES = len(Fate)
 
 SIDES = ("+x", "-x", "+y", "-y", "+z", "-z")
-"""Which way a face looks: the axis of the design's frame that its outward normal is nearest to."""
+"""Orientations of faces: the axis of the design's frame nearest to the outward normal."""
 
 
 @dataclass(frozen=True)
 class Bookings:
-    """What the ledger holds.
+    """The sums of the ledger.
 
     Attributes:
         power: (batches, groups, 3, surfaces + 1, fates) mW of lights of 1 mW in each channel. The

@@ -43,7 +43,7 @@ class PhotonMap:
 
 @dataclass
 class Records:
-    """Where the landings of a pass are written, as long as there is room.
+    """A buffer for the landings of a pass, with a fixed capacity.
 
     Attributes:
         capacity: number of landings that there is room for.

@@ -55,7 +55,7 @@ class TracedPhotons:
 
 @dataclass
 class _Course:
-    """What is written of photons under way.
+    """A buffer for the paths of photons.
 
     Attributes:
         points: coordinates, of `POINTS` points for each photon.

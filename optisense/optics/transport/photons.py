@@ -112,7 +112,7 @@ class _Flight:
 
 @dataclass
 class _Recording:
-    """What is recorded of photons: landings, whether they reach a target, and the crossings of a
+    """Records of photons: landings, whether they reach a target, and the crossings of a
     flux layer.
     """
 

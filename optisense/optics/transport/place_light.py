@@ -33,7 +33,7 @@ BATCHES = 16
 
 
 class LightWay(IntEnum):
-    """What light has met on its way to a place; where it is several, the last of this list."""
+    """The interactions of light on its path to a place; of several, the last in this list."""
 
     REFRACTED = 0  # nothing but interfaces that let it pass
     REFLECTED = 1  # an interface that reflected it, totally or in part
@@ -47,7 +47,7 @@ WAYS = len(LightWay)
 
 @dataclass(frozen=True)
 class Disc:
-    """Where photons are counted.
+    """A disc of the skin on which photons are counted.
 
     Attributes:
         middle: (3,) mm, on the sensing surface.

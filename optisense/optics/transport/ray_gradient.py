@@ -1,4 +1,4 @@
-"""How chief rays move when mirrors, other surfaces, or the camera move: derivatives by Dr.Jit.
+"""Derivatives of chief rays by the motion of surfaces and camera, computed by Dr.Jit.
 
 A ray's way is followed a second time, each hit written as a smooth function of the corners of the
 triangle that was met; which triangles these are is taken as given. What that misses is rays that
