@@ -1,4 +1,4 @@
-"""What every search method must do, as tests: for this package's methods, and for your own.
+"""Contract tests of search methods, for those of this package and for your own.
 
 In a test file of yours, to be run by pytest::
 

@@ -44,7 +44,7 @@ DesignFunction = Callable[[SensorDesign], float]
 """A goal that needs no image, such as a length or a price; higher is better."""
 
 Goal = str | Objective | DesignFunction
-"""What can be searched for."""
+"""A goal of a search."""
 
 
 RELIT = re.compile(r"^lights\..*\.(flux|colour)(\W|$)")
@@ -61,7 +61,7 @@ the time of AOAP."""
 
 
 class Evaluator(Protocol):
-    """What workers call: made once a worker (it must pickle), then asked for many points."""
+    """The function that workers call: made once per worker (it must pickle), for many points."""
 
     def __call__(self, vector: FloatArray, seed: int) -> Outcome:
         """What comes of a point (n,) of the space. The same for the same point and seed, whatever

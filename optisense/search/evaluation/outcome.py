@@ -1,4 +1,4 @@
-"""What came of trying one point of a search space."""
+"""The outcome of one trial of a search."""
 
 from __future__ import annotations
 

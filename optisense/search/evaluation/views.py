@@ -1,4 +1,4 @@
-"""What the camera of a trial must see of what it sees at the start: else it is another sensor."""
+"""The share of the view at the start that the camera of each trial must keep."""
 
 from __future__ import annotations
 

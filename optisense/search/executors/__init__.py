@@ -1,4 +1,4 @@
-"""Who works out trials: this process, a pool of processes, any executor, or a Dask cluster."""
+"""Executors of trials: this process, a pool of processes, any executor, or a Dask cluster."""
 
 from optisense.search.executors.base import Runner
 from optisense.search.executors.pool import ProcessPool

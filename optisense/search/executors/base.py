@@ -1,4 +1,4 @@
-"""Who works out trials: this process, a pool of processes, or a cluster."""
+"""The interface of executors: this process, a pool of processes, or a cluster."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What brings an evaluator to every Dask worker, also to one that comes later."""
+"""The plugin that brings an evaluator to every Dask worker, also to one that joins later."""
 
 from __future__ import annotations
 

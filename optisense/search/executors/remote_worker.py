@@ -1,4 +1,4 @@
-"""What a worker of another process or machine does: it keeps an evaluator and works out trials."""
+"""The worker in another process or machine: it keeps an evaluator and works out trials."""
 
 from __future__ import annotations
 

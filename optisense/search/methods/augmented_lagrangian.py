@@ -43,7 +43,7 @@ KEPT = 0.002
 
 @dataclass(frozen=True)
 class AugmentedLagrangian:
-    """What an ascent minimises.
+    """The function that an ascent minimises.
 
     Attributes:
         requirements: the conditions.

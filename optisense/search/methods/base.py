@@ -28,7 +28,7 @@ BoolArray = NDArray[np.bool_]
 
 @dataclass(frozen=True)
 class Problem:
-    """What a method searches.
+    """The problem that a method solves.
 
     Attributes:
         space: the points it may propose.

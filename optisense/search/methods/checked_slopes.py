@@ -71,7 +71,7 @@ LAYERS = "differences of scores of relit pictures"
 
 
 class Agreement(Enum):
-    """How a gradient compares with central differences of the true score."""
+    """Agreement of a gradient with central differences of the true score."""
 
     HOLDS = "agrees with differences over both steps"
     DIFFERS = "differences over both steps agree with each other, the gradient is another one"
@@ -79,7 +79,7 @@ class Agreement(Enum):
 
 
 class CheckedSlope(NamedTuple):
-    """What is known around a point.
+    """Values and gradients at a point.
 
     Attributes:
         values: (1 + m,) the smoothed score, and the smoothed value of what each condition limits;

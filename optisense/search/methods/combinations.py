@@ -1,4 +1,4 @@
-"""What methods over combinations of a few levels share: never twice the same, and climbing."""
+"""Base of methods over combinations of a few levels: no repeats, and hill climbing."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ GENERATION = 512
 """Combinations that are proposed together where nothing has to be learned in between."""
 
 Stage = tuple[str, list[Combination]]
-"""What is being done, and combinations to try for it."""
+"""The name of a stage, and the combinations that it tries."""
 
 
 class Combinations(Method):

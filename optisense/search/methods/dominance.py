@@ -1,4 +1,4 @@
-"""Which outcomes are better than which when there are several goals."""
+"""Pareto dominance of outcomes when there are several goals."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Where the gradient of a search comes from, and gradients by differences of trials."""
+"""Sources of a search's gradient, and gradients by differences of trials."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from optisense.search.methods.smooth_scores import SmoothScore
 
 
 class GradientSource(Enum):
-    """Where gradients come from."""
+    """A source of gradients."""
 
     RAYS = "derivatives of rays"
     LAYERS = "relit pictures"
@@ -28,7 +28,7 @@ class GradientSource(Enum):
 
 
 class LocalValues(NamedTuple):
-    """What is known around a point: values (1 + m,) of the score and of what conditions limit, and
+    """Values and gradients at a point: values (1 + m,) of the score and of the conditions, and
     their gradients (1 + m, n) by shares of the ranges.
     """
 

@@ -1,4 +1,4 @@
-"""How shapes and camera follow the coordinates of a search space, for chains of derivatives.
+"""The Jacobian of shapes and camera by the coordinates of a search space.
 
 Found by differences: where shapes follow the coordinates linearly, as they do a cage, these are
 exact, and one set of them serves all points.
@@ -27,7 +27,7 @@ LINEAR = 1e-6
 
 @dataclass(frozen=True)
 class Jacobian:
-    """What moves with each coordinate.
+    """Derivatives of shapes and camera by each coordinate.
 
     Attributes:
         point: (n,) where it was taken.

@@ -1,4 +1,4 @@
-"""Which type of light to take: one for all, one a group, or one a light.
+"""Choice of light types: one for all, one for each group, or one for each light.
 
 The three kinds of variation of the OptiSense paper (section "Light source"). The first two are
 few and mostly all tried; of the third there are as many as types to the power of lights, and the

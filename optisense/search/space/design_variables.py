@@ -1,4 +1,4 @@
-"""What one parameter can change in a design when that is more than single numbers."""
+"""Design variables: parameters that change more of a design than single numbers."""
 
 from __future__ import annotations
 
@@ -80,7 +80,7 @@ class LibraryCamera(DesignVariable):
 
 @dataclass(frozen=True)
 class PartMaterial(DesignVariable):
-    """What a part is made of; a material of the library joins the design's own."""
+    """The material of a part; a material of the library joins the design's own."""
 
     name: str
 

@@ -21,7 +21,7 @@ Node = dict[str | int, "Node | int"]
 
 
 class Edit:
-    """Where some values of a design are, so that they can be set together."""
+    """The places of some values of a design, which are set together."""
 
     def __init__(self, design: SensorDesign, paths: Sequence[str]) -> None:
         """Look up all paths.

@@ -1,4 +1,4 @@
-"""What a single parameter can be: a number between bounds, a whole number, or one of several."""
+"""Kinds of single parameters: a number between bounds, a whole number, or one of several."""
 
 from __future__ import annotations
 
@@ -152,10 +152,10 @@ class CagePoints:
 
 
 Single = Continuous | Integer | Choice
-"""What one parameter of a bound space is."""
+"""One parameter of a bound space."""
 
 Specification = Single | Around | CagePoints
-"""What a user can ask for at one path; some stand for many parameters."""
+"""The specification that a user gives for one path; some stand for many parameters."""
 
 
 def as_specification(value: object) -> Specification:

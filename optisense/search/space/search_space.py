@@ -33,7 +33,7 @@ SURE_SECTIONS = ("coating", "cages", "materials")
 
 
 class SearchSpace:
-    """What may change, by dotted path; not tied to a design yet.
+    """The parameters of a search by dotted path, not bound to a design yet.
 
     A value is (low, high), (low, high, steps), `Integer`, `Choice` or a list of options,
     `Around` (so far from what it is now), or `CagePoints`. A path to a vector or to a cage's

@@ -1,4 +1,4 @@
-"""How the score of a design spreads when sensors are made with errors, and which error matters."""
+"""Tolerance analysis: the distribution of a score under manufacturing errors, and its causes."""
 
 from optisense.search.tolerance.analysis import Tolerance, tolerance
 

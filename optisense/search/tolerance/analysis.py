@@ -1,4 +1,4 @@
-"""How a design's score spreads when sensors come out a little other than designed."""
+"""The distribution of a design's score under manufacturing errors."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ what the score at hand is at, where it is worked out in this process."""
 
 @dataclass(frozen=True)
 class ScoreDistribution:
-    """How one objective's score spreads.
+    """The distribution of one objective's score.
 
     Attributes:
         nominal: of the design as it is.
@@ -90,7 +90,7 @@ class ScoreDistribution:
 
 @dataclass(frozen=True)
 class Tolerance:
-    """What manufacturing errors do to a design.
+    """The effect of manufacturing errors on a design.
 
     Attributes:
         design: the design.

@@ -1,4 +1,4 @@
-"""Which error matters most: shares of the variance of a score.
+"""Sensitivity analysis: the share of each error in the variance of a score.
 
 The measure is the total-effect index of Homma and Saltelli ("Importance measures in global
 sensitivity analysis of nonlinear models", 1996): the part of the score's variance that is left, on
