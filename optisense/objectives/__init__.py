@@ -1,4 +1,4 @@
-"""How good a sensor is: four scores that stand for an expert's eye, and a user's own."""
+"""Objectives that rate a sensor: the four built-in ones, and a user's own."""
 
 from optisense.objectives.evaluation import Evaluation
 from optisense.objectives.press import Press

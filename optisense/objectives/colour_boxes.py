@@ -1,4 +1,4 @@
-"""Which normals hide in a box of colours: ranges of angles over all points in many boxes.
+"""Ranges of normal angles over all points whose colours lie in a box, for many boxes.
 
 Each of n points asks for the extremes over all points within its own colour box. A table of pairs
 would be quadratic. Points are sorted into small blocks of similar colour instead, as in a k-d tree

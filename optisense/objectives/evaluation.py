@@ -1,4 +1,4 @@
-"""What the objectives of one sensor share: images and rays, made once, on first use."""
+"""Images and rays that the objectives of one sensor share, made once, on first use."""
 
 from __future__ import annotations
 

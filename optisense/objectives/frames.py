@@ -1,4 +1,4 @@
-"""Where presses sit: the frame of each, and which press a pixel belongs to."""
+"""Positions of presses: the frame of each, and the press that a pixel belongs to."""
 
 from __future__ import annotations
 

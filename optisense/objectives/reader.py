@@ -1,4 +1,4 @@
-"""What a calibrated reader makes of each press, when all the other presses calibrate it."""
+"""Leave-one-out readings: each press is read after calibration with all the others."""
 
 from __future__ import annotations
 
@@ -157,7 +157,7 @@ def _read(evaluation: Evaluation, noise: float) -> list[ReadPress]:
 
 @dataclass(frozen=True)
 class _KnownPress:
-    """What is known of a press under any light.
+    """Data of a press that do not depend on the light.
 
     Attributes:
         grid, mask, seen, true_normals: as in `ReadPress`.

@@ -24,7 +24,7 @@ DIRECTIONS = 8
 directions."""
 
 COLOURS = "picture"
-"""What a robot reads."""
+"""The layer of colours that a robot reads."""
 
 LEAST_PIXELS = 8
 """Smallest number of pixels on a line; a straight fit through fewer says little."""

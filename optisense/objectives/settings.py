@@ -1,4 +1,4 @@
-"""What all objectives share: which images and rays a sensor is judged by."""
+"""Settings that all objectives share: the images and rays that a sensor is rated by."""
 
 from __future__ import annotations
 

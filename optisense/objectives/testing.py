@@ -1,4 +1,4 @@
-"""What every objective must do, as tests: for this package's objectives, and for your own.
+"""Contract tests of objectives, for those of this package and for your own.
 
 In a test file of yours, to be run by pytest::
 

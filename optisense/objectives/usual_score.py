@@ -1,4 +1,4 @@
-"""How long a score usually takes, to estimate the time left before any score is measured."""
+"""Usual durations of scores, which estimate the time left before one is measured."""
 
 from __future__ import annotations
 

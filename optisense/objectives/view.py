@@ -1,4 +1,4 @@
-"""How much of its sensing surface a camera sees: the evidence that every score rests on."""
+"""The share of the sensing surface that a camera sees, which every score depends on."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class View:
-    """What a camera sees of the untouched sensor.
+    """Measures of a camera's view of the untouched sensor.
 
     Attributes:
         picture: share of the pixels that see the sensing surface, 0 to 1.

@@ -1,1 +1,1 @@
-"""What a picture tells a reader: tilts of the skin from colours, and depth from tilts."""
+"""Reconstruction from a picture: tilts of the skin from colours, and depth from tilts."""

@@ -1,4 +1,4 @@
-"""Where a picture shows the dots that are printed on a skin."""
+"""Detection of the dots that are printed on a skin."""
 
 from __future__ import annotations
 

@@ -116,7 +116,7 @@ def tilt_kernel(tilts: FloatArray, grid: FloatArray) -> FloatArray:
 
 @dataclass(frozen=True)
 class PressTable:
-    """How a press changes the colour at each tilt of a grid.
+    """The change of colour by a press, at each tilt of a grid.
 
     Attributes:
         change: (k, 3) levels of 255.

@@ -22,7 +22,7 @@ place of a curved surface."""
 
 @dataclass(frozen=True)
 class UntouchedSurface:
-    """What the camera sees of a sensor that nothing touches; arrays are (h, w, ...).
+    """The camera's view of a sensor that nothing touches; arrays are (h, w, ...).
 
     points: mm. normals: unit, inward. directions: unit, of the ray that arrives. seen: (h, w),
     where the other three count. Everything is in the design's frame.
