@@ -1,4 +1,4 @@
-"""How parts stand to each other, and where the picture is: solids in one place, straight rays."""
+"""Checks of the arrangement: solids that share space, and the picture along straight rays."""
 
 from __future__ import annotations
 

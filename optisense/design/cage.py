@@ -27,7 +27,7 @@ class Point(Model):
 
 
 class Share(Model):
-    """How far each coordinate of a control point is on its way from c_min to c_max, 0 to 1."""
+    """Position of each coordinate of a control point between c_min (0) and c_max (1)."""
 
     x: Fraction
     y: Fraction

@@ -1,4 +1,4 @@
-"""What cages may have done to a design: folded parts, parts pushed into others or off them."""
+"""Checks of parts that cages bend: folds, and parts pushed into others or off them."""
 
 from __future__ import annotations
 

@@ -20,7 +20,7 @@ from optisense.near import suggestion
 
 Resolution = tuple[int, int, int]
 Shape = Literal["points", "c_min", "c_max"]
-"""Which control points of a cage: those that set the shape now, or an end of its range."""
+"""The control points of a cage: those of the present shape, or an end of its range."""
 
 THINNEST = 0.5
 """mm: a box over a flat part is made at least this thick."""

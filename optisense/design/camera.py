@@ -36,7 +36,7 @@ Pixels = Annotated[Count, Field(le=65_536)]
 
 
 class ImagingModel(Model):
-    """What a lens, a sensor and its processor do to a picture; None is an ideal one.
+    """Effects of lens, sensor and processor on a picture; None stands for an ideal one.
 
     Designs and entries of the library share these fields. The order of the chain is that of
     `design.responses.chain`.
@@ -91,7 +91,7 @@ class ImagingModel(Model):
 
 
 class Viewpoint(Model):
-    """Where a camera is, where it looks, and how large the picture is that it sees."""
+    """Position and orientation of a camera, and the size of its picture."""
 
     model: Name = Field(description="library camera it started from")
     projection: Literal["perspective", "equidistant"] = Field(

@@ -1,4 +1,4 @@
-"""What no camera can be or see: angles without a lens, a place inside a part, a view past the skin.
+"""Checks of the camera: angles without a lens, a place inside a part, a view past the skin.
 
 A design does not say how large its camera's lens is, so it is taken for as small as the smallest
 camera there is.

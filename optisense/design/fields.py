@@ -8,7 +8,7 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, Field, GetCoreSchema
 from pydantic_core import CoreSchema
 
 LARGEST_NUMBER = 1e12
-"""Of a number in a design, to either side of 0, whatever its unit. None that means something comes
+"""The largest magnitude of a number in a design, in any unit. No meaningful number comes
 near, and the cube of it is still far from the largest number of a computer."""
 
 
@@ -40,7 +40,7 @@ Count = Annotated[int, Field(strict=True, ge=1)]
 
 MILLIMETRES: dict[str, Any] = {"unit": "mm"}
 DEGREES: dict[str, Any] = {"unit": "degrees"}
-"""What `json_schema_extra` of a field says of its unit: `unit_of` reads it."""
+"""The unit of an angle in a field's `json_schema_extra`; `unit_of` reads it."""
 
 Vector = tuple[Number, Number, Number]
 """x, y, z."""

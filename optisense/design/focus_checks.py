@@ -1,4 +1,4 @@
-"""What a camera of a design sees out of focus, along straight rays."""
+"""Checks of the camera's focus, along straight rays."""
 
 from __future__ import annotations
 

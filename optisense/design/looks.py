@@ -1,4 +1,4 @@
-"""How parts are drawn wherever a design is shown."""
+"""Colours and opacities of parts in all drawings of a design."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What no transparent material can be: a refractive index that none has."""
+"""Checks of transparent materials: refractive indices that no material has."""
 
 from __future__ import annotations
 

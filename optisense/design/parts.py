@@ -24,7 +24,7 @@ from optisense.design.fields import (
 
 
 class Role(StrEnum):
-    """What a part is for."""
+    """The function of a part in the sensor."""
 
     SENSING_SURFACE = "sensing_surface"
     """The inside of the opaque coating; an open surface whose normals look into the sensor."""

@@ -1,4 +1,4 @@
-"""Where a design's camera shows points, and where its pixels look, along straight lines.
+"""Projection of points into a design's camera, and its pixels' directions, without refraction.
 
 A place of the picture is given by shares: 0 to 1 across from the left and down from the top.
 """

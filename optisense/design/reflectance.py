@@ -1,4 +1,4 @@
-"""How much light a surface reflects, and where a rough one sends it, as NumPy functions."""
+"""Fresnel reflectance and the lobes of rough surfaces, as NumPy functions."""
 
 from __future__ import annotations
 

@@ -37,7 +37,7 @@ class Outline(NamedTuple):
 
 @dataclass(frozen=True)
 class Section:
-    """What a plane through the camera cuts, in coordinates (across, along the view) in mm.
+    """The section of a design by a plane through the camera; (across, along the view) in mm.
 
     Attributes:
         outlines: parts that the plane meets, in the design's order.

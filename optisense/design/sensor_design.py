@@ -39,7 +39,7 @@ MATERIAL_REQUIRED = frozenset({Role.ELASTOMER, Role.SUPPORT, Role.INTERFACE, Rol
 
 
 class Status(StrEnum):
-    """How far a number can be trusted."""
+    """The kind of evidence for a number."""
 
     MEASURED = "measured"
     CALIBRATED = "calibrated"
@@ -51,7 +51,7 @@ class Status(StrEnum):
 
 
 class Provenance(Model):
-    """Where a number of the design comes from."""
+    """The source of a number of the design."""
 
     status: Status = Field(description="; ".join(status.value for status in Status))
     source: str = Field(description="where it is from, or how it was derived")

@@ -1,4 +1,4 @@
-"""Which boxes of two lots meet, found by boxes around boxes."""
+"""Intersecting pairs of boxes from two sets, found with a bounding volume hierarchy."""
 
 from __future__ import annotations
 

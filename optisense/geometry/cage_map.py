@@ -1,4 +1,4 @@
-"""What a cage does to space: how it stretches it, whether it folds it, and refining the cage."""
+"""The deformation of space by a cage: its stretch, its folds, and refinement of the cage."""
 
 from __future__ import annotations
 

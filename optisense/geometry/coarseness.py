@@ -18,7 +18,7 @@ _longest: weakref.WeakKeyDictionary[TriangleMesh, NDArray[np.int32]] = weakref.W
 
 
 class ChordError(NamedTuple):
-    """How far a bent mesh is off the shape that its cage gives.
+    """The largest distance of a bent mesh from the exact shape that its cage gives.
 
     Attributes:
         distance: mm, at the middle of the worst edge.

@@ -1,4 +1,4 @@
-"""Where two meshes lie on one another, whatever their triangles, and cutting along it.
+"""Coincident patches of two meshes with any triangles, and cutting along their borders.
 
 Two faces coincide where, over a common patch, they are no farther apart than a tolerance and
 their planes nearly parallel. Patches are found pairwise and cut out in the plane of the face.
@@ -127,7 +127,7 @@ def cut(mesh: TriangleMesh, overlays: list[Overlay]) -> list[TriangleMesh]:
 
 
 class _Remainder:
-    """What is left of each face while patches are taken from it."""
+    """The remainder of each face while patches are cut from it."""
 
     def __init__(self, mesh: TriangleMesh) -> None:
         self.mesh = mesh

@@ -1,4 +1,4 @@
-"""Which points are inside a closed mesh."""
+"""Tests whether points are inside a closed mesh."""
 
 from __future__ import annotations
 

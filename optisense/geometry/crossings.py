@@ -1,4 +1,4 @@
-"""Where the faces of meshes cut through one another."""
+"""Intersections of the faces of meshes."""
 
 from __future__ import annotations
 

@@ -21,7 +21,7 @@ _outlines: weakref.WeakKeyDictionary[TriangleMesh, NDArray[np.int64]] = weakref.
 
 
 class Fold(NamedTuple):
-    """What is wrong with a bent mesh.
+    """A defect of a bent mesh.
 
     Attributes:
         kind: "inside out" (the cage turns space over), "collapsed" (faces without area left) or

@@ -1,4 +1,4 @@
-"""What presses on a sensor: spheres, cylinders, plates and any mesh.
+"""Indenters that press on a sensor: spheres, cylinders, plates and any mesh.
 
 Each indenter has a frame of its own: +z points away from the sensor, and its lowest point lies
 at z = 0. Shading normals are those of the exact shape and point out of the indenter.

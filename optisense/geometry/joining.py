@@ -33,7 +33,7 @@ _PARALLEL = float(np.cos(np.radians(0.1)))
 
 @dataclass(frozen=True)
 class Join:
-    """What was done at the contact of two solids.
+    """The change that was made at the contact of two solids.
 
     Attributes:
         mesh: the moved solid.

@@ -32,7 +32,7 @@ _contacts = weakref.WeakKeyDictionary()
 
 
 class Meeting(NamedTuple):
-    """Where two parts share space.
+    """A place where two parts share space.
 
     Attributes:
         place: (3,) mm, a point of the first part that is on or in the second.

@@ -1,4 +1,4 @@
-"""What makes a mesh unfit for simulation, and where."""
+"""Defects that make a mesh unfit for simulation, and their places."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 
 LEAST_VOLUME = 1e-12
-"""Of a solid, as a share of the cube of its largest dimension: a sheet of glass of 20 mm that is as
+"""The least volume of a solid, as a share of its largest dimension cubed: a 20 mm sheet of glass as
 thin as a wavelength of light has 1e-5."""
 
 

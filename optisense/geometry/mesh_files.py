@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 FORMATS = (".obj", ".stl", ".ply")
 
 FARTHEST = 1e9
-"""Of a coordinate in a file, whatever its unit: a kilometre in micrometres."""
+"""The largest coordinate in a file, in any unit: a kilometre in micrometres."""
 
 MOST_TRIANGLES = 1_000_000
 """Triangles of one file; the built-in sensors have at most 25,000 in a part."""
@@ -36,7 +36,7 @@ MOST_CORNERS = 10_000
 
 
 class MeshArrays(NamedTuple):
-    """What a mesh file holds; `TriangleMesh.load` makes a mesh of it.
+    """The content of a mesh file; `TriangleMesh.load` makes a mesh of it.
 
     Attributes:
         vertices: (n, 3) float64, in the unit of the file.

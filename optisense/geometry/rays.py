@@ -1,4 +1,4 @@
-"""Where straight rays cross a mesh, without an acceleration structure."""
+"""Intersections of straight rays with a mesh, without an acceleration structure."""
 
 from __future__ import annotations
 

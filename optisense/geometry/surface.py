@@ -98,7 +98,7 @@ class SensingSurface:
         return face, np.asarray(on_faces[face], dtype=np.float64)
 
     def _surface_point(self, face: int, point: FloatArray) -> SurfacePoint:
-        """With the smooth normal, so that neighbouring places press in nearly one direction."""
+        """The frame has the smooth normal, so that presses nearby have nearly one direction."""
         smooth = self._smooth
         assert smooth.normals is not None
         share = _barycentric(self.mesh.triangles[face], point)

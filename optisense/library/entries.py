@@ -1,4 +1,4 @@
-"""What the library holds: a value, and where each of its numbers comes from."""
+"""Entries of the library: a value, and the source of each of its numbers."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ NOT_NUMBERS = frozenset({"kind", "shape", "library", "colour", "part", "maker"})
 
 
 class Source(Model):
-    """Where one number, or several, come from."""
+    """The source of one or several numbers."""
 
     status: Status
     source: Text
@@ -78,7 +78,7 @@ class Entry(Model, Generic[Value]):
 
 
 class TypicalLight(Model):
-    """What one colour of a light gives at its nominal current.
+    """The output of one colour of a light at its nominal current.
 
     Attributes:
         colour: R, G, B for a design's light group.

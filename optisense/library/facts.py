@@ -1,4 +1,4 @@
-"""What an entry says, as text: in a line, number by number, and what follows from the numbers."""
+"""Library entries as text: a summary, the numbers one by one, and derived quantities."""
 
 from __future__ import annotations
 

@@ -45,7 +45,7 @@ NO_TUNING = "Name a tuning file of libcamera for the Raspberry Pi, such as imx21
 
 @dataclass(frozen=True)
 class Tuning:
-    """What a tuning file says of a camera.
+    """The values of a camera's tuning file.
 
     Attributes:
         values: fields of `ImagingModel` as plain values, those that the file has.

@@ -1,4 +1,4 @@
-"""How a lamp sends out light: a file for each kind, `LightModel` for any of them."""
+"""Kinds of lamps, a file for each; `LightModel` stands for any of them."""
 
 from optisense.design.emitters.area import AreaEmitter
 from optisense.design.emitters.base import LightModel, Window

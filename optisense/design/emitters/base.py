@@ -1,4 +1,4 @@
-"""What every kind of lamp tells about itself."""
+"""The interface of all kinds of lamps."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ class Window:
 
 
 class LightModel(KindModel):
-    """How a lamp sends out light; each kind of lamp is a subclass.
+    """The emission of a lamp; each kind of lamp is a subclass.
 
     A kind needs its fields and `relative_intensity`; whatever simulates, draws or lists lamps
     asks the methods below and nothing else. Angles are in degrees: polar from the light's

@@ -1,4 +1,4 @@
-"""What a camera's lens does besides forming the picture: distortion, shading, blur.
+"""Departures of a camera's lens from an ideal one: distortion, shading, blur.
 
 Each noun has a base class with a registry of its kinds, and a file for each kind. `film` has the
 places of a picture's pixels that they are asked about.

@@ -34,7 +34,7 @@ LARGEST = 0.25
 
 
 class LensView(Protocol):
-    """What a blur may ask about a camera."""
+    """Properties of a camera that a blur can depend on."""
 
     @property
     def resolution(self) -> tuple[int, int]:
@@ -46,7 +46,7 @@ class LensView(Protocol):
 
 
 class LensBlur(KindModel):
-    """How wide a lens spreads the light of a point; each kind is a subclass."""
+    """The point spread of a lens; each kind is a subclass."""
 
     kinds: ClassVar[Registry[Any]] = Registry(
         "kind of lens blur",

@@ -34,7 +34,7 @@ Coefficient = Annotated[Number, Field(ge=-1e6, le=1e6)]
 
 
 class LensDistortion(KindModel):
-    """How a lens departs from its projection; each kind is a subclass.
+    """The departure of a lens from its projection; each kind is a subclass.
 
     `distort` and `slopes` use nothing but the four operations of arithmetic, so that they serve
     NumPy's arrays and those of the renderer alike. The coefficients are handed to them, as they are

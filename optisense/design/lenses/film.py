@@ -1,4 +1,4 @@
-"""Where the pixels of a picture, or of a part of it, lie on the film."""
+"""Positions on the film of the pixels of a picture, or of a part of it."""
 
 from __future__ import annotations
 

@@ -24,7 +24,7 @@ FloatArray = NDArray[np.floating]
 
 
 class LensShading(KindModel):
-    """How much of the light a lens lets through, by place; each kind is a subclass."""
+    """The transmittance of a lens over the picture; each kind is a subclass."""
 
     kinds: ClassVar[Registry[Any]] = Registry(
         "kind of lens shading",

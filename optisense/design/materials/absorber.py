@@ -17,5 +17,5 @@ class Absorber(Material):
     kind: Literal["absorber"] = "absorber"
 
     def in_words(self) -> str:
-        """That it is black."""
+        """The statement that the material is black."""
         return "reflects nothing"

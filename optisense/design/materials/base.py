@@ -1,4 +1,4 @@
-"""What every material and every coating tells about itself."""
+"""The interface of all materials and coatings."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ GEL_INDEX = 1.41
 
 @dataclass(frozen=True)
 class Medium:
-    """What light meets that enters a transparent material.
+    """The optical medium of a transparent material.
 
     Attributes:
         ior: refractive index, of all colours where dispersion is not simulated.
@@ -43,7 +43,7 @@ class Medium:
 
 @dataclass(frozen=True)
 class Reflection:
-    """How an opaque surface reflects: a blend of a diffuse lobe and a rough metal's.
+    """Reflection at an opaque surface: a blend of a diffuse lobe and a rough metal's.
 
     The weights are 1 - `specularity` and `specularity`. As it stands, the surface is black.
 
@@ -90,7 +90,7 @@ class Reflection:
 
 
 class Material(KindModel):
-    """What a part is made of; each kind of material is a subclass.
+    """The material of a part; each kind of material is a subclass.
 
     A kind is transparent, and has a `medium`, or opaque, and has a `reflection`.
 

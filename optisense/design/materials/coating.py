@@ -17,7 +17,7 @@ FIXED_ROUGHNESS = 0.1
 where none is given (its documentation), as the paper names that model and no roughness."""
 
 Scattering = Literal["blend", "blend-fixed-roughness", "conductor"]
-"""What the specularity of a coating changes; see `flake_lobe`."""
+"""The model that the specularity of a coating controls; see `flake_lobe`."""
 
 
 def _is_usual(scattering: object) -> bool:

@@ -1,4 +1,4 @@
-"""How an elastomer yields."""
+"""Elastic constants of an elastomer."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ infinite; silicones are measured between 0.48 and 0.4999."""
 
 
 class GelElasticity(Model):
-    """How a gel yields: the constants of linear isotropic elasticity, and friction."""
+    """Constants of linear isotropic elasticity of a gel, and its friction."""
 
     youngs_modulus: Positive = Field(
         description="Young's modulus", examples=[0.435], json_schema_extra={"unit": "MPa"}

@@ -1,4 +1,4 @@
-"""How a camera turns light into a picture: `PictureChain`, and the pieces that it is made of.
+"""The response of a camera to light: `PictureChain` and its pieces.
 
 `CameraResponse` has a file for each kind, `tone_curve` the tone curves, `electronics` noise, black
 level and colours; what the lens does is in `design/lenses`.

@@ -1,4 +1,4 @@
-"""What every kind of camera response does."""
+"""The interface of all kinds of camera responses."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a camera's sensor and its processor add to the light: noise, black level, colours.
+"""Noise, black level and colour matrix of a camera's sensor and processor.
 
 Levels are shares of the largest that a pixel can hold: 1 is full.
 """
@@ -20,7 +20,7 @@ FloatArray = NDArray[np.floating]
 Row = tuple[Number, Number, Number]
 
 NoiseSeed = int | tuple[int, ...]
-"""What names a random sequence of noise: one or several numbers from 0 up."""
+"""The seed of a noise sequence: one or several numbers from 0 up."""
 
 
 def _invertible(matrix: tuple[Row, Row, Row]) -> tuple[Row, Row, Row]:

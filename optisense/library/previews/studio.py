@@ -1,4 +1,4 @@
-"""Where the preview ball lies: a chequered floor, an even sky and soft lamps."""
+"""The surroundings of the preview ball: a chequered floor, an even sky and soft lamps."""
 
 from __future__ import annotations
 
