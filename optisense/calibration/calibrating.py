@@ -72,7 +72,7 @@ OUTLYING = 1.7
 
 @dataclass(frozen=True)
 class CalibrationSettings:
-    """How a design is fitted.
+    """Settings of a calibration.
 
     Attributes:
         families: what may change, of `families.FAMILIES`.

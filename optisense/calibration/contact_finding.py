@@ -1,4 +1,4 @@
-"""Where a ball touches, found in the difference between a photograph and the background.
+"""Detection of a ball's contact in the difference between a photograph and the background.
 
 The response of a tactile sensor to a tilt of its skin is nearly odd: what one flank of a ball loses
 in brightness, the opposite flank gains. So the contact's middle is the place about which the

@@ -311,10 +311,10 @@ FAMILIES = {
     "gel": Family("thickness of a flat gel, and Poisson ratio", _gel, False),
     "indices": Family("refractive indices", _indices, False),
 }
-"""What may be fitted without being asked for by path."""
+"""Families of quantities that a calibration can fit, by name."""
 
 USUAL = tuple(name for name, family in FAMILIES.items() if family.usual)
-"""What is fitted unless it is kept."""
+"""Names of the families that a calibration fits by default."""
 
 
 def chosen_families(keep: Sequence[str], also: Sequence[str]) -> tuple[str, ...]:

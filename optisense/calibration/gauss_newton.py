@@ -68,7 +68,7 @@ TRUST = 2.5
 
 @dataclass(frozen=True)
 class Solution:
-    """What a round of the fit found.
+    """The solution of one round of the fit.
 
     Attributes:
         steps: (n,) of the quantities, in plausible ranges from their starts.

@@ -89,4 +89,4 @@ class KeptRenderings:
 
 
 KEPT_NOWHERE = KeptRenderings()
-"""For calibrations without a folder, which make every rendering anew."""
+"""The store of calibrations without a folder, which repeat every rendering."""

@@ -30,7 +30,7 @@ WIDEST_RANGE = 4.0
 
 @dataclass(frozen=True)
 class ModelPictures:
-    """What a model gives for the background and the presses of photographs.
+    """Pictures that a model gives for the photographed background and presses.
 
     Attributes:
         exposure: the factor on its radiance that brings it closest to the photographed background.

@@ -1,4 +1,4 @@
-"""What a calibration may change in a design, and how its numbers become a design again.
+"""Quantities that a calibration fits, and the design that follows from their values.
 
 Each quantity has a start, limits, and a plausible range: the standard deviation of a normal
 distribution about the start, which the photographs outweigh where they tell anything. Quantities of

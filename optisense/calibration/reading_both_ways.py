@@ -1,4 +1,4 @@
-"""What a reader that was calibrated on a model reads in photographs, and the other way round.
+"""Readers calibrated on a model and tried on photographs, and the reverse.
 
 The reader is the one of the objective `reading` (`optisense.reading.lookup`). It learns the change
 of colour at each tilt from the contacts of the presses, where a ball decides how the skin is

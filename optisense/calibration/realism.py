@@ -1,4 +1,4 @@
-"""How far a model's pictures are from photographs of the real sensor.
+"""Differences between a model's pictures and photographs of the real sensor.
 
 A *response* is a picture with something pressed in, less the picture with nothing. All figures of
 presses compare responses, in two regions: the *contact*, a disc, and the *ring* around it, from 1.1
@@ -47,7 +47,7 @@ SIMILARITY_CONSTANTS = (0.01 * LEVELS) ** 2, (0.03 * LEVELS) ** 2
 
 @dataclass(frozen=True)
 class PressRealism:
-    """How far the model is from one photograph of a press; levels are those of 255.
+    """Differences between the model and one photograph of a press, in levels of 255.
 
     Attributes:
         name: of the photograph.
@@ -77,7 +77,7 @@ class PressRealism:
 
 @dataclass(frozen=True)
 class ReadBothWays:
-    """What readers read in one contact that were calibrated on the other's pictures.
+    """Readings of one contact by readers that were calibrated on the other's pictures.
 
     Attributes:
         name: of the photograph.
@@ -97,7 +97,7 @@ class ReadBothWays:
 
 @dataclass(frozen=True)
 class BackgroundRealism:
-    """How far the model's untouched picture is from the real one, for R, G and B.
+    """Differences between the model's untouched picture and the real one, for R, G and B.
 
     Attributes:
         correlation: of the pixels.
@@ -115,7 +115,7 @@ class BackgroundRealism:
 
 @dataclass(frozen=True)
 class Realism:
-    """How far a model is from photographs.
+    """Differences between a model and photographs.
 
     Attributes:
         background: of the untouched sensor.

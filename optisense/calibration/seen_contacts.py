@@ -1,4 +1,4 @@
-"""Where photographs show contacts, and what presses there into a model."""
+"""Contacts that photographs show, and the indenters that press there into a model."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ radii, from which on the label is doubted. Hand labels are off by a tenth."""
 
 @dataclass(frozen=True)
 class SeenContact:
-    """Where a photograph shows a contact.
+    """Position and size of a contact in a photograph.
 
     Attributes:
         centre: column and row of its middle, pixels from the left and top edge.

@@ -77,7 +77,7 @@ BESIDE_WINDOW = 0.5
 BEHIND_ROLLER = 2.0
 """mm from the roller to where green light is aimed in light design 3."""
 GREEN_LEAD = 3.0
-"""How many times red and blue green shines: it comes from one end of a longer way."""
+"""The ratio of green's power to that of red and blue: green comes from one end of a longer path."""
 WRAP = 90.0
 """Degrees by which the belt is turned where it is no longer drawn."""
 

@@ -1,4 +1,4 @@
-"""Where the numbers of GelBelt come from. Its authors publish few of them."""
+"""Sources of the numbers of GelBelt. Its authors publish few of them."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from optisense.design import Provenance, Status
 
 @dataclass(frozen=True)
 class LeftOut:
-    """What is not drawn of a belt: its way back behind the wheels.
+    """The part of a belt that is not modelled: its return behind the wheels.
 
     Attributes:
         length: mm, along the inner face.

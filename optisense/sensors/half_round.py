@@ -68,7 +68,7 @@ class HalfRound:
         return self._cut(outer._pieces(tessellation))
 
     def _pieces(self, tessellation: float) -> tuple[int, int, int, int]:
-        """Of the end, a corner, a side and the half round."""
+        """The numbers of points of the end, a corner, a side and the half round."""
 
         def odd(length: float, least: int) -> int:
             return 2 * (max(least, math.ceil(length / tessellation)) // 2) + 1

@@ -1,5 +1,4 @@
-"""How large the LEDs of the built-in sensors are, and how brightly they shine where no source says
-it."""
+"""Sizes of the LEDs of the built-in sensors, and their power where no source states it."""
 
 from __future__ import annotations
 

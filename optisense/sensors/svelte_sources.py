@@ -1,4 +1,4 @@
-"""Where the numbers of GelSight Svelte come from."""
+"""Sources of the numbers of GelSight Svelte."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a robot would read from a sensor: datasets, perception tasks, shape reconstruction.
+"""Tasks of a robot with a sensor: datasets, perception tasks, shape reconstruction.
 
 Names load on first use, so that importing the package loads neither scikit-learn nor the renderer.
 """

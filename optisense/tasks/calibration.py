@@ -55,12 +55,12 @@ _PLACE, _CAMERA, _SAMPLES, _SENSOR = 5, 6, 7, 10
 another. No two modules of this package share one."""
 
 _NEXT_READER = 1009
-"""What is added to the seed of a fit for each further reader: more than seeds usually differ by."""
+"""The offset of seeds between readers of a fit: a prime larger than usual differences of seeds."""
 
 
 @dataclass(frozen=True)
 class ReconstructionSettings:
-    """How a reader is fitted and tried.
+    """Settings of the fit and the test of a reader.
 
     Attributes:
         method: "network" or "table" (see `colour_to_normal`).

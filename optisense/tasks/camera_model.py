@@ -1,4 +1,4 @@
-"""What a dataset tells of its camera: a ray for each pixel, and the pinhole that comes nearest.
+"""The camera of a dataset: a ray for each pixel, and the pinhole that comes nearest.
 
 The rays are those inside the gel, where they arrive at the skin: between the skin at rest and a
 skin that is pressed in they are straight, so they are right through glass, gel and over mirrors. A
@@ -73,7 +73,7 @@ class Pinhole:
 
     @staticmethod
     def of(camera: Camera, resolution: tuple[int, int]) -> Pinhole:
-        """That of a design, as if nothing were before its lens.
+        """The camera of a design, without any refraction before its lens.
 
         Args:
             camera: its field of view is that across the picture.

@@ -1,4 +1,4 @@
-"""What tells designs and meshes apart when a dataset goes on."""
+"""Digests that identify designs and meshes when a dataset is continued."""
 
 from __future__ import annotations
 

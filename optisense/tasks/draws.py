@@ -100,7 +100,7 @@ class DrawnContact:
 
 @dataclass(frozen=True)
 class ContactDraw:
-    """What random contacts are drawn from, each quantity evenly.
+    """Ranges that random contacts are drawn from; each quantity is uniform.
 
     Attributes:
         indenters: texts of `parse_indenter`, each as likely as the others.

@@ -65,7 +65,7 @@ another. No two modules of this package share one."""
 
 @dataclass(frozen=True)
 class DatasetSettings:
-    """How samples are made. Another number of samples does not change the first ones.
+    """Settings of the samples. Another number of samples does not change the first ones.
 
     Attributes:
         contacts: what contacts are drawn from.

@@ -24,7 +24,7 @@ BETTER, WORSE, UNKNOWN = "better", "worse", "cannot be told"
 
 @dataclass(frozen=True)
 class ErrorChange:
-    """How an error differs between two sensors that were pressed by the same things.
+    """The difference of an error between two sensors that the same objects pressed.
 
     Attributes:
         before, after: mean errors of the two.

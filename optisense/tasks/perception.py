@@ -103,7 +103,7 @@ class PerceptionTask(Protocol):
 
 @dataclass(frozen=True)
 class SampleSettings:
-    """How samples are made.
+    """Settings of the samples.
 
     Attributes:
         count: of samples.
@@ -134,7 +134,7 @@ class Samples:
 
 @dataclass(frozen=True)
 class PerceptionResult:
-    """How well a sensor tells a quantity.
+    """The accuracy with which a sensor measures a quantity.
 
     task, unit, targets: of what. samples: what was learned from. reading: of the random forest,
     cross-validated. snr: the signal-to-noise ratio. settings: of task and samples.

@@ -1,4 +1,4 @@
-"""What a calibrated sensor reads of one press, and what two sensors miss of it."""
+"""Readings of one press by a calibrated sensor, and the errors of two sensors."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ FloatArray = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class PressPictures:
-    """What one press looks like; arrays are (h, w, ...).
+    """Pictures and normals of one press; arrays are (h, w, ...).
 
     picture: uint8. true_normals, read_normals: unit, in the design's frame. angles: degrees between
     them, NaN where nothing touches.
@@ -36,7 +36,7 @@ class PressPictures:
 
 @dataclass(frozen=True)
 class PressReading:
-    """What a sensor reads of one press, where its camera sees the contact.
+    """The reading of one press by a sensor, where its camera sees the contact.
 
     Attributes:
         points: (n, 3) mm, the untouched skin behind the pixels of the contact.

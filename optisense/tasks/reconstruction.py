@@ -137,7 +137,7 @@ def _mean_of_known(values: Iterable[float]) -> float:
 
 @dataclass(frozen=True)
 class ReconstructionResult:
-    """How well shapes come back: each object, and the means over objects."""
+    """The accuracy of reconstructed shapes: each object, and the means over objects."""
 
     design: str
     objects: dict[str, Reconstruction]

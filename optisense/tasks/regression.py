@@ -1,4 +1,4 @@
-"""How well a random forest reads a quantity from features, on samples it was not fitted to."""
+"""Cross-validated accuracy of a random forest that reads a quantity from features."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ FloatArray = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class ForestReading:
-    """What a random forest read, each sample by a forest that did not see it.
+    """Cross-validated predictions of a random forest.
 
     predictions: (n, t). error: mean absolute error over samples and targets. spread: standard
     deviation of the error among folds. guess: the error of always saying the mean.

@@ -1,4 +1,4 @@
-"""Which samples of a dataset learn, which choose, and which judge."""
+"""Training, validation and test samples of a dataset."""
 
 from __future__ import annotations
 

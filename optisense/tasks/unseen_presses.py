@@ -71,7 +71,7 @@ class UnseenPress:
 
 @dataclass(frozen=True)
 class UnseenPresses:
-    """What is pressed into two sensors.
+    """Presses of the same objects into two sensors.
 
     Attributes:
         presses: as many for each object, object by object.

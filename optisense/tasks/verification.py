@@ -53,7 +53,7 @@ BEFORE, AFTER = "before", "after"
 
 @dataclass(frozen=True)
 class VerificationSettings:
-    """What is pressed, and how it is read.
+    """Settings of a verification: the presses and the readers.
 
     Attributes:
         objects: keys of `optisense.geometry.objects.OBJECTS`.
@@ -85,7 +85,7 @@ class VerificationSettings:
 
 @dataclass(frozen=True)
 class SensorView:
-    """What a camera sees of the untouched skin.
+    """Measures of a camera's view of the untouched skin.
 
     Attributes:
         coverage: share of the skin's area.
@@ -100,7 +100,7 @@ class SensorView:
 
 @dataclass(frozen=True)
 class Verification:
-    """How two sensors read the same things.
+    """Errors of two sensors that read the same objects.
 
     Arrays are (objects, places, readers), of errors over the whole contact: what a camera does not
     see of it, while the other does, counts as read flat.

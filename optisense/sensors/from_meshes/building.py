@@ -43,7 +43,7 @@ USUAL_MATERIAL = {
     Role.SUPPORT: "acrylic",
     Role.MIRROR: "mirror-silver",
 }
-"""What parts are made of where the recipe does not say; marked as assumed."""
+"""Materials of parts for which the recipe names none; they are marked as assumed."""
 
 
 @dataclass

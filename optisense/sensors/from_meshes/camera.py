@@ -1,4 +1,4 @@
-"""Where the camera goes and what it looks at."""
+"""Placement and orientation of the camera."""
 
 from __future__ import annotations
 

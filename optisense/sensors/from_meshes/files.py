@@ -36,7 +36,7 @@ COMMON_UNITS = tuple(unit for unit in MM_PER if unit != "mil")
 
 @dataclass(frozen=True)
 class Body:
-    """What a file holds.
+    """One body of a file.
 
     Attributes:
         file: as it was named.

@@ -32,7 +32,7 @@ from optisense.sensors.from_meshes.recipe_parts import MM_PER, PartChoice, Shape
 from optisense.sensors.from_meshes.surfaces import WITHIN
 
 Use = Role | Literal["lights", "camera", "nothing"]
-"""What a body is: a part of some role, a reference for lights or the camera, or left out."""
+"""The use of a body: a part of some role, a reference for lights or the camera, or none."""
 
 WORDS: tuple[tuple[Use, tuple[str, ...]], ...] = (
     ("lights", ("led", "leds", "light", "lights", "lamp", "lamps", "diode")),

@@ -1,4 +1,4 @@
-"""Where the lights of a group go: along a side of a part, around it, or over a surface."""
+"""Placement of the lights of a group: along a side of a part, around it, or over a surface."""
 
 from __future__ import annotations
 

@@ -65,7 +65,10 @@ class CameraChoice(Model):
 
 
 class Recipe(Model):
-    """How a sensor is made of CAD files. Lengths in mm, angles in degrees, powers in mW."""
+    """A recipe that makes a sensor from CAD files.
+
+    Lengths are in mm, angles in degrees, powers in mW.
+    """
 
     name: Annotated[str, Field(min_length=1, max_length=200)]
     description: str = ""

@@ -1,4 +1,4 @@
-"""What a recipe says of its lights: their kind, their colour and where they go."""
+"""Lights of a recipe: their kind, colour and placement."""
 
 from __future__ import annotations
 
@@ -199,7 +199,7 @@ class FromTable(Model):
 
 
 WAYS = ("row", "ring", "over", "along", "from", "at")
-"""How the lights of a group can be placed."""
+"""Names of the ways to place the lights of a group."""
 
 
 class LightChoice(Model):

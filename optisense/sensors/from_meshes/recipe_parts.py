@@ -1,4 +1,4 @@
-"""What a recipe says of shapes and parts: their files, how they are put into place, their roles."""
+"""Shapes and parts of a recipe: their files, placement and roles."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the steps from a recipe to a design share."""
+"""The state that the steps from a recipe to a design share."""
 
 from __future__ import annotations
 

@@ -12,7 +12,7 @@ from optisense.sensors.from_meshes.recipe_parts import ShapeReference
 from optisense.writing import write_text
 
 RECIPE_FILE = "recipe.yaml"
-"""What the recipe of a design is called in its folder."""
+"""The file name of a design's recipe in its folder."""
 
 HEAD = "How a sensor is made of CAD files. Lengths in mm, angles in degrees, powers in mW."
 

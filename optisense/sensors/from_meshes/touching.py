@@ -34,7 +34,7 @@ PROBES = 64
 
 @dataclass
 class Contacts:
-    """What came of the contacts.
+    """The parts after their contacts were closed.
 
     Attributes:
         meshes: of the solids, by part.
