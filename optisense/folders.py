@@ -48,7 +48,7 @@ SUBFOLDERS = (
     "renderings",
     "units",
 )
-"""Where commands write temporary files besides the folder itself."""
+"""Subfolders in which commands write temporary files, beside the folder itself."""
 
 
 class FolderLock:

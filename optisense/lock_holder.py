@@ -1,4 +1,4 @@
-"""Which process holds the lock of a folder, as its lock file tells."""
+"""The process that holds the lock of a folder, read from its lock file."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ MOST_TEXT = 1_000_000
 
 @dataclass(frozen=True)
 class Holder:
-    """What a lock file tells.
+    """The content of a lock file.
 
     Attributes:
         process: number of the process that wrote it.
@@ -42,7 +42,7 @@ class Holder:
 
     @staticmethod
     def of_this_process() -> Holder:
-        """Who this process is."""
+        """The holder that stands for this process."""
         words = [Path(sys.argv[0]).name if sys.argv else "python", *sys.argv[1:2]]
         return Holder(
             process=os.getpid(),

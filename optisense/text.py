@@ -18,7 +18,7 @@ DIRECTIONS = frozenset("\u061c\u200e\u200f\u202a\u202b\u202c\u202d\u202e\u2066\u
 """Characters that change the direction of the text after them."""
 
 MARKDOWN = re.compile(r"[\\`*{}\[\]#!|~$]|(?<!\w)_|_(?!\w)")
-"""What marks text up in Markdown; '_' within a word does not."""
+"""Characters that mark text up in Markdown; '_' within a word does not."""
 
 
 def visible(text: str) -> str:

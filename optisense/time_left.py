@@ -1,4 +1,4 @@
-"""How long work will still take, estimated from the pieces that are finished.
+"""The time that work still takes, estimated from the pieces that are finished.
 
 Work is a sequence of steps, and a step is a number of like pieces: trials, sensors, photon passes.
 What is measured of a step tells how long its other pieces take. What has not begun yet is expected

@@ -66,7 +66,7 @@ MOST_STORE = 1024 * MEBIBYTE
 """Bytes of a study's store: a trial has some 2 KiB, so this is half a million of them."""
 
 LARGEST_INTEGER = 2**63 - 1
-"""Of whole numbers in JSON: the largest that NumPy and SQLite can hold."""
+"""The largest whole number accepted in JSON: NumPy and SQLite hold no larger one."""
 
 COPY_AGAIN = "Check that this is the right file, and copy or make it again"
 

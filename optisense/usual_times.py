@@ -1,4 +1,4 @@
-"""How long pieces of work usually take, so that a time left can be told before any is measured.
+"""Usual durations of pieces of work, which give the time left before any is measured.
 
 Times are stated in processor seconds on GelSight Mini, with kernels in the renderer's cache. They
 become seconds by the number of processors, by how many other processes want these, and by the size
@@ -52,8 +52,8 @@ MOST_THREADS = 8
 """Processors that shorten the work in proportion; more are idle between short kernels."""
 
 SHARED_POWER = 1.4
-"""Where other processes want the processors and work of one thread takes k times as long, that of
-all threads takes about k to this power: its slowest thread is waited for."""
+"""The exponent of slowdown by other processes: where work of one thread takes k times as
+long, that of all threads takes about k to this power, since it waits for its slowest thread."""
 
 _BEGAN = time.monotonic(), time.process_time()
 

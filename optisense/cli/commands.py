@@ -34,7 +34,7 @@ _HOMES = {
     "library": "library_app",
     "task": "task_app",
 }
-"""What stands for each command in the module of its name: a function, or a group of commands."""
+"""The function or group that defines each command, in the module of the command's name."""
 
 
 class _Commands(MutableMapping[str, Any]):

@@ -1,4 +1,4 @@
-"""What commands say and with which exit code they end.
+"""Output of commands and their exit codes.
 
 Results go to standard output, everything else to standard error, so that output can be piped.
 """
@@ -59,7 +59,7 @@ _P = ParamSpec("_P")
 _R = TypeVar("_R")
 _debug = False
 _ending: ContextVar[ExitStack] = ContextVar("ending")
-"""What is to be called when the command ends."""
+"""Callbacks that run when the command ends."""
 
 
 def set_debug(debug: bool) -> None:

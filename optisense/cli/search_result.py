@@ -1,4 +1,4 @@
-"""What came of a search, as text and as JSON."""
+"""Results of a search as text and as JSON."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How far a search is, on standard error."""
+"""Progress of a search on standard error."""
 
 from __future__ import annotations
 

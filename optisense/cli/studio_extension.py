@@ -23,7 +23,7 @@ HELP = ("studio", "cages", "library", "simulation", "objectives", "search", "wor
 """Pages of the documentation that come with the extension; its buttons *Help* show them."""
 
 NOT_THERE = "should have been installed but not found"
-"""What Blender says when it has installed nothing after all."""
+"""The message of Blender when it has installed nothing, although it reports success."""
 
 HOW_TO_GET = (
     "Get Blender 4.2 or newer from https://www.blender.org/download, then name it: "
@@ -49,7 +49,7 @@ PLACES = {
         "C:/Program Files (x86)/Steam/steamapps/common/Blender/blender.exe",
     ),
 }
-"""Where Blender usually is, by `sys.platform`."""
+"""The usual places of Blender's executable, by `sys.platform`."""
 
 
 def source_folder() -> Path:

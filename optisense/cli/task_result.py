@@ -1,4 +1,4 @@
-"""What `optisense task` prints of its results."""
+"""Results of `optisense task` as text."""
 
 from __future__ import annotations
 

@@ -78,7 +78,7 @@ def verify(
 
 
 class Compared(NamedTuple):
-    """What came of a comparison.
+    """The result of a comparison.
 
     Attributes:
         found: what both sensors read.

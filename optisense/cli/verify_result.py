@@ -1,4 +1,4 @@
-"""What `optisense verify` prints."""
+"""Results of `optisense verify` as text."""
 
 from __future__ import annotations
 

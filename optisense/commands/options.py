@@ -1,4 +1,4 @@
-"""What models of options consist of, and how values are read that people write as text."""
+"""Building blocks of option models, and parsers of values that users write as text."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ class CommandOptions(BaseModel):
 
 @dataclass(frozen=True)
 class Written:
-    """How an option is written on the command line.
+    """The notation of an option on the command line.
 
     Attributes:
         form: what stands for its value in help texts, such as WIDTHxHEIGHT.

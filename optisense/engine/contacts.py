@@ -46,7 +46,7 @@ class GivenContact(BaseModel):
 
 
 AnyContact = str | GivenContact
-"""What stands under `contacts` in a request."""
+"""A contact in a request's `contacts`."""
 
 
 def contact_of(given: AnyContact) -> Contact:

@@ -44,7 +44,7 @@ class DesignReference(BaseModel):
 
 
 AnyDesign = str | DesignReference
-"""What stands under `design` in a request."""
+"""The `design` of a request."""
 
 
 class MeshFile(BaseModel):

@@ -1,4 +1,4 @@
-"""What can go wrong with a request, and each of it as data."""
+"""Errors of requests, and their form as data."""
 
 from __future__ import annotations
 

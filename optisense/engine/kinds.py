@@ -33,7 +33,7 @@ NOUNS: dict[str, type[KindModel]] = {
     "blur": LensBlur,
     "tone_curve": ToneCurve,
 }
-"""What comes in kinds; each noun has its own registry."""
+"""Base classes that have kinds, by name; each has its own registry."""
 
 NOT_SHOWN = ("kind", "library")
 """Fields that say what a value is, and are no numbers to change."""
@@ -44,7 +44,7 @@ BOUNDS = {
     "maximum": "maximum",
     "exclusiveMaximum": "below",
 }
-"""What a JSON schema calls a bound, and what a row calls it."""
+"""Names of bounds in a JSON schema, and in the rows of this module."""
 
 
 @handles("kinds", Fields, Lane.QUICK)

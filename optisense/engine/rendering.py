@@ -41,7 +41,7 @@ MOST_PLACES = 100
 """Places of one ledger; each takes as long as the ledger."""
 
 LEVELS = (np.arange(256) / 255.0).astype(np.float32)
-"""What the 256 levels of a picture are from 0 to 1."""
+"""The 256 levels of a picture on a scale from 0 to 1."""
 
 ImageFile = Literal["picture", "pixels", "radiance", "layers", "normals", "points", "mask"]
 

@@ -18,7 +18,7 @@ Handler = Callable[[Session, Any, Job], dict[str, Any]]
 
 
 class Lane(Enum):
-    """Where a request is done."""
+    """The queue that carries out a request."""
 
     QUICK = "quick"  # what needs no renderer, one after another
     RENDER = "render"  # what needs it, one after another

@@ -21,7 +21,7 @@ PROCESS_FILE = "process.json"
 process."""
 
 LOG_FILE = "search.log"
-"""What the process says besides its result; for finding out why it died."""
+"""The file of the process's messages, which shows why it died."""
 
 LAST_WORDS = 2000
 """Number of bytes at the end of the process's output that are told when it died; a Python error

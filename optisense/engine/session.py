@@ -1,4 +1,4 @@
-"""What the engine keeps between requests."""
+"""State that the engine keeps between requests."""
 
 from __future__ import annotations
 

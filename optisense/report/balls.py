@@ -1,4 +1,4 @@
-"""Where a picture shows each of several pressed balls: outlines and numbers to draw over it."""
+"""Outlines and numbers of several pressed balls, to draw over their picture."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How a design looks from its camera: a picture, its chief rays, and how they distort."""
+"""A design seen from its camera: a picture, its chief rays, and their distortion."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ STRETCHED = 90.0
 
 @dataclass(frozen=True)
 class RayFigures:
-    """What chief rays alone tell of a design; NaN where it can't be told.
+    """Measures of a design that follow from chief rays alone; NaN where they are undefined.
 
     Attributes:
         aoap: the score.

@@ -1,4 +1,4 @@
-"""What a search did to a cage: its control points moved, drawn on the part that they bend."""
+"""Changes of a cage by a search: its moved control points, drawn on the part that they bend."""
 
 from __future__ import annotations
 

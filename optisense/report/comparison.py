@@ -35,7 +35,7 @@ LEAST_CUT = 24
 """Pixels that they show to each side, at least."""
 
 COLOURS = {"R": "#c0392b", "G": "#2e8b57", "B": "#1f6fb2"}
-"""Of the curves of the channels."""
+"""Colours of the curves of the channels."""
 
 
 def write_comparison(path: str | Path, design: SensorDesign, found: Comparison) -> Path:

@@ -1,4 +1,4 @@
-"""What figures in a page have in common."""
+"""Helpers that the figures of a page share."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Where the light goes, as a section of a page: bars, a table, and ways of photons in 3-D."""
+"""The ledger of the light as a section of a page: bars, a table, and photon paths in 3-D."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ is one of a usual light group."""
 
 @dataclass(frozen=True)
 class LightSection:
-    """What the section shows.
+    """Data of the section.
 
     Attributes:
         ledger: where the light of each group goes.

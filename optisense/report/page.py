@@ -28,7 +28,7 @@ from optisense.writing import write_text
 
 
 class RenderedImage(Protocol):
-    """What a page needs to know of a tactile image (see `optisense.optics.TactileImage`)."""
+    """The properties of a tactile image that a page needs (see `optisense.optics.TactileImage`)."""
 
     @property
     def radiance(self) -> NDArray[np.float32]:

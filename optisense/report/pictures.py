@@ -13,8 +13,8 @@ FloatArray = NDArray[np.floating]
 ByteArray = NDArray[np.uint8]
 
 MOST_STRETCHED = 4.0
-"""Where the scale of stretching ends: a ball that looks four times as long as wide is hardly a ball
-any more, and finer differences beyond that matter little."""
+"""The ratio at which the scale of stretching ends: a ball four times as long as wide is hardly a
+ball any more, and finer differences beyond that matter little."""
 
 
 UP = 2

@@ -1,4 +1,4 @@
-"""Why a place of the skin is as bright as it is, as a section of a page.
+"""The sources of the light at a place of the skin, as a section of a page.
 
 Each light group has a bar, and a drawing of the directions that its light comes from.
 """
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from optisense.optics.place_light import GroupLight, PlaceLight
 
 WAY_COLOURS = ("#0f7a41", "#6fc07a", "#4b3f8f", "#bf7a4a", "#f2c27b")
-"""Of the ways that light has come, in the order of `optisense.optics.place_light.WAY_WORDS`."""
+"""Colours of the light's paths, in the order of `optisense.optics.place_light.WAY_WORDS`."""
 
 LEAST_LABELLED = 0.12
 """Share of a bar that has room for its number."""

@@ -38,7 +38,7 @@ LONGEST = 34
 
 @dataclass(frozen=True)
 class Influence:
-    """How much a score goes with one parameter over the trials of a study.
+    """The association of a score with one parameter over the trials of a study.
 
     Attributes:
         number: of the parameter.

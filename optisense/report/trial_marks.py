@@ -1,4 +1,4 @@
-"""Where the figures of a page show which trial, so that the page can answer a pointer."""
+"""Positions of trials in the figures of a page, so that the page can answer a pointer."""
 
 from __future__ import annotations
 
