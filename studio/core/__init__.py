@@ -1,1 +1,1 @@
-"""What the extension computes, without bpy: numbers, poses, cages, meshes, the engine's process."""
+"""The extension's computations without bpy: numbers, poses, cages, meshes, the engine's process."""

@@ -1,4 +1,4 @@
-"""What makes a scene no design."""
+"""Errors of scenes that are no design."""
 
 from __future__ import annotations
 

@@ -11,15 +11,15 @@ ROOM = 0.86
 """Share of the free part of a view that the sensor fills; its head and gizmos stay beside it."""
 
 ROUNDS = 12
-"""How often a view is fitted: nearer things grow faster, and after twelve times nothing moves by a
-pixel any more."""
+"""The number of times that a view is fitted: nearer things grow faster, and after twelve times
+nothing moves by a pixel any more."""
 
 NEAREST = 0.2
 """Share of the distance between eye and middle: nothing is taken to be nearer to the eye."""
 
 
 class Fit(NamedTuple):
-    """Where a view looks and from how far, mm."""
+    """The point that a view looks at and its distance, mm."""
 
     location: NDArray[np.float64]
     distance: float

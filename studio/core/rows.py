@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 FloatArray = NDArray[np.float64]
 
 OFF_LINE = 0.1
-"""How far lights of one row stand beside its line at most, as a share of its length."""
+"""The largest distance of a row's lights from its line, as a share of its length."""
 
 SHORTEST = 1e-6
 """mm: shorter edges have no direction, and places that are nearer to one another are one."""

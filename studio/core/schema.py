@@ -8,7 +8,7 @@ Row = dict[str, Any]
 """A kind or a field, as the engine's answer to `kinds` has it."""
 
 JUST_BEYOND = 1e-6
-"""How far from a bound a number stays that must not reach it; in the number's own unit."""
+"""The distance kept from an exclusive bound, in the number's own unit."""
 
 _told: dict[str, Any] = {}
 

@@ -1,4 +1,4 @@
-"""What a score says: how good it is among sensors, and how it changed."""
+"""Scores as text: the place between poor and good sensors, and the change."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What of an object a search may change, in the words of the engine."""
+"""Parameters of an object that a search may change, as paths of the engine."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ TURN = 10.0
 
 
 NEAR = 0.1
-"""How far a number without two bounds may change, as a share of what it is now."""
+"""The range of a number without two bounds, as a share of its present value."""
 
 
 def listed(text: str) -> list[str]:

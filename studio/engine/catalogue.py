@@ -1,4 +1,4 @@
-"""What the engine offers, asked once when it starts: sensors, the library, objectives, methods."""
+"""The engine's catalogue, asked at its start: sensors, the library, objectives, methods."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What all panels share."""
+"""Layout helpers that all panels share."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How operators end: with an error that the user sees, or with a request to the engine."""
+"""The end of operators: an error that the user sees, or a request to the engine."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Why a button is grey."""
+"""Conditions of buttons, and the reason why one is grey."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Where the engine is."""
+"""Preferences: the place of the engine."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""How a sensor is drawn in 3D views, beside its objects: outlines, lit lamps, beams, sections."""
+"""Drawing of a sensor in 3D views, beside its objects: outlines, lit lamps, beams, sections."""

@@ -1,1 +1,1 @@
-"""What parts are made of, and the coating."""
+"""Panels of materials and the coating."""

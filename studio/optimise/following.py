@@ -1,4 +1,4 @@
-"""What the panel and the viewport show of a search while it runs."""
+"""Progress of a running search in the panel and the viewport."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What may vary, how to search, and how far the search is."""
+"""Properties of a search: its parameters, settings and progress."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a search may change of the object that is selected."""
+"""Parameters of the selected object that a search may change."""
 
 from __future__ import annotations
 

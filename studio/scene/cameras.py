@@ -16,7 +16,7 @@ from .collections import OPTICAL_SYSTEM, collection, objects_of
 from .lamps import place
 
 DRAWN_SIZE = 5.0
-"""How large (mm) the pyramid of the camera is drawn."""
+"""The drawn size (mm) of the camera's pyramid."""
 
 VIEW = ("model", "projection", "fov", "resolution")
 POSE = ("position", "direction", "up")

@@ -21,7 +21,7 @@ USUAL_HALF_ANGLE = 60.0
 """Degrees: that of a flat LED, for a lamp of which nothing is known yet."""
 
 POINT_SIZE = (0.6, 0.6)
-"""How large (mm) a lamp is drawn that is a point or whose size is not known."""
+"""The drawn size (mm) of a lamp that is a point or whose size is not known."""
 
 
 def add_light(

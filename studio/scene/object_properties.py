@@ -1,4 +1,4 @@
-"""What an object is in the design, and what the design says about it."""
+"""The role of an object in the design, and its properties."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a design holds besides objects: coating, materials, light groups."""
+"""Properties of a design besides its objects: coating, materials, light groups."""
 
 from __future__ import annotations
 

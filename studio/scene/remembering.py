@@ -1,4 +1,4 @@
-"""What is selected and hidden, by what it is in the design, so that it can be so again."""
+"""Selection and visibility of objects by their names in the design, to be restored."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What happens by itself when Blender starts or opens a file: the engine warms up."""
+"""Actions when Blender starts or opens a file: the engine warms up."""
 
 from __future__ import annotations
 

@@ -9,7 +9,7 @@ from ..scene.views import show_design
 from ..simulate import editors, picture
 
 SHARE = 0.62
-"""Of the window's width that the bench has; the picture has the rest."""
+"""The share of the window's width that the bench takes; the picture has the rest."""
 
 
 def show(context: bpy.types.Context) -> bool:

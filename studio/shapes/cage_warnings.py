@@ -1,4 +1,4 @@
-"""What the engine's check finds wrong with a cage, told beside it as soon as it rests."""
+"""Findings of the engine's check about a cage, shown beside it once the cage is at rest."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How large and how bright pictures are."""
+"""Size and exposure of pictures."""
 
 from __future__ import annotations
 

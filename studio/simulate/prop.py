@@ -1,4 +1,4 @@
-"""How to simulate, and what was simulated."""
+"""Properties of the simulation: its settings and its result."""
 
 from __future__ import annotations
 

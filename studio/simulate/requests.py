@@ -1,4 +1,4 @@
-"""What is asked of the engine for a picture, and what becomes of its answer."""
+"""Requests to the engine for a picture, and the handling of its answers."""
 
 from __future__ import annotations
 

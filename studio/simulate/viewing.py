@@ -1,4 +1,4 @@
-"""How Image Editors show the picture: channels, false colours, against a pinned picture.
+"""Display of the picture in Image Editors: channels, false colours, against a pinned picture.
 
 The picture itself stays as it is, for scripts and for saving: what is looked at is another image.
 """
