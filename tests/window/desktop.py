@@ -16,9 +16,14 @@ PAGE = (1000, 1000)
 
 
 class Desktop:
-    """A display of its own; what it shows is drawn by the processor."""
+    """A display of its own; what it shows is drawn by the processor.
+
+    Attributes:
+        actions: clicks, keys pressed and texts typed so far; a drag is one, a held key another.
+    """
 
     def __init__(self) -> None:
+        self.actions = 0
         for program in ("Xvfb", "xdotool"):
             assert which(program), f"{program} is missing: sh scripts/setup_blender_window.sh"
         read, write = os.pipe()
@@ -46,25 +51,30 @@ class Desktop:
 
     def click(self, x: float, y: float, *, button: int = 1, times: int = 1) -> None:
         """Click somewhere, as a hand does: first there, then down, then up."""
+        self.actions += times
         self.move(x, y)
         time.sleep(0.05)
         self._do("click", "--repeat", times, "--delay", 60, button)
 
     def press(self, down: bool) -> None:
         """Press the mouse's left button without letting it go, or let it go."""
+        self.actions += down
         self._do("mousedown" if down else "mouseup", 1)
 
     def hold(self, key: str, down: bool) -> None:
         """Press a key without letting it go, or let it go."""
+        self.actions += down
         self._do("keydown" if down else "keyup", key)
 
     def keys(self, *names: str) -> None:
         """Press keys, one after the other."""
+        self.actions += len(names)
         for name in names:
             self._do("key", "--delay", 30, name)
 
     def write(self, text: str) -> None:
         """Type a text."""
+        self.actions += 1
         self._do("type", "--delay", 15, text)
 
     def shown(self) -> Image.Image:

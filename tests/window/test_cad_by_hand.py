@@ -1,0 +1,74 @@
+"""From CAD files to the first picture, by mouse and keys, and how many of these that takes."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+from .bench import Bench
+from .test_by_hand import SIMULATE
+
+PARTS = Path(__file__).parents[2] / "docs" / "examples" / "pad-sensor"
+FILES = ("gel.stl", "window.stl", "housing.stl", "leds.stl", "lens.stl")
+
+MOST_ACTIONS = 60
+"""Clicks, keys and typed texts from the files to the first picture; 13 do, where no guess of what
+a body is has to be corrected."""
+
+NEW_SENSOR = 22
+"""Pixels from the button *Open* up to the menu *New Sensor*."""
+
+
+def test_a_picture_from_cad_files_takes_few_actions(bench: Bench) -> None:
+    folder = bench.home / "Documents"
+    for place in (bench.home, folder):
+        place.mkdir(exist_ok=True)
+        for name in FILES:
+            shutil.copy(PARTS / name, place)
+    bench.greet()
+    bench.open_tab()
+    bench.until("bool(part('engine.catalogue').entries('sensors'))")
+    before = bench.desktop.actions
+
+    x, y = bench.find("optisense.open", across=0.25)
+    bench.desktop.click(x, y - NEW_SENSOR)
+    bench.see("1")
+    bench.desktop.keys("End", "Return")
+    mark_all_files(bench)
+    bench.rest()
+    found = "manager.optisense_cad.bodies"
+    bench.until(f"len({found}) == {len(FILES)}")
+    assert bench.see(f"{{each.name: each.use for each in {found}}}") == {
+        "gel": "elastomer",
+        "window": "support",
+        "housing": "blocker",
+        "leds": "lights",
+        "lens": "camera",
+    }
+    bench.photograph("cad-table")
+    bench.press("optisense.make_from_cad", across=0.4)
+    bench.until("scene().optisense.is_open and not state().busy")
+    bench.only(SIMULATE)
+    bench.press("optisense.simulate")
+    bench.until("manager.optisense_picture.shown")
+    bench.rest()
+    bench.photograph("cad-picture")
+
+    actions = bench.desktop.actions - before
+    print(f"{actions} actions from CAD files to the first picture")
+    assert actions <= MOST_ACTIONS
+
+
+def mark_all_files(bench: Bench) -> None:
+    """Mark all files that are asked for, by the key A, and click on the button."""
+    bench.until("any(a.type == 'FILE_BROWSER' for w in manager.windows for a in w.screen.areas)")
+    bench.until("region('FILE_BROWSER', 'EXECUTE').width > 1")
+    left, top, width, height = bench.see("place('FILE_BROWSER', 'WINDOW')")
+    bench.desktop.click(left + width / 2, top + height - 20)
+    bench.see("1")
+    bench.desktop.keys("a")
+    bench.see("1")
+    bench.photograph("cad-files")
+    left, top, width, height = bench.see("place('FILE_BROWSER', 'EXECUTE')")
+    bench.desktop.click(left + width - 70, top + height / 2)
+    bench.until("len(manager.windows) == 1")
