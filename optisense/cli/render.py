@@ -216,6 +216,8 @@ def _say_what_came(image: TactileImage, folder: Path) -> None:
     facts = [f"{width} x {height} pixels", f"{settings['photons'] / 1e6:.2g} million photons"]
     if settings["noise_reached_percent"] is not None:
         facts.append(f"noise {settings['noise_reached_percent']:.2g} %")
+    if (worst := settings["noise_of_worst_places_percent"]) is not None:
+        facts.append(f"{worst:.2g} % and more in the worst 5 %")
     facts.append(f"{settings['seconds']['total']:.2g} s")
     output.print(", ".join(facts), style="dim")
     output.print(f"picture: {folder / PICTURE}", markup=False)

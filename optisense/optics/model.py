@@ -253,6 +253,7 @@ class OpticalModel(RayModel):
             "noise_asked_percent": noise,
             "seconds_asked": seconds,
             "noise_reached_percent": _percent(layers.noise),
+            "noise_of_worst_places_percent": _percent(layers.worst_noise),
             "samples_per_pixel": layers.samples,
             "interrupted": layers.interrupted,
             "contacts": [repr(contact) for contact in contacts],
@@ -326,8 +327,8 @@ def _named(contacts: Sequence[Contact], placed: list[TriangleMesh]) -> dict[str,
     return named
 
 
-def _percent(noise: float) -> float | None:
-    return round(100 * noise, 4) if np.isfinite(noise) else None
+def _percent(noise: float | None) -> float | None:
+    return None if noise is None or not np.isfinite(noise) else round(100 * noise, 4)
 
 
 def _photons_of(given: int | str) -> int:

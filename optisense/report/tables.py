@@ -16,6 +16,7 @@ LABELS = {
     "photons_asked": "photons asked for",
     "noise_asked_percent": "noise asked for",
     "noise_reached_percent": "noise reached",
+    "noise_of_worst_places_percent": "noise in the worst 5 %",
     "seconds_asked": "time asked for",
     "samples_per_pixel": "samples a pixel",
     "seconds": "time",

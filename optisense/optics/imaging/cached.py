@@ -110,6 +110,7 @@ class ImageLayers:
     contact_mask: NDArray[np.bool_]
     photons: int
     noise: float
+    worst_noise: float | None
     samples: list[int]
     interrupted: bool
     light_seconds: float
@@ -129,6 +130,7 @@ class ImageLayers:
             contact_mask=hit & (rays.region == Region.INDENTER),
             photons=result.photons,
             noise=noise if result.passes > 1 else float("inf"),
+            worst_noise=None,
             samples=[result.passes, result.passes],
             interrupted=False,
             light_seconds=0.0,
@@ -254,7 +256,8 @@ def render_cached(
     width, height = camera.width, camera.height
     # What interfaces reflect towards the eye is little: it is sampled once in a pixel or in those
     # beside it.
-    film, mirrored = (Film(width * height, field.groups) for _ in range(2))
+    # Lamps are so bright that one path in a thousand that meets one would be a speck.
+    film, mirrored, glints = (Film(width * height, field.groups) for _ in range(3))
 
     culled_beams = field.beams
     if scenes.indenters is not None:
@@ -266,6 +269,7 @@ def render_cached(
         film.count(pixel)
         if not again:
             mirrored.count(pixel)
+            glints.count(pixel)
         for channel in scenes.full.channels:
             main, reflected = find_visible_points(
                 scenes.full, camera, pixel, number, spots, own, again, channel
@@ -274,7 +278,7 @@ def render_cached(
             film.add_light(main, emitters, areas)
             if reflected is not None:
                 mirrored.add(reflected, shade(field, scenes, culled_beams, reflected, False, True))
-                mirrored.add_light(reflected, emitters, areas)
+                glints.add_light(reflected, emitters, areas)
 
     region_image = np.where(rays.hit, rays.region, 0)
     mask = region_image == Region.INDENTER
@@ -321,7 +325,7 @@ def render_cached(
         first = far & ~filled
         pixel = dr.compress(mi.Bool(first.ravel()))
         sample(pixel, dr.zeros(mi.UInt32, dr.width(pixel)), False)
-        reflections = mirrored.layers(width, height)
+        reflections = mirrored.layers(width, height) + glints.without_specks(width, height)
         if sparse:
             fill(reflections, filled)
         layers = film.layers(width, height) + reflections
@@ -354,7 +358,7 @@ def render_cached(
             fill(layers, alike)
     if layers is None:
         if reflections is None:
-            reflections = mirrored.layers(width, height)
+            reflections = mirrored.layers(width, height) + glints.without_specks(width, height)
         layers = film.layers(width, height) + reflections
     if beside is not None:
         layers = layers + beside
@@ -368,6 +372,7 @@ def render_cached(
         contact_mask=mask,
         photons=field.photons,
         noise=field.noise,
+        worst_noise=field.worst_noise,
         samples=samples,
         interrupted=interrupted,
         light_seconds=0.0,

@@ -11,6 +11,17 @@ from scipy import ndimage
 from optisense.optics.scene.emitters import Emitter
 from optisense.optics.transport.camera_paths import VisiblePoints
 
+LONE_WINDOW, LONE_RANK = 5, 4
+"""Side (pixels) of the square in which a bright pixel must have company, and how many pixels of it,
+with itself, must be bright: the reflection of a lamp that is seen has more."""
+
+LONE_RATIO = 2.0
+"""Times as bright as the last of them, above which the rest of a pixel's light is spread."""
+
+SPECK_REACH = 1.0 / 8.0
+"""Over how many pixels that light is spread, as a fraction of the image width; a speck of 50 times
+the light around it then adds 3 % to its middle."""
+
 
 class Film:
     """Sums of radiance and of samples per pixel and group."""
@@ -56,6 +67,33 @@ class Film:
         for layer, total in zip(out, self.sums, strict=True):
             np.multiply(np.asarray(total).reshape(height, width, 3), share, out=layer)
         return out
+
+    def without_specks(self, width: int, height: int) -> NDArray[np.float32]:
+        """The layers, where the light of lone bright pixels is spread over sampled ones around
+        them; the sum over all pixels stays as it is.
+        """
+        layers = self.layers(width, height)
+        sampled = (np.asarray(self.counts) > 0).reshape(height, width)
+        reach = round(SPECK_REACH * width) | 1  # odd: to both sides alike, so that no light is lost
+
+        def around(image: NDArray[np.floating]) -> NDArray[np.floating]:
+            for _ in range(2):
+                image = ndimage.uniform_filter(image, reach, mode="constant")
+            return image
+
+        for layer in layers:
+            bright = layer.sum(axis=-1)
+            if not bright.any():
+                continue
+            company = ndimage.rank_filter(bright, -LONE_RANK, size=LONE_WINDOW, mode="constant")
+            left = np.minimum(bright, LONE_RATIO * company)
+            kept = np.divide(left, bright, out=np.ones_like(bright), where=bright > 0)[..., None]
+            share = 1.0 / np.maximum(around(sampled.astype(np.float64)), 1e-12)
+            for k in range(3):
+                lone = (layer[..., k] * (1.0 - kept[..., 0])).astype(np.float64)
+                spread = np.maximum(around(lone * share), 0.0) * sampled  # rounding: -1e-17
+                layer[..., k] = layer[..., k] * kept[..., 0] + spread
+        return layers
 
     def spread_layers(
         self, width: int, height: int, where: NDArray[np.bool_], reach: int

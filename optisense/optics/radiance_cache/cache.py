@@ -40,6 +40,13 @@ FloatArray = NDArray[np.floating]
 MIN_COSINE = 0.02
 """Lower bound on the cosine of incidence that a photon's power is divided by, so that an isolated
 grazing photon does not become a bright beam."""
+NOISIEST_SHARE = 0.05
+"""Share of the area in view by whose noise the noise of the worst places is told."""
+PATCH_AVERAGES = 4
+"""Times that the squared noise is averaged with the kernel of a place: as it is, it is the square
+of one difference, so that chance alone would make some places the worst."""
+DARKEST_JUDGED = 0.1
+"""Share of the mean light; the noise of darker places is told relative to it."""
 EMPTY_BIN_SHARE = 1e-7
 """Share of all the light below which a direction bin counts as empty."""
 
@@ -75,6 +82,7 @@ class RadianceCache:
         beams: the same light in short lists of beams.
         photons: emitted photons.
         noise: relative RMS noise of the smoothed irradiance.
+        worst_noise: that of the noisiest 5 % of the area, relative to the light there.
         above_surface: the same tables for the light half-way up the flux layer above the cells, if
             there is one (see `volume_flux`).
     """
@@ -93,6 +101,7 @@ class RadianceCache:
     beams: Beams
     photons: int
     noise: float
+    worst_noise: float
     above_surface: Tables | None = None
 
     def binned(self) -> BinnedLight:
@@ -239,19 +248,46 @@ class CacheTally:
         """
         if self.passes < 1:
             return float("inf")
-        kernel = self._smoothing()
-        means = [kernel.kernel.matrix @ landed for landed in self._landed()]
-        if kernel.correction is not None:
-            means = [kernel.correction @ light for light in means]
-        means = [light[self.kernels.near] for light in means]
-        mean = (means[0] + means[1]) / 2
-        # Half the difference of two halves has the deviation of their mean.
-        spread = ((means[0] - means[1]) / 2) ** 2
+        near = self.kernels.near
+        mean, spread = (values[near] for values in self._light_and_spread())
         scale = mean.mean(axis=0)
         lit = scale > 0
         if not lit.any():
             return 0.0
         return float(np.sqrt((spread[:, lit] / scale[lit] ** 2).mean()))
+
+    def worst_noise(self) -> float:
+        """Relative RMS noise (1 = 100 %) that the noisiest 5 % of the area in or near the camera's
+        view have at least, each place relative to its own light.
+
+        Light groups count alike, each relative to its own mean. Infinite without photons.
+        """
+        if self.passes < 1:
+            return float("inf")
+        near, areas = self.kernels.near, self.cells.areas
+        mean, spread = self._light_and_spread()
+        scale = mean[near].mean(axis=0)
+        lit = scale > 0
+        if not lit.any():
+            return 0.0
+        square = (spread[:, lit] / scale[lit] ** 2).mean(axis=1)
+        light = (mean[:, lit] / scale[lit]).mean(axis=1)
+        kernel = self._smoothing().kernel.matrix
+        for _ in range(PATCH_AVERAGES):
+            square = kernel @ (square * areas)
+        relative = np.sqrt(square[near]) / np.maximum(light[near], DARKEST_JUDGED)
+        order = np.argsort(relative)
+        share = np.cumsum(areas[near][order]) / areas[near].sum()
+        return float(relative[order][np.searchsorted(share, 1.0 - NOISIEST_SHARE)])
+
+    def _light_and_spread(self) -> tuple[FloatArray, FloatArray]:
+        """(cells, groups) smoothed mW/mm^2, and the square of its deviation, from two halves."""
+        kernel = self._smoothing()
+        means = [kernel.kernel.matrix @ landed for landed in self._landed()]
+        if kernel.correction is not None:
+            means = [kernel.correction @ light for light in means]
+        # Half the difference of two halves has the deviation of their mean.
+        return (means[0] + means[1]) / 2, ((means[0] - means[1]) / 2) ** 2
 
     def _corrected(
         self,
@@ -350,5 +386,6 @@ class CacheTally:
             ),
             photons=self.photons,
             noise=self.noise(),
+            worst_noise=self.worst_noise(),
             above_surface=above_surface,
         )

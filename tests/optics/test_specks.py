@@ -1,0 +1,105 @@
+"""Light of lone bright pixels, and the noise of the noisiest places."""
+
+from __future__ import annotations
+
+import mitsuba as mi
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from scipy import ndimage
+
+from optisense import sensors
+from optisense.design import Light, SensorDesign
+from optisense.geometry import TriangleMesh
+from optisense.optics import OpticalModel
+from optisense.optics.imaging.film import Film
+
+WIDTH, HEIGHT = 80, 60
+
+
+def film_of(values: NDArray[np.float32], sampled: NDArray[np.bool_] | None = None) -> Film:
+    """A film of one group that holds an image (h, w)."""
+    film = Film(WIDTH * HEIGHT, 1)
+    film.sums[0] = mi.Float(np.repeat(values.ravel(), 3))
+    counts = np.ones(values.size) if sampled is None else sampled.ravel()
+    film.counts = mi.Float(counts.astype(np.float32))
+    return film
+
+
+def scattered() -> NDArray[np.float32]:
+    """Few bright pixels, as of single paths that meet a lamp."""
+    values = np.zeros((HEIGHT, WIDTH), dtype=np.float32)
+    random = np.random.default_rng(1)
+    values[random.integers(0, HEIGHT, 12), random.integers(0, WIDTH, 12)] = 5.0
+    return values
+
+
+class TestLonePixels:
+    def test_their_light_is_spread_and_none_is_lost(self) -> None:
+        values = scattered()
+        (layer,) = film_of(values).without_specks(WIDTH, HEIGHT)
+        np.testing.assert_allclose(layer.sum(axis=(0, 1)), values.sum(), rtol=1e-5)
+        assert layer.max() < 0.05 * values.max()
+        assert (layer >= 0.0).all()
+
+    def test_none_is_lost_where_every_second_pixel_is_sampled(self) -> None:
+        sampled = np.zeros((HEIGHT, WIDTH), dtype=bool)
+        sampled[::2, ::2] = True
+        values = scattered() * sampled
+        values[10, 20] = 5.0
+        (layer,) = film_of(values, sampled).without_specks(WIDTH, HEIGHT)
+        np.testing.assert_allclose(layer.sum(axis=(0, 1)), values.sum(), rtol=1e-5)
+        assert not layer[~sampled].any()
+
+    def test_the_reflection_of_a_lamp_stays(self) -> None:
+        values = np.zeros((HEIGHT, WIDTH), dtype=np.float32)
+        values[20:24, 30:33] = 5.0
+        (layer,) = film_of(values).without_specks(WIDTH, HEIGHT)
+        np.testing.assert_allclose(layer[..., 1], values)
+
+
+def steep() -> SensorDesign:
+    """A Mini whose skin goes down the sides of its gel, with lamps 0.2 mm off them below."""
+    design = sensors.gelsight_mini()
+    (x0, y0, z), (x1, y1, z1) = design.meshes["gel"].bounds.tolist()
+    gel = TriangleMesh.box((x0, y0, z), (x1, y1, z1), (50, 41, 8))
+    design.meshes["gel"] = gel
+    skin = gel.with_faces(gel.faces[gel.face_normals[:, 2] > -0.5])
+    design.meshes["skin"] = skin.compacted().flipped()
+    places = {
+        "red": [(x0 + 0.2, y) for y in (-6, 0, 6)],
+        "green": [(x1 - 0.2, y) for y in (-6, 0, 6)],
+        "blue": [(x, y1 - 0.2) for x in (-8, 0, 8)],
+    }
+    for name, group in design.lights.items():
+        group.lights = [
+            Light(position=(x, y, z - 0.5), direction=(0.0, 0.0, 1.0)) for x, y in places[name]
+        ]
+    design.camera.fov = 75.0
+    return design
+
+
+@pytest.fixture(scope="module")
+def model() -> OpticalModel:
+    return OpticalModel(steep())
+
+
+def test_no_lone_bright_pixel_is_on_a_steep_skin(model: OpticalModel) -> None:
+    image = model.render([], photons=200_000, resolution=(320, 240))
+    radiance = image.radiance
+    inside = ndimage.binary_erosion(np.isfinite(image.points[..., 0]), iterations=2)
+    around = ndimage.median_filter(radiance, size=(5, 5, 1))
+    least = 0.3 * radiance[inside].mean(axis=0)
+    lone = (radiance > 4.0 * np.maximum(around, least)).any(axis=-1) & inside
+    assert not lone.any()
+
+
+def test_the_noise_is_told_where_it_is(model: OpticalModel) -> None:
+    """Places near the lamps are noisier than all are in the mean; both fall with more photons."""
+    found = []
+    for photons in (200_000, 800_000):
+        settings = model.render([], photons=photons, resolution=(160, 120)).settings
+        found.append([settings[f"noise_{kind}_percent"] for kind in ("reached", "of_worst_places")])
+    few, many = np.array(found)
+    assert few[1] > 1.3 * few[0] and many[1] > 1.3 * many[0]
+    assert (many < 0.85 * few).all()
