@@ -138,7 +138,7 @@ class Photographs:
         )
 
     def warnings(self) -> list[str]:
-        """What is doubtful about the exposure of the pictures, one sentence each."""
+        """Warnings about the exposure of the pictures, one sentence each."""
         found = []
         pictures = [("the background", self.background)]
         pictures += [(press.name, press.picture) for press in self.presses]

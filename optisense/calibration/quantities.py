@@ -29,7 +29,7 @@ FloatArray = NDArray[np.float64]
 def quantities_of(
     design: SensorDesign, families: Sequence[str], asked: Sequence[tuple[str, float, float]] = ()
 ) -> list[FitQuantity]:
-    """What is fitted of a design.
+    """The quantities of a design that are fitted.
 
     Args:
         design: to start from.

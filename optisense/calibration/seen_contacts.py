@@ -69,7 +69,7 @@ def seen_contacts(photographs: Photographs, *, refine: bool = True) -> list[Seen
 
 
 def doubts(photographs: Photographs) -> list[str]:
-    """What is doubtful about presses: no contact to be seen, or labels that contradict it."""
+    """Warnings about presses: no visible contact, or labels that contradict it."""
     found = []
     twice = 0
     for press in photographs.presses:
@@ -124,7 +124,7 @@ def check_shape(photographs: Photographs, model: OpticalModel) -> None:
 def contact_of(
     press: PhotographedPress, seen: SeenContact, model: OpticalModel, rays: ChiefRays
 ) -> Contact:
-    """What presses into a model so that it touches where a photograph shows a contact.
+    """The contact of a model that touches where a photograph shows it.
 
     Args:
         press: whose ball presses.

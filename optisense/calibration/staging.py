@@ -37,7 +37,7 @@ def photograph_model(
     seed: int = 0,
     noise: float = USUAL_NOISE,
 ) -> Photographs:
-    """What a camera would photograph of a model as if it were a real sensor.
+    """Photographs of a model as if it were a real sensor.
 
     Args:
         model: of the sensor.

@@ -35,7 +35,7 @@ Overlap = Literal["no", "odd", "yes"]
 
 
 def cage_problems(design: SensorDesign, meshes: Meshes | None = None) -> list[Diagnostic]:
-    """What is wrong with the shapes that the cages give the parts.
+    """Problems of the shapes that the cages give the parts.
 
     Found are parts that are folded, collapsed, turned inside out or bent through themselves;
     bent parts that cut into, or lie inside, a part that they kept clear of before; and bent

@@ -71,7 +71,7 @@ class ImagingModel(Model):
     )
 
     def kinds_of_imaging(self) -> dict[str, KindModel]:
-        """What of it comes in kinds and is there, by field."""
+        """The components that have kinds and are present, by field."""
         given = ((name, getattr(self, name)) for name in ImagingModel.model_fields)
         return {name: value for name, value in given if isinstance(value, KindModel)}
 
@@ -125,7 +125,7 @@ class Camera(ImagingModel, Viewpoint):
         return float(0.5 / (half if self.projection == "equidistant" else np.tan(half)))
 
     def picture_chain(self, vergence: NDArray[np.floating] | None = None) -> PictureChain:
-        """What makes its picture of radiance.
+        """The chain that turns radiance into the camera's picture.
 
         Args:
             vergence: (h, w) of any size, 1/mm: one over the distance at which what the camera sees

@@ -164,7 +164,7 @@ def _check_kinds(design: SensorDesign) -> list[Diagnostic]:
 
 
 def unknown_light_hint(model: str, light_names: Collection[str]) -> str:
-    """What to do about a light that the library lacks; it may be known on another machine."""
+    """The hint for a light that the library lacks; it may be known on another machine."""
     near = suggestion(model, light_names) or "Name a light of the library"
     return (
         f"{near}{' ' if near.endswith('?') else '. '}If it is of somebody's own library, add it "

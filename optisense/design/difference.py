@@ -33,7 +33,7 @@ def fingerprint(design: SensorDesign) -> str:
 
 
 def differences(old: SensorDesign, new: SensorDesign) -> list[str]:
-    """What has changed from one design to another, a line each: 'PATH: OLD -> NEW'."""
+    """Changes from one design to another, a line each: 'PATH: OLD -> NEW'."""
     found = plain_differences(_values(old), _values(new))
     for name in sorted(set(old.meshes) | set(new.meshes)):
         if name in old.meshes and name in new.meshes:
@@ -44,7 +44,7 @@ def differences(old: SensorDesign, new: SensorDesign) -> list[str]:
 
 
 def notes(design: SensorDesign) -> dict[str, Any]:
-    """What is written down of a design (JSON-ready), to tell later where it was edited."""
+    """A summary of a design (JSON-ready), which later shows where it was edited."""
     return {
         "values": _values(design),
         "meshes": {
@@ -55,7 +55,7 @@ def notes(design: SensorDesign) -> dict[str, Any]:
 
 
 def differences_from(noted: dict[str, Any], new: SensorDesign) -> list[str]:
-    """What has changed in a design since its `notes` were written."""
+    """Changes of a design since its `notes` were written."""
     found = plain_differences(noted["values"], _values(new))
     now = notes(new)["meshes"]
     for name, (vertices, faces, mark) in noted["meshes"].items():

@@ -132,7 +132,7 @@ class KindModel(Model):
         return path
 
     def contents(self) -> dict[str, bytes]:
-        """What is in its files, by their names relative to the folder.
+        """Contents of its files, by their names relative to the folder.
 
         Raises:
             LibraryError: one can't be read.

@@ -53,7 +53,7 @@ class Entry(Model, Generic[Value]):
         return [field for field in given if field not in NOT_NUMBERS]
 
     def source_names(self) -> list[str]:
-        """What `sources` may speak of."""
+        """The names that `sources` may have."""
         return [*type(self.value).model_fields, "maker"]
 
     def source(self, field: str) -> Source | None:
@@ -122,7 +122,7 @@ class LightEntry(Entry[LightModel]):
         return [*super().numbers(), *own, *colours]
 
     def source_names(self) -> list[str]:
-        """What `sources` may speak of."""
+        """The names that `sources` may have."""
         fields = [field for field in TypicalLight.model_fields if field != "colour"]
         each = [f"{field}.{colour}" for colour in self.typical for field in fields]
         return [*super().source_names(), "package", "window", *fields, *each]
@@ -159,7 +159,7 @@ class CameraModel(ImagingModel, LensFacts):
     """
 
     def imaging(self) -> dict[str, Any]:
-        """What of `ImagingModel` is known of it: plain values by field, as for a design file."""
+        """The known fields of its `ImagingModel`: plain values by field, as for a design file."""
         values = self.model_dump(mode="json", include=set(ImagingModel.model_fields))
         return {name: value for name, value in values.items() if value is not None}
 

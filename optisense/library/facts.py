@@ -74,7 +74,7 @@ def facts(entry: AnyEntry) -> list[Fact]:
 
 
 def consequences(entry: AnyEntry) -> list[str]:
-    """What follows from the numbers of an entry, a line each.
+    """Quantities that follow from the numbers of an entry, a line each.
 
     Raises:
         LibraryError: the IES file of a light is missing or malformed.

@@ -47,7 +47,7 @@ def read_entry(kind: Kind, file: Path) -> AnyEntry:
 
 
 def files_of(value: Model) -> dict[str, bytes]:
-    """What is in the files that a value of an entry names, by their names.
+    """Contents of the files that a value of an entry names, by their names.
 
     Raises:
         LibraryError: one can't be read.
@@ -85,7 +85,7 @@ def inside(lines: Lines, key: str) -> Lines:
 
 
 def kind_of(data: dict[str, Any]) -> Kind | None:
-    """What kind of entry the data of a file are meant to be, or None when that can't be told."""
+    """The kind of entry that a file's data describe, or None if it is unknown."""
     value = data.get("value")
     if not isinstance(value, dict):
         return None

@@ -40,7 +40,7 @@ class CombinedObjective(Objective):
 
     @property
     def summary(self) -> str:
-        """What it is made of."""
+        """The parts of the score as text."""
         return "combined from " + " and ".join(each.title for each in self.terms)
 
 

@@ -190,7 +190,7 @@ class Evaluation:
         return self._once("calibration presses", lambda: self._exposed(exposure))
 
     def shared(self, name: str, make: Callable[[], _T]) -> _T:
-        """What several objectives need of this evaluation: made once; an error is kept too.
+        """A value that several objectives need, made once per evaluation; an error is kept too.
 
         Args:
             name: of it, with the settings that it depends on.

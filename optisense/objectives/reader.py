@@ -176,7 +176,7 @@ class _KnownPress:
 
     @classmethod
     def of(cls, press: Press) -> _KnownPress:
-        """What is measured in a press's images.
+        """The measurements in a press's images.
 
         Raises:
             ObjectiveError: the contact has too few pixels.
@@ -201,7 +201,7 @@ class _KnownPress:
         return float(np.linalg.norm(self.tilts, axis=1).max())
 
     def pixels(self, press: Press, noise: float, seed: int) -> Pixels:
-        """What the camera stores of the pixels seen, those of the contact first."""
+        """The camera's stored values of the pixels seen, those of the contact first."""
 
         def chosen(images: NDArray[np.floating]) -> FloatArray:
             return images[self.grid][self.seen][self.order].astype(np.float64)

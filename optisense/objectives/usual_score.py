@@ -149,7 +149,7 @@ class UsualTrials:
 
 
 def usual_score(design: SensorDesign, names: Iterable[str], settings: Settings) -> UsualScore:
-    """What scores of a sensor usually take, by objectives of these names, on this machine now."""
+    """The usual duration of a sensor's scores by the named objectives, on this machine now."""
     wanted = named_in(names)
     times = UsualTimes.here(design.sensing_area, len(design.lights))
     judging = sum(JUDGING.get(name, OWN_JUDGING) for name in wanted) * times.pace

@@ -64,7 +64,7 @@ class View:
 
 
 def view_of(rays: ChiefRays, face_areas: NDArray[np.float64]) -> View:
-    """What chief rays see.
+    """The view of the chief rays.
 
     Args:
         rays: of the untouched sensor.

@@ -269,7 +269,7 @@ class LedgerPlace:
 
 
 def places_of(pieces: list[Piece]) -> Iterator[LedgerPlace]:
-    """What all rows of the sums stand for; several of them may be the same place."""
+    """The places of all rows of the sums; several rows may belong to the same place."""
     for number, piece in enumerate(pieces):
         solid, around, (name, kind) = _names(piece)
         yield LedgerPlace(number, Fate.SEEN, SEEN, LightEnd.SEEN)

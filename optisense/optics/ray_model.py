@@ -135,7 +135,7 @@ class RayModel:
 
     @property
     def picture_chain(self) -> PictureChain:
-        """What the camera makes of radiance; where its blur depends on depth, with the depths that
+        """The camera's response to radiance; where its blur depends on depth, with the depths that
         it sees in the untouched sensor."""
         if self._chain is None:
             self._chain = focused_chain(

@@ -35,7 +35,7 @@ class UntouchedSurface:
 
     @classmethod
     def of(cls, rays: ChiefRays) -> UntouchedSurface:
-        """What chief rays without contacts tell."""
+        """The view along chief rays without contacts."""
         return cls(
             points=rays.points.astype(np.float64),
             normals=rays.normals.astype(np.float64),

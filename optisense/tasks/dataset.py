@@ -130,7 +130,7 @@ class _Info(BaseModel):
 
 
 def read_info(folder: Path) -> dict[str, Any]:
-    """What `dataset.json` says.
+    """The content of `dataset.json`.
 
     Raises:
         TaskError: it is missing, damaged, or of another release; says what is wrong.

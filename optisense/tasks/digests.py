@@ -12,7 +12,7 @@ from optisense.untrusted_files import MOST_MESH, MOST_STEP, read_bytes
 
 
 def design_values(design: SensorDesign) -> dict[str, Any]:
-    """What makes a design's pictures, without names of files and where numbers come from."""
+    """The values that determine a design's pictures, without file names and sources of numbers."""
     values = design.model_dump(mode="json", exclude={"provenance", "description", "name"})
     for part in values["parts"].values():
         part.pop("mesh", None)
@@ -20,7 +20,7 @@ def design_values(design: SensorDesign) -> dict[str, Any]:
 
 
 def mesh_digests(design: SensorDesign) -> dict[str, str]:
-    """What tells meshes of the same name apart."""
+    """Digests that distinguish meshes of the same name."""
     return {
         name: _digest(mesh.vertices.tobytes(), mesh.faces.tobytes())
         for name, mesh in design.meshes.items()

@@ -45,7 +45,7 @@ what the camera's noise lets a reader tell."""
 
 
 def unseen_objects() -> dict[str, Contact]:
-    """What is reconstructed by default: none of it is a ball of the radius that is fitted to."""
+    """The objects reconstructed by default: none is a ball of the radius used for the fit."""
     return {
         "ball of 3 mm": Contact(Sphere(3.0), at=(-2.0, 1.5), depth=0.6),
         "cylinder of 2 mm": Contact(Cylinder(2.0), at=(0.0, 0.0), depth=0.5, rotation=30.0),

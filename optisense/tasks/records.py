@@ -114,7 +114,7 @@ def read_rows(path: Path) -> list[dict[str, str]]:
 
 
 def differences(before: Mapping[str, Any], now: Mapping[str, Any], prefix: str = "") -> list[str]:
-    """What differs between two nested mappings, as "path: was A, is B", in the order of `now`."""
+    """Differences between two nested mappings, as "path: was A, is B", in the order of `now`."""
     found: list[str] = []
     for key in [*now, *(key for key in before if key not in now)]:
         found += _difference(before.get(key, _NOTHING), now.get(key, _NOTHING), f"{prefix}{key}")

@@ -169,7 +169,7 @@ class Verification:
         return f"Whether {second} reads better cannot be told: {numbers}"
 
     def notes(self) -> list[str]:
-        """What a user should know of how it was done, as sentences without a full stop."""
+        """Remarks on the procedure for the user, as sentences without a full stop."""
         found = []
         if self.scale < 1.0:
             found.append(

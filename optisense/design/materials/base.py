@@ -112,7 +112,7 @@ class Material(KindModel):
     roles: ClassVar[tuple[Role, ...]] = (Role.MIRROR, Role.BLOCKER, Role.INDENTER)
 
     def medium(self) -> Medium | None:
-        """What light meets that enters it; None of an opaque one."""
+        """The medium inside it; None for an opaque material."""
         return None
 
     def reflection(self) -> Reflection:
@@ -124,7 +124,7 @@ class Material(KindModel):
         return f"reflects {100 * float(self.reflection().head_on().mean()):.3g} %"
 
     def consequences(self) -> list[str]:
-        """What follows from its numbers, a line each."""
+        """Quantities that follow from its numbers, a line each."""
         return []
 
 
@@ -155,7 +155,7 @@ class CoatingModel(KindModel):
         return f"reflects {100 * share:.3g} % in silicone"
 
     def consequences(self) -> list[str]:
-        """What follows from its numbers, a line each."""
+        """Quantities that follow from its numbers, a line each."""
         return []
 
 

@@ -33,10 +33,10 @@ class Conductor(Material):
         return Reflection(specularity=1.0, roughness=self.roughness, eta=self.eta, k=self.k)
 
     def in_words(self) -> str:
-        """What it reflects head on."""
+        """Its reflectance at normal incidence, as text."""
         return f"reflects {100 * float(self.reflection().head_on().mean()):.0f} %"
 
     def consequences(self) -> list[str]:
-        """What it reflects of each colour."""
+        """Its reflectance in each colour, a line each."""
         share = 100 * self.reflection().head_on()
         return ["reflects {:.1f}, {:.1f}, {:.1f} % of R, G, B in air".format(*share)]

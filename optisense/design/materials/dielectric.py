@@ -241,7 +241,7 @@ class Dielectric(Material):
         return words
 
     def consequences(self) -> list[str]:
-        """What a smooth face reflects, and the limit of total reflection."""
+        """The reflectance of a smooth face, and the critical angle of total reflection."""
         share = 100 * float(fresnel_dielectric(1.0, self.ior))
         lines = [f"a smooth face reflects {share:.1f} % of light that comes straight from air"]
         limit = critical_angle(self.ior)

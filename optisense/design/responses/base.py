@@ -60,7 +60,7 @@ class CameraResponse(KindModel):
         return self.reach(exposed.shape[1]) > 0
 
     def curve(self, linear: FloatArray) -> NDArray[np.float64]:
-        """What is stored, 0 to 1 before rounding, of what the sensor reads: the sRGB curve."""
+        """The stored levels, 0 to 1 before rounding, of the sensor's readings: the sRGB curve."""
         return srgb_curve(linear)
 
     def encode(self, linear: FloatArray) -> NDArray[np.uint8]:

@@ -189,7 +189,7 @@ class PictureChain:
     def metered(
         self, radiance: FloatArray, where: NDArray[np.bool_] | None = None
     ) -> NDArray[np.floating]:
-        """What automatic exposure looks at: levels that must not exceed the full one.
+        """The input of automatic exposure: levels that must not exceed the full one.
 
         The larger of what fills the sensor's pixels and of what its processor makes of them,
         without blur, noise and overexposure.
@@ -239,7 +239,7 @@ class PictureChain:
         return self._largest * width >= LEAST_WIDTH
 
     def curve(self, linear: FloatArray) -> NDArray[np.float64]:
-        """What is stored, 0 to 1 before rounding, of linear levels."""
+        """The stored levels, 0 to 1 before rounding, of linear levels."""
         return (self.tone_curve or self.response).curve(linear)
 
     def encode(self, linear: FloatArray) -> NDArray[np.uint8]:

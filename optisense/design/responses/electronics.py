@@ -44,7 +44,7 @@ class BlackLevel(Model):
     )
 
     def read(self, level: FloatArray) -> FloatArray:
-        """What the converter gives, 0 to 1, of levels above black, negative ones included."""
+        """The converter's output, 0 to 1, for levels above black, negative ones included."""
         return np.clip(self.level + (1.0 - self.level) * level, 0.0, 1.0)
 
     def subtract(self, read: FloatArray) -> FloatArray:

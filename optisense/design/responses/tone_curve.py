@@ -31,7 +31,7 @@ class ToneCurve(KindModel):
 
     @abstractmethod
     def curve(self, linear: FloatArray) -> NDArray[np.float64]:
-        """What is stored, 0 to 1 before rounding, of linear levels; clipped to 0 and 1 first."""
+        """The stored levels, 0 to 1 before rounding, of linear levels; clipped to 0 and 1 first."""
 
     def encode(self, linear: FloatArray) -> NDArray[np.uint8]:
         """The same in 8 bits."""

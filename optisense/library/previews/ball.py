@@ -96,7 +96,7 @@ def _passing(start: FloatArray, towards: FloatArray) -> FloatArray:
 
 
 def medium_of(material: Material | CoatingModel) -> Medium | None:
-    """What light meets that enters a ball of the material; None where it is opaque."""
+    """The medium inside a ball of the material; None where it is opaque."""
     return material.medium() if isinstance(material, Material) else None
 
 

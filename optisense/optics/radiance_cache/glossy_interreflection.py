@@ -177,7 +177,7 @@ def shading_points(field: RadianceCache, scenes: ContactScenes, seen: PlacesSeen
 
 
 def light_of(field: RadianceCache, scenes: ContactScenes, at: ShadingPoints) -> list[mi.Color3f]:
-    """What places send to the points that see them, of the light that comes from afar."""
+    """The light from afar that places send to the points that see them."""
     sky = occluder_horizon(
         scenes.balls,
         dr.opaque(mi.UInt32, dr.width(scenes.balls) // 4),

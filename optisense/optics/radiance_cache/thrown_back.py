@@ -38,7 +38,7 @@ MIN_LANES = 2
 def thrown_back(
     field: RadianceCache, scenes: ContactScenes, points: VisiblePoints, rays: int
 ) -> tuple[VisiblePoints, list[mi.Color3f]] | None:
-    """What visible points have of the light that indenters throw back.
+    """The light that indenters reflect back to visible points.
 
     Args:
         field: the radiance cache.

@@ -58,7 +58,7 @@ class MadeBefore:
     made: list[tuple[tuple[Any, ...], Any]] = field(default_factory=list)
 
     def once(self, before: MadeBefore, key: tuple[Any, ...], make: Callable[[], Any]) -> Any:
-        """What ``make`` gives, or what it gave for the same key."""
+        """The result of ``make``, kept for further calls with the same key."""
         known = next((value for old, value in before.made if old == key), None)
         self.made.append((key, make() if known is None else known))
         return self.made[-1][1]

@@ -105,7 +105,7 @@ def _trace(scene: RayScene, patches: mi.UInt32 | None, ray: Ray) -> tuple[Any, .
 def trace_path_codes(
     scene: RayScene, camera: RayCamera, x: NDArray[np.floating], y: NDArray[np.floating]
 ) -> NDArray[np.uint32]:
-    """Which smooth patches chief rays meet one after the other, and where they are totally
+    """Codes of the smooth patches that chief rays meet in order, and where they are totally
     reflected, as one number for each ray: rays of the same number move smoothly into one another.
 
     Args:

@@ -157,7 +157,7 @@ class DesignEvaluator:
         return self.judge(design, seed, self.kept)
 
     def lost(self, design: SensorDesign) -> str | None:
-        """What a point's design has not kept of the design that the search starts from, or None."""
+        """The reason why a point's design departs too far from the starting design, or None."""
         return why_forbidden(design, self.kept)
 
     def judge(self, design: SensorDesign, seed: int, further: Sequence[Constraint] = ()) -> Outcome:
@@ -191,7 +191,7 @@ class DesignEvaluator:
         self._progress = callback
 
     def usual_score(self) -> UsualScore | None:
-        """What scores usually take; None where only functions of the design are wanted."""
+        """The usual duration of a score; None where only functions of the design are wanted."""
         if not self.renders:
             return None
         shared, _ = split_settings(self.settings, self._ready())
@@ -199,7 +199,7 @@ class DesignEvaluator:
         return usual_score(self.space.design, names, Settings(**shared))
 
     def usual_trials(self) -> UsualTrials | None:
-        """What the trials usually take; None where nobody can know.
+        """The usual duration of the trials; None where it is unknown.
 
         Other colours and powers of lights need no other light.
         """
@@ -333,7 +333,7 @@ def moved_parts(space: BoundSpace) -> set[str]:
 
 
 def goal_name(goal: Goal) -> str:
-    """What scores of a goal are called.
+    """The name of a goal's scores.
 
     Raises:
         ObjectiveError: there is no such objective; names the near match.

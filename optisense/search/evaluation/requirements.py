@@ -88,7 +88,7 @@ class Requirement:
         return value - self.limit if self.at_least else self.limit - value
 
     def objective(self) -> Objective:
-        """What measures the quantity.
+        """The objective that measures the quantity.
 
         Raises:
             SearchError: there is no such objective.

@@ -71,7 +71,7 @@ class AugmentedLagrangian:
         )
 
     def merit(self, values: FloatArray, gradients: FloatArray) -> tuple[float, FloatArray]:
-        """What is to be maximised, and its gradient (n,).
+        """The merit function, which is maximised, and its gradient (n,).
 
         Args:
             values: (1 + m,) the score, and the limited quantity of each condition.

@@ -88,10 +88,10 @@ class Method(ABC):
 
     @abstractmethod
     def tell(self, vectors: FloatArray, outcomes: Sequence[Outcome]) -> None:
-        """What came of the whole generation (k, n), in the order of its points."""
+        """Receive the outcomes of the whole generation (k, n), in the order of its points."""
 
     def evaluator(self, usual: DesignEvaluator) -> Evaluator:
-        """What scores the points; a method that knows a quicker or richer way returns its own."""
+        """The evaluator of the points; a method with a faster or richer one returns its own."""
         return usual
 
     def describe(self) -> dict[str, Any]:
@@ -99,7 +99,7 @@ class Method(ABC):
         return {}
 
     def notes(self) -> list[str]:
-        """What the user should know when the search is over."""
+        """Notes for the user at the end of the search."""
         return []
 
 

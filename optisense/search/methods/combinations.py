@@ -73,7 +73,7 @@ class Combinations(Method):
             self._known[key] = FAILED if outcome.failed else rank
 
     def describe(self) -> dict[str, Any]:
-        """Which stage it is in."""
+        """The present stage by the key "stage"."""
         return {"stage": self._stage}
 
     def everything(self, stage: str) -> Iterator[Stage]:

@@ -57,7 +57,7 @@ class Placed(NamedTuple):
         return Placed(point, np.zeros((0, len(point))))
 
     def along(self, slope: FloatArray) -> FloatArray:
-        """What is left of a slope (n,) where the point can follow it."""
+        """The part of a slope (n,) that the point can follow."""
         free: FloatArray = slope - self.normals.T @ (self.normals @ slope)
         return free
 

@@ -33,7 +33,7 @@ class DesignVariable(ABC):
 
     @abstractmethod
     def start(self, design: SensorDesign) -> float | str | None:
-        """What it is in a design: 0 for moves, else a name."""
+        """The value in a design: 0 for moves, else a name."""
 
     @abstractmethod
     def apply(self, design: SensorDesign, value: Any) -> SensorDesign:

@@ -141,7 +141,7 @@ class BoundSpace:
         return [parameter.name for parameter in self.parameters]
 
     def values(self, vector: ArrayLike) -> dict[str, float | int | str]:
-        """What a point means, by parameter: numbers, and the labels of options."""
+        """The values of a point by parameter: numbers, and the labels of options."""
         return {
             parameter.name: _meaning(parameter, coordinate)
             for parameter, coordinate in zip(
