@@ -21,6 +21,7 @@ from ..scene.paths import absolute
 from . import catalogue, session
 
 _written: dict[str, bytes] = {}
+"""Digest of the mesh in each file of the present design, by the file's path."""
 
 
 def design(scene: bpy.types.Scene) -> dict[str, Any]:
@@ -36,6 +37,9 @@ def design(scene: bpy.types.Scene) -> dict[str, Any]:
         row = {"kind": "DesignError", "message": str(error), "path": error.path}
         raise EngineError(row) from error
     caged = caged_parts(document)
+    present = {str(folder / part["mesh"]) for part in document["parts"].values()}
+    for gone in _written.keys() - present:
+        del _written[gone]
     for name, part in part_names(scene).items():
         path = folder / document["parts"][name]["mesh"]
         digest = _digest(part, caged=name in caged)

@@ -23,16 +23,16 @@ BEAM, WIDEST_BEAM = 3.0, 25.0
 the sensor."""
 
 BEAM_OPACITY, OUTLINE_OPACITY = 0.3, 0.35
-"""Of a beam where it leaves the lamp, and of an outline; 1 hides what is behind."""
+"""Opacity of a beam at its lamp, and of an outline; 1 hides what is behind."""
 
 WINDOW_OPACITY = 0.8
-"""Of a lit window of a lamp: what stands before it is still seen."""
+"""Opacity of a lit window of a lamp: parts behind it stay visible."""
 
 MOST_FACES = 200_000
 """Faces of a part above which it is drawn without outlines: they would take longer than a frame."""
 
 _edges: dict[str, tuple[tuple[int, int, int], NDArray[np.int64]]] = {}
-"""By part: how many vertices, edges and faces it had, and which edges are its outline."""
+"""Numbers of vertices, edges and faces of each present part, and the edges of its outline."""
 
 _handle: Any = None
 
@@ -48,6 +48,8 @@ def outline(part: bpy.types.Object) -> NDArray[np.float32]:
         return np.empty((0, 3), dtype=np.float32)
     kept = _edges.get(part.name)
     if kept is None or kept[0] != size:
+        for gone in [name for name in _edges if name not in bpy.data.objects]:
+            del _edges[gone]
         kept = _edges[part.name] = (size, _feature_edges(mesh))
     ends = np.empty(2 * size[1], dtype=np.int32)
     mesh.edges.foreach_get("vertices", ends)

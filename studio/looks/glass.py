@@ -31,7 +31,7 @@ METAL = ("mirror",)
 """Roles that reflect."""
 
 KEY = (-0.4, 0.7, 0.6)
-"""Where the light comes from that is seen as a highlight: right, up and towards whoever looks."""
+"""The direction of the light of highlights: right, up and towards the viewer."""
 
 VERTEX = """
 void main() {
@@ -63,7 +63,7 @@ void main() {
 
 _shader: Any = None
 _batches: dict[str, tuple[tuple[Any, ...], Any]] = {}
-"""By part: what its mesh was like, and its triangles on the graphics card."""
+"""State of each present part's mesh, and its triangles on the graphics card, by the part's name."""
 
 
 def draw(scene: bpy.types.Scene) -> None:
@@ -132,6 +132,8 @@ def _batch(part: bpy.types.Object) -> Any:
         corners, normals = triangles(mesh)
         turn = np.array(part.matrix_world.to_3x3().inverted_safe().transposed(), dtype=np.float32)
         content = {"pos": in_world(corners, part.matrix_world), "normal": normals @ turn.T}
+        for gone in [name for name in _batches if name not in bpy.data.objects]:
+            del _batches[gone]
         kept = _batches[part.name] = (state, batch_for_shader(_made(), "TRIS", content))
     return kept[1]
 
