@@ -13,8 +13,8 @@ from optisense.objectives.score import json_ready
 from paper.unit import Unit
 
 LEAST_UNITS = 6
-"""Of a share, where so many have the same sensor: fewer build it anew often, more are spread badly
-over processes, and progress comes in large steps."""
+"""Least units of a share, where so many have the same sensor: fewer build it anew often, more are
+spread badly over processes, and progress comes in large steps."""
 
 
 def shares(units: Iterable[Unit]) -> list[list[Unit]]:

@@ -27,7 +27,7 @@ PAPER = {"gelsight-mini": 6.0, "gelbelt": 8.9, "gelsight360": 8.7, "gelsight-sve
 
 KINDS = {"new_light": "new light", "light_kept": "light kept"}
 BUSY = 1.3
-"""Where wall time times processors is so many times the processor time, something else ran too."""
+"""Ratio of wall time times processors to processor time above which something else ran too."""
 
 
 def steps(settings: Values) -> Steps:

@@ -12,7 +12,7 @@ import numpy as np
 from optisense.objectives.score import deviation_of
 
 SURE = 0.95
-"""How sure a difference must be before two values count as different (one-sided t test)."""
+"""Confidence at which two values count as different (one-sided t test)."""
 
 Spread = dict[str, Any]
 """mean, standard_deviation (None for one value), values (None where a seed gave none)."""

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from optisense.optics import TactileImage
 
 UNTIMED_SEED = 10_000
-"""Of images that are not counted; another one than any that is."""
+"""Seed of images that are not counted; it differs from the seeds of those that are."""
 
 
 def image_times(inputs: Mapping[str, Any], folder: Path) -> Found:

@@ -16,8 +16,9 @@ from optisense.reading.untouched import UntouchedSurface
 FloatArray = NDArray[np.float64]
 
 ROUNDS = 3
-"""Of `NormalIntegrator.depths`: the change of a ray's direction between pixels, times the depth,
-is a correction of some per cent, and each round makes its error that much smaller."""
+"""Number of rounds of `NormalIntegrator.depths`: the change of a ray's direction between pixels,
+times the depth, is a correction of some per cent, and each round makes its
+error that much smaller."""
 
 
 class GridIntegrator:

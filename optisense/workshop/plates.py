@@ -34,7 +34,7 @@ SAME_RADIUS = 1e-4
 files."""
 
 ON_AXIS = 1e-9
-"""How far a normal may be off x, y or z to count as along it."""
+"""Largest difference from 1 of a unit normal's component along the axis that it is parallel to."""
 
 
 @dataclass(frozen=True)

@@ -19,13 +19,13 @@ EXACT = 2e-6
 files."""
 
 ARC_CORNERS = 5
-"""So many corners on one circle make an arc; three lie on one circle always."""
+"""Least number of corners on one circle that make an arc; three lie on one circle always."""
 
 SMOOTH = 20.0
 """Degrees that neighbouring sides of a smooth curve bend at most."""
 
 CURVE_CORNERS = 6
-"""So many corners in a smooth run make a curve."""
+"""Least number of corners in a smooth run that make a curve."""
 
 
 class OutlinePiece(NamedTuple):

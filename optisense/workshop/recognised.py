@@ -18,10 +18,12 @@ SAME = 1e-6
 """mm: coordinates that agree so well are one; files keep seven digits."""
 
 FEWEST_CORNERS = 12
-"""Of a full turn; a body with fewer corners around an axis is meant to have flat sides."""
+"""Least number of corners of a full turn; a body with fewer around an axis is meant to have flat
+sides."""
 
 NEAR_AXIS = 0.05
-"""Of the largest radius: a lone vertex so near to the axis is a pole, which may be set aside."""
+"""Share of the largest radius: a lone vertex so near to the axis is a pole, which may be set
+aside."""
 
 
 @dataclass(frozen=True)

@@ -37,9 +37,9 @@ into view, and which has small hills where an edge passes the picture's corner: 
 about this a derivative says little about the way up. Checks compare with half of this step."""
 
 FEW = 8
-"""With at most so many parameters differences by each cost no more scores than derivatives and the
-comparison with differences do. Over `STEP` they also see past the small hills of a true score, on
-which derivatives end."""
+"""Largest number of parameters for which differences by each cost no more scores than derivatives
+and the comparison with differences do. Over `STEP` they also see past the small hills of a
+true score, on which derivatives end."""
 
 TOLERANCE = 0.05
 """A derivative along a direction holds if it is off the difference of the true score by at most

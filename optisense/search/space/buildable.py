@@ -26,8 +26,8 @@ STILL_RESTS = 0.99
 for what is lost by rounding at curved faces, and by errors as small as those of manufacturing."""
 
 SEAT_POINTS = 400
-"""So many points of each of two parts tell whether they still lie on one another: four are a
-hundredth."""
+"""Number of points of each of two parts that show whether they still lie on one another; four of
+them are a hundredth."""
 
 FEW = 16
 """Fewer points that touch are an edge or a corner, on which no part rests."""
