@@ -15,6 +15,7 @@ from optisense.optics import OpticalModel
 from optisense.optics.imaging.film import Film
 
 WIDTH, HEIGHT = 80, 60
+NOWHERE = np.zeros((HEIGHT, WIDTH), dtype=bool)
 
 
 def film_of(values: NDArray[np.float32], sampled: NDArray[np.bool_] | None = None) -> Film:
@@ -37,24 +38,33 @@ def scattered() -> NDArray[np.float32]:
 class TestLonePixels:
     def test_their_light_is_spread_and_none_is_lost(self) -> None:
         values = scattered()
-        (layer,) = film_of(values).without_specks(WIDTH, HEIGHT)
+        (layer,) = film_of(values).without_specks(WIDTH, HEIGHT, NOWHERE)
         np.testing.assert_allclose(layer.sum(axis=(0, 1)), values.sum(), rtol=1e-5)
         assert layer.max() < 0.05 * values.max()
         assert (layer >= 0.0).all()
+
+    def test_none_gets_into_contacts_or_out_of_them(self) -> None:
+        values, near = scattered(), NOWHERE.copy()
+        near[20:40, 30:50] = True
+        values[30, 40] = 5.0
+        (layer,) = film_of(values).without_specks(WIDTH, HEIGHT, near)
+        for where in (near, ~near):
+            np.testing.assert_allclose(layer[where].sum(axis=0), values[where].sum(), rtol=1e-5)
+        assert layer.max() < 0.2 * values.max()
 
     def test_none_is_lost_where_every_second_pixel_is_sampled(self) -> None:
         sampled = np.zeros((HEIGHT, WIDTH), dtype=bool)
         sampled[::2, ::2] = True
         values = scattered() * sampled
         values[10, 20] = 5.0
-        (layer,) = film_of(values, sampled).without_specks(WIDTH, HEIGHT)
+        (layer,) = film_of(values, sampled).without_specks(WIDTH, HEIGHT, NOWHERE)
         np.testing.assert_allclose(layer.sum(axis=(0, 1)), values.sum(), rtol=1e-5)
         assert not layer[~sampled].any()
 
     def test_the_reflection_of_a_lamp_stays(self) -> None:
         values = np.zeros((HEIGHT, WIDTH), dtype=np.float32)
         values[20:24, 30:33] = 5.0
-        (layer,) = film_of(values).without_specks(WIDTH, HEIGHT)
+        (layer,) = film_of(values).without_specks(WIDTH, HEIGHT, NOWHERE)
         np.testing.assert_allclose(layer[..., 1], values)
 
 

@@ -325,7 +325,7 @@ def render_cached(
         first = far & ~filled
         pixel = dr.compress(mi.Bool(first.ravel()))
         sample(pixel, dr.zeros(mi.UInt32, dr.width(pixel)), False)
-        reflections = mirrored.layers(width, height) + glints.without_specks(width, height)
+        reflections = mirrored.layers(width, height) + glints.without_specks(width, height, near)
         if sparse:
             fill(reflections, filled)
         layers = film.layers(width, height) + reflections
@@ -358,7 +358,9 @@ def render_cached(
             fill(layers, alike)
     if layers is None:
         if reflections is None:
-            reflections = mirrored.layers(width, height) + glints.without_specks(width, height)
+            reflections = mirrored.layers(width, height) + glints.without_specks(
+                width, height, near
+            )
         layers = film.layers(width, height) + reflections
     if beside is not None:
         layers = layers + beside

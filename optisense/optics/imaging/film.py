@@ -68,12 +68,19 @@ class Film:
             np.multiply(np.asarray(total).reshape(height, width, 3), share, out=layer)
         return out
 
-    def without_specks(self, width: int, height: int) -> NDArray[np.float32]:
+    def without_specks(
+        self, width: int, height: int, near: NDArray[np.bool_]
+    ) -> NDArray[np.float32]:
         """The layers, where the light of lone bright pixels is spread over sampled ones around
-        them; the sum over all pixels stays as it is.
+        them. Neither in contacts nor outside of them does the sum over all pixels change.
+
+        Args:
+            width, height: pixels.
+            near: (height, width) which pixels lie in contacts or at their rims.
         """
         layers = self.layers(width, height)
         sampled = (np.asarray(self.counts) > 0).reshape(height, width)
+        regions = [where for where in (sampled & near, sampled & ~near) if where.any()]
         reach = round(SPECK_REACH * width) | 1  # odd: to both sides alike, so that no light is lost
 
         def around(image: NDArray[np.floating]) -> NDArray[np.floating]:
@@ -88,11 +95,13 @@ class Film:
             company = ndimage.rank_filter(bright, -LONE_RANK, size=LONE_WINDOW, mode="constant")
             left = np.minimum(bright, LONE_RATIO * company)
             kept = np.divide(left, bright, out=np.ones_like(bright), where=bright > 0)[..., None]
-            share = 1.0 / np.maximum(around(sampled.astype(np.float64)), 1e-12)
-            for k in range(3):
-                lone = (layer[..., k] * (1.0 - kept[..., 0])).astype(np.float64)
-                spread = np.maximum(around(lone * share), 0.0) * sampled  # rounding: -1e-17
-                layer[..., k] = layer[..., k] * kept[..., 0] + spread
+            lone = layer * (1.0 - kept)
+            layer *= kept
+            for where in regions:
+                share = where / np.maximum(around(where.astype(np.float64)), 1e-12)
+                for k in range(3):
+                    spread = around(lone[..., k].astype(np.float64) * share) * where
+                    layer[..., k] += np.maximum(spread, 0.0)  # rounding gives -1e-17
         return layers
 
     def spread_layers(
