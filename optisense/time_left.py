@@ -113,9 +113,18 @@ class TimeLeft:
             self._steps[self._current].count = count
         self._start_step(done)
 
-    def expect(self, name: str, count: float | None = None, seconds: float | None = None) -> None:
-        """Correct what is expected of a step: its pieces, or seconds a piece."""
+    def expect(
+        self,
+        name: str,
+        count: float | None = None,
+        seconds: float | None = None,
+        gauges: bool | None = None,
+    ) -> None:
+        """Correct what is expected of a step: its pieces, the seconds of a piece, or whether its
+        time tells how fast this machine is.
+        """
         step = next(step for step in self._steps if step.name == name)
+        step.gauges = step.gauges if gauges is None else gauges
         step.count = step.count if count is None else count
         step.seconds = step.seconds if seconds is None else seconds
 
@@ -244,7 +253,7 @@ class TimeLeft:
             finished = self._expected + step.seconds * done + usual
             spent = self._measured + self._advanced - self._step_began
             before = (spent + usual * before) / finished
-        if not step.gauges and self._expected > 0.0:
+        if not step.gauges:
             return before
         pieces = min(self._done + 1.0, step.count) - self._first
         expected = self._expected + step.seconds * max(0.0, pieces)

@@ -127,8 +127,8 @@ class StudyRun:
         self._best = self._start_score = math.nan
         self._told = time.monotonic()
         self._stage = START_STAGE
-        plain = self._evaluator is usual or settings.errors is not None
-        steps = stages(self.limit, self._usual, plain_trials=plain)
+        self._plain = self._evaluator is usual or settings.errors is not None
+        steps = stages(self.limit, self._usual, plain_trials=self._plain)
         self._time_left = time_left or TimeLeft(steps)
         self._fresh_done = self._fresh_count = 0
         self._fresh_seeds: set[int] = set()
@@ -151,7 +151,13 @@ class StudyRun:
         self._count_known()
         with self._make_runner(self._evaluator) as runner:
             self._time_left.workers = runner.workers
-            expect_stages(self._time_left, self.limit, self._usual, runner.workers)
+            expect_stages(
+                self._time_left,
+                self.limit,
+                self._usual,
+                runner.workers,
+                plain_trials=self._plain,
+            )
             if isinstance(runner, SerialRunner):
                 runner.report_progress_to(self._trial_progress)
             try:

@@ -21,8 +21,8 @@ def stages(
         limit: trials of the search, at most.
         usual: seconds that scores usually take.
         workers: processes that score.
-        plain_trials: whether trials are scored as usual; else their times, such as those with
-            derivatives, do not tell how fast this machine is.
+        plain_trials: whether the start and the trials are scored as usual; else their times, such
+            as those with derivatives and their compiling, do not tell how fast this machine is.
     """
     if usual is None:
         return [
@@ -31,15 +31,21 @@ def stages(
             TimedStep(FRESH, USUAL_FRESH),
         ]
     return [
-        TimedStep(START_STAGE, 1, usual.first * workers),  # on a share of the processors
+        # on a share of the processors
+        TimedStep(START_STAGE, 1, usual.first * workers, gauges=plain_trials),
         TimedStep(TRIALS, limit, usual.trial, gauges=plain_trials),
         TimedStep(FRESH, USUAL_FRESH, usual.fresh),
     ]
 
 
 def expect_stages(
-    time_left: TimeLeft, limit: int, usual: UsualTrials | None, workers: int = 1
+    time_left: TimeLeft,
+    limit: int,
+    usual: UsualTrials | None,
+    workers: int = 1,
+    *,
+    plain_trials: bool = True,
 ) -> None:
     """Correct what is expected of the stages among the steps of a command that searches."""
-    for step in stages(limit, usual, workers):
-        time_left.expect(step.name, step.count, step.seconds)
+    for step in stages(limit, usual, workers, plain_trials=plain_trials):
+        time_left.expect(step.name, step.count, step.seconds, step.gauges)
