@@ -1,7 +1,12 @@
-"""Make the pictures of docs/verify.md anew: python scripts/verify_pictures.py"""
+"""Make the pictures of docs/verify.md and docs/case-studies.md anew.
+
+python scripts/verify_pictures.py             the objects that are pressed
+python scripts/verify_pictures.py DESIGN      GelSight Svelte beside this one
+"""
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -49,5 +54,24 @@ def _copper() -> object:
     return colormaps["copper"]
 
 
+def mirrors(better: str) -> None:
+    """GelSight Svelte and a design with another mirror, with nine balls pressed into each."""
+    figure = Figure(figsize=(12, 4.9), layout="constrained")
+    for axes, title, name in zip(
+        figure.subplots(1, 2), ("start", "best"), ("gelsight-svelte", better), strict=True
+    ):
+        design = ots.load(name)
+        aoap, coverage = (ots.evaluate(design, each).value for each in ("aoap", "coverage"))
+        model = ots.OpticalModel(design)
+        image = model.render(model.nine_contacts(), (480, 360), photons=PHOTONS)
+        axes.imshow(image.picture())
+        axes.set_title(f"{title}: AOAP {aoap:.2f}, coverage {coverage:.2f}")
+        axes.set_axis_off()
+    figure.savefig(OUT / "case-svelte.png", dpi=75)
+
+
 if __name__ == "__main__":
-    objects()
+    if len(sys.argv) > 1:
+        mirrors(sys.argv[1])
+    else:
+        objects()
