@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -15,6 +16,7 @@ use_variant(os.environ.get("OPTISENSE_TEST_VARIANT", "llvm"))
 
 from optisense import Contact, OpticalModel, load  # noqa: E402
 from optisense.optics import TactileImage  # noqa: E402
+from optisense.optics.transport.chief_rays import ChiefRays  # noqa: E402
 
 
 @pytest.fixture(scope="session")
@@ -38,8 +40,8 @@ class LambertianSensor:
     the normal and that channel's light, infinitely far away, with no shadows.
     """
 
-    def __init__(self, model: OpticalModel) -> None:
-        self._model = model
+    def __init__(self, model: OpticalModel, rays: Callable[..., ChiefRays]) -> None:
+        self._model, self._rays = model, rays
         self.pictures = 0
 
     def __getattr__(self, name: str) -> Any:
@@ -54,7 +56,7 @@ class LambertianSensor:
     ) -> TactileImage:
         """An image without noise."""
         self.pictures += 1
-        rays = self._model.chief_rays(resolution, contacts, skin)
+        rays = self._rays(resolution, tuple(contacts), skin)
         light = np.maximum(rays.normals @ LIGHTS.T, 0).astype(np.float32)
         return TactileImage(
             layers={"all": np.where(rays.hit[..., None], light, 0)},
@@ -64,7 +66,14 @@ class LambertianSensor:
         )
 
 
+@pytest.fixture(scope="session")
+def rays_of_mini(mini: OpticalModel) -> Callable[..., ChiefRays]:
+    """Chief rays of the flat Mini, kept for as many presses as a test repeats: each takes a second
+    to find the elastic skin under a cylinder."""
+    return lru_cache(maxsize=48)(mini.chief_rays)
+
+
 @pytest.fixture
-def lambertian(mini: OpticalModel) -> Any:
+def lambertian(mini: OpticalModel, rays_of_mini: Callable[..., ChiefRays]) -> Any:
     """A flat Mini whose colours are algebra."""
-    return LambertianSensor(mini)
+    return LambertianSensor(mini, rays_of_mini)
