@@ -18,7 +18,7 @@ import math
 import operator
 import re
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from optisense.errors import ObjectiveError
 
@@ -70,7 +70,8 @@ class ScoreTerm:
 
     def __str__(self) -> str:
         plain = re.fullmatch(r"\w+", self.objective)
-        name = self.objective if plain else f"'{self.objective}'"
+        quote = '"' if "'" in self.objective else "'"
+        name = self.objective if plain else f"{quote}{self.objective}{quote}"
         return f"{name}.{self.part}" if self.part else name
 
 
@@ -97,7 +98,11 @@ class Expression:
 
     text: str
     quantities: tuple[ScoreTerm, ...]
-    _tree: _Term
+    _tree: _Term = field(repr=False, compare=False)
+
+    def __reduce__(self) -> tuple[Callable[[str], Expression], tuple[str]]:
+        """An expression goes to other processes as its text."""
+        return _parsed, (self.text,)
 
     @property
     def objectives(self) -> tuple[str, ...]:
@@ -136,7 +141,7 @@ class Expression:
                 f"an expression has {len(text):,} characters",
                 hint=f"Write it with at most {MOST_CHARACTERS}",
             )
-        return _Parser(text).expression()
+        return _parsed(text)
 
 
 @dataclass(frozen=True)
@@ -152,6 +157,11 @@ def marked(text: str, place: int, problem: str) -> ObjectiveError:
         f"{problem}:\n  {text}\n  {' ' * place}^",
         hint="Write it as in 'aoap + 0.5*coverage', with + - * / ( ) min max abs sqrt",
     )
+
+
+def _parsed(text: str) -> Expression:
+    """Read an expression of any length: its text with all spaces is longer than what was given."""
+    return _Parser(text).expression()
 
 
 class _Parser:
@@ -237,6 +247,8 @@ class _Parser:
         self._next += 1
         if token.kind == "number":
             number = float(token.text)
+            if math.isinf(number):
+                raise self._error(token, f"{token.text} is too large a number")
             return _Term(lambda known: number, repr(number).removesuffix(".0"), VALUE)
         if token.text in _FUNCTIONS and self._take("("):
             return self._call(token)

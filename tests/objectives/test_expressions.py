@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import pickle
 from typing import Any
 
 import numpy as np
@@ -45,6 +46,9 @@ def test_the_value_is_that_of_arithmetic(text: str, value: float) -> None:
     again = Expression.parse(expression.text)
     assert again.text == expression.text
     assert again.value(KNOWN) == expression.value(KNOWN)
+    sent = pickle.loads(pickle.dumps(expression))
+    assert sent == expression
+    assert sent.value(KNOWN) == expression.value(KNOWN)
 
 
 def test_random_expressions_keep_their_value_when_they_are_written_out() -> None:
@@ -92,6 +96,7 @@ def test_random_expressions_keep_their_value_when_they_are_written_out() -> None
         ("sqrt(aoap, 2)", 0, "one number"),
         ("__import__('os')", 10, "not expected"),
         ("3 + 4", 0, "names no objective"),
+        ("aoap + 1e999", 7, "too large a number"),
         ("", 0, "something is missing"),
     ],
 )
@@ -106,11 +111,20 @@ def test_an_error_marks_the_place(text: str, place: int, says: str) -> None:
 def test_a_very_long_expression_is_refused() -> None:
     with pytest.raises(ObjectiveError, match="characters"):
         Expression.parse("a + " * MOST_CHARACTERS + "a")
+    longest = Expression.parse("+".join("a" * (MOST_CHARACTERS // 2)))
+    assert len(longest.text) > MOST_CHARACTERS
+    assert pickle.loads(pickle.dumps(longest)) == longest
     deep = "(" * 40 + "a" + ")" * 40
     assert Expression.parse(deep).text == "a"
     for opening in ("(", "-", "abs("):
         with pytest.raises(ObjectiveError, match="inside one another"):
             Expression.parse(opening * 60 + "a")
+
+
+def test_a_name_with_an_apostrophe_is_written_as_it_is_read() -> None:
+    found = Expression.parse('2*"light\'s end"')
+    assert found.objectives == ("light's end",)
+    assert Expression.parse(found.text) == found
 
 
 def test_division_by_zero_is_told() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pickle
 from typing import Any
 
 import numpy as np
@@ -255,7 +256,8 @@ def test_what_conditions_limit_has_slopes(svelte: SensorDesign) -> None:
     wanted = ["coverage >= 0", "distortion >= 0", "aoap - 0.2*distortion >= 0"]
     usual = DesignEvaluator(bound, ["aoap"], SETTINGS, requirements=wanted, apart=False)
     problem = Problem(bound, ("aoap",), 10, requirements=tuple(wanted))
-    evaluator = Gradient(problem, resolution=RESOLUTION).evaluator(usual)
+    made = Gradient(problem, resolution=RESOLUTION).evaluator(usual)
+    evaluator = pickle.loads(pickle.dumps(made))  # as it is sent to workers
     assert isinstance(evaluator, SlopeEvaluator)
     _, gradients = evaluator._slopes(bound.start)
     sides = [evaluator._slopes(bound.start + way)[0] for way in (0.1, -0.1)]
