@@ -1,9 +1,9 @@
 """Find a better design: search spaces, search methods, and the studies that keep every trial.
 
-A design, a `SearchSpace` and an objective come in; a `SearchResult` with its `Study` comes out.
-`search` does it in one call. The rooms, from the bottom up: `space` (what may change),
-`evaluation` (a point of the space to its scores), `methods` (which points to score next),
-`executors` (which process scores them), `study` (the folder and the loop), `tolerance`
+`search` takes a design, a `SearchSpace` and an objective, and returns a `SearchResult` with its
+`Study`. The subpackages, from the bottom up: `space` (the parameters that may change), `evaluation`
+(from a point of the space to its scores), `methods` (which points to score next), `executors`
+(which process scores them), `study` (the folder of a search and its loop), `tolerance`
 (manufacturing errors).
 """
 

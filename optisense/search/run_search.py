@@ -1,4 +1,4 @@
-"""Searching for a better design, in one call."""
+"""Search for a better design in one call."""
 
 from __future__ import annotations
 
@@ -56,32 +56,34 @@ def search(
     ends the search early, and the result holds what was finished.
 
     Args:
-        design: where the search starts.
-        space: what may change.
+        design: design that the search starts from.
+        space: parameters that may change, and their bounds.
         objective: what to maximise: a name, arithmetic such as "aoap + 0.5*coverage", an
-            `Objective`, or a function of a design that returns a number. Several: the first is
-            maximised and the others are told, or, with the method "pareto", all are weighed against
-            each other.
+            `Objective`, or a function of a design that returns a number. Of several, the first is
+            maximised and the others are reported, or, with the method "pareto", the best trade-offs
+            between all are sought.
         method: "cma-es", "grid", "random", "types", "pareto", ... (see docs/search.md).
-        budget: number of trials; the method's own idea if None.
-        seed: of the method and of every trial.
-        workers: processes on this machine; 1 works in this one.
+        budget: number of trials; the method's default if None.
+        seed: seed of the method and of every trial.
+        workers: number of processes on this machine; 1 scores the trials in this process.
         cluster: address of a Dask scheduler, instead of `workers`.
         executor: any executor with the protocol of `concurrent.futures`, instead of `workers`.
-        out: folder that keeps the study, so that it can be resumed and reported.
-        resume: go on with the study in `out`.
-        options: of the method.
-        settings: of the objectives, as of `optisense.evaluate`.
-        errors: of making: P10 over manufactured sensors is maximised instead of the plain score.
-        samples: manufactured sensors a trial.
+        out: folder of the study, which can then be resumed and reported.
+        resume: continue the study in `out`.
+        options: options of the method.
+        settings: settings of the objectives (see `optisense.evaluate`).
+        errors: manufacturing errors: if given, P10 over manufactured sensors is maximised instead
+            of the plain score.
+        samples: number of manufactured sensors per trial.
         require: conditions that the best design must meet, such as "coverage >= 0.55".
-        apart: whether parts must not cut through one another, nor leave those on which they rest.
-        variant: of the renderer: "auto", "llvm" or "cuda".
-        progress: called now and then.
+        apart: whether designs are forbidden whose parts cut through one another or leave the parts
+            on which they rest.
+        variant: variant of the renderer: "auto", "llvm" or "cuda".
+        progress: function that is called a few times a second.
 
     Raises:
-        SearchError: something makes no sense, all trials fail, or a study can't be gone on with.
-        DesignError: a path leads nowhere.
+        SearchError: an argument is out of its range, all trials fail, or a study can't be resumed.
+        DesignError: a path names nothing in the design.
         ObjectiveError: an objective is unknown.
         SetupError: the renderer or the cluster can't be reached.
     """
@@ -136,21 +138,21 @@ def run_study(
     told: Callable[[], None] | None = None,
     time_left: TimeLeft | None = None,
 ) -> SearchResult:
-    """Run a study, or go on with one.
+    """Run a study, or resume one.
 
     Args:
-        study: new or opened again.
-        workers, cluster, executor: as of `search`.
+        study: new study, or one that was opened.
+        workers, cluster, executor: see `search`.
         own_process: use a process of its own even for one worker.
-        limit: trials in all; the study's budget if None.
-        variant: of the renderer, as of `search`.
-        progress: called now and then.
-        told: called when Ctrl-C waits for a trial in this process to finish.
-        time_left: of a command whose last steps are the stages of this search
+        limit: total number of trials; the study's budget if None.
+        variant: variant of the renderer, see `search`.
+        progress: function that is called a few times a second.
+        told: function that is called when Ctrl-C waits for a trial in this process to finish.
+        time_left: time estimate of a command whose last steps are the stages of this search
             (`optisense.search.study.stages`).
 
     Raises:
-        OptiSenseError: as of `search`.
+        OptiSenseError: see `search`.
     """
     if cluster is not None and executor is not None:
         raise SearchError("give a cluster or an executor, not both")
@@ -176,10 +178,10 @@ def run_study(
 
 
 def _hint_after(error: OptiSenseError, study: Study) -> str | None:
-    """What to do about an error of a run, and what has become of the study.
+    """Return a hint for an error of a run, which also tells the state of the study.
 
-    A study that was begun for this run, and in which nothing was scored, is removed, so that the
-    same call can be given again.
+    A study that was created for this run, and in which nothing was scored, is removed, so that the
+    same call can be repeated.
     """
     if study.folder is None or (isinstance(error, SearchError) and error.hint):
         return error.hint
@@ -194,7 +196,7 @@ def _hint_after(error: OptiSenseError, study: Study) -> str | None:
 
 
 def as_goals(objective: Goal | Sequence[Goal]) -> list[Goal]:
-    """One objective or several as a list."""
+    """Return one objective or several as a list."""
     if isinstance(objective, list | tuple):
         return list(objective)
     single: Any = objective

@@ -48,25 +48,32 @@ Goal = str | Objective | DesignFunction
 
 
 RELIT = re.compile(r"^lights\..*\.(flux|colour)(\W|$)")
-"""Parameters that change how light of a group counts, and no ray."""
+"""Pattern of the names of parameters that only rescale the light of a group, so that no ray has to
+be traced anew.
+"""
 
 
 PLACED = re.compile(r"^lights\..*\b(shift|turn|position)\b")
-"""Parameters that move lights."""
+"""Pattern of the names of parameters that move lights."""
 
 WATCHES = ("coverage", "distortion")
-"""Objectives by rays that are scored with every trial where the view may change, so that a search
-can say that it wins its score by seeing less, or by seeing the skin distorted. They take a tenth of
-the time of AOAP."""
+"""Objectives by chief rays that are scored with every trial where the view may change, so that a
+report can say that a design gains its score by seeing less of the skin, or by seeing it distorted.
+They take a tenth of the time of AOAP.
+"""
 
 
 class Evaluator(Protocol):
-    """The function that workers call: made once per worker (it must pickle), for many points."""
+    """Interface of the function that workers call. It is made once per worker, so it must pickle,
+    and scores many points.
+    """
 
     def __call__(self, vector: FloatArray, seed: int) -> Outcome:
-        """What comes of a point (n,) of the space. The same for the same point and seed, whatever
-        was asked before. Failures are told in the outcome; errors are for set-ups that can't
-        work.
+        """Score the point `vector`, (n,), of the space.
+
+        The outcome depends on the point and the seed only, not on the points scored before. A
+        design that can't be scored gives an outcome with a failure; an error is raised only if no
+        point can be scored.
         """
 
 
@@ -74,14 +81,15 @@ class DesignEvaluator:
     """Scores points by objectives: the evaluator of all methods that bring none of their own.
 
     Attributes:
-        space: with the design.
+        space: space that is searched, bound to its design.
         goals: objectives by name, `Objective`s, or functions of the design.
-        settings: of the objectives (see `optisense.evaluate`).
-        requirements: conditions that are measured beside the goals.
-        constraints: designs that they forbid are not scored.
-        kept: what a point of the space must keep of the design; manufacturing errors may not.
-        renders: whether the renderer is needed at all.
-        variant: of the renderer.
+        settings: settings of the objectives (see `optisense.evaluate`).
+        requirements: conditions whose quantities are measured beside the goals.
+        constraints: constraints on designs; a design that breaks one is not scored.
+        kept: constraints on points of the space, taken from the starting design; manufacturing
+            errors may break them.
+        renders: whether any goal needs the renderer.
+        variant: variant of the renderer.
     """
 
     def __init__(
@@ -100,16 +108,16 @@ class DesignEvaluator:
         Args:
             space: a bound space.
             goals: one or more; the first is what single-goal methods search for.
-            settings: of the objectives.
+            settings: settings of the objectives.
             requirements: conditions as texts, such as "coverage >= 0.55".
-            apart: whether parts must not cut through one another, nor leave those that they rest
-                on; only looked at where surfaces move, which is also the default.
-            keeps: whether points must keep what the design begins with, see `kept`; not where the
-                space is one of manufacturing errors.
-            variant: of the renderer.
+            apart: whether designs are forbidden whose parts cut through one another or leave the
+                parts that they rest on; if None, they are where the space moves surfaces.
+            keeps: whether points must keep the properties of the starting design in `kept`; False
+                for a space of manufacturing errors.
+            variant: variant of the renderer.
 
         Raises:
-            SearchError: there is no goal, two of one name, or a condition can't be read.
+            SearchError: there is no goal, two goals have one name, or a condition can't be read.
             ObjectiveError: an objective or a setting is unknown.
         """
         self.space = space
@@ -161,12 +169,12 @@ class DesignEvaluator:
         return why_forbidden(design, self.kept)
 
     def judge(self, design: SensorDesign, seed: int, further: Sequence[Constraint] = ()) -> Outcome:
-        """The outcome of any design: a point of the space, or one with manufacturing errors.
+        """Score any design: one of a point of the space, or one with manufacturing errors.
 
         Args:
-            design: the design.
-            seed: of the objectives.
-            further: constraints beside those for any design.
+            design: design to score.
+            seed: seed of the objectives.
+            further: constraints beside those of `constraints`.
 
         Raises:
             SetupError: the renderer can't run on this machine.
@@ -187,11 +195,15 @@ class DesignEvaluator:
         return Outcome(scores, failure, parts, time.perf_counter() - began)
 
     def report_progress_to(self, callback: ProgressCallback) -> None:
-        """Call `callback` while images are rendered in this process; copies elsewhere don't."""
+        """Call `callback` while images are rendered in this process. Pickled copies do not call
+        it.
+        """
         self._progress = callback
 
     def usual_score(self) -> UsualScore | None:
-        """The usual duration of a score; None where only functions of the design are wanted."""
+        """Return the usual duration of a score, or None if all goals are functions of the
+        design.
+        """
         if not self.renders:
             return None
         shared, _ = split_settings(self.settings, self._ready())
@@ -199,9 +211,9 @@ class DesignEvaluator:
         return usual_score(self.space.design, names, Settings(**shared))
 
     def usual_trials(self) -> UsualTrials | None:
-        """The usual duration of the trials; None where it is unknown.
+        """Return the usual duration of the trials, or None if it is unknown.
 
-        Other colours and powers of lights need no other light.
+        A search over only colours and powers of lights weights layers anew and renders none.
         """
         usual = self.usual_score()
         if usual is None:
@@ -211,18 +223,19 @@ class DesignEvaluator:
         return UsualTrials.of(usual, trial, usual.whole)
 
     def failed(self, reason: str, began: float) -> Outcome:
-        """An outcome without scores; `began` by `time.perf_counter`."""
+        """Return an outcome without scores; `began` is the start time by `time.perf_counter`."""
         return Outcome.of_failure(self.names, reason, time.perf_counter() - began)
 
     def objective_scores(
         self, design: SensorDesign, seed: int, only: Collection[str] | None = None
     ) -> Mapping[str, Score]:
-        """Scores by the objectives, plain functions left out; a quicker way may stand in here.
+        """Return the scores by the objectives, without plain functions. Subclasses may override it
+        with a faster way.
 
         Args:
-            design: what is scored.
-            seed: of the objectives.
-            only: names of those that are wanted; all if None.
+            design: design to score.
+            seed: seed of the objectives.
+            only: names of the objectives to score; all if None.
         """
         settings = dict(self.settings)
         if self._asks_view and "least_skin" not in settings:
@@ -267,7 +280,9 @@ class DesignEvaluator:
         return scores, parts, failures
 
     def _keep(self, apart: bool) -> None:
-        """Look at what the design begins with, as far as the space may change it."""
+        """Add the constraints that keep properties of the starting design which the space may
+        change.
+        """
         design, names, moved = self.space.design, self.space.names, moved_parts(self.space)
         if apart and moved:
             self.kept += [PartsRest(design, moved), LightsRest(design, moved)]
@@ -284,9 +299,9 @@ class DesignEvaluator:
             self.kept.append(SameMirrors(design, self.keeper))
 
     def _ready(self) -> list[Objective]:
-        """The objectives of goals and conditions, and those that are watched, each once.
+        """Return the objectives of goals and conditions, and those of `WATCHES`, each once.
 
-        A user's file is run once a process and not once a trial.
+        A user's file is run once per process and not once per trial.
         """
         if self._resolved is None:
             watched = [find(name) for name in WATCHES] if self._watches else []
@@ -295,7 +310,7 @@ class DesignEvaluator:
         return self._resolved
 
     def _wanted(self) -> list[Objective]:
-        """The objectives of goals and conditions."""
+        """Return the objectives of goals and conditions."""
         if self._needed is None:
             goals = [goal_of(each) for each in self._objectives]
             self._needed = [*goals, *(each.objective() for each in self.requirements)]
@@ -316,7 +331,9 @@ class DesignEvaluator:
 
 
 def _failures(scores: Sequence[Score]) -> list[str]:
-    """Why scores are missing, each reason once with the objectives that give it."""
+    """Return the reasons why scores are missing, each once, with the objectives that it
+    concerns.
+    """
     reasons: dict[str, list[str]] = {}
     for score in scores:
         if score.failure is not None:
@@ -327,16 +344,16 @@ def _failures(scores: Sequence[Score]) -> list[str]:
 
 
 def moved_parts(space: BoundSpace) -> set[str]:
-    """The parts that the parameters of a space shift or turn."""
+    """Return the names of the parts that parameters of a space shift or turn."""
     variables = (parameter.variable for parameter in space.parameters)
     return {each.name for each in variables if isinstance(each, PartShift | PartTurn)}
 
 
 def goal_name(goal: Goal) -> str:
-    """The name of a goal's scores.
+    """Return the name under which the scores of a goal are stored.
 
     Raises:
-        ObjectiveError: there is no such objective; names the near match.
+        ObjectiveError: there is no such objective; the message suggests a similar name.
     """
     if isinstance(goal, str | Objective):
         return goal_of(goal).name
@@ -344,7 +361,7 @@ def goal_name(goal: Goal) -> str:
 
 
 def placed(goal: Goal) -> Goal:
-    """A goal in a user's file with the file's whole path, which workers can find."""
+    """Return a goal with the absolute path of a user's file, which workers can find."""
     if not isinstance(goal, str):
         return goal
     file, colon, function = goal.rpartition(":")

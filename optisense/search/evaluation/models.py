@@ -1,7 +1,7 @@
-"""One optical model a process, changed from trial to trial as cheaply as can be.
+"""Optical models that are kept between trials, one per process, and changed as little as possible.
 
-The image of a design does not depend on which designs a model had before, so a study gives the same
-scores when it is resumed or shared among workers.
+The image of a design does not depend on the designs that a model had before, so a study gives the
+same scores when it is resumed or shared among workers.
 """
 
 from __future__ import annotations
@@ -15,19 +15,20 @@ if TYPE_CHECKING:
 
 
 class ModelKeeper:
-    """Models of designs that are variations of one design."""
+    """Keeper of the optical model for designs that are variations of one design."""
 
     def __init__(self, variant: str = "auto") -> None:
-        """Nothing is built yet.
+        """Store the variant; the model is built on first use.
 
         Args:
-            variant: of the renderer.
+            variant: variant of the renderer.
         """
         self.variant = variant
         self._model: OpticalModel | None = None
 
     def model(self, design: SensorDesign) -> OpticalModel:
-        """The model of a design; the one given before must not be used any more.
+        """Return the model of a design. It replaces the model returned before, which must no longer
+        be used.
 
         Raises:
             OptiSenseError: the design can't be built.

@@ -15,7 +15,7 @@ from optisense.objectives.registry import CONDITIONS
 from optisense.search.evaluation.requirements import breach_of
 
 Rank = tuple[int, float]
-"""Compares outcomes: a larger one is better."""
+"""Rank of an outcome, for comparison: of two outcomes the one with the larger rank is better."""
 
 FAILED: Rank = (-2, 0.0)
 """The rank of an outcome without a score, below all others."""
@@ -26,13 +26,15 @@ class Outcome:
     """The scores of one design.
 
     Attributes:
-        scores: by objective, higher is better; NaN where there is none.
-        failure: why a score is missing, or None.
-        parts: what the scores are made of, by objective, ready for JSON; and under `CONDITIONS`
-            the value of the limited quantity of each condition of the search, by its text.
-        seconds: wall time.
-        gradient: (n,) of the first objective by the coordinates, where a method asks for it.
-        worker: who worked it out.
+        scores: score by the name of each objective, higher is better; NaN where there is none.
+        failure: reason why a score is missing, or None.
+        parts: components of the scores, by objective, ready for JSON; the entry `CONDITIONS` holds
+            the value of the limited quantity of each condition of the search, by the condition's
+            text.
+        seconds: wall time of the trial, s.
+        gradient: gradient (n,) of the first objective by the coordinates, where a method asks for
+            it.
+        worker: name of the process that scored the trial.
     """
 
     scores: Mapping[str, float]
@@ -44,32 +46,32 @@ class Outcome:
 
     @property
     def failed(self) -> bool:
-        """Whether a score is missing."""
+        """True if a score is missing."""
         return self.failure is not None
 
     @property
     def conditions(self) -> Mapping[str, float | None]:
-        """The value of the limited quantity, by the text of each condition."""
+        """Value of the limited quantity by the text of each condition; None where it has none."""
         return self.parts.get(CONDITIONS, {})
 
     @cached_property
     def breach(self) -> float:
-        """How far the conditions are broken in all (see `breach_of`); 0 where all are met."""
+        """Sum of the violations of all conditions (see `breach_of`); 0 if all are met."""
         return breach_of(self.conditions)
 
     @property
     def is_feasible(self) -> bool:
-        """Whether no condition is broken."""
+        """True if no condition is broken."""
         return self.breach == 0.0
 
     @staticmethod
     def of_failure(objectives: list[str], reason: str, seconds: float = 0.0) -> Outcome:
-        """An outcome without scores."""
+        """Return an outcome without scores, with the reason for it."""
         return Outcome(dict.fromkeys(objectives, math.nan), reason, seconds=seconds)
 
 
 def rank_of(outcome: Outcome, objective: str) -> Rank:
-    """How an outcome compares with others by one objective, as `requirements` says."""
+    """Return the rank of an outcome by one objective, by the rules in `requirements`."""
     score = outcome.scores.get(objective, math.nan)
     if not math.isfinite(score):
         return FAILED

@@ -1,10 +1,10 @@
 """Conditions that a good design must meet, such as ``coverage >= 0.55``.
 
 Designs that break a condition are scored all the same, because a search learns from them in which
-direction the allowed designs are. They are compared by the rules of Deb, "An efficient constraint
-handling method for genetic algorithms", 2000: a design that meets all conditions is better than
-one that does not; of two that do, the one with the higher score is better; and of two that do not,
-the one that breaks them less.
+direction the feasible designs are. They are compared by the rules of Deb, "An efficient constraint
+handling method for genetic algorithms", 2000: a design that meets all conditions is better than one
+that does not; of two feasible designs the one with the higher score is better; of two infeasible
+designs the one with the smaller violation is better.
 """
 
 from __future__ import annotations
@@ -23,7 +23,8 @@ from optisense.objectives.named import named_in
 from optisense.objectives.registry import Objective, names
 
 ROUNDING = 1e-9
-"""Values count as within a limit if they miss it by a smaller part of the limit, which is rounding.
+"""Relative tolerance for limits: a value that misses its limit by less than this share of the limit
+meets it. It covers rounding errors of float64 sums.
 """
 
 HINT = "Write it as in 'coverage>=0.55' or 'distortion<=1.5'"
@@ -31,12 +32,12 @@ HINT = "Write it as in 'coverage>=0.55' or 'distortion<=1.5'"
 
 @dataclass(frozen=True)
 class Requirement:
-    """One condition on a quantity that can be measured for every design.
+    """Condition on a quantity that can be measured for every design.
 
     Attributes:
-        quantity: the objective, or the expression, that is limited.
-        at_least: the limit is the lowest value that is allowed, not the highest.
-        limit: the limit itself, in the unit of the quantity.
+        quantity: the objective or expression that is limited.
+        at_least: True if the limit is the lowest allowed value, False if it is the highest.
+        limit: limit, in the unit of the quantity.
     """
 
     quantity: str
@@ -48,10 +49,10 @@ class Requirement:
 
     @staticmethod
     def parse(text: str) -> Requirement:
-        """Read a condition.
+        """Parse a condition.
 
         Raises:
-            SearchError: the text is no condition; marks the place.
+            SearchError: the text is no condition; the message marks the place in the text.
         """
         found = re.fullmatch(r"(?P<what>[^<>=]*)(?P<sign>>=|<=)(?P<limit>[^<>=]*)", text)
         if found is None:
@@ -73,9 +74,9 @@ class Requirement:
         return Requirement(quantity, found["sign"] == ">=", limit)
 
     def breach(self, value: float) -> float:
-        """How far a value misses the limit, as a part of the limit; 0 where it meets it.
+        """Return by how much a value misses the limit, as a share of the limit; 0 if it meets it.
 
-        A limit of 0 counts as 1. A value that is no number misses it infinitely.
+        A limit of 0 counts as 1. NaN gives infinity.
         """
         if math.isnan(value):
             return math.inf
@@ -84,11 +85,13 @@ class Requirement:
         return missed if missed > ROUNDING else 0.0
 
     def margin(self, value: float) -> float:
-        """How far a value is on the allowed side of the limit; below 0 on the other side."""
+        """Return the distance of a value from the limit, positive on the allowed side, in the unit
+        of the quantity.
+        """
         return value - self.limit if self.at_least else self.limit - value
 
     def objective(self) -> Objective:
-        """The objective that measures the quantity.
+        """Return the objective that measures the quantity.
 
         Raises:
             SearchError: there is no such objective.
@@ -104,11 +107,11 @@ class Requirement:
 
 
 def requirements_of(texts: Iterable[str]) -> list[Requirement]:
-    """Several conditions as they are written, each once.
+    """Parse several conditions, and drop duplicates.
 
     Raises:
-        SearchError: one is no condition, names no objective, contradicts another, or can be met by
-            nothing.
+        SearchError: a text is no condition, names no objective, contradicts another, or can't be
+            met by any design.
     """
     found = list(dict.fromkeys(Requirement.parse(text) for text in texts))
     for each in found:
@@ -121,10 +124,10 @@ def requirements_of(texts: Iterable[str]) -> list[Requirement]:
 
 
 def _refuse_impossible(wanted: Requirement) -> None:
-    """Refuse a limit beyond the range of what it limits, as far as no setting moves that range.
+    """Refuse a limit outside the range of its quantity, where no setting changes that range.
 
     Raises:
-        SearchError: nothing can meet the condition, or it names no objective.
+        SearchError: no design can meet the condition, or it names no objective.
     """
     measured = wanted.objective()
     if callable(measured.range):
@@ -139,16 +142,18 @@ def _refuse_impossible(wanted: Requirement) -> None:
 
 @lru_cache(maxsize=256)
 def _requirement(text: str) -> Requirement:
-    """A condition from its stored text; all trials of a study have the same few."""
+    """Parse a condition. The results are cached, since all trials of a study have the same few
+    conditions.
+    """
     return Requirement.parse(text)
 
 
 def breach_of(conditions: Mapping[str, float | None]) -> float:
-    """How far a design breaks its conditions in all: the sum over them.
+    """Return the sum of the violations of all conditions of a design.
 
     Args:
-        conditions: the value of the limited quantity, by the text of each condition; None where it
-            could not be measured.
+        conditions: value of the limited quantity by the text of each condition; None where it could
+            not be measured.
 
     Raises:
         SearchError: a text is no condition.

@@ -1,4 +1,4 @@
-"""Scoring a design by what nine of ten manufactured ones reach."""
+"""Robust scores: the score that nine of ten manufactured sensors reach."""
 
 from __future__ import annotations
 
@@ -26,15 +26,16 @@ from optisense.search.space.manufacturing import (
 FloatArray = NDArray[np.float64]
 
 LOW, MIDDLE, HIGH = 0.1, 0.5, 0.9
-"""Quantiles of the scores of made sensors that a robust score can be taken from."""
+"""Quantiles of the scores of manufactured sensors that a robust score can be taken from."""
 
 
 class RobustEvaluator:
-    """Scores a point by the tenth percentile (P10) over sensors with manufacturing errors.
+    """Evaluator that scores a point by the tenth percentile (P10) over sensors with manufacturing
+    errors.
 
-    A condition is met where nine of ten such sensors meet it.
+    A condition is met if nine of ten such sensors meet it.
 
-    All points are tried with the same errors, so that they are compared fairly.
+    All points are scored with the same errors, so that they are compared fairly.
     """
 
     def __init__(
@@ -43,7 +44,7 @@ class RobustEvaluator:
         """Draw the errors.
 
         Raises:
-            DesignError, SearchError: an error's path does not fit the design.
+            DesignError, SearchError: the path of an error does not fit the design.
         """
         self.usual = usual
         self.errors = errors
@@ -54,14 +55,16 @@ class RobustEvaluator:
         self._errors(errors.bind(usual.space.prepared))
 
     def usual_trials(self) -> UsualTrials | None:
-        """See `DesignEvaluator.usual_trials`; each score is of several sensors."""
+        """Return the usual duration of the trials (see `DesignEvaluator.usual_trials`), each of
+        which scores several sensors.
+        """
         usual, trials = self.usual.usual_score(), self.usual.usual_trials()
         if usual is None or trials is None:
             return None
         return trials.slower((self.samples - 1) * (usual.building + usual.whole))
 
     def report_progress_to(self, callback: ProgressCallback) -> None:
-        """See `DesignEvaluator.listen`."""
+        """See `DesignEvaluator.report_progress_to`."""
         self.usual.report_progress_to(callback)
 
     def __call__(self, vector: FloatArray, seed: int) -> Outcome:
@@ -103,7 +106,9 @@ class RobustEvaluator:
         return Outcome(scores, failure, parts, time.perf_counter() - began)
 
     def _errors(self, bound: BoundManufacturingErrors) -> FloatArray:
-        """(samples, d) errors, the same for all designs with as many numbers."""
+        """Return the errors, (samples, d); designs with equally many erroneous values get the
+        same.
+        """
         if bound.size not in self._drawn:
             shares = latin_hypercube(self.samples, bound.size, self.seed)
             self._drawn[bound.size] = bound.errors(shares)
@@ -111,8 +116,9 @@ class RobustEvaluator:
 
 
 def _reached(wanted: Requirement, found: Sequence[Outcome]) -> float:
-    """What nine of ten manufactured sensors reach of a quantity that a condition limits: its tenth
-    percentile where it may not be too low, else its ninetieth; NaN where too many have none.
+    """Return the value of a limited quantity that nine of ten manufactured sensors reach: the tenth
+    percentile for a lower limit, the ninetieth for an upper limit; NaN if it falls among sensors
+    without a value.
     """
     measured = [outcome.conditions.get(str(wanted)) for outcome in found]
     values = np.array([math.nan if value is None else value for value in measured])
@@ -120,9 +126,10 @@ def _reached(wanted: Requirement, found: Sequence[Outcome]) -> float:
 
 
 def percentile(values: ArrayLike, share: float) -> float:
-    """The value that a share of all stay below, linear between neighbours.
+    """Return a percentile of the values, with linear interpolation between neighbours.
 
-    Failed ones (NaN) count as worse than any; NaN where the percentile falls among them.
+    Failed values (NaN) count as lower than any other; the result is NaN if the percentile falls
+    among them.
     """
     ordered = np.sort(np.nan_to_num(np.asarray(values, dtype=np.float64), nan=-np.inf))
     place = share * (len(ordered) - 1)

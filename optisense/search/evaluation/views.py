@@ -12,44 +12,51 @@ from optisense.search.evaluation.models import ModelKeeper
 
 LEAST_OF_START = 0.5
 """Share of the sensing surface seen at the start that a trial must see. Scores grow as the camera
-looks at less, so a search over the field of view ends where it sees as little as it may: a
-GelSight360 that sees its tip only, 0.41 of what it should, is none, and cameras that see 0.56 of
-the start or more by `benchmarks/single_parameters.py` are zooms that a person may want."""
+looks at less of the surface, so a search over the field of view would end at the smallest allowed
+view. Values come from examples: a GelSight360 that sees only its tip, 0.41 of the surface of the
+design, is useless, and cameras that see 0.56 of the start or more
+(`benchmarks/single_parameters.py`) are useful zooms.
+"""
 
 VIEW_RAYS = (48, 36)
-"""Width and height of the chief rays that tell by which mirrors the camera looks. Of GelSight
-Svelte's, 500 arrive: shares are off by a column of the picture at most, 0.03, and a trial by AOAP
-takes no longer by more than a twentieth."""
+"""Width and height, in rays, of the grid of chief rays that tells by which mirrors the camera
+looks. Of GelSight Svelte's, 500 arrive; shares are off by at most one column of the picture, 0.03,
+and a trial by AOAP takes at most a twentieth longer.
+"""
 
 MOST_BY_OTHER_WAYS = 0.1
 """Share of the chief rays that may reach the sensing surface by other mirrors than in the design
-that the search starts from, or by none. All rays of GelSight Svelte go by both of its mirrors; by
-AOAP, designs of which 31 to 99 % go past them were the best of a camera that may turn, and a
-strip of 6 % beside the edge of a mirror turned by a degree does no harm."""
+that the search starts from, or by none. All rays of GelSight Svelte go by both of its mirrors. With
+AOAP as the goal and a camera that may turn, the best designs had 31 to 99 % of the rays miss them;
+a strip of 6 % beside the edge of a mirror turned by a degree does no harm.
+"""
 
 SIGHTLESS = ("lights.", "coating.")
-"""Sections of a design that no chief ray depends on."""
+"""Prefixes of the names of parameters on which no chief ray depends."""
 
 
 class SameMirrors:
-    """The camera must see the sensing surface by the same mirrors as in the first design.
+    """Constraint that the camera sees the sensing surface by the same mirrors as in the starting
+    design.
 
     A mirror that the camera looks past is a part that nobody would build.
     """
 
     def __init__(self, design: SensorDesign, keeper: ModelKeeper) -> None:
-        """Nothing is traced yet.
+        """Store the design; nothing is traced yet.
 
         Args:
-            design: that the search starts from.
-            keeper: of the optical model.
+            design: design that the search starts from.
+            keeper: keeper of the optical model.
         """
         self._design = design
         self._keeper = keeper
         self._ways: frozenset[frozenset[str]] | None = None
 
     def __call__(self, design: SensorDesign) -> str | None:
-        """How much the camera sees past the mirrors, where that is too much; else None."""
+        """Return a message with the share of rays that miss the mirrors if it is too large, else
+        None.
+        """
         if self._ways is None:
             self._ways = frozenset(self._seen(self._design))
         seen = self._seen(design)
@@ -69,11 +76,11 @@ class SameMirrors:
 
 
 def least_skin(design: SensorDesign, keeper: ModelKeeper) -> float:
-    """The share of the sensing surface that trials must see, where no setting says otherwise.
+    """Return the share of the sensing surface that trials must see if no setting says otherwise.
 
     Args:
-        design: that the search starts from.
-        keeper: of the optical model.
+        design: design that the search starts from.
+        keeper: keeper of the optical model.
 
     Raises:
         SetupError: the renderer can't run on this machine.
@@ -88,7 +95,7 @@ def least_skin(design: SensorDesign, keeper: ModelKeeper) -> float:
 
 
 def may_change_view(names: Iterable[str]) -> bool:
-    """Whether what parameters of these names change can change what the camera sees."""
+    """Return whether parameters with these names may change what the camera sees."""
     return any(not name.startswith(SIGHTLESS) for name in names)
 
 

@@ -16,11 +16,12 @@ from optisense.search.evaluation.outcome import Outcome
 
 
 class Runner(ABC):
-    """Works out trials; a context manager. Every submitted trial ends in one outcome.
+    """Base class of executors, which are context managers. Every submitted trial ends in one
+    outcome.
 
     Attributes:
-        workers: how many trials are worked on at once, as far as that is known.
-        window: how many trials should be submitted before the first is finished.
+        workers: number of trials that are scored at once, as far as it is known.
+        window: number of trials that should be submitted before the first is finished.
     """
 
     workers: int = 1
@@ -28,11 +29,11 @@ class Runner(ABC):
 
     @abstractmethod
     def submit(self, vector: NDArray[np.float64], seed: int) -> Future[Outcome]:
-        """Work out a trial; the future's exception is an error that no trial can do without."""
+        """Score a trial. The future has an exception only for errors that concern all trials."""
 
     @abstractmethod
     def close(self) -> None:
-        """End all work at once; what is not finished is dropped."""
+        """Stop all work at once; unfinished trials are dropped."""
 
     def __enter__(self) -> Runner:
         return self
@@ -47,10 +48,10 @@ class Runner(ABC):
 
 
 def outcome_of(done: Future[Outcome]) -> Outcome:
-    """The outcome of a future.
+    """Return the outcome of a future.
 
     Raises:
-        OptiSenseError: no trial can be worked out.
+        OptiSenseError: no trial can be scored.
     """
     error = done.exception()
     if error is None:
@@ -62,10 +63,10 @@ def outcome_of(done: Future[Outcome]) -> Outcome:
 
 
 def packed(evaluator: Evaluator) -> bytes:
-    """An evaluator as bytes for other processes.
+    """Return an evaluator as bytes for other processes.
 
     Raises:
-        SearchError: it holds something that only this process knows.
+        SearchError: the evaluator holds an object that can't be pickled.
     """
     try:
         blob = pickle.dumps(evaluator, protocol=pickle.HIGHEST_PROTOCOL)

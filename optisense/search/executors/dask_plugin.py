@@ -1,4 +1,4 @@
-"""The plugin that brings an evaluator to every Dask worker, also to one that joins later."""
+"""Dask plugin that gives an evaluator to every worker, also to those that join later."""
 
 from __future__ import annotations
 
@@ -20,9 +20,13 @@ class EvaluatorPlugin(WorkerPlugin):
         self.blob = blob
 
     def setup(self, worker: Worker) -> None:
-        """Called when the worker starts, or when the plugin reaches it."""
+        """Remember the evaluator; Dask calls this when the worker starts or the plugin reaches
+        it.
+        """
         remember(self.key, self.blob)
 
     def teardown(self, worker: Worker) -> None:
-        """Called when the worker ends, or when the study does."""
+        """Forget the evaluator; Dask calls this when the worker ends or the study unregisters the
+        plugin.
+        """
         forget(self.key)

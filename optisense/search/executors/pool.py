@@ -1,8 +1,8 @@
 """A pool of processes on this machine.
 
-Python's own pool is lost as a whole when one of its processes dies, and starts them as copies of
-the calling program. Here each worker has a line of its own, so that a death costs the one trial
-that it was at, which another worker takes over.
+Python's own pool fails as a whole when one of its processes dies, and starts processes as copies of
+the calling program. Here each worker has its own pipe, so that a death interrupts only the trial in
+progress, which another worker takes over.
 """
 
 from __future__ import annotations
@@ -30,15 +30,21 @@ from optisense.search.executors.wire import receive, send
 from optisense.usual_times import processors
 
 MOST_DEATHS = 2
-"""A trial whose workers die so often is itself the reason, and fails."""
+"""Number of workers that may die during one trial; a trial that reaches it is taken to be the
+cause, and fails.
+"""
 
 ONE_THREAD = dict.fromkeys(
     ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS"), "1"
 )
-"""Linear algebra of small matrices; many threads of many workers would wait for each other."""
+"""Environment variables that give each worker one thread for linear algebra. Its matrices are
+small, and the threads of many workers would wait for each other.
+"""
 
 LAST_WORDS = 2000
-"""Characters of a dead worker's output that are looked at."""
+"""Characters at the end of a dead worker's output that are searched for its last line, which names
+the reason.
+"""
 
 
 @dataclass
@@ -51,17 +57,17 @@ class _Task:
 
 @dataclass
 class _Worker:
-    """A process with what is known of it."""
+    """Worker process and its state."""
 
     process: subprocess.Popen[bytes]
     ready: bool = False
     task: _Task | None = None
 
     def ask(self, message: Any) -> Any:
-        """Send it something and wait for the answer.
+        """Send a message to the worker and wait for the answer.
 
         Raises:
-            EOFError, OSError: it has died.
+            EOFError, OSError: the worker has died.
         """
         assert self.process.stdin is not None and self.process.stdout is not None
         send(self.process.stdin, message)
@@ -69,18 +75,19 @@ class _Worker:
 
 
 class ProcessPool(Runner):
-    """Workers on this machine, each with its share of the processor's threads."""
+    """Pool of worker processes on this machine, each with its share of the processor's threads."""
 
     def __init__(self, evaluator: Evaluator, workers: int, threads: int | None = None) -> None:
-        """Start the workers; they get ready in the background.
+        """Start the workers, which get ready in the background.
 
         Args:
-            evaluator: works out the trials.
-            workers: processes.
-            threads: of each worker's renderer; its share of the processors if None.
+            evaluator: evaluator of the trials.
+            workers: number of processes.
+            threads: threads of each worker's renderer; the worker's share of the processors if
+                None.
 
         Raises:
-            SearchError: there are less than one, or the evaluator can't be given to them.
+            SearchError: `workers` is below 1, or the evaluator can't be pickled.
         """
         if workers < 1:
             raise SearchError(f"{workers} workers can't do anything", hint="Give 1 or more")
@@ -119,12 +126,12 @@ class ProcessPool(Runner):
             process.wait()
 
     def process_ids(self) -> list[int]:
-        """Those of the workers that are running now."""
+        """Return the process ids of the workers that are running."""
         with self._changed:
             return [process.pid for process in self._processes.values()]
 
     def _keep(self, place: int) -> None:
-        """Keep one place filled with a worker: when it dies, another one follows."""
+        """Keep one place of the pool filled: start a new worker when the one there dies."""
         stillborn = 0
         try:
             while stillborn < MOST_DEATHS:
@@ -140,7 +147,7 @@ class ProcessPool(Runner):
                         code = process.wait()
                         if self._closed:
                             return
-                        if not worker.ready and code >= 0:  # it left by itself: so will others
+                        if not worker.ready and code >= 0:  # it exited itself: so will others
                             raise _never_ready(code, _tail(words)) from None
                         stillborn = 0 if worker.ready else stillborn + 1
                         if worker.task is not None:
@@ -154,11 +161,11 @@ class ProcessPool(Runner):
             self._give_up(SetupError(f"a worker could not be started: {error}"))
 
     def _attend(self, worker: _Worker) -> None:
-        """Get a worker ready and keep it busy until the pool is closed.
+        """Prepare a worker and give it tasks until the pool is closed.
 
         Raises:
-            EOFError, OSError: it has died.
-            OptiSenseError: it says that it can't work.
+            EOFError, OSError: the worker has died.
+            OptiSenseError: the worker reports that it can't score any trial.
         """
         kind, content = worker.ask((self._blob, self._threads))
         if kind == "unfit":
@@ -194,7 +201,7 @@ class ProcessPool(Runner):
             return process
 
     def _next(self) -> _Task | None:
-        """The next task, or None when the pool is closed."""
+        """Return the next task, or None if the pool is closed."""
         with self._changed:
             while not self._waiting and not self._closed and self._unfit is None:
                 self._changed.wait()
@@ -203,7 +210,7 @@ class ProcessPool(Runner):
             return self._waiting.popleft()
 
     def _mourn(self, task: _Task, code: int, words: str) -> None:
-        """The worker of a task has died: another one takes it, unless it is the reason."""
+        """Give the task of a dead worker to another one, or fail it if it has killed too many."""
         task.deaths += 1
         if task.deaths < MOST_DEATHS:
             with self._changed:
@@ -214,7 +221,7 @@ class ProcessPool(Runner):
         task.future.set_result(Outcome({}, reason))
 
     def _give_up(self, error: Exception) -> None:
-        """No worker can work: every task fails with this error."""
+        """Fail all tasks with this error, because no worker can work."""
         with self._changed:
             self._unfit = error
             tasks = list(self._waiting)
@@ -247,7 +254,7 @@ def _exit(code: int) -> str:
 
 
 def _tail(words: IO[bytes]) -> str:
-    """The last line of what a worker said."""
+    """Return the last line of a worker's output."""
     size = words.seek(0, os.SEEK_END)
     words.seek(max(0, size - LAST_WORDS))
     lines = words.read().decode("utf-8", "replace").strip().splitlines()

@@ -1,4 +1,4 @@
-"""Trials on any executor with the protocol of `concurrent.futures`, and on a Dask cluster."""
+"""Executors for any object with the protocol of `concurrent.futures`, and for a Dask cluster."""
 
 from __future__ import annotations
 
@@ -17,16 +17,21 @@ from optisense.search.executors.base import Runner, packed
 from optisense.search.executors.remote_worker import work_out
 
 CONNECT_SECONDS = 10.0
-"""Seconds that a Dask scheduler may take to answer; one in the same network answers within a
-second."""
+"""Longest wait for the answer of a Dask scheduler, s; one in the same network answers within a
+second.
+"""
 WORKER_SECONDS = 60.0
-"""A cluster without any worker is waited for so long."""
+"""Longest wait for the first worker of a cluster, s; enough for a cluster that starts its workers
+on demand.
+"""
 
 MANY = 1000
-"""Trials that wait at an executor, which may have any number of workers."""
+"""Number of trials that are submitted ahead to an executor, since its number of workers is not
+known; it exceeds the number of workers of most clusters.
+"""
 
 ADDRESS = re.compile(r"(?:[a-z]+://)?(?:\[[^\]\s]+\]|[^:/\s\[\]]+):\d{1,5}")
-"""Protocol, host and port."""
+"""Pattern of an address: protocol, host and port."""
 
 HOW_TO_START = (
     "Start one with `dask scheduler` on one machine and `dask worker ADDRESS --nthreads 1` on each "
@@ -35,13 +40,13 @@ HOW_TO_START = (
 
 
 class ExecutorRunner(Runner):
-    """Trials on an executor that someone else has set up (MPI, a batch system, threads, ...)."""
+    """Trials on an executor that the caller has set up (MPI, a batch system, threads, ...)."""
 
     def __init__(self, evaluator: Evaluator, executor: Executor, workers: int = 1) -> None:
-        """Take an executor, which is not shut down at the end.
+        """Take an executor; `close` does not shut it down.
 
         Raises:
-            SearchError: the evaluator can't be given to other processes.
+            SearchError: the evaluator can't be pickled.
         """
         self._blob = packed(evaluator)
         self._key = hashlib.sha256(self._blob).hexdigest()
@@ -54,22 +59,22 @@ class ExecutorRunner(Runner):
         return self._executor.submit(work_out, self._key, self._blob, vector, seed)
 
     def close(self) -> None:
-        """The executor is not ours to shut down."""
+        """Do nothing: the executor belongs to the caller."""
 
 
 class DaskRunner(Runner):
-    """Trials on a Dask cluster, whose workers may come and go while it runs.
+    """Trials on a Dask cluster, whose workers may join and leave while it runs.
 
-    A worker that dies costs the trials that it was at: Dask gives them to others. The evaluator
-    travels once to each worker, also to those that come later.
+    If a worker dies, Dask gives its trials to others. The evaluator is sent once to each worker,
+    also to those that join later.
     """
 
     def __init__(self, evaluator: Evaluator, address: str) -> None:
-        """Connect, and hand the evaluator to the workers.
+        """Connect to the scheduler, and send the evaluator to the workers.
 
         Raises:
             SetupError: Dask is not installed, no scheduler answers, or there is no worker.
-            SearchError: the evaluator can't be given to other processes.
+            SearchError: the evaluator can't be pickled.
         """
         blob = packed(evaluator)
         self._key = hashlib.sha256(blob).hexdigest()
@@ -103,7 +108,7 @@ class DaskRunner(Runner):
 
 
 def _connect(address: str) -> Any:
-    """A client of the scheduler there.
+    """Return a client of the scheduler at an address.
 
     Raises:
         SetupError: Dask is not installed, or no scheduler answers.
@@ -139,7 +144,9 @@ def _wait_for_a_worker(client: Any, address: str) -> None:
 
 
 def _settle(done: Future[Outcome], future: Future[Outcome]) -> None:
-    """Pass a result on; what Dask says about a trial whose workers keep dying is its failure."""
+    """Copy the result of a future to another one; Dask's error about a trial whose workers keep
+    dying becomes the failure of that trial.
+    """
     if done.cancelled():
         future.cancel()
         return

@@ -1,4 +1,4 @@
-"""The worker in another process or machine: it keeps an evaluator and works out trials."""
+"""Worker functions for other processes and machines: they keep an evaluator and score trials."""
 
 from __future__ import annotations
 
@@ -17,16 +17,18 @@ from optisense.search.evaluation.outcome import Outcome
 _evaluators: dict[str, Evaluator] = {}
 _blobs: dict[str, bytes] = {}
 _one_at_a_time = threading.Lock()
-"""An evaluator keeps one model and serves one trial at a time, whatever threads a worker has."""
+"""Lock that serves one trial at a time, since an evaluator keeps one model, whatever threads a
+worker has.
+"""
 
 
 def work_out(key: str, blob: bytes | None, vector: NDArray[np.float64], seed: int) -> Outcome:
-    """Work out a trial in whatever process this is called.
+    """Score a trial in the process where this is called.
 
     Args:
-        key: of the evaluator.
-        blob: the evaluator, or None where it came before.
-        vector, seed: the trial.
+        key: key of the evaluator.
+        blob: the pickled evaluator, or None if it was sent before by `remember`.
+        vector, seed: point of the trial, (n,), and its seed.
     """
     with _one_at_a_time:
         if key not in _evaluators:
@@ -51,11 +53,11 @@ def remember(key: str, blob: bytes) -> None:
 
 
 def forget(key: str) -> None:
-    """Drop an evaluator again."""
+    """Drop the evaluator stored under a key."""
     _blobs.pop(key, None)
     _evaluators.pop(key, None)
 
 
 def _own_name() -> str:
-    """The machine and the process that work a trial out."""
+    """Return the names of the machine and the process that score a trial."""
     return f"{socket.gethostname()}:{os.getpid()}"

@@ -1,4 +1,4 @@
-"""Trials one after another in this process."""
+"""Executor that scores trials one after another in this process."""
 
 from __future__ import annotations
 
@@ -17,19 +17,19 @@ from optisense.search.executors.base import Runner
 
 
 class SerialRunner(Runner):
-    """Works a trial out when it is submitted.
+    """Executor that scores a trial when it is submitted.
 
-    A render that Ctrl-C ends early still gives an image, and a score that must not count. So the
+    A render that Ctrl-C ends early still gives an image, with a score that must not count. So the
     first Ctrl-C waits until the trial is finished; the second drops it. Where Ctrl-C is ignored, as
-    shells arrange it for programs that they start in the background, it stays ignored.
+    shells arrange it for programs in the background, it stays ignored.
     """
 
     def __init__(self, evaluator: Evaluator, told: Callable[[], None] | None = None) -> None:
-        """Nothing is started.
+        """Store the evaluator; nothing is started yet.
 
         Args:
-            evaluator: works out the trials.
-            told: called when Ctrl-C is pressed during a trial.
+            evaluator: evaluator of the trials.
+            told: function that is called when Ctrl-C is pressed during a trial.
         """
         self._evaluator = evaluator
         self._told = told
@@ -37,10 +37,10 @@ class SerialRunner(Runner):
         self._before: Callable[[int, FrameType | None], object] | int | None = None
 
     def submit(self, vector: NDArray[np.float64], seed: int) -> Future[Outcome]:
-        """The finished trial.
+        """Score the trial and return a finished future.
 
         Raises:
-            KeyboardInterrupt: Ctrl-C was pressed before, or twice since.
+            KeyboardInterrupt: Ctrl-C was pressed before this trial, or twice during it.
         """
         if self._pressed:
             raise KeyboardInterrupt
@@ -56,13 +56,13 @@ class SerialRunner(Runner):
         return future
 
     def report_progress_to(self, callback: Callable[[float, str], None]) -> None:
-        """Call `callback` with the progress of the trial at hand, if its evaluator reports it."""
+        """Call `callback` with the progress of the current trial, if its evaluator reports it."""
         report_progress_to = getattr(self._evaluator, "report_progress_to", None)
         if report_progress_to is not None:
             report_progress_to(callback)
 
     def close(self) -> None:
-        """Nothing is running; Ctrl-C does what it did before."""
+        """Restore the handler of Ctrl-C."""
         if self._before is not None:
             signal.signal(signal.SIGINT, self._before)
             self._before = None

@@ -1,4 +1,4 @@
-"""Messages between a pool and its workers: pickles, each after its length."""
+"""Messages between a pool and its workers: pickles, each preceded by its length."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ def send(stream: IO[bytes], message: Any) -> None:
     """Write a message.
 
     Raises:
-        OSError: the other end has gone.
+        OSError: the process at the other end has closed the pipe.
     """
     blob = pickle.dumps(message, protocol=pickle.HIGHEST_PROTOCOL)
     stream.write(_LENGTH.pack(len(blob)) + blob)
@@ -24,7 +24,7 @@ def receive(stream: IO[bytes]) -> Any:
     """Read a message.
 
     Raises:
-        EOFError: the other end has gone.
+        EOFError: the process at the other end has closed the pipe.
     """
     head = _exactly(stream, _LENGTH.size)
     return pickle.loads(_exactly(stream, _LENGTH.unpack(head)[0]))

@@ -1,7 +1,7 @@
-"""A worker of the local pool: a process of its own that is asked over its standard input.
+"""Worker of the local pool: a separate process that reads requests from its standard input.
 
-It is started with ``python -m optisense.search.executors.worker`` and not as a copy of the
-program that wants it, so that programs need no guard around their main part.
+It is started with ``python -m optisense.search.executors.worker`` and not as a copy of the calling
+program, so that programs need no guard around their main part.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from optisense.search.executors.wire import receive, send
 
 
 def main() -> None:
-    """Work out trials until the other end closes the line."""
+    """Score trials until the pool closes the pipe."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     answers = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)  # whatever prints must not get between the answers
@@ -55,7 +55,7 @@ def main() -> None:
 
 
 def _listen(stream: BinaryIO, messages: queue.SimpleQueue[Any]) -> None:
-    """Pass messages on; when the other end has gone, end this process even amid a trial."""
+    """Pass messages on, and end this process, even amid a trial, when the pool closes the pipe."""
     try:
         while True:
             messages.put(receive(stream))
@@ -64,7 +64,7 @@ def _listen(stream: BinaryIO, messages: queue.SimpleQueue[Any]) -> None:
 
 
 def _sendable(error: Exception) -> Exception:
-    """The error itself where it survives the way, else what it says."""
+    """Return the error itself if it can be pickled, else an error with the same message."""
     if isinstance(error, OptiSenseError):
         return error
     return RuntimeError(f"{type(error).__name__}: {error}")

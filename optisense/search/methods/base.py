@@ -1,9 +1,9 @@
 """The base class of search methods, which propose points and receive their scores, by generation.
 
-A method must be a function of its problem, its options and what it was told, and of nothing else:
-a study that was killed is resumed by telling a new instance again what the old one knew. So no
+A method must be a function of its problem, its options and the outcomes that it was told, and of
+nothing else: a killed study is resumed by telling a new instance the outcomes of the old one. So no
 state has to be saved (and none from a stranger has to be unpickled), and a resumed study goes on
-with exactly the generation that the other would have had.
+with exactly the generation that the interrupted one would have had.
 """
 
 from __future__ import annotations
@@ -28,14 +28,14 @@ BoolArray = NDArray[np.bool_]
 
 @dataclass(frozen=True)
 class Problem:
-    """The problem that a method solves.
+    """Problem that a method solves.
 
     Attributes:
-        space: the points it may propose.
+        space: space of the points that the method may propose.
         objectives: names of the goals; methods for one goal maximise the first.
         requirements: conditions that the best design must meet, as texts.
-        budget: how many trials there may be; a method need not use them all.
-        seed: of its random numbers.
+        budget: largest number of trials; a method need not use them all.
+        seed: seed of the method's random numbers.
     """
 
     space: BoundSpace
@@ -45,17 +45,17 @@ class Problem:
     requirements: tuple[str, ...] = ()
 
     def random(self, name: str) -> np.random.Generator:
-        """Random numbers of a method's own."""
+        """Return a random generator that belongs to the method of this name."""
         return np.random.default_rng([self.seed, zlib.crc32(name.encode())])
 
 
 class Method(ABC):
-    """A way to search. Options are keyword arguments of the constructor.
+    """Base class of search methods. Options are keyword arguments of the constructor.
 
     Class attributes:
-        name: on the command line.
-        summary: what it does, in one line.
-        several: whether it looks for the best trade-offs between several goals.
+        name: name of the method on the command line.
+        summary: description in one line.
+        several: whether the method looks for the best trade-offs between several goals.
         renders_once: whether all trials of a seed share their images.
     """
 
@@ -75,7 +75,7 @@ class Method(ABC):
 
     @classmethod
     def usual_budget(cls, space: BoundSpace) -> int:
-        """How many trials there are when the user names no number.
+        """Return the number of trials for a search without a given budget.
 
         Raises:
             SearchError: the space does not fit the method.
@@ -84,31 +84,33 @@ class Method(ABC):
 
     @abstractmethod
     def ask(self) -> FloatArray:
-        """The next generation: (k, n) points of the space. None at all ends the search."""
+        """Return the next generation, (k, n) points of the space; zero points end the search."""
 
     @abstractmethod
     def tell(self, vectors: FloatArray, outcomes: Sequence[Outcome]) -> None:
         """Receive the outcomes of the whole generation (k, n), in the order of its points."""
 
     def evaluator(self, usual: DesignEvaluator) -> Evaluator:
-        """The evaluator of the points; a method with a faster or richer one returns its own."""
+        """Return the evaluator of the points. A method with a faster or richer evaluator overrides
+        it.
+        """
         return usual
 
     def describe(self) -> dict[str, Any]:
-        """Facts about the state for progress and reports, ready for JSON."""
+        """Return facts about the state for progress and reports, ready for JSON."""
         return {}
 
     def notes(self) -> list[str]:
-        """Notes for the user at the end of the search."""
+        """Return notes for the user at the end of the search."""
         return []
 
 
 def values_to_maximise(outcomes: Sequence[Outcome], objective: str) -> FloatArray:
-    """(k,) values of a generation in the order of `rank_of`.
+    """Return the values (k,) of a generation, ordered as by `rank_of`.
 
-    Trials that meet all conditions have their scores. Those that break one follow below the worst
-    of these, the farther the more they break it, and failed ones are the last. NaN for all if all
-    failed.
+    Trials that meet all conditions have their scores as values. Those that break one get values
+    below the worst of these, the lower the larger the violation, and failed ones get the lowest.
+    All values are NaN if all trials failed.
     """
     values = np.array([outcome.scores.get(objective, np.nan) for outcome in outcomes])
     failed = ~np.isfinite(values)
@@ -119,7 +121,9 @@ def values_to_maximise(outcomes: Sequence[Outcome], objective: str) -> FloatArra
 
 
 def _put_below(values: FloatArray, lower: BoolArray, upper: BoolArray, amounts: FloatArray) -> None:
-    """Give some values (k,) new ones below some others, which are kept, by falling amounts (k,)."""
+    """Set values of some trials (k,) to numbers below those of some others, in the order of falling
+    amounts (k,).
+    """
     if not lower.any():
         return
     if not upper.any():

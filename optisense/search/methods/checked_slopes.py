@@ -1,11 +1,11 @@
-"""The smoothed score of a point and its gradient, by derivatives of rays that are checked against
-differences of the true score, or by such differences.
+"""Smoothed score of a point and its gradient, by ray derivatives that are compared with finite
+differences of the true score, or by these differences.
 
-A derivative holds where it agrees with central differences of the true score and these agree with
-each other over two steps. A score can fail this in two ways. Its differences are steady and the
-derivative is another one: then the gradient is made of differences. Or its differences change with
-their step: the score steps, because a row of pixels or a row of AOAP's triangles comes into view
-at once, or it has a kink, and no derivative describes it. The outcome tells the two apart.
+A derivative is valid if it agrees with central differences of the true score, and these agree with
+each other for two step sizes. A score can fail this in two ways. If its differences agree with each
+other but not with the derivative, the gradient is made of differences. If its differences change
+with their step size, the score has a jump, because a row of pixels or of AOAP's triangles comes
+into view at once, or a kink, and no derivative describes it. The outcome tells the two apart.
 """
 
 from __future__ import annotations
@@ -31,40 +31,48 @@ if TYPE_CHECKING:
     from optisense.optics.transport.ray_gradient import DifferentiableRays
 
 STEP = 0.05
-"""Central differences of the true score go so far to both sides, as a part of the parameters'
-ranges. A true score is a sum over pixels and triangles, which steps where a row of pixels comes
-into view, and which has small hills where an edge passes the picture's corner: over less than
-about this a derivative says little about the way up. Checks compare with half of this step."""
+"""Step of central differences of the true score to each side, as a share of the parameters' ranges.
+A true score is a sum over pixels and triangles, which jumps where a row of pixels comes into view
+and has small hills where an edge passes the picture's corner: over shorter steps a difference says
+little about the direction of ascent. Checks also use half of this step.
+"""
 
 FEW = 8
-"""Largest number of parameters for which differences by each cost no more scores than derivatives
-and the comparison with differences do. Over `STEP` they also see past the small hills of a
-true score, on which derivatives end."""
+"""Largest number of parameters for which central differences by each parameter need no more scores
+than ray derivatives with their check. Differences over `STEP` also see past the small hills of a
+true score, on which ascents by derivatives end.
+"""
 
 TOLERANCE = 0.05
-"""A derivative along a direction holds if it is off the difference of the true score by at most
-this part of that difference, or of the slope that a random direction has on average (the
-gradient's length over the root of the number of parameters) where the difference is smaller."""
+"""Relative tolerance of the check of a derivative along a direction. It refers to the difference of
+the true score, or, if that is smaller, to the slope of an average random direction (the gradient's
+length over the root of the number of parameters).
+"""
 
 CHECKS_AT_START, CHECKS = 4, 1
-"""Directions in which a gradient is compared with differences: its own, and at the start three
-random ones as well, along which errors show that the steepest direction hides. Each takes four
-scores for derivatives of rays, and two for differences. Derivatives of rays that no difference
-contradicts at the start are not compared elsewhere: on GelSight Svelte's mirror that took more time
-than the search, and the differences that it then used were those of kinks and led no higher."""
+"""Number of directions in which a gradient is compared with differences, at the start and
+elsewhere: the direction of the gradient, and at the start three random ones as well, which show
+errors that the steepest direction hides. Each takes four scores for ray derivatives, and two for
+differences. Ray derivatives that no difference contradicts at the start are not compared elsewhere:
+on GelSight Svelte's mirror that took more time than the search, and the differences that it then
+used were those of kinks and led no higher.
+"""
 
 SMOOTHED = "smoothed"
-"""Key of the smoothed score among an outcome's parts."""
+"""Key of the smoothed score in an outcome's parts."""
 
 LIMITED = "smoothed_limited"
-"""Key among an outcome's parts of the smoothed values of what conditions limit, in their order."""
+"""Key of the smoothed values of the limited quantities, in the order of the conditions, in an
+outcome's parts.
+"""
 
 GRADIENT_BY = "gradient_by"
-"""Key of where the gradient comes from among an outcome's parts: `RAYS` or `DIFFERENCES`."""
+"""Key of the source of the gradient in an outcome's parts: `RAYS` or `DIFFERENCES`."""
 
 GRADIENT_HOLDS = "gradient_holds"
-"""Key among an outcome's parts: whether the gradient agrees with differences of the true score over
-two steps. Where it does not, the score has no derivative at this scale."""
+"""Key in an outcome's parts of whether the gradient agrees with differences of the true score over
+two steps. If it does not, the score has no derivative at this scale.
+"""
 
 RAYS, DIFFERENCES = "derivatives of rays", "differences of scores"
 LAYERS = "differences of scores of relit pictures"
@@ -82,11 +90,11 @@ class CheckedSlope(NamedTuple):
     """Values and gradients at a point.
 
     Attributes:
-        values: (1 + m,) the smoothed score, and the smoothed value of what each condition limits;
-            the exact ones where there is no smooth form.
-        gradients: (1 + m, n) of these by the coordinates.
-        source: where they come from: `RAYS`, `DIFFERENCES` or `LAYERS`.
-        holds: whether the score's one holds; None where that was not looked at.
+        values: smoothed score, and smoothed value of the quantity that each condition limits, (1 +
+            m,); the exact ones where there is no smooth form.
+        gradients: gradients of `values` by the coordinates, (1 + m, n).
+        source: source of the gradients: `RAYS`, `DIFFERENCES` or `LAYERS`.
+        holds: whether the gradient of the score passed the check; None if it was not checked.
     """
 
     values: FloatArray
@@ -96,8 +104,8 @@ class CheckedSlope(NamedTuple):
 
 
 class _Check(NamedTuple):
-    """A direction `way` (n,), as long as the ranges are, in which a gradient is checked; its slope
-    along that, and the slope that random directions have on average.
+    """Direction `way` (n,), in units of the parameters' ranges, in which a gradient is checked; its
+    slope along that direction, and the slope of an average random direction.
     """
 
     way: FloatArray
@@ -106,8 +114,8 @@ class _Check(NamedTuple):
 
 
 class SlopeEvaluator:
-    """Scores a point as usual, and adds the smoothed score and its gradient, and those of what the
-    conditions of the search limit.
+    """Evaluator that scores a point as usual, and adds the smoothed values and gradients of the
+    score and of the quantities that conditions limit.
     """
 
     def __init__(
@@ -118,14 +126,15 @@ class SlopeEvaluator:
         resolution: int,
         layers: bool = False,
     ) -> None:
-        """Nothing is traced yet.
+        """Store the settings; nothing is traced yet.
 
         Args:
-            usual: scores points.
-            parts: that points move.
-            objective: which score is climbed.
-            resolution: rays across the image.
-            layers: `usual` relights layers, so that all gradients are differences of its scores.
+            usual: evaluator of the points.
+            parts: names of the parts that points move.
+            objective: name of the score that is climbed.
+            resolution: number of rays across the image.
+            layers: True if `usual` relights layers, so that all gradients are differences of its
+                scores.
         """
         self.usual = usual
         self.parts = parts
@@ -159,15 +168,16 @@ class SlopeEvaluator:
         return Outcome(outcome.scores, None, parts, seconds, found.gradients.ravel())
 
     def usual_trials(self) -> None:
-        """Nobody knows what gradients take before the first one was made."""
+        """Return None: the duration of gradients is unknown before the first one was made."""
 
     def checked_slope(self, vector: FloatArray, seed: int) -> CheckedSlope:
-        """The smoothed score at a point (n,), and a gradient that has been compared with the score.
+        """Return the smoothed score at a point (n,), and a gradient that has been compared with the
+        score.
 
-        Derivatives of rays are used unless steady differences of the score contradict them: where
-        the score itself is unsteady, those of the smoothed score are as good as any, and cost less.
-        Where none contradicts them at the start, they are trusted everywhere. What conditions limit
-        is differentiated in the same way, without a check.
+        Ray derivatives are used unless differences of the score that agree with each other
+        contradict them: where the differences do not agree, ray derivatives are as good as any, and
+        cost less. If none contradicts them at the start, they are trusted everywhere. The
+        quantities that conditions limit are differentiated in the same way, without a check.
 
         Raises:
             OptiSenseError: the design can't be built, or no ray arrives.
@@ -185,11 +195,11 @@ class SlopeEvaluator:
         return CheckedSlope(self._values(vector, seed), gradients, DIFFERENCES, steady)
 
     def _by_rays(self, vector: FloatArray, seed: int) -> CheckedSlope:
-        """The smoothed score at a point (n,) and its gradient by derivatives of rays; what has no
-        smooth form by differences.
+        """Return the smoothed values at a point (n,) and their gradients by ray derivatives; by
+        differences for quantities without a smooth form.
 
         Raises:
-            NoDerivativeError: a part moves by which rays have no derivative.
+            NoDerivativeError: ray derivatives are not defined for a part that moves.
             _ContradictedError: differences of the true score contradict the gradient.
             OptiSenseError: the design can't be built, or no ray arrives.
         """
@@ -211,33 +221,33 @@ class SlopeEvaluator:
         return CheckedSlope(values, gradients, RAYS, holds)
 
     def _contradicted_at_start(self, seed: int) -> bool:
-        """Whether differences contradict derivatives of rays at the start; looked at once."""
+        """Return whether differences contradict ray derivatives at the start; computed once."""
         if self._contradicted is None:
             start = self.usual.space.start
             try:
                 _, gradient = self.slope(start)
-            except OptiSenseError:  # nothing is known: then every point is looked at
+            except OptiSenseError:  # the check is impossible here, so every point is checked
                 self._contradicted = True
             else:
                 self._contradicted = self.agreement(start, gradient, seed) is Agreement.DIFFERS
         return self._contradicted
 
     def slope(self, vector: FloatArray) -> tuple[float, FloatArray]:
-        """The smoothed score at a point (n,), and its gradient (n,) by derivatives of rays.
+        """Return the smoothed score at a point (n,), and its gradient (n,) by ray derivatives.
 
         Raises:
-            NoDerivativeError: a part moves by which rays have no derivative.
+            NoDerivativeError: ray derivatives are not defined for a part that moves.
             OptiSenseError: the design can't be built, or no ray arrives.
         """
         values, gradients = self._slopes(vector)
         return float(values[0]), gradients[0]
 
     def _slopes(self, vector: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """The smoothed values (1 + m,) at a point, and their gradients (1 + m, n) by derivatives of
-        rays; NaN where there is no smooth form.
+        """Return the smoothed values (1 + m,) at a point, and their gradients (1 + m, n) by ray
+        derivatives; NaN for quantities without a smooth form.
 
         Raises:
-            NoDerivativeError, OptiSenseError: as of `slope`.
+            NoDerivativeError, OptiSenseError: see `slope`.
         """
         space = self.usual.space
         design = space.apply(vector)
@@ -263,8 +273,8 @@ class SlopeEvaluator:
         return values, gradients
 
     def agreement(self, vector: FloatArray, gradient: FloatArray, seed: int) -> Agreement:
-        """How derivatives (n,) compare with central differences of the true score over `STEP` and
-        over half of it, along directions that the bounds leave open.
+        """Compare a gradient (n,) with central differences of the true score over `STEP` and half
+        of it, along directions that the bounds leave free.
         """
         found = Agreement.HOLDS
         for check in self._checks(vector, gradient):
@@ -279,7 +289,9 @@ class SlopeEvaluator:
         return found
 
     def steady(self, vector: FloatArray, gradient: FloatArray, seed: int) -> bool:
-        """Whether a gradient (n,) of differences over `STEP` agrees with those over half of it."""
+        """Return whether a gradient (n,) of differences over `STEP` agrees with those over half of
+        it.
+        """
         for check in self._checks(vector, gradient):
             near = self._difference(vector, check.way, STEP / 2, seed)
             if near is None:
@@ -289,7 +301,7 @@ class SlopeEvaluator:
         return True
 
     def _checks(self, vector: FloatArray, gradient: FloatArray) -> Iterator[_Check]:
-        """The directions in which a gradient (n,) is compared with the score."""
+        """Yield the directions in which a gradient (n,) is compared with the score."""
         space = self.usual.space
         span = space.upper - space.lower
         blocked = (gradient > 0) & (vector >= space.upper) | (gradient < 0) & (
@@ -310,13 +322,13 @@ class SlopeEvaluator:
             yield _Check(way * span, float(way @ scaled), typical)
 
     def differences(self, vector: FloatArray, seed: int) -> FloatArray:
-        """(n,) gradient of the true score at a point (n,) by central differences over `STEP`; 0
-        for coordinates by which there is no score on one of the sides.
+        """Return the gradient (n,) of the true score at a point (n,) by central differences over
+        `STEP`; 0 for coordinates with no score on one of the sides.
         """
         return self._all_differences(vector, seed, self.wanted[:1])[0]
 
     def _all_differences(self, vector: FloatArray, seed: int, names: Sequence[str]) -> FloatArray:
-        """(k, n) the same of several objectives."""
+        """Return the gradients (k, n) of several objectives, as `differences` does for one."""
         space = self.usual.space
         gradients = np.zeros((len(names), space.size))
         for number, span in enumerate(space.upper - space.lower):
@@ -329,16 +341,16 @@ class SlopeEvaluator:
     def _difference(
         self, vector: FloatArray, way: FloatArray, step: float, seed: int
     ) -> float | None:
-        """How the true score changes along `way`; see `_changes`."""
+        """Return the derivative of the true score along `way`; see `_changes`."""
         found = self._changes(vector, way, step, seed, self.wanted[:1])
         return None if found is None else float(found[0])
 
     def _changes(
         self, vector: FloatArray, way: FloatArray, step: float, seed: int, names: Sequence[str]
     ) -> FloatArray | None:
-        """(k,) how objectives change along `way` (n,), for a whole one, over `step` of it to both
-        sides, or as far as the bounds allow; None if that is less than half of a step in all, or
-        if there is no score on one of the sides.
+        """Return the derivatives (k,) of objectives along `way` (n,), per length of `way`, by
+        differences over `step` to both sides, or as far as the bounds allow; None if that is less
+        than half a step in all, or if there is no score on one of the sides.
         """
         space = self.usual.space
         room = [_room(space, vector, side * way, step) for side in (1.0, -1.0)]
@@ -354,10 +366,10 @@ class SlopeEvaluator:
         return np.asarray((found[0] - found[1]) / sum(room))
 
     def _exact(self, design: SensorDesign, seed: int, names: Sequence[str]) -> FloatArray:
-        """(k,) the values of objectives.
+        """Return the values of objectives, (k,).
 
         Raises:
-            OptiSenseError: the design can't be built, or has no such value.
+            OptiSenseError: the design can't be built, or has no value for one of them.
         """
         scores = self.usual.objective_scores(design, seed, names)
         for name in names:
@@ -367,7 +379,9 @@ class SlopeEvaluator:
         return np.array([scores[name].value for name in names])
 
     def _values(self, vector: FloatArray, seed: int) -> FloatArray:
-        """(1 + m,) smoothed values at a point; exact ones where there is no smooth form."""
+        """Return the smoothed values (1 + m,) at a point; exact ones for quantities without a
+        smooth form.
+        """
         design = self.usual.space.apply(vector)
         values = np.full(len(self.wanted), np.nan)
         if any(smooth is not None for smooth in self._smooth):
@@ -390,11 +404,13 @@ class SlopeEvaluator:
 
 
 class _ContradictedError(Exception):
-    """Differences of the true score are steady and contradict derivatives of rays."""
+    """Error: differences of the true score agree with each other and contradict ray derivatives."""
 
 
 def _room(space: BoundSpace, vector: FloatArray, way: FloatArray, most: float) -> float:
-    """How often `way` (n,), at most so often, fits between a point (n,) and the bounds."""
+    """Return the largest multiple of `way` (n,), at most `most`, that fits between a point (n,) and
+    the bounds.
+    """
     ahead = np.where(way > 0, space.upper - vector, vector - space.lower)
     moving = way != 0
     return float(np.min(ahead[moving] / np.abs(way[moving]), initial=most).clip(0.0))

@@ -20,21 +20,27 @@ from optisense.search.evaluation.outcome import Outcome
 from optisense.search.methods.base import FloatArray, Method, Problem, values_to_maximise
 
 MOST_POPULATION = 100_000
-"""Largest population; a generation of so many takes days, and a larger number is a slip."""
+"""Largest population; a generation of so many trials takes days, so a larger number is a typing
+error.
+"""
 
 LEAST_DIMENSIONS = 2
-"""Dimensions that pycma needs at least; a search over fewer parameters adds idle ones."""
+"""Smallest number of dimensions that pycma supports; a search over fewer parameters adds idle
+ones.
+"""
 
 
 class CmaEs(Method):
-    """CMA-ES from the design as it is, with restarts from elsewhere when it has converged.
+    """CMA-ES from the design as it is, with restarts from random points after convergence.
 
     Numbers are searched in the unit cube of their bounds. Integers keep their own steps; pycma
-    holds their spread wide enough to reach the next one. A choice is treated as the integer of
-    its option, in the order given: with more than two options that are not in any order, a grid
-    over the choices is the better search.
+    holds their spread wide enough to reach the next one. A choice is treated as the integer of its
+    option, in the given order: for more than two options without a natural order, a grid over the
+    choices is the better search.
 
     pycma does not support one dimension: it takes a scaling of one number for one that is not
+        initialized yet, and fails where a bound is met. A search over one parameter therefore runs
+        in two dimensions, the second of which has no effect.
     initialized yet, and fails where a bound is met. A search over one parameter therefore runs in
     two dimensions, the second of which changes nothing.
     """
@@ -50,19 +56,19 @@ class CmaEs(Method):
         sigma: float = 0.2,
         restarts: int | None = None,
     ) -> None:
-        """Set up.
+        """Set up pycma's strategy.
 
         Args:
-            problem: what to search.
-            population: points a generation; 4 + 3 ln n if None (Hansen's default), made even, so
+            problem: problem to solve.
+            population: points per generation; 4 + 3 ln n if None (Hansen's default), made even, so
                 that two workers finish together.
-            sigma: how far the first generation spreads, as a part of each parameter's range.
-            restarts: how often to begin anew elsewhere, each time with twice the population
-                (Auger and Hansen, "A restart CMA evolution strategy with increasing population
-                size", 2005); None goes on until the budget is spent.
+            sigma: standard deviation of the first generation, as a share of each parameter's range.
+            restarts: number of restarts from random points, each with twice the population (Auger
+                and Hansen, "A restart CMA evolution strategy with increasing population size",
+                2005); None restarts until the budget is spent.
 
         Raises:
-            SearchError: an option makes no sense.
+            SearchError: an option is out of its range.
         """
         super().__init__(problem)
         if not 0.0 < sigma <= 1.0:
@@ -78,43 +84,46 @@ class CmaEs(Method):
         self.restarts = restarts
         self.restarted = 0
         self._random = problem.random(self.name)
-        # pycma draws from NumPy's one global generator: it gets a state of its own while it runs.
+        # pycma draws from NumPy's global generator, which gets a state of its own while pycma runs.
         self._state = np.random.RandomState(int(self._random.integers(2**32))).get_state()
         whole = problem.space.whole
         self._unit = np.where(whole, 1.0, problem.space.upper - problem.space.lower)
         self._origin = np.where(whole, 0.0, problem.space.lower)
         self._idle = max(0, LEAST_DIMENSIONS - size)
-        # Its matrices are small: threads only wait for each other, and round differently.
+        # The matrices of pycma are small: threads only wait for each other, and round differently.
         self._linear_algebra = ThreadpoolController().select(user_api="blas")
         self._asked: list[FloatArray] = []
         self._begin(problem.space.start)
 
     def ask(self) -> FloatArray:
-        """The next generation, (population, n)."""
+        """Return the next generation, (population, n)."""
         with self._own_randomness():
             if self._strategy.stop(ignore_list=("maxiter", "maxfevals", "timeout")):
                 if self.restarts is not None and self.restarted >= self.restarts:
                     return np.empty((0, self.space.size))
                 self.restarted += 1
-                # A generation beyond the budget would never be finished, so nothing is learned.
+                # A generation beyond the budget would never be finished, and pycma would learn
+                # nothing.
                 self.population = max(self.population, min(2 * self.population, self._most()))
                 self._begin(self.space.from_unit(self._random.random(self.space.size)))
             self._asked = self._strategy.ask()
         return self._point(np.array(self._asked))
 
     def tell(self, vectors: FloatArray, outcomes: Sequence[Outcome]) -> None:
-        """Learn from a generation; one in which all failed teaches nothing."""
+        """Learn from a generation, unless all of its trials failed."""
         values = values_to_maximise(outcomes, self.problem.objectives[0])
         if np.isnan(values).any() or len(values) < len(self._asked):
             return
         solutions: Sequence[FloatArray] = self._asked
         if not np.array_equal(self._point(np.array(self._asked)), vectors):
-            solutions = list(self._inner(vectors))  # a study that another version began
+            solutions = list(self._inner(vectors))  # a study begun by another version
         with self._own_randomness():
             self._strategy.tell(solutions, (-values).tolist())
 
     def describe(self) -> dict[str, Any]:
-        """The spread of the current generation, restarts and population."""
+        """Return the spread of the current generation, the number of restarts, and the
+        population.
+        """
         return {
             "sigma": float(self._strategy.sigma),
             "restarts": self.restarted,
@@ -122,7 +131,7 @@ class CmaEs(Method):
         }
 
     def _most(self) -> int:
-        """The largest population of a restart."""
+        """Return the largest population of a restart."""
         return min(MOST_POPULATION, self.problem.budget + self.problem.budget % 2)
 
     def _begin(self, start: FloatArray) -> None:
@@ -131,7 +140,7 @@ class CmaEs(Method):
         lower, upper = self._inner(self.space.lower), self._inner(self.space.upper)
         lower[self.space.size :], upper[self.space.size :] = 0.0, 1.0
         whole = np.flatnonzero(self.space.whole)
-        # Half a step beyond the first and last whole number, so that each has as much room.
+        # Bounds are half a step beyond the first and last integer, so that each has an equal share.
         lower[whole], upper[whole] = lower[whole] - 0.499, upper[whole] + 0.499
         spread = np.ones(self.space.size + self._idle)
         spread[whole] = (self.space.upper - self.space.lower)[whole]
@@ -148,7 +157,7 @@ class CmaEs(Method):
             "maxiter": math.inf,
         }
         if self.space.size == 1:
-            # pycma 4.5 fails where it limits the only deviation, which may not outgrow the bounds.
+            # pycma 4.5 fails if it limits the only standard deviation; the bounds limit it already.
             options["maxstd"] = math.inf
         with self._own_randomness(), warnings.catch_warnings():
             warnings.simplefilter("ignore")
@@ -157,23 +166,25 @@ class CmaEs(Method):
             np.random.set_state(before)
 
     def _inner(self, vectors: FloatArray) -> FloatArray:
-        """Points (..., n) as pycma sees them: numbers 0 to 1, whole ones as they are, and a half
-        for each idle dimension.
+        """Return points (..., n) in pycma's coordinates: numbers 0 to 1, integers as they are, and
+        0.5 for each idle dimension.
         """
         points = (np.asarray(vectors) - self._origin) / self._unit
         idle = np.full((*points.shape[:-1], self._idle), 0.5)
         return np.concatenate([points, idle], axis=-1)
 
     def _point(self, inner: FloatArray) -> FloatArray:
-        """(k, n) points of the space for what pycma proposes; idle dimensions are left out."""
+        """Return the points (k, n) of the space for points in pycma's coordinates, without idle
+        dimensions.
+        """
         point = self._origin + inner[:, : self.space.size] * self._unit
         point = np.where(self.space.whole, np.round(point), point)
         return np.clip(point, self.space.lower, self.space.upper)
 
     @contextmanager
     def _own_randomness(self) -> Iterator[None]:
-        """NumPy's global generator in this method's state, afterwards as it was before; one
-        thread for linear algebra.
+        """Set NumPy's global generator to this method's state, and restore it at the end; limit
+        linear algebra to one thread meanwhile.
         """
         theirs = np.random.get_state()
         np.random.set_state(self._state)

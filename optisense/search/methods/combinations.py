@@ -1,4 +1,6 @@
-"""Base of methods over combinations of a few levels: no repeats, and hill climbing."""
+"""Base of methods over combinations of a few levels: enumeration without repeats, and hill
+climbing.
+"""
 
 from __future__ import annotations
 
@@ -15,21 +17,24 @@ from optisense.search.methods.base import FloatArray, Method, Problem
 from optisense.search.space.search_space import BoundSpace
 
 Combination = tuple[int, ...]
-"""The position of a level for each parameter."""
+"""Index of a level for each parameter."""
 
 GENERATION = 512
-"""Combinations that are proposed together where nothing has to be learned in between."""
+"""Number of combinations that are proposed together where the method needs no outcome in between;
+enough to keep any pool of workers busy.
+"""
 
 Stage = tuple[str, list[Combination]]
-"""The name of a stage, and the combinations that it tries."""
+"""Name of a stage, and the combinations that it tries."""
 
 
 class Combinations(Method):
-    """Tries combinations of levels by a plan, each once, until the budget is spent.
+    """Base class of methods that try combinations of levels by a plan, each once, until the budget
+    is spent.
 
     Attributes:
-        levels: the coordinates that each parameter may take.
-        size: how many combinations there are.
+        levels: coordinates that each parameter may take.
+        size: number of combinations.
     """
 
     def __init__(self, problem: Problem, levels: Sequence[Sequence[float]]) -> None:
@@ -47,10 +52,12 @@ class Combinations(Method):
 
     @abstractmethod
     def plan(self) -> Iterator[Stage]:
-        """The stages; a generator, so that later ones can start from the best so far."""
+        """Yield the stages; the plan is a generator, so that later stages can start from the best
+        so far.
+        """
 
     def ask(self) -> FloatArray:
-        """Combinations that were not tried yet, (k, n)."""
+        """Return combinations that were not tried yet, (k, n)."""
         self._asked = []
         if self._left > 0:
             for stage, wanted in self._stages:
@@ -67,17 +74,17 @@ class Combinations(Method):
         ).reshape(-1, self.space.size)
 
     def tell(self, vectors: FloatArray, outcomes: Sequence[Outcome]) -> None:
-        """Remember what each combination gave; failed ones count least."""
+        """Store the rank of each combination; failed ones rank last."""
         for key, outcome in zip(self._asked, outcomes, strict=True):
             rank = rank_of(outcome, self.problem.objectives[0])
             self._known[key] = FAILED if outcome.failed else rank
 
     def describe(self) -> dict[str, Any]:
-        """The present stage by the key "stage"."""
+        """Return the current stage under the key "stage"."""
         return {"stage": self._stage}
 
     def everything(self, stage: str) -> Iterator[Stage]:
-        """All combinations; the last parameter changes fastest."""
+        """Yield all combinations; the last parameter changes fastest."""
         everyone = product(*(range(len(each)) for each in self.levels))
         while chunk := list(islice(everyone, GENERATION)):
             yield stage, chunk
@@ -85,12 +92,13 @@ class Combinations(Method):
     def climb(
         self, stage: str, movable: Sequence[Sequence[int]], start: Combination | None = None
     ) -> Iterator[Stage]:
-        """Change one set of parameters that move together, take the best change, until none helps.
+        """Yield the stages of a hill climb: all changes of one set of parameters that move together
+        are tried, and the best is taken, until none is an improvement.
 
         Args:
-            stage: what it is called.
-            movable: sets of parameters; those of a set have the same levels.
-            start: where to begin; the best so far if None.
+            stage: name of the stage.
+            movable: sets of parameters that move together; those of a set have the same levels.
+            start: first combination; the best so far if None.
         """
         here = start if start is not None else self.best()
         yield stage, [here]
@@ -108,7 +116,9 @@ class Combinations(Method):
             here = best
 
     def climb_again(self, stage: str, movable: Sequence[Sequence[int]]) -> Iterator[Stage]:
-        """Climb from places near the best, until the budget is spent or all is known."""
+        """Climb from random changes of the best combination, until the budget is spent or all are
+        known.
+        """
         if self.size <= self.problem.budget:
             yield from self.everything(stage)
             return
@@ -116,7 +126,9 @@ class Combinations(Method):
             yield from self.climb(stage, movable, self._shaken(self.best()))
 
     def best(self) -> Combination:
-        """The best combination so far; the one nearest to the design before there is one."""
+        """Return the best combination so far; before there is one, the one nearest to the
+        design.
+        """
         if self._known:
             return max(self._known, key=lambda each: self._known[each])
         return tuple(
@@ -125,7 +137,7 @@ class Combinations(Method):
         )
 
     def _shaken(self, combination: Combination) -> Combination:
-        """Two parameters or more changed at random."""
+        """Return a combination with two or more parameters changed at random."""
         count = len(combination)
         most = int(self._random.integers(min(2, count), count + 1))
         shaken = list(combination)
@@ -135,7 +147,7 @@ class Combinations(Method):
 
 
 def changed(combination: Combination, members: Sequence[int], level: int) -> Combination:
-    """A combination with some parameters at another level."""
+    """Return a copy of a combination with some parameters at another level."""
     other = list(combination)
     for member in members:
         other[member] = level
@@ -143,10 +155,10 @@ def changed(combination: Combination, members: Sequence[int], level: int) -> Com
 
 
 def levels_of(space: BoundSpace) -> list[tuple[float, ...]]:
-    """The values of each parameter.
+    """Return the levels of each parameter.
 
     Raises:
-        SearchError: a parameter has no steps.
+        SearchError: a parameter has no levels.
     """
     found = []
     for parameter in space.parameters:

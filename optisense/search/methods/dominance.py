@@ -1,4 +1,4 @@
-"""Pareto dominance of outcomes when there are several goals."""
+"""Pareto dominance of outcomes for several goals."""
 
 from __future__ import annotations
 
@@ -9,14 +9,15 @@ FloatArray = NDArray[np.float64]
 
 
 def dominates(values: ArrayLike, broken: ArrayLike | None = None) -> NDArray[np.bool_]:
-    """(k, k): whether i is at least as good as j in all goals and better in one; higher is better.
+    """Return whether i dominates j, (k, k) bool: it is at least as good in all goals and better in
+    one, where higher is better.
 
-    Where conditions are broken this is constrained domination (Deb et al., 2002, section VI): what
-    breaks them less dominates what breaks them more.
+    If conditions are broken this is constrained domination (Deb et al., 2002, section VI): the
+    point with the smaller violation dominates.
 
     Args:
-        values: (k, m), NaN where a trial failed: dominated by all that did not.
-        broken: (k,) how far each breaks its conditions, 0 where it meets them; all do if None.
+        values: values of the goals, (k, m); a failed trial has NaN, and all others dominate it.
+        broken: violation of the conditions of each, (k,), 0 where all are met; all are met if None.
     """
     given = np.asarray(values, dtype=np.float64)
     known = np.where(_fine(given)[:, None], given, -np.inf)
@@ -31,16 +32,17 @@ def dominates(values: ArrayLike, broken: ArrayLike | None = None) -> NDArray[np.
 
 
 def front(values: ArrayLike) -> NDArray[np.int64]:
-    """Indices of the values (k, m) that nothing dominates, failed ones left out; in order.
+    """Return the indices of the values (k, m) that no other dominates, in order, without failed
+    ones.
 
-    Equal values are all kept.
+    Duplicates of a value are all kept.
     """
     given = np.asarray(values, dtype=np.float64)
     if not len(given):
         return np.empty(0, dtype=np.int64)
     fine = _fine(given)
     kept: list[int] = []
-    # Sorted by the first goal, only what came before can dominate what comes after.
+    # After sorting by the first goal a value can be dominated only by values before it.
     order = np.lexsort(tuple(-given[:, k] for k in reversed(range(given.shape[1]))))
     for number in order[fine[order]]:
         best = given[kept]
@@ -51,12 +53,12 @@ def front(values: ArrayLike) -> NDArray[np.int64]:
 
 
 def ranks(values: ArrayLike, broken: ArrayLike | None = None) -> NDArray[np.int64]:
-    """(k,): 0 for the front, 1 for the front of the rest, and so on (Deb et al., "A fast and
-    elitist multiobjective genetic algorithm: NSGA-II", 2002).
+    """Return the ranks (k,): 0 for the Pareto front, 1 for the front of the rest, and so on (Deb et
+    al., "A fast and elitist multiobjective genetic algorithm: NSGA-II", 2002).
 
     Args:
-        values: (k, m), as of `dominates`.
-        broken: (k,), as of `dominates`.
+        values: see `dominates`, (k, m).
+        broken: see `dominates`, (k,).
     """
     dominated = dominates(values, broken)
     rank = np.full(len(dominated), -1, dtype=np.int64)
@@ -71,7 +73,9 @@ def ranks(values: ArrayLike, broken: ArrayLike | None = None) -> NDArray[np.int6
 
 
 def crowding(values: ArrayLike, rank: NDArray[np.int64]) -> FloatArray:
-    """(k,): how much room each value has among those of its rank, infinite at the ends (ibid.)."""
+    """Return the crowding distance (k,) of each value among those of its rank, infinite at the ends
+    (Deb et al., 2002).
+    """
     given = np.asarray(values, dtype=np.float64)
     room = np.zeros(len(given))
     for level in np.unique(rank):
@@ -89,5 +93,5 @@ def crowding(values: ArrayLike, rank: NDArray[np.int64]) -> FloatArray:
 
 
 def _fine(values: FloatArray) -> NDArray[np.bool_]:
-    """(k,): which values have no part that failed."""
+    """Return which values have no NaN, (k,) bool."""
     return np.asarray(np.isfinite(values).all(axis=1))

@@ -1,13 +1,13 @@
-"""The point nearest to a wanted one at which a design can be built, for methods that climb.
+"""Nearest feasible point to a wanted one, for gradient methods.
 
-A method that follows a gradient runs into constraints again and again: the best shape of a mirror
-often touches the housing. A forbidden point has no score, so that the method learns nothing from
-it but that it must turn back. Here the wanted point is moved instead, so that the method slides
-along the constraint: where two parts cut through each other, each corner of a triangle that has
-gone through the plane of the other part's triangle must go back to it. That is a linear inequality
-where shapes move linearly with the point, as they do in cages, and the nearest point that keeps
-all of these is the solution of a quadratic programme. Other constraints have no such form, and
-parts may meet again elsewhere: then the point goes back towards one that is known to be allowed.
+A method that follows a gradient meets constraints again and again: the best shape of a mirror often
+touches the housing. A forbidden point has no score, so it tells the method nothing but to turn
+back. Here the wanted point is moved instead, so that the method slides along the constraint: if two
+parts cut through each other, each corner of a triangle beyond the plane of the other part's
+triangle must go back to it. That is a linear inequality if shapes move linearly with the point, as
+they do in cages, and the nearest point that meets all of them is the solution of a quadratic
+programme. Other constraints have no such form, and parts may meet again elsewhere: then the point
+goes back towards a feasible one.
 """
 
 from __future__ import annotations
@@ -26,26 +26,34 @@ from optisense.search.space.constraints import Constraint, PartsApart, why_forbi
 from optisense.search.space.search_space import BoundSpace
 
 ROUNDS = 12
-"""Times that a point is moved out of parts before it goes back instead. Two or three are enough
-where a mirror meets one wall; each looks at the shapes once (about 30 ms)."""
+"""Largest number of times that a point is moved out of parts before bisection is used instead. Two
+or three are enough where a mirror meets one wall; each intersects the shapes once (about 30 ms).
+"""
 
 CORNERS = 30
-"""Corners of triangles that are moved out at once: those that have gone through the farthest."""
+"""Number of corners of triangles that are moved out at once, those that are deepest inside; the
+others follow in the next round.
+"""
 
 GAP = 0.01
-"""mm that corners are kept away from the planes that they have gone through: more than what
-rounding changes and less than any part is made to."""
+"""Clearance between corners and the planes that they have crossed, mm: above rounding errors and
+below the manufacturing tolerance of any part.
+"""
 
 HALVINGS = 8
-"""Times that the way back is halved: to 0.4 % of it."""
+"""Number of bisections between the wanted point and a feasible one; 8 locate the boundary to 0.4 %
+of the distance.
+"""
 
 BINDING = 1e-7
-"""Part of the ranges: a bound or a plane that a point keeps by less holds the point back."""
+"""Largest distance of a point from a bound or plane that counts as active, in units of the ranges;
+it covers the solver's rounding errors.
+"""
 
 
 class Placed(NamedTuple):
-    """The allowed point for a wanted one, both as parts (n,) of the ranges, and unit vectors
-    (k, n), orthogonal to each other, along which it is held back.
+    """Feasible point for a wanted one, (n,) in units of the ranges, and orthonormal vectors (k, n),
+    the normals of the active constraints.
     """
 
     point: FloatArray
@@ -53,24 +61,24 @@ class Placed(NamedTuple):
 
     @staticmethod
     def unchanged(point: FloatArray) -> Placed:
-        """A wanted point (n,) that is allowed."""
+        """Return the result for a wanted point (n,) that is feasible itself."""
         return Placed(point, np.zeros((0, len(point))))
 
     def along(self, slope: FloatArray) -> FloatArray:
-        """The part of a slope (n,) that the point can follow."""
+        """Return the component of a slope (n,) that the active constraints leave free."""
         free: FloatArray = slope - self.normals.T @ (self.normals @ slope)
         return free
 
 
 class _Planes(NamedTuple):
-    """Linear inequalities ``normals @ point <= limits`` of points as parts of the ranges."""
+    """Linear inequalities ``normals @ point <= limits`` for points in units of the ranges."""
 
     normals: FloatArray
     limits: FloatArray
 
     @staticmethod
     def of(several: Sequence[_Planes]) -> _Planes:
-        """All of several."""
+        """Return the union of several sets of inequalities."""
         return _Planes(
             np.concatenate([each.normals for each in several]),
             np.concatenate([each.limits for each in several]),
@@ -78,17 +86,17 @@ class _Planes(NamedTuple):
 
 
 class FeasibleRegion:
-    """The points of a space that constraints on shapes allow."""
+    """Set of the points of a space that constraints on shapes allow."""
 
     def __init__(
         self, space: BoundSpace, constraints: Sequence[Constraint], parts: Sequence[str]
     ) -> None:
-        """Nothing is looked at yet.
+        """Store the constraints; nothing is computed yet.
 
         Args:
-            space: whose points are asked for.
-            constraints: that a design must keep.
-            parts: whose shapes points change.
+            space: space of the points.
+            constraints: constraints that a design must meet.
+            parts: names of the parts whose shapes points change.
         """
         self._space = space
         self._span = space.upper - space.lower
@@ -98,8 +106,9 @@ class FeasibleRegion:
         self._moves: Jacobian | None = None
 
     def allows(self, unit: FloatArray) -> bool:
-        """Whether no constraint forbids a point (n,), as parts of the ranges; errors of constraints
-        are left to those who score it.
+        """Return whether no constraint forbids a point (n,), in units of the ranges.
+
+        If a constraint raises an error the point is allowed: its evaluator reports the error.
         """
         try:
             return why_forbidden(self._design(unit), self._constraints) is None
@@ -107,11 +116,11 @@ class FeasibleRegion:
             return True
 
     def nearest(self, wanted: FloatArray, allowed: FloatArray) -> Placed:
-        """An allowed point near a wanted one, both as parts (n,) of the ranges.
+        """Return a feasible point near a wanted one, both (n,) in units of the ranges.
 
         Args:
-            wanted: within 0 to 1.
-            allowed: a point that constraints allow; a way back that always works.
+            wanted: wanted point (n,), 0 to 1.
+            allowed: a feasible point (n,), the fallback of the bisection.
         """
         if self.allows(wanted):
             return Placed.unchanged(wanted)
@@ -123,7 +132,7 @@ class FeasibleRegion:
                 break
             planes = _Planes.of([planes, further])
             found = _nearest(wanted, planes)
-            if found is None:  # beside an edge the planes of its faces may contradict each other
+            if found is None:  # planes of the faces beside an edge may exclude each other
                 break
             point = found
             if self.allows(point):
@@ -136,7 +145,9 @@ class FeasibleRegion:
         return space.apply(point)
 
     def _way_back(self, wanted: FloatArray, allowed: FloatArray) -> Placed:
-        """The last allowed point on the straight way from an allowed one to a wanted one."""
+        """Return the last feasible point on the line from a feasible point to a wanted one, by
+        bisection.
+        """
         way, low, high = wanted - allowed, 0.0, 1.0
         for _ in range(HALVINGS):
             middle = 0.5 * (low + high)
@@ -149,7 +160,9 @@ class FeasibleRegion:
         return Placed(allowed + low * way, normals)
 
     def _planes(self, unit: FloatArray, allowed: FloatArray) -> _Planes | None:
-        """What moves parts out of each other, or None if that is not what is forbidden."""
+        """Return the inequalities that move parts out of each other, or None if another constraint
+        forbids the point.
+        """
         design, before = self._design(unit), self._design(allowed)
         for rule in self._apart:
             found = rule.meeting(design)
@@ -166,14 +179,16 @@ class FeasibleRegion:
     def _out_of(
         self, design: SensorDesign, before: SensorDesign, unit: FloatArray, one: str, other: str
     ) -> _Planes:
-        """The corners of a part that have gone through planes of another part."""
+        """Return the inequalities for the corners of a part that have crossed planes of another
+        part.
+        """
         meshes, old = design.deformed_meshes(), before.deformed_meshes()
         mesh, against = meshes[one], meshes[other]
         pairs = crossings(mesh, against).pairs
         normal = against.face_normals[pairs[:, 1]]
         origin = against.triangles[pairs[:, 1], 0]
         heights = np.einsum("kci,ki->kc", mesh.triangles[pairs[:, 0]] - origin[:, None], normal)
-        # The side of the plane on which the triangle was where it was allowed.
+        # The side of the plane on which the triangle was at the feasible point.
         earlier = (
             old[one].triangles[pairs[:, 0]].mean(axis=1) - old[other].triangles[pairs[:, 1], 0]
         )
@@ -197,14 +212,18 @@ class FeasibleRegion:
         return _Planes(normals, normals @ unit - (depth[chosen] + GAP)[known] / length[known])
 
     def _slopes(self, part: str) -> FloatArray:
-        """(n, v, 3) mm a unit that the vertices of a part move with each coordinate."""
+        """Return the derivative of the vertices of a part by each coordinate, (n, v, 3), mm per
+        unit of the coordinate.
+        """
         if self._moves is None:
             self._moves = jacobian(self._space, self._space.start, self._parts)
         return self._moves.parts[part]
 
 
 def _nearest(wanted: FloatArray, planes: _Planes) -> FloatArray | None:
-    """The point within 0 to 1, and below all planes, nearest to one (n,); None if there is none."""
+    """Return the point within 0 to 1 and below all planes that is nearest to a point (n,), or None
+    if there is none.
+    """
     from scipy.optimize import LinearConstraint, minimize
 
     found = minimize(
@@ -220,7 +239,9 @@ def _nearest(wanted: FloatArray, planes: _Planes) -> FloatArray | None:
 
 
 def _held_back(wanted: FloatArray, point: FloatArray, planes: _Planes) -> FloatArray:
-    """(k, n) orthonormal: the directions in which a point can't follow the wanted one."""
+    """Return orthonormal directions (k, n) in which active constraints keep a point from the wanted
+    one.
+    """
     binding = planes.normals[planes.limits - planes.normals @ point < BINDING]
     bounds = np.eye(len(point))[np.abs(point - wanted) > 0.0]
     bounds = bounds[((point <= 0.0) | (point >= 1.0))[np.abs(point - wanted) > 0.0]]

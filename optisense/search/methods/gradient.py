@@ -1,8 +1,8 @@
 """Gradient ascent, with conditions.
 
 Quasi-Newton steps within bounds (L-BFGS-B: Byrd, Lu, Nocedal and Zhu, "A limited memory algorithm
-for bound constrained optimization", SIAM J. Sci. Comput. 16, 1995). Where gradients come from
-depends on what is searched (`GradientSource`):
+for bound constrained optimization", SIAM J. Sci. Comput. 16, 1995). The source of the gradients
+depends on the parameters and the objective (`GradientSource`):
 
 - scores that chief rays decide, over shapes of mirrors and the camera: a smoothed form of the score
   (`optisense.objectives.smooth`), whose derivatives come from retracing the rays, in each trial;
@@ -11,18 +11,21 @@ depends on what is searched (`GradientSource`):
 - everything else, such as poses of lights and coatings: central differences of scores. The points
   at both sides are trials of their own, which workers score at the same time.
 
-The scores that are stored are the true ones. Conditions are kept by an augmented Lagrangian
+The stored scores are the true ones. Conditions are met by an augmented Lagrangian
 (`optisense.search.methods.augmented_lagrangian`).
 
-A point that constraints on shapes forbid is not tried: the nearest one that can be built is
+A point that constraints on shapes forbid is replaced by the nearest feasible one
+    (`optisense.search.methods.feasible`), so that the ascent slides along the constraint and no
+    trial is spent. An ascent that treated the forbidden point as a bad one stopped at the first
+    wall.
 (`optisense.search.methods.feasible`), so that the ascent slides along the constraint and no trial
 is spent. An ascent that told the forbidden point as a bad one came to a stop at the first wall.
 
-At the start the derivative of rays is compared with central differences of the true score
-(`optisense.search.methods.checked_slopes`). Where the two disagree, where rays have no derivative
-at all (by the shape of a transparent part), and where there are few parameters, the gradient is
-taken from central differences by each parameter. The outcome says so, and it says where the score
-itself steps, so that no gradient holds.
+At the start the ray derivative is compared with central differences of the true score
+(`optisense.search.methods.checked_slopes`). If the two disagree, if rays have no derivative (by the
+shape of a transparent part), or if there are few parameters, the gradient consists of central
+differences by each parameter. The outcome tells which was used, and whether the score itself has
+jumps, so that no gradient is valid.
 """
 
 from __future__ import annotations
@@ -64,15 +67,18 @@ from optisense.search.methods.light_colours import RelitEvaluator
 from optisense.search.space.search_space import BoundSpace
 
 USUAL_STEPS = 12
-"""Steps of an ascent whose points beside each other are trials, where no budget is given."""
+"""Number of steps of an ascent by differences of trials, where no budget is given."""
 
 USUAL_BUDGET = 40
-"""Number of trials where none is given. A trial gives the score and all its slopes, so that an
-ascent needs tens of them and not hundreds."""
+"""Number of trials where no budget is given. A trial gives the score and all its slopes, so an
+ascent needs tens of trials and not hundreds.
+"""
 
 CONVERGED = 1e-4
-"""An ascent ends with a step that gains less than this, or this part of scores above 1. Smaller
-gains are the steps of true scores (an AOAP of 320 rays is good to about 3e-4)."""
+"""Smallest gain of a step, absolute or, for scores above 1, relative; a step that gains less ends
+the ascent. Smaller gains are within the jumps of true scores (an AOAP of 320 rays has an error of
+about 3e-4).
+"""
 
 
 class Gradient(Method):
@@ -89,14 +95,14 @@ class Gradient(Method):
         memory: int = 10,
         starts: int = 4,
     ) -> None:
-        """Find out where the gradient comes from.
+        """Determine the source of the gradient.
 
         Args:
-            problem: what to search.
-            resolution: rays across the image for gradients.
-            memory: how many steps the quasi-Newton method remembers.
-            starts: how many ascents there are: the first from the design as it is, the others, as
-                far as the budget goes, from points spread evenly over the space.
+            problem: problem to solve.
+            resolution: number of rays across the image for gradients.
+            memory: number of steps that the quasi-Newton method remembers.
+            starts: number of ascents: the first from the design as it is, the others, as far as the
+                budget allows, from points spread evenly over the space.
 
         Raises:
             SearchError: a parameter has no gradient.
@@ -122,7 +128,9 @@ class Gradient(Method):
 
     @classmethod
     def usual_budget(cls, space: BoundSpace) -> int:
-        """Enough to converge, as a rule, however many parameters there are."""
+        """Return a budget that is usually enough to converge; for ray derivatives and relit
+        pictures it does not depend on the number of parameters.
+        """
         turns_rays = not all(RELIT.search(name) for name in space.names) and may_change_view(
             space.names
         )
@@ -131,9 +139,9 @@ class Gradient(Method):
         return USUAL_STEPS * (2 * space.size + 1)
 
     def evaluator(self, usual: DesignEvaluator) -> Evaluator:
-        """Scores and slopes."""
+        """Return an evaluator of scores and their slopes."""
         rules = [*usual.constraints, *usual.kept]
-        shapes = [rule for rule in rules if not isinstance(rule, SameMirrors)]  # which traces rays
+        shapes = [rule for rule in rules if not isinstance(rule, SameMirrors)]  # it needs rays
         region = FeasibleRegion(self.space, shapes, self.parts)
         self._region = region if shapes and region.allows(self._start_unit) else None
         if self.source is GradientSource.TRIALS:
@@ -143,7 +151,7 @@ class Gradient(Method):
         return SlopeEvaluator(scored, self.parts, self.objective, self.resolution, layers=relit)
 
     def ask(self) -> FloatArray:
-        """The next points (k, n) that L-BFGS-B wants to know of; none when all ascents have
+        """Return the next points (k, n) that L-BFGS-B needs; none when all ascents have
         converged.
         """
         space = self.space
@@ -156,10 +164,10 @@ class Gradient(Method):
         return np.empty((0, space.size))
 
     def _climb(self, unit: FloatArray) -> None:
-        """Ascend from a point (n,), as parts of the ranges, until its conditions are kept.
+        """Ascend from a point (n,), in units of the ranges, until its conditions are met.
 
         Raises:
-            PointsWantedError: scores of points are wanted.
+            PointsWantedError: points must be scored first.
         """
         if not self.requirements:
             self._ascend_again(unit, None)
@@ -182,7 +190,9 @@ class Gradient(Method):
             best = value
 
     def _offsets(self, unit: FloatArray, known: LocalValues) -> FloatArray:
-        """(m,) what the smooth values of limited quantities lack to the true ones at a point."""
+        """Return the differences (m,) between exact and smooth values of the limited quantities at
+        a point.
+        """
         true = self._known[self._point(unit).tobytes()].conditions
         exact = [true.get(str(each)) for each in self.requirements]
         smooth = known.values[1:]
@@ -193,31 +203,31 @@ class Gradient(Method):
     def _ascend_again(
         self, unit: FloatArray, merit: AugmentedLagrangian | None
     ) -> tuple[float, FloatArray]:
-        """Ascend from a point (n,), and again from the best point that was reached, for as long as
-        that gains something: a line search gives up at a kink, and slides along constraints end
-        where the way leads off them again.
+        """Ascend from a point (n,), and again from the best point that was reached, as long as that
+        gains something. A line search fails at a kink, and a path along a constraint ends where the
+        direction of ascent leaves the constraint.
 
         Returns:
-            What was maximised at the best point, and that point.
+            Maximum of the merit function (of the score if there are no conditions), and its point.
 
         Raises:
-            PointsWantedError: scores of points are wanted.
+            PointsWantedError: points must be scored first.
         """
         best = -np.inf
         while True:
             value, unit = self._ascend(unit, merit)
-            if not value - best > CONVERGED * max(1.0, abs(value)):  # NaN where none has a score
+            if not value - best > CONVERGED * max(1.0, abs(value)):  # NaN if none has a score
                 return max(best, value), unit
             best = value
 
     def _ascend(
         self, start: FloatArray, merit: AugmentedLagrangian | None
     ) -> tuple[float, FloatArray]:
-        """The best value that an ascent from a point (n,) reaches, and the point of that, both
-        points as parts of the ranges.
+        """Return the best value that an ascent from a point (n,) reaches, and its point, both
+        points in units of the ranges.
 
         Raises:
-            PointsWantedError: scores of points are wanted.
+            PointsWantedError: points must be scored first.
         """
         from scipy.optimize import minimize
 
@@ -228,7 +238,7 @@ class Gradient(Method):
             nonlocal best, at, allowed, worst
             placed = self._placed(unit, allowed)
             known = self._around(self._point(placed.point))
-            if known is None:  # no score: a shorter step is tried
+            if known is None:  # no score: try a shorter step
                 return (1.0 - worst if np.isfinite(worst) else 1.0), np.zeros_like(unit)
             if merit is None:
                 value, gradient = float(known.values[0]), known.gradients[0]
@@ -256,10 +266,10 @@ class Gradient(Method):
         return best, at
 
     def _around(self, point: FloatArray) -> LocalValues | None:
-        """What is known around a point (n,); None where it has no score.
+        """Return values and gradients at a point (n,), or None if it has no score.
 
         Raises:
-            PointsWantedError: something must be scored first.
+            PointsWantedError: the point must be scored first.
         """
         if self.source is GradientSource.TRIALS:
             return self._differences.around(point, self._known)
@@ -274,7 +284,9 @@ class Gradient(Method):
         return LocalValues(values, outcome.gradient.reshape(len(values), -1) * span)
 
     def _placed(self, unit: FloatArray, allowed: FloatArray) -> Placed:
-        """Where a wanted point (n,) is scored: at the nearest one that constraints allow."""
+        """Return the nearest feasible point to a wanted point (n,), which is scored in its
+        place.
+        """
         key = unit.tobytes()
         if key not in self._places:
             if self._region is None:
@@ -284,19 +296,21 @@ class Gradient(Method):
         return self._places[key]
 
     def _point(self, unit: FloatArray) -> FloatArray:
-        """The point (n,) of parts of the ranges; the start as it is, which is scored already."""
+        """Return the point (n,) for units of the ranges. The start is returned without rounding,
+        since it is scored already.
+        """
         space = self.space
         point = np.clip(space.lower + unit * (space.upper - space.lower), space.lower, space.upper)
         return np.where(unit == self._start_unit, space.start, point)
 
     def tell(self, vectors: FloatArray, outcomes: Sequence[Outcome]) -> None:
-        """Remember slopes by their points."""
+        """Store the outcomes, with their slopes, by their points."""
         for vector, outcome in zip(vectors, outcomes, strict=True):
             self._known[np.asarray(vector, dtype=np.float64).tobytes()] = outcome
 
     def describe(self) -> dict[str, Any]:
-        """How many gradients are known, how many of them come from differences, how many were
-        compared with the score and do not hold because it steps, and why the ascent ended.
+        """Return the number of known gradients, of those made of differences, of those that were
+        checked and are invalid because the score has jumps, and the reason why the ascent ended.
         """
         found = [o.parts[self.objective] for o in self._known.values() if o.gradient is not None]
         checked = [parts for parts in found if GRADIENT_HOLDS in parts]
@@ -311,7 +325,9 @@ class Gradient(Method):
         }
 
     def notes(self) -> list[str]:
-        """Where gradients are differences of scores, where the score has none, and why."""
+        """Return notes on where gradients are differences of scores, where the score has no
+        gradient, and why.
+        """
         facts = self.describe()
         notes = []
         if facts["by_differences"]:
@@ -340,7 +356,7 @@ class Gradient(Method):
 
 
 def _starts(problem: Problem, count: int) -> FloatArray:
-    """(count, n) points to begin at, the design as it is first."""
+    """Return the points (count, n) at which the ascents start, the design as it is first."""
     from scipy.stats import qmc
 
     space = problem.space

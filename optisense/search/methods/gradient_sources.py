@@ -1,4 +1,4 @@
-"""Sources of a search's gradient, and gradients by differences of trials."""
+"""Sources of the gradient of a search, and gradients by differences of trials."""
 
 from __future__ import annotations
 
@@ -28,8 +28,8 @@ class GradientSource(Enum):
 
 
 class LocalValues(NamedTuple):
-    """Values and gradients at a point: values (1 + m,) of the score and of the conditions, and
-    their gradients (1 + m, n) by shares of the ranges.
+    """Values and gradients at a point: values (1 + m,) of the score and the limited quantities, and
+    their gradients (1 + m, n) by units of the ranges.
     """
 
     values: FloatArray
@@ -37,7 +37,7 @@ class LocalValues(NamedTuple):
 
 
 class PointsWantedError(Exception):
-    """Ends a run of the optimiser at points (k, n) whose scores are not known yet."""
+    """Signal that ends a run of the optimiser at points (k, n) that have no score yet."""
 
     def __init__(self, points: FloatArray) -> None:
         super().__init__()
@@ -45,10 +45,10 @@ class PointsWantedError(Exception):
 
 
 def source_of(problem: Problem) -> GradientSource:
-    """Where the gradients of a problem come from.
+    """Return the source of the gradients for a problem.
 
     Raises:
-        SearchError: a parameter is a choice or a whole number, or none changes the score.
+        SearchError: a parameter is a choice or an integer, or no parameter changes the score.
     """
     space, objective = problem.space, problem.objectives[0]
     for number in np.flatnonzero(space.whole):
@@ -59,30 +59,34 @@ def source_of(problem: Problem) -> GradientSource:
         )
     try:
         rays_only = are_rays_only([objective])
-    except ObjectiveError:  # a function of the program
+    except ObjectiveError:  # a function of the caller's program
         return GradientSource.TRIALS
     if not rays_only:
         relit = all(RELIT.search(name) for name in space.names)
         return GradientSource.LAYERS if relit else GradientSource.TRIALS
-    moving_parts(space)  # says which parameter changes no ray
+    moving_parts(space)  # raises an error for a parameter that changes no ray
     return GradientSource.TRIALS if SmoothScore.of(objective) is None else GradientSource.RAYS
 
 
 class TrialDifferences:
-    """Central differences of trials over `STEP` of the ranges, or over as much as bounds allow."""
+    """Central differences of trials over `STEP` of the ranges, or as much of it as the bounds
+    allow.
+    """
 
     def __init__(self, problem: Problem, requirements: Sequence[Requirement]) -> None:
-        """What is differentiated: the first objective, and what conditions limit."""
+        """Store what is differentiated: the first objective, and the quantities that conditions
+        limit.
+        """
         self._space, self._objective = problem.space, problem.objectives[0]
         self._span = problem.space.upper - problem.space.lower
         self._requirements = requirements
 
     def around(self, point: FloatArray, known: Mapping[bytes, Outcome]) -> LocalValues | None:
-        """What is known around a point (n,); None where it has no score. Where a point beside it
-        has none, the difference is taken to the other side only.
+        """Return values and gradients at a point (n,), or None if it has no score. If the trial on
+        one side failed, a one-sided difference is taken.
 
         Raises:
-            PointsWantedError: the point or points beside it must be scored first.
+            PointsWantedError: the point or its neighbours must be scored first.
         """
         sides = self._beside(point)
         wanted = [each for each in (point, *sides) if each.tobytes() not in known]
@@ -104,7 +108,7 @@ class TrialDifferences:
         return LocalValues(values, gradients)
 
     def _beside(self, point: FloatArray) -> list[FloatArray]:
-        """Two points (n,) for each parameter, above and below, within the bounds."""
+        """Return two points (n,) for each parameter, above and below, within the bounds."""
         found = []
         for number, span in enumerate(self._span):
             low, high = self._space.lower[number], self._space.upper[number]
@@ -115,7 +119,7 @@ class TrialDifferences:
         return found
 
     def _exact(self, outcome: Outcome) -> FloatArray | None:
-        """(1 + m,) the score and what conditions limit; None where one is missing."""
+        """Return the score and the limited quantities, (1 + m,), or None if one is missing."""
         limited = [outcome.conditions.get(str(each)) for each in self._requirements]
         values = [outcome.scores.get(self._objective, np.nan), *limited]
         if any(value is None or not np.isfinite(value) for value in values):

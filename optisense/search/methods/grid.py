@@ -1,4 +1,4 @@
-"""Every combination of the steps and options of all parameters."""
+"""Search method "grid": all combinations of the steps and options of all parameters."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from optisense.search.space.search_space import BoundSpace
 
 
 class Grid(Combinations):
-    """Every combination; the last parameter changes fastest."""
+    """Search over all combinations; the last parameter changes fastest."""
 
     name = "grid"
     summary = "every combination of steps and options"
@@ -27,7 +27,7 @@ class Grid(Combinations):
 
     @classmethod
     def usual_budget(cls, space: BoundSpace) -> int:
-        """All combinations."""
+        """Return the number of all combinations."""
         return math.prod(len(levels) for levels in levels_of(space))
 
     def plan(self) -> Iterator[Stage]:

@@ -1,6 +1,7 @@
 """The Jacobian of shapes and camera by the coordinates of a search space.
 
-Found by differences: where shapes follow the coordinates linearly, as they do a cage, these are
+It is computed by finite differences: where shapes depend linearly on the coordinates, as they do in
+    a cage, these are exact, and one Jacobian serves all points.
 exact, and one set of them serves all points.
 """
 
@@ -19,10 +20,15 @@ from optisense.search.space.search_space import BoundSpace
 FloatArray = NDArray[np.float64]
 
 STEP = 1e-4
-"""Distance to either side at which differences are taken, as a fraction of a parameter's range."""
+"""Step of the finite differences to each side, as a share of a parameter's range; small against all
+details of a shape, and large against rounding.
+"""
 
 LINEAR = 1e-6
-"""mm. Shapes that are predicted to this, along a random way, follow the coordinates linearly."""
+"""Tolerance of linearity, mm: shapes that are predicted to this along a random direction depend
+linearly on the coordinates. It is far above rounding errors and far below any dimension of a
+sensor.
+"""
 
 
 @dataclass(frozen=True)
@@ -30,9 +36,10 @@ class Jacobian:
     """Derivatives of shapes and camera by each coordinate.
 
     Attributes:
-        point: (n,) where it was taken.
-        parts: by part name (n, v, 3), mm a unit.
-        camera: (n, c) of the camera's numbers (see `camera_numbers`) a unit.
+        point: point (n,) at which the Jacobian was computed.
+        parts: derivatives of the vertices by part name, (n, v, 3), mm per unit of each coordinate.
+        camera: derivatives (n, c) of the camera's numbers (see `camera_numbers`), per unit of each
+            coordinate.
     """
 
     point: FloatArray
@@ -41,10 +48,10 @@ class Jacobian:
 
 
 def moving_parts(space: BoundSpace) -> list[str]:
-    """The parts whose shape a point of the space changes.
+    """Return the names of the parts whose shape a point of the space changes.
 
     Raises:
-        SearchError: a parameter changes something that chief rays have no derivative by.
+        SearchError: chief rays have no derivative by a parameter.
     """
     start = space.apply(space.start)
     meshes = start.deformed_meshes()
@@ -58,7 +65,7 @@ def moving_parts(space: BoundSpace) -> list[str]:
             )
         design = space.apply(_beside(space, space.start, number)[0])
         changed = [n for n, m in design.deformed_meshes().items() if not _same(m, meshes[n])]
-        # The middle of a cage may have no part in it: its points then have a gradient, of 0.
+        # A point inside of a cage may move no part: it has a gradient, of 0.
         harmless = parameter.name.startswith("cages.")
         still = np.array_equal(camera_numbers(design.camera), camera_numbers(start.camera))
         if not changed and not harmless and still:
@@ -72,7 +79,7 @@ def moving_parts(space: BoundSpace) -> list[str]:
 
 
 def jacobian(space: BoundSpace, point: FloatArray, parts: list[str]) -> Jacobian:
-    """How the parts and the camera follow the coordinates around a point (n,)."""
+    """Return the Jacobian of parts and camera at a point (n,)."""
     slopes: dict[str, list[FloatArray]] = {name: [] for name in parts}
     camera = []
     for number in range(space.size):
@@ -87,7 +94,7 @@ def jacobian(space: BoundSpace, point: FloatArray, parts: list[str]) -> Jacobian
 
 
 def holds(known: Jacobian, space: BoundSpace, design: SensorDesign, point: FloatArray) -> bool:
-    """Whether the shapes at a point are those that a Jacobian predicts, and so is the camera."""
+    """Return whether a Jacobian predicts the shapes and the camera at a point."""
     way = point - known.point
     if not way.any():
         return True
@@ -102,14 +109,15 @@ def holds(known: Jacobian, space: BoundSpace, design: SensorDesign, point: Float
 
 
 def camera_numbers(camera: Camera) -> FloatArray:
-    """(13,) or more: position (mm), the rows of the camera's axes, the field of view (degrees), and
-    the coefficients of the lens's distortion."""
+    """Return the numbers of a camera, (13,) or more: position (mm), the rows of the camera's axes,
+    the field of view (degrees), and the coefficients of the lens's distortion.
+    """
     lens = () if camera.distortion is None else camera.distortion.coefficients()
     return np.concatenate([camera.position, np.ravel(camera.axes()), [camera.fov], lens])
 
 
 def _beside(space: BoundSpace, point: FloatArray, number: int) -> tuple[FloatArray, FloatArray]:
-    """Two points a little to either side of one, within the bounds."""
+    """Return two points at a small distance to either side of one, within the bounds."""
     step = STEP * (space.upper[number] - space.lower[number])
     after, before = point.copy(), point.copy()
     after[number] = min(point[number] + step, space.upper[number])

@@ -1,8 +1,8 @@
-"""Colours and powers of light groups, each scored from the same images.
+"""Search over colours and powers of light groups, each scored from the same images.
 
 Light adds up: with a layer for each light group, an image under any colours and powers is a
 weighted sum, with no new rendering. So all 6,561 ways to make eight groups red, green or blue are
-scored in the time of a few hundred renderings, each exactly as a rendering of its own would be.
+scored in the time of a few hundred renderings, each exactly as by a rendering of its own.
 """
 
 from __future__ import annotations
@@ -32,17 +32,18 @@ if TYPE_CHECKING:
     from optisense.optics import OpticalModel
 
 MOST_USUAL = 20_000
-"""Colourings that are tried where the user names no number."""
+"""Largest number of colourings that are tried where no budget is given."""
 
 KEPT_SEEDS = 3
-"""Images are kept for so many seeds: the fresh ones that the best get when the study's own has
-done its work."""
+"""Number of seeds whose images are kept: the three fresh seeds of the final scoring, which starts
+when the study's own seed is no longer needed.
+"""
 
 
 class LightColours(Combinations):
-    """All colourings if the budget allows it, else one group after another.
+    """Search over all colourings if the budget allows it, else over one group after another.
 
-    For spaces of colours and powers only: `lights.GROUP.colour=R,G,B` and
+    It works for spaces of colours and powers only: `lights.GROUP.colour=R,G,B` and
     `lights.GROUP.flux=LOW:HIGH:STEPS`, of any groups.
     """
 
@@ -55,7 +56,7 @@ class LightColours(Combinations):
 
     @classmethod
     def usual_budget(cls, space: BoundSpace) -> int:
-        """All colourings, up to a limit."""
+        """Return the number of all colourings, up to a limit."""
         return min(math.prod(len(levels) for levels in _levels(space)), MOST_USUAL)
 
     def plan(self) -> Iterator[Stage]:
@@ -68,20 +69,21 @@ class LightColours(Combinations):
         yield from self.climb_again("one group after another", singles)
 
     def evaluator(self, usual: DesignEvaluator) -> Evaluator:
-        """An evaluator that renders once a seed."""
+        """Return an evaluator that renders once per seed."""
         return RelitEvaluator(usual)
 
 
 RELIGHTING_SHARE = 0.02
-"""The time to relight and judge the images of a score, as a share of the time to render and judge
-them: GelSight Mini, nine presses of which only the contacts are read."""
+"""Time to relight and judge the images of a score, as a share of the time to render and judge them;
+measured on GelSight Mini, for nine presses of which only the contacts are read.
+"""
 
 
 class RelitEvaluator(DesignEvaluator):
-    """Scores designs that differ in the colours and powers of their lights only."""
+    """Evaluator of designs that differ only in the colours and powers of their lights."""
 
     def __init__(self, usual: DesignEvaluator) -> None:
-        """Take over what the usual evaluator scores; nothing is rendered yet."""
+        """Copy the settings of the usual evaluator; nothing is rendered yet."""
         super().__init__(
             usual.space,
             usual.goals,
@@ -104,8 +106,9 @@ class RelitEvaluator(DesignEvaluator):
         return self._lit[seed].scores(design, only)
 
     def usual_trials(self) -> UsualTrials | None:
-        """See `DesignEvaluator.usual_trials`; a trial renders nothing, and designs share the light
-        of a fresh seed."""
+        """Return the usual duration of the trials (see `DesignEvaluator.usual_trials`); a trial
+        renders nothing, and all designs share the light of a fresh seed.
+        """
         usual = self.usual_score()
         if usual is None:
             return None
@@ -117,7 +120,7 @@ class RelitEvaluator(DesignEvaluator):
 
 
 class _Lit:
-    """The images of one seed, and the objectives made ready for them."""
+    """Images of one seed, and the objectives prepared for them."""
 
     def __init__(
         self,
@@ -131,11 +134,11 @@ class _Lit:
         reads = pixels_read(objectives, self._own)
         given = Settings(**shared, seed=seed)
         self._relighting = Relighting(Evaluation(model, given, progress, reads))
-        model.forget_light()  # the layers hold all that is needed of it
+        model.forget_light()  # the layers hold all that is needed
         self._objectives = objectives
 
     def scores(self, design: SensorDesign, only: Collection[str] | None = None) -> dict[str, Score]:
-        """One score for each objective, or for each of those that are wanted."""
+        """Return the scores by all objectives, or by those named in `only`."""
         cut, whole = (self._relighting.lit(design, whole=each) for each in (False, True))
         found = {}
         for each in self._objectives:
@@ -150,16 +153,17 @@ class _Lit:
 
 
 def _reads_contacts_only(objective: Objective) -> bool:
-    """Whether an objective reads no pixel outside of the contacts: built-in ones that name pixels.
+    """Return whether an objective reads no pixel outside of the contacts, which is known of
+    built-in objectives only.
 
-    A user's objective may look at what lies around a contact.
+    A user's objective may read pixels around a contact.
     """
     own = objective.function.__module__.startswith("optisense.objectives.")
     return own and objective.reads is not None
 
 
 def _without_details(score: Score) -> Score:
-    """A score with its main numbers only, because thousands of scores are stored."""
+    """Return a score with its main numbers only, because thousands of scores are stored."""
     if score.failure is not None:
         return score
     parts: dict[str, Any] = {name: score.parts[name] for name in score.shown}
@@ -170,10 +174,10 @@ def _without_details(score: Score) -> Score:
 
 
 def _levels(space: BoundSpace) -> list[tuple[float, ...]]:
-    """The values of each parameter.
+    """Return the levels of each parameter.
 
     Raises:
-        SearchError: a parameter is no colour or power of a light group, or has no steps.
+        SearchError: a parameter is no colour or power of a light group, or has no levels.
     """
     for parameter in space.parameters:
         paths = [target.path for target in parameter.targets]

@@ -1,8 +1,9 @@
-"""Choice of light types: one for all, one for each group, or one for each light.
+"""Search over light types: one for all lights, one for each group, or one for each light.
 
-The three kinds of variation of the OptiSense paper (section "Light source"). The first two are
-few and mostly all tried; of the third there are as many as types to the power of lights, and the
-budget decides how many: one light after another is changed, starting from the best of the others.
+These are the three kinds of variation of the OptiSense paper (section "Light source"). The first
+two have few combinations, which are usually all tried. The third has (number of types) to the power
+of (number of lights), so the budget decides how many are tried: one light after another is changed,
+starting from the best of the other kinds.
 """
 
 from __future__ import annotations
@@ -20,19 +21,21 @@ from optisense.search.space.parameters import Choice
 from optisense.search.space.search_space import BoundSpace
 
 GROUPWISE_SHARE = 0.5
-"""Combinations of groups are all tried where they take no more than this part of the budget."""
+"""Largest share of the budget that the combinations by group may take to be all tried; the rest is
+left for single lights.
+"""
 
 MOST_USUAL = 400
-"""Trials where the user names no number: each one traces its light anew."""
+"""Largest number of trials where no budget is given: each one traces its light anew."""
 
 FOR_ALL, FOR_GROUPS, FOR_LIGHTS = "one type for all", "one type a group", "one type a light"
 
 
 class LightTypes(Combinations):
-    """All of one type, then all combinations by group, then light by light.
+    """Search over one type for all, then all combinations by group, then light by light.
 
-    For spaces of light types only: `lights.types` (every light by itself), or any number of
-    `lights.GROUP.lights[INDEX].model`, all with the same options.
+    It works for spaces of light types only: `lights.types` (every light by itself), or any number
+    of `lights.GROUP.lights[INDEX].model`, all with the same options.
     """
 
     name = "types"
@@ -46,7 +49,9 @@ class LightTypes(Combinations):
 
     @classmethod
     def usual_budget(cls, space: BoundSpace) -> int:
-        """All combinations by group, and as much again for single lights, within limits."""
+        """Return the number of combinations by group, and as many trials again for single lights,
+        within limits.
+        """
         options = _options(space)
         wanted = max(2 * options ** len(_groups(space)), 4 * space.size)
         return min(wanted, options**space.size, MOST_USUAL)
@@ -65,13 +70,13 @@ class LightTypes(Combinations):
         yield from self.climb_again(FOR_LIGHTS, singles)
 
     def _by_group(self) -> Iterator[Stage]:
-        """All combinations of one type a group."""
+        """Yield all combinations of one type per group."""
         chosen = product(range(self._options), repeat=len(self._members))
         while chunk := list(islice(chosen, GENERATION)):
             yield FOR_GROUPS, [self._spread(each) for each in chunk]
 
     def _spread(self, chosen: Combination) -> Combination:
-        """One type a group as one type a light."""
+        """Return the combination by lights for one type per group."""
         combination = np.zeros(self.space.size, dtype=np.int64)
         for members, option in zip(self._members, chosen, strict=True):
             combination[members] = option
@@ -79,7 +84,7 @@ class LightTypes(Combinations):
 
 
 def _groups(space: BoundSpace) -> list[list[int]]:
-    """The parameters of each light group."""
+    """Return the indices of the parameters of each light group."""
     found: dict[str, list[int]] = {}
     for number, parameter in enumerate(space.parameters):
         if isinstance(parameter.variable, LightType):
@@ -88,10 +93,10 @@ def _groups(space: BoundSpace) -> list[list[int]]:
 
 
 def _options(space: BoundSpace) -> int:
-    """The number of types, the same for all lights.
+    """Return the number of types, which is the same for all lights.
 
     Raises:
-        SearchError: the space holds something else than types of lights.
+        SearchError: the space has a parameter that is not the type of a light.
     """
     for parameter in space.parameters:
         if not isinstance(parameter.variable, LightType):

@@ -1,4 +1,4 @@
-"""The best trade-offs between several goals: NSGA-II.
+"""Search for the best trade-offs between several goals: NSGA-II.
 
 Deb, Pratap, Agarwal and Meyarivan, "A fast and elitist multiobjective genetic algorithm: NSGA-II",
 2002; simulated binary crossover and polynomial mutation as there (and Deb and Agrawal, "Simulated
@@ -21,10 +21,12 @@ from optisense.search.methods.base import FloatArray, Method, Problem
 from optisense.search.methods.dominance import crowding, ranks
 
 CROSSOVER_SPREAD = 15.0
-"""Distribution index of the crossover; larger keeps children nearer to their parents."""
+"""Distribution index of the crossover; larger values keep children nearer to their parents; 15 is
+usual for NSGA-II.
+"""
 
 MUTATION_SPREAD = 20.0
-"""Distribution index of the mutation (both as is usual with NSGA-II)."""
+"""Distribution index of the mutation; 20 is usual for NSGA-II."""
 
 CROSSOVER_CHANCE = 0.9
 """Probability that two parents are crossed, as Deb et al. (2002) use it for NSGA-II."""
@@ -38,14 +40,14 @@ class Pareto(Method):
     several = True
 
     def __init__(self, problem: Problem, *, population: int | None = None) -> None:
-        """Set up.
+        """Set up the population and its size.
 
         Args:
-            problem: what to search.
-            population: points a generation, even; 20 to 100 by the budget if None.
+            problem: problem to solve.
+            population: points per generation, even; 20 to 100 depending on the budget if None.
 
         Raises:
-            SearchError: there is only one objective, or an option makes no sense.
+            SearchError: there is only one objective, or an option is out of its range.
         """
         super().__init__(problem)
         usual = int(np.clip(problem.budget // 10, 20, 100))
@@ -59,7 +61,7 @@ class Pareto(Method):
         self._children = np.empty((0, self.space.size))
 
     def ask(self) -> FloatArray:
-        """The next generation, (population, n)."""
+        """Return the next generation, (population, n)."""
         if not len(self._genes):
             cube = qmc.LatinHypercube(self.space.size, seed=self._random)
             self._children = cube.random(self.population)
@@ -86,7 +88,7 @@ class Pareto(Method):
         self._genes, self._values, self._broken = everyone[best], scores[best], broken[best]
 
     def describe(self) -> dict[str, Any]:
-        """The size of a generation."""
+        """Return the size of a generation."""
         return {"population": self.population}
 
     def _offspring(self) -> FloatArray:
@@ -97,7 +99,9 @@ class Pareto(Method):
         return self._mutated(children)
 
     def _winners(self, rank: NDArray[np.int64], room: FloatArray) -> NDArray[np.int64]:
-        """(population / 2,): the better one of two drawn at random, each time."""
+        """Return the winners of binary tournaments, (population / 2,): the better one of two drawn
+        at random.
+        """
         pairs = self._random.integers(len(rank), size=(self.population // 2, 2))
         one, other = pairs.T
         first = (rank[one] < rank[other]) | (
@@ -106,7 +110,7 @@ class Pareto(Method):
         return np.where(first, one, other)
 
     def _crossed(self, mothers: FloatArray, fathers: FloatArray) -> FloatArray:
-        """(population, n): two children of each couple."""
+        """Return two children of each couple, (population, n)."""
         shape = mothers.shape
         draw = self._random.random(shape)
         power = 1.0 / (CROSSOVER_SPREAD + 1.0)

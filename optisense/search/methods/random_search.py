@@ -1,4 +1,6 @@
-"""Points drawn evenly: a baseline, and a way to see how a score depends on everything."""
+"""Search by points spread evenly: a baseline, and a way to see how a score depends on all
+parameters.
+"""
 
 from __future__ import annotations
 
@@ -27,8 +29,8 @@ class Random(Method):
         self._points = qmc.Sobol(problem.space.size, seed=problem.random(self.name))
 
     def ask(self) -> FloatArray:
-        """The next points, (k, n)."""
+        """Return the next points, (k, n)."""
         return self.space.from_unit(self._points.random(GENERATION))
 
     def tell(self, vectors: FloatArray, outcomes: Sequence[Outcome]) -> None:
-        """Random search learns nothing."""
+        """Do nothing: random search does not learn."""

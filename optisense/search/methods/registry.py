@@ -1,4 +1,4 @@
-"""The registry of search methods: those of the package and those that other packages bring."""
+"""Registry of search methods: those of this package and those of other packages."""
 
 from __future__ import annotations
 
@@ -29,16 +29,16 @@ find, names = METHODS.find, METHODS.names
 
 
 def register(method: type[Method]) -> type[Method]:
-    """Add a method by its `name`; usable as a class decorator.
+    """Add a method under its `name`; usable as a class decorator.
 
     Raises:
-        SearchError: another one has this name.
+        SearchError: another method has this name.
     """
     return METHODS.register(method.name, method)
 
 
 def make(name: str, problem: Problem, options: dict[str, Any] | None = None) -> Method:
-    """A method, ready to be asked.
+    """Return an instance of a method for a problem.
 
     Raises:
         SearchError: the name or an option is unknown, or the problem does not fit the method.

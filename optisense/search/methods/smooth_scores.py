@@ -1,4 +1,4 @@
-"""Objectives and arithmetic with them as smooth functions of chief rays."""
+"""Objectives, and arithmetic expressions of them, as smooth functions of chief rays."""
 
 from __future__ import annotations
 
@@ -14,19 +14,24 @@ from optisense.objectives.expressions import Expression, ScoreTerm
 from optisense.objectives.smooth import SMOOTH, Rays, Slopes
 
 STEP = 1e-6
-"""Central differences of arithmetic go so far to both sides, as a part of the values above 1: the
-root of double precision times some hundreds, so that rounding does not show."""
+"""Step of central differences of arithmetic, absolute or, for values above 1, relative; it is a few
+hundred times the square root of double precision, so that rounding does not show.
+"""
 
 
 @dataclass(frozen=True)
 class SmoothScore:
-    """An objective, or arithmetic with several, whose value changes smoothly with chief rays."""
+    """Objective, or arithmetic expression of several, whose value is a smooth function of chief
+    rays.
+    """
 
     expression: Expression
 
     @staticmethod
     def of(text: str) -> SmoothScore | None:
-        """The smooth form of an objective or an expression; None where a part of it has none."""
+        """Return the smooth form of an objective or an expression, or None if a part of it has
+        none.
+        """
         try:
             expression = Expression.parse(text)
         except ObjectiveError:  # a function of a program or a file
@@ -35,11 +40,13 @@ class SmoothScore:
         return SmoothScore(expression) if smooth else None
 
     def slopes(self, rays: Rays, settings: Mapping[str, Any]) -> Slopes:
-        """Its value for some rays, and its derivatives by what these do.
+        """Return the value for some rays, and its derivatives by the points and directions of
+        these.
 
         Args:
             rays: chief rays.
-            settings: of the objectives; those that a smooth form does not know are left out.
+            settings: settings of the objectives; those that a smooth form does not know are
+                ignored.
         """
         found: dict[ScoreTerm, Slopes] = {}
         for each in self.expression.quantities:
@@ -59,7 +66,7 @@ class SmoothScore:
         return Slopes(self.expression.value(values), cosine, weight, points)
 
     def _slope(self, values: Mapping[ScoreTerm, float], by: ScoreTerm) -> float:
-        """The derivative of the arithmetic by one of the values in it."""
+        """Return the derivative of the expression by one of the values in it."""
         step = STEP * max(1.0, abs(values[by]))
         after, before = ({**values, by: values[by] + side * step} for side in (1.0, -1.0))
         return (self.expression.value(after) - self.expression.value(before)) / (2.0 * step)

@@ -1,5 +1,5 @@
 """The search space: parameters of a design, their bounds, and forbidden designs.
 
-Paths and specifications of a user come in; a `BoundSpace` of one design comes out, which turns
-points of numbers into designs. Manufacturing errors are a space, too.
+A `SearchSpace` holds paths and specifications of a user; bound to a design it is a `BoundSpace`,
+which turns points of numbers into designs. Manufacturing errors are a space, too.
 """

@@ -1,5 +1,5 @@
-"""What a point of a search must keep of the design that the search starts from, so that somebody
-could build it: parts that rest on one another, lights on their boards, and what is solid.
+"""Constraints that keep designs buildable: parts that rest on one another, lights on their boards,
+and solids must stay what they are in the design that the search starts from.
 """
 
 from __future__ import annotations
@@ -22,44 +22,49 @@ from optisense.geometry.surface import closest_points
 from optisense.search.space.constraints import same_shape
 
 STILL_RESTS = 0.99
-"""Share of the area on which two parts lay on one another that they must keep. A hundredth is left
-for what is lost by rounding at curved faces, and by errors as small as those of manufacturing."""
+"""Share of the contact area of two parts that a trial must keep. The remaining hundredth covers
+rounding at curved faces and displacements as small as manufacturing errors.
+"""
 
 SEAT_POINTS = 400
-"""Number of points of each of two parts that show whether they still lie on one another; four of
-them are a hundredth."""
+"""Number of points on each of two parts that are tested for contact; four of them are a
+hundredth.
+"""
 
 FEW = 16
-"""Fewer points that touch are an edge or a corner, on which no part rests."""
+"""Smallest number of touching points that count as a contact area; fewer are an edge or a corner,
+on which no part rests.
+"""
 
 PLASTIC = (0.7548776662466927, 0.5698402909980532)
 """The inverse of the plastic number and its square: steps of the R2 sequence, which spreads points
 evenly over a square (Roberts, "The unreasonable effectiveness of quasirandom sequences", 2018)."""
 
 LIGHT_SEAT = 0.1
-"""mm: a light that is no farther from an opaque part sits on it, and one that is no deeper in a
-part lies against its face. Lights of the built-in sensors are 0.01 mm off their boards, and 0.2 mm
-or more off the transparent parts into which they shine."""
+"""Largest distance of a light from the opaque part that it sits on, mm, and largest depth in a part
+of a light that lies against its face. Lights of the built-in sensors are 0.01 mm off their boards,
+and 0.2 mm or more off the transparent parts into which they shine.
+"""
 
 
 REACH_OUT = 0.25
-"""Part of the sensor's largest side by which a search may make it larger on each side: the model of
-a GelSight Mini, 28 mm long, may grow by 7 mm. A larger sensor starts from a larger design."""
+"""Share of the sensor's largest side by which a search may enlarge it on each side: the model of a
+GelSight Mini, 28 mm long, may grow by 7 mm. A larger sensor needs a larger starting design.
+"""
 
 
 class PartsRest:
-    """Parts that rest on one another must go on doing so where a search shifts or turns them.
+    """Constraint: parts that rest on one another must still do so after a search has moved them.
 
-    A gel that has slipped off its tray, or a coating that has left its gel, can't be built as it
-    is drawn. Parts that are moved together keep their contact, and a plate may slide on a larger
-    one.
+    A gel that has slipped off its tray, or a coating that has left its gel, can't be built. Parts
+    that are moved together keep their contact, and a plate may slide on a larger one.
     """
 
     def __init__(self, design: SensorDesign, moved: Collection[str]) -> None:
-        """Look at the design that the search starts from.
+        """Find the contacts in the design that the search starts from.
 
         Args:
-            design: the design.
+            design: design that the search starts from.
             moved: names of the parts that are shifted or turned.
         """
         self._meshes = design.deformed_meshes()
@@ -72,7 +77,7 @@ class PartsRest:
         self._seats: dict[tuple[str, str], tuple[Seat, Seat]] = {}
 
     def __call__(self, design: SensorDesign) -> str | None:
-        """Which two parts have come apart, or None."""
+        """Return a message with the two parts that have come apart, or None."""
         meshes = design.deformed_meshes()
         for one, other in self._pairs:
             if one not in meshes or other not in meshes:
@@ -107,8 +112,8 @@ class Seat(NamedTuple):
     """Points of one part that touch another one.
 
     Attributes:
-        faces: (k,) the faces of the part that they lie on.
-        shares: (k, 3) barycentric coordinates on these.
+        faces: indices (k,) of the faces of the part that the points lie on.
+        shares: barycentric coordinates (k, 3) in these faces.
     """
 
     faces: NDArray[np.int64]
@@ -116,7 +121,7 @@ class Seat(NamedTuple):
 
     @staticmethod
     def of(mesh: TriangleMesh, faces: NDArray[np.int64], other: TriangleMesh) -> Seat:
-        """Points spread evenly over some faces of a mesh, as far as they touch another one."""
+        """Return points spread evenly over some faces of a mesh that touch another mesh."""
         reached = np.cumsum(mesh.face_areas[faces])
         if len(faces) == 0 or reached[-1] <= 0.0:
             return Seat(np.zeros(0, dtype=np.int64), np.zeros((0, 3)))
@@ -129,30 +134,33 @@ class Seat(NamedTuple):
         return Seat(seat.faces[touch], seat.shares[touch])
 
     def points(self, mesh: TriangleMesh) -> NDArray[np.float64]:
-        """(k, 3) mm, where the points are on the part in its present shape."""
+        """Return the positions (k, 3) of the points, mm, on the part in its present shape."""
         found: NDArray[np.float64] = np.einsum(
             "kc,kci->ki", self.shares, mesh.triangles[self.faces]
         )
         return found
 
     def kept(self, mesh: TriangleMesh, other: TriangleMesh) -> float:
-        """Share of the points that still touch the other part; 0 where there are too few."""
+        """Return the share of the points that still touch the other part; 0 if there are too few
+        points.
+        """
         if len(self.faces) < FEW:
             return 0.0
         return float(np.isfinite(near_surface(self.points(mesh), other)).mean())
 
 
 class LightsRest:
-    """Lights that sit on an opaque part must stay on it where a search shifts or turns the part.
+    """Constraint: lights that sit on an opaque part must stay on it after a search has moved the
+    part.
 
-    A board that has left its lights would leave them hanging in the air.
+    Lights whose board has moved away have nothing that holds them.
     """
 
     def __init__(self, design: SensorDesign, moved: Collection[str]) -> None:
-        """Look at the design that the search starts from.
+        """Find the lights on opaque parts in the design that the search starts from.
 
         Args:
-            design: the design.
+            design: design that the search starts from.
             moved: names of the parts that are shifted or turned.
         """
         meshes = design.deformed_meshes()
@@ -169,7 +177,7 @@ class LightsRest:
         }
 
     def __call__(self, design: SensorDesign) -> str | None:
-        """Which light has lost its part, or None."""
+        """Return a message with the light that has lost its part, or None."""
         meshes = design.deformed_meshes()
         for part, lights in self._carried.items():
             for group, index in lights:
@@ -185,19 +193,19 @@ class LightsRest:
 
 
 class LightsStayOut:
-    """No light may come to be inside of a part in which it is not at the start.
+    """Constraint: no light may be inside of a part in which it is not at the start.
 
     A light in the acrylic of a tray is brighter than one in front of it, but there is no room for
-    an LED. Lights that are cast into a part from the beginning, as those of GelSight360, are left
-    alone.
+    an LED. Lights that are cast into a part from the beginning, as those of GelSight360, are
+    exempt.
     """
 
     def __init__(self, design: SensorDesign) -> None:
-        """Look at the design that the search starts from."""
+        """Find the lights inside of parts in the design that the search starts from."""
         self._always = self._within(design)
 
     def __call__(self, design: SensorDesign) -> str | None:
-        """Which light is inside of which part, or None."""
+        """Return a message with the light that is inside of a part, or None."""
         for group, index, part in sorted(self._within(design) - self._always):
             place = np.array(design.lights[group].lights[index].position)
             mesh = design.deformed_meshes()[part]
@@ -211,7 +219,7 @@ class LightsStayOut:
         return None
 
     def _within(self, design: SensorDesign) -> set[tuple[str, int, str]]:
-        """Group, number and part of lights that are inside of a closed part."""
+        """Return group, index and part of the lights that are inside of a closed part."""
         found = set()
         meshes = design.deformed_meshes()
         for part, mesh in meshes.items():
@@ -226,18 +234,20 @@ class LightsStayOut:
 
 
 class BentPartsRest:
-    """What a cage bends must stay on the parts outside of the cage on which it lies, and must not
-    grow into transparent ones.
+    """Constraint: parts that a cage deforms must keep contact with the parts outside of the cage on
+    which they lie, and must not grow into transparent parts.
 
-    A design whose cage has done so from the beginning is left alone.
+    Problems that the starting design has are ignored.
     """
 
     def __init__(self, design: SensorDesign) -> None:
-        """Look at the design that the search starts from."""
+        """Find the problems of the design that the search starts from."""
         self._always = {problem.where for problem in contact_problems(design)}
 
     def __call__(self, design: SensorDesign) -> str | None:
-        """Which part has come off another, or grown into it, or None."""
+        """Return a message with the part that has lost contact with another, or grown into it, or
+        None.
+        """
         for problem in contact_problems(design):
             if problem.where not in self._always:
                 return problem.message
@@ -245,13 +255,14 @@ class BentPartsRest:
 
 
 class StaysInSize:
-    """Parts that a search bends or moves may not reach far beyond the sensor that it starts from.
+    """Constraint: parts that a search deforms or moves may not reach far beyond the sensor that it
+    starts from.
 
     A gel that is drawn out to three times its width scores a little better and fits no housing.
     """
 
     def __init__(self, design: SensorDesign) -> None:
-        """Look at the design that the search starts from."""
+        """Store the bounds of the design that the search starts from."""
         self._names = [
             name for name, part in design.parts.items() if part.role is not Role.INDENTER
         ]
@@ -262,7 +273,7 @@ class StaysInSize:
         self._lower, self._upper = lower - self._most, upper + self._most
 
     def __call__(self, design: SensorDesign) -> str | None:
-        """Which part reaches too far, or None."""
+        """Return a message with the part that reaches too far, or None."""
         for name, (lower, upper) in self._bounds(design).items():
             if (lower < self._lower).any() or (upper > self._upper).any():
                 out = float(np.maximum(self._lower - lower, upper - self._upper).max())
@@ -278,14 +289,15 @@ class StaysInSize:
 
 
 class SolidsStay:
-    """A solid or liquid may not become a gas by its refractive index, nor a film of air a solid.
+    """Constraint: a refractive index may not turn a solid or liquid into a gas, nor an air gap into
+    a solid.
 
-    To a search that varies an index, air is a plate that has vanished. Another material that the
-    search may choose is left alone.
+    To a search that varies an index, air is a plate that has vanished. Materials that the search
+    chooses from are exempt.
     """
 
     def __init__(self, design: SensorDesign) -> None:
-        """Look at the design that the search starts from."""
+        """Find the gases in the design that the search starts from."""
         self._gases = {
             name: is_gas(medium)
             for name, material in design.materials.items()
@@ -293,7 +305,7 @@ class SolidsStay:
         }
 
     def __call__(self, design: SensorDesign) -> str | None:
-        """Which material has changed its state, or None."""
+        """Return a message with the material that has changed its state, or None."""
         for name, was_gas in self._gases.items():
             material = design.materials.get(name)
             medium = None if material is None else material.medium()
@@ -307,7 +319,7 @@ class SolidsStay:
 
 
 def _off(design: SensorDesign, group: str, index: int, mesh: TriangleMesh) -> float:
-    """mm from a light to a mesh; 0 for a light that is no longer there."""
+    """Return the distance from a light to a mesh, mm; 0 for a light that no longer exists."""
     lights = design.lights[group].lights
     if index >= len(lights):
         return 0.0

@@ -1,4 +1,4 @@
-"""Designs that must not be scored: parts that cut through one another, or a user's own rule."""
+"""Constraints on designs: parts that must not cut through one another, or a user's own rule."""
 
 from __future__ import annotations
 
@@ -19,11 +19,13 @@ from optisense.geometry import TriangleMesh
 from optisense.geometry.crossings import crossings
 
 Constraint = Callable[[SensorDesign], bool | str | None]
-"""False, or a text that says why, for a design that must not be."""
+"""Function that forbids designs: it returns False, or a text with the reason, for a forbidden
+design.
+"""
 
 
 class CrossingParts(NamedTuple):
-    """Two parts that cut through each other, and a place where they do, (3,) mm."""
+    """Two parts that cut through each other, and a point where they do, (3,) mm."""
 
     one: str
     other: str
@@ -31,14 +33,14 @@ class CrossingParts(NamedTuple):
 
 
 class PartsApart:
-    """No part may come to cut through another one that it leaves alone in the first design.
+    """Constraint: no part may cut through another one that it does not cut in the starting design.
 
-    Solids that light passes may overlap where their priorities differ, and a sensing surface lies
-    on its gel: such pairs are not looked at, nor those that do not move.
+    Transparent solids may overlap if their priorities differ, and a sensing surface lies on its
+    gel: such pairs are not tested, nor those that do not move.
     """
 
     def __init__(self, design: SensorDesign) -> None:
-        """Look at the design that the search starts from."""
+        """Store the meshes of the design that the search starts from."""
         self._meshes = design.deformed_meshes()
         self._pairs = [
             (one, other)
@@ -48,7 +50,7 @@ class PartsApart:
         self._known: dict[tuple[str, str], bool] = {}
 
     def __call__(self, design: SensorDesign) -> str | None:
-        """Which two parts cut through each other, or None."""
+        """Return a message with the two parts that cut through each other, or None."""
         found = self.meeting(design)
         if found is None:
             return None
@@ -59,7 +61,9 @@ class PartsApart:
         )
 
     def meeting(self, design: SensorDesign) -> CrossingParts | None:
-        """The first two parts that cut through each other and did not at the start, or None."""
+        """Return the first two parts that cut through each other and did not at the start, or
+        None.
+        """
         meshes = design.deformed_meshes()
         moved = {
             name for name, mesh in meshes.items() if not same_shape(mesh, self._meshes.get(name))
@@ -81,30 +85,31 @@ class PartsApart:
 
 
 class Unfolded:
-    """No cage may come to fold a part or turn it inside out: nobody can make such a shape.
+    """Constraint: no cage may fold a part or turn it inside out, because such a shape can't be
+    made.
 
-    A design that is folded from the beginning is left alone, as `PartsApart` leaves parts alone
-    that cut through each other from the beginning.
+    A part that is folded in the starting design is exempt, as `PartsApart` exempts parts that cut
+    through each other there.
     """
 
     def __init__(self, design: SensorDesign) -> None:
-        """Look at the design that the search starts from."""
+        """Find the folded parts of the design that the search starts from."""
         self._always = {problem.where for problem in fold_problems(design)}
 
     def __call__(self, design: SensorDesign) -> str | None:
-        """Which part is folded, or None."""
+        """Return a message with the part that is folded, or None."""
         new = [each for each in fold_problems(design) if each.where not in self._always]
         return new[0].message if new else None
 
 
 class UserRule:
-    """A function of a user's Python file, loaded where it is needed."""
+    """Function in a user's Python file, loaded when it is first called."""
 
     def __init__(self, text: str) -> None:
-        """Read FILE.py:FUNCTION. The file, which may be a stranger's, is not run yet.
+        """Parse FILE.py:FUNCTION. The file, which may come from a stranger, is not run yet.
 
         Raises:
-            SearchError: the text is something else.
+            SearchError: the text has another form.
         """
         file, colon, self.function = text.rpartition(":")
         if not colon or not file.endswith(".py") or not self.function:
@@ -113,7 +118,7 @@ class UserRule:
         self._loaded: Constraint | None = None
 
     def __call__(self, design: SensorDesign) -> bool | str | None:
-        """What the user's function says of a design."""
+        """Return the result of the user's function for a design."""
         return self.load()(design)
 
     def __getstate__(self) -> dict[str, object]:
@@ -123,7 +128,7 @@ class UserRule:
         return f"{self.path}:{self.function}"
 
     def load(self) -> Constraint:
-        """Run the file, once.
+        """Run the file, once, and return the function.
 
         Raises:
             SearchError, ObjectiveError: the file or the function is missing, or the file fails.
@@ -141,10 +146,10 @@ class UserRule:
 
 
 def why_forbidden(design: SensorDesign, constraints: Sequence[Constraint]) -> str | None:
-    """Why a design must not be, or None.
+    """Return the reason why a design is forbidden, or None.
 
     Raises:
-        SearchError: a rule returns something else than a bool, a text or None.
+        SearchError: a rule returns something other than a bool, a text or None.
     """
     for rule in constraints:
         said = rule(design)
@@ -182,7 +187,7 @@ def _crossing(one: TriangleMesh, other: TriangleMesh) -> NDArray[np.float64] | N
 
 
 def same_shape(mesh: TriangleMesh, before: TriangleMesh | None) -> bool:
-    """Whether a mesh has the vertices that it had before, where it was there."""
+    """Return whether a mesh exists before and has the same vertices."""
     if before is None or mesh.vertices.shape != before.vertices.shape:
         return False
     return mesh is before or bool(np.array_equal(mesh.vertices, before.vertices))

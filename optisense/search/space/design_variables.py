@@ -11,18 +11,20 @@ from optisense.design import SensorDesign
 from optisense.design.camera import ImagingModel
 
 LONGEST_NAME = 64
-"""Largest number of letters of a name that is made from a path; longer ones do not fit tables."""
+"""Largest number of letters of a name that is made from a path; longer ones do not fit into
+tables.
+"""
 
 
 @dataclass(frozen=True)
 class DesignVariable(ABC):
-    """Something that one parameter changes in a design.
+    """Base class of changes of a design by one parameter.
 
     Attributes:
-        path: what the user calls it.
-        stage: variables of a lower stage act first: whole parts (0), then single numbers, then
-            moves (2), and last what changes the list of light groups (3).
-        numeric: whether it takes numbers, else names.
+        path: path by which the user names it.
+        stage: order of application; variables of a lower stage act first: whole parts (0), then
+            single numbers, then moves (2), and last changes of the list of light groups (3).
+        numeric: whether its values are numbers; else they are names.
         shapes: whether it moves surfaces.
     """
 
@@ -33,11 +35,11 @@ class DesignVariable(ABC):
 
     @abstractmethod
     def start(self, design: SensorDesign) -> float | str | None:
-        """The value in a design: 0 for moves, else a name."""
+        """Return the value in a design: 0 for moves, else a name."""
 
     @abstractmethod
     def apply(self, design: SensorDesign, value: Any) -> SensorDesign:
-        """A changed design; only the rest is shared with the given one.
+        """Return a changed design, which shares everything else with the given one.
 
         Raises:
             OptiSenseError: the value does not fit.
@@ -45,7 +47,7 @@ class DesignVariable(ABC):
 
 
 class LibraryCoating(DesignVariable):
-    """The whole coating, from the library."""
+    """Replacement of the whole coating by one of the library."""
 
     def start(self, design: SensorDesign) -> str | None:
         return design.coating.library
@@ -59,8 +61,8 @@ class LibraryCoating(DesignVariable):
 class LibraryCamera(DesignVariable):
     """Projection, field of view and resolution of a camera of the library; the pose stays.
 
-    Where the design's camera has a lens, a sensor or a processor that is not ideal, it gets those
-    of the library's camera.
+    If the design's camera has a lens, a sensor or a processor that is not ideal, these are replaced
+    by those of the library's camera.
     """
 
     def start(self, design: SensorDesign) -> str:
@@ -80,7 +82,7 @@ class LibraryCamera(DesignVariable):
 
 @dataclass(frozen=True)
 class PartMaterial(DesignVariable):
-    """The material of a part; a material of the library joins the design's own."""
+    """Material of a part; a material of the library is added to the design's own."""
 
     name: str
 
@@ -98,7 +100,7 @@ class PartMaterial(DesignVariable):
 
 @dataclass(frozen=True)
 class GroupType(DesignVariable):
-    """The type of the lights of one group, or of all groups; their flux stays."""
+    """Type of the lights of one group, or of all groups; their flux stays."""
 
     group: str | None
 
@@ -121,7 +123,7 @@ class GroupType(DesignVariable):
 
 @dataclass(frozen=True)
 class LightType(DesignVariable):
-    """The type of one light: lights of another type than their group's form a group beside it."""
+    """Type of one light. Lights of another type than their group's form a new group beside it."""
 
     group: str
     index: int
@@ -135,10 +137,10 @@ class LightType(DesignVariable):
 
 
 def with_light_types(design: SensorDesign, types: dict[tuple[str, int], str]) -> SensorDesign:
-    """A design in which some lights, by group and index, are of other types.
+    """Return a design in which some lights, by group and index, are of other types.
 
     Raises:
-        LibraryError: the library has no such light; names the near match.
+        LibraryError: the library has no such light; the message suggests a similar name.
     """
     groups = {}
     for name, group in design.lights.items():

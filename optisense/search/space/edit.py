@@ -1,8 +1,8 @@
-"""Setting many numbers of a design at once.
+"""Set many numbers of a design at once.
 
 `set_value` checks the whole design for each value; a cage of 27 control points has 81. Here the
-places of all values are looked up once, and then only what lies on the way to them is rebuilt.
-Nothing is checked: the caller has tried the bounds, or checks the result.
+positions of all values are looked up once, and then only the containers on the way to them are
+rebuilt. Nothing is checked: the caller has tried the bounds, or checks the result.
 """
 
 from __future__ import annotations
@@ -17,17 +17,17 @@ from optisense.design import SensorDesign, get_value, parse_path
 _LETTERS = {"x": 0, "y": 1, "z": 2, "r": 0, "g": 1, "b": 2}
 
 Node = dict[str | int, "Node | int"]
-"""A step down the design; a leaf is the position of a value in the given sequence."""
+"""Step down the design; a leaf is the index of a value in the given sequence."""
 
 
 class Edit:
-    """The places of some values of a design, which are set together."""
+    """Positions of some values of a design, which are set together."""
 
     def __init__(self, design: SensorDesign, paths: Sequence[str]) -> None:
         """Look up all paths.
 
         Raises:
-            DesignError: one leads nowhere; names the near match.
+            DesignError: a path names nothing in the design; the message suggests a similar name.
         """
         self.paths = tuple(paths)
         self._root: Node = {}
@@ -44,10 +44,11 @@ class Edit:
             node[_key(value, last)] = number
 
     def apply(self, design: SensorDesign, values: Sequence[Any]) -> SensorDesign:
-        """A design with these values, one for each path; unchecked, the rest shared.
+        """Return a design with these values, one for each path; it is unchecked and shares
+        everything else.
 
         Args:
-            design: of the same structure as the one that the paths were looked up in.
+            design: design of the same structure as the one in which the paths were looked up.
             values: plain Python values (no NumPy scalars).
         """
         if not self._root:
@@ -57,7 +58,7 @@ class Edit:
 
 
 def _rebuilt(value: Any, node: Node, values: Sequence[Any]) -> Any:
-    """A copy of the containers on the way; everything else is shared."""
+    """Return a copy of the containers on the way to the values; everything else is shared."""
     if isinstance(value, BaseModel):
         update = {str(step): _below(getattr(value, str(step)), node[step], values) for step in node}
         return value.model_copy(update=update)
@@ -74,7 +75,7 @@ def _below(value: Any, node: Node | int, values: Sequence[Any]) -> Any:
 
 
 def _key(container: Any, step: str | int) -> str | int:
-    """x, y, z and r, g, b stand for 0, 1, 2 in three numbers."""
+    """Return the index 0, 1 or 2 for x, y, z and r, g, b in three numbers."""
     if isinstance(container, list | tuple) and step in _LETTERS:
         return _LETTERS[str(step)]
     return step

@@ -1,4 +1,6 @@
-"""Single parameters of what a user asks to vary: paths are looked up, bulk forms spread out."""
+"""Expansion of a user's paths into single parameters: paths are looked up, and those of vectors,
+cages and wildcards are split.
+"""
 
 from __future__ import annotations
 
@@ -31,12 +33,16 @@ RGB_FIELDS = (
 )  # fmt: skip
 
 SYMMETRY_TOLERANCE = 1e-4
-"""A cage whose mirror images differ by more (of its box, or of a share) is not symmetric."""
+"""Largest difference between mirror images in a symmetric cage, as a share of its box or as a blend
+share; it allows for rounded numbers in files.
+"""
 
 
 @dataclass(frozen=True)
 class Target:
-    """A value that follows a parameter: `scale` times it plus `offset` (choices: as it is)."""
+    """Value that follows a parameter: `scale` times the parameter plus `offset` (choices: as they
+    are).
+    """
 
     path: str
     scale: float = 1.0
@@ -45,15 +51,15 @@ class Target:
 
 @dataclass(frozen=True)
 class Parameter:
-    """One number or name that a search may change.
+    """Single number or name that a search may change.
 
     Attributes:
-        name: its dotted path; unique in a space.
+        name: dotted path of the parameter; unique in a space.
         kind: bounds or options.
-        start: what it is in the design, as a coordinate (see `BoundSpace`), within the bounds.
-        targets: the values of the design that follow it; empty where a variable acts.
-        variable: what it changes when that is more than values.
-        asked: the path as the user gave it.
+        start: value in the design, as a coordinate (see `BoundSpace`), within the bounds.
+        targets: values of the design that follow the parameter; empty if it has a variable.
+        variable: design variable that it changes, if it changes more than values.
+        asked: path as the user gave it.
     """
 
     name: str
@@ -67,15 +73,15 @@ class Parameter:
 def expand(
     design: SensorDesign, path: str, spec: Specification
 ) -> tuple[SensorDesign, list[Parameter]]:
-    """The single parameters behind one path.
+    """Return the single parameters for one path.
 
     Returns:
-        The design, made ready where its form has to change (a cage given by its points gets a
-        blend when that is what varies; the shape stays), and the parameters.
+        The design and the parameters. The design is changed in form, not in shape, where needed: a
+        cage given by its points gets a blend if the blend varies.
 
     Raises:
-        DesignError: the path leads nowhere; names the near match.
-        SearchError: it can't be varied like this.
+        DesignError: the path names nothing in the design; the message suggests a similar name.
+        SearchError: the path can't be varied like this.
     """
     if "*" in path:
         found: list[Parameter] = []
@@ -105,10 +111,10 @@ def expand(
 
 
 def starred(design: SensorDesign, path: str) -> list[str]:
-    """The paths that one with a star stands for: `lights.*.colour`, `lights.lg*.flux`.
+    """Return the paths that match one with a wildcard: `lights.*.colour`, `lights.lg*.flux`.
 
     Raises:
-        SearchError: the star is not in a name, or stands for none.
+        SearchError: the wildcard is not in a name, or matches none.
     """
     section, _, rest = path.partition(".")
     pattern, _, leaf = rest.partition(".")
@@ -152,7 +158,9 @@ def _of_variable(
 
 
 def _of_value(path: str, value: Any, spec: Specification) -> list[Parameter]:
-    """An ordinary path: one value, or the two or three numbers of a vector."""
+    """Return the parameters for an ordinary path: one value, or the two or three numbers of a
+    vector.
+    """
     if isinstance(spec, Choice):
         spec = _colours_read(path, spec)
         return [Parameter(path, spec, _number_of(value, spec), (Target(path),))]
@@ -178,7 +186,7 @@ def _of_value(path: str, value: Any, spec: Specification) -> list[Parameter]:
 
 
 def _bounds(value: float, spec: Specification) -> Continuous | Integer:
-    """Bounds for a number; whole ones for a whole number."""
+    """Return bounds for a number; integer bounds for an integer."""
     assert not isinstance(spec, Choice | CagePoints)
     whole = isinstance(value, int)
     if isinstance(spec, Around):
@@ -220,10 +228,10 @@ def _of_cage(
 
 
 def as_points(spec: Specification) -> CagePoints:
-    """Bounds or a reach for all control points, unless points are named already.
+    """Return bounds or a reach for all control points, unless single points are given already.
 
     Raises:
-        SearchError: these are options or whole numbers.
+        SearchError: the specification is a choice or an integer.
     """
     if isinstance(spec, CagePoints):
         return spec
@@ -240,11 +248,12 @@ def _points(
     mirror: np.ndarray | None = None,
     free: np.ndarray | None = None,
 ) -> list[Parameter]:
-    """Parameters for the numbers of control points (N, 3).
+    """Return parameters for the coordinates of control points (N, 3).
 
     Args:
-        mirror: (2, 3) mm, the box across whose middle coordinates are mirrored; shares are not.
-        free: (N, 3), which numbers make a difference.
+        mirror: box (2, 3), mm, across whose middle coordinates are mirrored; None for blend shares,
+            which are not.
+        free: coordinates (N, 3) that have an effect, bool.
     """
     count = len(now)
     chosen = range(count) if spec.points is None else spec.points
@@ -281,7 +290,9 @@ def _points(
 
 
 def _images(cage: Cage, symmetry: str | None) -> np.ndarray:
-    """(N,): the index of each control point's mirror image, or its own without symmetry."""
+    """Return the index of each control point's mirror image, (N,), or its own index without
+    symmetry.
+    """
     lattice = np.arange(int(np.prod(cage.resolution))).reshape(cage.resolution)
     return (np.flip(lattice, "xyz".index(symmetry)) if symmetry else lattice).reshape(-1)
 
@@ -314,7 +325,9 @@ def _check_symmetric(
 
 
 def _shares(cage: Cage) -> np.ndarray:
-    """(N, 3): how far each coordinate is from c_min to c_max now, 0 where both are the same."""
+    """Return the present blend share of each coordinate between c_min and c_max, (N, 3); 0 where
+    both are equal.
+    """
     if isinstance(cage.blend, list):
         return as_array(cage.blend)
     if cage.blend is not None:
@@ -335,7 +348,7 @@ def _span(cage: Cage) -> np.ndarray:
 
 
 def _with_blend(design: SensorDesign, name: str, blend: float | list[Share]) -> SensorDesign:
-    """The design with its cage given by `blend`, and its points left out."""
+    """Return the design with its cage given by `blend` instead of points."""
     plain = blend if isinstance(blend, float) else [share.model_dump() for share in blend]
     cage = design.cages[name].model_dump(mode="json")
     return set_value(design, f"cages.{name}", {**cage, "points": [], "blend": plain})
@@ -346,7 +359,7 @@ def _as_dicts(points: np.ndarray) -> list[dict[str, float]]:
 
 
 def _colours_read(path: str, spec: Choice) -> Choice:
-    """Names of colours as values, where the path is that of a colour."""
+    """Replace names of colours by values, if the path is that of a colour."""
     if not path.endswith(".colour"):
         return spec
     initials = {name[0]: name for name in NAMED_COLOURS}  # R, G, B and W
@@ -370,7 +383,7 @@ def _within(value: float, kind: Single) -> float:
 
 
 def _number_of(value: object, spec: Choice) -> float:
-    """The coordinate of a value among the options; 0 when it is not one of them."""
+    """Return the index of a value among the options; 0 if it is not one of them."""
     return float(spec.options.index(value)) if value in spec.options else 0.0
 
 
@@ -382,7 +395,7 @@ def _letters(path: str, count: int) -> list[str]:
 
 
 def _example(path: str, value: Any) -> str:
-    """The path of something inside a section."""
+    """Return an example of a path inside a section."""
     if isinstance(value, list):
         return f"{path}[0]"
     names = list(type(value).model_fields) if isinstance(value, BaseModel) else list(value)

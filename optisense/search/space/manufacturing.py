@@ -1,4 +1,4 @@
-"""Manufacturing errors: how a manufactured sensor may differ from its design."""
+"""Manufacturing errors: differences between a manufactured sensor and its design."""
 
 from __future__ import annotations
 
@@ -19,23 +19,28 @@ from optisense.search.space.search_space import BoundSpace, SearchSpace
 FloatArray = NDArray[np.float64]
 
 TRUNCATION = 3.0
-"""Standard deviations at which a normal distribution of errors is truncated: parts that are farther
-off do not pass the inspection of their maker."""
+"""Truncation of the normal distribution of errors, in standard deviations: parts with larger errors
+fail the maker's inspection.
+"""
 
 SAMPLES = 8
-"""Sensors with random manufacturing errors that each trial of a search scores."""
+"""Number of sensors with random manufacturing errors per trial; the tenth percentile of eight lies
+between the two worst.
+"""
 
 ALL_LIGHTS = {"position": "shift", "angle": "turn"}
-"""`lights.position` and `lights.angle`, and those of a group, speak of each light by itself."""
+"""Fields of each single light that `lights.position` and `lights.angle`, and those of a group,
+stand for.
+"""
 
 
 @dataclass(frozen=True)
 class ToleranceDistribution:
-    """The distribution of the error of one value.
+    """Distribution of the error of one value.
 
     Attributes:
-        size: the standard deviation of a normal distribution, or the limit of a uniform one, in
-            the value's unit (mm, degrees).
+        size: standard deviation of a normal distribution, or limit of a uniform one, in the value's
+            unit (mm, degrees).
         kind: "normal" (truncated at three standard deviations) or "uniform" (all errors up to the
             limit are equally likely).
     """
@@ -53,11 +58,11 @@ class ToleranceDistribution:
 
     @property
     def reach(self) -> float:
-        """The largest error."""
+        """Largest error, in the value's unit."""
         return self.size * (TRUNCATION if self.kind == "normal" else 1.0)
 
     def errors(self, share: FloatArray) -> FloatArray:
-        """Errors whose distribution function has the value `share` (0 to 1)."""
+        """Return the errors at which the distribution function has the values `share` (0 to 1)."""
         if self.kind == "uniform":
             return np.asarray((2.0 * share - 1.0) * self.size)
         from scipy.stats import truncnorm  # takes a second to load
@@ -77,11 +82,11 @@ UNITS = {
     "beam": "°",
     "flux": "mW",
 }
-"""Units of the quantities that a path may end with; all others are plain numbers."""
+"""Unit by the last step of a path; all other quantities are plain numbers."""
 
 
 def unit_of(path: str) -> str:
-    """The unit of what a path names, such as ``mm``; empty for a plain number."""
+    """Return the unit of the value at a path, such as ``mm``; empty for a plain number."""
     names = [re.sub(r"\[\d+\]$", "", step) for step in path.split(".")]
     while len(names) > 1 and names[-1] in ("x", "y", "z", "r", "g", "b"):
         names.pop()
@@ -89,18 +94,18 @@ def unit_of(path: str) -> str:
 
 
 class ManufacturingErrors:
-    """Everything that may come out other than designed, by path.
+    """Distributions of the errors of values, by path.
 
-    A path is one that may be varied (a number, a vector, the points of a cage, the shift or turn
-    of a group, a part or the camera), or `lights.position` and `lights.angle` for each light by
+    A path is one that may be varied (a number, a vector, the points of a cage, the shift or turn of
+    a group, a part or the camera), or `lights.position` and `lights.angle` for each light by
     itself, of all groups or as `lights.GROUP.position` of one.
     """
 
     def __init__(self, distributions: Mapping[str, ToleranceDistribution | float]) -> None:
-        """Name the errors; a plain number is a standard deviation.
+        """Store the distributions; a plain number is a standard deviation.
 
         Raises:
-            SearchError: there is none, or a size makes no sense.
+            SearchError: there is none, or a size is not above 0.
         """
         self.distributions: dict[str, ToleranceDistribution] = {}
         for path, given in distributions.items():
@@ -119,25 +124,25 @@ class ManufacturingErrors:
 
     @property
     def sources(self) -> list[str]:
-        """The paths, as given."""
+        """Paths, as given."""
         return list(self.distributions)
 
     def bind(self, design: SensorDesign) -> BoundManufacturingErrors:
-        """The errors of one design.
+        """Return the errors for one design.
 
         Raises:
-            DesignError: a path leads nowhere; names the near match.
-            SearchError: what it names takes no error.
+            DesignError: a path names nothing in the design; the message suggests a similar name.
+            SearchError: the value at a path takes no error.
         """
         return BoundManufacturingErrors(self, design)
 
     def to_plain(self) -> dict[str, Any]:
-        """JSON-ready."""
+        """Return the distributions as values ready for JSON."""
         return {path: [each.kind, each.size] for path, each in self.distributions.items()}
 
     @staticmethod
     def from_plain(data: Mapping[str, Any]) -> ManufacturingErrors:
-        """The errors of `to_plain`'s values; release 0.1 wrote "even" for "uniform"."""
+        """Return the errors for values of `to_plain`; release 0.1 wrote "even" for "uniform"."""
         return ManufacturingErrors(
             {
                 path: ToleranceDistribution(size, "uniform" if kind == "even" else kind)
@@ -150,9 +155,9 @@ class BoundManufacturingErrors:
     """Manufacturing errors for one design.
 
     Attributes:
-        sources: the paths as given.
-        owner: (d,) for each number that may be off, which source it belongs to.
-        space: of these numbers, within what is possible.
+        sources: paths as given.
+        owner: index (d,) of the source of each erroneous number.
+        space: space of these numbers, within the limits of the design.
     """
 
     def __init__(self, errors: ManufacturingErrors, design: SensorDesign) -> None:
@@ -174,11 +179,11 @@ class BoundManufacturingErrors:
 
     @property
     def size(self) -> int:
-        """d: how many numbers may be off."""
+        """Number of values with errors, d."""
         return len(self.owner)
 
     def errors(self, shares: FloatArray) -> FloatArray:
-        """(k, d) errors, in the unit of each value, for shares (k, d) from 0 to 1."""
+        """Return errors (k, d), in the unit of each value, for shares (k, d) from 0 to 1."""
         columns = [
             self._distributions[owner].errors(shares[:, k])
             for k, owner in enumerate(self.owner.tolist())
@@ -186,7 +191,8 @@ class BoundManufacturingErrors:
         return np.stack(columns, axis=1)
 
     def apply(self, errors: FloatArray) -> SensorDesign:
-        """The design with these errors (d,); what is impossible is cut off (a negative index).
+        """Return the design with these errors (d,); values beyond a limit of the design are clipped
+        to it.
 
         Raises:
             OptiSenseError: the values do not fit together.
@@ -194,15 +200,17 @@ class BoundManufacturingErrors:
         return self.space.apply(self.points(errors))
 
     def points(self, errors: FloatArray) -> FloatArray:
-        """(..., d) points of the space for errors (..., d); what is impossible is cut off."""
+        """Return points (..., d) of the space for errors (..., d), clipped to the limits of the
+        design.
+        """
         return np.clip(self.space.now + errors, self.space.lower, self.space.upper)
 
 
 class _ErrorSpace(BoundSpace):
-    """A space whose bounds are those of what is possible.
+    """Space whose bounds are the limits of the design.
 
     Attributes:
-        now: (d,) the values of the design.
+        now: values (d,) in the design.
     """
 
     def __init__(self, space: SearchSpace, design: SensorDesign) -> None:
@@ -211,7 +219,7 @@ class _ErrorSpace(BoundSpace):
 
 
 def latin_hypercube(count: int, size: int, seed: int) -> FloatArray:
-    """(count, size) shares from 0 to 1, each number spread evenly over its range (Latin
+    """Return shares (count, size) from 0 to 1, each column spread evenly over its range (Latin
     hypercube: McKay, Beckman and Conover, "A comparison of three methods for selecting values of
     input variables", 1979).
     """
@@ -222,7 +230,7 @@ def latin_hypercube(count: int, size: int, seed: int) -> FloatArray:
 
 
 def _paths(design: SensorDesign, source: str) -> list[str]:
-    """What a source names: itself, or one path a light."""
+    """Return the paths that a source names: itself, or one path per light."""
     match = re.fullmatch(r"lights(?:\.([^.\[\]]+))?\.(position|angle)", source)
     if match is None:
         return [source]
@@ -245,7 +253,7 @@ def _all_points(path: str, spread: ToleranceDistribution) -> Around | CagePoints
 
 
 def _limits(design: SensorDesign, parameter: Parameter, source: str) -> Continuous | Around:
-    """The range of a number with errors, cut where the design refuses it."""
+    """Return the range of a value with errors, clipped where the design refuses it."""
     kind = parameter.kind
     if isinstance(kind, Integer) or not isinstance(kind, Continuous):
         raise SearchError("a whole number or a name has no manufacturing error", where=source)
@@ -260,7 +268,7 @@ def _limits(design: SensorDesign, parameter: Parameter, source: str) -> Continuo
 
 
 def _farthest(design: SensorDesign, path: str, now: float, wanted: float) -> float:
-    """The value nearest to `wanted` that the design takes, by halving."""
+    """Return the value nearest to `wanted` that the design accepts, by bisection."""
     if _fits(design, path, wanted):
         return wanted
     good, bad = now, wanted

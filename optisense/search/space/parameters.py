@@ -1,4 +1,4 @@
-"""Kinds of single parameters: a number between bounds, a whole number, or one of several."""
+"""Kinds of single parameters: a number between bounds, an integer, or one of several options."""
 
 from __future__ import annotations
 
@@ -10,16 +10,16 @@ from typing import Any
 from optisense.errors import SearchError
 
 MOST_STEPS = 1_000_000
-"""A grid of more steps along one parameter is a slip."""
+"""Largest number of steps of one parameter in a grid; a larger number is a typing error."""
 
 
 @dataclass(frozen=True)
 class Continuous:
-    """A number between two bounds.
+    """Number between two bounds.
 
     Attributes:
         low, high: bounds, both included, in the unit of the value.
-        steps: for grids, the number of values from `low` to `high`; None where no grid is meant.
+        steps: number of values from `low` to `high` in a grid; None if no grid is meant.
     """
 
     low: float
@@ -39,7 +39,7 @@ class Continuous:
 
     @property
     def levels(self) -> tuple[float, ...] | None:
-        """The values of a grid, or None."""
+        """Values of a grid, or None."""
         if self.steps is None:
             return None
         span = self.high - self.low
@@ -50,7 +50,7 @@ class Continuous:
 
 @dataclass(frozen=True)
 class Integer:
-    """A whole number between two bounds, both included."""
+    """Integer between two bounds, both included."""
 
     low: int
     high: int
@@ -69,11 +69,12 @@ class Integer:
 
 @dataclass(frozen=True)
 class Choice:
-    """One of several values: names of materials or lights, colours, whatever the path takes.
+    """One of several options: names of materials or lights, colours, or any other values of the
+    path.
 
     Attributes:
-        options: the values; no two are alike.
-        labels: how to call each; made from the values when left out.
+        options: values, all different.
+        labels: name of each option; made from the values if omitted.
     """
 
     options: tuple[Any, ...]
@@ -97,17 +98,17 @@ class Choice:
 
     @property
     def levels(self) -> tuple[float, ...]:
-        """The numbers of the options."""
+        """Indices of the options."""
         return tuple(float(number) for number in range(len(self.options)))
 
 
 @dataclass(frozen=True)
 class Around:
-    """A number that may move from what it is in the design, by so much to either side.
+    """Number that may move from its value in the design by a distance to either side.
 
     Attributes:
-        reach: in the unit of the value; above 0.
-        steps: as of `Continuous`.
+        reach: distance in the unit of the value; above 0.
+        steps: see `Continuous`.
     """
 
     reach: float
@@ -118,7 +119,7 @@ class Around:
             raise SearchError(f"a reach of {self.reach} is not a number above 0")
 
     def about(self, value: float) -> Continuous:
-        """The bounds around a value."""
+        """Return the bounds around a value."""
         return Continuous(value - self.reach, value + self.reach, self.steps)
 
 
@@ -126,15 +127,15 @@ class Around:
 class CagePoints:
     """Control points of a cage: all of them, or some, or only some of their coordinates.
 
-    For the path `cages.NAME.points` (mm) or `cages.NAME.blend` (the matrix A of the OptiSense
-    paper, 0 to 1).
+    It applies to the paths `cages.NAME.points` (mm) and `cages.NAME.blend` (the matrix A of the
+    OptiSense paper, 0 to 1).
 
     Attributes:
-        range: bounds of each coordinate, or how far it may move.
+        range: bounds of each coordinate, or distance by which it may move.
         points: indices of control points; None takes all.
-        axes: which coordinates move.
-        symmetry: "x", "y" or "z": mirror images across the middle of the cage's box along this
-            axis move together, which halves the parameters. None leaves every point free.
+        axes: letters of the coordinates that move.
+        symmetry: "x", "y" or "z": mirror images across the middle of the cage's box along this axis
+            move together, which halves the number of parameters. None leaves every point free.
     """
 
     range: Continuous | Around
@@ -152,17 +153,17 @@ class CagePoints:
 
 
 Single = Continuous | Integer | Choice
-"""One parameter of a bound space."""
+"""Specification of one parameter of a bound space."""
 
 Specification = Single | Around | CagePoints
-"""The specification that a user gives for one path; some stand for many parameters."""
+"""Specification that a user gives for one path; some stand for many parameters."""
 
 
 def as_specification(value: object) -> Specification:
-    """Read the short forms: (low, high), (low, high, steps), or a list of options.
+    """Parse the short forms: (low, high), (low, high, steps), or a list of options.
 
     Raises:
-        SearchError: anything else, or bounds that make no sense.
+        SearchError: the value has another form, or its bounds are empty, reversed or not finite.
     """
     if isinstance(value, Continuous | Integer | Choice | Around | CagePoints):
         return value
@@ -180,7 +181,7 @@ def check_bounds(low: float, high: float) -> None:
     """Refuse bounds that are not finite, empty or reversed.
 
     Raises:
-        SearchError: says which.
+        SearchError: the bounds are not finite, empty or reversed; the message says which.
     """
     if not (math.isfinite(low) and math.isfinite(high)):
         raise SearchError(f"the bounds {low:g} to {high:g} are not finite")
@@ -196,7 +197,7 @@ def check_bounds(low: float, high: float) -> None:
 
 
 def to_plain(spec: Specification) -> dict[str, Any]:
-    """A specification as JSON-ready values."""
+    """Return a specification as values ready for JSON."""
     if isinstance(spec, Choice):
         plain = [list(o) if isinstance(o, tuple) else o for o in spec.options]
         return {"kind": "choice", "options": plain, "labels": list(spec.labels)}
@@ -217,10 +218,10 @@ def to_plain(spec: Specification) -> dict[str, Any]:
 
 
 def from_plain(data: Mapping[str, Any]) -> Specification:
-    """The specification of `to_plain`'s values.
+    """Return the specification for values of `to_plain`.
 
     Raises:
-        SearchError: they are not what `to_plain` writes.
+        SearchError: the values are not what `to_plain` writes.
     """
     try:
         fields = dict(data)

@@ -1,4 +1,4 @@
-"""Handles that shift and turn lights, parts and the camera."""
+"""Design variables that shift and turn lights, parts and the camera."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ FloatArray = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class _Move(DesignVariable):
-    """A number of mm or degrees along one axis; 0 leaves all as it is."""
+    """Move along or about one axis, mm or degrees; 0 changes nothing."""
 
     name: str
     axis: int
@@ -29,14 +29,14 @@ class _Move(DesignVariable):
 
 
 class GroupShift(_Move):
-    """Moves all lights of a group along an axis of the design."""
+    """Shift of all lights of a group along an axis of the design."""
 
     def apply(self, design: SensorDesign, value: Any) -> SensorDesign:
         return _with_poses(design, self.name, np.eye(3), _along(self.axis, value))
 
 
 class GroupTurn(_Move):
-    """Turns all lights of a group about an axis of the design through their middle."""
+    """Turn of all lights of a group about an axis of the design through their middle."""
 
     def apply(self, design: SensorDesign, value: Any) -> SensorDesign:
         lights = design.lights[self.name].lights
@@ -47,7 +47,7 @@ class GroupTurn(_Move):
 
 @dataclass(frozen=True)
 class LightShift(_Move):
-    """Moves one light along an axis of the design."""
+    """Shift of one light along an axis of the design."""
 
     index: int
 
@@ -58,7 +58,7 @@ class LightShift(_Move):
 
 @dataclass(frozen=True)
 class LightTurn(_Move):
-    """Turns one light about an axis of the design through its place."""
+    """Turn of one light about an axis of the design through its position."""
 
     index: int
 
@@ -69,7 +69,7 @@ class LightTurn(_Move):
 
 
 class CameraTurn(_Move):
-    """Turns the camera about one of its own axes: right, up, viewing direction."""
+    """Turn of the camera about one of its own axes: right, up, viewing direction."""
 
     def apply(self, design: SensorDesign, value: Any) -> SensorDesign:
         turn = rotation(design.camera.axes()[self.axis], value)
@@ -83,7 +83,7 @@ class CameraTurn(_Move):
 
 
 class PartShift(_Move):
-    """Moves a part along an axis of the design."""
+    """Shift of a part along an axis of the design."""
 
     shapes: ClassVar[bool] = True
 
@@ -92,7 +92,7 @@ class PartShift(_Move):
 
 
 class PartTurn(_Move):
-    """Turns a part about an axis of the design through the middle of its box."""
+    """Turn of a part about an axis of the design through the middle of its bounding box."""
 
     shapes: ClassVar[bool] = True
 
@@ -103,7 +103,7 @@ class PartTurn(_Move):
 
 
 def rotation(axis: FloatArray, degrees: float) -> FloatArray:
-    """(3, 3): the right-handed turn about an axis (Rodrigues' formula)."""
+    """Return the matrix (3, 3) of the right-handed rotation about an axis (Rodrigues' formula)."""
     x, y, z = np.asarray(axis, dtype=np.float64) / np.linalg.norm(axis)
     cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
     angle = np.radians(degrees)
@@ -113,7 +113,9 @@ def rotation(axis: FloatArray, degrees: float) -> FloatArray:
 def _with_poses(
     design: SensorDesign, group: str, turn: FloatArray, shift: FloatArray, only: int | None = None
 ) -> SensorDesign:
-    """The lights of a group, or one of them, turned about the origin and then shifted."""
+    """Return a design with the lights of a group, or one of them, turned about the origin and then
+    shifted.
+    """
     moved = list(design.lights[group].lights)
     for index in range(len(moved)) if only is None else (only,):
         light = moved[index]

@@ -1,4 +1,4 @@
-"""Search spaces: what may change in a design, and between which bounds."""
+"""Search spaces: the parameters of a design that may change, and their bounds."""
 
 from __future__ import annotations
 
@@ -29,29 +29,32 @@ from optisense.search.space.parameters import (
 FloatArray = NDArray[np.float64]
 
 SURE_SECTIONS = ("coating", "cages", "materials")
-"""Sections whose numbers only have bounds: what lies between two good values is good."""
+"""Sections of a design whose numbers are limited by bounds only, so that every value between two
+valid ones is valid.
+"""
 
 
 class SearchSpace:
-    """The parameters of a search by dotted path, not bound to a design yet.
+    """Parameters of a search by dotted path, not bound to a design yet.
 
-    A value is (low, high), (low, high, steps), `Integer`, `Choice` or a list of options,
-    `Around` (so far from what it is now), or `CagePoints`. A path to a vector or to a cage's
-    points stands for all their numbers. See `optisense.search.space.variable_paths` for paths that
-    move whole groups and parts.
+    A value is (low, high), (low, high, steps), `Integer`, `Choice` or a list of options, `Around`
+    (a distance from the present value), or `CagePoints`. A path to a vector or to a cage's points
+    stands for all their numbers. See `optisense.search.space.variable_paths` for paths that move
+    whole groups and parts.
     """
 
     def __init__(
         self, parameters: Mapping[str, object], constraints: Sequence[Constraint] = ()
     ) -> None:
-        """Read what may change.
+        """Parse the specifications.
 
         Args:
-            parameters: by dotted path.
-            constraints: designs for which one returns False, or a reason, are not scored.
+            parameters: specification by dotted path.
+            constraints: functions of a design; designs for which one returns False, or a reason,
+                are not scored.
 
         Raises:
-            SearchError: there is none, or bounds are empty, reversed or not finite.
+            SearchError: there is no parameter, or bounds are empty, reversed or not finite.
         """
         self.parameters: dict[str, Specification] = {}
         for path, value in parameters.items():
@@ -64,24 +67,27 @@ class SearchSpace:
         self.constraints = tuple(constraints)
 
     def bind(self, design: SensorDesign, *, tried: bool = True) -> BoundSpace:
-        """The space for one design: every path looked up and, unless not `tried`, every bound.
+        """Return the space for one design: every path is looked up and, if `tried`, every bound is
+        tried.
 
         Raises:
-            DesignError: a path leads nowhere (names the near match), or a bound does not fit.
+            DesignError: a path names nothing in the design, or a bound does not fit.
             SearchError: a path can't be varied like this.
         """
         return BoundSpace(self, design, tried=tried)
 
     def to_plain(self) -> dict[str, Any]:
-        """JSON-ready; constraints, which are functions, are not in it."""
+        """Return the parameters as values ready for JSON, without constraints, which are
+        functions.
+        """
         return {path: to_plain(spec) for path, spec in self.parameters.items()}
 
     @staticmethod
     def from_plain(data: Mapping[str, Any], constraints: Sequence[Constraint] = ()) -> SearchSpace:
-        """The space of `to_plain`'s values.
+        """Return the space for values of `to_plain`.
 
         Raises:
-            SearchError: they can't be read.
+            SearchError: the values can't be read.
         """
         return SearchSpace({path: from_plain(value) for path, value in data.items()}, constraints)
 
@@ -90,19 +96,20 @@ class SearchSpace:
 
 
 class BoundSpace:
-    """A search space for one design.
+    """Search space for one design.
 
-    A point in it is a vector (n,) of coordinates: a number as it is, a choice as the position of
-    its option. Methods that need a scale work in the unit cube (see `to_unit`).
+    A point in it is a vector (n,) of coordinates: a number as it is, a choice as the index of its
+    option. Methods that need a scale work in the unit cube (see `to_unit`).
 
     Attributes:
-        space: what was asked for.
-        design: the design that it was bound to.
-        prepared: the same shape in the form that parameters are set in.
-        parameters: one for each coordinate.
-        lower, upper: (n,) bounds, included.
-        start: (n,) the design as it is, or the point nearest to it.
-        whole: (n,) bool, where only whole numbers are meant (integers and choices).
+        space: the unbound space.
+        design: design that it was bound to.
+        prepared: the same design in the form in which parameters are set (a cage with a blend, for
+            example).
+        parameters: parameter of each coordinate.
+        lower, upper: bounds (n,), included.
+        start: the design as a point (n,), or the point nearest to it.
+        whole: coordinates (n,) that are integers (integers and choices), bool.
         reshapes: whether a parameter moves surfaces.
     """
 
@@ -132,16 +139,16 @@ class BoundSpace:
 
     @property
     def size(self) -> int:
-        """The number of parameters, n."""
+        """Number of parameters, n."""
         return len(self.parameters)
 
     @property
     def names(self) -> list[str]:
-        """The path of each parameter."""
+        """Paths of the parameters."""
         return [parameter.name for parameter in self.parameters]
 
     def values(self, vector: ArrayLike) -> dict[str, float | int | str]:
-        """The values of a point by parameter: numbers, and the labels of options."""
+        """Return the values of a point by parameter: numbers, and the labels of options."""
         return {
             parameter.name: _meaning(parameter, coordinate)
             for parameter, coordinate in zip(
@@ -150,7 +157,7 @@ class BoundSpace:
         }
 
     def vector(self, values: Mapping[str, object]) -> FloatArray:
-        """(n,): the point of these values; parameters that are not named stay at the start.
+        """Return the point (n,) with these values; parameters that are not named keep their start.
 
         Raises:
             SearchError: a name is unknown, or a value lies outside its bounds.
@@ -169,7 +176,7 @@ class BoundSpace:
         """Refuse a point outside the space.
 
         Raises:
-            SearchError: names the first parameter that is outside.
+            SearchError: the point is outside; the message names the first such parameter.
         """
         point = np.asarray(vector, dtype=float)
         if point.shape != (self.size,):
@@ -185,13 +192,13 @@ class BoundSpace:
             )
 
     def to_unit(self, vector: ArrayLike) -> FloatArray:
-        """Coordinates (..., n) from 0 at the lower to 1 at the upper bounds."""
+        """Return coordinates (..., n) from 0 at the lower to 1 at the upper bounds."""
         return np.asarray((np.asarray(vector) - self.lower) / (self.upper - self.lower))
 
     def from_unit(self, unit: ArrayLike) -> FloatArray:
-        """The point (..., n) of coordinates 0 to 1, clipped, whole where only whole ones are.
+        """Return the point (..., n) for coordinates 0 to 1, clipped, and rounded where `whole`.
 
-        Whole numbers share the unit interval evenly: four options get a quarter each.
+        Integers share the unit interval evenly: four options get a quarter each.
         """
         share = np.clip(np.asarray(unit, dtype=np.float64), 0.0, 1.0)
         span = self.upper - self.lower
@@ -200,13 +207,15 @@ class BoundSpace:
         return np.where(self.whole, counted, smooth)
 
     def unit_of(self, vector: ArrayLike) -> FloatArray:
-        """Coordinates that `from_unit` turns back into this point (whole ones: their middle)."""
+        """Return coordinates that `from_unit` turns back into this point (integers: the middle of
+        their interval).
+        """
         point = np.asarray(vector, dtype=np.float64)
         middle = (point - self.lower + 0.5) / (self.upper - self.lower + 1.0)
         return np.where(self.whole, middle, self.to_unit(point))
 
     def apply(self, vector: ArrayLike) -> SensorDesign:
-        """The design at a point.
+        """Return the design at a point.
 
         Raises:
             OptiSenseError: the values do not fit together.
@@ -230,22 +239,22 @@ class BoundSpace:
         return design if self._sure else checked(design)
 
     def _targets(self, point: FloatArray) -> list[Any]:
-        """The numbers of all direct targets, in the order of the edit's paths."""
+        """Return the numbers of all direct targets, in the order of the edit's paths."""
         numbers: list[Any] = (point[self._source] * self._scale + self._offset).tolist()
         for position, number in self._integers:
             numbers[position] = self._option(number, point)
         return numbers
 
     def _option(self, number: int, point: FloatArray) -> Any:
-        """What is set for a parameter of whole numbers: the option, or an int."""
+        """Return the value of an integer parameter at a point: the option, or an int."""
         kind, place = self.parameters[number].kind, round(float(point[number]))
         return kind.options[place] if isinstance(kind, Choice) else place
 
     def _plan(self) -> None:
-        """Look up all places once, so that applying a point is quick.
+        """Look up all paths once, so that applying a point is fast.
 
-        Options are whatever people wrote: they are set with a check, which makes them what their
-        field holds.
+        Options are values that users wrote: they are set with a check, which converts them to the
+        type of their field.
         """
         paths: list[str] = []
         source: list[int] = []
@@ -274,7 +283,7 @@ class BoundSpace:
         self._types = [(n, h) for n, h in handled if isinstance(h, LightType)]
 
     def _check_apart(self) -> None:
-        """No two parameters may set the same value."""
+        """Refuse two parameters that set the same value."""
         seen: dict[str, str] = {}
         for parameter in self.parameters:
             for path in [target.path for target in parameter.targets] or [parameter.name]:
@@ -289,10 +298,10 @@ class BoundSpace:
                     )
 
     def _try_bounds(self) -> None:
-        """Set each bound and option once, so that a bad one is told before the search.
+        """Set each bound and option once, so that an invalid one is reported before the search.
 
         Raises:
-            OptiSenseError: names the parameter.
+            OptiSenseError: a bound does not fit; the message names the parameter.
         """
         for number, parameter in enumerate(self.parameters):
             if parameter.targets and parameter.name.startswith("cages."):
@@ -321,7 +330,7 @@ class BoundSpace:
 
 
 def checked(design: SensorDesign) -> SensorDesign:
-    """A design after all checks of its fields.
+    """Return a design after all checks of its fields.
 
     Raises:
         DesignError: a value does not fit.
@@ -362,5 +371,7 @@ def _coordinate(parameter: Parameter, value: object) -> float:
 
 
 def _may_nest(path: str) -> bool:
-    """A whole coating or camera of the library may be refined by single numbers."""
+    """Return whether single numbers may vary within the object at a path: a whole coating or camera
+    of the library.
+    """
     return path.endswith((".library", ".model", ".material"))

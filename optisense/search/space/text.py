@@ -1,4 +1,4 @@
-"""Reading what may change from one line, as the command line takes it.
+"""Parser of parameters and errors in one line, as the command line takes them.
 
 ```text
 vary  = PATH "=" range [ "/" NAME "=" VALUE ]...
@@ -28,10 +28,10 @@ OPTIONS = ("symmetry", "axes", "points")
 
 
 def parse_vary(text: str) -> tuple[str, Specification]:
-    """The path and what it may be.
+    """Parse the path and the specification of a parameter.
 
     Raises:
-        SearchError: it can't be read, or its bounds make no sense.
+        SearchError: the text can't be read, or its bounds are invalid.
     """
     path, equals, rest = (part.strip() for part in text.partition("="))
     if not equals or not path or not rest:
@@ -45,10 +45,10 @@ def parse_vary(text: str) -> tuple[str, Specification]:
 
 
 def parse_space(texts: list[str]) -> dict[str, Specification]:
-    """Several of them, by path.
+    """Parse several parameters, by path.
 
     Raises:
-        SearchError: one can't be read, or a path is there twice.
+        SearchError: a text can't be read, or two have the same path.
     """
     found: dict[str, Specification] = {}
     for text in texts:
@@ -60,10 +60,10 @@ def parse_space(texts: list[str]) -> dict[str, Specification]:
 
 
 def parse_errors(texts: list[str]) -> ManufacturingErrors:
-    """Read manufacturing errors: PATH=SIZE is a standard deviation, PATH=+-LIMIT a limit.
+    """Parse manufacturing errors: PATH=SIZE is a standard deviation, PATH=+-LIMIT a limit.
 
     Raises:
-        SearchError: one can't be read, or a path is there twice.
+        SearchError: a text can't be read, or two have the same path.
     """
     found: dict[str, ToleranceDistribution] = {}
     for text in texts:
@@ -115,7 +115,7 @@ def _points(spec: Specification, extra: list[str]) -> CagePoints:
 
 
 def _indices(text: str) -> tuple[int, ...]:
-    """0,2,6-8 as (0, 2, 6, 7, 8)."""
+    """Parse indices: 0,2,6-8 gives (0, 2, 6, 7, 8)."""
     found: list[int] = []
     for part in text.split(","):
         match = re.fullmatch(r"\s*(\d{1,5})\s*(?:-\s*(\d{1,5})\s*)?", part)
@@ -137,7 +137,7 @@ def _options(text: str) -> list[Any]:
 
 
 def _scalar(text: str) -> Any:
-    """A number where it is one, else the text itself."""
+    """Return a number if the text is one, else the text itself."""
     word = text.strip()
     if not word:
         raise SearchError("an option is empty")

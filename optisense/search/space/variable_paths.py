@@ -1,6 +1,7 @@
-"""Paths for more than one value: a whole group of lights moved, a part from the library.
+"""Paths for more than one value: moves of whole groups of lights and parts, and parts of the
+library.
 
-They look like other paths but lead to no single number of a design:
+These look like other paths but lead to no single number of a design:
 
 | path | what it does |
 |---|---|
@@ -54,10 +55,11 @@ MOVES: dict[tuple[str, str], Callable[[str, str, int], DesignVariable]] = {
 
 
 def find_variables(design: SensorDesign, path: str) -> list[DesignVariable]:
-    """The variables that a path names: none for an ordinary path, three for a whole vector.
+    """Return the variables that a path names: none for an ordinary path, three for a whole vector.
 
     Raises:
-        SearchError, DesignError: it looks like a variable but names nothing in the design.
+        SearchError, DesignError: the path has the form of a variable but names nothing in the
+            design.
     """
     move = re.fullmatch(
         r"(?:(lights|parts)\.([^.\[\]]+)|(camera))\.(shift|turn)(?:\.([^.]+))?", path
