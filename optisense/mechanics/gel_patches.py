@@ -19,8 +19,8 @@ FLAT = 0.02
 """Rise of the skin or change of thickness within a thickness of a contact, as a share of it, up to
 which a gel is a flat layer. Forces change by less than half as much."""
 MOST_KEPT = 12
-"""Patches that are kept: nine places and some more. Each takes about 20 MB,
-and three times as much once it was dragged."""
+"""Patches that are kept: nine places and some more. Each takes about 20 MB, and three times as much
+once it was dragged."""
 STEP = 0.5
 """Step in which the loaded rectangle around a place grows, in thicknesses, so that presses of
 several depths at one place share a patch."""

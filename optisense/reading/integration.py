@@ -17,8 +17,8 @@ FloatArray = NDArray[np.float64]
 
 ROUNDS = 3
 """Number of rounds of `NormalIntegrator.depths`: the change of a ray's direction between pixels,
-times the depth, is a correction of some per cent, and each round makes its
-error that much smaller."""
+times the depth, is a correction of some per cent, and each round makes its error that much
+smaller."""
 
 
 class GridIntegrator:
@@ -88,17 +88,17 @@ class NormalIntegrator:
     """Depth from the normals that a camera sees, on flat and on curved sensors alike.
 
     What is integrated is not a height over a plane but t, how far back along its own ray (in the
-    gel, a straight line) each pixel's surface lies: the surface is p(t) = p0 - t d, where p0 is
-    the untouched point and d the ray's direction. From one pixel to the next,
-    the step between the two lies in the surface, so it is square to its normal n. With t and d in
-    the middle of both pixels, and D for what changes from one to the other,
+    gel, a straight line) each pixel's surface lies: the surface is p(t) = p0 - t d, where p0 is the
+    untouched point and d the ray's direction. From one pixel to the next, the step between the two
+    lies in the surface, so it is square to its normal n. With t and d in the middle of both pixels,
+    and D for what changes from one to the other,
 
         D t = (D p0 - t D d) . n / (d . n),
 
     as the mean of what the normals of both pixels give, which is exact for quadratic surfaces.
-    Perspective, refraction and curvature are all in p0 and d, which chief rays give; t on the
-    right is taken from the round before, first 0. Only neighbours that are both seen make a step,
-    so that nothing is read beyond the border of the view.
+    Perspective, refraction and curvature are all in p0 and d, which chief rays give; t on the right
+    is taken from the round before, first 0. Only neighbours that are both seen make a step, so that
+    nothing is read beyond the border of the view.
     """
 
     def __init__(self, untouched: UntouchedSurface) -> None:

@@ -34,8 +34,7 @@ DIM = 0.3
 
 def between_rays(rays: ChiefRays, where: BoolArray) -> BoolArray:
     """(h, w) the pixels of a mask that see the undeformed surface between the even pixels beside
-    them,
-    which must be in the mask, too.
+    them, which must be in the mask, too.
     """
     plain = where & rays.hit & (rays.region == Region.SENSING)
     out = np.zeros_like(plain)
@@ -80,8 +79,7 @@ Place = tuple[slice, slice]
 
 def _places(image: NDArray[np.generic]) -> Iterator[tuple[Place, list[Place]]]:
     """Slices of the pixels of an image (h, w) with odd column, odd row, or both, and of the even
-    pixels
-    beside each.
+    pixels beside each.
     """
     height, width = ((size + 1) // 2 for size in image.shape)
     for down, right in ((0, 1), (1, 0), (1, 1)):

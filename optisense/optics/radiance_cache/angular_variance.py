@@ -112,8 +112,7 @@ def cosine_half_width(
     """Half-width of the distribution of a beam's cosine with a normal.
 
     The distribution is taken to be uniform, with the beam's variance. All light comes from above
-    the
-    undeformed surface (normal ``upright``), which limits the width.
+    the undeformed surface (normal ``upright``), which limits the width.
     """
     variance = light.variance_along * dr.square(dr.dot(light.along, normal))
     variance += light.variance_up * dr.square(dr.dot(light.up, normal))
@@ -148,8 +147,7 @@ def occluder_horizon(
     """Sine of the elevation over the plane of ``upright`` below which a ball occludes the light.
 
     For points with ``own``, the one ball that they lie in does not count: they lie on the convex
-    shape
-    within it.
+    shape within it.
     """
     highest = mi.Float(-1)
     inside = mi.UInt32(0)

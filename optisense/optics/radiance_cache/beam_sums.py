@@ -50,8 +50,7 @@ def sum_diffuse(
     at: ShadingPoints,
 ) -> list[mi.Color3f]:
     """The same where coatings are diffuse and grey, from the `irradiance_table`: the vector sum of
-    the
-    beams gives what all of them bring.
+    the beams gives what all of them bring.
     """
     reflectance = dr.select(at.active, albedo_of(at.coating) * dr.inv_pi, 0)
     return [
@@ -72,8 +71,7 @@ def sum_hidden(
 
     Shadow rays are drawn in proportion to the light, evenly spaced in its running sum (systematic
     sampling). All the light of a group would take ``shadow_rays``; the given ``beams``, those that
-    pass
-    near indenters, take their share of them.
+    pass near indenters, take their share of them.
     """
     groups = len(totals)
     hidden = [mi.Color3f(0) for _ in range(groups)]

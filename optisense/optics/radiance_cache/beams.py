@@ -24,8 +24,8 @@ STRONG_SHARE = 0.03
 """Share of a group's light in a cell above which four neighbouring bins stay separate beams."""
 SPARSE_SHARE = 0.003
 """Share of a group's light in a cell below which a beam may be that of a single photon, whose
-spread nothing tells. Where bins are fine, such beams are at least as wide as 16 bins:
-a photon near the mirror direction of a narrow lobe would be a bright blotch else."""
+spread nothing tells. Where bins are fine, such beams are at least as wide as 16 bins: a photon near
+the mirror direction of a narrow lobe would be a bright blotch else."""
 NUMBER_SHIFT = 8
 """The bits of a beam's light group, of which there are at most 256; those above are the beam's
 number."""

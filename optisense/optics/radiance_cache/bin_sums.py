@@ -51,9 +51,8 @@ def sum_bins(
     """Every bin, looked up along its own line, with shadow rays for some of the bins.
 
     Shadow rays go to bins that are not wholly above the occluder horizon (``sky``, a sine). They
-    are
-    drawn in proportion to the light, evenly spaced in its running sum (systematic sampling); where
-    nothing is occluded, the sum is exact to half a step.
+    are drawn in proportion to the light, evenly spaced in its running sum (systematic sampling);
+    where nothing is occluded, the sum is exact to half a step.
 
     With light above the surface (half-way up the flux layer), points on indenters interpolate
     between it and that of the surface below them.
@@ -178,9 +177,9 @@ def _place(light: BinnedLight, fixed: RayScene, at: ShadingPoints, k: mi.UInt32)
 
     On an indenter it is where the line through the point along the bin's middle goes on to meet the
     undeformed surface, found on the planes of two cells in turn. On a curved surface, lines that
-    graze
-    these planes are followed by a ray. (The mean direction of the bin's light would not do: where a
-    lamp straddles two bins, its halves would be read at places that do not belong together.)
+    graze these planes are followed by a ray. (The mean direction of the bin's light would not do:
+    where a lamp straddles two bins, its halves would be read at places that do not belong
+    together.)
     """
     cells, point = light.cells, at.seen.point
     middle = dr.gather(mi.Vector4f, light.centres, k)

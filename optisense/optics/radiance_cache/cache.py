@@ -68,12 +68,10 @@ class RadianceCache:
         bins: number of direction bins that hold light.
         groups: number of light groups.
         moments: four floats per entry: the flux density across the light (mW/mm^2) times the
-        direction
-            towards the light (3), and the flux density (1).
+            direction towards the light (3), and the flux density (1).
         heights: the flux density times the squared component of the direction along the bins' axis.
         colours: four floats per entry: the flux density in R, G, B where surfaces are coloured,
-        else
-            the same array as ``moments``.
+            else the same array as ``moments``.
         coloured: whether surfaces are coloured.
         metallic: whether a coating has a metallic lobe.
         narrow_lobes: whether one is narrower than most lamps.
@@ -243,8 +241,7 @@ class CacheTally:
         halves.
 
         It is the RMS over all cells in or near the camera's view and all light groups, relative to
-        each
-        group's mean; infinite without photons.
+        each group's mean; infinite without photons.
         """
         if self.passes < 1:
             return float("inf")

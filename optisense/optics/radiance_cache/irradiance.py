@@ -33,8 +33,7 @@ def harmonics(n: mi.Vector3f) -> tuple[mi.Float, ...]:
 @dr.syntax
 def irradiance_table(moments: mi.Float, cells: int, bins: mi.UInt32, groups: int) -> mi.Float:
     """Twelve floats per cell and group: nine coefficients of the irradiance as a function of the
-    normal,
-    and the sum of the light's directions, each weighted with its flux density.
+    normal, and the sum of the light's directions, each weighted with its flux density.
     """
     lane = dr.arange(mi.UInt32, cells * groups)
     cell, group = lane // groups, lane % groups

@@ -57,8 +57,7 @@ def shade(
         culled_beams: the beams of the cache that pass near indenters (`cull_beams`).
         points: the visible points.
         thorough: whether the points lie on or near indenters: each bin is then looked up along its
-        own
-            line, and interreflection is added.
+            own line, and interreflection is added.
         reflected: whether the points are seen in the reflection of an interface.
     """
     table = scenes.full.table

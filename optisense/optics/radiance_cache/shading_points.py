@@ -46,8 +46,7 @@ def interpolating_cell(
     """A random cell next to points, the shift that led there, and whether there is one.
 
     It is the same for all bins, as light that straddles two bins must not be counted twice. Over
-    the
-    samples of a pixel, which are spread evenly, this interpolates between cells.
+    the samples of a pixel, which are spread evenly, this interpolates between cells.
     """
     home, found = cell_at(cells, base, active)
     upright, _ = plane_of(cells, home, found)

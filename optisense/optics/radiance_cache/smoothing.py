@@ -114,11 +114,9 @@ class Kernels:
             lamp_distance: (cells,) mm to the nearest lamp.
             density: landings per mm^2 for each emitted photon (1/mm^2).
             near: (cells,) whether a cell is in or near the camera's view. Other cells are smoothed
-            with the
-                narrowest kernel, which saves time.
+                with the narrowest kernel, which saves time.
             pilot_power: (2, cells, groups) mW on each cell, by the two halves of the pilot photons,
-            which
-                show where light varies over less than the distance of the lamps.
+                which show where light varies over less than the distance of the lamps.
             pilot_density: pilot photons per mm^2 (1/mm^2).
         """
         self.cells = cells
@@ -175,8 +173,8 @@ class Kernels:
         """Factors (cells, groups) that undo most of the blur of the kernel and the cells.
 
         The kernel lowers peaks and fills hollows. Applied to its own result, it shows by how much,
-        and the
-        ratio is divided out: multiplicative bias correction (Jones, Linton and Nielsen 1995).
+        and the ratio is divided out: multiplicative bias correction (Jones, Linton and Nielsen
+        1995).
 
         Args:
             landed: (cells, groups) mW on each cell.
@@ -194,13 +192,10 @@ def varies_over(cells: SurfaceCells, halves: FloatArray, radii: FloatArray) -> F
     """(cells,) mm: the length over which light varies.
 
     It is the distance of a lamp whose light the kernel would blur as much: under a lamp at distance
-    h,
-    a kernel of radius r lowers the peak by r^2 / (2 h^2). The blur is found by applying the kernel
-    to
-    its own result. The product of what two halves of the photons give is free of their noise, and
-    it
-    counts where it is larger than the noise. Light groups count alike, each relative to its own
-    light.
+    h, a kernel of radius r lowers the peak by r^2 / (2 h^2). The blur is found by applying the
+    kernel to its own result. The product of what two halves of the photons give is free of their
+    noise, and it counts where it is larger than the noise. Light groups count alike, each relative
+    to its own light.
 
     Args:
         cells: of the surface.
@@ -224,8 +219,7 @@ def kernel_matrix(cells: SurfaceCells, radii: FloatArray) -> csr_matrix:
     """Epanechnikov's kernel around each cell, (cells, cells): from mW on cells to mW/mm^2.
 
     The kernel is normalised by the surface's area under it, so edges and oblique cells lose
-    nothing.
-    Cells with another orientation (`MIN_NORMAL_COSINE`) do not count.
+    nothing. Cells with another orientation (`MIN_NORMAL_COSINE`) do not count.
     """
     tree = cKDTree(cells.centres)
     near = tree.sparse_distance_matrix(tree, float(radii.max()), output_type="coo_matrix").tocsr()

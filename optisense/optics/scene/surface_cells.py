@@ -134,8 +134,7 @@ def _frame(z: FloatArray) -> FloatArray:
 
 def bin_axis(cells: SurfaceCells, number: int) -> mi.Vector3f:
     """One axis of the frame of the direction bins, as an opaque array, so that kernels do not
-    depend on
-    its numbers: every design with a slightly bent surface would compile its own.
+    depend on its numbers: every design with a slightly bent surface would compile its own.
     """
     return mi.Vector3f(*[dr.opaque(mi.Float, float(part)) for part in cells.axes[number]])
 

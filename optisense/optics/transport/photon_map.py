@@ -28,8 +28,7 @@ class PhotonMap:
         power: the photon's share of a light of 1 mW, per channel if ``coloured``.
         coloured: whether powers differ between the channels.
         passing: the photons that crossed the flux layer, if one was given. The layer's height over
-        the
-            length of path that each stands for takes the place of the cosine.
+            the length of path that each stands for takes the place of the cosine.
     """
 
     count: int

@@ -79,8 +79,7 @@ def sample_segment(
     """A random place on one of the `SAMPLES_PER_SEGMENT` pieces of a path segment.
 
     Half of the pieces belong to the segment's end, where the light of a ``landing`` segment is near
-    the
-    surface.
+    the surface.
 
     Args:
         flux_layer: the layer.
@@ -92,8 +91,7 @@ def sample_segment(
 
     Returns:
         The place; the layer's height over the length of the piece, which plays the part of the
-        cosine
-        of incidence; and whether the place is in the layer.
+        cosine of incidence; and whether the place is in the layer.
     """
     end = dr.select(hit.valid, hit.distance, MAX_SEGMENT_LENGTH)
     cosine = dr.maximum(dr.abs(dr.dot(ray.direction, hit.normal)), MIN_COSINE)
