@@ -1,4 +1,4 @@
-"""The angular variance of a beam about its mean direction, and what it means for shading."""
+"""The angular variance of a beam about its mean direction, and its use in shading."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from optisense.optics.backend.sequences import unit_float
 from optisense.optics.scene.bsdf import CoatingBsdf
 
 MAX_SPREAD = 0.1
-"""Upper bound on 1 - mean cosine of a beam, up to which its directions are treated as a flat
-disc."""
+"""Upper bound on 1 - mean cosine of a beam; the flat disc that stands for its directions is a good
+approximation only up to it."""
 MIN_SQUARED_SINE = 0.1
-"""Squared sine of the angle to the axis of the bins below which the moment along that axis does not
-tell the variance of a direction."""
+"""Squared sine of the angle between a beam and the axis of the bins below which the second moment
+along that axis does not determine the beam's variance."""
 
 
 @dataclass
@@ -24,10 +24,11 @@ class AngularVariance:
 
     Attributes:
         towards: unit vector towards the light.
-        along: unit vector across it, along the sectors of the bins.
-        up: unit vector across it, towards the axis of the bins.
-        variance_along: variance of the angle (radians squared) in the direction ``along``.
-        variance_up: variance in the direction ``up``.
+        along: unit vector perpendicular to ``towards``, in the direction in which the sectors of
+            the bins are numbered.
+        up: unit vector perpendicular to ``towards``, on the side of the axis of the bins.
+        variance_along: variance of the angle (radians squared) along ``along``.
+        variance_up: variance of the angle (radians squared) along ``up``.
     """
 
     towards: mi.Vector3f
@@ -38,9 +39,10 @@ class AngularVariance:
 
 
 def mean_direction(value: mi.Vector4f) -> tuple[mi.Vector3f, mi.Float]:
-    """The mean direction of a cache entry, and the mean cosine of its light with it.
+    """Return the mean direction of a cache entry, and the mean cosine between its light and that
+    direction.
 
-    Both are the same for an entry of opposite sign.
+    An entry and its negative give the same result.
     """
     mean = mi.Vector3f(value.x, value.y, value.z)
     length = dr.norm(mean)
@@ -48,7 +50,7 @@ def mean_direction(value: mi.Vector4f) -> tuple[mi.Vector3f, mi.Float]:
 
 
 def isotropic_variance(towards: mi.Vector3f, cosine: mi.Float) -> AngularVariance:
-    """A beam of this mean cosine whose variance is the same in all directions."""
+    """Return a beam of the given mean cosine whose variance is the same in all directions."""
     frame = mi.Frame3f(towards)
     half = dr.minimum(1 - cosine, MAX_SPREAD)
     return AngularVariance(towards, frame.s, frame.t, half, half)
@@ -57,14 +59,14 @@ def isotropic_variance(towards: mi.Vector3f, cosine: mi.Float) -> AngularVarianc
 def angular_variance(
     axis: mi.Vector3f, towards: mi.Vector3f, cosine: mi.Float, height: mi.Float
 ) -> AngularVariance:
-    """A beam from its mean cosine and a second moment.
+    """Return the beam of a mean cosine and a second moment.
 
     For small angles, the sum of both variances is twice the difference of the mean cosine from 1.
 
     Args:
-        axis: of the bins.
-        towards: mean direction.
-        cosine: mean cosine with it.
+        axis: unit vector, the axis of the direction bins.
+        towards: unit vector, the mean direction towards the light.
+        cosine: mean cosine between the light and ``towards``.
         height: mean squared component of the directions along ``axis``.
     """
     slope = dr.dot(axis, towards)
@@ -80,10 +82,10 @@ def angular_variance(
 
 
 def two_discs(light: AngularVariance) -> tuple[mi.Vector3f, mi.Vector3f, mi.Float]:
-    """Two discs beside each other with the variances of a beam that is longer than wide.
+    """Return two discs side by side that together have the variances of an elongated beam.
 
     Returns:
-        The mean directions of both, and the mean cosine of each with its own.
+        The mean directions of the two discs, and the mean cosine within each disc.
     """
     wide = dr.maximum(light.variance_along, light.variance_up)
     slim = dr.maximum(dr.minimum(light.variance_along, light.variance_up), 0)
@@ -93,12 +95,12 @@ def two_discs(light: AngularVariance) -> tuple[mi.Vector3f, mi.Vector3f, mi.Floa
 
 
 def squared_radius(cosine: mi.Float) -> mi.Float:
-    """Squared angular radius R^2 of a uniform disc of this mean cosine, which is 1 - R^2 / 4."""
+    """Return the squared angular radius R^2 of the uniform disc of a mean cosine 1 - R^2 / 4."""
     return 4 * dr.minimum(1 - cosine, MAX_SPREAD)
 
 
 def sample_direction(light: AngularVariance, state: mi.UInt32) -> mi.Vector3f:
-    """A direction of a beam, drawn uniformly from the ellipse of its variances."""
+    """Draw a direction of a beam uniformly from the ellipse of its variances."""
     radius = 2 * dr.sqrt(unit_float((state ^ 0x9E3779B9) * 69069))
     sin_a, cos_a = dr.sincos(unit_float(state * 277803737) * dr.two_pi)
     aside = light.along * (cos_a * dr.sqrt(light.variance_along))
@@ -109,7 +111,7 @@ def sample_direction(light: AngularVariance, state: mi.UInt32) -> mi.Vector3f:
 def cosine_half_width(
     light: AngularVariance, normal: mi.Vector3f, upright: mi.Vector3f
 ) -> mi.Float:
-    """Half-width of the distribution of a beam's cosine with a normal.
+    """Return the half-width of the distribution of the cosine between a beam and a normal.
 
     The distribution is taken to be uniform, with the beam's variance. All light comes from above
     the undeformed surface (normal ``upright``), which limits the width.
@@ -120,14 +122,21 @@ def cosine_half_width(
 
 
 def mirrored_above(direction: mi.Vector3f, normal: mi.Vector3f) -> mi.Vector3f:
-    """A direction, mirrored at the plane of a normal if it lies below it."""
+    """Mirror directions that point below the plane of a normal to above it."""
     return direction - normal * (2 * dr.minimum(dr.dot(direction, normal), 0))
 
 
 def passes_near(
     ball: mi.Vector4f, start: mi.Point3f, towards: mi.Vector3f, radius2: mi.Float
 ) -> mi.Bool:
-    """Whether a beam (squared angular radius) from ``start`` may touch a ball (centre, radius)."""
+    """Return whether a beam from ``start`` may touch a ball.
+
+    Args:
+        ball: centre and radius, mm.
+        start: the point that the beam arrives at, mm.
+        towards: unit vector towards the light.
+        radius2: squared angular radius of the beam, radians squared.
+    """
     offset = mi.Vector3f(ball.x - start.x, ball.y - start.y, ball.z - start.z)
     along = dr.dot(offset, towards)
     # The margin covers the spread of the beam over the way to the ball.
@@ -144,10 +153,15 @@ def occluder_horizon(
     upright: mi.Vector3f,
     own: mi.Bool,
 ) -> mi.Float:
-    """Sine of the elevation over the plane of ``upright`` below which a ball occludes the light.
+    """Return the occluder horizon: the sine of the elevation below which a ball occludes the light.
 
-    For points with ``own``, the one ball that they lie in does not count: they lie on the convex
-    shape within it.
+    Args:
+        balls: centre and radius of each ball, four floats, mm.
+        ball_count: number of balls.
+        point: the points, mm.
+        upright: unit normal of the plane over which the elevation is measured.
+        own: whether a point lies on the convex shape inside one of the balls; that ball does not
+            occlude it.
     """
     highest = mi.Float(-1)
     inside = mi.UInt32(0)
@@ -160,21 +174,22 @@ def occluder_horizon(
             inside += 1
             highest = dr.select(own, highest, 1)
         else:
-            # The sum of the angles of the ball's middle and of its radius; at most a right angle.
+            # The top of the ball is at the elevation of its centre plus its angular radius, at most
+            # 90 degrees.
             sine, width = dr.dot(offset, upright) / distance, ball.w / distance
             cosine, side = dr.safe_sqrt(1 - sine * sine), dr.safe_sqrt(1 - width * width)
             top = dr.select(sine > side, 1, sine * side + width * cosine)
             highest = dr.maximum(highest, top)
         n += 1
-    # Within several, each may be in the way of the others.
+    # A point inside several balls may be occluded by any of them.
     return dr.select(inside > 1, 1, highest)
 
 
 def broadened_coating(coating: CoatingBsdf, cosine: mi.Float) -> CoatingBsdf:
-    """A coating as it reflects light that is spread about its mean direction.
+    """Return the coating that reflects light from one direction as ``coating`` reflects a beam.
 
-    The diffuse lobe is linear in direction, so the mean cosine makes it exact. The metallic lobe is
-    averaged over a disc of light.
+    The diffuse lobe is linear in direction, so that scaling it with the mean cosine is exact. The
+    metallic lobe is averaged over a disc of light.
     """
     reflectance = coating.reflectance * cosine
     if not coating.metallic:

@@ -1,4 +1,4 @@
-"""Points on the undeformed surface: the light of beams, and how much of it indenters occlude."""
+"""Sums over beams for points on the undeformed surface, and the part that indenters occlude."""
 
 from __future__ import annotations
 
@@ -28,7 +28,9 @@ def sum_beams(
     groups: int,
     at: ShadingPoints,
 ) -> list[mi.Color3f]:
-    """Radiance towards the camera due to all beams, for points on the undeformed surface."""
+    """Return the radiance towards the camera due to all beams, for points on the undeformed
+    surface.
+    """
     totals = [mi.Color3f(0) for _ in range(groups)]
     j = dr.gather(mi.UInt32, beams.starts, at.cell * groups, at.active)
     end = dr.gather(mi.UInt32, beams.starts, (at.cell + 1) * groups, at.active)
@@ -49,8 +51,10 @@ def sum_diffuse(
     groups: int,
     at: ShadingPoints,
 ) -> list[mi.Color3f]:
-    """The same where coatings are diffuse and grey, from the `irradiance_table`: the vector sum of
-    the beams gives what all of them bring.
+    """Return the radiance towards the camera for points with diffuse, grey coatings.
+
+    The result is that of `sum_beams`; the vector sum of the light in the `irradiance_table`
+    replaces the loop over beams.
     """
     reflectance = dr.select(at.active, albedo_of(at.coating) * dr.inv_pi, 0)
     return [
@@ -67,11 +71,11 @@ def sum_hidden(
     at: ShadingPoints,
     shadow_rays: mi.Float,
 ) -> list[mi.Color3f]:
-    """The part of ``totals`` that indenters occlude.
+    """Return the part of ``totals`` that indenters occlude.
 
     Shadow rays are drawn in proportion to the light, evenly spaced in its running sum (systematic
-    sampling). All the light of a group would take ``shadow_rays``; the given ``beams``, those that
-    pass near indenters, take their share of them.
+    sampling). They are spaced so that all the light of a group would take ``shadow_rays`` of them;
+    ``beams``, which are only those that pass near indenters, take their share.
     """
     groups = len(totals)
     hidden = [mi.Color3f(0) for _ in range(groups)]
@@ -94,7 +98,8 @@ def sum_hidden(
         running += share
         times = dr.floor(running) - before
         weight = dr.rcp(dr.select(share < 1, share, times))
-        # A beam's own bits: a beam that rounding adds or drops leaves the others' rays as they are.
+        # Each beam has random bits of its own, so that a beam added or dropped by rounding does not
+        # change the rays of the others.
         state = random + tag * GOLDEN_BITS
         while times > 0:
             state = next_random(state)
@@ -112,8 +117,8 @@ def sum_hidden(
 
 
 def beam_at(beams: Beams, number: mi.UInt32) -> tuple[mi.Vector3f, mi.Float, mi.Color3f, mi.UInt32]:
-    """Direction towards the light, mean cosine and flux density of beams, and the bits of their
-    light group and number.
+    """Return the direction towards the light, mean cosine and flux density (mW/mm^2) of beams, and
+    the bits of their light group and number.
     """
     way = dr.gather(mi.Vector4f, beams.ways, number)
     flux = dr.gather(mi.Vector4f, beams.fluxes, number)

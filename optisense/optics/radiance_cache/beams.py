@@ -1,9 +1,9 @@
 """The radiance cache as short lists of beams, for points on the undeformed surface.
 
 A cell of the cache keeps its light in many narrow direction bins. Most of them hold a little
-scattered light, a few hold the lamps. Where the surface is not tilted, four weak neighbouring bins
-may be merged into one beam without a visible change (see tests/optics/test_beams.py), which leaves
-a short list.
+scattered light, and a few hold the lamps. Where the surface is not tilted, four weak neighbouring
+bins can be merged into one beam without a visible change (see tests/optics/test_beams.py), so that
+a short list remains.
 """
 
 from __future__ import annotations
@@ -23,14 +23,14 @@ from optisense.optics.scene.surface_cells import SurfaceCells
 STRONG_SHARE = 0.03
 """Share of a group's light in a cell above which four neighbouring bins stay separate beams."""
 SPARSE_SHARE = 0.003
-"""Share of a group's light in a cell below which a beam may be that of a single photon, whose
-spread nothing tells. Where bins are fine, such beams are at least as wide as 16 bins: a photon near
-the mirror direction of a narrow lobe would be a bright blotch else."""
+"""Share of a group's light in a cell below which a beam may come from a single photon, which gives
+no estimate of its spread. Where bins are fine, such beams are at least as wide as 16 bins;
+otherwise a photon near the mirror direction of a narrow lobe would be a bright blotch."""
 NUMBER_SHIFT = 8
-"""The bits of a beam's light group, of which there are at most 256; those above are the beam's
-number."""
+"""Number of low bits of a beam's tag that hold its light group, of which there are at most 256; the
+bits above hold the beam's number."""
 NO_SLOT = 0xFFFFFFFF
-"""Marks a direction bin that the cache does not hold."""
+"""Marker of a direction bin that the cache does not hold."""
 READ_DISTANCE = 1.5
 """Largest distance, in cell sides, between a cell's centre and a point that reads its beams."""
 
@@ -41,11 +41,12 @@ class Beams:
 
     Attributes:
         starts: index of the first beam of each cell and group, and the total number at the end.
-        ways: four floats per beam: the unit direction towards the light, and the mean cosine with
-        it.
-        fluxes: four floats per beam: the flux density across it (mW/mm^2) in R, G, B, and as bits
-            the light group and the beam's number (see `NUMBER_SHIFT`). The number follows from the
-            direction bins of the beam alone, not from how many other beams there are.
+        ways: four floats per beam: the unit direction towards the light, and the mean cosine
+            between the light and that direction.
+        fluxes: four floats per beam: the flux density (mW/mm^2) across the beam in R, G, B, and a
+            tag of bits with the light group and the beam's number (see `NUMBER_SHIFT`). The number
+            follows from the direction bins of the beam alone, not from how many other beams there
+            are.
     """
 
     starts: mi.UInt32
@@ -63,21 +64,21 @@ def collect_beams(
     entries: int,
     groups: int,
 ) -> Beams:
-    """Beams from the bins of a cache.
+    """Merge the direction bins of a cache into beams.
 
     Args:
         moments, colours, coloured: as in `RadianceCache`.
-        used: which of the bands times sectors bins the cache holds, ascending.
-        bands, sectors: even numbers.
-        entries: cells times groups.
-        groups: light groups.
+        used: ascending numbers of the direction bins that the cache holds.
+        bands, sectors: number of bands, and of sectors in each band; both even.
+        entries: number of cells times number of light groups.
+        groups: number of light groups.
     """
     slots = np.full(bands * sectors, NO_SLOT, dtype=np.uint32)
     slots[used] = np.arange(len(used))
     block = np.arange(bands * sectors // 4)
     corner = (block // (sectors // 2)) * 2 * sectors + (block % (sectors // 2)) * 2
     four = slots[corner[:, None] + np.array([0, 1, sectors, sectors + 1])]
-    # Blocks without any light are not looked at.
+    # Blocks without any light are skipped.
     lit = (four != NO_SLOT).any(axis=1)
     four = four[lit]
     field = (moments, colours, indices(four), indices(block[lit]))
@@ -132,10 +133,10 @@ def _collect(
     fluxes: mi.Float,
     write: bool,
 ) -> mi.UInt32:
-    """Count the beams of each lane's cell and group, or write them from ``first`` on.
+    """Count the beams of each lane's cell and group, or write them from index ``first`` on.
 
-    ``names`` are the numbers of the blocks of four bins; ``sparse_cosine`` is the largest mean
-    cosine of a beam of little light.
+    ``names`` are the numbers of the blocks of four bins; ``sparse_cosine`` is the upper bound on
+    the mean cosine of a weak beam (see `SPARSE_SHARE`).
     """
     cell, group = lane // groups, lane % groups
     slot = mi.UInt32(first)
@@ -183,13 +184,13 @@ def _collect(
 
 
 def cull_beams(beams: Beams, cells: SurfaceCells, groups: int, balls: mi.Float) -> Beams:
-    """The beams that may touch one of the balls on their way to points of their cell.
+    """Return the beams that may touch one of the balls before they reach their cell.
 
     Args:
         beams: all beams.
         cells: the cells that they belong to.
-        groups: light groups.
-        balls: centre and radius, four floats (mm) each.
+        groups: number of light groups.
+        balls: centre and radius of each ball, four floats, mm.
     """
     entries = cells.cells * groups
     centres = np.zeros((cells.cells, 4), dtype=np.float32)

@@ -1,4 +1,4 @@
-"""Points in and near contacts: the light of direction bins, each looked up along its own line."""
+"""Sums over direction bins for points in and near contacts."""
 
 from __future__ import annotations
 
@@ -28,13 +28,13 @@ from optisense.optics.transport.volume_flux import LAYER_HEIGHT
 
 MIN_IRRADIANCE_SHARE = 0.2
 """Share of the mean irradiance that is added to the expected light when shadow rays are spaced, so
-that points in little light do not take many."""
+that weakly lit points do not take many rays."""
 MAX_EXTRAPOLATION = 1.5
 """Largest height, in units of half the flux layer's height, up to which the light above the surface
 is extrapolated; it is constant above."""
 MIN_SINE = 0.1
-"""Lower bound on the sine of elevation by which the way of light from a point on an indenter on to
-the undeformed surface is found: lower light meets another indenter or a wall before it."""
+"""Lower bound on the sine of elevation used for the length of the path from a point on an indenter
+to the undeformed surface: light that is lower meets another indenter or a wall first."""
 MIN_STEP = 1e-20
 """Lower bound on the step of the systematic sampling; it avoids a division by zero without
 light."""
@@ -48,14 +48,15 @@ def sum_bins(
     shadow_rays: mi.Float,
     sky: mi.Float,
 ) -> list[mi.Color3f]:
-    """Every bin, looked up along its own line, with shadow rays for some of the bins.
+    """Return the radiance towards the camera due to all direction bins, one colour per light group.
 
-    Shadow rays go to bins that are not wholly above the occluder horizon (``sky``, a sine). They
+    Each bin is looked up where the line along its middle direction meets the undeformed surface.
+    Shadow rays test the bins that are not wholly above the occluder horizon (``sky``, a sine). They
     are drawn in proportion to the light, evenly spaced in its running sum (systematic sampling);
-    where nothing is occluded, the sum is exact to half a step.
+    without occlusion, the sum is exact to half a step.
 
-    With light above the surface (half-way up the flux layer), points on indenters interpolate
-    between it and that of the surface below them.
+    If the cache also holds the light half-way up the flux layer, points on indenters interpolate
+    between that light and the light on the surface below them.
     """
     moments, heights, colours = light.tables
     upper, groups, bins, points = light.above, light.groups, light.bins, at.seen
@@ -65,12 +66,13 @@ def sum_bins(
     steps = []
     running = []
     for g in range(groups):
-        # About what the bins bring in all: how far apart the shadow rays are in the running sum.
+        # The expected sum over the bins, divided by the number of shadow rays, is their spacing in
+        # the running sum.
         falling, mean, _ = irradiance(light.irradiance, at.cell * groups + g, points.normal)
         expected = (falling + MIN_IRRADIANCE_SHARE * mean) * grey(albedo_of(at.coating))
         expected *= dr.inv_pi
         steps.append(dr.maximum(expected / shadow_rays, MIN_STEP))
-        # Of the samples of a pixel, each begins at another part of a step.
+        # Each sample of a pixel begins at another fraction of a step.
         running.append(in_series(points.series + (g + 1), points.number, 0))
     upright, offset = plane_of(light.cells, at.cell, active)
     up = dr.select(raised, (dr.dot(upright, points.point) - offset) / (LAYER_HEIGHT / 2), 0)
@@ -88,7 +90,7 @@ def sum_bins(
             counts = value.w != 0
             if upper is not None:
                 above_it = dr.gather(mi.Vector4f, upper[0], entry, active & raised)
-                # Light is not extrapolated to less than none.
+                # Extrapolation never turns positive light negative.
                 negative = dr.minimum(value.w, above_it.w) < 0
                 value = dr.lerp(value, above_it, up)
                 counts = (value.w > 0) | (negative & (value.w < 0))
@@ -99,7 +101,7 @@ def sum_bins(
                     height = dr.lerp(height, dr.gather(mi.Float, upper[1], entry, raised), up)
                 height = dr.maximum(height / value.w, 0)
                 beam = angular_variance(axis, towards, cosine, height)
-                # On the undeformed surface the mean cosine is the sum's already.
+                # On the undeformed surface the sum over bins already has the right mean cosine.
                 half_width = dr.select(raised, cosine_half_width(beam, points.normal, upright), 0)
                 reflected = _reflected(light, at, beam, cosine, half_width)
                 sine = dr.dot(upright, towards)
@@ -110,8 +112,8 @@ def sum_bins(
                 running[g] += dr.select(doubtful, share, 0)
                 times = dr.floor(running[g]) - before
                 if times > 0:
-                    # A bin's own bits: a ray or a bin that rounding adds or drops leaves the
-                    # others as they are.
+                    # Each bin has random bits of its own, so that a ray or a bin added or dropped
+                    # by rounding does not change the others.
                     number = dr.reinterpret_array(
                         mi.UInt32, dr.gather(mi.Float, light.centres, k * 4 + 3)
                     )
@@ -144,8 +146,17 @@ def _reflected(
     cosine: mi.Float,
     half_width: mi.Float,
 ) -> mi.Color3f:
-    """What the coating reflects of a beam of this mean cosine, whose cosines with the normal are
-    spread by so much. To narrow lobes, the beam is two discs.
+    """Return the radiance that the coating reflects towards the camera of a beam of unit flux
+    density.
+
+    Coatings with narrow lobes see the beam as two discs.
+
+    Args:
+        light: the binned light that the beam belongs to.
+        at: the points.
+        beam: the beam.
+        cosine: its mean cosine.
+        half_width: half-width of the distribution of its cosine with the normal.
     """
     points = at.seen
 
@@ -160,12 +171,13 @@ def _reflected(
 
 
 def _spared(scenes: ContactScenes, rise: mi.Float, sine: mi.Float) -> mi.Color3f:
-    """Factor by which light is stronger on an indenter, as it has come a shorter way through gel.
+    """Return the factor by which light is stronger on an indenter, as its path through the gel is
+    shorter.
 
     Args:
         scenes: the scenes, in a gel that absorbs.
-        rise: mm, height of the point above the undeformed surface; 0 and less there.
-        sine: of the light's elevation above that surface.
+        rise: height (mm) of the point above the undeformed surface; values up to 0 have no effect.
+        sine: sine of the light's elevation above that surface.
     """
     way = dr.maximum(rise, 0) / dr.maximum(sine, MIN_SINE)
     return dr.exp(scenes.absorption * way)
@@ -173,13 +185,13 @@ def _spared(scenes: ContactScenes, rise: mi.Float, sine: mi.Float) -> mi.Color3f
 
 @dr.syntax
 def _place(light: BinnedLight, fixed: RayScene, at: ShadingPoints, k: mi.UInt32) -> mi.UInt32:
-    """The cell where bin ``k`` is looked up for points.
+    """Return the number of the cell in which bin ``k`` is looked up for each point.
 
-    On an indenter it is where the line through the point along the bin's middle goes on to meet the
-    undeformed surface, found on the planes of two cells in turn. On a curved surface, lines that
-    graze these planes are followed by a ray. (The mean direction of the bin's light would not do:
-    where a lamp straddles two bins, its halves would be read at places that do not belong
-    together.)
+    For a point on an indenter, it is the cell where the line through the point along the bin's
+    middle direction meets the undeformed surface; the planes of two cells are intersected in turn.
+    On a curved surface, lines that graze these planes are traced as rays. (The mean direction of
+    the bin's light is not used: where a lamp straddles two bins, its halves would be looked up at
+    places that do not match.)
     """
     cells, point = light.cells, at.seen.point
     middle = dr.gather(mi.Vector4f, light.centres, k)

@@ -1,11 +1,11 @@
 """The radiance cache: light that falls on the undeformed opaque surfaces, by cell and direction.
 
-The light that arrives at the sensing surface varies slowly from place to place. What varies within
-a tenth of a millimetre in a contact is the surface's tilt and what it hides. So photons are traced
-once per design, without contacts, and tallied where they land: each surface cell and direction bin
-(see `DirectionBins`) keeps the flux through a plane *across the light* (a photon's power over its
-cosine of incidence) and the mean direction. `shading` looks it up for visible points. The cost of
-an image then does not depend on the number of photons.
+The light that arrives at the sensing surface varies slowly from place to place. In a contact, only
+the tilt of the surface and its shadows vary within a tenth of a millimetre. Photons are therefore
+traced once per design, without contacts, and tallied where they land: each surface cell and
+direction bin (see `DirectionBins`) keeps the flux through a plane *across the light* (a photon's
+power over its cosine of incidence) and the mean direction. `shading` looks it up for visible
+points. The cost of an image then does not depend on the number of photons.
 """
 
 from __future__ import annotations
@@ -41,12 +41,13 @@ MIN_COSINE = 0.02
 """Lower bound on the cosine of incidence that a photon's power is divided by, so that an isolated
 grazing photon does not become a bright beam."""
 NOISIEST_SHARE = 0.05
-"""Share of the area in view by whose noise the noise of the worst places is told."""
+"""Share of the area in view that counts as the worst places when their noise is reported."""
 PATCH_AVERAGES = 4
-"""Times that the squared noise is averaged with the kernel of a place: as it is, it is the square
-of one difference, so that chance alone would make some places the worst."""
+"""Number of times that the squared noise is averaged with the smoothing kernel. Without averaging
+it is the square of a single difference, and chance would decide which places are the worst."""
 DARKEST_JUDGED = 0.1
-"""Share of the mean light; the noise of darker places is told relative to it."""
+"""Lower bound on the light to which a place's noise is relative, as a share of the mean light, so
+that very dark places do not decide the result."""
 EMPTY_BIN_SHARE = 1e-7
 """Share of all the light below which a direction bin counts as empty."""
 
@@ -74,13 +75,13 @@ class RadianceCache:
             else the same array as ``moments``.
         coloured: whether surfaces are coloured.
         metallic: whether a coating has a metallic lobe.
-        narrow_lobes: whether one is narrower than most lamps.
+        narrow_lobes: whether a coating's lobe is narrower than most lamps.
         centres: the middle direction of each bin, and its number as bits; four floats each.
         irradiance: the table of `irradiance.irradiance_table`.
         beams: the same light in short lists of beams.
-        photons: emitted photons.
+        photons: number of emitted photons.
         noise: relative RMS noise of the smoothed irradiance.
-        worst_noise: that of the noisiest 5 % of the area, relative to the light there.
+        worst_noise: relative RMS noise that the noisiest 5 % of the area have at least.
         above_surface: the same tables for the light half-way up the flux layer above the cells, if
             there is one (see `volume_flux`).
     """
@@ -103,7 +104,7 @@ class RadianceCache:
     above_surface: Tables | None = None
 
     def binned(self) -> BinnedLight:
-        """The light by direction bins."""
+        """Return the light by direction bins."""
         return BinnedLight(
             cells=self.cells,
             tables=Tables(self.moments, self.heights, self.colours),
@@ -174,7 +175,7 @@ class CacheTally:
         entries = cells.cells * directions.count * groups * 4
         self.landed = self._tables(entries)
         self.above_surface = None if flux_layer is None else self._tables(entries)
-        # What photons of even and of odd number bring; their difference tells the noise.
+        # Power of the photons of even and of odd number; their difference gives the noise.
         self.halves = dr.zeros(mi.Float, 2 * cells.cells * groups)
 
     def _tables(self, entries: int) -> Tables:
@@ -183,7 +184,7 @@ class CacheTally:
         return Tables(moments, dr.zeros(mi.Float, entries // 4), colours)
 
     def add(self, photons: PhotonMap) -> None:
-        """Add a photon pass. All passes must have the same number of photons."""
+        """Add the photons of a pass. All passes must have the same number of photons."""
         cell, found, bits, scalar = self._tally(photons, self.landed, None)
         row = cell + ((bits >> HALF_SHIFT) & 1) * dr.opaque(mi.UInt32, self.cells.cells)
         dr.scatter_add(self.halves, scalar, row * self.groups + (bits & GROUP_MASK), found)
@@ -199,12 +200,12 @@ class CacheTally:
         """Add photons to tables.
 
         Args:
-            photons: those that landed, or those that crossed the flux layer.
-            tables: the sums.
+            photons: the photons that landed, or that crossed the flux layer.
+            tables: the sums that are added to.
             flux_layer: the layer that the photons crossed; None if they landed.
 
         Returns:
-            Of each photon: its cell, whether there is one, its bits and its power.
+            The cell of each photon, whether it lies in one, its bits and its power.
         """
         index = dr.arange(mi.UInt32, photons.count)
         place = dr.gather(mi.Vector4f, photons.place, index)
@@ -237,11 +238,11 @@ class CacheTally:
         return cell, found, bits, scalar
 
     def noise(self) -> float:
-        """Relative RMS noise of the smoothed irradiance (1 = 100 %), from the difference of two
-        halves.
+        """Return the relative RMS noise of the smoothed irradiance (1 = 100 %).
 
-        It is the RMS over all cells in or near the camera's view and all light groups, relative to
-        each group's mean; infinite without photons.
+        The noise is estimated from the difference between two halves of the photons. It is the RMS
+        over all cells in or near the camera's view and all light groups, relative to each group's
+        mean; infinite without photons.
         """
         if self.passes < 1:
             return float("inf")
@@ -254,10 +255,12 @@ class CacheTally:
         return float(np.sqrt((spread[:, lit] / scale[lit] ** 2).mean()))
 
     def worst_noise(self) -> float:
-        """Relative RMS noise (1 = 100 %) that the noisiest 5 % of the area in or near the camera's
-        view have at least, each place relative to its own light.
+        """Return the relative RMS noise (1 = 100 %) that the noisiest 5 % of the area have at
+        least.
 
-        Light groups count alike, each relative to its own mean. Infinite without photons.
+        The area is that in or near the camera's view, and the noise of each place is relative to
+        the light there. Light groups have equal weights, each relative to its own mean. The result
+        is infinite without photons.
         """
         if self.passes < 1:
             return float("inf")
@@ -278,12 +281,14 @@ class CacheTally:
         return float(relative[order][np.searchsorted(share, 1.0 - NOISIEST_SHARE)])
 
     def _light_and_spread(self) -> tuple[FloatArray, FloatArray]:
-        """(cells, groups) smoothed mW/mm^2, and the square of its deviation, from two halves."""
+        """Return the smoothed irradiance (cells, groups), mW/mm^2, and its squared standard
+        deviation.
+        """
         kernel = self._smoothing()
         means = [kernel.kernel.matrix @ landed for landed in self._landed()]
         if kernel.correction is not None:
             means = [kernel.correction @ light for light in means]
-        # Half the difference of two halves has the deviation of their mean.
+        # Half the difference of two halves has the same standard deviation as their mean.
         return (means[0] + means[1]) / 2, ((means[0] - means[1]) / 2) ** 2
 
     def _corrected(
@@ -293,10 +298,10 @@ class CacheTally:
         correction: csr_matrix,
         used: NDArray[np.integer],
     ) -> Tables:
-        """The light of the bins ``used``, smoothed and each bin's blur undone.
+        """Return the smoothed light of the bins ``used``, with the blur of each bin undone.
 
-        That fills most bins, of which there are many, so that products with matrices take half the
-        time of `smooth`.
+        Matrix products take half the time of `smooth` here, as the correction fills most of the
+        many bins.
         """
         cells, count = self.cells.cells, self.directions.count
         once, twice = (each.astype(np.float32) for each in (kernel / self.passes, correction))
@@ -312,12 +317,14 @@ class CacheTally:
         return self.kernels.smoothing(self.photons, self.directions.corrected)
 
     def _landed(self) -> FloatArray:
-        """(2, cells, groups) mW that landed on each cell, by photons of even and odd number."""
+        """Return the power (2, cells, groups), mW, of the photons of even and odd number on each
+        cell.
+        """
         halves = np.asarray(self.halves, dtype=np.float64) * (2 / self.passes)
         return halves.reshape(2, -1, self.groups)
 
     def smoothed(self) -> RadianceCache:
-        """The radiance cache of the photons so far; only bins that hold light are kept."""
+        """Return the radiance cache of the photons so far; only bins that hold light are kept."""
         count = self.directions.count
         total = dr.zeros(mi.Float, count)
         lanes = dr.arange(mi.UInt32, self.cells.cells * count * self.groups)
@@ -349,7 +356,7 @@ class CacheTally:
                 given.append(tables.colours)
                 kinds.append(mi.Vector4f)
             sums = smooth(kernel.kernel, self.cells.cells, given, kinds, *rest)
-            dr.eval(sums)  # together: the loop would run again for those that are asked for later
+            dr.eval(sums)  # together; otherwise the loop would run again for each array
             flat = [dr.ravel(each) for each in sums]
             return Tables(flat[0], flat[1], flat[2] if self.coloured else flat[0])
 

@@ -1,4 +1,4 @@
-"""The bins of direction by which a radiance cache keeps light, and how fine they are."""
+"""The direction bins in which a radiance cache keeps light, and their resolution."""
 
 from __future__ import annotations
 
@@ -15,17 +15,16 @@ from optisense.optics.scene.surface_cells import SurfaceCells, bin_axis
 
 @dataclass(frozen=True)
 class DirectionBins:
-    """Bins of equal solid angle: bands about the mean normal of the surfaces, each of as many
-    sectors of azimuth.
+    """Bins of equal solid angle: bands about the mean normal of the surfaces, each divided into as
+    many sectors of azimuth as there are bands.
 
-    With sharp edges between bins, a point above the surface would count a lamp twice or not at all,
-    depending on how near an edge the lamp lies; sums over overlapping bins hardly depend on where
-    the edges lie.
+    With sharp edges between bins, a point above the surface would count a lamp near an edge twice
+    or not at all; sums over overlapping bins hardly depend on the position of the edges.
 
     Attributes:
         across: number of bands, and of sectors in each; even.
         overlap: half-width, in bins, of the triangular density by which directions are spread over
-            neighbouring bins. At 1 each bin holds what a quadratic B-spline weights.
+            neighbouring bins. With 1, each bin is weighted with a quadratic B-spline.
         corrected: whether the blur of the smoothing is undone in each bin, instead of in the sum of
             all bins.
     """
@@ -41,17 +40,17 @@ class DirectionBins:
 
     @property
     def fine(self) -> bool:
-        """Whether they are those of narrow lobes."""
+        """Whether the bins are fine enough for narrow lobes."""
         return self.across >= FINE_BINS.across
 
     @classmethod
     def for_coating(cls, roughness: float | None, curved: bool = False) -> DirectionBins:
-        """The bins for coatings.
+        """Return the bins for coatings.
 
         Args:
             roughness: GGX alpha of the sharpest metallic lobe; None for diffuse coatings.
-            curved: whether the coated surfaces are curved, and light does not graze them (where it
-                does, the volume flux tells how it varies).
+            curved: whether the coated surfaces are curved and not lit by grazing light (the volume
+                flux describes how grazing light varies).
         """
         if roughness is None or roughness >= BROAD_LOBE:
             if curved:
@@ -65,8 +64,8 @@ DIFFUSE_BINS = DirectionBins(16, 1.0)
 CURVED_BINS = DirectionBins(18, 0.6, True)
 """The bins for diffuse coatings and broad lobes on curved surfaces, in front of which light varies
 faster. In a contact of the diffuse spherical GelSight Mini the RMS error over patches is 3.1 % with
-`DIFFUSE_BINS`, 2.0 % where their blur is undone bin by bin, and 1.3 % with these. The light takes a
-quarter longer, and images in light that is there as long as before."""
+`DIFFUSE_BINS`, 2.0 % where their blur is undone bin by bin, and 1.3 % with these. Tracing the light
+takes a quarter longer; images from a finished cache take as long as with `DIFFUSE_BINS`."""
 BROAD_LOBE_BINS = DirectionBins(16, 0.6)
 """The bins for broad metallic lobes. With the full overlap, the skin beside a contact of GelSight
 Mini of specularity 0.3 is 2.5 % off instead of 1.8 %; with 24 x 24 bins it is 1.3 %, for up to
@@ -76,7 +75,7 @@ FINE_BINS = DirectionBins(24, 0.6, True)
 FINEST_BINS = DirectionBins(32, 0.6, True)
 """The bins for lobes that are narrower than most lamps."""
 BROAD_LOBE = 0.5
-"""GGX alpha from which on a lobe is so broad that coarse bins do."""
+"""GGX alpha from which on a lobe is so broad that coarse bins suffice."""
 NARROW_LOBE = 0.25
 """GGX alpha below which the finest bins are needed: the error in a contact of GelSight Mini of
 alpha 0.05 is 5 % with them and 9 % with the next coarser ones; at 0.4 it is 1.4 and 1.6 %."""
@@ -89,20 +88,20 @@ def direction_bin(
     bands_off: mi.Float,
     sectors_off: mi.Float,
 ) -> mi.UInt32:
-    """The bin of a unit direction, or one beside it.
+    """Return the number of the bin of a direction, offset by a number of bands and sectors.
 
     Args:
-        cells: their frame is that of the bins.
+        cells: the surface cells, whose frame is that of the bins.
         bins: the bins.
         direction: unit vectors.
-        bands_off: offset in bands.
-        sectors_off: offset in sectors.
+        bands_off: offset in bands, added before rounding.
+        sectors_off: offset in sectors, added before rounding.
     """
     x, y, z = (dr.dot(direction, bin_axis(cells, k)) for k in range(3))
     across = dr.opaque(mi.Float, float(bins.across))
     last = mi.UInt32(across) - 1
     place = (z + 1) * (across / 2) + bands_off
-    # Beyond a pole: back from it.
+    # A place beyond a pole is reflected at the pole.
     place = dr.select(place > across, 2 * across - place, dr.abs(place))
     band = dr.minimum(mi.UInt32(place), last)
     turn = dr.atan2(y, x) * (1 / dr.two_pi) + sectors_off / across
@@ -113,9 +112,10 @@ def direction_bin(
 def dither(
     place: mi.Vector4f, direction: mi.Vector3f, bins: DirectionBins
 ) -> tuple[mi.Float, mi.Float]:
-    """Random offsets in bands and sectors, of a triangular density over the overlap of bins.
+    """Return random offsets in bands and sectors, with a triangular density over the overlap of
+    bins.
 
-    They are a hash of the landing, as landings come in no fixed order.
+    The random numbers are a hash of the landing, as landings are recorded in no fixed order.
     """
     reach = dr.opaque(mi.Float, bins.overlap)
     first, second, third = (
@@ -127,7 +127,7 @@ def dither(
 
 
 def bin_centres(cells: SurfaceCells, bins: DirectionBins, chosen: NDArray[np.integer]) -> mi.Float:
-    """The middle direction of each of the chosen bins, and its number as bits; four floats each."""
+    """Return four floats for each chosen bin: its middle direction, and its number as bits."""
     z = (chosen // bins.across + 0.5) * (2 / bins.across) - 1
     turn = (chosen % bins.across + 0.5) * (2 * np.pi / bins.across)
     flat = np.sqrt(1 - z * z)

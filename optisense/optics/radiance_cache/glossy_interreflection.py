@@ -1,9 +1,9 @@
-"""Interreflection of coatings with a metallic lobe, by the lobe of every place that is seen.
+"""Interreflection between coatings with a metallic lobe, with the full lobe at every bounce.
 
-As in `interreflection`, rays from points in and near a contact find the indenter or the skin
-beside it. The place that a ray meets is then shaded as any visible point is: each direction bin is
-looked up along its own line and reflected by the coating's lobes towards the point that sees it.
-From there rays go on, drawn from the same lobes.
+As in `interreflection`, rays from points in and near a contact find the indenter or the skin beside
+it. The place that a ray meets is then shaded like a visible point: each direction bin is looked up
+along its own line and reflected by the coating's lobes towards the point that sees the place. The
+next ray is drawn from the same lobes.
 """
 
 from __future__ import annotations
@@ -26,18 +26,21 @@ from optisense.optics.transport.camera_paths import VisiblePoints
 
 DIRECTIONS = 4
 """Directions per camera sample in which interreflected light is looked for. The lobes of the places
-seen are summed over all light, so that fewer directions will do than where one ray stands for the
-light of a place."""
+seen are summed over all light, so that fewer directions suffice than in `interreflection`, where
+one ray stands for the light of a place."""
 BROAD_DIRECTIONS = 2
-"""The same for lobes that are not narrower than most lamps: the light in a contact of GelSight Mini
-of specularity 0.6 has 2.24 % of noise then instead of 2.16 %, at a million photons."""
+"""Directions per camera sample for lobes that are not narrower than most lamps. In a contact of
+GelSight Mini of specularity 0.6, the noise at a million photons is then 2.24 % instead of 2.16
+%."""
 MAX_BOUNCES = 4
-"""Largest number of reflections inside a contact; of a metal ball's light, less than a thousandth
-goes on."""
+"""Largest number of reflections inside a contact; after so many, less than a thousandth of the
+light in the contact of a metal ball is left."""
 PLACE_SHADOW_RAYS = 4.0
-"""Shadow rays per light group of a place that is seen."""
+"""Number of shadow rays per light group of a place that a ray meets; fewer than for visible points,
+as its light is a small part of a pixel's."""
 MIN_LANES = 2
-"""Fewest places that are shaded at once: Dr.Jit compiles other kernels for single ones."""
+"""Lower bound on the number of places that are shaded at once, as Dr.Jit compiles other kernels for
+arrays of one entry."""
 
 
 @dataclass
@@ -47,8 +50,8 @@ class PlacesSeen:
     Attributes:
         points: the places, as visible points; their ``pixel`` is the number of the first point of
             their path.
-        raised: which of them lie on an indenter.
-        near: the cell of the point that sees each.
+        raised: mask of the places that lie on an indenter.
+        near: number of the cell of the point that sees each place.
     """
 
     points: VisiblePoints
@@ -59,8 +62,7 @@ class PlacesSeen:
 def glossily_interreflected(
     field: RadianceCache, scenes: ContactScenes, at: ShadingPoints
 ) -> list[mi.Color3f]:
-    """Radiance towards the camera that points reflect of interreflected light, one colour per
-    group.
+    """Return the radiance towards the camera due to interreflected light, one colour per group.
 
     Args:
         field: the radiance cache.
@@ -78,7 +80,7 @@ def glossily_interreflected(
     looking = ShadingPoints(
         seen=first,
         coating=coating_of(table, first.surface, first.valid),
-        start=first.point,  # not read: nothing is in the way of these points themselves
+        start=first.point,  # not read, as no shadow rays start at these points
         cell=dr.gather(mi.UInt32, at.cell, owner),
         shift=mi.Vector3f(0),
         active=dr.gather(mi.Bool, at.active, owner),
@@ -106,7 +108,7 @@ def glossily_interreflected(
 
 
 def _places_seen(scenes: ContactScenes, at: ShadingPoints) -> PlacesSeen | None:
-    """The places that one ray from each point meets, drawn from its coating's lobes."""
+    """Return the places that one ray from each point meets, drawn from its coating's lobes."""
     assert scenes.indenters is not None
     indenters, fixed, points = scenes.indenters, scenes.fixed, at.seen
     u = unit_float(points.series + points.number * STEPS_2D[0])
@@ -121,7 +123,7 @@ def _places_seen(scenes: ContactScenes, at: ShadingPoints) -> PlacesSeen | None:
     pressed = indenters.intersect(Ray(start, way, looks))
     skin = fixed.intersect(Ray(start, way, looks & at.raised))
     raised = pressed.valid & (~skin.valid | (pressed.distance < skin.distance))
-    # Light along a line that comes from the skin behind is in the field already.
+    # The cache already holds the light along a line that comes from the skin behind.
     behind = fixed.scene.ray_test(mi.Ray3f(start, -way), coherent=False, active=skin.valid)
     valid = raised | (skin.valid & ~behind)
     facing = dr.select(raised, pressed.normal, skin.normal)
@@ -157,7 +159,9 @@ def _places_seen(scenes: ContactScenes, at: ShadingPoints) -> PlacesSeen | None:
 
 
 def shading_points(field: RadianceCache, scenes: ContactScenes, seen: PlacesSeen) -> ShadingPoints:
-    """Where places that are seen read the cache: below them, along the normal of the skin there."""
+    """Return the shading points of places; each reads the cache below it, along the skin's
+    normal.
+    """
     points = seen.points
     upright, offset = plane_of(field.cells, seen.near, points.valid)
     foot = points.point - upright * (dr.dot(upright, points.point) - offset)
@@ -177,7 +181,7 @@ def shading_points(field: RadianceCache, scenes: ContactScenes, seen: PlacesSeen
 
 
 def light_of(field: RadianceCache, scenes: ContactScenes, at: ShadingPoints) -> list[mi.Color3f]:
-    """The light from afar that places send to the points that see them."""
+    """Return the light of the cache that places reflect towards the points that see them."""
     sky = occluder_horizon(
         scenes.balls,
         dr.opaque(mi.UInt32, dr.width(scenes.balls) // 4),

@@ -1,10 +1,11 @@
 """Interreflection: light that indenters and the skin near them reflect to each other.
 
-The radiance cache holds the light that comes from afar, also after scattering. Inside a contact, a
-point sees an indenter or, from an indenter, the skin beside it. The light from there is sampled by
-rays. It is a few per cent of the whole, so the place that is seen is taken to be diffuse, and its
-irradiance is read from nine spherical-harmonic coefficients per cell and light group (Ramamoorthi
-and Hanrahan 2001), with one shadow ray per group towards the mean direction of its light.
+The radiance cache holds the light that arrives from outside the contact, also after scattering.
+Inside a contact, a point sees an indenter or, from an indenter, the skin beside it. The light from
+there is sampled by rays. It is a few per cent of the total, so the place that a ray meets is
+treated as diffuse. Its irradiance is read from nine spherical-harmonic coefficients per cell and
+light group (Ramamoorthi and Hanrahan 2001), with one shadow ray per group towards the mean
+direction of the light.
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ from optisense.optics.scene.ray_scene import Ray, leave
 from optisense.optics.scene.surface_cells import SurfaceCells, cell_at
 
 DIRECTIONS = 8
-"""Directions per camera sample in which interreflected light is looked for."""
+"""Number of rays per camera sample that sample interreflected light."""
 MAX_BOUNCES = 8
 """Largest number of reflections inside a contact. Even a coating of reflectance 0.7 keeps at most 6
 % of the light after so many."""
@@ -37,17 +38,19 @@ def _sample(
     at: ShadingPoints,
     directions: mi.UInt32,
 ) -> list[mi.Color3f]:
-    """Radiance of interreflected light; ``table`` is that of `irradiance_table`."""
+    """Return the radiance of interreflected light; ``table`` is the result of
+    `irradiance_table`.
+    """
     assert scenes.indenters is not None
     indenters, fixed, points = scenes.indenters, scenes.fixed, at.seen
     series, first = points.series, points.number * directions
     totals = [mi.Color3f(0) for _ in range(groups)]
-    # How much of the light the places that are seen send on, if they are diffuse.
+    # The share of the light that a place reflects if it is diffuse.
     albedo = albedo_of(at.coating)
     survival = dr.max(albedo)
     k = mi.UInt32(0)
     while at.active & (k < directions):
-        # One sequence goes through all samples of a pixel.
+        # All samples of a pixel share one sequence.
         u = unit_float(series + (first + k) * STEPS_2D[0])
         v = unit_float(series * 277803737 + (first + k) * STEPS_2D[1])
         state = (points.random ^ (k * 0x9E3779B9)) * 69069
@@ -63,7 +66,7 @@ def _sample(
             pressed = indenters.intersect(Ray(start, way, mi.Bool(True)))
             skin = fixed.intersect(Ray(start, way, above))
             on_indenter = pressed.valid & (~skin.valid | (pressed.distance < skin.distance))
-            # Light along a line that comes from the skin behind is in the field already.
+            # The cache already holds the light along a line that comes from the skin behind.
             behind = fixed.scene.ray_test(mi.Ray3f(start, -way), coherent=False, active=above)
             walking = on_indenter | (skin.valid & ~behind)
             if walking:
@@ -71,8 +74,7 @@ def _sample(
                 facing = dr.select(on_indenter, pressed.shading_normal, skin.shading_normal)
                 facing *= -dr.sign(dr.dot(way, facing))
                 there, exists = cell_at(cells, skin.point, ~on_indenter)
-                # An indenter's place is lit like its neighbourhood, which is where the point
-                # stands.
+                # A place on an indenter is lit like the cell of the point that sees it.
                 there = dr.select(exists, there, at.cell)
                 lift = leave(seen, facing, facing)
                 for g in range(groups):
@@ -83,7 +85,7 @@ def _sample(
                         mi.Ray3f(lift, towards), coherent=False, active=mi.Bool(True)
                     )
                     totals[g] += dr.select(lit & ~hidden, light, 0) * dr.inv_pi * weight
-                # On from there, like light that is scattered evenly.
+                # The path continues in a direction of the diffuse lobe.
                 state = next_random(state)
                 places += 1
                 walking = (unit_float(state) < survival) & (places < MAX_BOUNCES)
@@ -102,14 +104,13 @@ def _sample(
 def interreflected(
     field: RadianceCache, scenes: ContactScenes, at: ShadingPoints, directions: int = DIRECTIONS
 ) -> list[mi.Color3f]:
-    """Radiance towards the camera that points reflect of interreflected light, one colour per
-    group.
+    """Return the radiance towards the camera due to interreflected light, one colour per group.
 
     Args:
         field: the radiance cache.
         scenes: the scenes of the image, with indenters.
         at: the points.
-        directions: in which each looks for it.
+        directions: number of rays from each point.
     """
     count = dr.opaque(mi.UInt32, directions)
     return _sample(field.cells, field.irradiance, field.groups, scenes, at, count)

@@ -15,7 +15,7 @@ pi, 2 pi / 3 and pi / 4 (Ramamoorthi and Hanrahan 2001, equation 8)."""
 
 
 def harmonics(n: mi.Vector3f) -> tuple[mi.Float, ...]:
-    """The nine real spherical harmonics of bands 0 to 2 for unit directions."""
+    """Return the nine real spherical harmonics of bands 0 to 2 for unit directions."""
     x, y, z = n.x, n.y, n.z
     return (
         mi.Float(0.282095) + 0 * x,
@@ -32,8 +32,11 @@ def harmonics(n: mi.Vector3f) -> tuple[mi.Float, ...]:
 
 @dr.syntax
 def irradiance_table(moments: mi.Float, cells: int, bins: mi.UInt32, groups: int) -> mi.Float:
-    """Twelve floats per cell and group: nine coefficients of the irradiance as a function of the
-    normal, and the sum of the light's directions, each weighted with its flux density.
+    """Return the irradiance coefficients and the vector sum of the light of each cell and group.
+
+    Each cell and group has twelve floats: nine coefficients of the irradiance (mW/mm^2) as a
+    function of the normal, and the sum of the light's directions, each weighted with its flux
+    density.
     """
     lane = dr.arange(mi.UInt32, cells * groups)
     cell, group = lane // groups, lane % groups
@@ -49,7 +52,7 @@ def irradiance_table(moments: mi.Float, cells: int, bins: mi.UInt32, groups: int
             for i in range(9):
                 sums[i] += value.w * basis[i]
         k += 1
-    dr.eval(sums, mean)  # together: the loop would run again for each
+    dr.eval(sums, mean)  # together; otherwise the loop would run again for each array
     band = [BAND_0, *[BAND_1] * 3, *[BAND_2] * 5]
     out = dr.empty(mi.Float, cells * groups * 12)
     for i in range(9):
@@ -62,9 +65,11 @@ def irradiance_table(moments: mi.Float, cells: int, bins: mi.UInt32, groups: int
 def irradiance(
     table: mi.Float, entry: mi.UInt32, normal: mi.Vector3f
 ) -> tuple[mi.Float, mi.Float, mi.Vector3f]:
-    """Irradiance (mW/mm^2) at normals, its mean over all normals, and the vector sum of the light.
+    """Return the irradiance (mW/mm^2) at normals, its mean over all normals, and the vector sum of
+    the light.
 
-    Light that is wholly above a normal's horizon contributes the component of its vector along it.
+    Where all light is above the horizon of a normal, the irradiance equals the component of the
+    vector sum along that normal.
     """
     a = dr.gather(mi.Vector4f, table, entry * 3)
     b = dr.gather(mi.Vector4f, table, entry * 3 + 1)
@@ -78,6 +83,6 @@ def irradiance(
 
 
 def vector(table: mi.Float, entry: mi.UInt32) -> mi.Vector3f:
-    """The vector sum of the light alone, as in `irradiance`."""
+    """Return the vector sum of the light alone, as in `irradiance`."""
     third = dr.gather(mi.Vector4f, table, entry * 3 + 2)
     return mi.Vector3f(third.y, third.z, third.w)

@@ -1,4 +1,4 @@
-"""The photons of the pilot pass, and what is estimated from them before any image."""
+"""The photons of the pilot pass, and the estimates made from them before any image."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ from optisense.optics.transport.photon_map import GROUP_MASK, HALF_SHIFT, Photon
 FloatArray = NDArray[np.floating]
 
 GRAZING_COSINE = 0.25
-"""Cosine of incidence below which light is grazing. It lands so far behind an indenter's place that
-the landings there do not tell the light that passes above it."""
+"""Cosine of incidence below which light is grazing. Light that passes above a place at such angles
+lands so far behind it that the landings at the place do not represent it."""
 MIN_COSINE = 0.02
 """Lower bound on the cosine of incidence when powers are divided by it, so that single photons do
 not dominate the share of grazing light."""
@@ -32,7 +32,7 @@ class PilotPhotons:
         cosines: (n,) cosines of incidence.
         powers: (n,) mW.
         groups: (n,) light groups.
-        halves: (n,) 0 or 1, which half of the photons each belongs to.
+        halves: (n,) the half of the photons that each landing belongs to, 0 or 1.
     """
 
     points: FloatArray
@@ -43,7 +43,7 @@ class PilotPhotons:
 
     @classmethod
     def of(cls, photons: PhotonMap) -> PilotPhotons:
-        """The landings of a photon pass."""
+        """Return the landings of a photon pass."""
         places = np.asarray(photons.place)[: 4 * photons.count].reshape(-1, 4)
         travels = np.asarray(photons.travel)[: 4 * photons.count].reshape(-1, 4)
         width = 4 if photons.coloured else 1
@@ -58,27 +58,31 @@ class PilotPhotons:
         )
 
     def cells_of(self, cells: SurfaceCells) -> tuple[NDArray[np.integer], NDArray[np.bool_]]:
-        """(n,) the cell that each landed in, and (n,) whether there is one."""
+        """Return the cell (n,) of each landing, and a mask (n,) of the landings that lie in a
+        cell.
+        """
         point = mi.Point3f(*(floats(self.points[:, k]) for k in range(3)))
         cell, found = cell_at(cells, point, mi.Bool(True))
         dr.eval(cell, found)
         return np.asarray(cell), np.asarray(found)
 
     def within(self, cells: SurfaceCells, where: NDArray[np.bool_]) -> PilotPhotons:
-        """The landings in the cells that ``where`` (cells,) marks."""
+        """Return the landings in the cells that the mask ``where`` (cells,) selects."""
         cell, found = self.cells_of(cells)
         kept = found & where[cell]
         return PilotPhotons(*(getattr(self, field.name)[kept] for field in fields(self)))
 
     def landed(self, cells: SurfaceCells, groups: int) -> FloatArray:
-        """(2, cells, groups) mW on each cell, for each half of the photons."""
+        """Return the power (2, cells, groups), mW, on each cell for each half of the photons."""
         cell, found = self.cells_of(cells)
         rows = (self.halves.astype(np.int64) * cells.cells + cell) * groups + self.groups
         power = np.bincount(rows[found], self.powers[found], 2 * cells.cells * groups)
         return np.asarray(power, dtype=np.float64).reshape(2, -1, groups)
 
     def grazing_share(self) -> float:
-        """The share of the flux across the light that lands at a cosine below `GRAZING_COSINE`."""
+        """Return the share of the flux across the light that lands at a cosine below
+        `GRAZING_COSINE`.
+        """
         across = self.powers / np.maximum(self.cosines, MIN_COSINE)
         grazing = self.cosines < GRAZING_COSINE
         return float(across[grazing].sum() / max(across.sum(), 1e-30))

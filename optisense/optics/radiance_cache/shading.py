@@ -1,10 +1,10 @@
 """Shading of visible points from the radiance cache: tilt, shadows and interreflection.
 
-A visible point sums the cache over direction bins and reflects each with its own normal. On an
-indenter, which stands off the undeformed surface, a bin is looked up where the light's line goes on
-to meet that surface. A shadow ray tests whether an indenter is in the way; it is drawn within the
-angular variance of the bin, so that lights of some size cast soft shadows. Light that indenters and
-the skin beside them reflect to each other is added by `interreflection`.
+For a visible point, the cache is summed over direction bins, each reflected with the point's own
+normal. On an indenter, which stands off the undeformed surface, a bin is looked up where the line
+of its light meets that surface. A shadow ray tests whether an indenter occludes the light; it is
+drawn within the angular variance of the bin, so that extended lights cast soft shadows.
+`interreflection` adds the light that indenters and the skin beside them reflect to each other.
 """
 
 from __future__ import annotations
@@ -30,15 +30,16 @@ from optisense.optics.scene.surfaces import Region
 from optisense.optics.transport.camera_paths import VisiblePoints
 
 CONTACT_SHADOW_RAYS = 16.0
-"""Shadow rays per light group of a camera sample in and near contacts."""
+"""Number of shadow rays per light group of a camera sample in and near contacts."""
 SHADOW_RAYS = 32.0
-"""Shadow rays per light group of a camera sample elsewhere, for all the light. Only those of beams
-that pass near an indenter are traced."""
+"""Number of shadow rays per light group of a camera sample elsewhere, for all the light. Only the
+rays of beams that pass near an indenter are traced."""
 REFLECTED_SHADOW_RAYS = 4.0
-"""The same for points seen in the reflection of an interface, of which little reaches the
-camera."""
+"""Number of shadow rays for points seen in the reflection of an interface; few suffice, as little
+of their light reaches the camera."""
 CELLS_PER_SAMPLE = 8
-"""Cells that a camera sample averages where coatings are diffuse and reading a cell is cheap."""
+"""Number of cells that a camera sample averages where coatings are diffuse and reading a cell is
+cheap."""
 
 
 def shade(
@@ -49,7 +50,8 @@ def shade(
     thorough: bool,
     reflected: bool,
 ) -> list[mi.Color3f]:
-    """Radiance of visible points towards the camera, for each light group with lights of 1 mW.
+    """Return the radiance of visible points towards the camera, for each light group with lights of
+    1 mW.
 
     Args:
         field: the radiance cache.
@@ -65,8 +67,7 @@ def shade(
     if thorough:
         region = surface_region(table, points.surface, points.valid)
         raised = points.valid & (region >= int(Region.INDENTER))
-        # Behind an indenter, along the line of sight, lies the undeformed surface that the eye
-        # would have met.
+        # The line of sight continues behind an indenter to the undeformed surface.
         onward = scenes.fixed.intersect(Ray(points.point, -points.towards_eye, raised))
         base = dr.select(raised & onward.valid, onward.point, points.point)
     seen = active
@@ -106,21 +107,23 @@ def shade(
         return totals
     shadow_rays = dr.opaque(mi.Float, REFLECTED_SHADOW_RAYS if reflected else SHADOW_RAYS)
     hidden = sum_hidden(culled_beams, totals, indenters.scene, at, shadow_rays)
-    # Where all is hidden, the sum of the shares may be a little more than all.
+    # Where all light is occluded, rounding may make the sum of the shares exceed the total.
     return [dr.maximum(one - other, 0) for one, other in zip(totals, hidden, strict=True)]
 
 
 def beside_contacts(
     field: RadianceCache, scenes: ContactScenes, points: VisiblePoints, directions: int
 ) -> list[mi.Color3f]:
-    """Radiance of points on the undeformed skin that indenters have reflected to it, one colour per
-    group.
+    """Return the radiance of points on the undeformed skin due to light from indenters.
 
     Args:
         field: the radiance cache.
         scenes: the scenes of the image, with indenters.
         points: the points.
-        directions: in which each looks for it; metal coatings have a number of their own.
+        directions: number of rays from each point; metallic coatings use a number of their own.
+
+    Returns:
+        The radiance towards the camera, one colour per light group.
     """
     table = scenes.full.table
     cell, shift, active = interpolating_cell(

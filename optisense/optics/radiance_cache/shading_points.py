@@ -1,4 +1,4 @@
-"""Visible points, and where each of them reads the radiance cache."""
+"""Visible points, and the places where they read the radiance cache."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ class ShadingPoints:
 
     Attributes:
         seen: the visible points.
-        coating: what they are coated with.
-        start: mm, where shadow rays from them start.
-        cell: the cell where each reads the cache.
-        shift: mm, from the point to the place that lies in this cell.
-        active: which points count.
-        raised: which points lie on an indenter.
+        coating: the BSDF of their coating.
+        start: origin (mm) of the shadow rays from each point.
+        cell: number of the cell in which each point reads the cache.
+        shift: vector (mm) from the point to the place that lies in this cell.
+        active: mask of the points that count.
+        raised: mask of the points that lie on an indenter.
     """
 
     seen: VisiblePoints
@@ -43,10 +43,11 @@ def interpolating_cell(
     series: mi.UInt32,
     number: mi.UInt32,
 ) -> tuple[mi.UInt32, mi.Vector3f, mi.Bool]:
-    """A random cell next to points, the shift that led there, and whether there is one.
+    """Return a random cell next to each point, the shift (mm) that led there, and whether there is
+    one.
 
-    It is the same for all bins, as light that straddles two bins must not be counted twice. Over
-    the samples of a pixel, which are spread evenly, this interpolates between cells.
+    All bins are read in the same cell, as light that straddles two bins must not be counted twice.
+    Averaged over the samples of a pixel, which are spread evenly, this interpolates between cells.
     """
     home, found = cell_at(cells, base, active)
     upright, _ = plane_of(cells, home, found)

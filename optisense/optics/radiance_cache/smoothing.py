@@ -37,7 +37,8 @@ DENSITY_EXPONENT = 1 / 6
 and noise as its inverse; this exponent minimises their sum of squares, and both go to zero
 (Silverman 1986, chapter 4; Knaus and Zwicker 2011)."""
 LENGTH_EXPONENT = 2 / 3
-"""Exponent of the length over which light varies by which the radius grows, for the same reason."""
+"""Exponent with which the radius grows with the length over which light varies; it also minimises
+the sum of squared blur and squared noise."""
 MAX_RADIUS_RATIO = 0.3
 """Largest radius as a fraction of the length over which light varies. The blur that remains after
 sharpening is below 1 % (see `Kernels.sharpening`)."""
@@ -75,7 +76,7 @@ class WeightedSums:
 
     @classmethod
     def of(cls, matrix: csr_matrix) -> WeightedSums:
-        """The sums that a matrix makes."""
+        """Return the sums that multiplication with a matrix computes."""
         return cls(indices(matrix.indptr), indices(matrix.indices), floats(matrix.data), matrix)
 
 
@@ -84,10 +85,10 @@ class Smoothing:
     """The smoothing that is applied to tallied light.
 
     Attributes:
-        kernel: from mW on cells to mW/mm^2.
+        kernel: the smoothing kernel, which maps mW on cells to mW/mm^2.
         blur: the kernel with the blur of the cells themselves added.
-        correction: from smoothed light to light without the blur of kernel and cells, in cells in
-            or near the camera's view; None where it is not made.
+        correction: matrix (cells, cells) that undoes the blur of kernel and cells in smoothed
+            light, in cells in or near the camera's view; None without this correction.
     """
 
     kernel: WeightedSums
@@ -110,14 +111,14 @@ class Kernels:
         """Find the length over which light varies in each cell.
 
         Args:
-            cells: of the surface.
-            lamp_distance: (cells,) mm to the nearest lamp.
+            cells: the cells of the surface.
+            lamp_distance: (cells,) distance (mm) to the nearest lamp.
             density: landings per mm^2 for each emitted photon (1/mm^2).
             near: (cells,) whether a cell is in or near the camera's view. Other cells are smoothed
                 with the narrowest kernel, which saves time.
-            pilot_power: (2, cells, groups) mW on each cell, by the two halves of the pilot photons,
-                which show where light varies over less than the distance of the lamps.
-            pilot_density: pilot photons per mm^2 (1/mm^2).
+            pilot_power: (2, cells, groups) power (mW) of the two halves of the pilot photons on
+                each cell, which shows where light varies over less than the distance of the lamps.
+            pilot_density: density of the pilot photons (1/mm^2).
         """
         self.cells = cells
         self.near = np.ones(cells.cells, dtype=bool) if near is None else near
@@ -130,7 +131,7 @@ class Kernels:
         self._known: dict[tuple[int, bool], Smoothing] = {}
 
     def radii(self, photons: int) -> FloatArray:
-        """(cells,) mm: the kernel radius in each cell for this number of emitted photons."""
+        """Return the kernel radius (cells,), mm, for this number of emitted photons."""
         return self._radii(self.density * photons)
 
     def _radii(self, density: float) -> FloatArray:
@@ -144,13 +145,14 @@ class Kernels:
         return np.where(self.near, np.clip(best, least, most), MIN_RADIUS_CELLS_LIMIT * self._size)
 
     def smoothing(self, photons: int, corrected: bool = False) -> Smoothing:
-        """The kernels for this number of emitted photons.
+        """Return the kernels for this number of emitted photons.
 
         Args:
-            photons: emitted.
-            corrected: whether the blur of each direction bin is undone by itself. With K the kernel
+            photons: number of emitted photons.
+            corrected: whether the blur is undone in each direction bin by itself. With K the kernel
                 and B the blur, light L becomes 2 K L - B K L ("twicing", Stuetzle and Mittal 1979):
-                blur goes with the fourth power of the radius then. Noise is 1.2 times that of K.
+                the remaining blur grows with the fourth power of the radius, and the noise is 1.2
+                times that of K.
         """
         key = photons, corrected
         if key not in self._known:
@@ -170,15 +172,15 @@ class Kernels:
         return kernel_matrix(self.cells, np.sqrt(radii**2 + CELL_BLUR * self._size**2))
 
     def sharpening(self, landed: FloatArray, photons: int) -> FloatArray:
-        """Factors (cells, groups) that undo most of the blur of the kernel and the cells.
+        """Return factors (cells, groups) that undo most of the blur of the kernel and the cells.
 
-        The kernel lowers peaks and fills hollows. Applied to its own result, it shows by how much,
-        and the ratio is divided out: multiplicative bias correction (Jones, Linton and Nielsen
-        1995).
+        The kernel lowers peaks and fills hollows. Smoothing the smoothed light once more shows by
+        how much, and the ratio is divided out: multiplicative bias correction (Jones, Linton and
+        Nielsen 1995).
 
         Args:
-            landed: (cells, groups) mW on each cell.
-            photons: emitted photons.
+            landed: (cells, groups) power (mW) on each cell.
+            photons: number of emitted photons.
         """
         kernel = self.smoothing(photons)
         smooth = kernel.kernel.matrix @ landed
@@ -189,18 +191,18 @@ class Kernels:
 
 
 def varies_over(cells: SurfaceCells, halves: FloatArray, radii: FloatArray) -> FloatArray:
-    """(cells,) mm: the length over which light varies.
+    """Return the length (cells,), mm, over which light varies.
 
     It is the distance of a lamp whose light the kernel would blur as much: under a lamp at distance
-    h, a kernel of radius r lowers the peak by r^2 / (2 h^2). The blur is found by applying the
-    kernel to its own result. The product of what two halves of the photons give is free of their
-    noise, and it counts where it is larger than the noise. Light groups count alike, each relative
-    to its own light.
+    h, a kernel of radius r lowers the peak by r^2 / (2 h^2). The blur is measured by smoothing the
+    smoothed light once more. The product of the results of two halves of the photons is free of
+    their noise, and it counts where it is larger than the noise. Light groups have equal weights,
+    each relative to its own light.
 
     Args:
-        cells: of the surface.
-        halves: (2, cells, groups) mW on each cell.
-        radii: (cells,) mm of the kernels.
+        cells: the cells of the surface.
+        halves: (2, cells, groups) power (mW) of each half of the photons on each cell.
+        radii: (cells,) kernel radii (mm).
     """
     kernel = kernel_matrix(cells, radii)
     areas = cells.areas[:, None]
@@ -216,10 +218,11 @@ def varies_over(cells: SurfaceCells, halves: FloatArray, radii: FloatArray) -> F
 
 
 def kernel_matrix(cells: SurfaceCells, radii: FloatArray) -> csr_matrix:
-    """Epanechnikov's kernel around each cell, (cells, cells): from mW on cells to mW/mm^2.
+    """Return Epanechnikov's kernel (cells, cells) around each cell, which maps mW on cells to
+    mW/mm^2.
 
-    The kernel is normalised by the surface's area under it, so edges and oblique cells lose
-    nothing. Cells with another orientation (`MIN_NORMAL_COSINE`) do not count.
+    The kernel is normalised by the surface's area under it, so that no light is lost at edges and
+    on oblique cells. Cells with another orientation (`MIN_NORMAL_COSINE`) have no weight.
     """
     tree = cKDTree(cells.centres)
     near = tree.sparse_distance_matrix(tree, float(radii.max()), output_type="coo_matrix").tocsr()
@@ -247,20 +250,20 @@ def smooth(
     groups: int,
     factors: mi.Float,
 ) -> list[Any]:
-    """Kernel-weighted sums over neighbouring cells of the chosen bins.
+    """Return kernel-weighted sums over neighbouring cells of the chosen bins.
 
     Args:
         kernel: the weights.
         cells: number of cells.
-        tables: to be smoothed; the first holds the moments of a radiance cache.
+        tables: the tables that are smoothed; the first holds the moments of a radiance cache.
         kinds: the type of an entry of each table: `mi.Float` or a vector.
-        bins: the chosen bins.
-        stride: bins per cell in the tables.
-        groups: light groups.
-        factors: (cells times groups) by which the sums are multiplied.
+        bins: the numbers of the chosen bins.
+        stride: number of bins per cell in the tables.
+        groups: number of light groups.
+        factors: (cells times groups) factors by which the sums are multiplied.
     """
     lane = dr.arange(mi.UInt32, cells * dr.width(bins) * groups)
-    used = dr.opaque(mi.UInt32, dr.width(bins))  # not part of the kernel, which then is kept
+    used = dr.opaque(mi.UInt32, dr.width(bins))  # one kernel for any number of bins
     group = lane % groups
     rest = lane // groups
     slot = dr.gather(mi.UInt32, bins, rest % used) * groups + group
@@ -270,7 +273,7 @@ def smooth(
     totals = [kind(0) for kind in kinds]
     while j < end:
         other = dr.gather(mi.UInt32, kernel.cell, j) * (stride * groups) + slot
-        # Most bins hold nothing: one look at the fourth float of the first table tells.
+        # Most bins are empty: the fourth float of their first table is 0.
         if dr.gather(mi.Float, tables[0], other * 4 + 3) != 0:
             weight = dr.gather(mi.Float, kernel.weight, j)
             for i in range(len(kinds)):

@@ -33,12 +33,12 @@ from optisense.optics.transport.photons import (
 from optisense.optics.transport.volume_flux import FluxLayer, flux_layer_above
 
 PASS_PHOTONS = 500_000
-"""Photons of one pass. A pass of this size keeps the photon map near 30 MB; progress and Ctrl-C are
-looked at between passes."""
+"""Number of photons of one pass. A pass of this size keeps the photon map near 30 MB; progress is
+reported and Ctrl-C obeyed between passes."""
 MAX_SINGLE_PASS = 2.5 * PASS_PHOTONS
 """Number of photons below which all are traced in one pass, as each pass has a fixed cost."""
 PILOT_PHOTONS = 300_000
-"""Photons of the pilot pass, from which the emission guide is learned."""
+"""Number of photons of the pilot pass, from which the emission guide is learned."""
 CELL_SIZE = 0.5
 """Side (mm) of the surface cells; larger where the tally would exceed `MAX_TALLY_BYTES`."""
 PILOT_CELL_SIZE = 1.0
@@ -46,7 +46,8 @@ PILOT_CELL_SIZE = 1.0
 MAX_TALLY_BYTES = 375e6
 """Memory (bytes) that the tally of one seed may take. Cells are made larger to stay below it."""
 MAX_FINE_TALLY_BYTES = 750e6
-"""The same with finer direction bins than those of diffuse coatings."""
+"""Memory (bytes) that the tally of one seed may take with the fine direction bins of narrow
+lobes."""
 VIEW_MARGIN = 2.0
 """Margin (mm) around what the camera sees to which photons are sent: light that lands there would
 meet the flank of an indenter."""
@@ -54,7 +55,7 @@ SMOOTHED_MARGIN = 5.0
 """Margin (mm) around what the camera sees, beyond which cells are smoothed with the narrowest
 kernel only, as few of them are read."""
 MAX_CACHES = 2
-"""Radiance caches that a store keeps; the oldest is dropped when there are more."""
+"""Number of radiance caches that a store keeps; the oldest is dropped when there are more."""
 GRAZING_SHARE_LIMIT = 0.25
 """Share of grazing light above which indenters are lit by the volume flux above the surface as
 well."""
@@ -77,18 +78,18 @@ class _Running:
 
 @dataclass(frozen=True)
 class LitScene:
-    """A sensor without contacts, as photons meet it.
+    """A sensor without contacts, ready for photon tracing.
 
     Attributes:
         scene: its surfaces.
         opaque: its opaque pieces.
-        table: the lights.
+        table: its lights.
         coloured: whether surfaces are coloured.
         roughness: GGX alpha of the sharpest metallic lobe of a coating; None without metal.
-        pilot: what pilot photons fly through; the scene itself if None. Where photons first land
-            does not depend on the coating. If pilot photons always meet the same one, neither do
-            images depend on the coating that a sensor had when its guide was learned.
-        pilot_coloured: whether the surfaces of that are coloured.
+        pilot: the scene that pilot photons are traced in; ``scene`` if None. The first landings of
+            photons do not depend on the coating. With the same coating in every pilot pass, images
+            do not depend on the coating that the sensor had when its guide was learned.
+        pilot_coloured: whether the surfaces of ``pilot`` are coloured.
     """
 
     scene: RayScene
@@ -101,7 +102,7 @@ class LitScene:
 
     @classmethod
     def of(cls, scenes: SensorScenes) -> LitScene:
-        """The sensor of these scenes."""
+        """Return the sensor of these scenes."""
         return cls(
             scenes.full,
             scenes.opaque,
@@ -114,23 +115,24 @@ class LitScene:
 
 
 class CacheStore:
-    """Traces photons pass by pass, and keeps the tallies and the caches that they give."""
+    """Tracer of photon passes that keeps the tallies and the radiance caches computed from them."""
 
     cell_size = CELL_SIZE
     tells_curved = True
     """Whether curved surfaces get direction bins of their own."""
     uses_pilot = True
-    """Whether the photons that teach the guide also tell how light falls: indenters are then lit
-    from a field above the surface where it grazes, and kernels are narrower where it varies."""
+    """Whether the pilot photons also estimate the distribution of the light: where it grazes,
+    indenters are then lit by the flux layer above the surface, and where it varies, kernels are
+    narrower."""
     groups: frozenset[int] | None = None
-    """The light groups whose light is traced; all where it is None."""
+    """The light groups whose light is traced; all groups if None."""
 
     def __init__(self, lit: LitScene, seen: NDArray[np.floating]) -> None:
-        """Keep what the caches depend on; nothing is traced yet.
+        """Create an empty store; nothing is traced yet.
 
         Args:
             lit: the sensor.
-            seen: (n, 3) mm, points that the camera sees.
+            seen: (n, 3) points (mm) that the camera sees.
         """
         self._lit = lit
         self._seen = seen
@@ -143,8 +145,10 @@ class CacheStore:
         self._done: dict[tuple[_Traced, int], RadianceCache] = {}
 
     def coated(self, lit: LitScene) -> Self:
-        """The store of the same sensor with another coating, and without any light. It takes over
-        the guide, and the cells unless other colours or lobes call for other sizes.
+        """Return a store, without any light, of the same sensor with another coating.
+
+        It takes over the guide, and also the cells unless the colours or lobes of the coating need
+        cells of another size.
         """
         other = copy(self)
         other._lit = lit
@@ -155,12 +159,12 @@ class CacheStore:
 
     @property
     def _directions(self) -> DirectionBins:
-        """The direction bins that the coating calls for."""
+        """The direction bins that the coating needs."""
         return DirectionBins.for_coating(self._lit.roughness, self._curved and not self._grazes)
 
     @cached_property
     def _curved(self) -> bool:
-        """Whether surfaces are curved, and get direction bins of their own."""
+        """Whether surfaces are curved and `tells_curved` gives them direction bins of their own."""
         return self.tells_curved and any(piece.normals is not None for piece in self._lit.opaque)
 
     @property
@@ -219,7 +223,7 @@ class CacheStore:
 
     @cached_property
     def _target(self) -> tuple[SurfaceCells, NDArray[np.bool_]]:
-        """Coarse cells over all opaque surfaces, and which of them (cells,) lie in or near the
+        """Coarse cells over all opaque surfaces, and the mask (cells,) of those in or near the
         view.
         """
         cells = build_cells(*self._opaque_mesh, PILOT_CELL_SIZE)
@@ -263,7 +267,7 @@ class CacheStore:
         return self._kernels
 
     def _lamp_distance(self, points: NDArray[np.floating]) -> NDArray[np.floating]:
-        """(n,) mm from points to the nearest lamp's window."""
+        """Return the distance (n,), mm, from points to the window of the nearest lamp."""
         lamps = self._lit.table.emitters
         places = np.array([lamp.position for lamp in lamps])
         nearest, which = cKDTree(places).query(points)
@@ -281,13 +285,13 @@ class CacheStore:
         on_stage: StageCallback,
         partial: bool = True,
     ) -> tuple[RadianceCache, bool]:
-        """The cache after ``photons``, or once ``noise`` or ``seconds`` are reached.
+        """Return the cache after ``photons``, or once ``noise`` or ``seconds`` are reached.
 
         Args:
-            seed: of the photons.
-            photons: number to emit; None for no such limit.
+            seed: seed of the photons.
+            photons: number of photons to emit; None for no such limit.
             noise: relative RMS noise to reach; None for no such limit.
-            seconds: since ``began``; None for no such limit.
+            seconds: time since ``began``; None for no such limit.
             most: number of photons at which tracing ends in any case.
             began: start of the render (`time.perf_counter`).
             on_stage: called when a stage begins and after each pass; see `StageCallback`.
@@ -297,7 +301,7 @@ class CacheStore:
             The cache, and whether Ctrl-C ended the tracing early.
         """
         lights = self._lit.table.count
-        # A pass costs a little by itself, so few photons are one.
+        # Each pass has a fixed cost, so that few photons are traced in a single pass.
         size = photons if photons is not None and photons < MAX_SINGLE_PASS else PASS_PHOTONS
         per_light = max(1, size // lights)
         wanted = None if photons is None else max(1, round(photons / (per_light * lights)))
@@ -310,7 +314,8 @@ class CacheStore:
         if self._guide is None:
             on_stage(Stage.PILOT, 0.0, 0, None)
         running = self._running.get(key)
-        # Only a number of photons is reached in the same way from those that are there already.
+        # Tracing can continue from the photons of an earlier call only if the number of photons is
+        # the one limit.
         timed = noise is not None or seconds is not None
         if running is None or wanted is None or timed or running.tally.passes > wanted:
             running = _Running(
@@ -364,7 +369,7 @@ class CacheStore:
                         break
                 on_stage(Stage.PHOTONS, fraction, tally.photons, reached)
         except KeyboardInterrupt:
-            self._running.clear()  # the last pass may be there in part
+            self._running.clear()  # the tally may hold a part of the last pass
             if tally.passes < 1 or not partial:
                 raise
             interrupted = True

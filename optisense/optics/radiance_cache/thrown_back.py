@@ -1,9 +1,10 @@
 """Light that contacts reflect to metal coatings through the interfaces.
 
-The radiance cache is that of the undeformed skin. A metallic coating mirrors the faces of gel and
-glass in front of it, and these mirror the contacts. So a few rays are drawn from the lobes of each
-visible point and followed as paths from the camera are. Where one ends on an indenter, the light of
-that place takes the place of what the undeformed skin behind it sends, which the cache has.
+The radiance cache holds the light of the undeformed skin. A metallic coating reflects the faces of
+gel and glass in front of it, and these reflect the contacts. A few rays are therefore drawn from
+the lobes of each visible point and followed like paths from the camera. Where a ray ends on an
+indenter, the light of that place replaces the light of the undeformed skin behind it, which is in
+the cache.
 """
 
 from __future__ import annotations
@@ -32,24 +33,26 @@ from optisense.optics.transport.camera_paths import PathEnd, VisiblePoints, foll
 from optisense.optics.transport.interact import Path
 
 MIN_LANES = 2
-"""Fewest places that are shaded at once: Dr.Jit compiles other kernels for single ones."""
+"""Lower bound on the number of places that are shaded at once, as Dr.Jit compiles other kernels for
+arrays of one entry."""
 
 
 def thrown_back(
     field: RadianceCache, scenes: ContactScenes, points: VisiblePoints, rays: int
 ) -> tuple[VisiblePoints, list[mi.Color3f]] | None:
-    """The light that indenters reflect back to visible points.
+    """Return the light that indenters reflect to visible points through the interfaces.
 
     Args:
         field: the radiance cache.
         scenes: the scenes of the image, with indenters.
-        points: what the camera sees.
-        rays: that go out from each.
+        points: the visible points.
+        rays: number of rays from each point.
 
     Returns:
-        The places on indenters that rays end on, with pixels and weights of the points that they
-        came from; and by how much these send more than the undeformed skin would, one colour per
-        group (less than none before brighter skin). None where no ray ends on an indenter.
+        The places on indenters where rays end, with the pixels and weights of the points that the
+        rays start from; and the difference between the radiance of each place and that of the
+        undeformed skin behind it, one colour per group (negative in front of brighter skin). None
+        if no ray ends on an indenter.
     """
     lane = dr.arange(mi.UInt32, dr.width(points.pixel) * rays)
     points = dr.gather(VisiblePoints, points, lane // rays)
@@ -77,8 +80,10 @@ def thrown_back(
 
 
 def _ends(scenes: ContactScenes, points: VisiblePoints) -> Iterator[tuple[PathEnd, mi.UInt32]]:
-    """Where rays from points end, and the number of the point of each: first of those that go
-    through interfaces, then of what interfaces reflect of them.
+    """Yield the ends of rays from points, and the number of the point that each ray starts from.
+
+    The first item holds the rays that pass through interfaces, the second their reflections at
+    interfaces.
     """
     scene = scenes.full
     coating = coating_of(scene.table, points.surface, points.valid)
@@ -91,7 +96,7 @@ def _ends(scenes: ContactScenes, points: VisiblePoints) -> Iterator[tuple[PathEn
     weight *= points.weight
     looks = points.valid & (dr.dot(way, points.face_normal) > 0) & (dr.max(weight) > 0)
     ray = Ray(leave(points.point, points.face_normal, way), way, looks)
-    # An indenter that is met before any interface is a matter of interreflection.
+    # Rays that meet an indenter before any interface belong to interreflection.
     first = scene.intersect(ray)
     kind, _, _ = surface_kind(scene.table, first.surface, first.valid)
     ray.active &= first.valid & (kind == int(SurfaceKind.DIELECTRIC))
@@ -116,7 +121,7 @@ def _ends(scenes: ContactScenes, points: VisiblePoints) -> Iterator[tuple[PathEn
 
 
 def _changes(field: RadianceCache, scenes: ContactScenes, seen: VisiblePoints) -> list[mi.Color3f]:
-    """What places on indenters send, less what the undeformed skin behind them would."""
+    """Return the radiance of places on indenters minus that of the undeformed skin behind them."""
     away = -seen.towards_eye
     behind = scenes.fixed.intersect(Ray(seen.point, away, seen.valid))
     base = dr.select(behind.valid, behind.point, seen.point)
