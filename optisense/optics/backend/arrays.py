@@ -1,7 +1,7 @@
 """Device arrays copied from NumPy arrays.
 
-The copies lie in memory of their own, because the alignment of a NumPy array would become part of
-compiled kernels, which could then not be used again.
+The copies have memory of their own, because the alignment of a NumPy array would become part of
+compiled kernels, which could then not be reused.
 """
 
 from __future__ import annotations
@@ -18,7 +18,9 @@ Value = TypeVar("Value")
 
 
 def gathered(value: Value, lanes: mi.UInt32) -> Value:
-    """Some lanes of an array, or of each array of a dataclass; fields that are None stay None."""
+    """Return the given lanes of an array, or of each array of a dataclass; fields that are None
+    stay None.
+    """
     if value is None:
         return value
     if is_dataclass(value) and not isinstance(value, type):
@@ -28,7 +30,7 @@ def gathered(value: Value, lanes: mi.UInt32) -> Value:
 
 
 def joined(first: Value, second: Value) -> Value:
-    """One array after the other, or so each array of two tuples or dataclasses of arrays."""
+    """Concatenate two arrays, or the corresponding arrays of two tuples or dataclasses."""
     if isinstance(first, tuple) and isinstance(second, tuple):
         return type(first)(joined(one, other) for one, other in zip(first, second, strict=True))
     if is_dataclass(first) and not isinstance(first, type):
@@ -42,14 +44,14 @@ def joined(first: Value, second: Value) -> Value:
 
 
 def floats(values: NDArray[np.floating]) -> mi.Float:
-    """All values of an array, row after row."""
+    """Return all values of an array as device floats, flattened in row-major order."""
     held = mi.Float(np.asarray(values, dtype=np.float32).ravel()) + dr.opaque(mi.Float, 0)
     dr.eval(held)
     return held
 
 
 def indices(values: NDArray[np.integer] | NDArray[np.bool_]) -> mi.UInt32:
-    """All values of an array, row after row."""
+    """Return all values of an array as device integers, flattened in row-major order."""
     held = mi.UInt32(np.asarray(values, dtype=np.uint32).ravel()) + dr.opaque(mi.UInt32, 0)
     dr.eval(held)
     return held

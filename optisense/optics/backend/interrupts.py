@@ -1,4 +1,4 @@
-"""Ctrl-C while a loop or a branch is being recorded."""
+"""Handling of Ctrl-C while Dr.Jit records a loop or a branch."""
 
 from __future__ import annotations
 
@@ -13,8 +13,9 @@ _R = TypeVar("_R")
 def lets_ctrl_c_through(work: Callable[_P, _R]) -> Callable[_P, _R]:
     """Decorate a function that runs loops of Dr.Jit.
 
-    Dr.Jit turns whatever is raised while it records a loop or a branch into a RuntimeError; so
-    Ctrl-C at such a moment would look like a defect. It is a KeyboardInterrupt again here.
+    Dr.Jit turns any exception that is raised while it records a loop or a branch into a
+    RuntimeError, so that Ctrl-C at such a moment would look like a defect. The decorator raises
+    KeyboardInterrupt instead.
     """
 
     @functools.wraps(work)

@@ -1,9 +1,9 @@
-"""The system libraries that the renderer needs: finding a fit libLLVM, and libatomic.
+"""The system libraries that the renderer needs: a suitable libLLVM, and libatomic.
 
 Dr.Jit, the renderer's compiler, loads libLLVM the moment it is imported. With libLLVM 15 or 16 the
-first kernel on an AVX-512 machine aborts the whole process (``Cannot select: fminimum``), and with
-none at all every kernel fails. So a fit library is looked for *before* that, and its path handed
-to Dr.Jit through the variable ``DRJIT_LIBLLVM_PATH``.
+first kernel on an AVX-512 machine aborts the whole process (``Cannot select: fminimum``), and
+without libLLVM every kernel fails. A suitable library is therefore searched for *before* the
+import, and its path is passed to Dr.Jit in the variable ``DRJIT_LIBLLVM_PATH``.
 """
 
 from __future__ import annotations
@@ -21,10 +21,11 @@ from pathlib import Path
 from optisense.errors import SetupError
 
 MINIMUM_LLVM = 17
-"""Oldest libLLVM that does not abort the process (15 and 16 were seen to)."""
+"""Oldest major version of libLLVM that does not abort the process, as 15 and 16 do."""
 
 TESTED_LLVM = 19
-"""The version preferred when several are installed: the one the tests run with."""
+"""Major version of libLLVM preferred when several are installed: the one that the tests run
+with."""
 
 PATH_VARIABLE = "DRJIT_LIBLLVM_PATH"
 
@@ -73,7 +74,7 @@ class LlvmLibrary:
 
     @property
     def is_fit(self) -> bool:
-        """Whether the renderer can run on it without taking the process down."""
+        """Whether the renderer can use the library without aborting the process."""
         return self.version[0] >= MINIMUM_LLVM
 
     def __str__(self) -> str:
@@ -81,7 +82,7 @@ class LlvmLibrary:
 
 
 def install_command() -> str:
-    """The one command that installs a fit libLLVM on this kind of machine."""
+    """Return the command that installs a suitable libLLVM on this kind of machine."""
     if sys.platform == "darwin":
         return "brew install llvm"
     return system_command(
@@ -90,10 +91,10 @@ def install_command() -> str:
 
 
 def installed_llvms() -> list[LlvmLibrary]:
-    """Every libLLVM in the usual places, the most suitable one first.
+    """Return every libLLVM in the usual places, the most suitable one first.
 
-    Nothing is loaded into this process. Versions come from file and folder names, where these say
-    nothing from ``LLVMGetVersion`` called in a child process.
+    Nothing is loaded into this process. Versions come from file and folder names; if these contain
+    none, a child process calls ``LLVMGetVersion``.
     """
     libraries = {}
     for path in _library_files():
@@ -109,12 +110,13 @@ def installed_llvms() -> list[LlvmLibrary]:
 
 
 def find_llvm() -> LlvmLibrary:
-    """The libLLVM to render with, and ``DRJIT_LIBLLVM_PATH`` set to it.
+    """Find the libLLVM to render with, and set ``DRJIT_LIBLLVM_PATH`` to its path.
 
-    A path that the user has put in ``DRJIT_LIBLLVM_PATH`` is used as it is, after a check.
+    A path that the user has put in ``DRJIT_LIBLLVM_PATH`` is checked and used unchanged.
 
     Raises:
-        SetupError: there is none, or none new enough; the hint is the command to type.
+        SetupError: no libLLVM is found, or none that is new enough; the hint is the command that
+            installs one.
     """
     chosen = os.environ.get(PATH_VARIABLE)
     if chosen:
@@ -141,7 +143,7 @@ def find_llvm() -> LlvmLibrary:
 
 
 def _check_chosen(chosen: str) -> LlvmLibrary:
-    """The library the user named in ``DRJIT_LIBLLVM_PATH``, checked."""
+    """Check and return the library that the user named in ``DRJIT_LIBLLVM_PATH``."""
     where = f"{PATH_VARIABLE}={chosen}"
     hint = f"Unset {PATH_VARIABLE}, or set it to libLLVM {MINIMUM_LLVM} or newer"
     path = Path(chosen)
@@ -161,7 +163,7 @@ def _check_chosen(chosen: str) -> LlvmLibrary:
 
 
 def system_command(apt: str, dnf: str, pacman: str, zypper: str) -> str:
-    """The command that installs a package, given its name in each package manager."""
+    """Return the command that installs a package, given its name in each package manager."""
     for tool, command in (
         ("apt-get", f"apt-get install {apt}"),
         ("dnf", f"dnf install {dnf}"),
@@ -181,7 +183,7 @@ def load_atomic() -> None:
     misleading message.
 
     Raises:
-        SetupError: there is none; the hint is the command to type.
+        SetupError: libatomic is not found; the hint is the command that installs it.
     """
     if sys.platform != "linux":
         return
@@ -199,15 +201,15 @@ def load_atomic() -> None:
 
 
 def _environment_folders() -> list[Path]:
-    """Where a virtual environment, and the one that it was made from, keep libraries.
+    """Return the library folders of a virtual environment and of the one that it was made from.
 
-    Packages such as conda's libllvm19 and libgcc put them there.
+    Packages such as conda's libllvm19 and libgcc install libraries there.
     """
     return [Path(prefix) / "lib" for prefix in dict.fromkeys((sys.prefix, sys.base_prefix))]
 
 
 def _library_files() -> Iterator[Path]:
-    """Files that look like a libLLVM, in the usual places."""
+    """Yield the files in the usual places whose names are those of a libLLVM."""
     if sys.platform in _FILE_NAMES:
         for folder in _environment_folders():
             yield from sorted(folder.glob(_FILE_NAMES[sys.platform]))
@@ -220,7 +222,7 @@ def _library_files() -> Iterator[Path]:
 
 
 def _version_of(path: Path) -> tuple[int, int] | None:
-    """Version of the libLLVM at a resolved path, None if it cannot be found out."""
+    """Return the version of the libLLVM at a resolved path, or None if it cannot be determined."""
     match = _VERSION_IN_NAME.match(path.name) or _VERSION_IN_FOLDER.search(str(path.parent))
     if match and path.name.startswith("libLLVM"):
         return int(match[1]), int(match[2] or 0)
@@ -228,7 +230,7 @@ def _version_of(path: Path) -> tuple[int, int] | None:
 
 
 def _ask_version(path: str) -> tuple[int, int] | None:
-    """Version by ``LLVMGetVersion`` (LLVM 16 and newer), asked in a child process."""
+    """Return the version that ``LLVMGetVersion`` (LLVM 16 and newer) reports in a child process."""
     try:
         answer = subprocess.run(
             [sys.executable, "-c", _ASK_VERSION, path],
@@ -244,7 +246,7 @@ def _ask_version(path: str) -> tuple[int, int] | None:
 
 
 def _loads(path: Path) -> bool:
-    """Whether the dynamic linker accepts the library (Dr.Jit will load the same one)."""
+    """Return whether the dynamic linker accepts the library, which Dr.Jit will load."""
     try:
         library = ctypes.CDLL(str(path))
     except OSError:

@@ -1,4 +1,4 @@
-"""Memory that Dr.Jit keeps for the next arrays, and how much of it may stay."""
+"""Limits on the freed memory that Dr.Jit keeps for further arrays."""
 
 from __future__ import annotations
 
@@ -11,25 +11,26 @@ from pathlib import Path
 import drjit as dr
 
 MOST_RESIDENT = 2 * 2**30
-"""Bytes that this process may take up before Dr.Jit's freed memory is given back. The light of a
-built-in sensor takes up to 1.5 GB to trace, of which less than 0.4 GB are in use afterwards."""
+"""Resident memory (bytes) of this process above which Dr.Jit's freed memory is returned to the
+system. Tracing the light of a built-in sensor takes up to 1.5 GB, of which less than 0.4 GB are in
+use afterwards."""
 
 
 def bound_memory() -> None:
-    """Give memory that Dr.Jit has freed and keeps back to the system, where it has become much.
+    """Return memory that Dr.Jit has freed to the system if the process exceeds `MOST_RESIDENT`.
 
-    Dr.Jit keeps the memory of arrays for others of the same size. Designs need different sizes, so
-    that models made in turn would take up more and more.
+    Dr.Jit keeps the memory of freed arrays for new ones of the same size. As designs need different
+    sizes, the memory of models made in turn would grow without bound.
     """
     if resident() > MOST_RESIDENT:
         dr.flush_malloc_cache()
 
 
 def release_memory() -> None:
-    """Give back to the system whatever nothing uses any more, freed pages of the C library too.
+    """Return all unused memory to the system, including freed pages of the C library.
 
-    It is for work that goes on to another sensor: after GelSight360 and then a Mini, 0.3 GB of 1.1
-    GB stay.
+    It is meant for work that continues with another sensor: after GelSight360 and then a Mini, 0.3
+    GB of 1.1 GB stay in use.
     """
     gc.collect()
     dr.sync_thread()
@@ -41,7 +42,9 @@ def release_memory() -> None:
 
 
 def resident() -> float:
-    """Bytes of memory that this process takes up; infinity where the system does not report it."""
+    """Return the resident memory (bytes) of this process; infinity if the system does not report
+    it.
+    """
     try:
         pages = int(Path("/proc/self/statm").read_text().split()[1])
     except (OSError, ValueError, IndexError):

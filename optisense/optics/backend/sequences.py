@@ -22,14 +22,15 @@ STEPS = _steps(4)
 STEPS_2D = _steps(2)
 """Steps of the two-dimensional sequence, in units of 2^-32."""
 RICHTMYER_STEPS = [round((prime**0.5 % 1) * 2**32) for prime in (2, 3, 5, 7)]
-"""Fractional parts of the square roots of primes (Richtmyer's sequence), in units of 2^-32. No
-simple fraction is near them, so that a few elements are spread evenly in each dimension alone, too;
-the first of `STEPS` is nearly 6/7."""
+"""Fractional parts of the square roots of primes (Richtmyer's sequence), in units of 2^-32. They
+are not close to simple fractions, so that a few elements are spread evenly in each single dimension
+as well; the first of `STEPS` is nearly 6/7."""
 GOLDEN_BITS = 0x9E3779B9
-"""2^32 over the golden ratio: multiples of it are far apart, as bits for members of a list."""
+"""Multiplier (2^32 over the golden ratio) that gives the members of a list bits of their own: its
+multiples are far apart."""
 HASH_ROUNDS = 8
-"""Rounds of the hash that shifts a Richtmyer sequence. With the usual four, similar bits give
-similar shifts."""
+"""Number of rounds of the hash that shifts a Richtmyer sequence. With the usual four, similar bits
+give similar shifts."""
 
 
 def unit_float(bits: mi.UInt32) -> mi.Float:
@@ -69,13 +70,13 @@ def in_series(series: mi.UInt32, number: mi.UInt32, dimension: int) -> mi.Float:
 
     Args:
         series: random bits that shift the sequence.
-        number: of the element.
-        dimension: of the coordinate.
+        number: number of the element.
+        dimension: index of the coordinate.
     """
     shift = mi.sample_tea_32(series, mi.UInt32(dimension), HASH_ROUNDS)[0]
     return unit_float(number * mi.UInt32(RICHTMYER_STEPS[dimension]) + shift)
 
 
 def seed_of(*numbers: int) -> int:
-    """One 32-bit seed from several numbers."""
+    """Hash several numbers into one 32-bit seed."""
     return int(np.random.SeedSequence([n & 0xFFFFFFFF for n in numbers]).generate_state(1)[0])

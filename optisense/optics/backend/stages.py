@@ -18,8 +18,8 @@ class Stage(Enum):
 
 
 StageCallback = Callable[[Stage, float, int, float | None], None]
-"""Called with the stage, the part of the photons that is traced (0 to 1), their number, and the
-relative noise if it is known."""
+"""A function that is called with the stage, the traced part of the photons (0 to 1), their number,
+and the relative noise if it is known."""
 
 _BEFORE = {
     Stage.PREPARING: 0.0,
@@ -29,11 +29,17 @@ _BEFORE = {
     Stage.SHADING: 0.85,
     Stage.DONE: 1.0,
 }
-"""The fraction of a render of five million photons that is over when a stage begins, roughly."""
+"""Approximate fraction of the time of a render of five million photons that has passed when each
+stage begins."""
 
 
 def fraction_done(stage: Stage, part: float) -> float:
-    """How much of a render is done, 0 to 1, roughly; ``part`` of its photons is traced."""
+    """Estimate the completed fraction (0 to 1) of a render.
+
+    Args:
+        stage: the current stage.
+        part: the traced part of the photons, 0 to 1.
+    """
     if stage is not Stage.PHOTONS:
         return _BEFORE[stage]
     return _BEFORE[stage] + part * (_BEFORE[Stage.SMOOTHING] - _BEFORE[stage])

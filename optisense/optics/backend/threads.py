@@ -6,7 +6,7 @@ from optisense.optics.backend.variant import import_renderer, select_variant
 
 
 def use_threads(count: int) -> None:
-    """Let Dr.Jit compute on so many threads, for processes that share a machine.
+    """Set the number of threads that Dr.Jit uses, for processes that share a machine.
 
     Raises:
         SetupError: the renderer can't run on this machine.

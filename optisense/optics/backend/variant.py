@@ -21,7 +21,7 @@ from optisense.errors import SetupError
 from optisense.optics.backend.llvm import MINIMUM_LLVM, PATH_VARIABLE, find_llvm, load_atomic
 
 VARIANTS = {"llvm": "llvm_ad_rgb", "cuda": "cuda_ad_rgb"}
-"""Mitsuba's name for each variant a user can ask for; ``auto`` picks one."""
+"""Mitsuba's name for each variant that a user can request; ``auto`` selects one."""
 
 
 @dataclass(frozen=True)
@@ -35,15 +35,15 @@ class KernelTest:
 
 
 def select_variant(variant: str = "auto") -> str:
-    """Mitsuba's name of the variant to render with.
+    """Return Mitsuba's name of the variant to render with.
 
     Args:
         variant: ``llvm`` (processor), ``cuda`` (NVIDIA GPU), or ``auto``: CUDA where a GPU can be
             used, LLVM otherwise.
 
     Returns:
-        ``"llvm_ad_rgb"`` or ``"cuda_ad_rgb"``, checked to be usable on this machine. The variant
-        is not activated.
+        ``"llvm_ad_rgb"`` or ``"cuda_ad_rgb"``, checked to be usable on this machine. The variant is
+        not activated.
 
     Raises:
         SetupError: an unknown variant, no GPU for ``cuda``, no fit libLLVM for ``llvm``, or no
@@ -82,7 +82,7 @@ def use_variant(variant: str = "auto") -> str:
     ``auto`` keeps the one that is already in use. Models of different variants must not be mixed.
 
     Raises:
-        SetupError: as :func:`select_variant`.
+        SetupError: the variant cannot be used on this machine, as in :func:`select_variant`.
     """
     name = select_variant(variant)
     mitsuba = import_renderer("mitsuba")
@@ -92,8 +92,9 @@ def use_variant(variant: str = "auto") -> str:
     elif current != name:
         with _loops_rewritten_on_first_call():
             mitsuba.set_variant(name)
-    # Where Dr.Jit may merge gathers into packets it writes one of several kernels by chance, and
-    # compiles them all in turn; without it the kernels are as fast and always the same.
+    # If Dr.Jit may merge gathers into packets, it generates one of several equivalent kernels by
+    # chance and compiles each of them sooner or later. Without merging, the kernels are as fast and
+    # always the same.
     drjit = import_renderer("drjit")
     drjit.set_flag(drjit.JitFlag.PacketOps, False)
     return name
@@ -101,10 +102,11 @@ def use_variant(variant: str = "auto") -> str:
 
 @contextmanager
 def _loops_rewritten_on_first_call() -> Iterator[None]:
-    """Put off what Dr.Jit's decorator for loops does, to the first call of each function.
+    """Postpone the work of Dr.Jit's decorator for loops to the first call of each function.
 
-    With a variant, Mitsuba loads integrators written in Python, which nothing here uses, and the
-    decorator parses and compiles the source of each anew: a sixth of a second.
+    When a variant is set, Mitsuba loads integrators written in Python that this package does not
+    use, and the decorator parses and compiles the source of each. This would take a sixth of a
+    second.
     """
     drjit = import_renderer("drjit")
     rewrite = drjit.syntax
@@ -126,7 +128,9 @@ def _loops_rewritten_on_first_call() -> Iterator[None]:
 
 
 def cuda_device_found() -> bool:
-    """Whether Dr.Jit sees a CUDA device and the driver has the OptiX library for ray tracing."""
+    """Return whether Dr.Jit finds a CUDA device and the driver has the OptiX library for ray
+    tracing.
+    """
     if sys.platform == "darwin" or not _cuda_driver_present():
         return False
     drjit = import_renderer("drjit")
@@ -137,8 +141,8 @@ def run_test_kernel(variant: str = "auto", timeout: float = 120.0) -> KernelTest
     """Compile and run a tiny kernel and trace a few rays, in a child process.
 
     Args:
-        variant: as for :func:`select_variant`.
-        timeout: seconds after which the child is ended.
+        variant: the variant, as in :func:`select_variant`.
+        timeout: time (s) after which the child process is ended.
     """
     command = (
         f"from optisense.optics.backend.variant import _kernel_child; _kernel_child({variant!r})"
@@ -187,10 +191,10 @@ def _kernel_child(variant: str) -> None:
 
 
 def _prepare_llvm() -> None:
-    """Find libLLVM in time; where Dr.Jit already runs, check the one it has loaded.
+    """Find libLLVM before Dr.Jit is imported; if it already is, check the one that it has loaded.
 
     Raises:
-        SetupError: none, or one that is too old.
+        SetupError: no libLLVM is found, or the loaded one is too old.
     """
     if "drjit" not in sys.modules:
         find_llvm()
@@ -215,7 +219,7 @@ def _prepare_llvm() -> None:
 
 
 def _cuda_driver_present() -> bool:
-    """Whether NVIDIA's driver is there with both CUDA and OptiX."""
+    """Return whether NVIDIA's driver is installed with both CUDA and OptiX."""
     names = (
         ("nvcuda.dll", "nvoptix.dll")
         if sys.platform == "win32"
@@ -233,10 +237,10 @@ def _cuda_driver_present() -> bool:
 
 
 def import_renderer(name: str) -> Any:
-    """Import Mitsuba or Dr.Jit, which must not happen when this module is imported.
+    """Import Mitsuba or Dr.Jit, which must not be imported together with this module.
 
     Raises:
-        SetupError: it is not installed, or a system library that it needs is not.
+        SetupError: the package, or a system library that it needs, is not installed.
     """
     load_atomic()
     try:

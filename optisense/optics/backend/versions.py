@@ -8,7 +8,7 @@ from importlib.metadata import PackageNotFoundError, version
 
 
 def versions(variant: str) -> dict[str, str]:
-    """Versions of the packages that decide a rendered number, for a run's record."""
+    """Return the versions of the packages that affect rendered values, for the record of a run."""
     return {"python": platform.python_version(), "variant": variant, **_installed()}
 
 

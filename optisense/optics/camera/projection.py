@@ -13,8 +13,9 @@ from optisense.design.lenses import LensDistortion
 
 
 class Pose(NamedTuple):
-    """Where a camera is and how it looks: mm, unit axes of the image, degrees across its width, and
-    the coefficients of its lens's distortion."""
+    """The pose and lens of a camera: position (mm), unit axes of the image, field of view across
+    the image's width (degrees), and coefficients of the lens's distortion.
+    """
 
     position: mi.Point3f
     right: mi.Vector3f
@@ -24,15 +25,22 @@ class Pose(NamedTuple):
     lens: tuple[mi.Float, ...] = ()
 
     def numbers(self) -> tuple[mi.Point3f | mi.Vector3f | mi.Float, ...]:
-        """All of them, one after the other."""
+        """Return all variables, one after the other."""
         return (*self[:-1], *self.lens)
 
 
 @dataclass(frozen=True)
 class RayCamera:
-    """A camera ready to shoot rays. ``fov`` is in degrees along the image's width.
+    """A camera that generates rays.
 
-    position, direction and up as in the design; width and height in pixels.
+    Attributes:
+        position: the camera's place, mm.
+        direction: the viewing direction.
+        up: a direction towards the top of the image; it need not be perpendicular to ``direction``.
+        fov: field of view across the image's width, degrees.
+        width, height: size of the image, pixels.
+        equidistant: whether the lens is an equidistant fisheye instead of a perspective lens.
+        distortion: the lens's distortion; None for an ideal lens.
     """
 
     position: tuple[float, float, float]
@@ -45,9 +53,7 @@ class RayCamera:
     distortion: LensDistortion | None = None
 
     def axes(self) -> np.ndarray:
-        """(3, 3): image right, image up, viewing direction as rows, right-handed as seen from
-        the camera.
-        """
+        """Return the unit axes (3, 3) as rows: image right, image up and viewing direction."""
         forward = np.asarray(self.direction, float)
         forward = forward / np.linalg.norm(forward)
         right = np.cross(forward, np.asarray(self.up, float))
@@ -55,16 +61,16 @@ class RayCamera:
         return np.stack([right, np.cross(right, forward), forward])
 
     def pose(self, rays: int = 1) -> Pose:
-        """Place, axes and field of view on the device.
+        """Return the position, axes and field of view as device arrays.
 
         Args:
-            rays: entries of each number. One serves all rays; as many as there are rays have
-                derivatives that are summed afterwards, and not amid them, where each sum would
-                compile all that leads to it once more.
+            rays: number of entries of each variable. With 1, all rays share it. With one entry per
+                ray, derivatives are summed after the backward pass and not within it, where each
+                sum would compile the preceding computation once more.
         """
 
         def number(value: float) -> mi.Float:
-            return dr.opaque(mi.Float, float(value), rays)  # no part of kernels: they serve all
+            return dr.opaque(mi.Float, float(value), rays)  # opaque: one kernel for all values
 
         right, up, forward = (mi.Vector3f(*map(number, row)) for row in self.axes())
         lens = () if self.distortion is None else self.distortion.coefficients()
@@ -80,11 +86,11 @@ class RayCamera:
     def rays(
         self, x: mi.Float, y: mi.Float, pose: Pose | None = None
     ) -> tuple[mi.Point3f, mi.Vector3f]:
-        """Rays through film positions in pixels, (0, 0) the top left corner; unit directions.
+        """Return the origins (mm) and unit directions of the rays through film positions.
 
         Args:
-            x, y: pixels.
-            pose: the camera's own if None; another one to differentiate by.
+            x, y: film positions in pixels from the top left corner.
+            pose: the pose to use, for derivatives with respect to it; the camera's own if None.
         """
         position, right, up, forward, fov, lens = self.pose() if pose is None else pose
         half = fov * float(np.pi / 360)
@@ -111,11 +117,11 @@ class RayCamera:
         half: mi.Float,
         lens: tuple[mi.Float, ...],
     ) -> tuple[mi.Float, mi.Float]:
-        """The film position at which an ideal lens shows what this one shows at (u, v).
+        """Return the film position at which an ideal lens shows what this lens shows at (u, v).
 
-        Newton's method finds it without derivatives. One more step, of the functions themselves,
-        then has the derivatives by the field of view and by the coefficients (the implicit
-        function theorem), and changes nothing else.
+        Newton's method finds it without recording derivatives. One further recorded step does not
+        change the result, but carries the derivatives with respect to the field of view and the
+        coefficients (the implicit function theorem).
         """
         across, down = distortion.centre
         edge = half if self.equidistant else dr.tan(half)

@@ -1,4 +1,4 @@
-"""The picture that a camera would store of linear radiance, by its chain."""
+"""The picture that a camera stores of linear radiance, computed by its picture chain."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ def picture(
     chain: PictureChain | None = None,
     noise_seed: NoiseSeed = 0,
 ) -> NDArray[np.uint8]:
-    """An 8-bit picture (h, w, 3) of a radiance image.
+    """Return an 8-bit picture (h, w, 3) of a radiance image.
 
     Args:
-        radiance: (h, w, 3).
-        exposure: "auto" or a factor above 0.
-        chain: of the camera; the usual one if None.
-        noise_seed: of its noise, where it has some.
+        radiance: (h, w, 3) radiance, mW/(mm^2 sr).
+        exposure: factor on the radiance above 0, or "auto".
+        chain: picture chain of the camera; the default `PictureChain` if None.
+        noise_seed: seed of the camera's noise, if it has some.
 
     Raises:
         RenderError: the exposure is neither "auto" nor a number above 0.

@@ -1,4 +1,5 @@
-"""Light on its way: photons from the emitters, paths from the camera, chief rays, derivatives.
+"""Light transport: photons from the emitters, paths from the camera, chief rays, derivatives.
 
-A ray scene comes in. Photon maps, visible points and chief rays go out; nothing is kept.
+The functions take a ray scene and return photon maps, visible points and chief rays; no state is
+kept between calls.
 """

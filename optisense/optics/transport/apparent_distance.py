@@ -1,11 +1,11 @@
 """The apparent distance of the skin from the camera, after all reflections and refractions.
 
-A lens sees a point from all over its pupil. Seen from a place beside the pupil's middle, the point
-appears in another direction; the nearer it is, the more. How much is found with two rays more per
-place of the picture, one from a shifted pupil for each of its axes, and two in slightly other
-directions: all five meet the skin, and from where they do follows by how much the direction must
-change with the pupil for the same point to be seen. Refraction and mirrors are followed as they
-are. In air the result is one over the distance.
+A lens sees a point from its whole pupil. From a place beside the pupil's centre the point appears
+in another direction, and the nearer the point, the larger the change. The change is measured with
+five rays per place of the picture: the chief ray, one from a pupil shifted along each of its two
+axes, and two in slightly different directions. From their intersections with the skin follows the
+change of direction with the pupil that keeps the same point in sight. The rays are refracted and
+reflected as usual. In air the result is one over the distance.
 """
 
 from __future__ import annotations
@@ -27,21 +27,21 @@ from optisense.optics.transport.chief_rays import trace_to_skin
 FloatArray = NDArray[np.float64]
 
 PUPIL_SHIFT = 0.02
-"""mm by which the pupil is shifted: small against all distances, and large against the rounding of
-points (some 1e-6 mm)."""
+"""Shift of the pupil (mm): small against all distances, and large against the rounding of points
+(some 1e-6 mm)."""
 
 FILM_SHIFT = 0.1
 """Distance in pixels by which rays are turned: small against a pixel, large against the rounding of
 directions."""
 
 LARGEST = 10.0
-"""1/mm: nothing appears nearer than a tenth of a millimetre; larger values come from rays that meet
-another part than their neighbours."""
+"""Upper bound on the vergence (1/mm), a distance of a tenth of a millimetre; larger values come
+from rays that meet another part than their neighbours."""
 
 
 FOCUS_ACROSS = 64
-"""Places across the picture at which it is found how far away things appear: depth of field varies
-slowly over a picture."""
+"""Number of places across the picture at which the apparent distance is computed; few suffice, as
+the blur of depth of field varies slowly over a picture."""
 
 
 def focused_chain(
@@ -49,12 +49,13 @@ def focused_chain(
     scene: Callable[[], RayScene],
     rays: Callable[[tuple[int, int]], RayCamera],
 ) -> PictureChain:
-    """The chain of a design's camera, with the blur of its depth of field, if it has one.
+    """Return the picture chain of a design's camera, with the blur of its depth of field, if it has
+    one.
 
     Args:
-        camera: of the design.
-        scene: makes the surfaces; called where the blur depends on depth.
-        rays: makes the camera of a resolution.
+        camera: the camera of the design.
+        scene: function that returns the surfaces; called only if the blur depends on depth.
+        rays: function that returns the ray camera of a resolution.
     """
     if camera.blur is None or not camera.blur.by_depth:
         return camera.picture_chain()
@@ -64,7 +65,7 @@ def focused_chain(
 
 
 def apparent_vergence(scene: RayScene, camera: RayCamera) -> FloatArray:
-    """One over the distance at which the skin appears, for the middle of each pixel.
+    """Return one over the distance at which the skin appears, for the middle of each pixel.
 
     Distances are measured along the axis for perspective lenses, whose field of focus is flat, and
     along the ray for fisheyes. A lens that sees the two directions across a ray at different
@@ -73,10 +74,10 @@ def apparent_vergence(scene: RayScene, camera: RayCamera) -> FloatArray:
 
     Args:
         scene: the surfaces.
-        camera: its pixels.
+        camera: the camera whose pixels are evaluated.
 
     Returns:
-        (h, w) 1/mm; 0 where no pixel sees the skin.
+        The vergence (h, w), 1/mm; 0 everywhere if no pixel sees the skin.
     """
     height, width = camera.height, camera.width
     index = np.arange(height * width)
@@ -113,7 +114,7 @@ def apparent_vergence(scene: RayScene, camera: RayCamera) -> FloatArray:
 def _rays(
     camera: RayCamera, x: NDArray[np.floating], y: NDArray[np.floating]
 ) -> tuple[FloatArray, FloatArray]:
-    """(k, 3), (k, 3): places and directions in double precision."""
+    """Return origins (k, 3), mm, and directions (k, 3) of rays in double precision."""
     origin, direction = camera.rays(floats(x), floats(y))
     dr.eval(origin, direction)
     unit = np.asarray(direction, dtype=np.float64).T
@@ -121,13 +122,13 @@ def _rays(
 
 
 def _solved(matrix: FloatArray, right: FloatArray) -> FloatArray:
-    """(k, 2, 2): the least-squares solution of matrix (k, 3, 2) times it = right (k, 3, 2)."""
+    """Return the least-squares solutions x (k, 2, 2) of matrix (k, 3, 2) x = right (k, 3, 2)."""
     turned = np.swapaxes(matrix, 1, 2)
     return np.linalg.inv(_safe(turned @ matrix)) @ turned @ right
 
 
 def _safe(matrix: FloatArray) -> FloatArray:
-    """Matrices (k, 2, 2) with NaN in place of those that can't be inverted."""
+    """Return matrices (k, 2, 2) with NaN in place of those that cannot be inverted."""
     single = np.abs(np.linalg.det(matrix)) < 1e-30
     return np.where(single[:, None, None], np.nan, matrix)
 

@@ -1,8 +1,8 @@
-"""The camera pass: which points of the coating every pixel sees, and through what.
+"""The camera pass: paths from the pixels to the points of the coating that they see.
 
 The main path of a pixel sample always goes through smooth interfaces (weighted with the
-transmittance), so the image carries no noise of Fresnel reflections drawn at random. What
-interfaces reflect is followed by one more path a sample, its branch drawn in proportion to its
+transmittance), so the image has no noise of randomly drawn Fresnel reflections. The reflections at
+interfaces are followed by one further path per sample, whose branch is drawn in proportion to its
 weight.
 """
 
@@ -26,15 +26,14 @@ class PathEnd:
     """End points of paths from the camera.
 
     Attributes:
-        valid: whether on an opaque surface.
-        weight: multiplies the radiance that leaves the point along ``towards_eye``.
-        point: mm.
+        valid: mask of the paths that end on an opaque surface.
+        weight: factor on the radiance that leaves the point along ``towards_eye``.
+        point: the end point, mm.
         normal: the shading normal, on the path's side.
-        face_normal: that of the triangle, on the path's side.
-        towards_eye: unit vector.
+        face_normal: the normal of the triangle, on the path's side.
+        towards_eye: unit vector back along the path.
         surface: the surface's number.
-        light: the number + 1 of a light that the path ends on instead (its emission is seen), else
-            0.
+        light: the number + 1 of the light whose emitting face the path ends on, else 0.
     """
 
     valid: mi.Bool
@@ -49,14 +48,14 @@ class PathEnd:
 
 @dataclass
 class VisiblePoints(PathEnd):
-    """Points of opaque surfaces that the camera sees; one entry a path.
+    """Points of opaque surfaces that the camera sees, one entry per path.
 
     Attributes:
         pixel: the path's pixel.
-        random: random bits of the path's own.
-        series: random bits of its pixel. What the samples of a pixel draw from one series is
-            spread evenly.
-        number: of the sample in its pixel.
+        random: random bits of the path.
+        series: random bits of its pixel. The numbers that the samples of a pixel draw from one
+            series are spread evenly.
+        number: number of the sample in its pixel.
     """
 
     pixel: mi.UInt32
@@ -72,8 +71,8 @@ def follow(
     """Follow paths to their ends.
 
     Returns:
-        The ends; and, of a path from the camera, one of its reflections at interfaces, drawn in
-        proportion to its weight, and the weight of them all.
+        The ends; and for each path from the camera one of its reflections at interfaces, drawn in
+        proportion to its weight, and the sum of their weights.
     """
     found = mi.Bool(False)
     light = mi.UInt32(0)
@@ -124,8 +123,8 @@ def follow(
 
 
 def film_samples(pixel: mi.UInt32, width: int, sample: mi.UInt32, seed: int) -> mi.Point2f:
-    """Film positions of samples of pixels; sample 0 is the pixel's middle, the others are
-    spread over it.
+    """Return film positions of samples of pixels: sample 0 lies in the pixel's middle, and the
+    others are spread over the pixel.
     """
     jitter = sequence_2d(sample, pixel, dr.opaque(mi.UInt32, seed))
     middle = sample == 0
@@ -144,12 +143,12 @@ def find_visible_points(
     only_main: bool = False,
     channel: int | None = None,
 ) -> tuple[VisiblePoints, VisiblePoints | None]:
-    """Main and reflected visible points of film positions (the second are fewer, or none, as they
-    are with ``only_main``).
+    """Return the main and the reflected visible points of film positions.
 
-    With a ``channel`` the paths are those of its light alone, and have no weight in others.
-    What is drawn at random follows from pixel, ``number`` of the sample and seed alone, so that
-    each path is the same whichever others are traced with it.
+    There are fewer reflected points than main ones, and they may be None, as with ``only_main``.
+    With a ``channel`` the paths carry light of that channel only. Random numbers depend on pixel,
+    ``number`` of the sample and seed alone, so that a path does not depend on the others that are
+    traced with it.
     """
     dr.make_opaque(number)  # one kernel for all numbers
     stream = mi.sample_tea_32(number, dr.opaque(mi.UInt32, seed))[0]
@@ -185,7 +184,7 @@ def find_visible_points(
     alone = dr.width(kept) == 1
     if (
         alone
-    ):  # Dr.Jit compiles other kernels for arrays of one entry: add one that counts for nothing
+    ):  # Dr.Jit compiles other kernels for arrays of one entry: append an entry without weight
         kept = dr.repeat(kept, 2)
     pixel = dr.gather(mi.UInt32, pixel, lanes)
     found = VisiblePoints(**vars(end), pixel=pixel, random=other, series=series, number=number)
@@ -199,7 +198,7 @@ def find_visible_points(
 
 
 def generator(bits: mi.UInt32) -> mi.PCG32:
-    """Random numbers that follow from these bits and not from the place in an array."""
+    """Return random generators that depend on the given bits and not on the place in an array."""
     random = mi.PCG32()
     random.seed(mi.UInt64(bits), mi.UInt64(bits))
     return random

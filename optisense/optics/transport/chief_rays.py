@@ -1,4 +1,4 @@
-"""Chief rays: where on the sensing surface each pixel looks, refracted and reflected ideally."""
+"""Chief rays from the pixels to the sensing surface, with ideal refraction and reflection."""
 
 from __future__ import annotations
 
@@ -24,8 +24,8 @@ as in Knuth's multiplicative hashing."""
 
 
 MIRROR_BITS = 32
-"""Bits that tell which mirrors a ray has met: as many as a number of the kernel has. Mirrors whose
-surfaces' numbers differ by a multiple of it are told as one."""
+"""Number of bits that record the mirrors a ray has met: the bits of an unsigned integer of the
+kernel. Mirrors whose surface numbers differ by a multiple of it share a bit."""
 
 
 class RayOutcome(IntEnum):
@@ -40,14 +40,19 @@ class RayOutcome(IntEnum):
 
 @dataclass(frozen=True)
 class ChiefRays:
-    """One chief ray a pixel; arrays are (h, w, ...). Entries other than ``outcome`` count where
-    it is HIT.
+    """The chief rays of a picture, one per pixel; entries other than ``outcome`` are valid where it
+    is HIT.
 
-    points: mm; normals: unit, towards the ray; incidence: cosine of the angle between ray and
-    normal (1 is perpendicular); directions: unit, the way the ray travels when it arrives;
-    face: triangle of the sensing surface hit, in the order of its mesh; region: 1 sensing
-    surface, 2 indenter; mirrors: bit n % 32 is set where surface n of the scene, a mirror, has
-    reflected the ray.
+    Attributes:
+        points: (h, w, 3) end points, mm.
+        normals: (h, w, 3) unit normals, on the ray's side.
+        directions: (h, w, 3) unit vectors, the direction of travel on arrival.
+        incidence: (h, w) cosine of the angle between ray and normal (1 is perpendicular).
+        outcome: (h, w) `RayOutcome` of each ray.
+        face: (h, w) number of the triangle in the mesh of the sensing surface.
+        region: (h, w) 1 for the sensing surface, 2 for an indenter.
+        mirrors: (h, w) bits; bit n % 32 is set where surface n of the scene, a mirror, has
+            reflected the ray.
     """
 
     points: NDArray[np.float32]
@@ -61,12 +66,12 @@ class ChiefRays:
 
     @property
     def hit(self) -> NDArray[np.bool_]:
-        """(h, w): which pixels see the sensing surface."""
+        """Mask (h, w) of the pixels that see the sensing surface."""
         return self.outcome == RayOutcome.HIT
 
     @property
     def contact_mask(self) -> NDArray[np.bool_]:
-        """(h, w): which pixels see an indenter."""
+        """Mask (h, w) of the pixels that see an indenter."""
         return self.hit & (self.region == Region.INDENTER)
 
 
@@ -105,16 +110,19 @@ def _trace(scene: RayScene, patches: mi.UInt32 | None, ray: Ray) -> tuple[Any, .
 def trace_path_codes(
     scene: RayScene, camera: RayCamera, x: NDArray[np.floating], y: NDArray[np.floating]
 ) -> NDArray[np.uint32]:
-    """Codes of the smooth patches that chief rays meet in order, and where they are totally
-    reflected, as one number for each ray: rays of the same number move smoothly into one another.
+    """Return a code for the path of each chief ray.
+
+    The code is a hash of the smooth patches that the ray meets, in order, and of its total
+    reflections. Between rays of the same code the path changes smoothly.
 
     Args:
         scene: the surfaces.
-        camera: whose rays.
+        camera: the camera of the rays.
         x, y: (k,) film positions, pixels.
 
     Returns:
-        (k,): 0 for rays that do not arrive at the sensing surface, and never 0 for the others.
+        The codes (k,): 0 for rays that do not arrive at the sensing surface, and never 0 for the
+        others.
     """
     traced = _trace(scene, scene.patches, Ray(*camera.rays(floats(x), floats(y)), mi.Bool(True)))
     outcome, path = traced[0], traced[-1]
@@ -125,15 +133,15 @@ def trace_path_codes(
 def trace_to_skin(
     scene: RayScene, origin: NDArray[np.floating], direction: NDArray[np.floating]
 ) -> tuple[NDArray[np.bool_], NDArray[np.float64]]:
-    """Follow rays from anywhere.
+    """Follow rays from given origins to the sensing surface.
 
     Args:
         scene: the surfaces.
-        origin: (k, 3) mm.
-        direction: (k, 3), unit.
+        origin: (k, 3) origins, mm.
+        direction: (k, 3) unit directions.
 
     Returns:
-        (k,) whether each arrives at the sensing surface, and (k, 3) mm where.
+        A mask (k,) of the rays that arrive at the sensing surface, and their end points (k, 3), mm.
     """
     start, way = (
         dr.unravel(kind, floats(each.ravel()))
@@ -149,8 +157,12 @@ def trace_chief_rays(
 ) -> ChiefRays:
     """Follow the ray through the middle of every pixel.
 
-    ``sensing_faces`` maps the scene's triangles to those of the sensing surface (-1, as for any
-    triangles that follow: another); without it ``face`` is -1 everywhere.
+    Args:
+        scene: the surfaces.
+        camera: the camera.
+        sensing_faces: (n,) for each of the scene's first n triangles, the number of the triangle of
+            the sensing surface, or -1 for other surfaces; further triangles count as -1. Without
+            it, ``face`` is -1 everywhere.
     """
     shape = camera.height, camera.width
     index = dr.arange(mi.UInt32, camera.width * camera.height)
@@ -182,8 +194,9 @@ def trace_chief_rays(
 
 
 def pixel_areas(rays: ChiefRays) -> NDArray[np.float64]:
-    """(h, w) mm^2 of surface behind each pixel, from its neighbours' points; 0 where these do
-    not hit.
+    """Return the area (h, w), mm^2, of the surface that each pixel sees.
+
+    It is computed from the points of the pixel's neighbours, and is 0 where these do not hit.
     """
     p = rays.points.astype(np.float64)
     along_x = np.zeros_like(p)
@@ -203,13 +216,14 @@ def pixel_areas(rays: ChiefRays) -> NDArray[np.float64]:
 
 
 def pixel_stretching(rays: ChiefRays) -> NDArray[np.float64]:
-    """How much longer than wide a small circle of the picture is on the sensing surface.
+    """Return the ratio of length to width of a pixel's footprint on the sensing surface.
 
-    The map from the picture to the surface is linear around a pixel; the value is the ratio of its
-    singular values. 1 keeps all angles; 3 shows a ball as an ellipse three times as long as wide.
+    The map from the picture to the surface is linear around a pixel; the result is the ratio of its
+    singular values. With 1 all angles are kept; with 3 a ball appears as an ellipse three times as
+    long as wide.
 
     Returns:
-        (h, w), 1 or more; NaN where the pixel or a neighbour does not see the surface.
+        The ratio (h, w), at least 1; NaN where the pixel or a neighbour does not see the surface.
     """
     p = rays.points.astype(np.float64)
     found = np.full(rays.hit.shape, np.nan)
@@ -235,11 +249,11 @@ def pixel_stretching(rays: ChiefRays) -> NDArray[np.float64]:
 def shares_by_mirrors(
     rays: ChiefRays, mirrors: list[tuple[int, str]]
 ) -> dict[frozenset[str], float]:
-    """The shares of the rays that arrive, by the set of mirrors that reflect them on their way.
+    """Return the shares of the rays that arrive, by the set of mirrors that reflect them.
 
     Args:
         rays: chief rays.
-        mirrors: bits of ``rays.mirrors``, and the mirror that each stands for.
+        mirrors: pairs of a bit of ``rays.mirrors`` and the name of the mirror that it stands for.
     """
     met, counts = np.unique(rays.mirrors[rays.hit], return_counts=True)
     shares: dict[frozenset[str], float] = {}
@@ -250,7 +264,9 @@ def shares_by_mirrors(
 
 
 def sees_nothing(rays: ChiefRays) -> RenderError:
-    """The error to raise where no chief ray meets the sensing surface; says what became of them."""
+    """Return the error to raise if no chief ray meets the sensing surface; it reports their
+    outcomes.
+    """
     names = {outcome: outcome.name.lower().replace("_", " ") for outcome in RayOutcome}
     counts = {names[o]: int((rays.outcome == o).sum()) for o in RayOutcome}
     met = ", ".join(f"{name}: {count}" for name, count in counts.items() if count)

@@ -1,9 +1,9 @@
 """Emission guiding: for each light, a sampling density over the unit square of its emission angles.
 
-Light that never reaches the sensing surface (it leaves through a side, or circles in the light
-guide) tells nothing. A pilot pass finds out from which emission angles photons arrive. Later passes
-sample these more densely and weight each photon with the inverse of the density, so the estimate
-stays unbiased: no cell gets less than `MIN_DENSITY` of the uniform density.
+Light that never reaches the sensing surface (it leaves through a side, or is trapped in the light
+guide) does not contribute. A pilot pass records the emission angles of the photons that arrive.
+Later passes sample these more densely and weight each photon with the inverse of the density, so
+the estimate stays unbiased: no cell gets less than `MIN_DENSITY` of the uniform density.
 """
 
 from __future__ import annotations
@@ -16,7 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 GUIDE_CELLS = 16
-"""Cells along each side of a light's table over the unit square of its emission angles."""
+"""Number of cells along each side of a light's table over the unit square of its emission
+angles."""
 MIN_DENSITY = 0.15
 """Lower bound on the sampling density, relative to the uniform one. No angle is left out, so the
 estimate stays unbiased, and no photon weighs more than 1 / 0.15."""
@@ -29,7 +30,7 @@ class EmissionGuide:
     Attributes:
         rows: (lights, GUIDE_CELLS + 1), cumulative over the rows of a light's table.
         columns: (lights, GUIDE_CELLS, GUIDE_CELLS + 1), cumulative along each row.
-        arriving: the share of the sent photons that land where they are wanted; 1 if unknown.
+        arriving: the share of the emitted photons that land in the target cells; 1 if unknown.
     """
 
     rows: mi.Float
@@ -38,8 +39,10 @@ class EmissionGuide:
 
 
 def guide_from_density(density: NDArray[np.floating]) -> EmissionGuide:
-    """A guide whose sampling density follows ``density`` (lights, GUIDE_CELLS, GUIDE_CELLS), of
-    any scale, with a lower bound of MIN_DENSITY times its mean.
+    """Return a guide whose sampling density is proportional to ``density``.
+
+    ``density`` is (lights, GUIDE_CELLS, GUIDE_CELLS), of any scale; it is raised to at least
+    `MIN_DENSITY` times the mean of each light.
     """
     even = _floored(np.asarray(density, dtype=np.float64))
     by_row = even.sum(axis=2)
@@ -53,14 +56,14 @@ def guide_from_density(density: NDArray[np.floating]) -> EmissionGuide:
 
 
 def _floored(density: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Densities relative to the mean of each light, with the lower bound."""
+    """Return densities relative to the mean of each light, raised to at least `MIN_DENSITY`."""
     mean = density.mean(axis=(1, 2), keepdims=True)
     even = np.where(mean > 0, density / np.where(mean > 0, mean, 1), 1.0)
     return (1 - MIN_DENSITY) * even + MIN_DENSITY
 
 
 def uniform_guide(lights: int) -> EmissionGuide:
-    """A guide of uniform density."""
+    """Return a guide of uniform density."""
     return guide_from_density(np.ones((lights, GUIDE_CELLS, GUIDE_CELLS)))
 
 
@@ -82,7 +85,9 @@ def _invert(
 def warp(
     guide: EmissionGuide, light: mi.UInt32, sample: mi.Point2f
 ) -> tuple[mi.Point2f, mi.Float, mi.UInt32]:
-    """The sample moved by the guide, its weight (1 / density), and the number of its cell."""
+    """Return the sample warped by the guide, its weight (1 / density), and the number of its
+    cell.
+    """
     row, y, dy = _invert(guide.rows, light * (GUIDE_CELLS + 1), sample.x)
     column, x, dx = _invert(
         guide.columns, (light * GUIDE_CELLS + row) * (GUIDE_CELLS + 1), sample.y
@@ -93,12 +98,12 @@ def warp(
 
 
 def learn_guide(cells: mi.UInt32, lights: int, per_light: int) -> EmissionGuide:
-    """A guide from a pilot pass of uniform density.
+    """Learn a guide from a pilot pass of uniform density.
 
     Args:
-        cells: the cell (over all lights) of every photon that arrived.
+        cells: number of the guide's cell (over all lights) of every photon that arrived.
         lights: number of lights.
-        per_light: photons of each light in the pass.
+        per_light: number of photons of each light in the pass.
     """
     arrived = np.asarray(cells)
     arrived = arrived[arrived < lights * GUIDE_CELLS * GUIDE_CELLS]

@@ -1,8 +1,8 @@
-"""A ray meets a surface: the one place where light goes on from one surface to the next.
+"""The interaction of a ray with a surface, the same for all kinds of rays.
 
-Photons, paths from the camera, chief rays, drawn rays and their derivatives differ in what they
-carry and in which lobe they follow; where they are refracted, reflected or scattered to, with what
-weight, and when they are given up, is said here.
+Photons, paths from the camera, chief rays, drawn rays and their derivatives differ in the quantity
+that they carry and in the lobe that they follow. The direction of refraction, reflection or
+scattering, its weight and the end of a path are computed here for all of them.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ from optisense.optics.scene.surfaces import Region, SurfaceKind
 
 MAX_DEPTH = 64
 """Largest number of surfaces that any ray meets. In GelSight-like sensors less than 0.1 % of the
-photons' light gets so far."""
+photons' light remains after so many."""
 
 
 class Path(Enum):
@@ -48,7 +48,7 @@ class Path(Enum):
 
     @property
     def scatters(self) -> bool:
-        """Whether rays go on from opaque surfaces; others end there."""
+        """Whether rays continue from opaque surfaces; others end there."""
         return self is Path.PHOTON
 
     @property
@@ -58,13 +58,15 @@ class Path(Enum):
 
     @property
     def is_coherent(self) -> bool:
-        """Whether rays of neighbouring lanes are alike, which the ray tracer makes use of."""
+        """Whether rays of neighbouring lanes are similar, which lets the ray tracer handle them
+        faster.
+        """
         return self in (Path.CAMERA, Path.CHIEF)
 
 
 @dataclass
 class LobeSample:
-    """Random numbers, 0 to 1: which lobe, and where in it."""
+    """Random numbers from 0 to 1: ``pick`` chooses the lobe, ``place`` the direction in it."""
 
     pick: mi.Float = field(default_factory=lambda: mi.Float(0))
     place: mi.Point2f = field(default_factory=lambda: mi.Point2f(0))
@@ -83,27 +85,28 @@ class Interaction:
     """The interaction of a ray with the next surface that it meets.
 
     Attributes:
-        hit: where that is.
+        hit: the intersection.
         side: 1 where the ray comes from the side that the face normal points to, else -1.
-        eta: the index behind the face normal over the index before it.
-        region: of `Region`.
-        opaque: the surface is opaque.
-        light: it is the emitting face of a light.
-        scattered: the ray goes on from an opaque surface or a mirror.
-        sensed: it is the sensing surface or an indenter.
-        ended: the ray ends on anything else: a blocker, a light, another opaque surface.
-        goes_on: the ray neither ends nor escapes.
-        totally: it is totally reflected.
-        turned: it is reflected, by a mirror or at an interface.
-        lobe: the lobe that it follows.
-        reflection: what a smooth interface reflects beside the light that the ray goes on with;
-            of weight 0 where there is none.
-        absorption: the coefficient of the medium that the ray came through, per mm; None where
-            nothing absorbs.
+        eta: the index behind the face normal over the index in front of it.
+        region: the surface's `Region`.
+        opaque: mask of the rays that meet an opaque surface.
+        light: mask of the rays that meet the emitting face of a light.
+        scattered: mask of the rays that continue from an opaque surface or a mirror.
+        sensed: mask of the rays that meet the sensing surface or an indenter.
+        ended: mask of the rays that end on anything else: a blocker, a light, another opaque
+            surface.
+        goes_on: mask of the rays that neither end nor escape.
+        totally: mask of the rays that are totally reflected.
+        turned: mask of the rays that are reflected, by a mirror or at an interface.
+        lobe: the lobe that the ray follows.
+        reflection: the reflected lobe of a smooth interface through which the ray continues; of
+            weight 0 elsewhere.
+        absorption: the absorption coefficient (1/mm) of the medium that the ray came through; None
+            where nothing absorbs.
         transmittance: the share of the light that the medium leaves on the way to the surface, per
             channel. No weight of a lobe includes it.
-        ray: the ray that goes on; inactive where none does, or where it has met `MAX_DEPTH`
-            surfaces, and otherwise unchanged where none does.
+        ray: the ray that continues. Where none does, it is unchanged but inactive; it is also
+            inactive after `MAX_DEPTH` surfaces.
     """
 
     hit: SurfaceHit
@@ -130,9 +133,10 @@ class _Media:
     """Absorption coefficients on both sides of a surface that rays meet.
 
     Attributes:
-        known: whether the surface tells its media; elsewhere light stays in the one it is in.
-        before, behind: absorption coefficients in front of the face normal and behind it.
-        here: that of the medium that the ray comes through.
+        known: mask of the rays that meet a surface whose media are known; others stay in their
+            medium.
+        before, behind: absorption coefficients (1/mm) in front of the face normal and behind it.
+        here: absorption coefficient (1/mm) of the medium that the ray comes through.
     """
 
     known: mi.Bool
@@ -155,13 +159,13 @@ def _media(
 def interact(
     scene: RayScene, ray: Ray, path: Path, sample: LobeSample | None = None
 ) -> Interaction:
-    """Follow rays to the next surface, and on from there; symbolic loops may call it.
+    """Follow rays to the next surface and compute how they continue; symbolic loops may call it.
 
     Args:
         scene: the surfaces.
         ray: the rays.
-        path: what they are.
-        sample: random numbers; not needed by chief rays, nor from the camera in smooth scenes.
+        path: the kind of the rays.
+        sample: random numbers; not needed for chief rays, nor for camera rays in smooth scenes.
     """
     drawn = LobeSample() if sample is None else sample
     hit = scene.intersect(ray, path.is_coherent)

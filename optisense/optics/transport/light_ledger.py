@@ -1,8 +1,8 @@
-"""The light ledger: where the light of each group goes.
+"""The light ledger: the destinations of the light of each group.
 
-Photons are followed as in the photon pass, and whatever one loses on its way is booked: what a
-medium absorbs, what a surface absorbs, what leaves the sensor. The bookings of a photon add up to
-its power, so that the ledger closes whatever its noise.
+Photons are followed as in the photon pass, and all losses on their paths are booked: absorption in
+media, absorption by surfaces, escape from the sensor. The bookings of a photon add up to its power,
+so that the ledger balances exactly despite its noise.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ PASS_PHOTONS = 1_000_000
 """Number of photons of one pass; progress is reported and Ctrl-C obeyed between passes."""
 
 BATCHES = 16
-"""Independent parts of the photons, whose spread gives the noise of the sums."""
+"""Number of independent parts of the photons; their spread gives the noise of the sums."""
 
 
 class Fate(IntEnum):
@@ -54,11 +54,13 @@ class Bookings:
     """The sums of the ledger.
 
     Attributes:
-        power: (batches, groups, 3, surfaces + 1, fates) mW of lights of 1 mW in each channel. The
-            last surface stands for the lights themselves: for what happens before any surface.
-        rest: (batches, groups, 3) mW of photons that were given up on their way.
-        exits: (batches, groups, 3, surfaces + 1, sides) mW of what escapes, by the way that the
-            face looks through which it does, of `SIDES`. Light that meets nothing has none.
+        power: (batches, groups, 3, surfaces + 1, fates) power (mW), for lights of 1 mW in each
+            channel. The last surface stands for the lights themselves, and holds the losses before
+            any surface.
+        rest: (batches, groups, 3) power (mW) of photons whose paths were cut off.
+        exits: (batches, groups, 3, surfaces + 1, sides) power (mW) that escapes, by the orientation
+            of the face that it leaves through (see `SIDES`). Light that meets no surface is not
+            included.
     """
 
     power: NDArray[np.float64]
@@ -82,21 +84,21 @@ class _Sums:
 
         Args:
             line: the number of batch and group.
-            surface: its number.
-            fate: of `Fate`.
-            what: mW per channel.
-            where: which lanes count.
+            surface: the number of the surface.
+            fate: a value of `Fate`.
+            what: power (mW) per channel.
+            where: mask of the lanes that count.
         """
         row = (line * self.surfaces + surface) * FATES + fate
         for k in range(3):
             dr.scatter_add(self.power, mi.Float64(what[k]), row * 3 + k, where)
 
     def book_end(self, line: mi.UInt32, end: _End) -> None:
-        """Add what is left of photons at their ends.
+        """Add the remaining power of photons at their ends.
 
         Args:
             line: the number of batch and group.
-            end: of each photon.
+            end: the end of each photon.
         """
         self.book(line, end.last, mi.UInt32(int(Fate.ESCAPED)), end.escaped, mi.Bool(True))
         through = (line * self.surfaces + end.last) * len(SIDES) + _side_of(end.outward)
@@ -111,10 +113,10 @@ class _End:
     """Photons at their ends.
 
     Attributes:
-        escaped: mW per channel of those that left the sensor, else 0.
-        given_up: mW per channel of those that were given up on their way, else 0.
-        last: the surface from which each went on last.
-        outward: its face normal, on the side on which the photon went on.
+        escaped: power (mW) per channel of photons that left the sensor, else 0.
+        given_up: power (mW) per channel of photons whose paths were cut off, else 0.
+        last: the last surface on the path of each photon.
+        outward: the face normal of that surface, on the side on which the photon continued.
     """
 
     escaped: mi.Color3f
@@ -124,7 +126,7 @@ class _End:
 
 
 def _side_of(normal: mi.Vector3f) -> mi.UInt32:
-    """The number of the side, of `SIDES`, that unit normals look to."""
+    """Return the index in `SIDES` of the direction nearest to each unit normal."""
     far = dr.abs(normal)
     axis = dr.select(far.x >= dr.maximum(far.y, far.z), mi.UInt32(0), 1)
     axis = dr.select(far.z > dr.maximum(far.x, far.y), 2, axis)
@@ -133,21 +135,22 @@ def _side_of(normal: mi.Vector3f) -> mi.UInt32:
 
 
 def _is_interface(step: Interaction) -> mi.Bool:
-    """Whether light meets a surface from which its medium is known."""
+    """Return whether light meets a surface from which its medium is known."""
     return step.hit.valid & step.goes_on & ~step.scattered
 
 
 def medium_before(
     step: Interaction, bound: mi.UInt32, side: mi.UInt32
 ) -> tuple[mi.UInt32, mi.UInt32]:
-    """The medium through which light has come to a surface.
+    """Return the medium through which light has come to a surface.
 
     Args:
-        step: what happens at the surface.
-        bound, side: the interface that told the medium so far, and the side of it, a `Fate`.
+        step: the interaction at the surface.
+        bound, side: the interface that bounds the medium so far, and the medium's side of it, as a
+            `Fate`.
 
     Returns:
-        The same two; the surface's own where it is an interface.
+        The new ``bound`` and ``side``; they refer to the surface itself where it is an interface.
     """
     near_side = dr.select(step.side > 0, mi.UInt32(int(Fate.BEFORE)), int(Fate.BEHIND))
     interface = _is_interface(step)
@@ -155,7 +158,7 @@ def medium_before(
 
 
 def medium_after(step: Interaction, side: mi.UInt32) -> mi.UInt32:
-    """The side of the interface on which light goes on, a `Fate`."""
+    """Return the side of the interface on which light continues, as a `Fate`."""
     ahead = dr.dot(step.lobe.direction, step.hit.normal) > 0
     far_side = dr.select(ahead, mi.UInt32(int(Fate.BEFORE)), int(Fate.BEHIND))
     return dr.select(_is_interface(step), far_side, side)
@@ -172,15 +175,16 @@ def _follow(
     seen: TargetCells,
     seed: mi.UInt32,
 ) -> _End:
-    """Follow photons to their ends and book what they lose on their way."""
-    # Hashed: streams of neighbouring numbers resemble one another, and so would the batches.
+    """Follow photons to their ends and book their losses."""
+    # The number is hashed, as streams of neighbouring numbers resemble one another, and so would
+    # the batches.
     rng = mi.PCG32()
     first, second = mi.sample_tea_32(number, seed)
     rng.seed(mi.UInt64(first), mi.UInt64(second))
     last = mi.UInt32(sums.surfaces - 1)
     outward = mi.Vector3f(0, 0, 1)
     gone = mi.Color3f(0)
-    # The interface that tells the medium, and the side of it.
+    # The interface that bounds the medium, and the medium's side of it.
     bound = mi.UInt32(sums.surfaces - 1)
     side = mi.UInt32(int(Fate.BEFORE))
     while ray.active:
@@ -216,15 +220,15 @@ def trace_ledger(
     photons: int,
     seed: int = 0,
 ) -> Bookings:
-    """Send photons from all lights, and book where their light goes.
+    """Trace photons from all lights, and book where their light ends.
 
     Args:
         scene: the sensor.
         table: its lights; each emits 1 mW in each channel.
         surfaces: the number of surfaces in the scene's table.
-        seen: the cells of the sensing surface, and which of them the camera sees.
-        photons: about so many, of all lights together.
-        seed: another one gives other photons.
+        seen: the cells of the sensing surface, with flags for those that the camera sees.
+        photons: approximate number of photons of all lights together.
+        seed: seed of the photons.
     """
     per_light = max(BATCHES, photons // table.count // BATCHES * BATCHES)
     lines = BATCHES * table.groups

@@ -1,4 +1,4 @@
-"""Photon maps: where the photons of a pass landed, and how landings are recorded."""
+"""Photon maps: the landings of the photons of a pass, and the buffers that record them."""
 
 from __future__ import annotations
 
@@ -8,10 +8,10 @@ import drjit as dr
 import mitsuba as mi
 
 GROUP_MASK = 0xFF
-"""Bits of a photon's record that hold its light group."""
+"""Mask of the bits of a photon's record that hold its light group."""
 HALF_SHIFT = 8
-"""Position of the bit that tells photons of odd number from those of even number. The difference
-between the two halves gives the noise."""
+"""Position of the bit that is set for photons of odd number. The difference between the two halves
+gives the noise."""
 SURFACE_SHIFT = 9
 """Position of the first bit of the number of the surface that a photon landed on."""
 
@@ -22,7 +22,7 @@ class PhotonMap:
 
     Attributes:
         count: number of landings.
-        emitted: photons of all lights, including those that are not lit in this pass.
+        emitted: number of photons of all lights, including those that are not lit in this pass.
         place: four floats per landing: x, y, z (mm) and bits (light group, half, surface).
         travel: four floats per landing: the unit direction and the cosine of incidence.
         power: the photon's share of a light of 1 mW, per channel if ``coloured``.
@@ -45,8 +45,8 @@ class Records:
     """A buffer for the landings of a pass, with a fixed capacity.
 
     Attributes:
-        capacity: number of landings that there is room for.
-        counter: number of landings, those included for which there was no room.
+        capacity: number of landings that the buffer can hold.
+        counter: number of landings, including those that did not fit.
         place, travel, power: as in `PhotonMap`.
         coloured: whether powers differ between the channels.
     """
@@ -60,7 +60,7 @@ class Records:
 
     @classmethod
     def of(cls, capacity: int, coloured: bool) -> Records:
-        """Empty records for this number of landings."""
+        """Return empty records for this number of landings."""
         size = max(capacity, 1)
         return cls(
             capacity=dr.opaque(mi.UInt32, capacity),
@@ -72,7 +72,7 @@ class Records:
         )
 
     def write(self, landing: Landing, where: mi.Bool) -> None:
-        """Add the landings at which ``where`` is set; symbolic loops may call it."""
+        """Add the landings that the mask ``where`` selects; symbolic loops may call it."""
         slot = dr.scatter_inc(self.counter, mi.UInt32(0), where)
         kept = where & (slot < self.capacity)
         p, d, t = landing.point, landing.direction, landing.power
@@ -85,11 +85,12 @@ class Records:
             dr.scatter(self.power, t.x, slot, kept)
 
     def photon_map(self, emitted: int, passing: PhotonMap | None = None) -> PhotonMap:
-        """The landings of a pass of ``emitted`` photons."""
+        """Return the landings of a pass of ``emitted`` photons."""
         count = int(self.counter[0])
         place, travel, power = self.place, self.travel, self.power
         if count == 0:
-            # The renderer takes no empty arrays: one photon without power stands for none.
+            # The renderer does not accept empty arrays, so an empty map holds one photon without
+            # power.
             count = 1
             place, travel, power = (dr.zeros(mi.Float, 4) for _ in range(3))
         return PhotonMap(count, emitted, place, travel, power, self.coloured, passing)
@@ -100,9 +101,9 @@ class Landing:
     """A photon as it lands, or as it crosses the flux layer.
 
     Attributes:
-        point: mm.
+        point: position, mm.
         direction: unit vector along which it travels.
-        cosine: of incidence, or its counterpart in the layer.
+        cosine: cosine of incidence, or its counterpart in the layer (see `PhotonMap.passing`).
         power: the photon's share of a light of 1 mW, per channel.
         bits: light group, half, and surface.
     """

@@ -1,7 +1,8 @@
 """The paths of single photons from the lights to their ends, for drawing.
 
-Photons go as those of the light ledger, but they carry all their power to one end: what a photon of
-the ledger loses at a place is the probability that one of these ends there.
+Photons are traced like those of the light ledger, but each carries all its power to a single end.
+The share that a photon of the ledger loses at a place is the probability that one of these photons
+ends there.
 """
 
 from __future__ import annotations
@@ -29,20 +30,20 @@ ESCAPE_LENGTH = 4.0
 """Length (mm) of the last segment of a photon that escapes."""
 
 POINTS = MAX_DEPTH + 2
-"""Largest number of points of a way: the light, the surfaces, and where the photon ends."""
+"""Largest number of points of a path: the light, the surfaces, and the photon's end."""
 
 
 @dataclass(frozen=True)
 class TracedPhotons:
-    """Photons and where they went.
+    """The paths of traced photons.
 
     Attributes:
-        points: (photons, `POINTS`, 3) float32, mm.
-        counts: (photons,) the points of each that count.
-        group: (photons,) the number of the light group.
-        power: (photons,) of each, relative to one another.
-        surface: (photons,) that tells where it ends, as in the ledger's sums.
-        fate: (photons,) of `Fate`.
+        points: (photons, `POINTS`, 3) float32, the points of each path, mm.
+        counts: (photons,) number of valid points of each path.
+        group: (photons,) number of the light group.
+        power: (photons,) power of each photon, in arbitrary units.
+        surface: (photons,) number of the surface that the end belongs to, as in the ledger's sums.
+        fate: (photons,) the `Fate` of each photon.
     """
 
     points: NDArray[np.float32]
@@ -58,15 +59,15 @@ class _Course:
     """A buffer for the paths of photons.
 
     Attributes:
-        points: coordinates, of `POINTS` points for each photon.
-        surfaces: the number of surfaces, those of the lights' own row not counted.
+        points: coordinates (mm) of `POINTS` points for each photon.
+        surfaces: number of surfaces, without the additional row of the lights.
     """
 
     points: mi.Float
     surfaces: int
 
     def write(self, photon: mi.UInt32, place: mi.UInt32, point: mi.Point3f, where: mi.Bool) -> None:
-        """Keep a point of a photon; symbolic loops may call it."""
+        """Store a point of a photon's path; symbolic loops may call it."""
         row = (photon * POINTS + place) * 3
         for k in range(3):
             dr.scatter(self.points, point[k], row + k, where)
@@ -86,14 +87,14 @@ def _follow(
     """Follow photons to their ends.
 
     Returns:
-        The number of points of each, and the surface and the fate that tell where it ends.
+        The number of points of each path, and the surface and the fate of its end.
     """
     rng = mi.PCG32()
     first, second = mi.sample_tea_32(photon, seed)
     rng.seed(mi.UInt64(first), mi.UInt64(second))
     course.write(photon, mi.UInt32(0), ray.origin, mi.Bool(ray.active))
     count = mi.UInt32(1)
-    # Photons that are given up keep these.
+    # Photons whose paths are cut off keep these values.
     ending = mi.UInt32(course.surfaces)
     fate = mi.UInt32(int(Fate.ABSORBED))
     last = mi.UInt32(course.surfaces)
@@ -138,7 +139,7 @@ def _follow(
 
 
 def _part(some: mi.Color3f, whole: mi.Color3f, weights: mi.Color3f) -> mi.Float:
-    """The part that some power is of the whole, over all channels; at most 1."""
+    """Return the share of ``some`` power in the ``whole``, over all channels; at most 1."""
     return dr.minimum(dr.dot(some, weights) / dr.maximum(dr.dot(whole, weights), 1e-30), 1)
 
 
@@ -156,10 +157,11 @@ def trace_photon_paths(
     Args:
         scene: the sensor.
         table: its lights.
-        flux: (groups, 3) mW in each channel, which decide how photons of all channels end.
-        seen: the cells of the sensing surface, and which of them the camera sees.
-        per_light: photons of each light.
-        seed: another one gives other photons.
+        flux: (groups, 3) power (mW) in each channel, the weights of the channels in the
+            probabilities of ends.
+        seen: the cells of the sensing surface, with flags for those that the camera sees.
+        per_light: number of photons of each light.
+        seed: seed of the photons.
     """
     emission = Emission(table, uniform_guide(table.count), per_light, seed_of(seed, 7))
     flight, _ = launch(scene, emission, indices(np.arange(table.count)))

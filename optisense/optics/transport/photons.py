@@ -1,8 +1,8 @@
-"""The photon pass: light leaves the emitters, is refracted, reflected and scattered, and is
-recorded wherever it lands on an opaque surface.
+"""The photon pass: photons from the emitters are traced and recorded where they land.
 
-Photons carry all light, direct light included, so nothing is connected to lights from elsewhere
-(no next-event estimation) and no light is counted twice.
+Photons are refracted, reflected and scattered, and recorded at every landing on an opaque surface.
+They carry all light, direct light included. There is no next-event estimation, so that no light is
+counted twice.
 """
 
 from __future__ import annotations
@@ -34,27 +34,28 @@ STAGES = (4, 4, 6)
 """Numbers of surfaces after which the surviving photons are gathered into a dense array. Photons
 with long paths would leave most lanes of a vector idle."""
 LANDINGS_PER_PHOTON = 1.5
-"""Landings per photon that memory is reserved for at first. A pass with more is traced again with
-more room."""
+"""Number of landings per photon for which memory is reserved at first. A pass with more landings is
+traced again with more memory."""
 MIN_GATHERED_PHOTONS = 100_000
-"""Photons of a pass below which gathering the survivors costs more than it saves."""
+"""Number of photons of a pass below which gathering the survivors costs more than it saves."""
 MAX_SURVIVAL = 0.95
 """Upper bound on the probability that a photon survives its reflection (Russian roulette), so that
-none goes on for ever between white surfaces."""
+no path between white surfaces is endless."""
 
 
 @dataclass(frozen=True)
 class Emission:
-    """The photons that a pass sends out.
+    """The photons that a pass emits.
 
     Attributes:
         table: the lights; each emits 1 mW.
         guide: the sampling density of emission.
-        per_light: photons of each light.
-        seed: of the pass.
-        first: photons that each light has already sent in earlier passes of the same seed.
-        groups: the light groups that are lit; all if None. Their photons are the same in both
-            cases.
+        per_light: number of photons of each light.
+        seed: seed of the pass.
+        first: number of photons that each light has already emitted in earlier passes of the same
+            seed.
+        groups: the light groups that are lit; all if None. The photons of a group do not depend on
+            the other groups.
     """
 
     table: EmitterTable
@@ -65,7 +66,7 @@ class Emission:
     groups: Collection[int] | None = None
 
     def lights(self) -> mi.UInt32:
-        """The numbers of the lights that are lit."""
+        """Return the numbers of the lights that are lit."""
         lit = [
             number
             for number, emitter in enumerate(self.table.emitters)
@@ -75,7 +76,7 @@ class Emission:
 
     @property
     def emitted(self) -> int:
-        """Photons of all lights, those included that are not lit."""
+        """Number of photons of all lights, including those that are not lit."""
         return self.per_light * self.table.count
 
 
@@ -91,15 +92,15 @@ class TargetCells:
 
 @dataclass
 class _Flight:
-    """Photons under way.
+    """Photons in flight.
 
     Attributes:
-        ray: where they are.
+        ray: their current rays.
         throughput: their power.
         group: their light group and half, as bits.
-        landed: whether they have met the target.
-        scattered: whether an opaque surface has sent them on their way.
-        number: their place in the pass.
+        landed: mask of the photons that have met the target.
+        scattered: mask of the photons that an opaque surface has scattered last.
+        number: their index in the pass.
     """
 
     ray: Ray
@@ -123,10 +124,10 @@ class _Recording:
 
 
 def launch(scene: RayScene, emission: Emission, lights: mi.UInt32) -> tuple[_Flight, mi.UInt32]:
-    """Photons as they leave the lights, and the guide's cell of each.
+    """Emit photons from the lights; return them and the guide's cell of each.
 
-    Where indices differ between channels, each photon is light of one channel, the channels in
-    turn.
+    If refractive indices differ between channels, each photon carries light of one channel; the
+    channels take turns.
     """
     table = emission.table
     first, per_light, seed = (
@@ -168,19 +169,20 @@ def _fly(
     throughput = mi.Color3f(flight.throughput)
     landed = mi.Bool(flight.landed)
     scattered = mi.Bool(flight.scattered)
-    # By the photon's number alone: with `size` its lane would count too, and after a stage all
-    # photons behind one that ended elsewhere would go other ways. So a small change of the design
-    # changes little but what it touches.
+    # The stream depends on the photon's number alone. With `size` it would also depend on the lane,
+    # and one photon that ended earlier would change the paths of all photons after it. A small
+    # change of the design therefore changes few paths.
     rng = mi.PCG32(initstate=seed, initseq=mi.UInt64(flight.number))
     while ray.active & (ray.depth < limit):
         sample = LobeSample(rng.next_float32(), mi.Point2f(rng.next_float32(), rng.next_float32()))
         step = interact(scene, ray, Path.PHOTON, sample)
         hit = step.hit
         if recording.flux_layer is not None:
-            # What has left an opaque surface and meets none is interreflection.py's part.
+            # Light that leaves an opaque surface and meets no other is handled by
+            # interreflection.py.
             passes = ray.active & (step.opaque | ~scattered)
             bits = mi.UInt32(seed) ^ (flight.number * 747796405) ^ (ray.depth * 0x9E3779B9)
-            # Hashed: neighbouring photons have neighbouring bits.
+            # The bits are hashed, as neighbouring photons have neighbouring bits.
             chance = unit_float(mi.sample_tea_32(bits, mi.UInt32(0))[0])
             piece = mi.UInt32(0)
             while passes & (piece < SAMPLES_PER_SEGMENT):
@@ -221,7 +223,7 @@ def _trace(
     """Trace a pass stage by stage.
 
     Returns:
-        The guide's cell of each photon, or all ones if it never landed.
+        The guide's cell of each photon, or a number of all one bits if it never landed.
     """
     photons = emission.per_light * dr.width(lights)
     flight, cell = launch(scene, emission, lights)
@@ -252,8 +254,8 @@ def trace_pilot(
     """Trace the pilot pass.
 
     Returns:
-        For each photon the cell of the guide that it came from, or all ones if it missed the
-        target; and the photon map.
+        The guide's cell that each photon was drawn from, or a number of all one bits if it missed
+        the target; and the photon map.
     """
     return _traced(scene, emission, target, None, coloured)
 
@@ -265,9 +267,9 @@ def trace_photons(
 
     Args:
         scene: the surfaces.
-        emission: the photons.
+        emission: the photons to emit.
         coloured: whether surfaces are coloured.
-        flux_layer: photons that cross this layer are recorded, too.
+        flux_layer: layer whose crossings are recorded as well; None for no layer.
     """
     return _traced(scene, emission, None, flux_layer, coloured)[1]
 
@@ -279,7 +281,7 @@ def _traced(
     flux_layer: FluxLayer | None,
     coloured: bool,
 ) -> tuple[mi.UInt32, PhotonMap]:
-    """Trace a pass and collect its landings; one with more landings than room is repeated."""
+    """Trace a pass and collect its landings; a pass whose landings do not fit is repeated."""
     lights = emission.lights()
     photons = emission.per_light * dr.width(lights)
     room = [int(photons * LANDINGS_PER_PHOTON) + 1024, 0]

@@ -1,7 +1,7 @@
 """Photons that land at one place of the sensing surface: their paths and directions.
 
-Photons fly as those of a picture do. What lands within a disc is summed up by what it has met on
-its way and by the direction that it comes from.
+Photons are traced like those of a picture. The power that lands within a disc is summed by the kind
+of its path and by the direction of incidence.
 """
 
 from __future__ import annotations
@@ -26,14 +26,16 @@ from optisense.optics.transport.photon_map import GROUP_MASK
 from optisense.optics.transport.photons import MAX_SURVIVAL, Emission, TargetCells, launch
 
 TILT_BINS, TURN_BINS = 9, 12
-"""Bins of 10 degrees of the angle of incidence, and of 30 degrees of azimuth."""
+"""Numbers of bins of the angle of incidence (10 degrees each) and of azimuth (30 degrees each)."""
 
 BATCHES = 16
-"""Independent parts of the photons, whose spread gives the noise."""
+"""Number of independent parts of the photons; their spread gives the noise."""
 
 
 class LightWay(IntEnum):
-    """The interactions of light on its path to a place; of several, the last in this list."""
+    """The interactions of light on its path to a place; a path with several counts as the last in
+    this list.
+    """
 
     REFRACTED = 0  # nothing but interfaces that let it pass
     REFLECTED = 1  # an interface that reflected it, totally or in part
@@ -50,10 +52,11 @@ class Disc:
     """A disc of the skin on which photons are counted.
 
     Attributes:
-        middle: (3,) mm, on the sensing surface.
+        middle: (3,) centre on the sensing surface, mm.
         inward: (3,) unit normal there, into the gel.
-        right, up: (3,) unit vectors across it, from which azimuths count, anticlockwise.
-        radius: mm.
+        right, up: (3,) unit vectors in the disc's plane; azimuth is counted anticlockwise from
+            ``right``.
+        radius: radius, mm.
     """
 
     middle: NDArray[np.float64]
@@ -77,8 +80,10 @@ def _count(
     view: mi.Float64,
     seed: mi.UInt32,
 ) -> None:
-    """Follow photons to their ends; add what lands in the disc to sums (lines, ways, tilts, turns,
-    3), and what lands in the camera's view to ``view`` (lines, 3).
+    """Follow photons to their ends and sum their power.
+
+    Power that lands in the disc is added to ``sums`` (lines, ways, tilts, turns, 3), and power that
+    lands in the camera's view to ``view`` (lines, 3).
     """
     middle, inward, right, up = disc
     rng = mi.PCG32()
@@ -128,19 +133,19 @@ def trace_to_place(
     photons: int,
     seed: int,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Count photons at a place.
+    """Sum the power of the photons that land at a place.
 
     Args:
-        scene: the sensor, nothing pressed in.
+        scene: the sensor without contacts.
         table: its lights.
         disc: the place.
-        seen: the cells of the sensing surface, and which of them the camera sees.
-        photons: of all lights together.
-        seed: another one gives other photons.
+        seen: the cells of the sensing surface, with flags for those that the camera sees.
+        photons: number of photons of all lights together.
+        seed: seed of the photons.
 
     Returns:
-        (batches, groups, ways, tilts, turns, 3) mW that land in the disc, and (batches, groups, 3)
-        mW that land in view, of lights of 1 mW in each channel.
+        The power (mW) that lands in the disc, (batches, groups, ways, tilts, turns, 3), and in the
+        camera's view, (batches, groups, 3), for lights of 1 mW in each channel.
     """
     groups = table.groups
     sums = dr.zeros(mi.Float64, BATCHES * groups * WAYS * TILT_BINS * TURN_BINS * 3)

@@ -1,10 +1,10 @@
 """Boundaries between pixels whose chief rays take different paths, and their causes.
 
-Between two pixels whose rays take different ways there is a boundary in the picture: the edge of a
-part, or of another part in front of it, a line where two parts meet, or the limit of total
+Between two pixels whose rays take different paths there is a boundary in the picture: the edge of a
+part, the edge of another part in front of it, a line where two parts meet, or the limit of total
 reflection. Its place between the two pixels is found by bisection, and its cause by following the
-two rays beside it to the first surface where they differ. Each cause is a function that is 0 on
-the boundary and smooth beside it, so that derivatives tell how the boundary moves (the boundary
+two rays beside it to the first surface where they differ. Each cause is a function that is 0 on the
+boundary and smooth beside it, so that derivatives tell how the boundary moves (the boundary
 integral of Li, Aittala, Durand and Lehtinen, "Differentiable Monte Carlo ray tracing through edge
 sampling", ACM Trans. Graph. 37(6), 2018, with the edges found between pixels, which works through
 mirrors and refracting surfaces alike).
@@ -34,11 +34,13 @@ HALVINGS = 11
 sensor is about the rounding of single-precision points."""
 
 NEAR = 8.0
-"""An edge is taken to be what parts two rays if it passes the nearer hit within so many times the
-rays' distance there. They are on both sides of it; some of them meet it at a slant."""
+"""Largest distance between an edge and the nearer hit of two rays at which the edge counts as the
+cause that separates them, in units of the rays' distance there. It is more than 1 as rays may meet
+the edge at a slant."""
 
 ROUNDING = 1e-4
-"""mm by which single-precision rays may miss an edge that they pass, some 50 mm from the camera."""
+"""Distance (mm) by which single-precision rays may miss an edge that they pass, some 50 mm from the
+camera."""
 
 
 class Cause(IntEnum):
@@ -55,15 +57,16 @@ class Edges:
     """Points of boundaries in a picture, each between two neighbouring pixels.
 
     Attributes:
-        before, after: (k,) numbers of the pixels, row after row; `after` is right of `before` or
-            below it.
-        along_x: (k,) whether they are neighbours in a row.
+        before, after: (k,) indices of the pixels in the flattened picture; `after` is right of
+            `before` or below it.
+        along_x: (k,) whether the two pixels are neighbours in a row.
         x, y: (k,) film position of the boundary, pixels.
-        side: (k,) film position, pixels along the row or column, from the middle between the two.
-        depth: (k,) how many surfaces the ray meets before the one that parts it.
-        cause: (k,) of `Cause`.
-        first, second: (k,) an EDGE's vertices, or the triangles of a CROSSING; of TOTAL_REFLECTION
-            `first` is the triangle.
+        side: (k,) position of the boundary along the row or column, pixels from the middle between
+            the two pixels.
+        depth: (k,) number of surfaces that the rays meet before the one at which they separate.
+        cause: (k,) the `Cause`.
+        first, second: (k,) the vertices of an EDGE, or the triangles of a CROSSING; for
+            TOTAL_REFLECTION, `first` is the triangle.
     """
 
     before: IntArray
@@ -80,15 +83,19 @@ class Edges:
 
 @dataclass(frozen=True)
 class Stop:
-    """A surface on the path of rays, all arrays as long as there are rays.
+    """A surface on the path of rays; all arrays have one entry per ray.
 
     Attributes:
-        origin, direction: of the ray that arrives here.
-        distance: mm to the surface.
-        face: triangle met; smooth: whether its normal varies.
-        eta: relative refractive index; turned: whether the ray is reflected.
-        totally: whether totally; valid: whether a surface is met at all.
-        arrived: whether it is the sensing surface or an indenter; goes_on: whether the ray goes on.
+        origin, direction: origin (mm) and unit direction of the ray that arrives here.
+        distance: distance (mm) from the origin to the surface.
+        face: number of the triangle.
+        smooth: whether the normal varies over the triangle.
+        eta: relative refractive index.
+        turned: whether the ray is reflected.
+        totally: whether the ray is totally reflected.
+        valid: whether the ray meets a surface at all.
+        arrived: whether the surface is the sensing surface or an indenter.
+        goes_on: whether the ray continues.
     """
 
     origin: mi.Point3f
@@ -105,7 +112,7 @@ class Stop:
 
 
 def walk(scene: RayScene, origin: mi.Point3f, direction: mi.Vector3f) -> list[Stop]:
-    """All surfaces that rays meet one after the other, without derivatives."""
+    """Return all surfaces that rays meet one after the other, without derivatives."""
     stops = []
     active = dr.full(mi.Bool, True, dr.width(direction))
     ray = Ray(dr.detach(origin), dr.detach(direction), active)
@@ -133,12 +140,15 @@ def walk(scene: RayScene, origin: mi.Point3f, direction: mi.Vector3f) -> list[St
 
 
 def find_edges(scene: RayScene, camera: RayCamera, codes: NDArray[np.uint32]) -> Edges | None:
-    """All boundaries between pixels of which one sees the sensing surface; None if there are none.
+    """Find all boundaries between pixels of which at least one sees the sensing surface.
 
     Args:
         scene: the surfaces.
-        camera: whose picture.
-        codes: (h, w) of `trace_path_codes`, through the middle of each pixel.
+        camera: the camera of the picture.
+        codes: (h, w) result of `trace_path_codes` for the middle of each pixel.
+
+    Returns:
+        The boundaries; None if there are none.
     """
     number = np.arange(codes.size).reshape(codes.shape)
     across = codes[:, 1:] != codes[:, :-1]
@@ -169,8 +179,8 @@ def find_edges(scene: RayScene, camera: RayCamera, codes: NDArray[np.uint32]) ->
 def _causes(
     scene: RayScene, camera: RayCamera, left: FloatArray, right: FloatArray
 ) -> tuple[IntArray, IntArray, IntArray, IntArray]:
-    """Depth, cause, first and second (each (k,), see `Edges`) of what parts the rays through two
-    film positions (k, 2) each.
+    """Return the depth, cause, first and second (each (k,), see `Edges`) of the separation of the
+    rays through pairs of film positions ``left`` and ``right`` (k, 2).
     """
     count = len(left)
     both = np.concatenate([left, right])
@@ -207,7 +217,9 @@ def _nearest_edges(
     rows: IntArray,
     count: int,
 ) -> tuple[IntArray, IntArray, IntArray]:
-    """Cause, first and second (see `Edges`) for pairs of rays that meet different patches."""
+    """Return the cause, first and second (see `Edges`) for pairs of rays that meet different
+    patches.
+    """
     origin = np.asarray(stop.origin, dtype=np.float64).T
     direction = np.asarray(stop.direction, dtype=np.float64).T
     distance = np.where(valid, np.asarray(stop.distance, dtype=np.float64), np.inf)
@@ -220,7 +232,7 @@ def _nearest_edges(
     best = np.full(len(rows), np.inf)
     first, second = np.zeros(len(rows), dtype=np.int64), np.zeros(len(rows), dtype=np.int64)
     for ray in (one, other):
-        # What lies farther away does not end here, it is covered.
+        # A surface that lies farther away does not end here; it is covered.
         stopped = valid[ray] & (distance[ray] <= near + within)
         corners = np.asarray(scene.faces, dtype=np.int64)[np.where(valid[ray], face[ray], 0)]
         for k in range(3):

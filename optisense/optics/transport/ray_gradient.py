@@ -1,9 +1,10 @@
 """Derivatives of chief rays by the motion of surfaces and camera, computed by Dr.Jit.
 
-A ray's way is followed a second time, each hit written as a smooth function of the corners of the
-triangle that was met; which triangles these are is taken as given. What that misses is rays that
-begin or cease to arrive, or arrive another way, because an edge moves past them. These boundaries
-in the picture are found between pixels (`ray_edges`), and how they move is part of the derivative.
+Each ray's path is followed a second time, with every hit written as a smooth function of the
+corners of the triangle that was met; the sequence of triangles is taken as given. This misses rays
+that begin or cease to arrive, or that take another path, because an edge moves past them. These
+boundaries in the picture are found between pixels (`ray_edges`), and their motion is part of the
+derivative.
 """
 
 from __future__ import annotations
@@ -36,9 +37,9 @@ class RayGradient:
     """Derivatives of a number that depends on chief rays.
 
     Attributes:
-        parts: by part name (n, 3), by the place of each vertex, a mm.
-        camera: (13,), by the camera's position (mm), the three rows of its axes, and its field
-            of view (degrees).
+        parts: by part name, derivatives (n, 3) with respect to the position of each vertex, per mm.
+        camera: (13,) derivatives with respect to the camera's position (per mm), the three rows of
+            its axes, and its field of view (per degree).
     """
 
     parts: dict[str, FloatArray]
@@ -49,26 +50,27 @@ class DifferentiableRays:
     """Chief rays of one shape of a sensor, with the graph of how they came about.
 
     Attributes:
-        codes: (h, w) of `trace_path_codes`: 0 where a ray does not arrive; neighbours of one
-            number arrive the same way.
-        hit: (h, w) which arrive.
-        cosine: (k,) of those, in the order of `hit`: between ray and normal, 1 is upright.
-        weight: (k,) the area of the picture that each stands for, pixels: 1, and more or less
-            beside a boundary, by where it lies between two pixels.
-        points: (k, 3) mm.
-        density: (k,) 1/mm²; the part of all triangles of the sensing surface that lies in one mm²
-            where each arrives.
+        codes: (h, w) result of `trace_path_codes`: 0 where a ray does not arrive; neighbours of
+            equal code take the same path.
+        hit: (h, w) mask of the k rays that arrive.
+        cosine: (k,) cosine of the angle between ray and normal, in the order of `hit`; 1 is
+            perpendicular.
+        weight: (k,) area of the picture that each ray stands for, pixels: 1, and more or less
+            beside a boundary, depending on its place between two pixels.
+        points: (k, 3) end points, mm.
+        density: (k,) share of the triangles of the sensing surface per area (1/mm²) where each ray
+            arrives: 1 over the triangle's area and the number of triangles.
         edges: the boundaries; None where there are none.
     """
 
     def __init__(self, scene: RayScene, camera: RayCamera, moving: dict[str, TriangleMesh]) -> None:
-        """Trace, and record.
+        """Trace the rays, and record the computation for `pull_back`.
 
         Args:
             scene: the surfaces of the sensor.
-            camera: whose rays.
-            moving: meshes of the parts whose vertices are asked about. They are sheets: pieces
-                of the same name.
+            camera: the camera of the rays.
+            moving: by part name, the meshes with respect to whose vertices derivatives are wanted.
+                They must be sheets, and the scene's pieces have the same names.
 
         Raises:
             NoDerivativeError: a moving part is no sheet.
@@ -109,7 +111,7 @@ class DifferentiableRays:
         self.weight = self._record_edges(*turning)
 
     def _record(self, x: NDArray[np.floating], y: NDArray[np.floating]) -> None:
-        """Rays that arrive, as functions of what moves."""
+        """Record the rays that arrive as functions of the moving vertices and the camera."""
         origin, direction = self._camera.rays(floats(x), floats(y), self._poses[0])
         cosine = dr.zeros(mi.Float, len(x))
         arrived_at = dr.zeros(mi.Point3f, len(x))
@@ -127,7 +129,7 @@ class DifferentiableRays:
         self.density = 1.0 / (np.count_nonzero(areas) * areas[np.asarray(face)])
 
     def _sensing_areas(self) -> FloatArray:
-        """(f,) mm² of the triangles of sensing surfaces, 0 for all others."""
+        """Return the area (f,), mm², of each triangle of sensing surfaces, and 0 for all others."""
         areas = []
         for piece in self._pieces:
             a, b, c = (np.asarray(piece.vertices, np.float64)[piece.faces[:, k]] for k in range(3))
@@ -138,8 +140,9 @@ class DifferentiableRays:
     def _follow(
         self, stop: Stop, origin: mi.Point3f, direction: mi.Vector3f
     ) -> tuple[mi.Point3f, mi.Vector3f, mi.Point3f, mi.Vector3f, mi.Vector3f]:
-        """Where rays meet a surface, its shading normal, the rays that go on (unchanged where
-        none does), and the way in which they arrived."""
+        """Return the point where rays meet a surface, its shading normal, the origin and direction
+        of the rays that continue (unchanged where none does), and the direction of arrival.
+        """
         point, normal, shading = _hit(
             self._vertices,
             self._faces,
@@ -150,7 +153,7 @@ class DifferentiableRays:
             direction,
             stop.valid,
         )
-        # A ray that is turned back takes no part in refraction, whose root has no slope there.
+        # Reflected rays are excluded from refraction, whose square root has no derivative there.
         relative = dr.select(stop.turned | ~stop.goes_on, 1.0, stop.eta)
         _, reflected, transmitted, _ = refract(direction, shading, relative)
         onward = dr.select(stop.turned, reflected, transmitted)
@@ -164,8 +167,8 @@ class DifferentiableRays:
         )
 
     def _boundary_slopes(self) -> tuple[FloatArray, FloatArray]:
-        """(k,) how the function that is 0 on each boundary changes along x and y of the film, a
-        pixel.
+        """Return the derivatives (k,) along x and along y of the film, per pixel, of the function
+        that is 0 on each boundary.
         """
         if self.edges is None:
             return np.zeros(0), np.zeros(0)
@@ -177,7 +180,9 @@ class DifferentiableRays:
         return by_x, by_y
 
     def _boundary(self, x: mi.Float, y: mi.Float, pose: Pose) -> mi.Float:
-        """A function of film positions (and of all that moves) that is 0 on the boundaries."""
+        """Return the value of a function of film positions and all moving things that is 0 on the
+        boundaries.
+        """
         edges = self.edges
         assert edges is not None
         depth, cause, first, second = (
@@ -187,7 +192,8 @@ class DifferentiableRays:
             cause == int(c) for c in (Cause.EDGE, Cause.CROSSING, Cause.TOTAL_REFLECTION)
         )
         value = dr.zeros(mi.Float, len(edges.x))
-        # Up to the surface that parts two rays both take the same way as the one between them.
+        # Up to the surface that separates two rays, both take the same path as the ray between
+        # them.
         origin, direction = self._camera.rays(x, y, pose)
         for number, stop in enumerate(walk(self._scene, origin, direction)):
             here = depth == number
@@ -212,7 +218,7 @@ class DifferentiableRays:
     def _distance(
         self, face: mi.UInt32, origin: mi.Point3f, direction: mi.Vector3f, active: mi.Bool
     ) -> mi.Float:
-        """mm along rays to the planes of triangles; 0 where not active."""
+        """Return the distance (mm) along rays to the planes of triangles; 0 where not active."""
         corner = dr.gather(mi.Vector3u, self._faces, face, active)
         a, b, c = (dr.gather(mi.Point3f, self._vertices, corner[k], active) for k in range(3))
         cross = dr.cross(b - a, c - a)
@@ -220,11 +226,12 @@ class DifferentiableRays:
         return dr.select(active, dr.dot(a - origin, cross) / steep, 0.0)
 
     def _record_edges(self, by_x: FloatArray, by_y: FloatArray) -> FloatArray:
-        """The boundaries as functions of what moves; returns the weights of the rays that arrive.
+        """Record the boundaries as functions of all moving things; return the weights of the rays
+        that arrive.
 
-        A boundary point stands for the boundary's crossing of a row or a column of pixels. By
-        how much a boundary's slant counts to the one and the other, squares of its normal's
-        components say, which add up to 1.
+        A boundary point stands for the boundary's crossing of a row or a column of pixels. The
+        squares of the components of the boundary's normal, which add up to 1, are the weights of
+        its crossings of rows and of columns.
         """
         weight = np.ones(int(self.hit.sum()))
         edges = self.edges
@@ -245,7 +252,9 @@ class DifferentiableRays:
         return weight
 
     def _vertex_normals(self) -> mi.Float:
-        """Normals of all vertices; those of moving sheets as functions of their vertices."""
+        """Return the normals of all vertices; those of moving sheets are functions of their
+        vertices.
+        """
         fixed = np.zeros((self._starts[-1], 3), dtype=np.float32)
         for piece, start in zip(self._pieces, self._starts[:-1], strict=True):
             if piece.normals is not None and piece.name not in self._sheets:
@@ -263,10 +272,12 @@ class DifferentiableRays:
         weight: FloatArray | None = None,
         points: FloatArray | None = None,
     ) -> RayGradient:
-        """Derivatives of a number by shapes and camera, given those by what rays do.
+        """Return the derivatives of a number with respect to vertices and camera.
 
         Args:
-            cosine, weight: (k,), points: (k, 3): derivatives of the number by these; None for 0.
+            cosine, weight: (k,) derivatives of the number with respect to these attributes; None
+                for 0.
+            points: (k, 3) derivatives of the number with respect to the end points; None for 0.
         """
         loss = mi.Float(0)
         for output, slope in zip(self._outputs, (cosine, points), strict=True):
@@ -277,7 +288,7 @@ class DifferentiableRays:
         if weight is not None and self.edges is not None:
             sides = [np.where(there, weight[number], 0.0) for there, number in self._sides]
             loss += dr.sum(self._value * floats(self._per_value * (sides[0] - sides[1])))
-        # What was recorded is kept for the next number, whose derivatives begin at 0 again.
+        # The recorded graph is kept for the next call, whose gradients begin at 0 again.
         for value in self._inputs:
             dr.clear_grad(value)
         dr.backward(loss, flags=dr.ADFlag.ClearInterior)
@@ -293,13 +304,15 @@ class DifferentiableRays:
         return RayGradient(parts, camera.reshape(len(self._poses), -1).sum(axis=0))
 
     def _numbers(self) -> list[mi.Float | mi.Point3f | mi.Vector3f]:
-        """The numbers of the camera's poses."""
+        """Return the variables of all camera poses."""
         return [value for pose in self._poses for value in pose.numbers()]
 
 
 @dataclass(frozen=True)
 class _Sheet:
-    """A moving mesh, smooth, and from which of its vertices each one of the piece comes."""
+    """A moving, smooth mesh, and the index of its vertex that each vertex of the piece comes
+    from.
+    """
 
     mesh: TriangleMesh
     source: NDArray[np.integer]
@@ -314,7 +327,7 @@ class _Sheet:
         return cls(smooth, source, len(mesh.vertices))
 
     def piece(self, like: Piece) -> Piece:
-        """The piece itself where it is smooth and whole already, and else such a one."""
+        """Return ``like`` if it is already smooth and whole, else a piece that is."""
         if like.normals is not None and np.array_equal(like.vertices, self.mesh.vertices):
             return like
         mesh = self.mesh
@@ -336,7 +349,7 @@ def _hit(
     direction: mi.Vector3f,
     active: mi.Bool,
 ) -> tuple[mi.Point3f, mi.Vector3f, mi.Vector3f]:
-    """Point, face normal and shading normal where rays meet the planes of triangles."""
+    """Return the point, face normal and shading normal where rays meet the planes of triangles."""
     corner = dr.gather(mi.Vector3u, faces, face, active)
     a, b, c = (dr.gather(mi.Point3f, vertices, corner[k], active) for k in range(3))
     side, other = b - a, c - a
@@ -354,16 +367,18 @@ def _hit(
 
 
 def _evaluated(inputs: list[Any]) -> list[Any]:
-    """The gradients of inputs, computed together: by kernels of their own, each would do the work
-    of all, and compiling one takes seconds."""
+    """Return the gradients of inputs, all computed by one kernel.
+
+    Separate kernels would each repeat the whole work, and compiling one takes seconds.
+    """
     slopes = [dr.grad(value) for value in inputs]
     dr.eval(slopes)
     return slopes
 
 
 def _smooth_normals(vertices: mi.Float, corners: mi.UInt32, count: int) -> mi.Float:
-    """(3 count,) vertex normals by corner angles, as `shading_normals` has them; 0 for vertices
-    of no face here.
+    """Return vertex normals (3 count,) weighted by corner angles, as in `shading_normals`; 0 for
+    vertices without a face.
     """
     index = dr.arange(mi.UInt32, dr.width(corners) // 3) * 3
     ids = [dr.gather(mi.UInt32, corners, index + k) for k in range(3)]

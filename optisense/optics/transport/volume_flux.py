@@ -1,9 +1,9 @@
-"""Volume flux: light on its way through a thin layer above a surface.
+"""Volume flux: the light that passes through a thin layer above a surface.
 
 An indenter that stands off the undeformed surface catches light that would pass over that surface,
-or land on it far behind. Photons that cross a thin layer give its amount: the length of their paths
-within the layer over its volume is the flux density across the light (a track-length estimator).
-Each segment of a photon's path is tested at a few random places.
+or land on it far behind. The amount of this light is estimated from the photons that cross the
+layer: the length of their paths within the layer over its volume is the flux density across the
+light (a track-length estimator). Each segment of a photon's path is tested at a few random places.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ SAMPLES_PER_SEGMENT = 4
 """Number of pieces of a path segment; one random place of each is tested for lying in the layer."""
 GOLDEN_RATIO_FRACTION = 0.618034
 """Offset (modulo 1) between the places within successive pieces. Multiples of the golden ratio's
-fractional part are spread evenly, however few they are."""
+fractional part are spread evenly for any number of pieces."""
 TAIL_HEIGHTS = 1.5
 """Height above the surface, in units of `LAYER_HEIGHT`, at which the last part of a landing
 photon's path begins. Half of the pieces divide this part."""
@@ -36,14 +36,14 @@ MIN_COSINE = 1e-3
 
 @dataclass
 class FluxLayer:
-    """The layer above ``cells``; ``centres`` holds the middle of each, four floats."""
+    """The layer above ``cells``; ``centres`` holds the centre (mm) of each cell, four floats."""
 
     cells: SurfaceCells
     centres: mi.Float
 
 
 def flux_layer_above(cells: SurfaceCells) -> FluxLayer:
-    """The layer above a surface."""
+    """Return the layer above a surface."""
     four = np.zeros((cells.cells, 4), dtype=np.float32)
     four[:, :3] = cells.centres
     return FluxLayer(cells, floats(four))
@@ -52,7 +52,9 @@ def flux_layer_above(cells: SurfaceCells) -> FluxLayer:
 def layer_cell_at(
     flux_layer: FluxLayer, point: mi.Point3f, active: mi.Bool
 ) -> tuple[mi.UInt32, mi.Float, mi.Bool]:
-    """The cell that points lie above, their height (mm), and whether they are in the layer."""
+    """Return the cell that each point lies above, its height (mm), and whether it is in the
+    layer.
+    """
     cells = flux_layer.cells
     near, found = cell_at(cells, point, active)
     normal, offset = plane_of(cells, near, found)
@@ -60,7 +62,7 @@ def layer_cell_at(
     cell, found = cell_at(cells, foot, found)
     normal, offset = plane_of(cells, cell, found)
     height = dr.dot(normal, point) - offset
-    # Beyond the surface's edge the nearest cell is found, too.
+    # Beyond the surface's edge the nearest cell is found as well.
     middle = dr.gather(mi.Vector4f, flux_layer.centres, cell, found)
     aside = foot - mi.Point3f(middle.x, middle.y, middle.z)
     size = dr.rcp(cells.inverse_size)
@@ -76,7 +78,7 @@ def sample_segment(
     piece: mi.UInt32,
     landing: mi.Bool,
 ) -> tuple[mi.Point3f, mi.Float, mi.Bool]:
-    """A random place on one of the `SAMPLES_PER_SEGMENT` pieces of a path segment.
+    """Return a random place on one of the `SAMPLES_PER_SEGMENT` pieces of a path segment.
 
     Half of the pieces belong to the segment's end, where the light of a ``landing`` segment is near
     the surface.
@@ -84,14 +86,14 @@ def sample_segment(
     Args:
         flux_layer: the layer.
         ray: the segment's start and direction.
-        hit: where it ends.
-        chance: even over 0..1, one for all pieces of a segment.
+        hit: the segment's end.
+        chance: uniform random number from 0 to 1, the same for all pieces of a segment.
         piece: the number of the piece.
         landing: whether the segment ends on an opaque surface.
 
     Returns:
-        The place; the layer's height over the length of the piece, which plays the part of the
-        cosine of incidence; and whether the place is in the layer.
+        The place (mm); the layer's height over the length of the piece, which replaces the cosine
+        of incidence; and whether the place is in the layer.
     """
     end = dr.select(hit.valid, hit.distance, MAX_SEGMENT_LENGTH)
     cosine = dr.maximum(dr.abs(dr.dot(ray.direction, hit.normal)), MIN_COSINE)
