@@ -1,6 +1,6 @@
-"""Contract tests of search methods, for those of this package and for your own.
+"""Contract tests of search methods, for those of this package and of other packages.
 
-In a test file of yours, to be run by pytest::
+Use them in a test file for pytest::
 
     from optisense.search.testing import MethodContract
 
@@ -34,7 +34,7 @@ from optisense.search.study.study import Study
 
 FloatArray = NDArray[np.float64]
 Landscape = Callable[[FloatArray], float]
-"""The score of a point (n,), whose coordinates are shares of their ranges, 0 to 1."""
+"""Score of a point (n,), whose coordinates are shares of their ranges, 0 to 1."""
 
 LANDSCAPES: dict[str, Landscape] = {
     "a hill": lambda share: -float(((share - 0.3) ** 2).sum()),
@@ -46,22 +46,26 @@ LANDSCAPES: dict[str, Landscape] = {
     "a quarter of it is infinite": lambda share: float(share[0]) if share[0] < 0.75 else math.inf,
     "very large numbers": lambda share: 1e300 * float(share.sum()),
 }
-"""Scores that methods have stumbled over."""
+"""Scores with shapes that are difficult for search methods."""
 
 MANY = 50
-"""Spaces of more parameters are searched by one score only: others would test nothing new."""
+"""Largest number of parameters of spaces that are searched by all scores; larger ones are searched
+by one score only, since the others would test nothing new.
+"""
 
 
 @cache
 def gelsight_mini() -> SensorDesign:
-    """The design that the studies start from."""
+    """Return the design that the studies start from."""
     from optisense.sensors import load
 
     return load("gelsight-mini")
 
 
 def general_spaces() -> dict[str, dict[str, object]]:
-    """Spaces of every size and kind; numbers have steps, so that a grid can search them too."""
+    """Return spaces of every size and kind; numbers have steps, so that a grid can search them
+    too.
+    """
     design = gelsight_mini()
     lights = [
         f"lights.{group}.lights[{index}].{what}.{axis}"
@@ -101,17 +105,17 @@ def general_spaces() -> dict[str, dict[str, object]]:
 
 
 class MethodContract:
-    """The contract; a subclass names the method.
+    """Contract of search methods; a subclass names the method.
 
     Attributes:
-        method: its name.
-        options: of its own, to test it with.
-        budget: trials of each study.
-        goals: how many objectives it needs.
-        reaches: the best trial must come as near to the best of one or two numbers as this part of
-            the range; None where the method promises nothing.
-        rounding: how far apart two runs of one study may be, as a part of the ranges and scores: 0
-            unless trials themselves come out otherwise in their last digits.
+        method: name of the method.
+        options: options of the method for the tests.
+        budget: number of trials of each study.
+        goals: number of objectives that the method needs.
+        reaches: largest distance of the best trial from the optimum of one or two numbers, as a
+            share of the range; None if the method promises nothing.
+        rounding: largest difference between two runs of one study, as a share of the ranges and
+            scores; above 0 only if trials themselves differ in their last digits.
     """
 
     method: str
@@ -122,23 +126,23 @@ class MethodContract:
     rounding: float = 0.0
 
     def design(self) -> SensorDesign:
-        """Where the studies start."""
+        """Return the design that the studies start from."""
         return gelsight_mini()
 
     def spaces(self) -> dict[str, dict[str, object]]:
-        """What may change, by a name for messages."""
+        """Return the spaces to search, by a name for messages."""
         return general_spaces()
 
     def landscapes(self) -> dict[str, str | Landscape]:
-        """The scores to search by, by a name for messages; a text is an objective's name."""
+        """Return the scores to maximise, by a name for messages; a text is an objective's name."""
         return dict(LANDSCAPES)
 
     def settings(self) -> dict[str, Any]:
-        """Settings of objectives, where the landscapes are objectives."""
+        """Return the settings of the objectives, if the landscapes are objectives."""
         return {}
 
     def coordinates(self, space: BoundSpace, design: SensorDesign) -> FloatArray:
-        """(n,) the point of a space that a design was made from, read back from the design."""
+        """Return the point (n,) of a space that a design was made from, read from the design."""
         found = []
         for parameter in space.parameters:
             target = parameter.targets[0]
@@ -153,7 +157,7 @@ class MethodContract:
     def study(
         self, space: Mapping[str, object], goal: str | Landscape, budget: int, seed: int = 0
     ) -> Study:
-        """A new study in memory.
+        """Return a new study in memory.
 
         Raises:
             SearchError: the method refuses the space.
@@ -174,7 +178,7 @@ class MethodContract:
         return Study.create(None, design, plan)
 
     def cases(self) -> Iterator[tuple[str, Mapping[str, object], str | Landscape]]:
-        """Each space with each landscape, and a name for messages."""
+        """Yield each space with each landscape, and a name for messages."""
         for space_name, space in self.spaces().items():
             for number, (name, goal) in enumerate(self.landscapes().items()):
                 if number and len(space) > MANY:
@@ -184,11 +188,13 @@ class MethodContract:
     def run(
         self, space: Mapping[str, object], goal: str | Landscape, budget: int | None = None
     ) -> SearchResult:
-        """A whole study."""
+        """Return the result of a whole study."""
         return run_study(self.study(space, goal, budget or self.budget))
 
     def whole(self, case: str) -> SearchResult:
-        """The whole study of a case of `cases`, run once for all tests that only look at it."""
+        """Return the result of a case of `cases`, which is run once for all tests that only read
+        it.
+        """
         return _whole(type(self), case)  # type: ignore[arg-type]  # classes can be hashed
 
     def test_it_searches_every_space_by_every_score(self) -> None:
@@ -211,7 +217,7 @@ class MethodContract:
     def test_a_study_that_was_stopped_goes_on_as_if_it_had_not_been(self) -> None:
         for case, space, goal in self.cases():
             if case.endswith(("bounds", "large numbers", "infinite")):
-                continue  # nothing else than in the others can be forgotten
+                continue  # other landscapes test the same memory
             whole = self.whole(case)
             study = self.study(space, goal, self.budget)
             for limit in (self.budget // 8 + 1, self.budget // 2, self.budget):
@@ -242,7 +248,7 @@ class MethodContract:
                 self.run(space, broken)
 
     def test_failed_trials_cost_nothing_else(self) -> None:
-        """The design as it is scores, and every other one fails: the start is the best."""
+        """Only the design as it is has a score: the start is the best."""
         if not all(callable(goal) for goal in self.landscapes().values()):
             return
 
@@ -269,7 +275,9 @@ class MethodContract:
     def _function(
         self, space: Mapping[str, object], landscape: Landscape, number: int
     ) -> Callable[[SensorDesign], float]:
-        """A goal from a landscape; the second goal is highest where the first one is lowest."""
+        """Return a goal for a landscape; the second goal is highest where the first one is
+        lowest.
+        """
         bound = SearchSpace(space).bind(self.design())
 
         def score(design: SensorDesign) -> float:
@@ -288,7 +296,7 @@ def _whole(contract: type[MethodContract], case: str) -> SearchResult:
 
 
 def _same(one: SearchResult, other: SearchResult, rounding: float, case: str) -> None:
-    """Two results have the same trials: to the last bit where `rounding` is 0."""
+    """Check that two results have the same trials, to the last bit if `rounding` is 0."""
     pairs = list(zip(one.trials, other.trials, strict=True))
     for first, second in pairs:
         assert (first.number, first.generation) == (second.number, second.generation), case

@@ -1,4 +1,4 @@
-"""Checks, before a search begins, that what it varies can change what it maximises."""
+"""Warning, before a search begins, that its parameters can't change its objective."""
 
 from __future__ import annotations
 
@@ -13,27 +13,28 @@ _NO_RAY_TURNS = re.compile(
     r"|lights\.[^.]+\.(flux|colour|spectrum)(\..+|\[.+)?"
     r"|materials\.[^.]+\.(reflectance|specularity|roughness|absorption|extinction)(\..+|\[.+)?"
 )
-"""Paths of numbers that change how bright something is, and neither where a ray goes nor where it
-ends: colours and powers of lights, coatings, and how much a material reflects or absorbs."""
+"""Paths of numbers that change brightness, but no path of a ray: colours and powers of lights,
+coatings, and how much a material reflects or absorbs.
+"""
 
 LIGHT_OBJECTIVES = ("rgb2normal", "normdiff")
-"""Objectives of this package that look at pictures."""
+"""Objectives of this package that read pictures."""
 
 
 def turns_no_ray(path: str) -> bool:
-    """Whether a number of a design, by its path, changes brightness and colours only."""
+    """Return whether a number of a design, by its path, changes only brightness and colours."""
     return _NO_RAY_TURNS.fullmatch(path.strip()) is not None
 
 
 def advice(paths: Iterable[str], objectives: Iterable[str]) -> str | None:
-    """What is to be said against a search: that no trial will score otherwise than its start.
+    """Return a warning if no trial of a search can have another score than its start.
 
     Args:
-        paths: what varies.
-        objectives: names of what is maximised, expressions, or functions in files.
+        paths: paths of the parameters.
+        objectives: names of the objectives, expressions, or functions in files.
 
     Returns:
-        A sentence that says why and one that says what to do; None where nothing is to be said.
+        A sentence that says why and one that says what to do; None if there is nothing to warn of.
     """
     named, varied = list(objectives), list(paths)
     if not named or not varied or not all(turns_no_ray(each) for each in varied):
@@ -41,7 +42,7 @@ def advice(paths: Iterable[str], objectives: Iterable[str]) -> str | None:
     try:
         if not are_rays_only(named):
             return None
-    except OptiSenseError:  # told by what reads it in full
+    except OptiSenseError:  # the parser of objectives reports it
         return None
     what, which = _listed(named), _listed(varied)
     return (
@@ -52,7 +53,9 @@ def advice(paths: Iterable[str], objectives: Iterable[str]) -> str | None:
 
 
 def _listed(texts: list[str]) -> str:
-    """One to three texts in words; of more, the first two and how many follow."""
+    """Return one to three texts joined by commas and "and"; for more, the first two and the number
+    of the others.
+    """
     if len(texts) > 3:
         texts = [*texts[:2], f"{len(texts) - 2} more"]
     return " and ".join(filter(None, [", ".join(texts[:-1]), texts[-1]]))

@@ -1,4 +1,4 @@
-"""A trial's design as one to go on with: its new numbers say where they come from."""
+"""Design of a trial with the provenance of its new numbers."""
 
 from __future__ import annotations
 
@@ -11,7 +11,8 @@ from optisense.search.study.trial import Trial
 
 
 def design_of(study: Study, trial: Trial) -> SensorDesign:
-    """The design of a trial; what differs from the study's design is marked as found by it.
+    """Return the design of a trial; values that differ from the study's design are marked as found
+    by the study.
 
     Raises:
         OptiSenseError: the values do not fit together.
@@ -26,7 +27,7 @@ def design_of(study: Study, trial: Trial) -> SensorDesign:
         f"which scores {trial.fair_score:.4g}",
     )
     before = study.space.design
-    # A cage is marked as a whole, other numbers one by one.
+    # A cage is marked as a whole; other numbers are marked one by one.
     varied = {
         p.asked if p.name.startswith("cages.") else p.name
         for p in study.space.parameters
@@ -41,7 +42,7 @@ def design_of(study: Study, trial: Trial) -> SensorDesign:
 
 
 def _value(design: SensorDesign, path: str) -> tuple[Any, ...]:
-    """What is at a path, in a tuple; an empty one where the path leads nowhere."""
+    """Return the value at a path as a tuple of one, or an empty tuple if the path names nothing."""
     try:
         return (get_value(design, path),)
     except DesignError:

@@ -1,9 +1,13 @@
-"""Which trial is the best, and what is said where several share the best score.
+"""Choice of the best trial of a study, also among trials with equal scores.
 
-A trial that breaks a condition of the study is never the best. Where trials were scored again with
-fresh seeds, the means over these decide whether it does.
+A trial that breaks a condition of the study is never the best. If trials were scored again with
+fresh seeds, the means over these decide whether it breaks one.
 
-The rule: the highest score by fresh seeds where some trials were scored so, else the highest score
+The best trial has the highest score by fresh seeds if some trials were scored so, else the highest
+    score by the study's seed. Of trials with equal scores the one nearest to the start is the best,
+    since it changes least, and of equally near ones the one that was proposed first. So the start
+    itself wins every tie, and the same trials always have the same best one, in whatever order
+    workers finished.
 by the study's seed. Of trials that share it the one nearest to the start is the best, since it
 changes least, and of equally near ones the one that was proposed first. So the start itself wins
 every tie, and the same trials always have the same best one, in whatever order workers finished.
@@ -21,10 +25,10 @@ from optisense.search.study.trial import Trial
 
 
 def distance(trial: Trial) -> float:
-    """How far a trial is from the start.
+    """Return the distance of a trial from the start.
 
-    Each parameter counts as a share (0 to 1) of its range, options of a choice as 0 (the same) or
-    1 (another one), and the shares are added up as the sides of a right angle are.
+    It is the Euclidean norm over the parameters, each as a share (0 to 1) of its range; options of
+    a choice count as 0 (the same) or 1 (another one).
     """
     space = trial.space
     share = np.abs(trial.vector - space.start) / (space.upper - space.lower)
@@ -33,28 +37,30 @@ def distance(trial: Trial) -> float:
 
 
 def ranked(trials: Iterable[Trial]) -> list[Trial]:
-    """Trials with a score by the study's own seed that break no condition, the best first; see the
-    rule above.
+    """Return the trials with a score by the study's own seed that break no condition, the best
+    first, by the rule above.
     """
     fine = [trial for trial in trials if math.isfinite(trial.score) and trial.is_feasible]
     return sorted(fine, key=lambda trial: (-trial.score, distance(trial), trial.number))
 
 
 def best_of(trials: Sequence[Trial]) -> Trial | None:
-    """The best trial by the rule above; None where none has a score and meets the conditions."""
+    """Return the best trial by the rule above, or None if no trial has a score and meets the
+    conditions.
+    """
     fine = ranked(trials)
     again = [trial for trial in fine if math.isfinite(trial.fresh_score())]
     if again:
-        # `min` keeps the first of equals, and `fine` is in the order of the rule.
+        # `min` returns the first of equals, and `fine` is in the order of the rule.
         return min(again, key=lambda trial: (-trial.fresh_score(), -trial.score))
     if any(trial.fresh for trial in trials):
-        return None  # what was scored again breaks conditions, and little is known of the others
+        return None  # the rescored ones break conditions, and the others are not rescored
     return fine[0] if fine else None
 
 
 def nearest(trials: Sequence[Trial]) -> Trial | None:
-    """The trial that breaks the conditions least, with the highest score of equals; None where a
-    trial is the best or none has a score.
+    """Return the trial with the smallest violation of the conditions, of equals the one with the
+    highest score, or None if there is a best trial or none has a score.
     """
     scored = [trial for trial in trials if math.isfinite(trial.score) and not trial.is_feasible]
     if not scored or best_of(trials) is not None:
@@ -63,9 +69,9 @@ def nearest(trials: Sequence[Trial]) -> Trial | None:
 
 
 def tied(trials: Sequence[Trial]) -> list[Trial]:
-    """The trials that share the best score, each point once, the best trial first.
+    """Return the trials that share the best score, each point once, the best trial first.
 
-    Those that fresh seeds have shown to be worse are left out.
+    Trials that fresh seeds have shown to be worse are left out.
     """
     best = best_of(trials)
     if best is None:
@@ -81,7 +87,7 @@ def tied(trials: Sequence[Trial]) -> list[Trial]:
 
 
 def tie_note(trials: Sequence[Trial]) -> str | None:
-    """What the user should know where several trials share the best score; None where none do."""
+    """Return a note for the user if several trials share the best score, else None."""
     same = tied(trials)
     if len(same) < 2:
         return None

@@ -1,4 +1,4 @@
-"""What is said of the conditions of a study: what its trials keep, and what they lack."""
+"""Texts about the conditions of a study: which ones trials meet, and which ones they break."""
 
 from __future__ import annotations
 
@@ -13,15 +13,16 @@ from optisense.search.study.best import nearest
 from optisense.search.study.trial import Trial
 
 WORSE = 0.1
-"""A quantity that is watched is named when it is worse than the start's by this part of it: less is
-no more than what rounding of pixels and triangles changes."""
+"""Share of the start's value by which a watched quantity must be worse to be reported; smaller
+changes may come from the rounding of pixels and triangles.
+"""
 
 
 def unmet(conditions: Mapping[str, float | None]) -> list[str]:
-    """The conditions that are broken, each with its value: ``coverage >= 0.6 (is 0.52)``.
+    """Return the conditions that are broken, each with its value: ``coverage >= 0.6 (is 0.52)``.
 
     Args:
-        conditions: the value of the limited quantity, by the text of each condition.
+        conditions: value of the limited quantity, by the text of each condition.
     """
     return [
         f"{text} (is {_shown(value)})"
@@ -31,8 +32,8 @@ def unmet(conditions: Mapping[str, float | None]) -> list[str]:
 
 
 def margins(trial: Trial) -> list[tuple[str, float | None, float | None]]:
-    """Each condition with its value and its margin: how far the value is on the allowed side of the
-    limit, below 0 on the other side. Both are None where nothing was measured.
+    """Return each condition with its value and its margin: the distance of the value from the
+    limit, negative if the condition is broken. Both are None if nothing was measured.
     """
     return [
         (text, value, None if value is None else Requirement.parse(text).margin(value))
@@ -41,7 +42,7 @@ def margins(trial: Trial) -> list[tuple[str, float | None, float | None]]:
 
 
 def kept(trial: Trial, start: Trial | None) -> list[str]:
-    """A line for each condition: the value of a trial, that of the start, and the margin."""
+    """Return a line for each condition: the value of a trial, that of the start, and the margin."""
     lines = []
     for text, value in trial.conditions.items():
         wanted = Requirement.parse(text)
@@ -55,8 +56,8 @@ def kept(trial: Trial, start: Trial | None) -> list[str]:
 
 
 def condition_note(trials: Sequence[Trial]) -> str | None:
-    """What the user should know where the start breaks conditions, or nothing meets them; None
-    where nothing is to be said.
+    """Return a note for the user if the start breaks conditions, or no trial meets them, else
+    None.
     """
     close = nearest(trials)
     if close is not None:
@@ -73,10 +74,11 @@ def condition_note(trials: Sequence[Trial]) -> str | None:
 
 
 def lost(best: Outcome, start: Outcome) -> dict[str, tuple[float, float]]:
-    """What the best outcome has lost that no condition limits, by the name of the objective.
+    """Return the quantities without a condition that are worse in the best outcome than in the
+    start, by the name of the objective.
 
     Returns:
-        The value of the best and that of the start, where the best's is worse by `WORSE`.
+        The value of the best and that of the start, if the best's is worse by `WORSE`.
     """
     limited = {Requirement.parse(text).quantity for text in best.conditions}
     before, now = start.parts.get(WATCHED, {}), best.parts.get(WATCHED, {})
@@ -89,9 +91,7 @@ def lost(best: Outcome, start: Outcome) -> dict[str, tuple[float, float]]:
 
 
 def lost_note(best: Trial | None, start: Trial | None) -> str | None:
-    """What the user should know where the score rose because the sensor got worse otherwise; None
-    where it did not.
-    """
+    """Return a note for the user if the score rose at the cost of another quantity, else None."""
     if best is None or start is None or best.is_start or not best.score > start.score:
         return None
     worse = lost(best.outcome, start.outcome)

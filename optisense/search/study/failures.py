@@ -1,4 +1,4 @@
-"""Failed trials grouped by cause: the same two parts, the same rule, wherever and however much."""
+"""Failed trials grouped by cause: the same two parts or the same rule, with any coordinates."""
 
 from __future__ import annotations
 
@@ -7,20 +7,22 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 
 _PLACE = re.compile(r" at \([-+\d., e]+\)(?: mm)?")
-"""Coordinates in a message, such as `` at (3.76, 11.51, 86.87) mm``."""
+"""Pattern of coordinates in a message, such as `` at (3.76, 11.51, 86.87) mm``."""
 
 _NUMBER = re.compile(r"(?<![\w.'])[-+]?\d+(?:[.,]\d+)*(?:e[-+]?\d+)?(?![\w'])")
-"""A number by itself. Digits within a name (``M1``) or in quotes (``'2'``) tell names apart."""
+"""Pattern of a number by itself. Digits within a name (``M1``) or in quotes (``'2'``) belong to
+names.
+"""
 
 
 @dataclass
 class FailureCause:
-    """Why trials failed.
+    """Cause of failed trials.
 
     Attributes:
-        text: the reason without coordinates; other numbers are replaced by an ellipsis.
-        example: the first reason of this kind, in full.
-        numbers: of the items that failed for it, in their order.
+        text: reason without coordinates; other numbers are replaced by an ellipsis.
+        example: first reason of this kind, in full.
+        numbers: numbers of the items that failed for this cause, in their order.
     """
 
     text: str
@@ -29,15 +31,17 @@ class FailureCause:
 
 
 def cause_of(reason: str) -> str:
-    """The cause behind a reason: the text without what differs from trial to trial."""
+    """Return the cause in a reason: the text without the numbers that differ from trial to
+    trial.
+    """
     return _NUMBER.sub("…", _PLACE.sub("", reason))
 
 
 def by_cause(failures: Iterable[tuple[int, str]]) -> list[FailureCause]:
-    """Group failures by cause, the commonest cause first.
+    """Group failures by cause, the most frequent cause first.
 
     Args:
-        failures: the number of each failed trial, and its reason.
+        failures: number of each failed trial, and its reason.
     """
     found: dict[str, FailureCause] = {}
     for number, reason in failures:

@@ -1,4 +1,4 @@
-"""The folder of a study: how it is begun, and whether it is as it was begun."""
+"""The folder of a study: its creation, and the check that it was not edited since."""
 
 from __future__ import annotations
 
@@ -15,19 +15,19 @@ from optisense.search.study.store import Store
 DESIGN_FOLDER = "design"
 STORE_FILE = "trials.sqlite"
 SQLITE_ENDINGS = ("", "-wal", "-shm", "-journal")
-"""What SQLite adds to the name of a store for the files that it keeps beside it."""
+"""Endings that SQLite appends to the name of a store for the files that it keeps beside it."""
 
 MOST_SHOWN = 8
-"""Number of differences between settings that an error lists; the rest is counted."""
+"""Number of differences between settings that an error lists; the others are counted."""
 
 
 def begin(folder: Path, design: SensorDesign) -> FolderLock:
-    """Take the lock of a folder for a new study, and write down which files it will have.
+    """Take the lock of a folder for a new study, and record which files it will have.
 
     Raises:
-        SearchError: there is a study in it.
-        FolderInUseError: another process is writing to it.
-        OutputError: it is not empty, or can't be written.
+        SearchError: there is a study in the folder.
+        FolderInUseError: another process is writing to the folder.
+        OutputError: the folder is not empty, or can't be written.
     """
     lock = FolderLock(folder)
     try:
@@ -47,16 +47,18 @@ def begin(folder: Path, design: SensorDesign) -> FolderLock:
 
 
 def kept(folder: Path, design: SensorDesign) -> SensorDesign:
-    """The design as it will be read again, so that a resumed study has the very same one."""
+    """Save the design, and return it as it is read again, so that a resumed study has exactly the
+    same one.
+    """
     save_design(design, folder / DESIGN_FOLDER)
     return load_design(folder / DESIGN_FOLDER)
 
 
 def as_begun(folder: Path, settings: StudySettings, store: Store) -> SensorDesign:
-    """The study's own design, where neither it nor the settings were edited since it was begun.
+    """Return the study's own design, after a check that neither it nor the settings were edited.
 
     Raises:
-        SearchError: one of them was; says what.
+        SearchError: one of them was edited; the message says which.
     """
     if store.fact("settings") != settings.fingerprint_of_all():
         begun = store.fact("study")
@@ -83,7 +85,7 @@ def _told(changed: list[str]) -> str:
 
 
 def listed(changed: list[str]) -> str:
-    """The first of some differences, one a line."""
+    """Return the first of some differences, one per line."""
     shown = "\n".join(f"  {line}" for line in changed[:MOST_SHOWN])
     more = len(changed) - MOST_SHOWN
     return shown + (f"\n  and {more} more" if more > 0 else "")

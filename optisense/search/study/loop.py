@@ -1,4 +1,4 @@
-"""Running a study: generation by generation, until its budget is spent or someone stops it."""
+"""The loop of a study: generation by generation, until its budget is spent or the user stops it."""
 
 from __future__ import annotations
 
@@ -41,28 +41,38 @@ from optisense.search.study.trial import Trial
 from optisense.time_left import TimeLeft
 
 ALL_FAIL = 20
-"""A study whose first trials all fail stops after so many, ..."""
+"""Number of first trials that must all fail for a study to stop early, if the starting design has a
+score.
+"""
 
 ALL_FAIL_WITH_START = 5
-"""... or so many where the design as it is fails too."""
+"""Number of first trials that must all fail for a study to stop early, if the starting design fails
+too; then an error in the set-up is likely.
+"""
 
 SAME_POINT = 1e-9
-"""Proposals of another release that differ by less, relative to the range, are the same."""
+"""Largest difference, as a share of the range, between proposals that count as the same point;
+releases of libraries differ in rounding.
+"""
 
 TICK = 0.2
-"""Seconds between looks at the clock while trials are worked out."""
+"""Interval between checks of the clock while trials are scored, s; short enough for a smooth
+display.
+"""
 
 FRESH_SHARE = 0.8
-"""The first score with a fresh seed takes as long as a trial, or so much of the first trial's time
-if that is more: where trials share the light that is traced for the first one, another seed needs
-its own. The rest of the first one's time is taken to be compiling."""
+"""Smallest duration of the first score with a fresh seed, as a share of the first trial's duration.
+Such a score takes as long as a trial, or this share if that is longer: if trials share the light
+that is traced for the first one, another seed needs its own. The rest of the first trial's time is
+taken to be compiling.
+"""
 
 
 MakeRunner = Callable[[Evaluator], Runner]
 
 
 class StudyRun:
-    """One run of a study, in this process and on its workers."""
+    """Run of a study, in this process and on its workers."""
 
     def __init__(
         self,
@@ -73,15 +83,15 @@ class StudyRun:
         variant: str = "auto",
         time_left: TimeLeft | None = None,
     ) -> None:
-        """Get ready; nothing is scored yet.
+        """Set up the run; nothing is scored yet.
 
         Args:
-            study: new, or one that was stopped.
-            make_runner: who works out the trials.
-            progress: called a few times a second.
-            limit: how many trials there may be; the study's budget if None.
-            variant: of the renderer.
-            time_left: of a command whose last steps are the stages of this search.
+            study: new study, or one that was stopped.
+            make_runner: function that returns the executor of the trials.
+            progress: function that is called a few times a second.
+            limit: largest number of trials; the study's budget if None.
+            variant: variant of the renderer.
+            time_left: time estimate of a command whose last steps are the stages of this search.
 
         Raises:
             OptiSenseError: the study can't be run here.
@@ -138,12 +148,12 @@ class StudyRun:
         self._pace = math.nan
 
     def go(self) -> SearchResult:
-        """Run to the end, or until Ctrl-C; the study stays locked, for the caller to unlock.
+        """Run to the end, or until Ctrl-C; the caller unlocks the study.
 
         Raises:
             FolderInUseError: another process runs this study.
             SearchError: all trials fail.
-            SetupError, OutputError: nothing can be scored, or written.
+            SetupError, OutputError: no trial can be scored, or written.
         """
         study = self.study
         study.lock()
@@ -175,7 +185,7 @@ class StudyRun:
         study.store.set_fact("ended", ended)
         if not interrupted and self._done == self._failed > 0 and math.isnan(self._start_score):
             raise self._all_failed()
-        several = self.method.several  # its result is a front, not one best trial
+        several = self.method.several  # the result is a front, not one best trial
         tie = None if several else tie_note(study.trials)
         told = [tie, condition_note(study.trials)]
         told += [] if several else [lost_note(study.best, study.start)]
@@ -183,7 +193,7 @@ class StudyRun:
         return SearchResult(study, interrupted, ended, tuple(notes))
 
     def _search(self, runner: Runner) -> str:
-        """All generations; returns why the search is over."""
+        """Run all generations, and return the reason why the search has ended."""
         known = self.study.store.last_generation()
         generation = 0
         while True:
@@ -206,7 +216,7 @@ class StudyRun:
             generation += 1
 
     def _proposed(self, generation: int) -> int:
-        """How many trials the generations before this one have."""
+        """Return the number of trials in the generations before this one."""
         return self.study.store.proposed_before(generation)
 
     def _score_start(self, runner: Runner) -> None:
@@ -218,10 +228,10 @@ class StudyRun:
         self._work(runner, rows)
 
     def _work(self, runner: Runner, rows: Sequence[Row]) -> None:
-        """Work out the rows that are not finished, and write each as it finishes.
+        """Score the rows that are not finished, and write each as it finishes.
 
         A point that was scored before keeps its score: a grid holds the start, and choices and
-        whole numbers repeat.
+        integers repeat.
         """
         by_number = {row.number: row for row in rows if row.outcome is None}
 
@@ -275,7 +285,7 @@ class StudyRun:
         jobs: Sequence[tuple[int, np.ndarray, int]],
         finished: Callable[[int, Outcome], None],
     ) -> None:
-        """Keep the workers busy with jobs (number, point, seed), and pass on what comes back."""
+        """Keep the workers busy with jobs (number, point, seed), and pass on each outcome."""
         waiting = list(reversed(jobs))
         open_jobs = 0
         while waiting or open_jobs:
@@ -293,7 +303,7 @@ class StudyRun:
             finished(number, outcome_of(done))
 
     def _hand_over(self, number: int, done: Future[Outcome]) -> None:
-        """Called in whatever thread a trial is finished."""
+        """Queue a finished trial; it is called in the thread where the trial finished."""
         self._finished.put((number, done))
 
     def _count_known(self) -> None:
@@ -302,10 +312,10 @@ class StudyRun:
                 self._count(row, row.outcome)
 
     def _count(self, row: Row, outcome: Outcome) -> None:
-        """Keep count, and stop a study in which everything fails.
+        """Count a finished trial, and stop a study in which every trial fails.
 
         Raises:
-            SearchError: the first trials all failed; says why.
+            SearchError: the first trials all failed; the message says why.
         """
         score = outcome.scores.get(self.study.objective, math.nan)
         if row.generation == START:
@@ -327,7 +337,7 @@ class StudyRun:
             raise self._all_failed()
 
     def _all_failed(self) -> SearchError:
-        """What to say of a study in which no trial has a score."""
+        """Return the error for a study in which no trial has a score."""
         reasons = max(self._reasons.values(), key=len)
         return SearchError(
             f"all {self._done} trials so far have failed, {len(reasons)} of them because: "
@@ -337,7 +347,7 @@ class StudyRun:
         )
 
     def _compare(self, asked: np.ndarray, rows: Sequence[Row]) -> None:
-        """Whether the method proposes what it did before."""
+        """Note if the method proposes other points than it did before."""
         if not rows or self._notes:
             return
         stored = np.array([row.vector for row in rows])
@@ -356,13 +366,13 @@ class StudyRun:
         )
 
     def _begin(self, stage: str, done: float = 0.0) -> None:
-        """A stage begins; `done` of its pieces were finished by earlier runs."""
+        """Begin a stage, of which earlier runs finished `done` pieces."""
         self._stage = stage
         self._time_left.begin(stage, done=done)
         self._report(now=True)
 
     def _expect_fresh(self, outcome: Outcome) -> None:
-        """Learn from a score how long one with a fresh seed will take."""
+        """Estimate from a score how long one with a fresh seed will take."""
         if self._stage == START_STAGE:
             self._first_seconds = outcome.seconds
         pace = self._time_left.pace
@@ -373,9 +383,9 @@ class StudyRun:
                 self._trials_an_hour = 3600.0 / pace
 
     def _expect_fresh_scores(self, count: float) -> None:
-        """Expect so many scores with fresh seeds, the first one of each seed with its own light.
+        """Expect `count` scores with fresh seeds, the first one of each seed with its own light.
 
-        Their time is counted in first scores; others are parts of one.
+        Their time is counted in units of first scores; other scores take a part of one.
         """
         if self._usual is not None:
             first, again = self._usual.fresh, self._usual.fresh_again
@@ -389,11 +399,13 @@ class StudyRun:
         self._time_left.expect(FRESH, count=whole, seconds=known)
 
     def _in_first_scores(self, count: float, seeds: float) -> float:
-        """How many first scores of seeds take as long as so many scores with so many seeds."""
+        """Return the number of first scores that take as long as `count` scores with `seeds`
+        seeds.
+        """
         return seeds + (count - seeds) * self._again
 
     def _trial_progress(self, fraction: float, text: str) -> None:
-        """Note the progress of the trial that this process is scoring."""
+        """Store the progress of the trial that this process is scoring."""
         self._doing = text
         if self._stage == START_STAGE and self._usual is not None:
             self._time_left.advance(self._usual.done(fraction))
@@ -424,7 +436,9 @@ class StudyRun:
         )
 
     def _lost(self) -> tuple[str, ...]:
-        """What the best trial so far has lost that the start has."""
+        """Return the watched quantities that are worse in the best trial so far than in the
+        start.
+        """
         best, start = self._best_outcome, self._start_outcome
         if best is None or start is None or start.failed or not self._best > self._start_score:
             return ()
@@ -433,7 +447,9 @@ class StudyRun:
 
 
 def _nearest_note(outcome: Outcome | None) -> str:
-    """What the trial that comes nearest to meeting all conditions lacks; nothing if one does."""
+    """Return the conditions that the trial nearest to feasibility breaks, or "" if a trial is
+    feasible.
+    """
     if outcome is None or outcome.is_feasible:
         return ""
     return ", ".join(unmet(outcome.conditions))

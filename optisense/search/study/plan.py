@@ -1,4 +1,4 @@
-"""What a new study shall do, checked and written down."""
+"""Plan of a new study: what to search and how, with all defaults resolved."""
 
 from __future__ import annotations
 
@@ -25,17 +25,20 @@ from optisense.search.study.settings import StudySettings
 from optisense.untrusted_files import MOST_PROGRAM, read_bytes
 
 ONLY_HERE = "function:"
-"""Begins the name of a goal or rule that is a function of the program and in no file."""
+"""Prefix of the name of a goal or rule that is a function of the caller's program and in no
+file.
+"""
 
 RAYS_ACROSS = 320
-"""Chief rays across the image unless `ray_resolution` is given: a quarter of the rays that a single
-evaluation traces. Over shapes of GelSight Svelte's mirror they rank alike (Spearman 0.99) and AOAP
-differs by 0.0001 +- 0.0002."""
+"""Number of chief rays across the image unless `ray_resolution` is given: a quarter of the rays
+that a single evaluation traces. Over shapes of GelSight Svelte's mirror they rank alike (Spearman
+0.99) and AOAP differs by 0.0001 +- 0.0002.
+"""
 
 
 @dataclass(frozen=True)
 class Plan:
-    """What a new study shall do; see `optisense.search.search` for each."""
+    """Plan of a new study; see `optisense.search.search` for each field."""
 
     space: SearchSpace
     goals: Sequence[Goal]
@@ -50,11 +53,11 @@ class Plan:
     requirements: Sequence[str] = ()
 
     def settings_for(self, design: SensorDesign) -> StudySettings:
-        """The plan for a design, with everything that it leaves open decided.
+        """Return the settings of the study for a design, with all defaults resolved.
 
         Raises:
-            SearchError: the plan makes no sense.
-            DesignError: a path leads nowhere.
+            SearchError: a field of the plan is invalid.
+            DesignError: a path names nothing in the design.
             ObjectiveError: an objective or a setting is unknown.
         """
         bound = self.space.bind(design)
@@ -108,22 +111,22 @@ class Plan:
 
 
 def reference(goal: Goal) -> str:
-    """How a stored study names a goal."""
+    """Return the name of a goal in a stored study."""
     return str(placed(goal)) if isinstance(goal, str) else ONLY_HERE + goal_name(goal)
 
 
 def rule_reference(rule: Constraint) -> str:
-    """How a stored study names a constraint."""
+    """Return the name of a constraint in a stored study."""
     if isinstance(rule, UserRule):
         return str(rule)
     return ONLY_HERE + str(getattr(rule, "__name__", type(rule).__name__))
 
 
 def known_goals(settings: StudySettings, given: Sequence[Goal] | None) -> list[Goal]:
-    """The goals of a stored study; none where one of them is not known here.
+    """Return the goals of a stored study, or none if one of them is not known in this process.
 
     Raises:
-        SearchError: those given are others than the study's.
+        SearchError: the given goals are not those of the study.
     """
     if given:
         names = [goal_name(goal) for goal in given]
@@ -138,14 +141,16 @@ def known_goals(settings: StudySettings, given: Sequence[Goal] | None) -> list[G
 
 
 def known_rules(settings: StudySettings, given: Sequence[Constraint] | None) -> list[Constraint]:
-    """The constraints of a stored study, without those that are not known here."""
+    """Return the constraints of a stored study, without those that are not known in this
+    process.
+    """
     if given:
         return list(given)
     return [UserRule(rule) for rule in settings.rules if not rule.startswith(ONLY_HERE)]
 
 
 def file_prints(references: Sequence[str]) -> dict[str, str]:
-    """The SHA-256 of each user's Python file that is named, by its path."""
+    """Return the SHA-256 of each user's Python file that is named, by its path."""
     paths = [each.rpartition(":")[0] or each for each in references]
     return {
         path: hashlib.sha256(read_bytes(Path(path), MOST_PROGRAM, SearchError)).hexdigest()

@@ -1,4 +1,4 @@
-"""What a running study reports, and what came of it at its end."""
+"""Progress of a running study, and its result."""
 
 from __future__ import annotations
 
@@ -12,25 +12,27 @@ from optisense.search.study.trial import Trial
 
 @dataclass(frozen=True)
 class SearchProgress:
-    """How far a study is.
+    """Progress of a study.
 
     Attributes:
-        stage: "start" while the design as it is is scored, "trials", or "fresh seeds" while the
-            best are scored again.
-        done: finished trials, those of earlier runs included; the start is not counted. Scores in
-            the stage "fresh seeds".
-        total: trials that there may be; scores that are wanted in the stage "fresh seeds".
-        failed: of the finished ones.
-        broken: of the finished ones, those that break a condition.
-        nearest: what the trial that comes nearest to meeting all conditions lacks; empty as soon as
-            one meets them.
-        lost: what the best trial so far has lost that the start has, such as coverage.
-        best: the best score so far of those that meet all conditions, NaN before there is one.
+        stage: "start" while the starting design is scored, "trials", or "fresh seeds" while the
+            best trials are scored again.
+        done: number of finished trials, including those of earlier runs, without the start. In the
+            stage "fresh seeds", number of finished scores.
+        total: largest number of trials; in the stage "fresh seeds", expected number of scores.
+        failed: number of finished trials that failed.
+        broken: number of finished trials that break a condition.
+        nearest: conditions that the trial nearest to feasibility breaks; empty as soon as a trial
+            meets them all.
+        lost: watched quantities, such as coverage, that are worse in the best trial so far than in
+            the start.
+        best: best score so far of trials that meet all conditions; NaN before there is one.
         start: score of the start.
-        trials_per_hour: at the pace of the last ones; 0 before that can be known.
-        seconds_left: until the end, scoring the best again included; NaN before that can be known.
-        facts: what the method tells of itself.
-        doing: what the trial at hand is at, where it is worked out in this process.
+        trials_per_hour: rate of the last trials; 0 before it is known.
+        seconds_left: time until the end, s, including the scoring with fresh seeds; NaN before it
+            is known.
+        facts: facts that the method reports about its state.
+        doing: stage of the current trial, if it is scored in this process.
     """
 
     stage: str
@@ -50,13 +52,13 @@ class SearchProgress:
 
 @dataclass(frozen=True)
 class SearchResult:
-    """What came of a study.
+    """Result of a study.
 
     Attributes:
-        study: with all its trials; can be run again to go on.
+        study: the study with all its trials; it can be run again to continue.
         interrupted: whether it was stopped before its end.
-        ended: why it ended.
-        notes: what the user should know.
+        ended: reason why it ended.
+        notes: notes for the user.
     """
 
     study: Study
@@ -66,16 +68,16 @@ class SearchResult:
 
     @property
     def best(self) -> Trial:
-        """The best trial, by fresh seeds where they were scored.
+        """Best trial, by fresh seeds if they were scored.
 
         Raises:
-            SearchError: none succeeded.
+            SearchError: no trial succeeded.
         """
         return self.study.trial("best")
 
     @property
     def start(self) -> Trial:
-        """The design as it is, or the nearest to it in the space.
+        """Trial of the starting design, or of the nearest point to it in the space.
 
         Raises:
             SearchError: it has not been scored.
@@ -89,9 +91,9 @@ class SearchResult:
 
     @property
     def front(self) -> list[Trial]:
-        """The trials that no other one beats in all objectives."""
+        """Pareto front: the trials that no other one dominates."""
         return self.study.front
 
 
 SearchProgressCallback = Callable[[SearchProgress], None]
-"""Called a few times a second while a study runs."""
+"""Function that is called a few times a second while a study runs."""

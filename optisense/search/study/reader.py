@@ -1,9 +1,9 @@
-"""Reading a SQLite file in write-ahead mode without writing anything beside it.
+"""Reader of a SQLite file in write-ahead mode that writes nothing beside it.
 
-SQLite's own read-only mode makes the files FILE-wal and FILE-shm where they are missing, and fails
-on a disk that is read-only. So a file that nobody is writing to is read into memory, one that
-somebody is writing to is read through SQLite's read-only mode, and one whose writer was killed and
-that lies on a read-only disk is copied to the folder of temporary files and merged there.
+SQLite's own read-only mode creates the files FILE-wal and FILE-shm if they are missing, and fails
+on a disk that is read-only. So a file without a writer is read into memory, one with a writer is
+read through SQLite's read-only mode, and one whose writer was killed and that lies on a read-only
+disk is copied to the folder of temporary files and merged there.
 """
 
 from __future__ import annotations
@@ -16,24 +16,26 @@ from contextlib import closing, contextmanager
 from pathlib import Path
 
 Stamp = tuple[int, int, int]
-"""Time of change (ns) and size (bytes) of the file, and size of its write-ahead log."""
+"""Time of change (ns) and size (bytes) of the file, and size (bytes) of its write-ahead log."""
 
 FORMAT_VERSIONS = slice(18, 20)
-"""Bytes of the file's head: 2 in write-ahead mode, 1 in the older one, which memory can hold."""
+"""Range of the bytes in the file's header that hold 2 in write-ahead mode and 1 in the older mode,
+which a database in memory can have.
+"""
 
 
 class Reader:
-    """Connections to read one file with; each sees what was committed before it was asked for."""
+    """Source of connections that read one file; each sees the commits before it was requested."""
 
     def __init__(self, path: Path) -> None:
-        """Remember the file; nothing is read yet."""
+        """Store the path; nothing is read yet."""
         self._path = path
         self._log = path.with_name(path.name + "-wal")
         self._memory: tuple[Stamp, sqlite3.Connection] | None = None
 
     @contextmanager
     def connected(self) -> Iterator[sqlite3.Connection]:
-        """A connection for the time of the block.
+        """Yield a connection for the duration of the block.
 
         Raises:
             sqlite3.Error, OSError: the file can't be read.
@@ -58,7 +60,10 @@ class Reader:
             yield live
 
     def _stamp(self) -> Stamp:
-        """Raises: OSError, the file is not there."""
+        """Return the state of the file.
+
+        Raises: OSError: the file does not exist.
+        """
         found = self._path.stat()
         try:
             log = self._log.stat().st_size
@@ -67,7 +72,7 @@ class Reader:
         return found.st_mtime_ns, found.st_size, log
 
     def _live(self) -> sqlite3.Connection:
-        """A read-only connection beside a writer's."""
+        """Return a read-only connection, while another process may write."""
         address = f"{self._path.absolute().as_uri()}?mode=ro"
         db = sqlite3.connect(address, uri=True, check_same_thread=False)
         try:
@@ -78,7 +83,7 @@ class Reader:
         return db
 
     def _merged(self) -> sqlite3.Connection:
-        """File and log in memory."""
+        """Return the file merged with its log, in memory."""
         with tempfile.TemporaryDirectory(prefix="optisense-") as folder:
             copy = Path(folder) / self._path.name
             shutil.copyfile(self._path, copy)
@@ -90,7 +95,7 @@ class Reader:
 
 
 def _in_memory(content: bytes) -> sqlite3.Connection:
-    """A connection to a file's content."""
+    """Return a connection to a copy of a file's content."""
     data = bytearray(content)
     if len(data) >= FORMAT_VERSIONS.stop:
         data[FORMAT_VERSIONS] = b"\x01\x01"

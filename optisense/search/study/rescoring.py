@@ -1,8 +1,8 @@
-"""Scoring the best again with fresh seeds before one is announced.
+"""Scoring of the best trials with fresh seeds before one is announced.
 
-Of many noisy scores the largest is too large: it won partly by luck. So the best trial is scored
-with seeds that had no part in its choice, and so are the next ones as long as they might really
-be better.
+The largest of many noisy scores is too large on average: it won partly by chance. So the best trial
+is scored with seeds that were not used in its choice, and so are the next ones as long as they may
+really be better.
 """
 
 from __future__ import annotations
@@ -20,34 +20,37 @@ from optisense.search.study.study import Study
 from optisense.search.study.trial import Trial
 
 SEEDS = 3
-"""Number of fresh seeds with which each trial is scored again; their scatter tells how well the
-mean is known."""
+"""Number of fresh seeds with which each trial is scored again; their standard deviation tells how
+well the mean is known.
+"""
 
 MOST = 5
-"""Largest number of trials that are scored again, which bounds the time that a search takes at its
-end."""
+"""Largest number of trials that are scored again, which bounds the time at the end of a search."""
 
 MOST_BROKEN = 20
-"""Largest number of trials that are scored again for as long as each breaks a condition with fresh
-seeds: scores beside a limit break it by luck in about half of the cases."""
+"""Largest number of trials that are scored again while each breaks a condition with fresh seeds:
+scores beside a limit break it by chance in about half of the cases.
+"""
 
 _FRESH = 0xF2E5
-"""A number that is mixed into a study's seed, so that fresh seeds have nothing in common with those
-of its trials."""
+"""Constant that is mixed into a study's seed, so that fresh seeds are independent of those of its
+trials; its value is arbitrary.
+"""
 
 Work = Callable[[Sequence[tuple[Trial, int]], int, float], list[Outcome]]
-"""Scores trials with seeds, and is told how many such scores may follow for these trials, and how
-many are expected for others after them."""
+"""Function that scores trials with seeds. It also takes the number of such scores that may follow
+for these trials, and the expected number for others after them.
+"""
 
 
 def fresh_seeds(seed: int, count: int = SEEDS) -> list[int]:
-    """Seeds that have nothing to do with a study's own."""
+    """Return seeds that are independent of a study's own."""
     words = np.random.SeedSequence([seed, _FRESH]).generate_state(count + 1).tolist()
     return [word for word in words if word != seed][:count]
 
 
 def rescore(study: Study, work: Work) -> None:
-    """Score the start and the best again; what was scored before is kept."""
+    """Score the start and the best trials with fresh seeds; existing scores are kept."""
     seeds = fresh_seeds(study.settings.seed)
     trials = study.trials
     fine = ranked(trials)
@@ -76,14 +79,14 @@ def _score(
     rivals: Sequence[float] = (),
     best: float = -math.inf,
 ) -> list[Trial]:
-    """The trials with what fresh seeds give; one seed suffices where it changes nothing.
+    """Return the trials with their scores by fresh seeds; one seed suffices if seeds do not matter.
 
     Args:
-        trials: to score.
-        seeds: to score them with.
-        work: scores them.
+        trials: trials to score.
+        seeds: fresh seeds.
+        work: function that scores them.
         rivals: scores of the trials that may come next.
-        best: the largest mean over fresh seeds until now.
+        best: largest mean over fresh seeds so far.
     """
     first = [(trial, seeds[0]) for trial in trials if seeds[0] not in trial.fresh]
     rest = len(trials) * (len(seeds) - 1)
@@ -109,21 +112,21 @@ def _score(
 
 
 def _alike(one: Outcome, other: Outcome) -> bool:
-    """Whether two seeds give the same scores and the same values of what conditions limit."""
+    """Return whether two seeds give the same scores and the same values of limited quantities."""
     same = dict(one.conditions) == dict(other.conditions)
     return same and dict(one.scores) == dict(other.scores)
 
 
 def _likely(rivals: Sequence[float], best: float) -> float:
-    """How many rivals are expected to be scored: about half of those with more than the best fresh
-    score, since each that is scored raises that as a rule.
+    """Return the number of rivals that are expected to be scored: about half of those above the
+    best fresh score, since each that is scored usually raises it.
     """
     above = sum(score > best for score in rivals)
     return 0.5 * (above + 1) if above else 0.0
 
 
 def _spread_out(study: Study) -> list[Trial]:
-    """Some trials of the front, from one end to the other."""
+    """Return some trials of the front, from one end to the other."""
     front = study.front
     if len(front) <= MOST:
         return front

@@ -1,4 +1,4 @@
-"""What a study is about, written as study.json: enough to go on with it elsewhere."""
+"""Settings of a study, written as study.json, which suffice to resume it on another machine."""
 
 from __future__ import annotations
 
@@ -19,18 +19,21 @@ from optisense.untrusted_files import COPY_AGAIN, first_problem, is_file, read_j
 from optisense.writing import write_text
 
 STUDY_VERSION = 1
-"""Version of the format of `STUDY_FILE`; it is raised when an older program cannot read it."""
+"""Version of the format of `STUDY_FILE`; it is increased when an older program can't read it."""
 STUDY_FILE = "study.json"
 
 LIBRARIES = ("optisense", "cma", "numpy", "scipy", "mitsuba")
-"""Packages that a study's numbers depend on."""
+"""Packages on which the numbers of a study depend."""
 
 MOST_NAMES = 100
-"""Objectives, or rules, of a study; a search by more than a few finds no front."""
+"""Largest number of objectives, or of rules, of a study; a search by more than a few finds no
+useful front.
+"""
 
 LATER = ("requirements",)
-"""Settings that studies of earlier releases do not have. They count as their defaults, and one with
-its default is left out where settings are compared, so that such studies go on as they are."""
+"""Settings that studies of earlier releases do not have. They count as their defaults, and are left
+out of comparisons if they have their defaults, so that such studies can be resumed.
+"""
 
 Names = Annotated[list[str], Field(max_length=MOST_NAMES)]
 Whole = Annotated[int, Field(ge=0, le=2**53)]
@@ -38,31 +41,33 @@ Whole = Annotated[int, Field(ge=0, le=2**53)]
 
 @dataclass(frozen=True)
 class StudySettings:
-    """Everything that decides how a study goes.
+    """Settings that determine the course of a study.
 
     Attributes:
-        design: the design's name.
-        fingerprint: of the design (see `optisense.design.difference`).
-        space: as of `SearchSpace.to_plain`.
-        objectives: how to find them: names, FILE.py:FUNCTION, or "function:NAME" for functions
-            that only the program which began the study knows.
-        names: what their scores are called, in the same order.
-        method: name.
-        options: of the method.
-        budget: trials that the method plans for.
-        seed: of the method and of all trials.
-        settings: of the objectives.
-        apart: whether parts must not cut through one another, nor leave those on which they rest.
+        design: name of the design.
+        fingerprint: fingerprint of the design (see `optisense.design.difference`).
+        space: parameters, as from `SearchSpace.to_plain`.
+        objectives: references to the objectives: names, FILE.py:FUNCTION, or "function:NAME" for
+            functions of the program that began the study.
+        names: names of their scores, in the same order.
+        method: name of the search method.
+        options: options of the method.
+        budget: number of trials that the method plans for.
+        seed: seed of the method and of all trials.
+        settings: settings of the objectives.
+        apart: whether designs are forbidden whose parts cut through one another or leave the parts
+            on which they rest.
         rules: constraints as FILE.py:FUNCTION, or "function:NAME".
-        files: the SHA-256 of each user's file that objectives and rules come from, by path.
-        errors: of making, where P10 is searched; as of `ManufacturingErrors.to_plain`.
-        samples: manufactured sensors a trial.
+        files: SHA-256 of each user's file with objectives or rules, by path.
+        errors: manufacturing errors, as from `ManufacturingErrors.to_plain`, if P10 is searched;
+            else None.
+        samples: number of manufactured sensors per trial.
         requirements: conditions that the best trial must meet.
-        begun: when, UTC.
-        versions: of the packages that it was begun with.
+        begun: time of creation, UTC.
+        versions: versions of the packages with which the study was begun.
 
-    As it is read from a file, its values must have these types, and what is not told here is
-    refused; parameters, errors of making and options are checked by what they are for.
+    Values that are read from a file must have these types, and unknown fields are refused.
+    Parameters, manufacturing errors and options are checked where they are used.
     """
 
     __pydantic_config__: ClassVar[ConfigDict] = ConfigDict(strict=True, extra="forbid")
@@ -87,22 +92,22 @@ class StudySettings:
     versions: dict[str, str] = field(default_factory=lambda: package_versions())
 
     def to_text(self) -> str:
-        """JSON."""
+        """Return the settings as JSON text."""
         return json.dumps({"study_version": STUDY_VERSION, **asdict(self)}, indent=1) + "\n"
 
     def fingerprint_of_all(self) -> str:
-        """The same for studies that go the same way."""
+        """Return a hash that is equal for studies with the same course."""
         kept = self._without("begun", "versions", "design")
         return hashlib.sha256(json.dumps(kept, sort_keys=True).encode()).hexdigest()
 
     def comparable(self) -> dict[str, Any]:
-        """What must be the same when a study is gone on with by the same call; the design, which
-        is compared value by value, and the budget, which may grow, are not in it.
+        """Return the settings that must be equal for a study to be resumed. The design, which is
+        compared value by value, and the budget, which may grow, are left out.
         """
         return self._without("begun", "versions", "design", "fingerprint", "budget")
 
     def _without(self, *names: str) -> dict[str, Any]:
-        """All settings but these, and but later ones that are not used."""
+        """Return all settings but these, and but those of `LATER` that are not used."""
         return {
             key: value
             for key, value in asdict(self).items()
@@ -110,10 +115,10 @@ class StudySettings:
         }
 
     def save(self, folder: Path) -> None:
-        """Write study.json, whole.
+        """Write study.json; the file appears whole.
 
         Raises:
-            OutputError: it can't be written.
+            OutputError: the file can't be written.
         """
         write_text(folder / STUDY_FILE, self.to_text(), "the study")
 
@@ -122,7 +127,8 @@ class StudySettings:
         """Read study.json.
 
         Raises:
-            SearchError: there is no study, it can't be read, or a newer release wrote it.
+            SearchError: there is no study, its settings can't be read, or a newer release wrote
+                them.
         """
         path = folder / STUDY_FILE
         if not is_file(path):
@@ -160,7 +166,7 @@ class StudySettings:
 
 @cache
 def _schema() -> TypeAdapter[StudySettings]:
-    """What study.json must hold besides its version."""
+    """Return the schema of study.json, without its version."""
     return TypeAdapter(StudySettings)
 
 
@@ -169,7 +175,7 @@ def _fields() -> list[str]:
 
 
 def package_versions() -> dict[str, str]:
-    """The installed versions of the packages that a study's numbers depend on."""
+    """Return the installed versions of the packages on which the numbers of a study depend."""
     found = {}
     for name in LIBRARIES:
         try:

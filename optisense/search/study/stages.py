@@ -1,4 +1,4 @@
-"""The stages of a search, with what they usually take, for its time left."""
+"""Stages of a search and their usual durations, for estimates of the time left."""
 
 from __future__ import annotations
 
@@ -8,19 +8,20 @@ from optisense.time_left import TimedStep, TimeLeft
 START_STAGE, TRIALS, FRESH = "start", "trials", "fresh seeds"
 
 USUAL_FRESH = 9
-"""Scores with fresh seeds that a search is expected to need: three for the start, for the best
-trial, and for one that might be better."""
+"""Number of scores with fresh seeds that a search is expected to need: three for the start, for the
+best trial, and for one that might be better.
+"""
 
 
 def stages(
     limit: int, usual: UsualTrials | None, workers: int = 1, *, plain_trials: bool = True
 ) -> list[TimedStep]:
-    """The stages of a search of so many trials, with what their scores usually take, if known.
+    """Return the stages of a search, with the usual durations of their scores, if known.
 
     Args:
-        limit: trials of the search, at most.
-        usual: seconds that scores usually take.
-        workers: processes that score.
+        limit: largest number of trials.
+        usual: usual durations of scores, s.
+        workers: number of processes that score.
         plain_trials: whether the start and the trials are scored as usual; else their times, such
             as those with derivatives and their compiling, do not tell how fast this machine is.
     """
@@ -31,7 +32,7 @@ def stages(
             TimedStep(FRESH, USUAL_FRESH),
         ]
     return [
-        # on a share of the processors
+        # each worker has a share of the processors
         TimedStep(START_STAGE, 1, usual.first * workers, gauges=plain_trials),
         TimedStep(TRIALS, limit, usual.trial, gauges=plain_trials),
         TimedStep(FRESH, USUAL_FRESH, usual.fresh),
@@ -46,6 +47,6 @@ def expect_stages(
     *,
     plain_trials: bool = True,
 ) -> None:
-    """Correct what is expected of the stages among the steps of a command that searches."""
+    """Update the expected durations of the stages of a search among the steps of a command."""
     for step in stages(limit, usual, workers, plain_trials=plain_trials):
         time_left.expect(step.name, step.count, step.seconds, step.gauges)

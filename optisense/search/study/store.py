@@ -1,9 +1,9 @@
-"""The trials of a study in one SQLite file.
+"""Store of a study's trials in one SQLite file.
 
 A generation is written when it is proposed and each of its trials when it is finished, so that a
-search that is killed at any moment has lost nothing but what was being worked on. In write-ahead
-mode such a commit costs a few hundredths of a millisecond: the file is synchronised with the disk
-now and then, and after a power cut the last trials may have to run again.
+search that is killed at any moment loses only the trials in progress. In write-ahead mode such a
+commit costs a few hundredths of a millisecond: the file is synchronised with the disk from time to
+time, and after a power cut the last trials may have to run again.
 """
 
 from __future__ import annotations
@@ -30,10 +30,10 @@ from optisense.untrusted_files import MOST_STORE, check_size
 FloatArray = NDArray[np.float64]
 
 STORE_VERSION = 1
-"""Version of the tables of trials; it is raised when an older program cannot read them."""
+"""Version of the tables of trials; it is increased when an older program can't read them."""
 
 START = -1
-"""Number of the generation of the start, which is scored before the first one, 0."""
+"""Generation number of the start, which is scored before the first generation, 0."""
 
 _TABLES = """
 create table facts (name text primary key, value text not null) without rowid;
@@ -66,12 +66,12 @@ _STRANGE = (
     "select type from sqlite_master where type not in ('table', 'index') "
     "or tbl_name not in ('facts', 'trials', 'fresh_scores') or sql like '%generated%' limit 1"
 )
-"""What a store does not have."""
+"""Query for a table, view or trigger that a store does not have."""
 
 
 @dataclass(frozen=True)
 class Row:
-    """A trial as it is stored; `outcome` is None until it is finished."""
+    """Trial as it is stored; `outcome` is None until it is finished."""
 
     number: int
     generation: int
@@ -82,14 +82,14 @@ class Row:
 
 
 class Store:
-    """The trials of one study.
+    """Trials of one study.
 
-    A store that was opened is read, which writes nothing in its folder and sees what another
-    process writes meanwhile; `write` makes it ready to be written to, by one process at a time.
+    A store that was opened is only read: nothing is written in its folder, and commits of another
+    process are seen. `write` opens it for writing, by one process at a time.
     """
 
     def __init__(self, path: Path | None, objectives: Sequence[str]) -> None:
-        """Use `create` or `open`."""
+        """Store the arguments; use `create` or `open` instead."""
         self.path = path
         self.objectives = list(objectives)
         self._db: sqlite3.Connection | None = None
@@ -97,14 +97,14 @@ class Store:
 
     @staticmethod
     def create(path: Path | None, objectives: Sequence[str]) -> Store:
-        """Make a store, to be written to.
+        """Create a store, open for writing.
 
         Args:
-            path: of the file, which must not exist; None keeps everything in memory.
-            objectives: in the order of the stored scores.
+            path: path of the file, which must not exist; None keeps everything in memory.
+            objectives: names of the objectives in the order of the stored scores.
 
         Raises:
-            OutputError: it can't be written.
+            OutputError: the file can't be written.
         """
         store = Store(path, objectives)
         with _told(path):
@@ -117,11 +117,11 @@ class Store:
 
     @staticmethod
     def open(path: Path, objectives: Sequence[str]) -> Store:
-        """Open a store to read it.
+        """Open a store for reading.
 
         Raises:
             SearchError: the file is no store, or one of a newer version.
-            OutputError: it can't be read.
+            OutputError: the file can't be read.
         """
         check_size(path, MOST_STORE, SearchError, "the study's store")
         store = Store(path, objectives)
@@ -136,15 +136,15 @@ class Store:
                 hint="A newer release wrote it: update OptiSense Studio" if newer else None,
             )
         if strange is not None:
-            # Such as a view in the place of a table, which may compute for ever.
+            # For example a view in place of a table, which may compute for ever.
             raise damaged("the store", path, f"it has a {strange[0]} that is none of a study's")
         return store
 
     def write(self) -> None:
-        """Get ready to write; the caller holds the lock of the folder.
+        """Open the store for writing; the caller holds the lock of the folder.
 
         Raises:
-            OutputError: it can't be written.
+            OutputError: the file can't be written.
         """
         if self._db is None:
             if self.path is not None and self.path.is_symlink():
@@ -164,16 +164,16 @@ class Store:
             self.close()
 
     def close(self) -> None:
-        """Close the file; a store in memory is gone."""
+        """Close the file; the content of a store in memory is lost."""
         if self._db is not None:
             with _told(self.path):
                 self._db.close()
             self._db = None
 
     def _connect(self, mode: str) -> None:
-        """Open the file for writing; `mode` as in an address of SQLite."""
+        """Open the file for writing; `mode` as in a URI of SQLite."""
         name = ":memory:" if self.path is None else f"{self.path.absolute().as_uri()}?mode={mode}"
-        # Progress and reports may ask from another thread; calls never overlap.
+        # Progress and reports may read from another thread; calls never overlap.
         self._db = sqlite3.connect(name, uri=True, isolation_level=None, check_same_thread=False)
         self._db.execute("pragma journal_mode = wal")
         self._db.execute("pragma synchronous = normal")
@@ -185,7 +185,7 @@ class Store:
 
     @contextmanager
     def _read(self) -> Iterator[sqlite3.Connection]:
-        """A connection to read with."""
+        """Yield a connection for reading."""
         with _told(self.path):
             if self._db is not None:
                 yield self._db
@@ -195,14 +195,14 @@ class Store:
                     yield db
 
     def set_fact(self, name: str, value: object) -> None:
-        """Keep a JSON-ready value under a name."""
+        """Store a JSON-ready value under a name."""
         with _told(self.path):
             self._writer.execute(
                 "insert or replace into facts values (?, ?)", (name, json.dumps(value))
             )
 
     def fact(self, name: str) -> Any:
-        """The value under a name, or None."""
+        """Return the value under a name, or None."""
         with self._read() as db:
             row = db.execute("select value from facts where name = ?", (name,)).fetchone()
             with self._readable(f"the fact '{name}'"):
@@ -212,9 +212,9 @@ class Store:
         """Write the points (k, n) of a generation, all in one commit.
 
         Args:
-            generation: its number.
-            vectors: the points.
-            place: of the first of them in the generation.
+            generation: number of the generation.
+            vectors: points (k, n).
+            place: index of the first point within the generation.
         """
         first = self._count("select coalesce(max(number) + 1, 0) from trials")
         rows = [
@@ -227,7 +227,7 @@ class Store:
             )
 
     def finish(self, number: int, outcome: Outcome) -> None:
-        """Write what came of a trial, which must not be finished already."""
+        """Write the outcome of a trial, which must not be finished already."""
         values = (
             self._packed(outcome.scores),
             outcome.failure,
@@ -248,7 +248,7 @@ class Store:
             raise SearchError(f"trial {number} was finished twice", where=str(self.path))
 
     def finish_fresh(self, number: int, seed: int, outcome: Outcome) -> None:
-        """Write what a trial scores with another seed."""
+        """Write the outcome of a trial with another seed."""
         with _told(self.path):
             self._writer.execute(
                 "insert or replace into fresh_scores (number, seed, scores, failure, conditions) "
@@ -263,7 +263,9 @@ class Store:
             )
 
     def rows(self, generation: int | None = None) -> list[Row]:
-        """All trials, or those of one generation, in the order in which they were proposed."""
+        """Return all trials, or those of one generation, in the order in which they were
+        proposed.
+        """
         query = (
             "select number, generation, place, vector, done, scores, failure, parts, gradient, "
             "seconds, worker, finished from trials"
@@ -275,7 +277,7 @@ class Store:
         return [self._row(row) for row in found]
 
     def fresh_scores(self) -> dict[int, dict[int, Outcome]]:
-        """What trials score with other seeds, by number and seed."""
+        """Return the outcomes of trials with other seeds, by number and seed."""
         found: dict[int, dict[int, Outcome]] = {}
         with self._read() as db:
             conditions = "conditions" if _has_conditions(db) else "null"
@@ -291,10 +293,10 @@ class Store:
         return found
 
     def check_points(self, size: int) -> None:
-        """Check that each trial has a point of so many numbers.
+        """Check that each trial has a point of `size` numbers.
 
         Raises:
-            SearchError: one has not.
+            SearchError: a trial has not.
         """
         with self._read() as db:
             wrong = db.execute(
@@ -307,11 +309,11 @@ class Store:
             raise damaged(f"trial {wrong[0]}", self.path, why)
 
     def last_generation(self) -> int:
-        """The number of the last generation; `START` - 1 where there is none."""
+        """Return the number of the last generation; `START` - 1 if there is none."""
         return self._count(f"select coalesce(max(generation), {START - 1}) from trials")
 
     def proposed_before(self, generation: int) -> int:
-        """How many trials the generations before this one have, without the start."""
+        """Return the number of trials in the generations before this one, without the start."""
         return self._count(
             f"select count(*) from trials where generation >= 0 and generation < {generation:d}"
         )
@@ -343,7 +345,9 @@ class Store:
 
     @contextmanager
     def _readable(self, what: str) -> Iterator[None]:
-        """Values that are not what this class writes as an error that says where they are."""
+        """Turn errors from values that this class does not write into an error that names their
+        place.
+        """
         try:
             yield
         except (ValueError, TypeError, RecursionError, MemoryError, OverflowError) as error:
@@ -358,27 +362,27 @@ class Store:
 
     @contextmanager
     def _together(self) -> Iterator[sqlite3.Connection]:
-        """One transaction: all or nothing."""
+        """Run the block as one transaction, which is committed whole or not at all."""
         db = self._writer
         db.execute("begin immediate")
         try:
             yield db
             db.execute("commit")
         except BaseException:
-            if db.in_transaction:  # SQLite has rolled back already where the disk is full
+            if db.in_transaction:  # on a full disk SQLite has rolled back already
                 db.execute("rollback")
             raise
 
 
 def _has_conditions(db: sqlite3.Connection) -> bool:
-    """Whether fresh scores have a column for conditions, which those of 0.2.0 do not."""
+    """Return whether fresh scores have a column for conditions, which stores of 0.2.0 lack."""
     return any(
         column[1] == "conditions" for column in db.execute("pragma table_info(fresh_scores)")
     )
 
 
 def _objects(parts: Any) -> dict[str, Any]:
-    """Parts of scores as they were read from JSON.
+    """Return the parts of scores that were read from JSON, after a check.
 
     Raises:
         TypeError: they are no objects by name.
@@ -392,7 +396,7 @@ def _objects(parts: Any) -> dict[str, Any]:
 
 
 def damaged(what: str, path: Path | None, why: str) -> SearchError:
-    """The error for a store that does not hold what it should."""
+    """Return the error for a store with unexpected content."""
     return SearchError(
         f"{what} can't be read: {why}",
         where=None if path is None else str(path),
@@ -402,7 +406,7 @@ def damaged(what: str, path: Path | None, why: str) -> SearchError:
 
 @contextmanager
 def _told(path: Path | None) -> Iterator[None]:
-    """SQLite's errors, and those of its files, as ours."""
+    """Turn errors of SQLite and of the file system into errors of this package."""
     try:
         yield
     except (sqlite3.Error, OSError, MemoryError, UnicodeDecodeError) as error:
@@ -413,7 +417,7 @@ def _error(error: Exception, path: Path | None) -> OptiSenseError:
     where = None if path is None else str(path)
     text = str(error)
     if isinstance(error, MemoryError | UnicodeDecodeError):
-        # SQLite says so of a file whose pages make no sense, too.
+        # SQLite also reports pages with impossible content like this.
         return damaged("the study's store", path, text or "its pages make no sense")
     if "full" in text:
         return OutputError("the disk is full", where=where, hint="Free some space on it")
@@ -434,4 +438,4 @@ REMEDIES = {
     "locked": "End the other program that has the file open",
     "Permission denied": "Ask its owner for the right to read it",
 }
-"""What to do about other errors of SQLite, by words in them."""
+"""Hints for other errors of SQLite, by words in their message."""

@@ -1,4 +1,4 @@
-"""A study: one search with everything that belongs to it, in a folder or in memory.
+"""A study: one search with all its data, in a folder or in memory.
 
 ```text
 STUDY/
@@ -37,13 +37,13 @@ from optisense.search.study.trust import not_trusted, trust
 
 
 class Study:
-    """One search. Make one with `create` or `open`, and run it with `optisense.search.run_study`.
+    """One search. Create one with `create` or `open`, and run it with `optisense.search.run_study`.
 
     Attributes:
-        folder: where it is kept; None in memory.
-        settings: what it is about.
-        space: bound to the design.
-        goals: what it searches for; empty where only the program that began it knows them.
+        folder: folder of the study; None in memory.
+        settings: settings of the study.
+        space: space that is searched, bound to the design.
+        goals: goals of the search; empty if only the program that began the study knows them.
     """
 
     def __init__(
@@ -56,7 +56,7 @@ class Study:
         store: Store,
         lock: FolderLock | None = None,
     ) -> None:
-        """Use `create` or `open`."""
+        """Store the arguments; use `create` or `open` instead."""
         self.folder = folder
         self.settings = settings
         self.goals = list(goals)
@@ -67,16 +67,17 @@ class Study:
 
     @staticmethod
     def create(folder: str | Path | None, design: SensorDesign, plan: Plan) -> Study:
-        """Begin a study; nothing is scored yet. It holds the lock of its folder until it is closed.
+        """Create a study; nothing is scored yet. It holds the lock of its folder until it is
+        closed.
 
         Args:
-            folder: where to keep it; None keeps it in memory.
-            design: where the search starts.
+            folder: folder to create; None keeps the study in memory.
+            design: design that the search starts from.
             plan: what to search and how.
 
         Raises:
-            SearchError: the plan makes no sense, or there is a study in the folder already.
-            DesignError: a path leads nowhere.
+            SearchError: the plan is invalid, or there is a study in the folder already.
+            DesignError: a path names nothing in the design.
             ObjectiveError: an objective or a setting is unknown.
             FolderInUseError: another process is writing to the folder.
             OutputError: the folder is not empty, or can't be written.
@@ -117,16 +118,16 @@ class Study:
         goals: Sequence[Goal] | None = None,
         rules: Sequence[Constraint] | None = None,
     ) -> Study:
-        """Open a study to look at it or to go on with it; nothing in its folder is written.
+        """Open a study to read or resume it; nothing in its folder is written.
 
         Args:
-            folder: of the study.
-            design: the design that the user means; refused where it is not the study's.
-            goals, rules: those that are functions of the program and in no file.
+            folder: folder of the study.
+            design: expected design; an error is raised if it is not the study's.
+            goals, rules: goals and rules that are functions of the program and in no file.
 
         Raises:
-            SearchError: there is no study, it was changed by hand, it is of a newer version, or
-                the design differs; says where.
+            SearchError: there is no study, it was edited, it is of a newer version, or the design
+                differs; the message says where.
         """
         place = Path(folder)
         settings = StudySettings.load(place)
@@ -152,13 +153,13 @@ class Study:
         return study
 
     def expect(self, wanted: Mapping[str, Any]) -> None:
-        """Refuse to go on with other settings than those that the study was begun with.
+        """Refuse to resume the study with other settings than those that it was begun with.
 
         Args:
             wanted: fields of `StudySettings` as JSON-ready values.
 
         Raises:
-            SearchError: some differ; says how.
+            SearchError: some differ; the message lists them.
         """
         here = json.loads(self.settings.to_text())
         there = json.loads(json.dumps(wanted))
@@ -172,7 +173,7 @@ class Study:
 
     @property
     def references(self) -> list[str]:
-        """How its objectives and rules are named."""
+        """References to its objectives and rules, as stored."""
         return [*self.settings.objectives, *self.settings.rules]
 
     def trust(self) -> None:
@@ -184,11 +185,11 @@ class Study:
         trust(self.references)
 
     def evaluator(self, variant: str = "auto") -> DesignEvaluator:
-        """What scores its points, on a variant of the renderer.
+        """Return the evaluator of its points, on a variant of the renderer.
 
         Raises:
-            SearchError: a goal or rule is known only to the program that began the study, or is
-                in a Python file that the user has not named.
+            SearchError: a goal or rule is known only to the program that began the study, or is in
+                a Python file that the user has not named.
         """
         known = self.references
         unknown = [each.removeprefix(ONLY_HERE) for each in known if each.startswith(ONLY_HERE)]
@@ -226,12 +227,12 @@ class Study:
 
     @property
     def objective(self) -> str:
-        """The first goal, which methods for one goal maximise."""
+        """First goal, which methods for one goal maximise."""
         return self.settings.names[0]
 
     @property
     def trials(self) -> list[Trial]:
-        """The finished trials in the order in which they were proposed, the start first."""
+        """Finished trials in the order in which they were proposed, the start first."""
         fresh = self.store.fresh_scores()
         return [
             self.trial_of(row, fresh.get(row.number, {}))
@@ -241,21 +242,23 @@ class Study:
 
     @property
     def start(self) -> Trial | None:
-        """The design as it is, or the nearest to it in the space."""
+        """Trial of the starting design, or of the nearest point to it in the space; None if not
+        scored.
+        """
         return next((trial for trial in self.trials if trial.is_start), None)
 
     @property
     def best(self) -> Trial | None:
-        """The best trial by the first objective; see `optisense.search.study.best` for the rule."""
+        """Best trial by the first objective; see `optisense.search.study.best` for the rule."""
         return best_of(self.trials)
 
     @property
     def front(self) -> list[Trial]:
-        """The trials that no other one beats in all objectives, by the first of them."""
+        """Pareto front: the trials that no other one dominates, sorted by the first objective."""
         return front_among(self.trials, self.settings.names)
 
     def trial(self, which: int | str) -> Trial:
-        """A trial by its number, or "best" or "start".
+        """Return a trial by its number, or "best" or "start".
 
         Raises:
             SearchError: there is no such trial.
@@ -284,7 +287,7 @@ class Study:
         return found
 
     def trial_of(self, row: Row, fresh: Mapping[int, Any] | None = None) -> Trial:
-        """A finished row of the store as a trial."""
+        """Return a finished row of the store as a trial."""
         assert row.outcome is not None
         return Trial(
             number=row.number,
@@ -297,11 +300,11 @@ class Study:
         )
 
     def lock(self) -> None:
-        """Keep other processes from writing to it, and open its store for writing.
+        """Take the lock against other processes that write, and open the store for writing.
 
         Raises:
-            FolderInUseError: another process is writing to it.
-            OutputError: it can't be written.
+            FolderInUseError: another process is writing to the folder.
+            OutputError: the folder can't be written.
         """
         if self.folder is None:
             return
@@ -311,20 +314,21 @@ class Study:
 
     @property
     def is_new(self) -> bool:
-        """Whether it was created here, and not unlocked since."""
+        """True if it was created in this process, and not unlocked since."""
         return self._lock is not None and self._lock.has_made
 
     def unlock(self) -> None:
-        """Let others write to it; it can still be read."""
+        """Release the lock; the study can still be read."""
         if self._lock is not None:
             self.store.only_read()
             self._lock.release()
             self._lock = None
 
     def discard(self) -> None:
-        """Close a study that nothing was scored in, and remove the files that were made for it.
+        """Close a study without scores, and remove the files that were made for it.
 
-        A study that was opened and not created here is closed only: its files are another's.
+        A study that was opened and not created here is only closed: its files belong to another
+        process.
         """
         self.store.close()
         if self._lock is not None:
@@ -333,7 +337,7 @@ class Study:
             self._lock = None
 
     def close(self) -> None:
-        """Close its files; one that is in memory is gone."""
+        """Close its files; a study in memory is lost."""
         self.store.close()
         if self._lock is not None:
             self._lock.release()
@@ -341,8 +345,8 @@ class Study:
 
 
 def beside(study: Study, trial: Trial) -> dict[str, float]:
-    """What stands beside a trial's score: its other scores, and the parts that an objective wants
-    to be seen with its own, such as the coverage with AOAP.
+    """Return the numbers that are shown beside a trial's score: its other scores, and the parts
+    that an objective lists to be shown, such as the coverage with AOAP.
     """
     found: dict[str, float] = {}
     for number, name in enumerate(study.settings.names):
@@ -354,8 +358,8 @@ def beside(study: Study, trial: Trial) -> dict[str, float]:
 
 
 def _shown(name: str) -> tuple[str, ...]:
-    """The parts that an objective wants to be seen with its value; none of those of a user's own,
-    whose file is not run to look at a study.
+    """Return the parts that an objective lists to be shown with its value; none for a user's
+    objective, whose file is not run to look at a study.
     """
     from optisense.objectives.combined import objective_of
     from optisense.objectives.named import is_plain
@@ -364,14 +368,14 @@ def _shown(name: str) -> tuple[str, ...]:
     try:
         known = name in (*BUILT_IN, *FURTHER) or not is_plain(name)
         return objective_of(name).beside if known else ()
-    except ObjectiveError:  # an expression with an objective that is not installed here
+    except ObjectiveError:  # an expression with an objective that is not installed
         return ()
 
 
 def front_among(trials: Sequence[Trial], names: Sequence[str]) -> list[Trial]:
-    """The trials that no other one beats in all objectives, the best in the first one first.
+    """Return the trials that no other one dominates, the best in the first objective first.
 
-    Those that break a condition are left out.
+    Trials that break a condition are left out.
     """
     trials = [trial for trial in trials if trial.is_feasible]
     if not trials:

@@ -1,4 +1,4 @@
-"""A trial of a study: one point of its space and what came of it."""
+"""A trial of a study: one point of its space and its outcome."""
 
 from __future__ import annotations
 
@@ -22,13 +22,13 @@ class Trial:
     """A finished trial.
 
     Attributes:
-        number: counts from 0, the start.
-        generation: which it was proposed in; -1 for the start.
-        vector: (n,) the point.
-        outcome: scores with the seed of the study.
-        fresh: scores with other seeds, by seed; only of the best trials.
-        space: what the point means.
-        objective: the first goal.
+        number: number of the trial, from 0, the start.
+        generation: generation that it was proposed in; -1 for the start.
+        vector: point (n,) of the space.
+        outcome: outcome with the seed of the study.
+        fresh: outcomes with other seeds, by seed; only for the best trials.
+        space: space of the point.
+        objective: first goal.
     """
 
     number: int
@@ -41,12 +41,12 @@ class Trial:
 
     @property
     def is_start(self) -> bool:
-        """Whether this is the design as it is, or the nearest to it in the space."""
+        """True for the starting design, or the nearest point to it in the space."""
         return self.generation < 0
 
     @property
     def scores(self) -> Mapping[str, float]:
-        """Score by each objective; NaN where it failed."""
+        """Score by each objective; NaN if it failed."""
         return self.outcome.scores
 
     @property
@@ -56,19 +56,19 @@ class Trial:
 
     @property
     def failure(self) -> str | None:
-        """Why a score is missing."""
+        """Reason why a score is missing, or None."""
         return self.outcome.failure
 
     @property
     def parts(self) -> Mapping[str, Mapping[str, Any]]:
-        """What the scores are made of, by objective."""
+        """Components of the scores, by objective."""
         return self.outcome.parts
 
     @property
     def conditions(self) -> Mapping[str, float | None]:
-        """The value of the limited quantity, by the text of each condition of the study.
+        """Value of the limited quantity, by the text of each condition of the study.
 
-        Means over fresh seeds where the trial was scored with these, as of its score.
+        The values are means over fresh seeds if the trial was scored with these, as is its score.
         """
         if not self.fresh:
             return self.outcome.conditions
@@ -77,33 +77,33 @@ class Trial:
 
     @property
     def breach(self) -> float:
-        """How far it breaks the conditions of the study; 0 where it meets them."""
+        """Sum of the violations of the study's conditions; 0 if all are met."""
         return breach_of(self.conditions) if self.fresh else self.outcome.breach
 
     @property
     def is_feasible(self) -> bool:
-        """Whether it meets all conditions of the study."""
+        """True if all conditions of the study are met."""
         return self.breach == 0.0
 
     @property
     def values(self) -> dict[str, float | int | str]:
-        """What it sets, by parameter."""
+        """Values of the point, by parameter."""
         return self.space.values(self.vector)
 
     @property
     def design(self) -> SensorDesign:
-        """The design of this trial; a new one each time."""
+        """Design of this trial; a new one each time."""
         return self.space.apply(self.vector).copy()
 
     def fresh_score(self, objective: str | None = None) -> float:
-        """Mean over the other seeds; NaN if there is none or one failed."""
+        """Return the mean score over the fresh seeds; NaN if there are none or one failed."""
         name = objective or self.objective
         values = [outcome.scores.get(name, math.nan) for outcome in self.fresh.values()]
         return float(np.mean(values)) if values else math.nan
 
     @property
     def fair_score(self) -> float:
-        """Score by the first objective, by fresh seeds where they were scored.
+        """Score by the first objective, by fresh seeds if they were scored.
 
         The score by the study's seed, by which a trial was chosen, is too high on average.
         """
@@ -111,13 +111,13 @@ class Trial:
         return fresh if math.isfinite(fresh) else self.score
 
     def fresh_spread(self, objective: str | None = None) -> float:
-        """Standard deviation over the other seeds; NaN if there are less than two."""
+        """Return the standard deviation over the fresh seeds; NaN if there are less than two."""
         name = objective or self.objective
         values = [outcome.scores.get(name, math.nan) for outcome in self.fresh.values()]
         return deviation_of(values) if np.isfinite(values).all() else math.nan
 
 
 def _mean(values: Sequence[float | None]) -> float | None:
-    """The mean; None where one was not measured."""
+    """Return the mean, or None if a value was not measured."""
     known = [value for value in values if value is not None]
     return float(np.mean(known)) if len(known) == len(values) else None

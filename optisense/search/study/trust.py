@@ -1,10 +1,11 @@
-"""Which Python files of a study may be run: those that this user has named on this machine.
+"""Trust in the Python files of a study: only files that this user has named on this machine are
+run.
 
 A study's folder may come from a stranger, and its `study.json` names the Python files of its
-objectives and rules. Such a file is run only if the user has named it: when the study was begun,
-by naming it again, or by saying that the study is trusted. What was named is noted outside the
+objectives and rules. Such a file is run only if the user has named it: when the study was begun, by
+naming it again, or by confirming that the study is trusted. Trusted files are recorded outside the
 study, in `optisense/trusted-files.txt` of the user's state folder ($XDG_STATE_HOME, or
-~/.local/state): FILE:FUNCTION and the SHA-256 of the file, so that an edited file is a new one.
+~/.local/state), as FILE:FUNCTION and the SHA-256 of the file, so that an edited file is a new one.
 """
 
 from __future__ import annotations
@@ -20,13 +21,15 @@ from optisense.untrusted_files import MOST_PROGRAM, read_bytes
 
 
 def file_of(reference: str) -> Path | None:
-    """The Python file of an objective or rule as a study names it; None for other names."""
+    """Return the Python file of an objective or rule in a study, or None for other names."""
     path = reference.rpartition(":")[0] if not reference.endswith(".py") else reference
     return Path(path) if path.endswith(".py") else None
 
 
 def not_trusted(references: Iterable[str]) -> list[str]:
-    """Those that name a Python file that the user has not named yet, or not as it is now."""
+    """Return the references to Python files that the user has not named yet, or not in their
+    present content.
+    """
     try:
         known = set(_notes().read_text(encoding="utf-8").splitlines())
     except (OSError, ValueError):
@@ -35,9 +38,9 @@ def not_trusted(references: Iterable[str]) -> list[str]:
 
 
 def trust(references: Iterable[str]) -> None:
-    """Note that the user has named these files.
+    """Record that the user has named these files.
 
-    Where nothing can be noted, the user is asked again another time.
+    If the record can't be written, the user is asked again the next time.
     """
     lines = [_note(each) + "\n" for each in not_trusted(references)]
     if not lines:
@@ -49,7 +52,9 @@ def trust(references: Iterable[str]) -> None:
 
 
 def _note(reference: str) -> str:
-    """A line: the print of the file as it is now, and the reference without line breaks."""
+    """Return a line with the hash of the file's present content, and the reference without line
+    breaks.
+    """
     file = file_of(reference)
     try:
         content = b"" if file is None else read_bytes(file, MOST_PROGRAM, SearchError)

@@ -1,4 +1,4 @@
-"""The distribution of a design's score under manufacturing errors."""
+"""Distribution of a design's score under manufacturing errors."""
 
 from __future__ import annotations
 
@@ -35,44 +35,53 @@ from optisense.time_left import TimedStep, TimeLeft
 FloatArray = NDArray[np.float64]
 
 SENSORS = 120
-"""Sensors that are tried where the user names no number."""
+"""Number of sensors that are tried where none is given."""
 
 LEAST_ROWS = 8
-"""Each row is one sensor, and one more for each source of error."""
+"""Smallest number of rows of sensors; each row is one sensor, and one more for each source of
+error.
+"""
 
 NOISE_SEEDS = 3
-"""Seeds with which the design as it is is scored again, to separate noise from tolerance."""
+"""Number of seeds with which the nominal design is scored again, to separate noise from
+tolerance.
+"""
 
 OWN_SCORES = 1 + NOISE_SEEDS
-"""Scores of the design as it is, which come before those of manufactured sensors."""
+"""Number of scores of the nominal design, which come before those of manufactured sensors."""
 
 PERCENTILES = {"p10": LOW, "p50": MIDDLE, "p90": HIGH}
 
 POSITION, ANGLE, SPECULARITY, CAGE_POINT, INDEX = 0.1, 2.0, 0.05, 0.05, 0.005
-"""Usual errors, standard deviations: of each light's place (mm) and direction (degrees about each
-axis), of the specularity, of each coordinate of a control point (mm), of a refractive index.
-Assumptions for a sensor that is built by hand: LEDs soldered to a board that is glued in, a printed
-mould, silicone and resin of another batch."""
+"""Default standard deviations of errors: of each light's position (mm) and direction (degrees about
+each axis), of the specularity, of each coordinate of a control point (mm), and of a refractive
+index. They are assumptions for a sensor that is built by hand: LEDs soldered to a board that is
+glued in, a printed mould, silicone and resin of another batch.
+"""
 
 FIRST, SENSORS_STEP = "the design itself", "sensors"
-"""Stages, for the time left: the first score, which compiles, and all others."""
+"""Stages for estimates of the time left: the first score, which includes compiling, and all
+others.
+"""
 
 ToleranceCallback = Callable[[int, int, float, str], None]
-"""Called with the number of finished scores, of all, the seconds left (NaN if unknown), and with
-what the score at hand is at, where it is worked out in this process."""
+"""Function that is called with the number of finished scores, the number of all, the seconds left
+(NaN if unknown), and the stage of the current score, if it is worked out in this process.
+"""
 
 
 @dataclass(frozen=True)
 class ScoreDistribution:
-    """The distribution of one objective's score.
+    """Distribution of one objective's score.
 
     Attributes:
-        nominal: of the design as it is.
-        noise: standard deviation over seeds of the design as it is; 0 where seeds do not matter.
-        scores: (rows, k) of the sensors, NaN where one failed.
-        percentiles: by name ("p10", ...).
-        shares: by source of error, its share in the variance, the largest first; None where
-            too many sensors failed to tell.
+        nominal: score of the nominal design.
+        noise: standard deviation of the nominal design's score over seeds; 0 if seeds do not
+            matter.
+        scores: scores (rows, k) of the sensors, NaN where one failed.
+        percentiles: percentiles by name ("p10", ...).
+        shares: share of each source of error in the variance, the largest first; None if too many
+            sensors failed to tell.
     """
 
     nominal: float
@@ -83,27 +92,27 @@ class ScoreDistribution:
 
     @property
     def deviation(self) -> float:
-        """Standard deviation of the scores, failed sensors left out; NaN for less than two."""
+        """Standard deviation of the scores, without failed sensors; NaN for less than two."""
         known = self.scores[np.isfinite(self.scores)]
         return deviation_of(known.ravel().tolist())
 
 
 @dataclass(frozen=True)
 class Tolerance:
-    """The effect of manufacturing errors on a design.
+    """Effect of manufacturing errors on a design.
 
     Attributes:
-        design: the design.
-        errors: of making.
-        results: by objective.
-        sensors: how many were tried.
-        failures: the causes for which sensors have no score (see `failures.cause_of`), each with
-            the number of sensors.
-        interrupted: whether it was stopped early.
-        seconds: wall time.
-        settings: of the objectives.
-        values: (rows, k, d) what the numbers with errors were, for plots.
-        names: of these numbers.
+        design: nominal design.
+        errors: manufacturing errors.
+        results: distribution of the score by objective.
+        sensors: number of sensors that were tried.
+        failures: causes for which sensors have no score (see `failures.cause_of`), each with the
+            number of sensors.
+        interrupted: whether the analysis was stopped early.
+        seconds: wall time, s.
+        settings: settings of the objectives.
+        values: values (rows, k, d) of the numbers with errors, for plots.
+        names: names (d) of these numbers.
     """
 
     design: SensorDesign
@@ -118,7 +127,7 @@ class Tolerance:
     names: Sequence[str] = field(repr=False)
 
     def to_dict(self) -> dict[str, Any]:
-        """All of it, ready for JSON."""
+        """Return all results, ready for JSON."""
         return {
             "design": self.design.name,
             "errors": self.errors.to_plain(),
@@ -132,7 +141,7 @@ class Tolerance:
 
 
 def usual_errors(design: SensorDesign) -> ManufacturingErrors:
-    """Errors that a design may have, of the usual sizes."""
+    """Return the default errors of a design."""
     found: dict[str, ToleranceDistribution | float] = {}
     if design.lights:
         found |= {"lights.position": POSITION, "lights.angle": ANGLE}
@@ -160,20 +169,20 @@ def tolerance(
     told: Callable[[], None] | None = None,
     time_left: TimeLeft | None = None,
 ) -> Tolerance:
-    """Try sensors with manufacturing errors, all with the same seed of the light.
+    """Score sensors with manufacturing errors, all with the same seed of the light.
 
     Args:
-        design: the sensor.
-        objective: one or several; see `optisense.search.search`.
-        errors: by path (see `ManufacturingErrors`); usual ones if None.
-        sensors: about how many to try; at least 8 for each source of error and 8 more.
-        seed: of the errors and of the light.
-        workers: processes on this machine; 1 works in this one.
-        settings: of the objectives.
-        variant: of the renderer: "auto", "llvm" or "cuda".
-        progress: called now and then.
-        told: called when Ctrl-C waits for a sensor in this process to finish.
-        time_left: of a command whose last steps are those of `tolerance_steps`.
+        design: nominal design.
+        objective: one or several objectives; see `optisense.search.search`.
+        errors: distributions by path (see `ManufacturingErrors`); `usual_errors` if None.
+        sensors: approximate number of sensors; at least 8 for each source of error and 8 more.
+        seed: seed of the errors and of the light.
+        workers: number of processes on this machine; 1 scores the sensors in this process.
+        settings: settings of the objectives.
+        variant: variant of the renderer: "auto", "llvm" or "cuda".
+        progress: function that is called a few times a second.
+        told: function that is called when Ctrl-C waits for a sensor in this process to finish.
+        time_left: time estimate of a command whose last steps are those of `tolerance_steps`.
 
     Returns:
         Percentiles of the scores, and each source's share in their variance. Ctrl-C ends it
@@ -181,9 +190,9 @@ def tolerance(
         each source of error), percentiles any sensor.
 
     Raises:
-        KeyboardInterrupt: Ctrl-C came before the design itself had its score.
-        SearchError: an error makes no sense, or the design itself has no score.
-        DesignError: a path leads nowhere; names the near match.
+        KeyboardInterrupt: Ctrl-C came before the nominal design had its score.
+        SearchError: an error is invalid, or the nominal design has no score.
+        DesignError: a path names nothing in the design; the message suggests a similar name.
         ObjectiveError: an objective or a setting is unknown.
     """
     began = time.perf_counter()
@@ -241,12 +250,12 @@ def tolerance(
 
 
 def tolerance_steps(sensors: int, usual: UsualTrials | None, workers: int = 1) -> list[TimedStep]:
-    """The stages of a tolerance analysis with what they usually take, if that is known.
+    """Return the stages of a tolerance analysis with their usual durations, if known.
 
     Args:
-        sensors: with errors.
-        usual: scores of the design, and of others.
-        workers: that share the processors.
+        sensors: number of sensors with errors.
+        usual: usual durations of the first score and of the others.
+        workers: number of workers that share the processors.
     """
     rest = sensors + NOISE_SEEDS
     if usual is None:
@@ -300,7 +309,9 @@ def _work(
     time_left: TimeLeft,
     usual: UsualTrials | None,
 ) -> tuple[list[Outcome | None], bool]:
-    """The outcome of each job, None where Ctrl-C came first; and whether it came."""
+    """Return the outcome of each job, None for jobs after Ctrl-C, and whether Ctrl-C was
+    pressed.
+    """
     found: list[Outcome | None] = [None] * len(jobs)
     running: dict[Future[Outcome], int] = {}
     time_left.begin(FIRST)

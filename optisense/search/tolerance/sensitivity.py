@@ -1,12 +1,13 @@
 """Sensitivity analysis: the share of each error in the variance of a score.
 
 The measure is the total-effect index of Homma and Saltelli ("Importance measures in global
-sensitivity analysis of nonlinear models", 1996): the part of the score's variance that is left, on
-average, while one source of error varies and all others are held, its interactions with them
-included. It is estimated by Jansen's formula ("Analysis of variance designs for model output",
-1999; formula (f) of table 2 in Saltelli et al., "Variance based sensitivity analysis of model
-output", 2010): half the mean squared difference between two sensors whose errors differ in that
-source alone, over the variance. A source may be many numbers, such as the places of all lights.
+sensitivity analysis of nonlinear models", 1996): the share of the score's variance that remains, on
+average, if one source of error varies and all others are fixed, including its interactions with
+them. It is estimated by Jansen's formula ("Analysis of variance designs for model output", 1999;
+formula (f) of table 2 in Saltelli et al., "Variance based sensitivity analysis of model output",
+2010): half the mean squared difference between two sensors whose errors differ in that source
+alone, divided by the variance. A source may comprise many numbers, such as the positions of all
+lights.
 """
 
 from __future__ import annotations
@@ -22,24 +23,26 @@ from optisense.search.space.manufacturing import BoundManufacturingErrors, latin
 FloatArray = NDArray[np.float64]
 
 RESAMPLES = 1000
-"""Number of bootstrap samples behind an interval; the ends of an interval of 90 % are known to a
-few per cent of its width."""
+"""Number of bootstrap samples for an interval; with 1000 the ends of a 90 % interval are known to a
+few per cent of its width.
+"""
 
 INTERVAL = (0.05, 0.95)
-"""Ends of an interval, as parts of the bootstrap's distribution."""
+"""Ends of a 90 % interval, as quantiles of the bootstrap distribution."""
 
 LEAST_PAIRS = 4
-"""Number of pairs of sensors that a share of variance must rest on; no interval can be told from
-fewer."""
+"""Smallest number of pairs of sensors for an estimate of a share of variance; fewer give no
+interval.
+"""
 
 
 @dataclass(frozen=True)
 class Estimate:
-    """A number with the interval that holds it in nine of ten cases (bootstrap).
+    """Number with its 90 % bootstrap interval.
 
     Attributes:
         value, low, high: the number and the ends of the interval.
-        error: its standard error: the standard deviation of the bootstrap.
+        error: standard error: the standard deviation of the bootstrap.
     """
 
     value: float
@@ -49,11 +52,11 @@ class Estimate:
 
 
 def paired_errors(bound: BoundManufacturingErrors, rows: int, seed: int) -> FloatArray:
-    """(rows, 1 + sources, d) errors: in each row a first sensor, and for each source another one
-    that differs from it in the errors of this source alone.
+    """Return errors (rows, 1 + sources, d): each row has a first sensor, and for each source
+    another one that differs from it in the errors of this source alone.
 
-    All of them are distributed as the errors are. With a single source there is nothing to tell
-    apart, and each row holds one sensor.
+    All sensors have the distribution of the errors. With a single source there is nothing to
+    separate, and each row has one sensor.
     """
     sources = len(bound.sources)
     shares = latin_hypercube(rows, 2 * bound.size, seed)
@@ -69,7 +72,9 @@ def paired_errors(bound: BoundManufacturingErrors, rows: int, seed: int) -> Floa
 
 
 def percentile_of(scores: ArrayLike, share: float) -> Estimate:
-    """A percentile of scores (rows, k), failed ones (NaN) below all others; NaN without any row."""
+    """Return a percentile of scores (rows, k), with failed ones (NaN) below all others; NaN without
+    rows.
+    """
     values = np.asarray(scores, dtype=np.float64)
     if not values.size:
         return Estimate(np.nan, np.nan, np.nan)
@@ -78,14 +83,14 @@ def percentile_of(scores: ArrayLike, share: float) -> Estimate:
 
 
 def total_effect(scores: ArrayLike, source: int) -> Estimate | None:
-    """The share of one source in the variance; None where too few pairs have scores.
+    """Return the share of one source in the variance, or None if too few pairs have scores.
 
     Args:
-        scores: (rows, 1 + sources) of the sensors of `paired_errors`, NaN where one failed.
-        source: its number.
+        scores: scores (rows, 1 + sources) of the sensors of `paired_errors`, NaN where one failed.
+        source: index of the source.
 
     Returns:
-        The share, at most 1, with the standard error of the estimate before it was cut there.
+        The share, clipped to at most 1, with the standard error of the unclipped estimate.
     """
     values = np.asarray(scores, dtype=np.float64)
     if values.shape[1] == 1:
@@ -98,11 +103,11 @@ def total_effect(scores: ArrayLike, source: int) -> Estimate | None:
 
 
 def _within_bounds(share: Estimate) -> Estimate:
-    """A share without what chance adds above 1.
+    """Return a share clipped to at most 1.
 
     The formula is unbiased and so can give 1.65 where a share is near 1 and sensors are few. The
-    true share is never above 1, so cutting there brings each estimate, and each end of an
-    interval, nearer to it or leaves it. The standard error is that of the estimate before.
+    true share is never above 1, so clipping never increases the error of the estimate or of an end
+    of its interval. The standard error is that of the unclipped estimate.
     """
     value, low, high = (min(1.0, each) for each in (share.value, share.low, share.high))
     return Estimate(value, low, high, share.error)
@@ -118,7 +123,7 @@ def _share(values: FloatArray, source: int) -> float:
 
 
 def _resampled(rows: int) -> NDArray[np.int64]:
-    """(RESAMPLES, rows): rows drawn with replacement; the same ones each time."""
+    """Return rows drawn with replacement, (RESAMPLES, rows); the same ones each time."""
     return np.random.default_rng(rows).integers(rows, size=(RESAMPLES, rows))
 
 
