@@ -1,7 +1,8 @@
-"""The engine: a long-lived process that front ends talk to, by lines of JSON.
+"""The engine: a long-lived process that front ends talk to by lines of JSON.
 
-docs/engine.md is the protocol. `Engine` in `server` reads requests; each module beside it handles
-some of them (`rendering`, `designing`, `keeping` for the library, `scoring`, `searching`).
+The protocol is documented in docs/engine.md. `Engine` in `server` reads requests; each module
+beside it handles some of them (`rendering`, `designing`, `keeping` for the library, `scoring`,
+`searching`).
 """
 
 from optisense.engine.protocol import PROTOCOL

@@ -1,4 +1,4 @@
-"""Requests that make a sensor of the user's CAD files, or an empty one."""
+"""Requests that make a sensor from the user's CAD files, or an empty one."""
 
 from __future__ import annotations
 
@@ -22,18 +22,18 @@ AnyUse = Literal[
 ]  # fmt: skip
 
 COATING = "diffuse-grey"
-"""The library's coating that an empty sensor begins with."""
+"""Coating of the library that an empty sensor has."""
 
 
 class Cad(Fields):
-    """See docs/engine.md."""
+    """Fields of the request "cad"; see docs/engine.md."""
 
     files: list[str] = Field(min_length=1)
     units: AnyUnits | None = None
 
 
 class FromCad(Cad):
-    """See docs/engine.md."""
+    """Fields of the request "from_cad"; see docs/engine.md."""
 
     uses: dict[str, AnyUse] = Field(default_factory=dict)
     to: str
@@ -41,7 +41,7 @@ class FromCad(Cad):
 
 @handles("cad", Cad, Lane.QUICK)
 def cad(session: Session, fields: Cad, job: Job) -> dict[str, Any]:
-    """The bodies of CAD files, what each probably is, and the unit of their lengths."""
+    """Return the bodies of CAD files, the probable use of each, and the unit of their lengths."""
     from optisense.sensors.from_meshes import guessing
 
     files = session.files(fields, job.id)
@@ -68,7 +68,7 @@ def cad(session: Session, fields: Cad, job: Job) -> dict[str, Any]:
 
 @handles("from_cad", FromCad, Lane.QUICK)
 def from_cad(session: Session, fields: FromCad, job: Job) -> dict[str, Any]:
-    """A design folder made of CAD files, with usual lights and a usual camera."""
+    """Write a design folder made of CAD files, with default lights and a default camera."""
     from optisense.design import Role
     from optisense.sensors.from_meshes import design_from_meshes
     from optisense.sensors.from_meshes.guessing import recipe_of
@@ -92,7 +92,7 @@ def from_cad(session: Session, fields: FromCad, job: Job) -> dict[str, Any]:
 
 @handles("empty", Fields, Lane.QUICK)
 def empty(session: Session, fields: Fields, job: Job) -> dict[str, Any]:
-    """What a sensor begins with that has no part, no light and no camera yet."""
+    """Return the data of a sensor that has no part, no light and no camera yet."""
     from optisense import library
 
     coating = library.coating(COATING)

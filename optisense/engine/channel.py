@@ -1,4 +1,4 @@
-"""Standard output as a channel for messages and nothing else."""
+"""Standard output as a channel for messages only."""
 
 from __future__ import annotations
 
@@ -13,19 +13,21 @@ from optisense.engine.protocol import to_line
 
 
 class Channel:
-    """Writes messages, one a line, from any thread."""
+    """Writer of messages, one per line, for any thread."""
 
     def __init__(self, descriptor: int) -> None:
-        """Write to an open file descriptor, which from here on is the channel's own."""
+        """Write to an open file descriptor, which belongs to the channel from here on."""
         self._descriptor = descriptor
         self._lock = threading.Lock()
         self._gone = False
 
     @staticmethod
     def of_standard_output() -> Channel:
-        """The process's standard output; whatever else prints goes to standard error from now on.
+        """Return a channel on the process's standard output, and redirect all other output to
+        standard error.
 
-        On the level of file descriptors, so that libraries in C are kept out as well.
+        The redirection is on the level of file descriptors, so that it holds for libraries in C as
+        well.
         """
         sys.stdout.flush()
         own = os.dup(1)
@@ -35,11 +37,11 @@ class Channel:
 
     @property
     def gone(self) -> bool:
-        """Whether nobody reads any more."""
+        """True if the reader has closed the channel."""
         return self._gone
 
     def send(self, message: Mapping[str, Any]) -> None:
-        """Write a message; one to a reader that has gone is dropped."""
+        """Write a message; it is dropped if the reader has closed the channel."""
         line = memoryview(to_line(message))
         with self._lock:
             if self._gone:
@@ -51,7 +53,7 @@ class Channel:
                 self._gone = True
 
     def close(self) -> None:
-        """Nothing can be sent any more."""
+        """Close the channel; further messages are dropped."""
         with self._lock:
             self._gone = True
             with contextlib.suppress(OSError):

@@ -1,4 +1,4 @@
-"""Contacts as requests write them."""
+"""Contacts in requests."""
 
 from __future__ import annotations
 
@@ -17,20 +17,22 @@ from optisense.geometry.contact_text import parse_contact
 from optisense.geometry.indenter_kinds import indenter_from_plain
 
 ROUNDED = 1e-3
-"""mm by which a point that a pixel sees may lie beside the mesh that it sees."""
+"""Tolerance, mm, for the distance between a point that a pixel sees and the mesh; it covers
+rounding to float32.
+"""
 
 FloatArray = NDArray[np.float32] | NDArray[np.float64]
 
 Place = Callable[[Contact], TriangleMesh]
-"""Presses a contact in: `OpticalModel.place`."""
+"""Function that presses a contact in: `OpticalModel.place`."""
 
 
 GivenIndenter = dict[str, Any]
-"""An indenter as an object: its kind, and the numbers of the kind by name."""
+"""Indenter as an object: its kind, and the parameters of the kind by name."""
 
 
 class GivenContact(BaseModel):
-    """A contact as an object."""
+    """Contact as an object."""
 
     model_config = ConfigDict(extra="forbid")
 
@@ -46,14 +48,14 @@ class GivenContact(BaseModel):
 
 
 AnyContact = str | GivenContact
-"""A contact in a request's `contacts`."""
+"""Contact in a request's `contacts`: a text or an object."""
 
 
 def contact_of(given: AnyContact) -> Contact:
-    """The contact.
+    """Return the contact that a request gives.
 
     Raises:
-        ContactError: it can't be read, or its numbers make no sense.
+        ContactError: the contact can't be read, or a number is out of its range.
     """
     if isinstance(given, str):
         return parse_contact(given)
@@ -71,10 +73,10 @@ def contact_of(given: AnyContact) -> Contact:
 
 
 def contacts_of(given: list[AnyContact]) -> list[Contact]:
-    """The contacts; an error says which one it is.
+    """Return the contacts that a request gives; an error names the contact.
 
     Raises:
-        WrongContactError: as of `contact_of`.
+        WrongContactError: a contact can't be read; see `contact_of`.
     """
     found = []
     for number, each in enumerate(given):
@@ -87,14 +89,14 @@ def contacts_of(given: list[AnyContact]) -> list[Contact]:
 
 @contextmanager
 def telling_which(contacts: Sequence[Contact], place: Place) -> Iterator[None]:
-    """What is done with all contacts at once: an error about one of them says which one.
+    """Context in which an error about one of several contacts names that contact.
 
     Args:
-        contacts: all.
-        place: presses one in, and raises what is wrong with it.
+        contacts: all contacts.
+        place: function that presses one contact in, and raises an error if it can't.
 
     Raises:
-        WrongContactError: in place of the error that one of them causes by itself.
+        WrongContactError: a contact causes the error by itself.
     """
     try:
         yield
@@ -110,12 +112,13 @@ def telling_which(contacts: Sequence[Contact], place: Place) -> Iterator[None]:
 def unseen(
     placed: Iterable[TriangleMesh], points: FloatArray, touched: NDArray[np.bool_]
 ) -> list[int]:
-    """Which contacts no pixel sees, so that a picture does not show them; the first is 0.
+    """Return the indices, from 0, of the contacts that no pixel sees, so that a picture does not
+    show them.
 
     Args:
-        placed: the mesh of each where it presses.
-        points: (h, w, 3) mm, what each pixel sees.
-        touched: (h, w) where a pixel sees an indenter.
+        placed: mesh of each contact in its pressed position.
+        points: points (h, w, 3), mm, that the pixels see.
+        touched: mask (h, w), true where a pixel sees an indenter.
     """
     seen = points[touched]
     found = []
@@ -127,7 +130,7 @@ def unseen(
 
 
 def plain_contact(contact: Contact, indenter: GivenIndenter) -> dict[str, Any]:
-    """A contact as a request can give it again."""
+    """Return a contact as data that a request can give again."""
     given = GivenContact(
         indenter=indenter,
         at=contact.at,

@@ -34,22 +34,23 @@ from optisense.near import suggestion
 from optisense.sensors.registry import SENSORS
 
 SAME_PLACE = 1e-6
-"""Distance in mm within which a cage's point counts as being in its place at rest; a margin for
-rounding."""
+"""Largest distance, mm, between a cage's point and its place at rest that counts as rest; a margin
+for rounding.
+"""
 
 Resolution = tuple[int, int, int]
 Place = tuple[float, float, float]
 
 
 class Save(OfDesign):
-    """See docs/engine.md."""
+    """Fields of the request "save"; see docs/engine.md."""
 
     to: str
     only_new: bool = False
 
 
 class Mesh(Fields):
-    """See docs/engine.md."""
+    """Fields of the request "mesh"; see docs/engine.md."""
 
     file: AnyMesh
     role: Role | None = None
@@ -57,7 +58,7 @@ class Mesh(Fields):
 
 
 class ChangeCage(OfDesign):
-    """See docs/engine.md."""
+    """Fields of the request "cage"; see docs/engine.md."""
 
     action: Literal["add", "remove", "refine", "range", "settle"]
     cage: str
@@ -70,13 +71,13 @@ class ChangeCage(OfDesign):
 
 
 class CageWeights(OfDesign):
-    """See docs/engine.md."""
+    """Fields of the request "cage_weights"; see docs/engine.md."""
 
     cage: str
 
 
 class Export(OfDesign):
-    """See docs/engine.md."""
+    """Fields of the request "export"; see docs/engine.md."""
 
     to: str
     formats: list[str] = Field(default=["stl"])
@@ -84,7 +85,7 @@ class Export(OfDesign):
 
 @handles("sensors", Fields, Lane.QUICK)
 def sensors(session: Session, fields: Fields, job: Job) -> dict[str, Any]:
-    """The built-in sensors."""
+    """Return the names and descriptions of the built-in sensors."""
     rows = []
     for name in SENSORS.names():
         job.check()
@@ -94,7 +95,7 @@ def sensors(session: Session, fields: Fields, job: Job) -> dict[str, Any]:
 
 @handles("open", OfDesign, Lane.QUICK)
 def open_design(session: Session, fields: OfDesign, job: Job) -> dict[str, Any]:
-    """A design as JSON, with its meshes."""
+    """Return a design as JSON, with its meshes."""
     files = session.files(fields, job.id)
     design = design_of(session, fields, job)
     warnings = [p for p in session.designs.problems(design) if p.severity == "warning"]
@@ -117,7 +118,7 @@ def save(session: Session, fields: Save, job: Job) -> dict[str, Any]:
 
 @handles("mesh", Mesh, Lane.QUICK)
 def mesh(session: Session, fields: Mesh, job: Job) -> dict[str, Any]:
-    """A mesh file, and what is wrong with it for a part of some role."""
+    """Read a mesh file, and report the problems that it has for a part with a role."""
     files = session.files(fields, job.id)
     found = session.designs.mesh(fields.file, fields.scale)
     problem = None
@@ -135,7 +136,7 @@ def mesh(session: Session, fields: Mesh, job: Job) -> dict[str, Any]:
 
 @handles("check", OfDesign, Lane.QUICK)
 def check(session: Session, fields: OfDesign, job: Job) -> dict[str, Any]:
-    """All that can be found wrong with a design without tracing light."""
+    """Return all problems of a design that can be found without tracing light."""
     design = design_of(session, fields, job)
     found = session.designs.problems(design)
     return {"problems": [problem_row(each, design) for each in found]}
@@ -143,7 +144,7 @@ def check(session: Session, fields: OfDesign, job: Job) -> dict[str, Any]:
 
 @handles("cage", ChangeCage, Lane.QUICK)
 def cage(session: Session, fields: ChangeCage, job: Job) -> dict[str, Any]:
-    """Another cage, or a changed one."""
+    """Return a design with a cage added, removed or changed."""
     design = design_of(session, fields, job)
     if fields.action == "add":
         changed = add_cage(design, fields.cage, fields.parts, fields.resolution, fields.margin)
@@ -162,7 +163,7 @@ def cage(session: Session, fields: ChangeCage, job: Job) -> dict[str, Any]:
 
 @handles("cage_weights", CageWeights, Lane.QUICK)
 def weights(session: Session, fields: CageWeights, job: Job) -> dict[str, Any]:
-    """How much each control point of a cage moves each vertex of its parts."""
+    """Return the weights of the control points of a cage for the vertices of its parts."""
     files = session.files(fields, job.id)
     design = design_of(session, fields, job)
     if fields.cage not in design.cages:
@@ -179,7 +180,7 @@ def weights(session: Session, fields: CageWeights, job: Job) -> dict[str, Any]:
 
 @handles("export", Export, Lane.QUICK)
 def export(session: Session, fields: Export, job: Job) -> dict[str, Any]:
-    """Files for the workshop."""
+    """Write files for the workshop."""
     from optisense.workshop import export as write
 
     written = write(design_of(session, fields, job), fields.to, fields.formats)
@@ -189,7 +190,9 @@ def export(session: Session, fields: Export, job: Job) -> dict[str, Any]:
 def bent_shapes(
     design: SensorDesign, files: Files, before: SensorDesign | None = None
 ) -> dict[str, dict[str, str]]:
-    """The parts whose present shape differs from their mesh at rest, or from that in `before`."""
+    """Write the parts whose present shape differs from their mesh at rest, or from that in
+    `before`.
+    """
     shapes = design.deformed_meshes()
     others = design.meshes if before is None else before.deformed_meshes()
     bent = {name: mesh for name, mesh in shapes.items() if not _alike(mesh, others.get(name))}

@@ -1,4 +1,4 @@
-"""Designs as requests name them, read again only where something changed."""
+"""Designs that requests name, read again only where a file has changed."""
 
 from __future__ import annotations
 
@@ -27,13 +27,14 @@ from optisense.untrusted_files import inside as inside_folder
 from optisense.untrusted_files import is_file, is_folder, read_array
 
 MOST_MESHES = 200
-"""Mesh files that are kept; the one not asked for longest goes first."""
+"""Largest number of mesh files that are kept; the one not used for longest is dropped first.
+"""
 
 Stamp = tuple[str, int, int]
 
 
 class DesignReference(BaseModel):
-    """A design that is not just named; see docs/engine.md."""
+    """Design that is not given by a name only; see docs/engine.md."""
 
     model_config = ConfigDict(extra="forbid", populate_by_name=True)
 
@@ -44,11 +45,11 @@ class DesignReference(BaseModel):
 
 
 AnyDesign = str | DesignReference
-"""The `design` of a request."""
+"""Value of the field `design` of a request."""
 
 
 class MeshFile(BaseModel):
-    """A mesh as NumPy files."""
+    """Mesh given by two NumPy files."""
 
     model_config = ConfigDict(extra="forbid")
 
@@ -57,17 +58,18 @@ class MeshFile(BaseModel):
 
 
 AnyMesh = str | MeshFile
-"""A mesh file, or the two arrays of one."""
+"""Path of a mesh file, or of the two arrays of a mesh."""
 
 
 class Designs:
-    """Reads designs and keeps what it has read.
+    """Reader of designs with a cache.
 
-    The same file gives the same mesh object, from which an `OpticalModel` sees what has changed.
+    The same file gives the same mesh object, by which an `OpticalModel` recognises what has
+    changed.
     """
 
     def __init__(self) -> None:
-        """Nothing is read yet."""
+        """Start with an empty cache."""
         self._built: dict[str, SensorDesign] = {}
         self._folders: dict[str, tuple[list[Stamp], SensorDesign]] = {}
         self._meshes: dict[tuple[Stamp, ...], TriangleMesh] = {}
@@ -75,15 +77,15 @@ class Designs:
         self._sound: tuple[SensorDesign, list[Diagnostic]] | None = None
 
     def read(self, given: AnyDesign, meshes: Mapping[str, AnyMesh] | None = None) -> SensorDesign:
-        """The design that a request names.
+        """Return the design that a request names.
 
         Args:
             given: a name, a folder, or values.
-            meshes: files to take for some parts instead of the design's own.
+            meshes: mesh files that replace the design's own, by part.
 
         Raises:
-            DesignError, MeshError, LibraryError: it can't be read.
-            ProtocolError: the reference itself makes no sense.
+            DesignError, MeshError, LibraryError: the design can't be read.
+            ProtocolError: the fields of the reference contradict each other.
         """
         if isinstance(given, str):
             design = self._named(given)
@@ -106,7 +108,7 @@ class Designs:
         return design
 
     def problems(self, design: SensorDesign) -> list[Diagnostic]:
-        """All that `check` finds; the answer for the last design is kept."""
+        """Return all problems that `check` finds; the answer for the last design is cached."""
         if self._sound is not None and _same(self._sound[0], design):
             return self._sound[1]
         found = check_design(design, light_names=names("light"))
@@ -114,10 +116,10 @@ class Designs:
         return found
 
     def must_be_sound(self, design: SensorDesign) -> list[Diagnostic]:
-        """The warnings about a design.
+        """Return the warnings about a design.
 
         Raises:
-            UnsoundDesignError: it can't be simulated, or only wrongly.
+            UnsoundDesignError: the design can't be simulated, or its simulation would be wrong.
         """
         found = self.problems(design)
         if any(problem.severity == "error" for problem in found):
@@ -125,10 +127,10 @@ class Designs:
         return found
 
     def mesh(self, given: AnyMesh, scale: float = 1.0) -> TriangleMesh:
-        """The mesh in a file, or in two arrays; not checked.
+        """Return the mesh in a file, or in two arrays; it is not checked.
 
         Raises:
-            MeshError: it can't be read.
+            MeshError: the mesh can't be read.
         """
         paths = [given] if isinstance(given, str) else [given.vertices, given.faces]
         key = tuple(_stamp(Path(path)) for path in paths)
@@ -178,7 +180,7 @@ class Designs:
         return design
 
     def _read(self, path: Path, part: str) -> TriangleMesh:
-        """The mesh of a part; what is wrong with its file names the part."""
+        """Return the mesh of a part; errors about its file name the part."""
         try:
             return self.mesh(str(path))
         except MeshError as error:
@@ -200,7 +202,9 @@ class Designs:
         return design
 
     def _checked(self, mesh: TriangleMesh, name: str, role: Role) -> TriangleMesh:
-        """The mesh, turned outward where it must be closed; the same object for the same mesh."""
+        """Return the checked mesh, turned outward if it must be closed; the same object for the
+        same mesh.
+        """
         closed = role in TRANSPARENT_SOLIDS
         kept = self._valid.setdefault(mesh, {})
         if closed not in kept:
@@ -218,7 +222,7 @@ def _same(one: SensorDesign, other: SensorDesign) -> bool:
 
 
 def _stamps(design: SensorDesign, file: Path) -> list[Stamp]:
-    """What tells whether any file of a design has changed."""
+    """Return a value that changes if any file of a design changes."""
     meshes = [file.parent / part.mesh for part in design.parts.values()]
     kinds = design.values_of_kinds().values()
     others = [file.parent / name for each in kinds for name in each.files().values()]
@@ -226,7 +230,7 @@ def _stamps(design: SensorDesign, file: Path) -> list[Stamp]:
 
 
 def _stamp(path: Path) -> Stamp:
-    """What tells whether a file has changed."""
+    """Return a value that changes if a file changes."""
     try:
         found = path.stat()
     except (OSError, ValueError):
@@ -235,15 +239,15 @@ def _stamp(path: Path) -> Stamp:
 
 
 def _array(path: str) -> Any:
-    """What a NumPy file holds; nothing in it is run."""
+    """Return the array in a NumPy file; pickled objects in it are refused."""
     return read_array(Path(path), MeshError)
 
 
 def _mesh_of_arrays(given: MeshFile) -> TriangleMesh:
-    """The mesh of two NumPy files.
+    """Return the mesh of two NumPy files.
 
     Raises:
-        MeshError: they are not (n, 3) numbers and (m, 3) whole numbers.
+        MeshError: they are not (n, 3) numbers and (m, 3) integers.
     """
     vertices, faces = _array(given.vertices), _array(given.faces)
     for array, path, kinds in ((vertices, given.vertices, "fiu"), (faces, given.faces, "iu")):
@@ -257,7 +261,9 @@ def _mesh_of_arrays(given: MeshFile) -> TriangleMesh:
 
 
 def _inside(folder: Path | None, relative: str, where: str) -> Path:
-    """A file of a design; paths must not leave its folder, links followed."""
+    """Return the path of a file of a design, which must not leave its folder, after links are
+    resolved.
+    """
     if folder is None:
         raise DesignError(
             f"'{relative}' is in no folder", where=where, hint="Name the design's folder"

@@ -1,4 +1,4 @@
-"""Errors of requests, and their form as data."""
+"""Errors of requests, and their representation as data."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from optisense.errors import OptiSenseError
 
 
 class ProtocolError(OptiSenseError):
-    """A line that is no request, or one that makes no sense: the front end's mistake."""
+    """Invalid request, or line that is no request: an error of the front end."""
 
     def __init__(
         self,
@@ -28,17 +28,16 @@ class ProtocolError(OptiSenseError):
 class Cancelled(BaseException):
     """Raised at a safe point of a request that was cancelled.
 
-    No `Exception`, so that code which tells any failure of a score as a score's failure lets it
-    pass.
+    It is not an `Exception`, so that code which reports any failure of a score lets it pass.
     """
 
 
 class WrongContactError(OptiSenseError):
-    """An error about one of a request's contacts.
+    """Error about one of a request's contacts.
 
     Attributes:
-        number: which one, the first is 0.
-        kind: of the error, as the protocol names it.
+        number: index of the contact, from 0.
+        kind: kind of the error in the protocol.
     """
 
     def __init__(self, error: OptiSenseError, number: int) -> None:
@@ -49,7 +48,7 @@ class WrongContactError(OptiSenseError):
 
 
 class UnsoundDesignError(OptiSenseError):
-    """A design that `check` refuses, with all that it found."""
+    """Error about a design that `check` refuses, with all problems that it found."""
 
     def __init__(self, problems: Sequence[Diagnostic], source: str) -> None:
         errors = [problem for problem in problems if problem.severity == "error"]
@@ -63,12 +62,12 @@ class UnsoundDesignError(OptiSenseError):
 def as_data(
     error: BaseException, design: SensorDesign | None = None, parts: Iterable[str] = ()
 ) -> dict[str, Any]:
-    """An error as the protocol tells it.
+    """Return an error as data of the protocol.
 
     Args:
-        error: of any kind; one of ours says where and what to do.
-        design: what the request was about, to find the part in.
-        parts: names of parts that are known otherwise.
+        error: an error of any kind; an `OptiSenseError` tells its place and a remedy.
+        design: design of the request, in which the part is looked up.
+        parts: names of further parts.
     """
     known = [*(design.parts if design is not None else ()), *parts]
     if isinstance(error, Cancelled):
@@ -100,7 +99,7 @@ def as_data(
 
 
 def problem_row(problem: Diagnostic, design: SensorDesign | None) -> dict[str, Any]:
-    """What `check` has found, with the part that it is about."""
+    """Return a problem that `check` found as data, with the part that it is about."""
     known = list(design.parts) if design is not None else []
     path = path_in(problem.where)
     return {
@@ -114,7 +113,7 @@ def problem_row(problem: Diagnostic, design: SensorDesign | None) -> dict[str, A
 
 
 def path_in(where: str | None) -> str | None:
-    """The dotted path of a value in the design, where a place is one."""
+    """Return the place of an error if it is a dotted path of the design, else None."""
     if where is None:
         return None
     found = _PATH.fullmatch(where)
@@ -122,11 +121,12 @@ def path_in(where: str | None) -> str | None:
 
 
 def place_in(message: str, parts: object = None) -> str | None:
-    """The first dotted path that a message quotes, or the path of the first part that it names.
+    """Return the first dotted path that a message quotes, or the path of the first part that it
+    names.
 
     Args:
-        message: of an error.
-        parts: the parts of the design as JSON, or whatever stands there.
+        message: message of an error.
+        parts: parts of the design as JSON; a value of another type counts as no parts.
     """
     known = parts if isinstance(parts, dict) else {}
     for text in re.findall(r"'([^']+)'", message):
@@ -142,7 +142,7 @@ def place_in(message: str, parts: object = None) -> str | None:
 def part_of(
     message: str, path: str | None, known: Sequence[str], design: SensorDesign | None = None
 ) -> str | None:
-    """The part that an error is about: by its path, or else by its name in the message."""
+    """Return the part that an error is about: by its path, or else by its name in the message."""
     if path is not None:
         found = re.match(r"parts\.([A-Za-z0-9_-]+)", path)
         if found:

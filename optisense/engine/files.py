@@ -1,4 +1,4 @@
-"""Files that a request makes: pictures, arrays and meshes, each written whole."""
+"""Files that a request writes: pictures, arrays and meshes, each written whole."""
 
 from __future__ import annotations
 
@@ -16,17 +16,19 @@ from optisense.untrusted_files import is_folder
 from optisense.writing import written_whole
 
 LONGEST_NAME = 150
-"""Bytes that files of a request may begin with; file systems take names of 255 bytes."""
+"""Largest length of the common prefix of a request's files, bytes; file systems allow names of 255
+bytes, and endings follow.
+"""
 
 
 class Files:
-    """The files of one request: in its folder, named after it."""
+    """Files of one request: in its folder, with its name as prefix."""
 
     def __init__(self, folder: Path, name: str) -> None:
-        """Files `NAME.*` in a folder.
+        """Prepare files `NAME.*` in a folder.
 
         Raises:
-            OutputError: there is no such folder, or the name is not that of a file.
+            OutputError: there is no such folder, or the name can't be part of a file name.
         """
         if not is_folder(folder):
             raise OutputError(
@@ -46,17 +48,17 @@ class Files:
         self.name = name
 
     def path(self, rest: str) -> Path:
-        """Where the file with this ending goes."""
+        """Return the path of the file with an ending."""
         return self.folder / f"{self.name}.{rest}"
 
     def picture(self, rest: str, picture: NDArray[np.uint8]) -> str:
-        """Write a PNG; returns its path."""
+        """Write a PNG file, and return its path."""
         from optisense.report.pictures import png
 
         return self._write(rest, lambda path: path.write_bytes(png(picture)))
 
     def array(self, rest: str, values: NDArray[Any]) -> str:
-        """Write a NumPy file; returns its path."""
+        """Write a NumPy file, and return its path."""
         whole = np.ascontiguousarray(values)
 
         def write(path: Path) -> None:
@@ -66,7 +68,7 @@ class Files:
         return self._write(rest, write)
 
     def mesh(self, rest: str, mesh: TriangleMesh) -> dict[str, str]:
-        """Write a mesh as float32 vertices and int32 faces; returns their paths."""
+        """Write a mesh as float32 vertices and int32 faces, and return their paths."""
         return {
             "vertices": self.array(f"{rest}.vertices.npy", mesh.vertices.astype(np.float32)),
             "faces": self.array(f"{rest}.faces.npy", mesh.faces.astype(np.int32)),
@@ -75,7 +77,7 @@ class Files:
     def meshes(
         self, meshes: Mapping[str, TriangleMesh], before: str = ""
     ) -> dict[str, dict[str, str]]:
-        """Write several, by name."""
+        """Write several meshes, and return their paths by name."""
         return {name: self.mesh(f"{before}{name}", mesh) for name, mesh in meshes.items()}
 
     def _write(self, rest: str, write: Callable[[Path], object]) -> str:

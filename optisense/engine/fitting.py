@@ -1,4 +1,4 @@
-"""The request that fits a design to photographs of the real sensor."""
+"""Request that fits a design to photographs of the real sensor."""
 
 from __future__ import annotations
 
@@ -19,25 +19,25 @@ from optisense.writing import write_json
 
 
 class Calibrate(OfDesign, CalibrateOptions):
-    """See docs/engine.md."""
+    """Fields of the request "calibrate"; see docs/engine.md."""
 
     photos: str
     to: str
 
 
 class Nothing(Fields):
-    """See docs/engine.md."""
+    """Fields of the request "calibration_families"; see docs/engine.md."""
 
 
 @handles("calibration_families", Nothing, Lane.QUICK)
 def calibration_families(session: Session, fields: Nothing, job: Job) -> dict[str, Any]:
-    """What a calibration fits without being asked."""
+    """Return the families of parameters that a calibration fits by default."""
     return {"families": [{"name": name, "words": FAMILIES[name].words} for name in USUAL]}
 
 
 @handles("calibrate", Calibrate, Lane.RENDER)
 def calibrate(session: Session, fields: Calibrate, job: Job) -> dict[str, Any]:
-    """Fit a design to photographs; writes the fitted design and its page."""
+    """Fit a design to photographs, and write the fitted design and its report."""
     from optisense.calibration import read_photographs
     from optisense.calibration.calibrating import CalibrationSettings
     from optisense.calibration.calibrating import calibrate as fit_design
@@ -97,10 +97,10 @@ def calibrate(session: Session, fields: Calibrate, job: Job) -> dict[str, Any]:
 
 
 def _asked(text: str) -> tuple[str, float, float]:
-    """A further number that may change.
+    """Return the path and bounds of a further parameter of the fit.
 
     Raises:
-        ProtocolError: it is no PATH=LO:HI.
+        ProtocolError: the text is not PATH=LO:HI.
     """
     path, equals, given = text.partition("=")
     low, colon, high = given.partition(":")

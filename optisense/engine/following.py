@@ -1,4 +1,4 @@
-"""Telling a front end what a search does, by reading the trials that it writes."""
+"""Events about a search for a front end, from the trials that the search writes."""
 
 from __future__ import annotations
 
@@ -20,17 +20,19 @@ if TYPE_CHECKING:
     from optisense.search.study.store import Row
 
 LOOK_EVERY = 0.25
-"""Seconds between looks at the study; longer where a look itself takes long."""
+"""Interval between two looks at the study, s; it is longer if a look takes long."""
 
 LOOKING_SHARE = 0.05
-"""Largest share of the time that looking at a study may take; longer looks are made less often."""
+"""Largest share of the time that looks at a study may take, so that they do not slow the search."""
 
 MOST_AT_ONCE = 20
-"""Trials told one by one in a look; of more, only the best one and the last."""
+"""Largest number of trials that a look reports one by one; of more, only the best and the last are
+reported.
+"""
 
 
 class Following:
-    """A study that is followed until nobody runs it any more."""
+    """Follower of a study until no process runs it any more."""
 
     def __init__(
         self,
@@ -40,14 +42,14 @@ class Following:
         child: SearchProcess | None,
         budget: int | None = None,
     ) -> None:
-        """Follow a study.
+        """Store the arguments; `result` follows the study.
 
         Args:
-            folder: of the study.
-            job: the request that gets the events.
-            files: where meshes of the best go.
-            child: the process that runs it, if that is the engine's own.
-            budget: trials in all; the study's own if None.
+            folder: folder of the study.
+            job: request that gets the events.
+            files: files for the meshes of the best trial.
+            child: process that runs the study, if the engine has started it.
+            budget: total number of trials; the study's own budget if None.
         """
         self._budget = budget
         self._folder = folder
@@ -61,11 +63,11 @@ class Following:
         self._time_left: TimeLeft | None = None
 
     def result(self) -> dict[str, Any]:
-        """Follow it to its end.
+        """Follow the study to its end, and return its result.
 
         Raises:
             OptiSenseError: there is no study, or the search failed.
-            Cancelled: it was only watched, and that was cancelled.
+            Cancelled: the study was only watched, and that was cancelled.
         """
         from optisense.search import Study
 
@@ -92,7 +94,7 @@ class Following:
         }
 
     def _cancel(self, leaving: bool) -> None:
-        """What `cancel` means: stop the engine's own search, or stop looking at another's."""
+        """Stop the engine's own search, or stop following another's."""
         if self._child is not None and not (leaving and self._child.go_on):
             self._child.stop()
         else:
@@ -100,7 +102,7 @@ class Following:
 
     def _follow(self, study: Study) -> None:
         while not self._left.is_set():
-            running = self._runs()  # asked first, so that the last trials are seen
+            running = self._runs()  # read first, so that the last trials are seen
             began = time.monotonic()
             self._look(study)
             if not running:
@@ -112,7 +114,7 @@ class Following:
         return is_running(self._folder) if self._child is None else self._child.running
 
     def _look(self, study: Study) -> None:
-        """Tell of the trials that were finished since the last look."""
+        """Report the trials that were finished since the last look."""
         rows = [row for row in study.store.rows() if row.outcome is not None]
         new = [row for row in rows if row.number not in self._told]
         self._told.update(row.number for row in new)
@@ -159,7 +161,7 @@ class Following:
         )
 
     def _total(self, study: Study) -> int:
-        """Trials that there are to be."""
+        """Return the total number of trials of the study."""
         return study.settings.budget if self._budget is None else self._budget
 
     def _outcome(self, study: Study) -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""Requests about the skin: where on it the camera looks, and where its markers are."""
+"""Requests about the skin: the area that the camera sees, and the positions of the markers."""
 
 from __future__ import annotations
 
@@ -13,29 +13,32 @@ from optisense.engine.requests import Lane, handles
 from optisense.engine.session import Session
 
 WIDTH = 96
-"""Columns of the grid of chief rays, unless asked for otherwise: the border of the footprint is
-told to a hundredth of the picture, in some milliseconds."""
+"""Default number of columns of the grid of chief rays: it locates the border of the footprint to a
+hundredth of the picture, in some milliseconds.
+"""
 
 MOST = 640
-"""Largest number of columns or rows of the grid: the pixels of a usual picture."""
+"""Largest number of columns or rows of the grid, the number of pixels across a usual picture."""
 
 
 class FootprintGrid(OfDesign):
-    """See docs/engine.md."""
+    """Fields of the request "footprint"; see docs/engine.md."""
 
     columns: int = Field(default=WIDTH, ge=2, le=MOST)
 
 
 @handles("footprint", FootprintGrid, Lane.RENDER)
 def footprint(session: Session, fields: FootprintGrid, job: Job) -> dict[str, Any]:
-    """Where a grid of chief rays meets the sensing surface, and how much of it they see."""
+    """Write the points where a grid of chief rays meets the sensing surface, and return the share
+    of the surface that they see.
+    """
     from optisense.objectives.view import view_of
 
     files = session.files(fields, job.id)
     design = design_of(session, fields, job)
     width, height = design.camera.resolution
     rows = min(max(2, round(fields.columns * height / width)), MOST)
-    # The model of drafts follows what is being edited; that of whole pictures keeps its light.
+    # The model for drafts follows the edits; that for whole pictures keeps its light.
     model = session.renderer.draft_model(design)
     rays = model.chief_rays((fields.columns, rows))
     view = view_of(rays, model.sensing.face_areas)
@@ -53,7 +56,7 @@ def footprint(session: Session, fields: FootprintGrid, job: Job) -> dict[str, An
 
 @handles("markers", OfDesign, Lane.RENDER)
 def markers(session: Session, fields: OfDesign, job: Job) -> dict[str, Any]:
-    """Where the dots that are printed on the skin lie."""
+    """Write the positions of the dots that are printed on the skin."""
     from optisense.optics.imaging.markers import MarkerDots
 
     files = session.files(fields, job.id)

@@ -1,4 +1,4 @@
-"""A request that is being worked on, and the lines in which requests wait."""
+"""Requests in progress, and the queues in which requests wait."""
 
 from __future__ import annotations
 
@@ -13,55 +13,55 @@ from optisense.engine.failures import Cancelled
 from optisense.engine.protocol import RequestId
 
 EVENTS_EVERY = 0.1
-"""Seconds between two progress events of a request; a person does not follow more."""
+"""Shortest interval between two progress events of a request, s; a person can't follow more."""
 
 LONGEST_WAIT = 3.0
-"""Seconds that a render waits for short work at each of its safe points."""
+"""Longest time that a render waits for short work at each of its safe points, s."""
 
 GLANCE = 0.002
-"""Seconds that it always leaves to the other threads there."""
+"""Time that a render leaves to other threads at each safe point, s, enough to read a request."""
 
 Send = Callable[[Mapping[str, Any]], None]
 
 
 class PriorityGate:
-    """Lets short work go first.
+    """Gate that lets short work go first.
 
-    The renderer keeps Python's lock while it waits for its kernels. Another thread gets a turn only
+    The renderer holds Python's lock while it waits for its kernels. Another thread gets a turn only
     now and then, and importing a package, which takes hundreds of turns, would take a minute. So a
     render stops at its safe points until the short work is done.
     """
 
     def __init__(self) -> None:
-        """Nothing is being done."""
+        """Open the gate: no short work is in progress."""
         self._count = 0
         self._changed = threading.Condition()
 
     def __enter__(self) -> None:
-        """Begin with short work; from any thread."""
+        """Begin short work; from any thread."""
         with self._changed:
             self._count += 1
 
     def __exit__(self, *_: object) -> None:
-        """It is done."""
+        """End short work."""
         with self._changed:
             self._count -= 1
             self._changed.notify_all()
 
     def give_way(self) -> None:
-        """Wait until no short work is being done, or for `LONGEST_WAIT`."""
+        """Wait until no short work is in progress, or for `LONGEST_WAIT`."""
         time.sleep(GLANCE)  # the thread that reads requests may have one
         with self._changed:
             self._changed.wait_for(lambda: self._count == 0, LONGEST_WAIT)
 
 
 class Job:
-    """A request that is being worked on: its handler reports through it.
+    """Request in progress, through which its handler reports.
 
     Attributes:
-        id: of the request.
+        id: id of the request.
         draft: whether a newer one of its kind replaces it while it waits.
-        design: what it is about, once that is read; errors find the part in it.
+        design: design of the request, once it is read; errors look the part up in it.
     """
 
     def __init__(
@@ -71,7 +71,7 @@ class Job:
         draft: bool = False,
         give_way: Callable[[], None] | None = None,
     ) -> None:
-        """A request that nobody has begun with; `give_way` is called at its safe points."""
+        """Store a request whose work has not begun; `give_way` is called at its safe points."""
         self._give_way = give_way
         self.id = number
         self.draft = draft
@@ -88,10 +88,11 @@ class Job:
         self._send({"id": self.id, "event": event, **content})
 
     def progress(self, fraction: float, text: str, **content: Any) -> None:
-        """Send how far it is, not too often; a safe point, where a cancelled request ends.
+        """Send the progress, if the last event is old enough. This is a safe point, where a
+        cancelled request ends.
 
         Raises:
-            Cancelled: it was cancelled.
+            Cancelled: the request was cancelled.
         """
         if self._give_way is not None:
             self._give_way()
@@ -102,19 +103,19 @@ class Job:
             self.send("progress", fraction=round(fraction, 4), text=text, **content)
 
     def check(self) -> None:
-        """A safe point.
+        """Raise an error if the request was cancelled: a safe point.
 
         Raises:
-            Cancelled: it was cancelled.
+            Cancelled: the request was cancelled.
         """
         if self._cancelled.is_set():
             raise Cancelled
 
     def cancel(self, leaving: bool = False) -> None:
-        """Ask for it to be given up; called again, ask once more.
+        """Cancel the request; a second call repeats the signal to its hooks.
 
         Args:
-            leaving: nobody asked for it, but the engine ends.
+            leaving: True if the engine ends, False if the front end asked for it.
         """
         with self._lock:
             self._cancelled.set()
@@ -124,7 +125,7 @@ class Job:
             hook(leaving)
 
     def on_cancel(self, hook: Callable[[bool], None]) -> None:
-        """Call something, with `leaving`, at each `cancel`; for one that has come already too."""
+        """Call a function, with `leaving`, at each `cancel`, also for a cancel before this call."""
         with self._lock:
             self._on_cancel.append(hook)
             late, leaving = self._cancelled.is_set(), self._leaving
@@ -133,29 +134,28 @@ class Job:
 
     @property
     def cancelled(self) -> bool:
-        """Whether it was asked to end."""
+        """True if the request was cancelled."""
         return self._cancelled.is_set()
 
 
 class Task(Protocol):
-    """A job with its work, ready to run."""
+    """Job with its work, ready to run."""
 
     @property
     def job(self) -> Job:
-        """What is known of it."""
+        """Job of the task."""
 
     def run(self) -> None:
-        """Do the work and answer; raises nothing."""
+        """Do the work and send the answer; raises nothing."""
 
     def give_up(self, kind: str) -> None:
-        """Answer without having done it: "Cancelled" or "Replaced"."""
+        """Send the answer without having done the work: "Cancelled" or "Replaced"."""
 
 
 class JobQueue:
-    """Requests that are done one after another, in a thread of their own.
+    """Queue of requests that are carried out one after another, in a thread of its own.
 
-    Drafts wait in a place of their own, which only the newest one has, and give way to whatever
-    else waits.
+    A draft waits in a separate place, which holds only the newest one, and other requests go first.
     """
 
     def __init__(self, name: str) -> None:
@@ -166,7 +166,7 @@ class JobQueue:
         threading.Thread(target=self._work, name=name, daemon=True).start()
 
     def put(self, task: Task) -> None:
-        """Let a task wait for its turn."""
+        """Queue a task."""
         replaced: Task | None = None
         with self._changed:
             if task.job.draft:
@@ -178,7 +178,7 @@ class JobQueue:
             replaced.give_up("Replaced")
 
     def drop(self, job: Job) -> bool:
-        """Take a task out that still waits, and answer it; false where it has begun."""
+        """Remove a task that still waits, and answer it; False if it has begun."""
         found: Task | None = None
         with self._changed:
             if self._draft is not None and self._draft.job is job:

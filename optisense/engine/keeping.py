@@ -1,4 +1,4 @@
-"""Requests about the library: its entries, their pictures, and adding one's own."""
+"""Requests about the library: its entries, their pictures, and the user's own entries."""
 
 from __future__ import annotations
 
@@ -19,23 +19,23 @@ from optisense.library.own_parts import write_own
 from optisense.library.reading import files_of, make_entry
 
 BALL_PIXELS = 160
-"""Width and height in pixels of the picture of a single ball."""
+"""Width and height of the picture of a single ball, in pixels."""
 
 
 class OfKind(Fields):
-    """See docs/engine.md."""
+    """Fields of the request "library"; see docs/engine.md."""
 
     kind: str
 
 
 class OneEntry(OfKind):
-    """See docs/engine.md."""
+    """Fields of the request "entry"; see docs/engine.md."""
 
     entry: str
 
 
 class Preview(OfKind):
-    """See docs/engine.md."""
+    """Fields of the request "preview"; see docs/engine.md."""
 
     entry: str | None = None
     value: dict[str, Any] | None = None
@@ -43,7 +43,7 @@ class Preview(OfKind):
 
 
 class LibraryAdd(OneEntry):
-    """See docs/engine.md."""
+    """Fields of the request "library_add"; see docs/engine.md."""
 
     value: dict[str, Any]
     description: str
@@ -55,7 +55,7 @@ class LibraryAdd(OneEntry):
 
 @handles("library", OfKind, Lane.QUICK)
 def entries(session: Session, fields: OfKind, job: Job) -> dict[str, Any]:
-    """The entries of a kind."""
+    """Return the entries of a kind."""
     rows = []
     for name in library.names(fields.kind):
         job.check()
@@ -69,7 +69,7 @@ def entries(session: Session, fields: OfKind, job: Job) -> dict[str, Any]:
 
 @handles("entry", OneEntry, Lane.QUICK)
 def entry(session: Session, fields: OneEntry, job: Job) -> dict[str, Any]:
-    """One entry in full."""
+    """Return all fields of an entry."""
     found = library.entry(fields.kind, fields.entry)
     own = library.is_own(fields.kind, fields.entry)
     return {"entry": found.model_dump(mode="json", exclude_none=True), "own": own}
@@ -77,7 +77,7 @@ def entry(session: Session, fields: OneEntry, job: Job) -> dict[str, Any]:
 
 @handles("preview", Preview, Lane.QUICK)
 def preview(session: Session, fields: Preview, job: Job) -> dict[str, Any]:
-    """A picture of an entry, or of values that are in no library yet."""
+    """Draw an entry, or values that are in no library yet."""
     from optisense.library import previews
 
     files = session.files(fields, job.id)
@@ -107,7 +107,7 @@ def preview(session: Session, fields: Preview, job: Job) -> dict[str, Any]:
 
 @handles("library_add", LibraryAdd, Lane.QUICK)
 def library_add(session: Session, fields: LibraryAdd, job: Job) -> dict[str, Any]:
-    """Keep values as one of the user's own parts."""
+    """Add values to the user's own library."""
     check_new_name(fields.entry)
     made = _made(
         fields.kind,
@@ -140,7 +140,9 @@ def _made(
     more: dict[str, Any] | None = None,
     sources: dict[str, Any] | None = None,
 ) -> AnyEntry:
-    """An entry of values; each of its numbers has the same source unless `sources` are given."""
+    """Return an entry with these values; all numbers have the same source unless `sources` are
+    given.
+    """
     singular = kind_named(kind)
     own = {key: each for key, each in value.items() if each is not None}
     own.pop("library", None)

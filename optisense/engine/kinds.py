@@ -1,4 +1,4 @@
-"""The request about kinds: what emitters, materials and coatings there are, and their fields."""
+"""Request that lists the kinds of emitters, materials and coatings, and their fields."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ NOUNS: dict[str, type[KindModel]] = {
 """Base classes that have kinds, by name; each has its own registry."""
 
 NOT_SHOWN = ("kind", "library")
-"""Fields that say what a value is, and are no numbers to change."""
+"""Fields that name a kind or an entry, and are not shown as values."""
 
 BOUNDS = {
     "minimum": "minimum",
@@ -49,7 +49,7 @@ BOUNDS = {
 
 @handles("kinds", Fields, Lane.QUICK)
 def kinds(session: Session, fields: Fields, job: Job) -> dict[str, Any]:
-    """All kinds with their fields, and which materials suit a role."""
+    """Return all kinds with their fields, and the kinds of materials that suit each role."""
     return {
         "kinds": {
             word: [_kind(noun.kinds.find(name)) for name in noun.kinds.names()]
@@ -60,7 +60,7 @@ def kinds(session: Session, fields: Fields, job: Job) -> dict[str, Any]:
 
 
 class Lamp(Fields):
-    """See docs/engine.md."""
+    """Fields of the request "lamp"; see docs/engine.md."""
 
     entry: str | None = None
     value: dict[str, Any] | None = None
@@ -69,7 +69,7 @@ class Lamp(Fields):
 
 @handles("lamp", Lamp, Lane.QUICK)
 def lamp(session: Session, fields: Lamp, job: Job) -> dict[str, Any]:
-    """How a lamp is drawn: its window and its half angle."""
+    """Return the drawing of a lamp: its window and its half angle."""
     if (fields.entry is None) == (fields.value is None):
         raise ProtocolError("give either 'entry' or 'value'", where="lamp")
     if fields.value is None:
@@ -109,7 +109,7 @@ def _kind(kind: type[KindModel]) -> dict[str, Any]:
 
 
 def field_row(name: str, schema: dict[str, Any], *, required: bool) -> dict[str, Any]:
-    """A field as a front end shows it, of its JSON schema.
+    """Return a field as a front end shows it, from its JSON schema.
 
     Returns:
         `name`, `title`, `help`, `unit`; whether it is `required` and may be `absent`; `start`, a

@@ -21,13 +21,13 @@ from optisense.geometry.indenter_kinds import indenter_from_plain
 
 
 class Place(OfDesign):
-    """See docs/engine.md."""
+    """Fields of the request "place"; see docs/engine.md."""
 
     contacts: list[AnyContact]
 
 
 class NinePlaces(OfDesign):
-    """See docs/engine.md."""
+    """Fields of the request "nine_places"; see docs/engine.md."""
 
     indenter: GivenIndenter
     depth: float = 0.5
@@ -36,7 +36,7 @@ class NinePlaces(OfDesign):
 
 @handles("place", Place, Lane.RENDER)
 def place(session: Session, fields: Place, job: Job) -> dict[str, Any]:
-    """Contacts where they sit on the surface."""
+    """Write the meshes of contacts in their positions on the surface."""
     files = session.files(fields, job.id)
     model = session.renderer.model(design_of(session, fields, job))
     rows = []
@@ -56,7 +56,7 @@ def place(session: Session, fields: Place, job: Job) -> dict[str, Any]:
 
 @handles("nine_places", NinePlaces, Lane.RENDER)
 def nine_places(session: Session, fields: NinePlaces, job: Job) -> dict[str, Any]:
-    """Nine contacts that cover what the camera sees."""
+    """Return nine contacts that cover the area that the camera sees."""
     model = session.renderer.model(design_of(session, fields, job))
     found = model.nine_contacts(indenter_from_plain(fields.indenter), fields.depth)
     turned = [replace(contact, rotation=fields.rotation) for contact in found]

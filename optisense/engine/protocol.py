@@ -1,7 +1,7 @@
-"""Lines in, lines out: what a request, an answer, an event and an error look like.
+"""The protocol: lines of requests, answers, events and errors.
 
-docs/engine.md is the reference; `PROTOCOL` is raised when something in it goes away or changes
-its meaning.
+The reference is docs/engine.md; `PROTOCOL` is increased when a part of it is removed or changes its
+meaning.
 """
 
 from __future__ import annotations
@@ -20,10 +20,10 @@ from optisense.engine.failures import ProtocolError
 from optisense.untrusted_files import as_text, parse_json
 
 PROTOCOL = 1
-"""Version of the protocol; see the module's description for when it is raised."""
+"""Version of the protocol; see the module's description for when it is increased."""
 
 MOST_OF_A_LINE = 64 * 1024 * 1024
-"""Bytes of a request; one that is longer is a mistake and not read into memory."""
+"""Largest size of a request, bytes; a longer one is an error and not read into memory."""
 
 LONGEST_ID = 64
 """Largest number of characters of a request's id. Every answer repeats the id; a UUID has 36."""
@@ -32,7 +32,7 @@ RequestId = int | str
 
 
 class Fields(BaseModel):
-    """The fields of a request: those it does not have are refused."""
+    """Base class of the fields of a request; unknown fields are refused."""
 
     model_config = ConfigDict(extra="forbid", strict=False)
 
@@ -42,7 +42,7 @@ class Fields(BaseModel):
 
 @dataclass(frozen=True)
 class Request:
-    """A request as it came: its fields are not checked yet."""
+    """Request whose fields are not checked yet."""
 
     id: RequestId
     do: str
@@ -50,10 +50,10 @@ class Request:
 
 
 def read_request(line: bytes) -> Request:
-    """The request on a line.
+    """Parse the request on a line.
 
     Raises:
-        ProtocolError: it is none; carries the id where that could be read.
+        ProtocolError: the line is no request; the error has the id if it could be read.
     """
     if len(line) > MOST_OF_A_LINE:
         raise ProtocolError(
@@ -62,7 +62,7 @@ def read_request(line: bytes) -> Request:
     try:
         text = as_text(line, "request", ProtocolError, "the line")
         data = parse_json(text, "request", ProtocolError, "the line")
-        if "\\u0000" in text:  # no name of a file, nor any other text here, has it
+        if "\\u0000" in text:  # no file name or other text here has it
             raise ProtocolError("a text has the character NUL")
     except ProtocolError as error:
         raise ProtocolError(error.message, hint="Write one JSON object on each line") from None
@@ -85,7 +85,7 @@ def read_request(line: bytes) -> Request:
 
 
 def is_id(value: object) -> bool:
-    """Whether a value can be the id of a request."""
+    """Return whether a value can be the id of a request."""
     if isinstance(value, str):
         return 0 < len(value) <= LONGEST_ID
     return isinstance(value, int) and not isinstance(value, bool) and abs(value) < 2**53
@@ -95,10 +95,10 @@ _F = TypeVar("_F", bound=Fields)
 
 
 def checked_fields(kind: type[_F], request: Request) -> _F:
-    """The fields of a request as it should have them.
+    """Return the checked fields of a request.
 
     Raises:
-        ProtocolError: one is missing, unknown (names the near match) or of the wrong kind.
+        ProtocolError: a field is missing, unknown (with a similar name) or of the wrong type.
     """
     try:
         return kind.model_validate(request.fields)
@@ -110,17 +110,19 @@ def checked_fields(kind: type[_F], request: Request) -> _F:
 
 
 def answer(number: RequestId | None, result: Mapping[str, Any]) -> dict[str, Any]:
-    """The message that a request is done."""
+    """Return the message that a request has succeeded."""
     return {"id": number, "ok": True, "result": result}
 
 
 def refusal(number: RequestId | None, error: Mapping[str, Any]) -> dict[str, Any]:
-    """The message that it is not; `error` as of `optisense.engine.failures.as_data`."""
+    """Return the message that a request has failed; see `optisense.engine.failures.as_data` for
+    `error`.
+    """
     return {"id": number, "ok": False, "error": error}
 
 
 def to_line(message: Mapping[str, Any]) -> bytes:
-    """A message as the line to write; numbers that are not finite become null."""
+    """Return a message as a line of JSON; numbers that are not finite become null."""
     text = json.dumps(_plain(message), ensure_ascii=False, allow_nan=False, separators=(",", ":"))
     return text.encode("utf-8", "replace") + b"\n"
 

@@ -1,4 +1,4 @@
-"""Requests that render: images, drafts, the same image under other lights, rays."""
+"""Requests that render: images, drafts, relit images, rays."""
 
 from __future__ import annotations
 
@@ -35,33 +35,34 @@ if TYPE_CHECKING:
     from optisense.optics import RenderProgress, TactileImage
 
 DRAFT_WIDTH = 160
-"""Width in pixels of a draft, which has a quarter of the pixels of a usual image."""
+"""Width of a draft, in pixels; it has a quarter of the pixels of an image that is 320 pixels wide.
+"""
 
 MOST_PLACES = 100
-"""Places of one ledger; each takes as long as the ledger."""
+"""Largest number of places of one ledger; each takes as long as the ledger."""
 
 LEVELS = (np.arange(256) / 255.0).astype(np.float32)
-"""The 256 levels of a picture on a scale from 0 to 1."""
+"""Levels of a picture, 256 numbers on a scale from 0 to 1."""
 
 ImageFile = Literal["picture", "pixels", "radiance", "layers", "normals", "points", "mask"]
 
 
 class OfDesign(Fields):
-    """A request about a design."""
+    """Fields of a request about a design."""
 
     design: AnyDesign
     meshes: dict[str, AnyMesh] = Field(default_factory=dict)
 
 
 class Warm(OfDesign):
-    """See docs/engine.md."""
+    """Fields of the request "warm"; see docs/engine.md."""
 
     contacts: bool = False
     drafts: bool = False
 
 
 class Simulate(OfDesign, RenderOptions):
-    """See docs/engine.md."""
+    """Fields of the request "simulate"; see docs/engine.md."""
 
     contacts: list[AnyContact] = Field(default_factory=list)
     draft: bool = False
@@ -69,14 +70,14 @@ class Simulate(OfDesign, RenderOptions):
 
 
 class LightChange(Fields):
-    """Other light of a group."""
+    """Change of the light of a group."""
 
     flux: float | None = Field(default=None, ge=0.0)
     colour: tuple[float, float, float] | None = None
 
 
 class Relight(Fields):
-    """See docs/engine.md."""
+    """Fields of the request "relight"; see docs/engine.md."""
 
     image: str
     lights: dict[str, LightChange] = Field(default_factory=dict)
@@ -85,14 +86,14 @@ class Relight(Fields):
 
 
 class Report(Fields):
-    """See docs/engine.md."""
+    """Fields of the request "report"; see docs/engine.md."""
 
     image: str
     file: str
 
 
 class Ledger(OfDesign, LedgerOptions):
-    """See docs/engine.md."""
+    """Fields of the request "ledger"; see docs/engine.md."""
 
     at: list[tuple[float, float] | tuple[float, float, float]] = Field(
         default_factory=list, max_length=MOST_PLACES
@@ -100,21 +101,21 @@ class Ledger(OfDesign, LedgerOptions):
 
 
 class ChiefRayGrid(OfDesign):
-    """See docs/engine.md."""
+    """Fields of the request "chief_rays"; see docs/engine.md."""
 
     contacts: list[AnyContact] = Field(default_factory=list)
     resolution: tuple[int, int] = (16, 12)
 
 
 def design_of(session: Session, fields: OfDesign, job: Job) -> SensorDesign:
-    """The design that a request is about."""
+    """Return the design of a request."""
     job.design = session.designs.read(fields.design, fields.meshes)
     return job.design
 
 
 @handles("warm", Warm, Lane.RENDER)
 def warm(session: Session, fields: Warm, job: Job) -> dict[str, Any]:
-    """Build the sensor and compile what an image needs."""
+    """Build the sensor and compile the kernels for an image."""
     began = time.perf_counter()
     design = design_of(session, fields, job)
     job.progress(0.0, "loading the renderer")
@@ -133,7 +134,7 @@ def warm(session: Session, fields: Warm, job: Job) -> dict[str, Any]:
 
 @handles("simulate", Simulate, Lane.RENDER)
 def simulate(session: Session, fields: Simulate, job: Job) -> dict[str, Any]:
-    """A tactile image, or a draft of one."""
+    """Render a tactile image, or a draft of one."""
     from optisense.report.camera_rays import CameraRays
 
     files = session.files(fields, job.id)
@@ -190,7 +191,7 @@ def simulate(session: Session, fields: Simulate, job: Job) -> dict[str, Any]:
 
 @handles("relight", Relight, Lane.QUICK)
 def relight(session: Session, fields: Relight, job: Job) -> dict[str, Any]:
-    """The same image under other lights."""
+    """Write an image that was rendered before under other lights."""
     files = session.files(fields, job.id)
     kept = session.images.find(fields.image)
     lights = kept.design.lights
@@ -210,7 +211,7 @@ def relight(session: Session, fields: Relight, job: Job) -> dict[str, Any]:
 
 @handles("report", Report, Lane.RENDER)
 def report(session: Session, fields: Report, job: Job) -> dict[str, Any]:
-    """The HTML page of an image."""
+    """Write the HTML report of an image."""
     from optisense.report import write_report
     from optisense.report.light_section import LightSection
 
@@ -233,7 +234,9 @@ def report(session: Session, fields: Report, job: Job) -> dict[str, Any]:
 
 @handles("ledger", Ledger, Lane.RENDER)
 def ledger(session: Session, fields: Ledger, job: Job) -> dict[str, Any]:
-    """Where the light of each group goes, and why it is bright or dark at places of the skin."""
+    """Return the ledger of the light of each group, and the causes of brightness at places of the
+    skin.
+    """
     from optisense.optics import camera_light, light_at, light_ledger
     from optisense.optics.ledger import cells_in_view
 
@@ -254,7 +257,7 @@ def ledger(session: Session, fields: Ledger, job: Job) -> dict[str, Any]:
 
 @handles("chief_rays", ChiefRayGrid, Lane.RENDER)
 def chief_rays(session: Session, fields: ChiefRayGrid, job: Job) -> dict[str, Any]:
-    """The ways of chief rays, for drawing."""
+    """Write the paths of chief rays, for drawing."""
     from optisense.optics import RayOutcome
     from optisense.optics.ray_paths import trace_paths
 
@@ -280,7 +283,7 @@ def chief_rays(session: Session, fields: ChiefRayGrid, job: Job) -> dict[str, An
 def write_image(
     image: TactileImage, exposure: float, wanted: list[ImageFile], files: Files
 ) -> dict[str, Any]:
-    """Write the files of an image that were asked for; their paths by kind."""
+    """Write the requested files of an image, and return their paths by kind."""
     written: dict[str, Any] = {}
     picture: NDArray[np.uint8] | None = None
     if "picture" in wanted or "pixels" in wanted:
@@ -306,7 +309,9 @@ def write_image(
 
 
 def blender_pixels(picture: NDArray[np.uint8]) -> NDArray[np.float32]:
-    """(h, w, 4) of a picture (h, w, 3): 0 to 1, opaque, row 0 at the bottom."""
+    """Return Blender's pixels (h, w, 4) of a picture (h, w, 3): 0 to 1, opaque, row 0 at the
+    bottom.
+    """
     height, width = picture.shape[:2]
     opaque = np.full((height, width, 4), 255, dtype=np.uint8)
     opaque[..., :3] = picture[::-1]
@@ -338,10 +343,10 @@ def _exposure(image: TactileImage, given: float | Literal["auto", "same"]) -> fl
 
 
 def _changed(name: str, lights: Mapping[str, LightGroup], change: LightChange) -> LightGroup:
-    """A light group with another flux or colour.
+    """Return a light group with another flux or colour.
 
     Raises:
-        ProtocolError: there is no such group, or a colour of nothing.
+        ProtocolError: there is no such group, or the colour is black.
     """
     if name not in lights:
         hint = suggestion(name, lights, limit=20)

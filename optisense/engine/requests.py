@@ -1,4 +1,4 @@
-"""The requests that the engine knows: their fields, their line, and who does them."""
+"""Registry of the engine's requests: their fields, their queue, and their handler."""
 
 from __future__ import annotations
 
@@ -18,16 +18,16 @@ Handler = Callable[[Session, Any, Job], dict[str, Any]]
 
 
 class Lane(Enum):
-    """The queue that carries out a request."""
+    """Queue that carries out a request."""
 
-    QUICK = "quick"  # what needs no renderer, one after another
-    RENDER = "render"  # what needs it, one after another
+    QUICK = "quick"  # needs no renderer; one after another
+    RENDER = "render"  # needs the renderer; one after another
     OWN = "own"  # in a thread of its own, since it mostly waits
 
 
 @dataclass(frozen=True)
 class Kind:
-    """A kind of request."""
+    """Kind of request."""
 
     do: str
     fields: type[Fields]
@@ -51,10 +51,10 @@ def handles(do: str, fields: type[Fields], lane: Lane) -> Callable[[_H], _H]:
 
 
 def find(do: str, others: tuple[str, ...] = ()) -> Kind:
-    """The kind of request of this name.
+    """Return the kind of request with this name.
 
     Raises:
-        ProtocolError: there is none; names the near match.
+        ProtocolError: there is none; the message suggests a similar name.
     """
     _load()
     if do not in _kinds:
@@ -64,13 +64,15 @@ def find(do: str, others: tuple[str, ...] = ()) -> Kind:
 
 
 def names() -> list[str]:
-    """All kinds of requests with a handler."""
+    """Return the names of all kinds of requests."""
     _load()
     return list(_kinds)
 
 
 def _load() -> None:
-    """Import the modules that register requests; late, so that `hello` need not wait for them."""
+    """Import the modules that register requests; not at the start, so that `hello` need not
+    wait.
+    """
     for module in (
         "rendering",
         "footprint",

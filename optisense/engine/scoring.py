@@ -25,7 +25,7 @@ _registering = threading.Lock()
 
 
 class Evaluate(OfDesign):
-    """See docs/engine.md."""
+    """Fields of the request "evaluate"; see docs/engine.md."""
 
     objectives: list[str] = Field(
         default=["rgb2normal", "normdiff", "aoap", "2to3pw"], min_length=1
@@ -36,7 +36,7 @@ class Evaluate(OfDesign):
 
 @handles("objectives", Fields, Lane.QUICK)
 def objectives(session: Session, fields: Fields, job: Job) -> dict[str, Any]:
-    """What can be scored."""
+    """Return the objectives that can be scored."""
     from optisense.objectives.registry import find, names
 
     rows = []
@@ -59,7 +59,7 @@ def objectives(session: Session, fields: Fields, job: Job) -> dict[str, Any]:
 
 
 def _finite(bounds: tuple[float, float]) -> tuple[float, float] | None:
-    """The lowest and highest value, where both are numbers."""
+    """Return the lowest and highest value, or None if one is infinite."""
     return bounds if all(map(math.isfinite, bounds)) else None
 
 
@@ -103,10 +103,10 @@ def evaluate(session: Session, fields: Evaluate, job: Job) -> dict[str, Any]:
 
 @contextmanager
 def own_objectives() -> Iterator[None]:
-    """What a user's files register here is forgotten afterwards.
+    """Context after which all that a user's files have registered in it is removed.
 
-    Objectives of one name in two files must not get into each other's way in a process that lives
-    for days, and a file that was edited must count as it is now.
+    Objectives of one name in two files must not conflict in a process that lives for days, and a
+    file that was edited must be read anew.
     """
     from optisense.objectives.registry import forgetting
 
@@ -115,7 +115,7 @@ def own_objectives() -> Iterator[None]:
 
 
 def _figure(score: Score, files: Files) -> str | None:
-    """Draw a score; None where a user's own drawing fails."""
+    """Draw a score; None if a user's own drawing fails."""
     from optisense.library.previews import save
 
     path = files.path(f"{score.file_name}.png")

@@ -1,4 +1,4 @@
-"""The process that runs a study for the engine: started here, told to stop, found again."""
+"""The process that runs a study for the engine: start, stop, and search for a running one."""
 
 from __future__ import annotations
 
@@ -17,28 +17,30 @@ from optisense.folders import holder_of
 from optisense.untrusted_files import read_json
 
 PROCESS_FILE = "process.json"
-"""File in the study's folder while one of these processes runs it; it tells how to end the
-process."""
+"""Name of the file in the study's folder while one of these processes runs it; it tells how to end
+the process.
+"""
 
 LOG_FILE = "search.log"
-"""The file of the process's messages, which shows why it died."""
+"""Name of the file of the process's messages, which shows why it died."""
 
 LAST_WORDS = 2000
-"""Number of bytes at the end of the process's output that are told when it died; a Python error
-with its cause fits."""
+"""Number of bytes at the end of the process's output that are reported when it died; a Python error
+with its cause fits.
+"""
 
 
 class SearchProcess:
-    """A running search."""
+    """Running search."""
 
     def __init__(self, folder: Path, workers: int, budget: int | None, go_on: bool) -> None:
-        """Start it.
+        """Start the process.
 
         Args:
-            folder: of the study.
-            workers: processes that score trials.
-            budget: trials in all; the study's own if None.
-            go_on: whether it outlives this process.
+            folder: folder of the study.
+            workers: number of processes that score trials.
+            budget: total number of trials; the study's own budget if None.
+            go_on: whether it continues after the end of this process.
         """
         self.folder = folder
         self.go_on = go_on
@@ -60,26 +62,26 @@ class SearchProcess:
 
     @property
     def pid(self) -> int:
-        """Its process."""
+        """Process id."""
         return self._process.pid
 
     @property
     def running(self) -> bool:
-        """Whether it has not ended."""
+        """True if the process has not ended."""
         return self._process.poll() is None
 
     def stop(self) -> None:
-        """Ask it to end after the trials that it is at; asked again, it drops them."""
+        """Ask it to end after the trials in progress; a second call drops them."""
         with contextlib.suppress(OSError, ValueError):
             assert self._process.stdin is not None
             self._process.stdin.write(b"stop\n")
             self._process.stdin.flush()
 
     def outcome(self) -> dict[str, Any]:
-        """What it told at its end.
+        """Return the result that the process wrote at its end.
 
         Raises:
-            OptiSenseError: it failed, or died.
+            OptiSenseError: the search failed, or the process died.
         """
         assert self._process.stdout is not None
         told = self._process.stdout.read()
@@ -103,15 +105,15 @@ class SearchProcess:
 
 
 def is_running(folder: Path) -> bool:
-    """Whether any process runs a study at present."""
+    """Return whether any process runs a study at present."""
     return holder_of(folder) is not None
 
 
 def stop_other(folder: Path) -> bool:
-    """Ask the process that runs a study to end; false where none does.
+    """Ask the process that runs a study to end; False if none does.
 
     Raises:
-        SearchError: it runs, but not by an engine of this machine.
+        SearchError: the study is run, but not by an engine of this machine.
     """
     holder = holder_of(folder)
     if holder is None:
@@ -138,7 +140,7 @@ def _error_of(data: dict[str, Any]) -> OptiSenseError:
 
 
 def _last_words(log: Path) -> str | None:
-    """The last line of a log."""
+    """Return the last line of a log, or None."""
     try:
         text = log.read_bytes()[-LAST_WORDS:].decode("utf-8", "replace").strip()
     except OSError:

@@ -1,8 +1,8 @@
-"""``python -m optisense.engine.searcher STUDY``: runs a study for an engine.
+"""``python -m optisense.engine.searcher STUDY`` runs a study for an engine.
 
-Standard input tells when to end: a line "stop" ends it after the trials that it is at, and a
-second one at once; the end of the input does so too, unless ``--go-on`` is given. The result is
-one line of JSON on standard output.
+A line "stop" on standard input ends it after the trials in progress, and a second one at once; so
+does the end of the input, unless ``--go-on`` is given. The result is one line of JSON on standard
+output.
 """
 
 from __future__ import annotations
@@ -26,10 +26,12 @@ from optisense.engine.search_process import PROCESS_FILE
 from optisense.errors import OptiSenseError
 
 PATIENCE = 20.0
-"""Seconds after which a search whose engine has gone drops its trial, and then dies."""
+"""Time after the end of the engine until the search drops its trial, s; after the same time again
+the process exits.
+"""
 
 NICENESS = 5
-"""A search runs for hours: let drafts in the front end go first."""
+"""Niceness of the process: a search runs for hours, and drafts in the front end go first."""
 
 
 def main() -> None:
@@ -40,7 +42,7 @@ def main() -> None:
     parser.add_argument("--budget", type=int)
     parser.add_argument("--go-on", action="store_true")
     given = parser.parse_args()
-    # The engine stops a search by this signal, whatever the shell that started it arranged.
+    # The engine stops a search by this signal, whatever handler the starting shell has set.
     signal.signal(signal.SIGINT, signal.default_int_handler)
     if sys.platform != "win32":
         signal.pthread_sigmask(signal.SIG_UNBLOCK, [signal.SIGINT])
@@ -58,14 +60,16 @@ def main() -> None:
 def _run(
     folder: Path, workers: int, budget: int | None, working: threading.Event
 ) -> dict[str, Any]:
-    """Run a study; its result, or the error, as data. Interrupts are for while `working` is set."""
+    """Run a study, and return its result, or the error, as data. Interrupts are for while `working`
+    is set.
+    """
     mark = folder / PROCESS_FILE
     try:
         working.set()
         from optisense.search import Study, run_study
 
         study = Study.open(folder)
-        study.lock()  # before the mark: it must tell of the process that has the study
+        study.lock()  # before the mark, which names the process that has the study
         mark.write_text(json.dumps({"pid": os.getpid()}), encoding="utf-8")
         try:
             result = run_study(study, workers=workers, limit=budget)
@@ -92,7 +96,7 @@ def _run(
 
 
 def _listen(go_on: bool, working: threading.Event) -> None:
-    """Turn what comes on standard input into Ctrl-C, from when there is work to interrupt."""
+    """Turn lines on standard input into Ctrl-C, once there is work to interrupt."""
     working.wait()
     asked = False
     for line in sys.stdin.buffer:

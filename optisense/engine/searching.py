@@ -29,13 +29,13 @@ if TYPE_CHECKING:
 
 
 class Space(OfDesign):
-    """See docs/engine.md."""
+    """Fields of the request "space"; see docs/engine.md."""
 
     vary: list[str] = Field(min_length=1)
 
 
 class Search(Space, SearchOptions):
-    """See docs/engine.md."""
+    """Fields of the request "search"; see docs/engine.md."""
 
     study: str
     objectives: list[str] = Field(min_length=1)
@@ -44,7 +44,7 @@ class Search(Space, SearchOptions):
 
 
 class Advise(Space):
-    """See docs/engine.md."""
+    """Fields of the request "advise"; see docs/engine.md."""
 
     objectives: list[str] = Field(min_length=1)
     method: str = "cma-es"
@@ -52,13 +52,13 @@ class Advise(Space):
 
 
 class OfStudy(Fields):
-    """A request about a study."""
+    """Fields of a request about a study."""
 
     study: str
 
 
 class Resume(OfStudy):
-    """See docs/engine.md."""
+    """Fields of the request "resume"; see docs/engine.md."""
 
     workers: int = Field(default=1, ge=1)
     budget: int | None = Field(default=None, ge=1)
@@ -66,20 +66,20 @@ class Resume(OfStudy):
 
 
 class OneTrial(OfStudy):
-    """See docs/engine.md."""
+    """Fields of the request "trial"; see docs/engine.md."""
 
     trial: int | str = "best"
 
 
 class Apply(OneTrial):
-    """See docs/engine.md."""
+    """Fields of the request "apply"; see docs/engine.md."""
 
     to: str
 
 
 @handles("methods", Fields, Lane.QUICK)
 def methods(session: Session, fields: Fields, job: Job) -> dict[str, Any]:
-    """The search methods, by name."""
+    """Return the search methods with their summaries."""
     from optisense.search.methods import find, names
 
     return {"methods": [{"name": name, "summary": find(name).summary} for name in names()]}
@@ -87,7 +87,7 @@ def methods(session: Session, fields: Fields, job: Job) -> dict[str, Any]:
 
 @handles("space", Space, Lane.QUICK)
 def space(session: Session, fields: Space, job: Job) -> dict[str, Any]:
-    """What may change, looked up in a design."""
+    """Return the parameters of a search for a design."""
     from optisense.search import SearchSpace
     from optisense.search.space.text import parse_space
 
@@ -98,7 +98,7 @@ def space(session: Session, fields: Space, job: Job) -> dict[str, Any]:
 
 @handles("advise", Advise, Lane.QUICK)
 def advise(session: Session, fields: Advise, job: Job) -> dict[str, Any]:
-    """Whether a search can succeed, and how long it takes, before it is begun."""
+    """Return whether a search can succeed, and its expected duration, before it begins."""
     from optisense.objectives.settings import Settings
     from optisense.objectives.usual_score import UsualTrials, usual_score
     from optisense.search import SearchSpace
@@ -131,7 +131,7 @@ def search(session: Session, fields: Search, job: Job) -> dict[str, Any]:
 
 
 def _begun(session: Session, fields: Search, job: Job) -> SearchProcess:
-    """The process that runs a new study."""
+    """Start the process that runs a new study."""
     from optisense.search import Study
 
     folder = _absolute(fields.study)
@@ -145,11 +145,11 @@ def _begun(session: Session, fields: Search, job: Job) -> SearchProcess:
 
 @handles("resume", Resume, Lane.OWN)
 def resume(session: Session, fields: Resume, job: Job) -> dict[str, Any]:
-    """Go on with a study and follow it to its end."""
+    """Resume a study and follow it to its end."""
     files = session.files(fields, job.id)
     folder = _absolute(fields.study)
     with session.priority_gate, _opened(folder) as study:
-        study.lock()  # what is wrong with it is told before a process is started
+        study.lock()  # errors in it are reported before a process is started
     child = SearchProcess(folder, fields.workers, fields.budget, fields.go_on)
     return Following(folder, job, files, child, fields.budget).result()
 
@@ -163,13 +163,13 @@ def watch(session: Session, fields: OfStudy, job: Job) -> dict[str, Any]:
 
 @handles("stop", OfStudy, Lane.QUICK)
 def stop(session: Session, fields: OfStudy, job: Job) -> dict[str, Any]:
-    """End a search, whoever follows it."""
+    """Stop a search of any engine on this machine."""
     return {"stopped": stop_other(_absolute(fields.study))}
 
 
 @handles("study", OfStudy, Lane.QUICK)
 def about_study(session: Session, fields: OfStudy, job: Job) -> dict[str, Any]:
-    """All about a study but its designs."""
+    """Return all data of a study except its designs."""
     folder = _absolute(fields.study)
     with _opened(folder) as study:
         trials = study.trials
@@ -192,7 +192,7 @@ def about_study(session: Session, fields: OfStudy, job: Job) -> dict[str, Any]:
 
 @handles("trial", OneTrial, Lane.QUICK)
 def trial(session: Session, fields: OneTrial, job: Job) -> dict[str, Any]:
-    """One trial as a design."""
+    """Return one trial as a design."""
     from optisense.search.study.applied import design_of as design_of_trial
 
     files = session.files(fields, job.id)

@@ -1,4 +1,4 @@
-"""The engine: reads requests, gives them to their lines, and answers each exactly once."""
+"""The engine: it reads requests, puts them into their queues, and answers each exactly once."""
 
 from __future__ import annotations
 
@@ -34,14 +34,15 @@ from optisense.errors import OptiSenseError, OutputError
 from optisense.untrusted_files import is_folder
 
 FAREWELL = 3.0
-"""Seconds that the end of the engine, or of its requests, waits for what is being worked on."""
+"""Longest time that the engine waits at its end, s, for answers to the requests in progress.
+"""
 
 AT_ONCE = ("hello", "cancel", "shutdown")
-"""Requests that wait for nothing."""
+"""Requests that are carried out without a queue."""
 
 
 class Hello(Fields):
-    """See docs/engine.md."""
+    """Fields of the request "hello"; see docs/engine.md."""
 
     protocol: int
     client: str = ""
@@ -50,19 +51,19 @@ class Hello(Fields):
 
 
 class Cancel(Fields):
-    """See docs/engine.md."""
+    """Fields of the request "cancel"; see docs/engine.md."""
 
     of: int | str
 
 
 class Engine:
-    """Serves one front end until it goes."""
+    """Server of one front end."""
 
     def __init__(self, channel: Channel) -> None:
-        """Nothing is loaded yet.
+        """Start the queues; nothing is loaded yet.
 
         Args:
-            channel: where answers go.
+            channel: channel for the answers.
         """
         self.session = Session()
         self._channel = channel
@@ -88,7 +89,7 @@ class Engine:
             self._give_up_all()
 
     def _take(self, line: bytes) -> None:
-        """Begin with a request, or say why not."""
+        """Begin a request, or answer why it can't be."""
         number: RequestId | None = None
         try:
             request = read_request(line)
@@ -96,7 +97,7 @@ class Engine:
             with self._changed:
                 taken = number in self._open
             if taken:
-                number = None  # the answer to this id is that of the other request
+                number = None  # the answer to this id belongs to the other request
                 raise ProtocolError(
                     f"a request with the id {request.id!r} is still open",
                     where="id",
@@ -126,7 +127,7 @@ class Engine:
             self._enter(request)
 
     def _enter(self, request: Request) -> None:
-        """Put a request into its line."""
+        """Put a request into its queue."""
         kind = requests.find(request.do, AT_ONCE)
         fields = checked_fields(kind.fields, request)
         job = Job(
@@ -193,7 +194,7 @@ class Engine:
         self._channel.send(answer(request.id, {}))
 
     def _give_up_all(self) -> None:
-        """Cancel what is open, and let it answer for `FAREWELL` seconds."""
+        """Cancel all open requests, and wait `FAREWELL` seconds for their answers."""
         self._cancel_all()
         until = time.monotonic() + FAREWELL
         with self._changed:
@@ -218,7 +219,7 @@ class Engine:
 
 
 class _Work:
-    """A request with everything that it needs; see `optisense.engine.jobs.Task`."""
+    """Request with all that it needs to run; see `optisense.engine.jobs.Task`."""
 
     def __init__(self, engine: Engine, kind: Kind, fields: Fields, job: Job) -> None:
         self._engine = engine
@@ -230,7 +231,7 @@ class _Work:
             engine.session.priority_gate.__enter__()
 
     def run(self) -> None:
-        """Do it and answer."""
+        """Carry out the request and answer."""
         session = self._engine.session
         try:
             self.job.check()
@@ -246,7 +247,7 @@ class _Work:
             self._answer(answer(self.job.id, result))
 
     def give_up(self, kind: str) -> None:
-        """Answer without having done it."""
+        """Answer the request without carrying it out."""
         error = as_data(Cancelled())
         if kind == "Replaced":
             error |= {"kind": kind, "message": "a newer draft took its place"}
@@ -265,7 +266,7 @@ def serve(interrupted: Callable[[], int] = lambda: 130) -> NoReturn:
     """Serve the front end at standard input and output, and end the process with it.
 
     Args:
-        interrupted: the exit code after Ctrl-C or SIGTERM.
+        interrupted: function that returns the exit code after Ctrl-C or SIGTERM.
     """
     faulthandler.enable()
     channel = Channel.of_standard_output()

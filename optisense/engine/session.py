@@ -24,20 +24,21 @@ if TYPE_CHECKING:
 
 MOST_IMAGES = 6
 """Number of images that are kept for one design, to compare with and to relight; one of 640x480
-with three light groups takes some 30 MB."""
+with three light groups takes some 30 MB.
+"""
 DRAFTS = 1
 """Number of drafts that are kept for one design; only the last one is shown."""
 
 
 @dataclass(frozen=True)
 class KeptImage:
-    """An image with what it was made of.
+    """Image with the data that it was made from.
 
     Attributes:
-        image: the layers of the image.
-        design: the sensor.
-        contacts: what presses into it.
-        exposure: of the picture, a factor on the radiance.
+        image: layers of the image.
+        design: design of the sensor.
+        contacts: contacts in the image.
+        exposure: factor on the radiance in the picture.
         draft: whether it is a draft.
         rays: chief rays to draw in the report; None for a draft.
     """
@@ -51,15 +52,15 @@ class KeptImage:
 
 
 class Images:
-    """The last images, by the names of their requests."""
+    """Cache of the last images, by the names of their requests."""
 
     def __init__(self) -> None:
-        """None yet."""
+        """Start with an empty cache."""
         self._kept: OrderedDict[str, KeptImage] = OrderedDict()
         self._lock = threading.Lock()
 
     def keep(self, name: str, image: KeptImage) -> None:
-        """Keep an image, and let the oldest of its kind go."""
+        """Keep an image, and drop the oldest of its kind."""
         with self._lock:
             self._kept.pop(name, None)
             self._kept[name] = image
@@ -68,10 +69,10 @@ class Images:
                 del self._kept[key]
 
     def find(self, name: str) -> KeptImage:
-        """An image that is kept.
+        """Return an image from the cache.
 
         Raises:
-            ProtocolError: there is none of this name any more.
+            ProtocolError: there is no image of this name any more.
         """
         with self._lock:
             if name not in self._kept:
@@ -85,16 +86,16 @@ class Images:
 
 
 class Renderer:
-    """The optical models, which take on whatever design comes; for one thread only."""
+    """Optical models, which are changed to each design that comes; for one thread only."""
 
     def __init__(self) -> None:
-        """Nothing is loaded yet."""
+        """Start without a model; nothing is loaded yet."""
         self.variant = "auto"
         self._model: OpticalModel | None = None
         self._drafts: DraftModel | None = None
 
     def model(self, design: SensorDesign) -> OpticalModel:
-        """The model of a design; what did not change since the last one is not made again.
+        """Return the model of a design; parts that did not change since the last one are reused.
 
         Raises:
             SetupError: the renderer can't run on this machine.
@@ -112,10 +113,11 @@ class Renderer:
         return self._model
 
     def draft_model(self, design: SensorDesign) -> OpticalModel:
-        """A model of its own for drafts: the light of whole pictures is kept meanwhile.
+        """Return a separate model for drafts, so that the light of whole pictures is kept
+        meanwhile.
 
         Raises:
-            SetupError, OptiSenseError: as of `model`.
+            SetupError, OptiSenseError: see `model`.
         """
         from optisense.optics import OpticalModel as Usual  # first: it checks libLLVM
         from optisense.optics.drafts import DraftModel
@@ -128,7 +130,7 @@ class Renderer:
         return made
 
     def _leave(self, design: SensorDesign) -> None:
-        """The work went on to another sensor: drafts of the one before are not wanted any more."""
+        """Drop the drafts of the sensor before, if the design is another sensor."""
         from optisense.optics.backend.memory import release_memory
 
         if self._drafts is not None and _is_another(self._drafts.design, design):
@@ -136,28 +138,28 @@ class Renderer:
         release_memory()
 
     def forget(self) -> None:
-        """Drop the models after a failure that nobody foresaw: they may be half made."""
+        """Drop the models after an unexpected error, which may have left them incomplete."""
         self._model = self._drafts = None
 
 
 def _is_another(before: SensorDesign, after: SensorDesign) -> bool:
-    """Whether a design is another sensor, and not the same one after an edit."""
+    """Return whether a design is another sensor, and not the same one after an edit."""
     return before.parts.keys() != after.parts.keys()
 
 
 class Session:
-    """One front end's work.
+    """Work of one front end.
 
     Attributes:
-        folder: where files go that no request puts elsewhere.
-        designs: what was read.
-        renderer: the model.
-        images: what was rendered.
-        priority_gate: lets short work go first.
+        folder: folder of the files that no request puts elsewhere.
+        designs: cache of designs.
+        renderer: optical models.
+        images: cache of images.
+        priority_gate: gate that lets short work go first.
     """
 
     def __init__(self) -> None:
-        """Before `hello`."""
+        """Start in the state before `hello`."""
         self.folder: Path | None = None
         self.designs = Designs()
         self.renderer = Renderer()
@@ -165,10 +167,10 @@ class Session:
         self.priority_gate = PriorityGate()
 
     def files(self, fields: Fields, number: int | str) -> Files:
-        """Where the files of a request go.
+        """Return the files of a request.
 
         Raises:
-            OutputError: there is no such folder, or the name is not that of a file.
+            OutputError: there is no such folder, or the name can't be part of a file name.
         """
         assert self.folder is not None  # `hello` comes first
         folder = self.folder if fields.to is None else Path(fields.to)
@@ -176,5 +178,5 @@ class Session:
 
 
 def name_of(fields: Fields, number: int | str) -> str:
-    """What a request's files and image are called."""
+    """Return the name of a request's files and image."""
     return fields.name if fields.name is not None else str(number)

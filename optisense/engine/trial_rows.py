@@ -10,7 +10,7 @@ if TYPE_CHECKING:
 
 
 def curve_row(trial: Trial) -> dict[str, Any]:
-    """A point of the curve of scores."""
+    """Return a point of the curve of scores."""
     return {
         "number": trial.number,
         "start": trial.is_start,
@@ -21,7 +21,7 @@ def curve_row(trial: Trial) -> dict[str, Any]:
 
 
 def trial_row(study: Study, trial: Trial) -> dict[str, Any]:
-    """A trial without its design."""
+    """Return a trial without its design."""
     from optisense.search.study.conditions import margins
     from optisense.search.study.study import beside
 
@@ -38,5 +38,5 @@ def trial_row(study: Study, trial: Trial) -> dict[str, Any]:
 
 
 def finite(value: float) -> float | None:
-    """A number as JSON can hold it: None where it is infinite or no number."""
+    """Return a number as JSON can hold it: None if it is infinite or NaN."""
     return value if math.isfinite(value) else None
