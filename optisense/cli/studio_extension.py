@@ -19,7 +19,9 @@ MANIFEST = "blender_manifest.toml"
 OLDEST = (4, 2)
 """The oldest version of Blender that the studio runs in: the first one that has extensions."""
 
-HELP = ("studio", "cages", "library", "simulation", "objectives", "search", "workshop")
+HELP = (
+    "studio", "cages", "library", "simulation", "objectives", "search", "workshop", "calibration",
+)  # fmt: skip
 """Pages of the documentation that come with the extension; its buttons *Help* show them."""
 
 NOT_THERE = "should have been installed but not found"

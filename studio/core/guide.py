@@ -5,11 +5,6 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-PAGES = (
-    "studio", "cages", "library", "simulation", "objectives", "search", "workshop", "calibration",
-)  # fmt: skip
-"""The pages that the extension's zip holds; `optisense studio` puts them there."""
-
 _PICTURE = re.compile(r"!\[[^\]]*\]\([^)]*\)\n*")
 _LINK = re.compile(r"\[([^\]]*)\]\(([^)]*)\)")
 
