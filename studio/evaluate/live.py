@@ -9,6 +9,7 @@ import bpy
 
 from ..core.engine import EngineError, Request
 from ..engine import catalogue, handing, session
+from ..scene.collections import is_edited
 from . import prop
 from .operator import chosen, take_live
 
@@ -69,13 +70,8 @@ def _leave() -> None:
 
 @bpy.app.handlers.persistent
 def _changed(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
-    if not bpy.context.window_manager.optisense_evaluation.live:
-        return
-    for update in depsgraph.updates:
-        item = update.id.original
-        if isinstance(item, bpy.types.Object) and item.optisense.kind in KINDS:
-            wanted()
-            return
+    if bpy.context.window_manager.optisense_evaluation.live and is_edited(depsgraph, *KINDS):
+        wanted()
 
 
 HOOKS: tuple[tuple[Any, Any], ...] = (

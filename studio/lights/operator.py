@@ -349,7 +349,7 @@ class OPTISENSE_OT_set_group(polls.Checked, ChoosingProperties, bpy.types.Operat
         lights = polls.picked(context, "LIGHT")
         if self.group in ("NEW", ""):
             old = design.light_groups.get(lights[0].optisense.group)
-            values = {"model": "smd-3528", "colour": (1.0, 1.0, 1.0), "flux": 2.0}
+            values = {"model": USUAL_LAMP, "colour": (1.0, 1.0, 1.0), "flux": 2.0}
             if old is not None:
                 values = {"model": old.model, "colour": old.colour[:], "flux": old.flux}
             group = add_light_group(

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from ..core import outlines
 from ..core.engine import EngineError, Request
 from ..engine import handing, session
+from ..scene.collections import is_edited
 from ..scene.contacts import sensing_surface
 from . import drawing, section
 
@@ -193,13 +194,8 @@ def _leave() -> None:
 @bpy.app.handlers.persistent
 def _changed(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
     global _wanted
-    if not is_on(scene):
-        return
-    for update in depsgraph.updates:
-        item = update.id.original
-        if isinstance(item, bpy.types.Object) and item.optisense.kind in KINDS:
-            _wanted = True  # asked at the next tick: Blender is in the middle of an edit
-            return
+    if is_on(scene) and is_edited(depsgraph, *KINDS):
+        _wanted = True  # asked at the next tick: Blender is in the middle of an edit
 
 
 @bpy.app.handlers.persistent

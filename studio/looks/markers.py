@@ -15,6 +15,7 @@ from ..core.engine import EngineError, Request
 from ..engine import handing, polls, session
 from ..engine.layout import labelled
 from ..engine.operators import ChoosingProperties
+from ..scene.collections import is_edited
 from . import drawing, footprint, section
 
 KINDS = ("PART", "CAGE")
@@ -172,13 +173,7 @@ def _set(scene: bpy.types.Scene, values: dict[str, Any] | None) -> None:
 @bpy.app.handlers.persistent
 def _changed(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
     global _wanted
-    if _wanted or not is_on(scene):
-        return
-    for update in depsgraph.updates:
-        item = update.id.original
-        if isinstance(item, bpy.types.Object) and item.optisense.kind in KINDS:
-            _wanted = True
-            return
+    _wanted = _wanted or (is_on(scene) and is_edited(depsgraph, *KINDS))
 
 
 @bpy.app.handlers.persistent

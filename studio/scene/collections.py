@@ -30,6 +30,14 @@ def objects_of(scene: bpy.types.Scene, *kinds: str) -> list[bpy.types.Object]:
     return sorted(found, key=lambda each: (each.optisense.order, each.name))
 
 
+def is_edited(depsgraph: bpy.types.Depsgraph, *kinds: str) -> bool:
+    """Whether an update of Blender's dependency graph is of an object of some kinds."""
+    items = (update.id.original for update in depsgraph.updates)
+    return any(
+        isinstance(item, bpy.types.Object) and item.optisense.kind in kinds for item in items
+    )
+
+
 def object_of(scene: bpy.types.Scene, kind: str, key: str) -> bpy.types.Object | None:
     """The object of a kind that stands for the part, cage or group member called `key`."""
     return next((each for each in objects_of(scene, kind) if each.optisense.key == key), None)

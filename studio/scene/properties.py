@@ -19,9 +19,6 @@ from bpy.props import (
 
 from .fields import HasFields, OPTISENSE_PG_field, kind_menu
 
-NAME_LENGTH = 64
-"""Largest number of characters of a name in the studio, of which Blender's own names have 63."""
-
 USUAL_COATING = "flake"
 """The kind of a coating whose file names none."""
 

@@ -9,7 +9,6 @@ from mathutils import Vector
 from numpy.typing import NDArray
 
 from ..core import outer
-from ..core.mesh_file import Mesh
 from ..engine import polls
 from ..engine.operators import refuse
 from ..scene.build import add_part
@@ -48,7 +47,7 @@ def _middle(item: bpy.types.Object) -> Vector:
     return item.matrix_world @ (sum(corners, Vector()) / len(corners))
 
 
-def _chosen(gel: bpy.types.Object, mesh: Mesh) -> NDArray[np.int64]:
+def _chosen(gel: bpy.types.Object) -> NDArray[np.int64]:
     """The triangles of the faces that are selected in edit mode."""
     edited = bmesh.from_edit_mesh(gel.data)
     edited.faces.ensure_lookup_table()
@@ -83,7 +82,7 @@ class OPTISENSE_OT_make_skin(polls.Checked, bpy.types.Operator):
             return refuse(self, f"A cage bends {gel.name}: remove the cage first")
         mesh = part_mesh(gel, caged=False)
         if gel.mode == "EDIT":
-            faces = _chosen(gel, mesh)
+            faces = _chosen(gel)
             if not len(faces):
                 return refuse(self, "Select the outer faces of the gel first")
             bpy.ops.object.mode_set(mode="OBJECT")

@@ -9,6 +9,7 @@ import bpy
 
 from ..core.engine import EngineError, Request
 from ..engine import handing, session
+from ..scene.collections import is_edited
 from . import requests
 from .exposing import exposure
 
@@ -110,13 +111,8 @@ def _leave() -> None:
 
 @bpy.app.handlers.persistent
 def _changed(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
-    if not scene.optisense_simulation.draft:
-        return
-    for update in depsgraph.updates:
-        item = update.id.original
-        if isinstance(item, bpy.types.Object) and item.optisense.kind in KINDS:
-            wanted()
-            return
+    if scene.optisense_simulation.draft and is_edited(depsgraph, *KINDS):
+        wanted()
 
 
 HOOKS = (
