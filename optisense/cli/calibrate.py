@@ -12,7 +12,7 @@ from optisense.cli.console import EXIT_INTERRUPTED, ends_well, messages, output,
 from optisense.cli.options import DesignArgument, VariantOption
 from optisense.cli.output_folder import take_folder
 from optisense.cli.progress import progress_line
-from optisense.commands.comparing import CalibrateOptions
+from optisense.commands.comparing import CalibrateOptions, read_range
 from optisense.time_left import TimedStep
 from optisense.writing import write_json, written_together
 
@@ -137,12 +137,8 @@ def _figures(found: Realism) -> list[str]:
 
 
 def _asked(text: str) -> tuple[str, float, float]:
-    path, equals, given = text.partition("=")
-    low, colon, high = given.partition(":")
     try:
-        if not (equals and colon and path.strip()):
-            raise ValueError
-        return path.strip(), float(low), float(high)
+        return read_range(text)
     except ValueError:
         raise typer.BadParameter(
             f"'{text}' is not PATH=LO:HI, such as camera.fov=45:60", param_hint="--fit"

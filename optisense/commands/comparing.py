@@ -62,3 +62,16 @@ class CalibrateOptions(PhotographOptions):
     )
     photons: Photons = Field(300_000, description="Photons to trace for each round.")
     seed: Seed = Field(0, description="The same seed gives the same light.")
+
+
+def read_range(text: str) -> tuple[str, float, float]:
+    """The path, the lowest and the highest value of a PATH=LO:HI.
+
+    Raises:
+        ValueError: the text is something else.
+    """
+    path, equals, given = text.partition("=")
+    low, colon, high = given.partition(":")
+    if not (equals and colon and path.strip()):
+        raise ValueError
+    return path.strip(), float(low), float(high)

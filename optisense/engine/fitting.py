@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from optisense.calibration.families import FAMILIES, USUAL, chosen_families
-from optisense.commands.comparing import CalibrateOptions
+from optisense.commands.comparing import CalibrateOptions, read_range
 from optisense.engine.failures import ProtocolError
 from optisense.engine.jobs import Job
 from optisense.engine.protocol import Fields
@@ -102,12 +102,8 @@ def _asked(text: str) -> tuple[str, float, float]:
     Raises:
         ProtocolError: the text is not PATH=LO:HI.
     """
-    path, equals, given = text.partition("=")
-    low, colon, high = given.partition(":")
     try:
-        if not (equals and colon and path.strip()):
-            raise ValueError
-        return path.strip(), float(low), float(high)
+        return read_range(text)
     except ValueError:
         hint = "Write PATH=LO:HI, such as camera.fov=45:60"
         raise ProtocolError(f"'{text}' is no range", where="fit", hint=hint) from None
