@@ -31,6 +31,10 @@ from optisense.optics.transport.chief_rays import ChiefRays
 
 if TYPE_CHECKING:
     from optisense.optics.imaging.sppm import SppmResult
+    from optisense.optics.transport.camera_paths import VisiblePoints
+
+    PointLight = tuple[VisiblePoints, list[mi.Color3f]]
+    """Points and their radiance, one colour for each light group."""
 
 CONTACT_SAMPLES = 12
 """Camera samples per pixel inside contacts, where tilt and shadow vary within a pixel, in an image
@@ -179,23 +183,13 @@ def _thrown_layers(
     """(groups, h, w, 3) light that contacts throw back to the pixels ``where``, averaged over
     ``skin``; None where there is none.
     """
-    if scenes.indenters is None or np.count_nonzero(where) < 2:
-        return None
-    width, height = camera.width, camera.height
-    film = Film(width * height, field.groups)
     least = THROWN_RAYS if field.narrow_lobes else BROAD_THROWN_RAYS
-    rays = max(least, round(least * (REFERENCE_WIDTH / width) ** 2))
-    pixel, _ = _repeated(where, 1)
-    first = dr.zeros(mi.UInt32, dr.width(pixel))
-    film.count(pixel)
-    for channel in scenes.full.channels:
-        spots = film_samples(pixel, width, first, seed_of(seed, 3))
-        own = seed_of(seed, 9)
-        main, _ = find_visible_points(scenes.full, camera, pixel, first, spots, own, True, channel)
-        found = thrown_back(field, scenes, main, rays)
-        if found is not None:
-            film.add(*found)
-    return film.spread_layers(width, height, skin, max(2, round(THROWN_REACH * width)))
+    rays = max(least, round(least * (REFERENCE_WIDTH / camera.width) ** 2))
+
+    def light(points: VisiblePoints) -> PointLight | None:
+        return thrown_back(field, scenes, points, rays)
+
+    return _averaged_layers(field.groups, scenes, camera, (where, skin), (seed, 9), light)
 
 
 def _beside_layers(
@@ -208,20 +202,50 @@ def _beside_layers(
     """(groups, h, w, 3) light that contacts reflect to the skin ``where`` beside them, averaged
     over it; None where there is none.
     """
+    more = (REFERENCE_WIDTH / camera.width) ** 2
+    directions = max(BESIDE_DIRECTIONS, round(BESIDE_DIRECTIONS * more))
+
+    def light(points: VisiblePoints) -> PointLight:
+        return points, beside_contacts(field, scenes, points, directions)
+
+    return _averaged_layers(field.groups, scenes, camera, (where, where), (seed, 10), light)
+
+
+def _averaged_layers(
+    groups: int,
+    scenes: ContactScenes,
+    camera: RayCamera,
+    places: tuple[NDArray[np.bool_], NDArray[np.bool_]],
+    seeds: tuple[int, int],
+    light: Callable[[VisiblePoints], PointLight | None],
+) -> NDArray[np.float32] | None:
+    """(groups, h, w, 3) ``light`` of what one ray through each pixel sees; None where there is
+    none.
+
+    Args:
+        groups: of the lights.
+        scenes: the sensor with its contacts.
+        camera: its pixels.
+        places: (h, w), the pixels that are looked through, and those that it is averaged over.
+        seeds: of the image, and of these rays.
+        light: the points whose light counts, and its radiance for each group.
+    """
+    where, over = places
     if scenes.indenters is None or np.count_nonzero(where) < 2:
         return None
     width, height = camera.width, camera.height
-    film = Film(width * height, field.groups)
-    directions = max(BESIDE_DIRECTIONS, round(BESIDE_DIRECTIONS * (REFERENCE_WIDTH / width) ** 2))
+    film = Film(width * height, groups)
     pixel, _ = _repeated(where, 1)
     first = dr.zeros(mi.UInt32, dr.width(pixel))
     film.count(pixel)
     for channel in scenes.full.channels:
-        spots = film_samples(pixel, width, first, seed_of(seed, 3))
-        own = seed_of(seed, 10)
+        spots = film_samples(pixel, width, first, seed_of(seeds[0], 3))
+        own = seed_of(*seeds)
         main, _ = find_visible_points(scenes.full, camera, pixel, first, spots, own, True, channel)
-        film.add(main, beside_contacts(field, scenes, main, directions))
-    return film.spread_layers(width, height, where, max(2, round(THROWN_REACH * width)))
+        found = light(main)
+        if found is not None:
+            film.add(*found)
+    return film.spread_layers(width, height, over, max(2, round(THROWN_REACH * width)))
 
 
 def render_cached(
