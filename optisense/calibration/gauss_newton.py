@@ -271,7 +271,7 @@ class LayeredFit:
         size = n + 3 * count
         matrix, tiles = np.zeros((size, size)), np.zeros((size, size))
         gradient = np.zeros(size)
-        moved = [self._moved(pictures, steps, contacts, k) for k in range(n)]
+        moved = [self._moved(steps, contacts, k) for k in range(n)]
         for index in range(-1, count):
             residual = self._residuals(pictures, index, scales)
             columns = list(range(n))
@@ -299,9 +299,7 @@ class LayeredFit:
         prior = np.concatenate([steps, (contacts / self._contact_spread).ravel()])
         return matrix + np.eye(size), gradient + prior, tiles
 
-    def _moved(
-        self, pictures: list[FloatArray], steps: FloatArray, contacts: FloatArray, number: int
-    ) -> list[FloatArray]:
+    def _moved(self, steps: FloatArray, contacts: FloatArray, number: int) -> list[FloatArray]:
         other = steps.copy()
         other[number] += STEP
         return self.pictures(other, contacts)

@@ -111,7 +111,7 @@ def render_study(
         figures_of.draw("front", partial(study_figures.front, trials, front, names, best))
     looks = looks or {}
     figures = [looks.get(label, Look()).figures for label in ("before", "after")]
-    after = _design(study, best)
+    after = _design(best)
     cages = [] if after is None else cage_changes(study.space.design, after)
     changes = tables.changes(study, start, best, bool(cages))
     failures, more_causes = tables.failures(trials)
@@ -258,7 +258,7 @@ def _sides(study: Study, best: Trial | None, looks: Mapping[str, Look]) -> list[
     """Before and after: the picture with its balls, and the section with chief rays."""
     found = []
     for label in ("before", "after"):
-        design = _design(study, best) if label == "after" else study.space.design
+        design = _design(best) if label == "after" else study.space.design
         if design is None:
             continue
         is_start = label == "before" or best is None or best.is_start
@@ -308,7 +308,7 @@ def _cage(change: CageChange) -> dict[str, Any]:
 
 def _overlay(study: Study, best: Trial | None) -> str:
     """Both outlines in one drawing, where a shape or a place has changed."""
-    after = _design(study, best)
+    after = _design(best)
     if best is None or best.is_start or after is None:
         return ""
     moved = study.space.reshapes or any(
@@ -319,7 +319,7 @@ def _overlay(study: Study, best: Trial | None) -> str:
     return figure_uri(study_figures.sections(study.space.design, after)) if moved else ""
 
 
-def _design(study: Study, trial: Trial | None) -> SensorDesign | None:
+def _design(trial: Trial | None) -> SensorDesign | None:
     if trial is None:
         return None
     try:

@@ -107,12 +107,11 @@ def mirrored_and_joined(left: FloatArray, right: FloatArray) -> FloatArray:
     return np.concatenate([left[:0:-1] * (-1.0, 1.0), right])
 
 
-def way_back(left: BeltHalf, right: BeltHalf, radius: float) -> tuple[float, float]:
+def way_back(left: BeltHalf, right: BeltHalf) -> tuple[float, float]:
     """How a belt closes behind its two wheels, which turn it by a quarter each before.
 
     Args:
         left: as if it lay on the right.
-        radius: mm, of the inner face around both wheels.
 
     Returns:
         mm: the length of the inner face that is drawn, and of the straight run of the way back;

@@ -268,7 +268,7 @@ def _left_out(
 ) -> LeftOut:
     """The belt's way back, which no light takes and which is not drawn."""
     tape, gel = layers
-    drawn, run = way_back(left, right, radius)
+    drawn, run = way_back(left, right)
     inner, outer = radius + tape, radius + tape + gel
     half_turn = 0.5 * math.pi * (outer**2 - inner**2)
     return LeftOut(

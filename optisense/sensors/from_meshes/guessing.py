@@ -12,7 +12,6 @@ from pathlib import Path
 from typing import Literal, cast
 
 import numpy as np
-from numpy.typing import NDArray
 
 from optisense.design import Role
 from optisense.errors import MeshError
@@ -60,8 +59,6 @@ LIGHT, CAMERA = "smd-3528", "pi-v2"
 
 LED_PITCH = 4.5
 """mm between guessed LEDs; a 3528 is 3.5 mm long."""
-
-Bounds = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
