@@ -51,10 +51,7 @@ def cage_problems(design: SensorDesign, meshes: Meshes | None = None) -> list[Di
     Raises:
         DesignError: a vertex of a caged part lies outside the cage's box.
     """
-    moved = _moved_cages(design)
-    if not moved:
-        return []
-    bent = design.deformed_meshes() if meshes is None else meshes
+    moved, bent = _moved_cages(design, meshes)
     problems: list[Diagnostic] = []
     done: set[frozenset[str]] = set()
     for cage_name, cage in moved.items():
@@ -78,8 +75,7 @@ def fold_problems(design: SensorDesign) -> list[Diagnostic]:
     Raises:
         DesignError: a vertex of a caged part lies outside the cage's box.
     """
-    moved = _moved_cages(design)
-    bent = design.deformed_meshes() if moved else {}
+    moved, bent = _moved_cages(design)
     problems: list[Diagnostic] = []
     for cage_name, cage in moved.items():
         for name in cage.parts:
@@ -95,8 +91,7 @@ def contact_problems(design: SensorDesign) -> list[Diagnostic]:
     Raises:
         DesignError: a vertex of a caged part lies outside the cage's box.
     """
-    moved = _moved_cages(design)
-    bent = design.deformed_meshes() if moved else {}
+    moved, bent = _moved_cages(design)
     problems: list[Diagnostic] = []
     for cage_name, cage in moved.items():
         others = [other for other in bent if other not in cage.parts]
@@ -147,9 +142,13 @@ def _coats(surface: TriangleMesh, solid: TriangleMesh) -> bool:
     return bool(np.isfinite(near_surface(middles, solid)).any())
 
 
-def _moved_cages(design: SensorDesign) -> dict[str, Cage]:
-    """The cages whose points are no longer at rest, by name."""
-    return {name: cage for name, cage in design.cages.items() if _has_moved(cage)}
+def _moved_cages(
+    design: SensorDesign, meshes: Meshes | None = None
+) -> tuple[dict[str, Cage], Meshes]:
+    """The cages whose points are no longer at rest, by name, and where there are any the deformed
+    meshes of all parts."""
+    moved = {name: cage for name, cage in design.cages.items() if _has_moved(cage)}
+    return moved, (meshes or design.deformed_meshes()) if moved else {}
 
 
 def _has_moved(cage: Cage) -> bool:

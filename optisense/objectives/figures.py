@@ -9,6 +9,7 @@ import numpy as np
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+    from numpy.typing import NDArray
 
     from optisense.objectives.score import Score
 
@@ -20,6 +21,20 @@ def _figure(width: float, height: float) -> Figure:
     from matplotlib.figure import Figure
 
     return Figure(figsize=(width, height), layout="constrained")
+
+
+def _square_grid(
+    count: int, width: float, height: float, *, sharey: bool = False
+) -> tuple[Figure, NDArray[np.object_]]:
+    """A figure with axes (rows, columns) for at least so many drawings of a width and height in
+    inches, as many side by side as one below the other; those that are left over are hidden."""
+    across = int(np.ceil(count**0.5))
+    down = -(-count // across)
+    figure = _figure(width * across, height * down)
+    grid = figure.subplots(down, across, squeeze=False, sharey=sharey)
+    for axes in grid.ravel()[count:]:
+        axes.set_axis_off()
+    return figure, grid
 
 
 def draw_failure(score: Score) -> Figure:
@@ -139,11 +154,8 @@ def draw_projection_warping(score: Score) -> Figure:
 def draw_shadow(score: Score) -> Figure:
     """The skin that loses red, green or blue light, in that colour, for each place."""
     maps, places = score.arrays["maps"], score.parts["places"]
-    across = int(np.ceil(len(maps) ** 0.5))
-    down = -(-len(maps) // across)
-    figure = _figure(2.4 * across, 2.1 * down)
-    grid = figure.subplots(down, across, squeeze=False).ravel()
-    for number, (axes, lost) in enumerate(zip(grid, maps, strict=False)):
+    figure, grid = _square_grid(len(maps), 2.4, 2.1)
+    for number, (axes, lost) in enumerate(zip(grid.ravel(), maps, strict=False)):
         taken = np.nan_to_num(lost)
         none = ~taken.any(axis=2, keepdims=True)
         shown = np.where(np.isnan(lost), 0.55, np.where(none, 0.92, 0.85 * taken))
@@ -151,8 +163,6 @@ def draw_shadow(score: Score) -> Figure:
         axes.set_title(f"{number + 1}: {100 * places[number]['share']:.1f} %", fontsize=10)
         axes.set_xticks([])
         axes.set_yticks([])
-    for axes in grid[len(maps) :]:
-        axes.set_axis_off()
     figure.suptitle("place and the share of the skin that loses the colours shown", fontsize=11)
     return figure
 
@@ -160,21 +170,16 @@ def draw_shadow(score: Score) -> Figure:
 def draw_depth(score: Score) -> Figure:
     """The depth along a row of each contact, as it is and as it is read."""
     profiles, places = score.arrays["profiles"], score.parts["places"]
-    across = int(np.ceil(len(profiles) ** 0.5))
-    down = -(-len(profiles) // across)
-    figure = _figure(2.6 * across, 1.9 * down)
-    grid = figure.subplots(down, across, squeeze=False, sharey=True).ravel()
-    for number, (axes, each) in enumerate(zip(grid, profiles, strict=False)):
+    figure, grid = _square_grid(len(profiles), 2.6, 1.9, sharey=True)
+    for number, (axes, each) in enumerate(zip(grid.ravel(), profiles, strict=False)):
         axes.plot(each["true"], color="#888888", lw=2.5, label="true")
         axes.plot(each["read"], color=LINE, lw=1.2, label="read")
         axes.set_title(f"{number + 1}: {places[number]['error']:.3f} mm", fontsize=10)
         axes.set_xticks([])
-        if number % across == 0:
+        if number % grid.shape[1] == 0:
             axes.set_ylabel("depth (mm)")
-    for axes in grid[len(profiles) :]:
-        axes.set_axis_off()
-    grid[0].invert_yaxis()
-    grid[0].legend(fontsize=8, frameon=False)
+    grid[0, 0].invert_yaxis()
+    grid[0, 0].legend(fontsize=8, frameon=False)
     figure.suptitle("place and the mean error over its contact; along its middle row", fontsize=11)
     return figure
 

@@ -20,6 +20,7 @@ from optisense.geometry.patches import patches
 from optisense.geometry.step import no_step
 from optisense.version import __version__
 from optisense.workshop.exact_shapes import WORTH_IT, exact_body
+from optisense.workshop.occ import compound
 from optisense.workshop.shapes import Shape
 
 
@@ -137,9 +138,7 @@ def bodies(mesh: TriangleMesh) -> list[list[TriangleMesh]]:
 
 def _boundary(shape: Shape) -> Any:
     """A solid, several of them, or the shell of a sheet."""
-    from OCP.BRep import BRep_Builder
     from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeSolid
-    from OCP.TopoDS import TopoDS_Compound
 
     if not shape.is_solid:
         return _shell(shape.mesh, closed=False)
@@ -149,13 +148,7 @@ def _boundary(shape: Shape) -> Any:
         for cavity in cavities:
             maker.Add(_shell(cavity, closed=True))
         solids.append(maker.Solid())
-    if len(solids) == 1:
-        return solids[0]
-    builder, compound = BRep_Builder(), TopoDS_Compound()
-    builder.MakeCompound(compound)
-    for solid in solids:
-        builder.Add(compound, solid)
-    return compound
+    return compound(solids)
 
 
 def _shell(mesh: TriangleMesh, closed: bool) -> Any:
