@@ -41,8 +41,8 @@ CONTACT_SAMPLES = 12
 `REFERENCE_WIDTH` wide. Twelve keep the noise of the samples below 1 % in the contact of a 1.5 mm
 ball on GelSight Mini. Finer images have smaller pixels and take fewer."""
 MIN_CONTACT_SAMPLES = 16_000
-"""Least number of camera samples in all contacts together. Where contacts fill few pixels, more
-varies within each pixel, and each gets more samples."""
+"""Lower bound on the number of camera samples in all contacts together. If contacts fill few
+pixels, tilt and shadow vary more within each pixel, and each gets more samples."""
 MAX_PIXEL_SAMPLES = 64
 """Largest number of camera samples per pixel that `MIN_CONTACT_SAMPLES` leads to."""
 RIM_SAMPLES = 6
@@ -50,7 +50,7 @@ RIM_SAMPLES = 6
 DRAFT_SAMPLES = 3, 1
 """Camera samples per pixel of a draft, in contacts and around them."""
 MIN_PIXEL_SAMPLES = 2
-"""Camera samples of a contact pixel whose importance is zero: it is only averaged with others."""
+"""Camera samples of a contact pixel of importance 0, which is only averaged with others."""
 REFERENCE_WIDTH = 320
 """Image width (pixels) for which the numbers of samples per pixel are stated."""
 RIM_WIDTH = 8.0 / 320.0
@@ -64,38 +64,38 @@ GRAIN_SAMPLES = 4
 limited to half of the image's samples. A sample reads one cell of the cache, so that neighbouring
 cells that differ much show as grain."""
 GRAIN_THRESHOLD = 0.03
-"""RMS deviation of pixels from the mean of their neighbours, relative to it, above which a place is
-grainy: three times a camera's own noise, which is about 0.01."""
+"""Threshold of the relative RMS deviation of pixels from the mean of their neighbours above which a
+place is grainy: three times a camera's own noise, which is about 0.01."""
 NEIGHBOUR_MEAN = np.array([[0, 1, 0], [1, 0, 1], [0, 1, 0]], dtype=np.float32) / 4
 """Convolution kernel that gives the mean of the four neighbours of a pixel."""
 DARK_FRACTION = 0.02
-"""Fraction of the mean brightness below which grain is not looked for, as it is not visible."""
+"""Fraction of the mean brightness below which grain is ignored, as it is not visible."""
 GRAIN_WINDOW = 9
-"""Side (pixels) of the square over which grain is measured and sampled again."""
+"""Side (pixels) of the square over which grain is measured and resampled."""
 
 THROWN_RANGE = 0.1
-"""Distance from a contact, as a fraction of the image width, within which metal coatings are shaded
-with the light that it throws back: 2 mm on GelSight Mini."""
+"""Distance from a contact, as a fraction of the image width, within which metallic coatings are
+shaded with the light that the contact reflects through the interfaces: 2 mm on GelSight Mini."""
 THROWN_RAYS = 8
-"""Rays of a pixel that look for it in an image `REFERENCE_WIDTH` wide, and more in smaller ones:
-few of them end where a contact mirrors a lamp."""
+"""Rays per pixel that sample this light in an image `REFERENCE_WIDTH` wide; smaller images take
+more. Few of the rays end where a contact mirrors a lamp."""
 BROAD_THROWN_RAYS = 1
-"""The same for lobes that are not narrower than most lamps, to which little is thrown back, from
-everywhere."""
+"""Rays per pixel for lobes that are not narrower than most lamps; one suffices, as they receive
+little such light, and evenly from all directions."""
 LEAST_LEFT = 0.5
-"""Share of a pixel's light that is left where contacts hide what would throw light back: beyond it,
-it is the noise of a few bright rays."""
+"""Lower bound on the share of a pixel's light that remains after the light of the skin hidden by
+contacts is subtracted; a larger loss is the noise of a few bright rays."""
 THROWN_REACH = 1.0 / 40.0
-"""Over how many pixels of skin that light is averaged, as a fraction of the image width: half a
+"""Width of the averaging of that light over the skin, as a fraction of the image width: half a
 millimetre on GelSight Mini. A lobe of alpha 0.05 spreads it over 1 to 2 mm."""
 
 BESIDE_RANGE = 0.1
 """Distance from a contact, as a fraction of the image width, within which the skin is shaded with
-light that the contact reflects to it: 2 mm on GelSight Mini. It is half a per cent of a diffuse
-coating's light there; to narrow lobes, single rays of it would be bright blotches."""
+light that the contact reflects to it: 2 mm on GelSight Mini. This is half a per cent of a diffuse
+coating's light there; with narrow lobes, single rays would be bright blotches."""
 BESIDE_DIRECTIONS = 2
-"""Directions of a pixel that look for it in an image `REFERENCE_WIDTH` wide, and more in smaller
-ones. It is averaged over `THROWN_REACH`, which leaves noise of some tenths of a per cent."""
+"""Rays per pixel that sample this light in an image `REFERENCE_WIDTH` wide; smaller images take
+more. The light is averaged over `THROWN_REACH`, which leaves noise of some tenths of a per cent."""
 
 PixelImportance = Callable[[ChiefRays], NDArray[np.bool_] | NDArray[np.floating]]
 """A function of the chief rays that gives the importance (h, w) of each contact pixel to a score,
@@ -104,8 +104,8 @@ PixelImportance = Callable[[ChiefRays], NDArray[np.bool_] | NDArray[np.floating]
 
 @dataclass
 class ImageLayers:
-    """radiance (groups, h, w, 3) for lights of 1 mW in each channel, and the ground truth of an
-    image.
+    """The layers (groups, h, w, 3) of an image for lights of 1 mW in each channel, and its ground
+    truth.
     """
 
     radiance: NDArray[np.float32]
@@ -122,7 +122,7 @@ class ImageLayers:
 
     @classmethod
     def from_sppm(cls, result: SppmResult, rays: ChiefRays, began: float) -> ImageLayers:
-        """Layers of progressive photon mapping, with ground truth from chief rays."""
+        """Return the layers of progressive photon mapping, with ground truth from chief rays."""
         hit = rays.hit
         difference = result.halves[0] - result.halves[1]
         mean = float(result.layers.mean())
@@ -143,8 +143,11 @@ class ImageLayers:
 
 
 def _repeated(mask: NDArray[np.bool_], times: int) -> tuple[mi.UInt32, mi.UInt32]:
-    """Every pixel of a mask (one or more) ``times`` times, and the number of the sample, from 1."""
-    # Made on the device: arrays handed over from numpy differ in alignment, and so would kernels.
+    """Return the index of each pixel of a non-empty mask ``times`` times, and the sample's number,
+    from 1.
+    """
+    # The arrays are made on the device, as NumPy arrays differ in alignment, which is part of
+    # kernels.
     chosen = dr.compress(mi.Bool(mask.ravel()))
     lane = dr.arange(mi.UInt32, dr.width(chosen) * times)
     count = dr.opaque(mi.UInt32, dr.width(chosen))
@@ -152,14 +155,16 @@ def _repeated(mask: NDArray[np.bool_], times: int) -> tuple[mi.UInt32, mi.UInt32
 
 
 def _grainy(image: NDArray[np.float32], where: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """(h, w) which pixels of a mask lie in grainy places: where an image (h, w) often differs from
-    the mean of the four neighbours, by more than a smooth image can.
+    """Return a mask (h, w) of the pixels of ``where`` that lie in grainy places.
+
+    In these, the image (h, w) often differs from the mean of the four neighbours by more than a
+    smooth image does.
     """
     if not where.any():
         return where
     inner = ndimage.binary_erosion(where) & (image > DARK_FRACTION * image[where].mean())
     mean = ndimage.convolve(image, NEIGHBOUR_MEAN, mode="nearest")
-    # A lit pixel among black ones is as far off as can be told.
+    # The lower bound avoids a division by zero at a lit pixel among black ones.
     least = np.maximum(0.01 * np.abs(image), np.finfo(np.float32).tiny)
     off = np.where(inner, (image - mean) / np.maximum(np.abs(mean), least), 0.0)
     share = ndimage.uniform_filter(inner.astype(np.float32), GRAIN_WINDOW)
@@ -168,7 +173,7 @@ def _grainy(image: NDArray[np.float32], where: NDArray[np.bool_]) -> NDArray[np.
 
 
 def masked(values: NDArray[np.float32], where: NDArray[np.bool_]) -> NDArray[np.float32]:
-    """Values (h, w, 3) with NaN outside a mask."""
+    """Return values (h, w, 3) with NaN outside a mask."""
     return np.where(where[..., None], values, np.nan).astype(np.float32)
 
 
@@ -180,8 +185,8 @@ def _thrown_layers(
     skin: NDArray[np.bool_],
     seed: int,
 ) -> NDArray[np.float32] | None:
-    """(groups, h, w, 3) light that contacts throw back to the pixels ``where``, averaged over
-    ``skin``; None where there is none.
+    """Return the radiance (groups, h, w, 3) due to light that contacts reflect through the
+    interfaces to the pixels ``where``, averaged over ``skin``; None if there is none.
     """
     least = THROWN_RAYS if field.narrow_lobes else BROAD_THROWN_RAYS
     rays = max(least, round(least * (REFERENCE_WIDTH / camera.width) ** 2))
@@ -199,8 +204,8 @@ def _beside_layers(
     where: NDArray[np.bool_],
     seed: int,
 ) -> NDArray[np.float32] | None:
-    """(groups, h, w, 3) light that contacts reflect to the skin ``where`` beside them, averaged
-    over it; None where there is none.
+    """Return the radiance (groups, h, w, 3) due to light that contacts reflect to the skin
+    ``where`` beside them, averaged over it; None if there is none.
     """
     more = (REFERENCE_WIDTH / camera.width) ** 2
     directions = max(BESIDE_DIRECTIONS, round(BESIDE_DIRECTIONS * more))
@@ -265,22 +270,22 @@ def render_cached(
     Args:
         light: the cache, and whether Ctrl-C ended its photon tracing early.
         scenes: the sensor with its contacts.
-        camera: its pixels.
+        camera: the camera.
         rays: chief rays through the same scene and camera.
         emitters: the lights, whose windows may be in view.
-        areas: mm^2 of their windows.
-        seed: of the camera samples.
-        only_contacts: leave all pixels dark that do not see an indenter.
-        pixel_importance: with ``only_contacts``, the share of the samples that each pixel gets; a
-            pixel gets `MIN_PIXEL_SAMPLES` at least.
-        draft: take few samples in contacts, and leave grain as it is.
+        areas: areas of their windows, mm^2.
+        seed: seed of the camera samples.
+        only_contacts: whether all pixels that do not see an indenter stay dark.
+        pixel_importance: function that gives, with ``only_contacts``, the share of the samples of
+            each pixel; a pixel gets at least `MIN_PIXEL_SAMPLES`.
+        draft: whether few samples are taken in contacts and grain is not resampled.
     """
     began = time.perf_counter()
     field, interrupted = light
     width, height = camera.width, camera.height
-    # What interfaces reflect towards the eye is little: it is sampled once in a pixel or in those
-    # beside it.
-    # Lamps are so bright that one path in a thousand that meets one would be a speck.
+    # Interfaces reflect little light towards the camera, so their reflections are sampled once in a
+    # pixel or in its neighbours. Lamps are so bright that the rare path (one in a thousand) that
+    # meets one would be a speck.
     film, mirrored, glints = (Film(width * height, field.groups) for _ in range(3))
 
     culled_beams = field.beams
@@ -341,8 +346,8 @@ def render_cached(
     far = ~near
     layers = reflections = None
     if far.any() and not only_contacts:
-        # Beams to go through: where they are many, every second pixel will do, if its neighbours
-        # are like it.
+        # The number of beams to sum. If it is large, only every second pixel is shaded where its
+        # neighbours are similar.
         beams = dr.width(field.beams.ways) / 4 / field.cells.cells
         sparse = int(far.sum()) * beams > SPARSE_SHADING_BEAMS
         filled = between_rays(rays, far) if sparse else np.zeros_like(far)
@@ -370,8 +375,8 @@ def render_cached(
                 layers = film.layers(width, height) + reflections
             alike = agreed(layers, filled)
             if (apart := filled & ~alike).any():
-                # Once in their middle as the others, and once more where those beside them were
-                # sampled again.
+                # These pixels get a sample in their middle like the others, and a further one where
+                # their neighbours were resampled.
                 again = apart & np.kron(grainy[::2, ::2], np.ones((2, 2), bool))[:height, :width]
                 tiers = [_repeated(each, 1) for each in (apart, again) if each.any()]
                 tiers[0] = tiers[0][0], dr.zeros(mi.UInt32, dr.width(tiers[0][0]))
@@ -389,7 +394,7 @@ def render_cached(
     if beside is not None:
         layers = layers + beside
     if thrown is not None:
-        # A contact also hides skin that would throw light back, but never much of all light.
+        # A contact also hides skin that would reflect light, but never a large share of the light.
         layers = np.maximum(layers + thrown, layers * LEAST_LEFT)
     return ImageLayers(
         radiance=layers,

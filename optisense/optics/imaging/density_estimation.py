@@ -1,10 +1,9 @@
-"""Density estimation: photons in a uniform grid, and the light they bring to visible points
-(pairwise SPPM).
+"""Density estimation at visible points from photons in a uniform grid (pairwise SPPM).
 
-A photon's power is divided by the cosine at the place where *it* landed: that gives the flux
+A photon's power is divided by the cosine at the place where *it* landed. The quotient is the flux
 through a plane across its path, which hardly changes in the neighbourhood, while the density of
-landings follows the local tilt. Reflection is then evaluated with the visible point's own
-normal. The kernel is Epanechnikov's, over a disc of radius r.
+landings follows the local tilt. Reflection is then evaluated with the visible point's own normal.
+The kernel is Epanechnikov's, over a disc of radius r.
 """
 
 from __future__ import annotations
@@ -27,7 +26,7 @@ grazing photon does not become a bright spot."""
 
 @dataclass
 class PhotonGrid:
-    """Photons in the order of the cells of a uniform grid; ``starts`` has one entry a cell and
+    """Photons in the order of the cells of a uniform grid; ``starts`` has one entry per cell and
     one more.
     """
 
@@ -53,7 +52,7 @@ def _cell(
 def build_grid(
     photons: PhotonMap, lower: NDArray[np.floating], upper: NDArray[np.floating], radius: float
 ) -> PhotonGrid:
-    """Sort photons into cells of side ``radius`` (mm) by counting; no comparison sort is needed."""
+    """Sort photons into cells of side ``radius`` (mm) by counting sort."""
     size = [max(float(upper[i] - lower[i]), radius) for i in range(3)]
     cell_size = max(radius, max(size) / 1000)
     while True:
@@ -110,7 +109,8 @@ def _gather(
     low = mi.Vector3u(centre - dr.minimum(reach, centre))
     high = mi.Vector3u(dr.minimum(centre + reach, grid.counts - 1))
     span = high - low + 1
-    # Cells of one x row are neighbours in memory: one run of photons for each (y, z).
+    # Cells along x are neighbours in memory, so that each (y, z) has one contiguous range of
+    # photons.
     rows = dr.select(active, span.y * span.z, 0)
     while step < rows:
         y = low.y + step % span.y
@@ -148,7 +148,9 @@ def gather_pairwise(
     radius: mi.Float,
     groups: int,
 ) -> list[mi.Color3f]:
-    """Radiance of each visible point towards the eye, for each light group, lights of 1 mW."""
+    """Return the radiance of each visible point towards the camera for each light group, with
+    lights of 1 mW.
+    """
     coating = coating_of(surfaces, points.surface, points.valid)
     return _gather(
         grid,

@@ -12,15 +12,16 @@ from optisense.optics.scene.emitters import Emitter
 from optisense.optics.transport.camera_paths import VisiblePoints
 
 LONE_WINDOW, LONE_RANK = 5, 4
-"""Side (pixels) of the square in which a bright pixel must have company, and how many pixels of it,
-with itself, must be bright: the reflection of a lamp that is seen has more."""
+"""Side (pixels) of the square around a bright pixel, and the number of its pixels, itself included,
+that must be bright for the pixel to count as real: the visible reflection of a lamp has more."""
 
 LONE_RATIO = 2.0
-"""Times as bright as the last of them, above which the rest of a pixel's light is spread."""
+"""Ratio of a pixel's light to that of the `LONE_RANK`-th brightest pixel in its square above which
+the excess is spread."""
 
 SPECK_REACH = 1.0 / 8.0
-"""Over how many pixels that light is spread, as a fraction of the image width; a speck of 50 times
-the light around it then adds 3 % to its middle."""
+"""Width over which that excess is spread, as a fraction of the image width; a speck of 50 times the
+light around it then adds 3 % to its middle."""
 
 
 class Film:
@@ -31,19 +32,19 @@ class Film:
         self.counts = dr.zeros(mi.Float, pixels)
 
     def count(self, pixel: mi.UInt32) -> None:
-        """Note one sample of each of these pixels."""
+        """Count one sample of each of these pixels."""
         dr.scatter_add(self.counts, mi.Float(1), pixel)
 
     def add(self, points: VisiblePoints, radiance: list[mi.Color3f]) -> None:
-        """Add what leaves visible points towards the eye, one colour a group."""
+        """Add the radiance of visible points towards the camera, one colour per group."""
         for total, value in zip(self.sums, radiance, strict=True):
             weighted = points.weight * value
             for k in range(3):
                 dr.scatter_add(total, weighted[k], points.pixel * 3 + k, points.valid)
 
     def add_light(self, points: VisiblePoints, emitters: list[Emitter], areas: list[float]) -> None:
-        """The windows of flat lights that are seen directly; a Lambertian window of 1 mW has
-        radiance 1 / (pi A).
+        """Add the windows of flat lights that are seen directly; a Lambertian window of 1 mW and
+        area A has radiance 1 / (pi A).
         """
         radiance = [1 / (np.pi * area) if area > 0 else 0.0 for area in areas]
         values = mi.Float(np.array([0.0, *radiance], dtype=np.float32))
@@ -61,7 +62,7 @@ class Film:
                 )
 
     def layers(self, width: int, height: int) -> NDArray[np.float32]:
-        """(groups, h, w, 3): sums over the number of samples."""
+        """Return the layers (groups, h, w, 3): the sums divided by the number of samples."""
         share = 1 / np.maximum(np.asarray(self.counts), 1).reshape(height, width, 1)
         out = np.empty((len(self.sums), height, width, 3), dtype=np.float32)
         for layer, total in zip(out, self.sums, strict=True):
@@ -71,17 +72,20 @@ class Film:
     def without_specks(
         self, width: int, height: int, near: NDArray[np.bool_]
     ) -> NDArray[np.float32]:
-        """The layers, where the light of lone bright pixels is spread over sampled ones around
-        them. Neither in contacts nor outside of them does the sum over all pixels change.
+        """Return the layers with the light of lone bright pixels spread over sampled pixels around
+        them.
+
+        The sum over the pixels in contacts does not change, and neither does the sum over the
+        others.
 
         Args:
-            width, height: pixels.
-            near: (height, width) which pixels lie in contacts or at their rims.
+            width, height: size of the image, pixels.
+            near: (height, width) mask of the pixels in contacts or at their rims.
         """
         layers = self.layers(width, height)
         sampled = (np.asarray(self.counts) > 0).reshape(height, width)
         regions = [where for where in (sampled & near, sampled & ~near) if where.any()]
-        reach = round(SPECK_REACH * width) | 1  # odd: to both sides alike, so that no light is lost
+        reach = round(SPECK_REACH * width) | 1  # odd: a symmetric square loses no light
 
         def around(image: NDArray[np.floating]) -> NDArray[np.floating]:
             for _ in range(2):
@@ -107,14 +111,14 @@ class Film:
     def spread_layers(
         self, width: int, height: int, where: NDArray[np.bool_], reach: int
     ) -> NDArray[np.float32]:
-        """The same, where ``where`` (h, w) is set averaged over the samples of the pixels around
-        for which it is set, too.
+        """Return the layers with the pixels of a mask averaged over the samples of other pixels of
+        the mask around them.
 
         Args:
-            width: pixels of a row.
-            height: rows.
-            where: which pixels are averaged, with others alone.
-            reach: pixels; half the side of the square over which a triangular kernel averages.
+            width: number of pixels in a row.
+            height: number of rows.
+            where: (h, w) mask of the pixels that are averaged with one another.
+            reach: half the side (pixels) of the square over which a triangular kernel averages.
         """
         layers = self.layers(width, height)
         inside = where.astype(np.float32)

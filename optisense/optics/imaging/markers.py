@@ -1,4 +1,4 @@
-"""Dots on the skin: how dark they make pixels, and where pictures show them."""
+"""Markers (dots on the skin): their coverage of pixels and their positions in pictures."""
 
 from __future__ import annotations
 
@@ -22,11 +22,12 @@ if TYPE_CHECKING:
 FloatArray = NDArray[np.float64]
 
 FARTHEST = 1.5
-"""Distance of a dot from the nearest pixel's place, over the width of a pixel, from which it counts
-as unseen."""
+"""Distance of a dot from the nearest pixel's place on the skin, in widths of a pixel, from which on
+it counts as unseen."""
 DEEPEST_MISS = 1.0
-"""mm that a pixel's place may lie off the skin at a dot, along its normal: a conforming skin tells
-no displacement, and the other side of a thin sensor must not count."""
+"""Largest distance (mm) of a pixel's place from the skin at a dot, along its normal. Places in
+contacts of a conforming skin, which has no known displacement, are off the skin; those on the other
+side of a thin sensor must not count."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,8 +38,8 @@ class MarkerPlaces:
         coordinates: (n, 2) u, v on the undeformed surface, mm; markers beyond its edge are absent.
         before: (n, 2) column and row in the untouched sensor's picture, in pixels from its upper
             left corner; NaN where it is not seen.
-        after: (n, 2) the same with the contacts.
-        displacement: (n, 3) mm by which each has moved, in the design's frame; NaN if unseen.
+        after: (n, 2) column and row in the picture with the contacts; NaN where it is not seen.
+        displacement: (n, 3) displacement (mm) of each marker in the design's frame; NaN if unseen.
     """
 
     coordinates: FloatArray
@@ -47,7 +48,7 @@ class MarkerPlaces:
     displacement: FloatArray
 
     def rows(self) -> NDArray[np.float32]:
-        """(n, 4): column and row before, column and row after."""
+        """Return an array (n, 4) of column and row before, and column and row after."""
         return np.hstack([self.before, self.after]).astype(np.float32)
 
 
@@ -62,7 +63,7 @@ class MarkerDots:
 
     @classmethod
     def on(cls, markers: Markers, surface: SensingSurface) -> MarkerDots:
-        """The dots that lie on the surface; those beyond its edge are left out."""
+        """Return the dots that lie on the surface; those beyond its edge are left out."""
         kept, points, normals = [], [], []
         for u, v in markers.coordinates():
             try:
@@ -81,10 +82,10 @@ class MarkerDots:
         )
 
     def coverage(self, material: FloatArray) -> FloatArray:
-        """(h, w) share of each pixel that a dot covers.
+        """Return the share (h, w) of each pixel that a dot covers.
 
         Args:
-            material: (h, w, 3) mm, where the skin behind a pixel was before it moved.
+            material: (h, w, 3) position (mm) of the skin behind each pixel before it moved.
         """
         result = np.zeros(material.shape[:2])
         if not len(self.points):
@@ -101,7 +102,7 @@ class MarkerDots:
         return result
 
     def pixels(self, material: FloatArray) -> FloatArray:
-        """(n, 2) column and row at which each dot is seen; NaN where it is not."""
+        """Return the column and row (n, 2) at which each dot is seen; NaN where it is not seen."""
         result = np.full((len(self.points), 2), np.nan)
         seen = np.isfinite(material).all(axis=2)
         if not seen.any() or not len(self.points):
@@ -127,12 +128,12 @@ class MarkerDots:
         return result
 
     def places(self, untouched: ChiefRays, material: FloatArray, moved: FloatArray) -> MarkerPlaces:
-        """Where the dots are seen before and after.
+        """Return the positions of the dots before and after the contacts.
 
         Args:
             untouched: chief rays of the untouched sensor.
-            material: (h, w, 3) mm, as for `coverage`.
-            moved: (h, w, 3) mm, the displacement behind each pixel.
+            material: (h, w, 3) position (mm) of the skin before it moved, as in `coverage`.
+            moved: (h, w, 3) displacement (mm) of the skin behind each pixel.
         """
         at_rest = np.where(untouched.hit[..., None], untouched.points, np.nan).astype(np.float64)
         after = self.pixels(material)
@@ -147,9 +148,11 @@ class MarkerDots:
 
 
 def ink_factor(markers: Markers, coating: CoatingModel) -> FloatArray:
-    """(3,) what a dot's ink reflects over what the coating reflects straight on, for R, G, B.
+    """Return the ratio (3,) of the reflectance of a dot's ink to that of the coating at normal
+    incidence, for R, G, B.
 
-    Dots darken light by this factor: exact for a diffuse coating but for light between surfaces.
+    Dots darken light by this factor. For a diffuse coating this is exact except for
+    interreflection.
     """
     lobe = coating.reflection()
     diffuse = np.array(lobe.reflectance)
@@ -162,7 +165,7 @@ def ink_factor(markers: Markers, coating: CoatingModel) -> FloatArray:
 
 
 def _pixel_width(material: FloatArray) -> FloatArray:
-    """(h, w) mm: the side of the patch of skin behind a pixel; 0 where it is not known."""
+    """Return the side (h, w), mm, of the patch of skin behind each pixel; 0 where it is unknown."""
     along = np.gradient(material, axis=1)
     down = np.gradient(material, axis=0)
     area = np.linalg.norm(np.cross(along, down), axis=2)

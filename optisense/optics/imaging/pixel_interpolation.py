@@ -19,22 +19,22 @@ FloatArray = NDArray[np.floating]
 BoolArray = NDArray[np.bool_]
 
 MAX_OFFSET = 0.2
-"""Largest distance of a pixel's surface point from the middle of those beside it, relative to their
-distance from the middle. More is an edge."""
+"""Largest distance of a pixel's surface point from the centre of its neighbours' points, relative
+to the distance of those points from the centre. A larger distance indicates an edge."""
 MIN_COSINE = 0.995
 """Smallest cosine between a pixel's normal and ray and those of the pixels beside it."""
 AGREEMENT = 0.1
-"""Largest difference between the pixels beside another in all light, relative to their mean or to
-`DIM` times the image's mean."""
+"""Largest difference in the total light of the neighbours of a pixel at which it is interpolated,
+relative to their mean or to `DIM` times the image's mean."""
 GROUP_AGREEMENT = 0.3
-"""The same in the light of one group, which is noisier."""
+"""Largest difference, as in `AGREEMENT`, in the light of a single group, which is noisier."""
 DIM = 0.3
 """Fraction of the image's mean below which differences are measured against that mean."""
 
 
 def between_rays(rays: ChiefRays, where: BoolArray) -> BoolArray:
-    """(h, w) the pixels of a mask that see the undeformed surface between the even pixels beside
-    them, which must be in the mask, too.
+    """Return the mask (h, w) of the pixels of ``where`` that see the undeformed surface between the
+    places of their even neighbours, which must be in ``where`` as well.
     """
     plain = where & rays.hit & (rays.region == Region.SENSING)
     out = np.zeros_like(plain)
@@ -53,7 +53,9 @@ def between_rays(rays: ChiefRays, where: BoolArray) -> BoolArray:
 
 
 def agreed(layers: FloatArray, where: BoolArray) -> BoolArray:
-    """(h, w) the pixels of a mask whose even neighbours agree in their light (groups, h, w, 3)."""
+    """Return the mask (h, w) of the pixels of ``where`` whose even neighbours agree in their light
+    (groups, h, w, 3).
+    """
     groups = layers.sum(axis=-1)
     out = where.copy()
     for light, bound in ((groups.sum(axis=0)[None], AGREEMENT), (groups, GROUP_AGREEMENT)):
@@ -68,7 +70,9 @@ def agreed(layers: FloatArray, where: BoolArray) -> BoolArray:
 
 
 def fill(layers: NDArray[np.float32], where: BoolArray) -> None:
-    """Give the pixels of a mask the mean of their even neighbours, in (groups, h, w, 3)."""
+    """Replace the pixels of a mask in ``layers`` (groups, h, w, 3) by the mean of their even
+    neighbours.
+    """
     for odd, corners in _places(where):
         mean = sum(layers[:, c[0], c[1]] for c in corners) / np.float32(len(corners))
         layers[:, odd[0], odd[1]] = np.where(where[odd][..., None], mean, layers[:, odd[0], odd[1]])

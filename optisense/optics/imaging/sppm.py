@@ -1,9 +1,9 @@
-"""Stochastic progressive photon mapping, pair by pair: the estimator without pooling.
+"""Stochastic progressive photon mapping (SPPM), the reference estimator.
 
-Every pass traces photons through the scene as it is, contacts included, and gathers them at
-fresh visible points with a radius that shrinks as passes^(-1/6) (area as passes^(-1/3), the
-rate of Knaus and Zwicker 2011, alpha = 2/3), so that both noise and bias go to zero. It is
-slower than the radiance cache and is what that is checked against.
+Every pass traces photons through the scene with its contacts, and gathers them at new visible
+points with a radius that shrinks as passes^(-1/6) (area as passes^(-1/3), the rate of Knaus and
+Zwicker 2011, alpha = 2/3), so that both noise and bias go to zero. It is slower than the radiance
+cache, which is verified against it.
 """
 
 from __future__ import annotations
@@ -24,14 +24,19 @@ from optisense.optics.transport.camera_paths import film_samples, find_visible_p
 from optisense.optics.transport.photons import Emission, trace_photons
 
 FIRST_RADIUS = 0.3
-"""Gather radius in mm of the first pass. It shrinks with each pass, so that it decides how soon an
-image is smooth and not what it converges to."""
+"""Gather radius (mm) of the first pass. As the radius shrinks with each pass, it affects how fast
+noise falls and not the limit of the image."""
 
 
 @dataclass
 class SppmResult:
-    """layers (groups, h, w, 3): radiance for lights of 1 mW; halves: the same of even and odd
-    passes.
+    """The result of SPPM.
+
+    Attributes:
+        layers: (groups, h, w, 3) radiance for lights of 1 mW.
+        halves: the layers of the even and of the odd passes.
+        passes: number of passes.
+        photons: number of emitted photons.
     """
 
     layers: NDArray[np.float32]
@@ -51,18 +56,19 @@ def render_sppm(
     samples: int = 1,
     stop: Callable[[int], bool] | None = None,
 ) -> SppmResult:
-    """Average several passes.
+    """Render the average of several passes.
 
     Args:
         scene: the surfaces, contacts included.
-        emission: the photons of the first pass; the others go on with its sequence.
-        camera: its pixels.
+        emission: the photons of the first pass; the other passes continue its sequence.
+        camera: the camera.
         passes: number of passes.
         coloured: whether surfaces are coloured.
         radius: gather radius (mm) of the first pass.
-        samples: camera samples of each pixel in a pass. With discs much smaller than a pixel, one
-            sample leaves most photons of the pixel out.
-        stop: called with the number of passes done; tracing ends early if it returns True.
+        samples: number of camera samples of each pixel in a pass. If the gather discs are much
+            smaller than a pixel, a single sample misses most photons of the pixel.
+        stop: function that is called with the number of passes done; tracing ends early if it
+            returns True.
     """
     table, seed = emission.table, emission.seed
     width, height = camera.width, camera.height

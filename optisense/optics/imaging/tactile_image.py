@@ -1,4 +1,4 @@
-"""A tactile image: what the sensor's camera sees, and what is true about it."""
+"""A tactile image: the picture of the sensor's camera and its ground truth."""
 
 from __future__ import annotations
 
@@ -44,18 +44,23 @@ MARKER_COLUMNS = "u,v,column_before,row_before,column_after,row_after,dx,dy,dz"
 
 @dataclass
 class TactileImage:
-    """The result of a render; arrays are (h, w, ...), row 0 is the top.
+    """The result of a render; row 0 of arrays is the top of the image.
 
-    layers: linear radiance (mW / (mm^2 sr)) of each light group with its colour and flux; they
-        add up to the radiance.
-    normals: unit, of the coating as it is seen, in the design's frame, towards the camera's
-        side; NaN where the camera sees none. contact_mask: where an indenter is seen. depth: mm
-        that the coating is pushed in along the inward normal, 0 outside contacts. settings:
-        what was asked and what was reached, ready for JSON. unit_layers: each group's layer for
-        lights of 1 mW in every channel, from which others follow (see ``relight``). chain: of the
-        camera, from radiance to the picture. indenters: what pressed in, by a name to show, in the
-        design's frame (mm). pressed: forces, pressures and displacements of an elastic skin with
-        contacts. markers: where the design's markers are seen, if it has any.
+    Attributes:
+        layers: by light group, (h, w, 3) linear radiance (mW/(mm^2 sr)) with the group's colour and
+            flux; the layers add up to the radiance.
+        normals: (h, w, 3) unit normals of the coating in the design's frame, towards the camera's
+            side; NaN where the camera sees no coating.
+        contact_mask: (h, w) mask of the pixels that see an indenter.
+        points: (h, w, 3) points (mm) of the coating in the design's frame.
+        settings: the requested settings and the values reached, ready for JSON.
+        interrupted: whether Ctrl-C ended the tracing early.
+        unit_layers: by light group, the layer for lights of 1 mW in every channel, from which other
+            layers follow (see ``relight``).
+        chain: the picture chain of the camera, from radiance to the picture.
+        indenters: the meshes (mm) that press in, in the design's frame, by a display name.
+        pressed: forces, pressures and displacements of an elastic skin with contacts.
+        markers: positions of the design's markers in the picture, if it has any.
     """
 
     layers: dict[str, NDArray[np.float32]]
@@ -71,11 +76,11 @@ class TactileImage:
     markers: MarkerPlaces | None = None
 
     def relight(self, flux: Mapping[str, ArrayLike]) -> TactileImage:
-        """The same image under lights of other colours and powers; exact, with no new rendering.
+        """Return the same image under lights of other colours and powers; exact, without rendering.
 
         Args:
-            flux: (3,) mW of R, G, B of each light, by light group; a group that is not named
-                keeps its light. ``LightGroup.channel_flux()`` gives a design's own.
+            flux: by light group, the power (3,), mW, of each light in R, G, B; a group that is not
+                named keeps its light. ``LightGroup.channel_flux()`` returns the values of a design.
 
         Raises:
             RenderError: there is no such light group.
@@ -94,7 +99,7 @@ class TactileImage:
 
     @property
     def radiance(self) -> NDArray[np.float32]:
-        """(h, w, 3) linear radiance, the sum of all layers."""
+        """The linear radiance (h, w, 3), mW/(mm^2 sr), the sum of all layers."""
         total = np.zeros_like(self.normals, dtype=np.float32)
         for layer in self.layers.values():
             total += layer
@@ -103,11 +108,11 @@ class TactileImage:
     def picture(
         self, exposure: float | str = "auto", noise_seed: NoiseSeed | None = None
     ) -> NDArray[np.uint8]:
-        """(h, w, 3) uint8: exposed, and stored as the camera does.
+        """Return the picture (h, w, 3) uint8 that the camera stores.
 
         Args:
             exposure: the factor on the radiance, or "auto".
-            noise_seed: of the noise, where the camera has some; that of the image if None.
+            noise_seed: seed of the camera's noise, if it has some; the image's own if None.
         """
         own = int(self.settings.get("seed", 0))
         return picture(
@@ -115,18 +120,18 @@ class TactileImage:
         )
 
     def without_noise(self) -> TactileImage:
-        """The same image by a camera without noise, as the mean of many pictures has none."""
+        """Return the same image for a camera without noise, like the mean of many pictures."""
         return replace(self, chain=self.chain.without_noise())
 
     def auto_exposure(self) -> float:
-        """The factor that makes a good picture of the radiance."""
+        """Return the exposure factor that the camera's chain selects for the radiance."""
         return self.chain.auto_exposure(self.radiance)
 
     def skin_maps(self) -> SkinMaps | None:
         """Pressure (MPa), penetration (mm) and displacement (mm) of the skin behind each pixel.
 
-        They are NaN where the camera sees no skin. None without contacts, and of a conforming
-        skin, of which no forces are known.
+        They are NaN where the camera sees no skin. The result is None without contacts and for a
+        conforming skin, whose forces are not known.
         """
         return None if self.pressed is None else self.pressed.maps(self.points, self.normals)
 
@@ -140,20 +145,21 @@ class TactileImage:
         """Write the linear radiance as an EXR file.
 
         Raises:
-            OSError: it can't be written.
+            OSError: the file cannot be written.
         """
         _bitmap(self.radiance, path)
 
     def save(self, folder: str | Path, exposure: float | str = "auto") -> None:
-        """Write image.png, radiance.exr, normals.npy, contact_mask.npy, `layers/*.exr`, run.json,
-        pressure.npy of an elastic skin with contacts, and markers.csv where the design has markers.
+        """Write the image to a folder.
 
-        They are written under temporary names and appear when all are whole. What an earlier
-        image left in the folder goes: its pressure, markers, layers of groups that this image does
-        not have, and the page (report.html) that was written about it. Other files stay.
+        The files are image.png, radiance.exr, normals.npy, contact_mask.npy, `layers/*.exr`,
+        run.json, pressure.npy for an elastic skin with contacts, and markers.csv for a design with
+        markers. They are written under temporary names and renamed when all are complete. The files
+        of an earlier image that this one lacks are removed: its pressure, markers, layers of other
+        groups, and its page (report.html). Other files stay.
 
         Raises:
-            OutputError: a file can't be written, for instance because the disk is full.
+            OutputError: a file cannot be written, for instance because the disk is full.
         """
         out = Path(folder)
         self.settings["exposure"] = self.auto_exposure() if exposure == "auto" else float(exposure)
@@ -183,7 +189,7 @@ class TactileImage:
 
 
 def _marker_table(markers: MarkerPlaces) -> str:
-    """The places of markers as CSV: a heading, and a row for each."""
+    """Return the positions of markers as CSV: a header, and a row for each marker."""
     values = np.hstack([markers.coordinates, markers.before, markers.after, markers.displacement])
     lines = [MARKER_COLUMNS]
     lines += [",".join("" if np.isnan(v) else f"{v:.5g}" for v in row) for row in values]
@@ -191,7 +197,9 @@ def _marker_table(markers: MarkerPlaces) -> str:
 
 
 def _layers_before(folder: Path) -> set[str]:
-    """The layers that an earlier image wrote into a folder, by its run.json."""
+    """Return the names of the layers that an earlier image wrote into a folder, from its
+    run.json.
+    """
     try:
         names = read_json(folder / "run.json", OutputError)["layers"]
         return {name for name in names if re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9_-]*", name)}
@@ -200,7 +208,9 @@ def _layers_before(folder: Path) -> set[str]:
 
 
 def _scaled(layer: NDArray[np.float32], factors: NDArray[np.float32]) -> NDArray[np.float32]:
-    """A layer (h, w, 3) times (3,) factors; by rows, several times sooner than by pixels."""
+    """Return a layer (h, w, 3) times factors (3,); multiplying rows is several times faster than
+    pixels.
+    """
     height, width = layer.shape[:2]
     row = np.tile(np.broadcast_to(factors, 3), width)
     return (layer.reshape(height, -1) * row).reshape(layer.shape)
@@ -213,9 +223,9 @@ def _bitmap(values: NDArray[Any], path: Path) -> None:
     try:
         bitmap.write(str(path))
     except RuntimeError as error:
-        full = os.strerror(errno.ENOSPC) in str(error)  # it has words only, and no number
+        full = os.strerror(errno.ENOSPC) in str(error)  # the error has a text only, and no number
         number = errno.ENOSPC if full else errno.EIO
         said = os.strerror(number) if full else str(error)
         raise OSError(number, said, str(path)) from error
-    if path.stat().st_size == 0:  # it says nothing when the disk is full
+    if path.stat().st_size == 0:  # no error is raised when the disk is full
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(path))
