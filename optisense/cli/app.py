@@ -47,9 +47,10 @@ def _options(
 
 
 NEW_OBJECTS = 50_000
-"""Python looks for garbage after so many new objects (700 by default). Modules make hundreds of
-thousands, nearly all of which stay, and looking at them again and again takes a thirtieth of a
-render."""
+"""Number of new objects after which Python collects garbage (700 by default). Modules make hundreds
+of thousands, nearly all of which stay, and examining them again and again takes a thirtieth of a
+render.
+"""
 
 
 def main() -> None:

@@ -1,4 +1,4 @@
-"""``optisense apply``: a trial of a study as an ordinary design."""
+"""``optisense apply``: write a trial of a study as an ordinary design."""
 
 from __future__ import annotations
 

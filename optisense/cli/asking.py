@@ -1,4 +1,4 @@
-"""Questions at a terminal: each has an answer that Enter takes, and is asked until it is fit."""
+"""Questions at a terminal: each has a default answer, and is repeated until the answer is valid."""
 
 from __future__ import annotations
 
@@ -16,15 +16,16 @@ _NONE = ("", "-", "none")
 
 
 def ask(question: str, read: Callable[[str], T], default: str | None = None) -> T:
-    """Ask until `read` takes the answer.
+    """Ask a question until `read` accepts the answer.
 
     Args:
-        question: what is asked, without a mark at its end.
-        read: the answer's meaning; raises ValueError, or an OptiSenseError, with what is wrong.
-        default: taken by Enter; None insists on an answer.
+        question: text of the question, without a mark at its end.
+        read: function that converts the answer; it raises a ValueError, or an OptiSenseError, for
+            an invalid one.
+        default: answer for Enter; None requires an answer.
 
     Raises:
-        KeyboardInterrupt: the user has had enough.
+        KeyboardInterrupt: the user has pressed Ctrl-C.
     """
     while True:
         try:
@@ -41,7 +42,7 @@ def ask(question: str, read: Callable[[str], T], default: str | None = None) -> 
 
 
 def ask_word(question: str, words: Iterable[str], default: str) -> str:
-    """One of some words; the beginning of one is enough where it is the only one."""
+    """Ask for one of several words; the beginning of a word suffices if it is unique."""
     known = list(words)
 
     def read(answer: str) -> str:
@@ -56,7 +57,7 @@ def ask_word(question: str, words: Iterable[str], default: str) -> str:
 
 
 def ask_name(question: str, default: str, taken: Iterable[str] = ()) -> str:
-    """A name for something in the design; empty or '-' for none."""
+    """Ask for the name of an object of the design; empty or '-' means none."""
     import re
 
     used = set(taken)
@@ -74,14 +75,14 @@ def ask_name(question: str, default: str, taken: Iterable[str] = ()) -> str:
 
 
 def ask_number(question: str, default: float, least: float = float("-inf")) -> float:
-    """A number."""
+    """Ask for a number."""
     return ask(question, lambda answer: _number(answer, least), f"{default:g}")
 
 
 def ask_number_or_none(
     question: str, least: float = float("-inf"), whole: bool = False
 ) -> float | None:
-    """A number, or None for an empty answer or '-'."""
+    """Ask for a number; None for an empty answer or '-'."""
 
     def read(answer: str) -> float | None:
         if answer.lower() in _NONE:
@@ -95,7 +96,7 @@ def ask_number_or_none(
 
 
 def ask_count(question: str, default: int) -> int:
-    """A whole number from 1."""
+    """Ask for a whole number from 1."""
 
     def read(answer: str) -> int:
         if not answer.isdecimal() or int(answer) < 1:
@@ -106,15 +107,15 @@ def ask_count(question: str, default: int) -> int:
 
 
 def ask_yes(question: str, default: bool) -> bool:
-    """Yes or no."""
+    """Ask for yes or no."""
     return ask_word(f"{question} (yes, no)", ("yes", "no"), "yes" if default else "no") == "yes"
 
 
 def three_numbers(answer: str) -> tuple[float, float, float]:
-    """x,y,z.
+    """Parse "x,y,z".
 
     Raises:
-        ValueError: it is something else.
+        ValueError: the text has another form.
     """
     words = answer.replace(",", " ").split()
     if len(words) != 3:

@@ -255,7 +255,7 @@ def _moves(texts: list[str], option: str) -> list[tuple[str, tuple[float, float,
 
 
 def _shape(design: SensorDesign, name: str) -> str:
-    """One line on where a cage's points are."""
+    """Return one line on the positions of a cage's points."""
     import numpy as np
 
     from optisense.design.cage_edit import offsets_at_rest
@@ -292,7 +292,7 @@ def _show_points(design: SensorDesign, name: str) -> None:
             cells += [_numbers(ends[0][row]), _numbers(ends[1][row])]
         rows.append(cells)
     widths = [max(len(cells[k]) for cells in rows) for k in range(len(rows[0]))]
-    for cells in rows:  # not a table of rich's, which would break lines in a narrow terminal
+    for cells in rows:  # rich's tables would break lines in a narrow terminal
         line = "  ".join(cell.ljust(width) for cell, width in zip(cells, widths, strict=True))
         output.print(line.rstrip(), markup=False)
 
@@ -303,7 +303,9 @@ def _numbers(values: object) -> str:
 
 
 def _check_ends(design: SensorDesign, name: str) -> None:
-    """Say what is wrong with either end of a range; a search may still find good shapes within."""
+    """Print the problems of both ends of a range; a search may still find good shapes in
+    between.
+    """
     from optisense.design import set_value
     from optisense.design.cage_checks import cage_problems
 

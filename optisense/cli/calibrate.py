@@ -1,4 +1,4 @@
-"""``optisense calibrate``: a design that is fitted to photographs of the real sensor."""
+"""``optisense calibrate``: fit a design to photographs of the real sensor."""
 
 from __future__ import annotations
 
@@ -104,7 +104,9 @@ def calibrate(
 
 
 def print_calibration(found: Calibration) -> None:
-    """What was fitted, and how far the design is from the photographs before and after."""
+    """Print the fitted numbers, and the distance of the design from the photographs before and
+    after.
+    """
     table = table_of("fitted", "before", "after", "±", "")
     for each in found.numbers:
         table.add_row(

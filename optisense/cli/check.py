@@ -1,4 +1,4 @@
-"""``optisense check``: is a design in order, and what is in it?"""
+"""``optisense check``: check a design, and print its contents."""
 
 from __future__ import annotations
 
@@ -14,7 +14,9 @@ if TYPE_CHECKING:
     from optisense.design import SensorDesign
 
 MOST_TOLD = 40
-"""Lines about what is odd in a design; the rest is counted, so that the end stays in sight."""
+"""Largest number of lines about problems of a design; the others are counted, so that the end stays
+in sight.
+"""
 
 
 @ends_well
@@ -61,7 +63,7 @@ def _tell_views(design: SensorDesign) -> None:
 
 
 def _describe(design: SensorDesign) -> None:
-    """Print what the design is made of, and how much of it the camera sees."""
+    """Print the contents of the design, and the share of the skin that the camera sees."""
     from optisense.design.camera_checks import view_shares
     from optisense.design.parts import Role
     from optisense.mechanics import elasticity_in_words, is_attached

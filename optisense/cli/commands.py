@@ -1,5 +1,5 @@
-"""The commands by name. A command's module is imported when the command is asked for: none waits
-for what the others need.
+"""Commands by name. The module of a command is imported when the command is called, so that no
+command waits for the imports of others.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ _HOMES = {
 
 
 class _Commands(MutableMapping[str, Any]):
-    """Commands as Typer's groups hold them, made on first use."""
+    """Mapping of commands for Typer's groups, made on first use."""
 
     def __init__(self) -> None:
         self._made: dict[str, Any] = {}
@@ -62,7 +62,7 @@ class _Commands(MutableMapping[str, Any]):
 
 
 class Commands(TyperGroup):
-    """The group of all commands of ``optisense``."""
+    """Group of all commands of ``optisense``."""
 
     def __init__(self, **settings: Any) -> None:
         super().__init__(**settings)

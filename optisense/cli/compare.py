@@ -1,4 +1,4 @@
-"""``optisense compare``: a design beside photographs of the real sensor."""
+"""``optisense compare``: compare a design with photographs of the real sensor."""
 
 from __future__ import annotations
 
@@ -90,7 +90,9 @@ def compare(
 
 
 def reading_lines(found: Realism) -> list[str]:
-    """What readers read that were calibrated on the other's pictures, in words."""
+    """Return sentences on readers that were calibrated on pictures of the model or of the real
+    sensor, and read the other's.
+    """
     if not found.readings:
         return []
     return [
@@ -104,7 +106,7 @@ def reading_lines(found: Realism) -> list[str]:
 
 
 def print_comparison(found: Comparison) -> None:
-    """A table of the presses, and one of the background."""
+    """Print a table of the presses, and one of the background."""
     table = table_of("press", "unexplained", "contact", "ring", "far field", "similarity")
     for press in found.realism.presses:
         table.add_row(

@@ -36,9 +36,10 @@ EXIT_INTERRUPTED = 130
 
 
 class PlainConsole(Console):
-    """A console that shows control characters in text, which may be a stranger's, and obeys none.
+    """Console that prints control characters in text, which may come from a stranger, as visible
+    symbols.
 
-    Colours and bars are made of control segments and styles, which stay.
+    Colours and bars consist of control segments and styles, which are kept.
     """
 
     def render(
@@ -63,18 +64,18 @@ _ending: ContextVar[ExitStack] = ContextVar("ending")
 
 
 def set_debug(debug: bool) -> None:
-    """Show tracebacks of unexpected errors from here on, or don't."""
+    """Set whether tracebacks of unexpected errors are shown from here on."""
     global _debug
     _debug = debug
 
 
 def at_end(call: Callable[[], object]) -> None:
-    """Call something when the command that runs ends, however it ends."""
+    """Register a function that is called when the running command ends, however it ends."""
     _ending.get().callback(call)
 
 
 def table_of(*heads: str, texts: int = 1) -> Table:
-    """A table without lines whose first columns hold texts and whose others hold numbers."""
+    """Return a table without lines; its first columns hold texts and the others numbers."""
     from rich.table import Table
 
     table = Table(box=None, pad_edge=False)
@@ -84,7 +85,7 @@ def table_of(*heads: str, texts: int = 1) -> Table:
 
 
 def say_error(message: str, *, where: str | None = None, hint: str | None = None) -> None:
-    """Print an error: what is wrong, where, and what to do."""
+    """Print an error: the problem, its place, and the remedy."""
     messages.print("error:", style="bold red", end=" ")
     messages.print(message, markup=False)
     if where:
@@ -94,9 +95,9 @@ def say_error(message: str, *, where: str | None = None, hint: str | None = None
 
 
 def ends_well(command: Callable[_P, _R]) -> Callable[..., _R]:
-    """Decorate a command so that no error of the user's shows a traceback.
+    """Decorate a command so that errors of the user show no traceback.
 
-    Its parameters that are models of options become options of the command line.
+    Parameters of the command that are models of options become options of the command line.
 
     Exit codes: 2 for bad input, 1 for a failure, 130 for Ctrl-C.
     """
@@ -117,7 +118,7 @@ def ends_well(command: Callable[_P, _R]) -> Callable[..., _R]:
             messages.print("interrupted")
             raise typer.Exit(EXIT_INTERRUPTED) from None
         except BrokenPipeError:
-            # The reader of a pipe has gone; keep Python from complaining at exit.
+            # The reader of the pipe has closed it; keep Python from complaining at exit.
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
             raise typer.Exit(EXIT_FAILURE) from None
         except OSError as error:
@@ -131,7 +132,7 @@ def ends_well(command: Callable[_P, _R]) -> Callable[..., _R]:
         except typer.Exit:
             raise
         except Exception as error:
-            # Usage errors are told by typer itself; everything else is a defect.
+            # Typer prints usage errors itself; every other error is a defect.
             if type(error).__module__.split(".")[0] in ("click", "typer"):
                 raise
             say_error(
@@ -145,7 +146,9 @@ def ends_well(command: Callable[_P, _R]) -> Callable[..., _R]:
 
 
 def output_error(error: OSError) -> OutputError:
-    """What an error of the operating system means to the user."""
+    """Return an error of the operating system as an error with a message and a hint for the
+    user.
+    """
     where = str(error.filename) if error.filename else None
     if error.errno in (errno.ENOSPC, errno.EDQUOT):
         return OutputError("the disk is full", where=where, hint="Free some space and try again")

@@ -1,4 +1,4 @@
-"""``optisense contacts``: the contacts in photographs, to correct them."""
+"""``optisense contacts``: find the contacts in photographs, to correct them."""
 
 from __future__ import annotations
 

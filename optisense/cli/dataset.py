@@ -1,4 +1,4 @@
-"""``optisense dataset``: labelled pictures of random contacts."""
+"""``optisense dataset``: make labelled pictures of random contacts."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ SAMPLES, WRITING = "samples", "writing Parquet files"
 """Steps of the progress."""
 
 SAMPLE_WORK = 0.5
-"""Processor seconds that a sample of `USUAL_PIXELS` usually takes, its files included."""
+"""Processor time of a sample of `USUAL_PIXELS`, files included, s; measured on GelSight Mini."""
 
 
 @ends_well
@@ -114,10 +114,10 @@ def dataset(
 
 
 def _say_what_came(made: Dataset, count: int) -> None:
-    """Tell how many samples there are, and why others are not.
+    """Print the number of samples, and why others failed.
 
     Raises:
-        typer.Exit: there is none.
+        typer.Exit: there is no sample.
     """
     reasons = Counter(row["reason"] for row in made.failures if int(row["index"]) < count)
     output.print(f"dataset: {made.folder}, {len(made)} samples", markup=False)

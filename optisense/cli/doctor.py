@@ -1,4 +1,4 @@
-"""``optisense doctor``: is everything here that rendering needs?"""
+"""``optisense doctor``: check that this machine has all that rendering needs."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ def doctor() -> None:
 
 
 def examine() -> Iterator[Finding]:
-    """The findings, one by one, so that slow ones don't hold back the others."""
+    """Yield the findings one by one, so that slow ones don't hold back the others."""
     checks: tuple[Callable[[], Finding], ...] = (
         _package,
         _python,

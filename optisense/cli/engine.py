@@ -1,4 +1,4 @@
-"""``optisense engine``: the process that front ends talk to."""
+"""``optisense engine``: run the process that front ends talk to."""
 
 from __future__ import annotations
 

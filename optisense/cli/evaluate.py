@@ -1,4 +1,4 @@
-"""``optisense evaluate``: how good a sensor is, by one objective or several."""
+"""``optisense evaluate``: score a sensor by one objective or several."""
 
 from __future__ import annotations
 
@@ -140,7 +140,7 @@ def _score(
 
 
 def _write(scored: Scored, folder: Path, objectives: list[Objective]) -> None:
-    """The JSON file, and the page if there are objectives to explain in it."""
+    """Write the JSON file, and the page if there are objectives to explain in it."""
     from optisense.report.scores import write_score_report
 
     text = json.dumps(scored.to_dict(), indent=2, allow_nan=False) + "\n"
@@ -175,12 +175,13 @@ SCORING = "scoring"
 
 
 USUAL_SCORING = 3.0
-"""Processor seconds that scoring with one seed takes, light apart, before the sensor and the
-objectives are known."""
+"""Processor time of scoring with one seed, without its light, s; the estimate before the sensor and
+the objectives are known.
+"""
 
 
 def _steps(seeds: int, photons: int) -> list[TimedStep]:
-    """The steps, with their usual times; a piece of scoring usually takes one second."""
+    """Return the steps, with their usual durations; a piece of scoring takes one second."""
     times = UsualTimes.here()
     each = USUAL_SCORING * times.pace + times.tracing(photons)
     return [
@@ -190,15 +191,15 @@ def _steps(seeds: int, photons: int) -> list[TimedStep]:
 
 
 class _Told:
-    """Shows how far the scoring with one seed is: images, which objectives share, and objectives.
+    """Progress of scoring with one seed: images, which objectives share, and objectives.
 
-    Each part of the work counts as many pieces as it usually takes seconds.
+    Each part of the work counts as many pieces as the seconds that it usually takes.
     """
 
     def __init__(
         self, line: ProgressLine, number: int, seeds: int, objectives: int, usual: UsualScore
     ) -> None:
-        """Seed ``number`` (from 0) of ``seeds``, for so many objectives."""
+        """Show seed ``number`` (from 0) of ``seeds``, for ``objectives`` objectives."""
         self._line = line
         self._number, self._seeds, self._objectives = number, seeds, objectives
         self._usual = usual
@@ -208,23 +209,23 @@ class _Told:
         self._title = ""
 
     def begin(self, title: str) -> None:
-        """An objective begins."""
+        """Begin an objective."""
         self._title = title
         self._show(title)
 
     def end(self) -> None:
-        """It has its score."""
+        """Mark the objective as finished."""
         self._finished += 1
         self._show(self._title)
 
     def images(self, fraction: float, text: str) -> None:
-        """So much of the images is rendered."""
+        """Show that a fraction (0 to 1) of the images is rendered."""
         self._images = max(self._images, fraction)
         self._show(f"{self._title}: {text}")
 
     def _show(self, text: str) -> None:
         usual, scored = self._usual, self._finished / self._objectives
-        # An objective without images may come first; then its share of the rest is done.
+        # If an objective without images comes first, its share of the rest counts as done.
         rendered = max(self._images, scored if scored == 1.0 else 0.0)
         judging = usual.judging + (usual.libraries if self._number == 0 else 0.0)
         done = usual.done(rendered, first=self._number == 0) + scored * judging

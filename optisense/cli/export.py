@@ -1,4 +1,4 @@
-"""``optisense export``: shapes to make, where the LEDs go, and what to buy."""
+"""``optisense export``: write the shapes to make, the places of the LEDs, and the parts to buy."""
 
 from __future__ import annotations
 

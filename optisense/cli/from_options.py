@@ -16,7 +16,9 @@ from optisense.commands.options import CommandOptions, Written
 
 
 def with_options(command: Callable[..., Any]) -> Callable[..., Any]:
-    """A command whose parameters of a type `CommandOptions` are options for each of its fields."""
+    """Return a command whose parameters of a type `CommandOptions` are replaced by an option for
+    each field.
+    """
     hints = get_type_hints(command, include_extras=True)
     models = {
         name: kind
@@ -45,13 +47,13 @@ def with_options(command: Callable[..., Any]) -> Callable[..., Any]:
 
 
 def _fields(model: type[CommandOptions]) -> list[tuple[str, FieldInfo]]:
-    """The fields of a model by name, its own before those of the models that it builds on."""
+    """Return the fields of a model by name, its own before those of its base models."""
     names = dict.fromkeys(name for kind in model.__mro__ for name in inspect.get_annotations(kind))
     return [(name, model.model_fields[name]) for name in names if name in model.model_fields]
 
 
 def _parameter(name: str, field: FieldInfo) -> inspect.Parameter:
-    """The parameter from which Typer makes the option of a field."""
+    """Return the parameter from which Typer makes the option of a field."""
     kind, notes = _plain(field.annotation)
     notes += field.metadata
     written = _written(notes)
@@ -85,7 +87,7 @@ def _parameter(name: str, field: FieldInfo) -> inspect.Parameter:
 
 
 def _plain(annotation: Any) -> tuple[Any, list[Any]]:
-    """The type of a field without None, and what is noted beside it."""
+    """Return the type of a field without None, and the annotations beside it."""
     if get_origin(annotation) in (Union, UnionType):
         annotation = next(each for each in get_args(annotation) if each is not type(None))
     if get_origin(annotation) is Annotated:
@@ -103,10 +105,10 @@ def _flags(name: str, written: Written) -> tuple[str, ...]:
 
 
 def options_of(model: type[CommandOptions], values: dict[str, Any]) -> CommandOptions:
-    """The options as given; those that were left out keep the model's defaults.
+    """Return the options as given; omitted ones keep the model's defaults.
 
     Raises:
-        typer.BadParameter: one makes no sense.
+        typer.BadParameter: an option is invalid.
     """
     try:
         return model.model_validate({k: v for k, v in values.items() if v is not None and v != []})

@@ -1,4 +1,4 @@
-"""Ctrl-C during a render: stop at the next safe point, so that what is finished can be written."""
+"""Ctrl-C during a render: stop at the next safe point, so that finished work can be written."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from optisense.cli import stopping
 
 
 class Interrupt:
-    """Whether Ctrl-C was pressed."""
+    """Record of whether Ctrl-C was pressed."""
 
     def __init__(self) -> None:
         self.requested = False
@@ -34,7 +34,7 @@ def held_interrupt() -> Iterator[Interrupt]:
     """Hold the first Ctrl-C back until a safe point; the second one acts at once.
 
     Nothing changes outside the main thread, where signals can't be handled, and where Ctrl-C is
-    ignored, as shells arrange it for programs that they start in the background.
+    ignored, as shells arrange it for programs in the background.
     """
     interrupt = Interrupt()
     in_main_thread = threading.current_thread() is threading.main_thread()

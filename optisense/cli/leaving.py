@@ -1,4 +1,4 @@
-"""The end of the process."""
+"""End of the process."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ from optisense.cli import stopping
 def run_and_leave(command: Callable[[], object]) -> NoReturn:
     """Run a command that ends by SystemExit, and end the process with its exit code.
 
-    The process ends as soon as its threads have ended and its files and streams are closed. To take
-    modules down piece by piece, as Python does, takes a third of a second where the renderer is
-    loaded, and an interrupt that was handled long ago can change the exit code there.
+    The process ends as soon as its threads have ended and its files and streams are closed.
+    Python's normal shutdown, which destroys modules one by one, takes a third of a second after the
+    renderer was loaded, and an interrupt that was handled long ago can change the exit code there.
     """
     code = 0
     try:

@@ -1,4 +1,4 @@
-"""``optisense ledger``: where the light of each group goes."""
+"""``optisense ledger``: print where the light of each group goes."""
 
 from __future__ import annotations
 
@@ -23,10 +23,12 @@ if TYPE_CHECKING:
 JSON_FILE, PAGE_FILE = "ledger.json", "ledger.html"
 
 LEAST_SHOWN = 5e-5
-"""Share of a group's light below which the table says nothing: less than 0.01 %."""
+"""Smallest share of a group's light that the table shows: smaller ones round to 0.00 %."""
 
 LEAST_EXIT = 0.005
-"""Share of a group's light below which a face through which it escapes is not listed."""
+"""Smallest share of a group's light for which a face through which it escapes is listed, half a per
+cent.
+"""
 
 
 @ends_well
@@ -101,7 +103,7 @@ def _print(found: LightLedger, seen: CameraLight) -> None:
             table.add_row(where, *(f"{100 * share:.2f}" for share in shares))
     table.add_row("sum", *(f"{100 * found.closing_sum(group):.2f}" for group in groups))
     table.add_row("emitted (mW)", *(f"{found.emitted[group]:.4g}" for group in groups))
-    # Light at the lens is no part of the sum: most of it goes on and is counted where it ends.
+    # Light at the lens is not part of the sum: most of it goes on and is counted where it ends.
     for title, values in seen.as_text().items():
         table.add_row(title, *(values[group] for group in groups))
     output.print(table)

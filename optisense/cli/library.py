@@ -1,4 +1,6 @@
-"""``optisense library``: the materials, lights and cameras that designs can name."""
+"""``optisense library``: show and extend the materials, lights and cameras that designs can
+name.
+"""
 
 from __future__ import annotations
 
@@ -16,8 +18,9 @@ if TYPE_CHECKING:
 
 KINDS = ("material", "coating", "light", "camera")
 PIPED_WIDTH = 240
-"""Characters in a line of a table that is piped to another program. No cell of the library's tables
-is wrapped at this width, so that every entry stays on one line."""
+"""Characters per line of a table that is piped to another program. No cell of the library's tables
+is wrapped at this width, so that every entry stays on one line.
+"""
 
 KindOption = Annotated[
     str | None,
@@ -232,7 +235,7 @@ def _refuse(given: dict[str, Any], why: str) -> None:
     """Refuse options that were given.
 
     Raises:
-        typer.BadParameter: one was.
+        typer.BadParameter: an option was given.
     """
     for option, value in given.items():
         if value is not None:
@@ -248,7 +251,7 @@ def _say_added(added: Added) -> None:
 
 
 def _print_table(table: Table) -> None:
-    """Print a table, each row on a line of its own where a program reads along."""
+    """Print a table; if a program reads the output, each row is on one line."""
 
     if output.is_terminal:
         output.print(table, soft_wrap=False)
@@ -257,7 +260,7 @@ def _print_table(table: Table) -> None:
 
 
 def _describe(title: str, entry: AnyEntry, own: bool) -> None:
-    """Print what an entry says, and where each number is from."""
+    """Print an entry, and the source of each number."""
     from optisense.library.facts import consequences, facts
 
     output.print(title + (" (yours)" if own else ""), style="bold", markup=False)

@@ -1,4 +1,4 @@
-"""Adding a light from an IES file by command: what the file does not tell is asked for."""
+"""Addition of a light from an IES file; data that the file lacks are asked for."""
 
 from __future__ import annotations
 
@@ -29,12 +29,12 @@ def add_ies_file(
     source: str | None,
     status: str,
 ) -> Added:
-    """Store a light from an IES file; colour and flux are asked for at a terminal.
+    """Store a light from an IES file; its colour and flux are asked for at a terminal.
 
     Raises:
-        LibraryError: the file is damaged, or the name taken.
+        LibraryError: the file is damaged, or the name is taken.
         OutputError: the user's folder can't be written.
-        typer.BadParameter: an option can't be read, or is missing where nobody can be asked.
+        typer.BadParameter: an option can't be read, or is missing while there is no terminal.
     """
     from datetime import date
 
@@ -79,7 +79,7 @@ def add_ies_file(
 
 
 def _lengths(text: str | None, count: int, option: str) -> tuple[float, ...] | None:
-    """Lengths in mm such as 2.8x3.5x1.9."""
+    """Parse lengths in mm such as 2.8x3.5x1.9."""
     if text is None:
         return None
     try:

@@ -1,4 +1,4 @@
-"""Adding a camera from a tuning file by command."""
+"""Addition of a camera from a tuning file."""
 
 from __future__ import annotations
 
@@ -20,20 +20,20 @@ def add_tuning_file(
     name: str | None,
     description: str | None,
 ) -> Added:
-    """Store a camera from libcamera's tuning file of it.
+    """Store a camera from libcamera's tuning file.
 
     Args:
-        what: the command's argument: the word camera.
-        tuning: the file.
+        what: argument of the command: the word camera.
+        tuning: tuning file.
         like: camera of the library whose view it has.
-        temperature: K; the usual one if None.
-        name: what designs call it; the file's name if None.
-        description: in a line.
+        temperature: colour temperature, K; the default if None.
+        name: name for designs; the file's name if None.
+        description: description in one line.
 
     Raises:
         LibraryError: the file is no tuning file, there is no such camera, or the name is taken.
         OutputError: the user's folder can't be written.
-        typer.BadParameter: an option is missing or makes no sense.
+        typer.BadParameter: an option is missing or invalid.
     """
     from optisense import library
     from optisense.library.tuning import DAYLIGHT

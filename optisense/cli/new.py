@@ -1,4 +1,4 @@
-"""``optisense new``: a design folder of one's own, from a built-in sensor or from CAD files."""
+"""``optisense new``: make a design folder from a built-in sensor or from CAD files."""
 
 from __future__ import annotations
 
@@ -166,12 +166,12 @@ def _at_terminal() -> bool:
 
 
 def _units(text: str | None) -> Units | None:
-    """Checked before; the type says so."""
+    """Cast a text that was checked before to its type."""
     return cast("Units | None", text)
 
 
 def _take_folder(folder: Path, overwrite: bool) -> bool:
-    """Take the folder for this command; returns whether it is empty."""
+    """Take the lock of the folder for this command, and return whether it is empty."""
     take_folder(folder)
     if is_empty(folder):
         return True
@@ -192,7 +192,7 @@ def _take_folder(folder: Path, overwrite: bool) -> bool:
 
 
 def _say_guesses(recipe: Recipe, guessed: bool) -> None:
-    """What was guessed without asking, to be looked over."""
+    """Print the guesses that were made without a question."""
     if not guessed:
         return
     for name, part in recipe.parts.items():

@@ -1,6 +1,7 @@
-"""The questions of ``optisense new --from-meshes``: what each CAD file is, lights and camera.
+"""Questions of ``optisense new --from-meshes`` on the use of each CAD file, the lights and the
+camera.
 
-Imported only when they are asked, so that other commands start fast.
+This module is imported only when the questions are asked, so that other commands start fast.
 """
 
 from __future__ import annotations
@@ -55,15 +56,15 @@ USES = {
 
 
 def ask_recipe(source: Path, units: Units | None) -> Recipe:
-    """Ask for all that a recipe says, with what is guessed from the files as answers.
+    """Ask for all fields of a recipe, with guesses from the files as defaults.
 
     Args:
-        source: a CAD file, or a folder of them.
-        units: of the files that don't know theirs; None asks.
+        source: CAD file, or folder of CAD files.
+        units: unit of the files that do not state theirs; None asks.
 
     Raises:
         SetupError, MeshError: the files can't be read.
-        KeyboardInterrupt: the user has had enough.
+        KeyboardInterrupt: the user has pressed Ctrl-C.
     """
     found = guessing.find_bodies(source)
     folder = source if source.is_dir() else source.parent
@@ -95,7 +96,7 @@ def ask_recipe(source: Path, units: Units | None) -> Recipe:
 
 
 def say(text: str) -> None:
-    """Tell something between questions."""
+    """Print a text between questions."""
     messages.print(text, markup=False)
 
 
@@ -148,7 +149,7 @@ def _ask_materials(found: list[CadBody], uses: dict[str, Use]) -> Parts:
 
 
 def _ask_skin(parts: Parts, meshes: Meshes, gel: str, outward: str) -> tuple[Parts, str]:
-    """Which faces of which part are coated."""
+    """Ask which faces of which part are coated."""
     say("\nThe sensing surface is the coated side of the gel.")
     carrier = ask_word("Coated faces belong to", parts, gel)
     mesh = meshes[carrier].welded()

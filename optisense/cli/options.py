@@ -1,4 +1,4 @@
-"""Options that several commands share, and how their values are read."""
+"""Options that several commands share, and their parsers."""
 
 from __future__ import annotations
 
@@ -32,10 +32,10 @@ ContactOption = Annotated[
 
 
 def parse_variant(text: str) -> str:
-    """Read ``auto``, ``llvm`` or ``cuda``.
+    """Parse ``auto``, ``llvm`` or ``cuda``.
 
     Raises:
-        typer.BadParameter: anything else.
+        typer.BadParameter: the text is another one.
     """
     if text not in ("auto", "llvm", "cuda"):
         raise typer.BadParameter(f"'{text}' is none of auto, llvm, cuda", param_hint="--variant")
@@ -57,15 +57,17 @@ WorkersOption = Annotated[
 
 
 def out_option(text: str, metavar: str = "DIR") -> Any:
-    """``--out DIR``, of commands that may also do without; ``text`` says what goes there."""
+    """Return the option ``--out DIR`` for commands that can run without; ``text`` is its help
+    text.
+    """
     return typer.Option("--out", "-o", metavar=metavar, help=text, show_default=False)
 
 
 def parse_contacts(texts: list[str] | None) -> list[Contact]:
-    """Read the values of ``--contact``.
+    """Parse the values of ``--contact``.
 
     Raises:
-        ContactError: one of them can't be read.
+        ContactError: a value can't be read.
     """
     from optisense.geometry import parse_contact
 

@@ -1,4 +1,4 @@
-"""The folder that a command writes into."""
+"""Folder that a command writes into."""
 
 from __future__ import annotations
 
@@ -11,23 +11,21 @@ from optisense.folders import hold
 
 
 def take_folder(folder: Path) -> None:
-    """Make the folder if need be, and keep other processes from writing to it until the command
+    """Create the folder if needed, and hold its lock against other processes until the command
     ends.
 
-    Raises:
-        FolderInUseError: another process is writing to it.
-        OutputError: it can't be written, found out before the work instead of after it.
+    FolderInUseError: another process is writing to the folder.
     """
     at_end(hold(folder))
 
 
 def ensure_writable(folder: Path) -> None:
-    """Make the folder if need be, and try whether one file can be written into it.
+    """Create the folder if needed, and check that a file can be written into it.
 
     This is for pages that are written whole into folders of others, such as a study that runs.
 
     Raises:
-        OutputError: it can't, found out before the work instead of after it.
+        OutputError: it can't; the error comes before the work and not after it.
     """
     if folder.exists() and not folder.is_dir():
         raise OutputError(

@@ -1,4 +1,4 @@
-"""Progress on standard error: one live line on a terminal, a line now and then in a log."""
+"""Progress on standard error: one live line on a terminal, or a line from time to time in a log."""
 
 from __future__ import annotations
 
@@ -17,18 +17,21 @@ if TYPE_CHECKING:
     from rich.text import Text
 
 LOG_EVERY = 30.0
-"""Least seconds between lines where standard error is no terminal."""
+"""Shortest interval between lines if standard error is no terminal, s; short enough to see
+progress, and logs stay short.
+"""
 
 REFRESHES = 4
-"""Times per second that the live progress line is drawn again; more would not be seen and takes
-processor time."""
+"""Redraws of the live progress line per second; more would not be seen and take processor time."""
 
 MOST_BAR, LEAST_BAR = 30, 8
-"""Columns of the bar; it is left out where less than the least would remain."""
+"""Largest and smallest width of the bar, in columns; it is omitted if there is less room than the
+smallest.
+"""
 
 
 class ProgressLine:
-    """The progress of a command: the step at hand, the time left, and what is known so far.
+    """Progress of a command: the current step, the time left, and results so far.
 
     ``scoring trial 12/40 ━━━━━━━━━━━━╸━━━━━━━━━━━  0:42, 3:10 left  best 0.6123``
     """
@@ -39,8 +42,8 @@ class ProgressLine:
         """Start the clock.
 
         Args:
-            steps: what will be done, for the time left; none if `show` is told the time left.
-            clock: tells seconds.
+            steps: steps of the work, for the time left; empty if `show` is given the time left.
+            clock: function that returns the time, s.
         """
         self.time_left = TimeLeft(steps, clock=clock)
         self._clock = clock
@@ -59,16 +62,18 @@ class ProgressLine:
         """Begin a step of the work.
 
         Args:
-            step: its name.
+            step: name of the step.
             count, done: see `TimeLeft.begin`.
-            text: what to call it; its name if None.
+            text: text of the step; its name if None.
         """
         with self._lock:
             self.time_left.begin(step, count, done)
         self.say(text or step, done, count)
 
     def advance(self, done: float, count: float | None = None, *notes: str) -> None:
-        """So many pieces of the step are done; ``count`` of all pieces shows both numbers."""
+        """Show that ``done`` pieces of the step are finished; with ``count``, both numbers are
+        shown.
+        """
         with self._lock:
             self.time_left.advance(done)
         self.say(self._what, done, count, *notes)
@@ -76,7 +81,9 @@ class ProgressLine:
     def say(
         self, what: str, done: float | None = None, count: float | None = None, *notes: str
     ) -> None:
-        """Change the words: what is done, how many of how many, and notes, the foremost first."""
+        """Change the texts: the step, the number of finished pieces and of all, and notes, the most
+        important first.
+        """
         self._what = what
         self._count = f"{int(done or 0)}/{int(count)}" if count is not None else ""
         self._notes = notes
@@ -91,13 +98,13 @@ class ProgressLine:
         left: float,
         notes: Sequence[str] = (),
     ) -> None:
-        """Show progress that somebody else has estimated: seconds left, NaN if unknown."""
+        """Show progress with an estimate by the caller: seconds left, NaN if unknown."""
         self._left, self._shown = left, self._clock()
         self.say(what, done, count, *notes)
 
     @property
     def seconds_left(self) -> float:
-        """Until the end; NaN if that is unknown."""
+        """Time until the end, s; NaN if unknown."""
         if self._left is not None and math.isnan(self._left):
             return math.nan
         if self._left is not None:
@@ -107,7 +114,7 @@ class ProgressLine:
 
     @property
     def fraction(self) -> float:
-        """The share of the whole time that has passed; it never falls."""
+        """Share of the whole time that has passed; it never falls."""
         left, elapsed = self.seconds_left, self._clock() - self._began
         if math.isfinite(left):
             now = elapsed / max(elapsed + left, 1e-9)
@@ -115,7 +122,7 @@ class ProgressLine:
         return self._told_fraction
 
     def text(self, columns: int) -> Text:
-        """The line, in no more than so many columns."""
+        """Return the line, in at most ``columns`` columns."""
         from rich.text import Text
 
         left = self.seconds_left
@@ -144,7 +151,7 @@ class ProgressLine:
         return line
 
     def _log(self) -> None:
-        """A line in a log, if the last one is some time ago."""
+        """Print a line in a log, if the last one is `LOG_EVERY` seconds old."""
         now = self._clock()
         if now - self._logged < LOG_EVERY:
             return
@@ -159,11 +166,13 @@ class ProgressLine:
 def progress_line(
     *steps: TimedStep, waits: Callable[[ProgressLine], str] | None = None
 ) -> Iterator[ProgressLine]:
-    """A line of progress that vanishes at its end; lines now and then where there is no terminal.
+    """Show a line of progress that vanishes at its end; without a terminal, print lines from time
+    to time.
 
     Args:
-        steps: what will be done.
-        waits: what Ctrl-C waits for, if it does not act at once; see `stopping.waiting`.
+        steps: steps of the work.
+        waits: function that says what Ctrl-C waits for, if it does not act at once; see
+            `stopping.waiting`.
     """
     line = ProgressLine(steps, time.monotonic)
     with stopping.waiting(None if waits is None else lambda: waits(line)):
@@ -188,14 +197,14 @@ def progress_line(
 
 
 def duration(seconds: float) -> str:
-    """Hours, minutes and seconds as 1:02:03 or 2:03."""
+    """Format a time as 1:02:03 or 2:03."""
     minutes, rest = divmod(round(seconds), 60)
     hours, minutes = divmod(minutes, 60)
     return f"{hours}:{minutes:02}:{rest:02}" if hours else f"{minutes}:{rest:02}"
 
 
 def about(seconds: float) -> str:
-    """A time in words, to end a phrase: ", about 12 s"; nothing if it is unknown."""
+    """Return a time in words, to end a phrase: ", about 12 s"; empty if it is unknown."""
     if not math.isfinite(seconds):
         return ""
     if seconds < 100.0:

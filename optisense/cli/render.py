@@ -1,4 +1,4 @@
-"""``optisense render``: from a design and contacts to a tactile image and its report."""
+"""``optisense render``: render a tactile image of a design with contacts, and its report."""
 
 from __future__ import annotations
 
@@ -126,16 +126,16 @@ COMPARING = "comparing with a real sensor"
 FOLLOWING = "following the light of each group"
 
 NOISE_PHOTONS = 4_000_000
-"""Photons that a noise target is expected to take, before the noise is known."""
+"""Number of photons that a noise target is expected to take, before the noise is known."""
 
 WRITING_TIME = 0.8
-"""Seconds that writing the files and the report takes, measured on GelSight Mini at 320x240."""
+"""Time to write the files and the report, s; measured on GelSight Mini at 320x240."""
 
 
 def _steps(
     times: UsualTimes, options: RenderOptions, pixels: int = USUAL_PIXELS
 ) -> list[TimedStep]:
-    """The steps of a render of so many pixels, and their usual times."""
+    """Return the steps of a render with this number of pixels, and their usual durations."""
     usual = NOISE_PHOTONS if options.noise is not None else PICTURE_PHOTONS
     tracing = times.tracing(options.photons or usual)
     if options.photons is None and options.seconds is not None:
@@ -153,7 +153,7 @@ def _steps(
 
 
 def _waits(line: ProgressLine) -> str:
-    """What a first Ctrl-C waits for: the light so far is made into a picture."""
+    """Return what a first Ctrl-C waits for: a picture is made from the light so far."""
     left = line.time_left
     rest = left.seconds_left - left.seconds_left_of(TRACING)
     return f"finishing the picture{about(rest)}"
@@ -162,10 +162,10 @@ def _waits(line: ProgressLine) -> str:
 def _beside_real(
     model: OpticalModel, image: TactileImage, interrupt: Interrupt
 ) -> RealComparison | None:
-    """The comparison with the real picture of this sensor; None where Ctrl-C ended it."""
+    """Return the comparison with the real picture of this sensor, or None if Ctrl-C ended it."""
     from optisense.report.real_sensor import MOST_PHOTONS, compare_with_real
 
-    # As many photons as were asked for, so that the light that is there serves again.
+    # Use as many photons as were asked for, so that the cached light serves again.
     photons = min(image.settings["photons_asked"] or image.settings["photons"], MOST_PHOTONS)
     seed = image.settings["seed"]
     try:
@@ -177,19 +177,19 @@ def _beside_real(
 
 
 class RenderStages:
-    """Shows the stages of a render on a progress line.
+    """Display of the stages of a render on a progress line.
 
     Attributes:
-        stage: the one at hand.
+        stage: current stage.
     """
 
     def __init__(self, line: ProgressLine) -> None:
-        """``line`` has a step for each stage."""
+        """Show the stages on ``line``, which has a step for each."""
         self._line = line
         self.stage = ""
 
     def __call__(self, progress: RenderProgress) -> None:
-        """Show it."""
+        """Show a report of progress."""
         from optisense.optics.backend.stages import Stage
 
         if progress.stage is Stage.DONE:

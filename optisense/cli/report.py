@@ -1,4 +1,4 @@
-"""``optisense report``: a study as a page to look at, keep and send."""
+"""``optisense report``: write a study as an HTML page."""
 
 from __future__ import annotations
 
@@ -22,8 +22,9 @@ if TYPE_CHECKING:
 REPORT_FILE = "report.html"
 
 FEW_PICTURES, MOST_PICTURES = 6, 100
-"""Number of trials that are rendered unless something else is asked for, some 2 s each, and at
-most, with which the page has about 10 MB."""
+"""Default and largest number of trials that are rendered for the page; each takes some 2 s, and
+with the largest number the page has about 10 MB.
+"""
 
 
 @ends_well
@@ -99,8 +100,9 @@ WRITING, TRIALS = "writing the page", "rendering trials"
 
 
 def _steps(photons: int, pictures: bool, trials: int) -> list[TimedStep]:
-    """The steps, with their usual times (seconds on two cores of a desktop processor, GelSight
-    Mini)."""
+    """Return the steps, with their usual durations (s on two cores of a desktop processor, for
+    GelSight Mini).
+    """
     look = 5.0 + 2.2 * photons / 1e6 if pictures else 1.0
     return [
         TimedStep("the sensor before the search", 1, 3.0 + look),
@@ -111,7 +113,7 @@ def _steps(photons: int, pictures: bool, trials: int) -> list[TimedStep]:
 
 
 def _pictures(study: Study, count: int, line: ProgressLine) -> dict[int, NDArray[np.uint8]]:
-    """Pictures of the trials that a reader looks at first, by number."""
+    """Render the trials that a reader is most likely to look at, by number."""
     from optisense.report.trial_pictures import TrialPictures, worth_a_picture
 
     made, found = TrialPictures(study), {}
@@ -128,7 +130,7 @@ def _pictures(study: Study, count: int, line: ProgressLine) -> dict[int, NDArray
 
 
 def _looks(study: Study, photons: int, pictures: bool, line: ProgressLine) -> dict[str, Look]:
-    """Chief rays of the start and of the best trial, and pictures where they are asked for.
+    """Return chief rays of the start and of the best trial, with pictures if they are asked for.
 
     Raises:
         SetupError: the renderer can't run on this machine, and pictures are asked for.

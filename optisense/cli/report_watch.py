@@ -1,4 +1,4 @@
-"""``optisense report --watch``: the page of a study that runs, on this machine only."""
+"""``optisense report --watch``: serve the page of a running study, on this machine only."""
 
 from __future__ import annotations
 
@@ -12,20 +12,22 @@ if TYPE_CHECKING:
     from optisense.search import Study
 
 LOOK_EVERY = 1.0
-"""Seconds between looks at the study's files; trials that end within one are shown together."""
+"""Interval between checks of the study's files, s; trials that end within one are shown
+together.
+"""
 
 
 def watch(study: Path, port: int, pictures: bool) -> None:
     """Serve the page of a study until Ctrl-C.
 
     Args:
-        study: the folder, as the user names it.
-        port: 0 takes a free one.
+        study: folder of the study, as the user names it.
+        port: port of the server; 0 takes a free one.
         pictures: whether to render the trials that are clicked.
 
     Raises:
         SearchError: there is no study, or it was damaged meanwhile.
-        OutputError: the port can't be had.
+        OutputError: the port is not available.
     """
     from optisense.report.live import LiveServer
     from optisense.search import Study
@@ -48,7 +50,7 @@ def watch(study: Path, port: int, pictures: bool) -> None:
 
 
 class _Watched:
-    """A study and what is shown of it."""
+    """Study and the page that shows it."""
 
     def __init__(self, study: Study, named: str, server: object, pictures: bool) -> None:
         from optisense.report.live import LiveServer
@@ -61,7 +63,7 @@ class _Watched:
         self._looks: dict[int, Look] = {}
 
     def refresh(self) -> None:
-        """Show the study as it is, if its files have changed."""
+        """Update the page if the study's files have changed."""
         from optisense.report.study import render_study
 
         version = _version_of(self._study)
@@ -72,7 +74,9 @@ class _Watched:
         self._version = version
 
     def answer(self) -> None:
-        """Wait a little for a browser that asks for a trial's picture, and render it."""
+        """Wait up to `LOOK_EVERY` seconds for a browser that asks for a trial's picture, and render
+        it.
+        """
         from optisense.report.pictures import png
 
         asked = self._server.wait(LOOK_EVERY)
@@ -88,7 +92,7 @@ class _Watched:
             answer.set_result(None if found is None else png(found))
 
     def _sides(self) -> dict[str, Look]:
-        """Chief rays of the start and of the best trial; each design is traced once."""
+        """Return chief rays of the start and of the best trial; each design is traced once."""
         from optisense.report.before_after import look
 
         best = self._study.best
@@ -105,7 +109,7 @@ class _Watched:
 
 
 def _version_of(study: Study) -> str:
-    """Differs when something was written to the study's store."""
+    """Return a value that changes if the study's store changes."""
     from optisense.search.study.folder import STORE_FILE
 
     assert study.folder is not None

@@ -1,4 +1,4 @@
-"""The progress of samples that share one light: pictures of random contacts."""
+"""Progress of samples that share one light: pictures of random contacts."""
 
 from __future__ import annotations
 
@@ -21,10 +21,10 @@ LOADING, BUILDING = "loading", "building the scene"
 
 
 def loading_steps(libraries: float = 0.0) -> list[TimedStep]:
-    """Steps before any picture, with their usual times.
+    """Return the steps before any picture, with their usual durations.
 
     Args:
-        libraries: seconds that libraries of the command's own take to load.
+        libraries: time to load libraries that only this command needs, s.
     """
     pace = UsualTimes.here().thread_pace
     return [
@@ -43,16 +43,17 @@ def sample_steps(
     again: bool = False,
     times: UsualTimes | None = None,
 ) -> list[TimedStep]:
-    """Steps of samples: their light and the first one, the others, and what follows.
+    """Return the steps of samples: their light and the first one, the others, and the work after
+    them.
 
     Args:
-        name: of the samples, which none of another name shares.
-        photons: of their light.
-        count: of all samples.
-        work: processor seconds that a sample usually takes on GelSight Mini.
-        after: seconds that usually follow the last one.
-        again: whether the light is there already, since other samples had it.
-        times: of the sensor; those of a GelSight Mini on an idle machine if None.
+        name: name of the samples, different from that of other samples.
+        photons: photons of their light.
+        count: number of samples.
+        work: processor time of a sample on GelSight Mini, s.
+        after: time of the work after the last sample, s.
+        again: whether the light is cached already, since other samples have used it.
+        times: usual durations for the sensor; those of a GelSight Mini on an idle machine if None.
     """
     usual = times or UsualTimes.here()
     light = 0.0 if again else usual.first_light(photons) + usual.compiling()
@@ -71,14 +72,15 @@ def sensor_to_press(
     variant: str,
     steps: Callable[[UsualTimes, SensorDesign], list[TimedStep]],
 ) -> OpticalModel:
-    """The sensor of a command: loaded, the folder of the results taken, its scene built.
+    """Return the model of a command's sensor, after the design was loaded, the output folder taken
+    and the scene built.
 
     Args:
-        line: has the steps of `loading_steps`.
-        source: names the design.
-        out: the folder, if there is one.
-        variant: of the renderer.
-        steps: makes the steps that follow for usual times and the design.
+        line: progress line with the steps of `loading_steps`.
+        source: name or folder of the design.
+        out: output folder, if there is one.
+        variant: variant of the renderer.
+        steps: function that returns the later steps for usual durations and the design.
 
     Raises:
         OptiSenseError: the design can't be loaded or built, or the folder can't be taken.
@@ -98,12 +100,12 @@ def sensor_to_press(
 def expect_here(
     line: ProgressLine, design: SensorDesign, steps: Callable[[UsualTimes], list[TimedStep]]
 ) -> None:
-    """Expect the times of this sensor on this machine, now that both are known.
+    """Set the expected durations for this sensor on this machine, once both are known.
 
     Args:
-        line: shows the steps.
-        design: of the sensor.
-        steps: makes steps for usual times.
+        line: progress line of the steps.
+        design: design of the sensor.
+        steps: function that returns the steps for usual durations.
     """
     times = UsualTimes.here(design.sensing_area, len(design.lights))
     for step in steps(times):
@@ -113,13 +115,13 @@ def expect_here(
 def shown_samples(
     line: ProgressLine, model: OpticalModel, name: str, after: str
 ) -> Callable[[int, int], None]:
-    """What is to be called with the number of samples that are done, and of all.
+    """Return a callback that takes the number of finished samples and that of all.
 
     Args:
-        line: has the steps of `sample_steps`.
-        model: of the sensor; tells of the light while it is traced.
-        name: of the samples.
-        after: what follows them.
+        line: progress line with the steps of `sample_steps`.
+        model: model of the sensor, which reports the progress of its light.
+        name: name of the samples.
+        after: text of the work after them.
     """
     line.begin(_light(name), text=f"{name}: tracing light")
     first: list[int] = []

@@ -1,4 +1,4 @@
-"""``optisense search``: look for a better design, and keep everything that was tried."""
+"""``optisense search``: search for a better design, and keep all trials."""
 
 from __future__ import annotations
 
@@ -28,11 +28,12 @@ if TYPE_CHECKING:
     from optisense.search import Study
 
 VERIFIED_FROM = 300.0
-"""Seconds of a search from which on it ends with a quick verification where nothing else is asked
-for: that takes half a minute on two idle cores, which is little beside five minutes."""
+"""Duration of a search, s, from which on it ends with a quick verification by default: that takes
+half a minute on two idle cores, which is little beside five minutes.
+"""
 
 VERIFY_FOLDER = "verify"
-"""Name of the folder in that of a study for what a search verifies at its end."""
+"""Name of the folder for the results of the verification, in that of the study."""
 
 
 @ends_well
@@ -134,9 +135,10 @@ def search(
 
 
 def _verify(study: Path, variant: str) -> None:
-    """Tell whether the best design of a study reads better than its start, in the study's folder.
+    """Verify whether the best design of a study reads better than its start; results go to the
+    study's folder.
 
-    What fails there is told, and the search is none the worse for it.
+    Errors are printed, and do not make the search fail.
     """
     from optisense.cli.verify import compare, print_comparison
     from optisense.commands.sampling import VerifyOptions
@@ -161,7 +163,7 @@ def _verify(study: Path, variant: str) -> None:
 
 
 def _begun(out: Path, design: str | None, options: SearchOptions, line: ProgressLine) -> Study:
-    """A new study of what was given."""
+    """Return a new study of the given options."""
     from optisense.sensors import load
 
     if design is None:
@@ -182,7 +184,9 @@ def _begun(out: Path, design: str | None, options: SearchOptions, line: Progress
 
 
 def _resumed(out: Path, design: str | None, wanted: dict[str, Any], trust: bool) -> Study:
-    """The study in a folder; what was given as well must be what it was begun with."""
+    """Return the study in a folder, after a check that given options are those that it was begun
+    with.
+    """
     from optisense.search import Study
     from optisense.search.study.trust import not_trusted
     from optisense.sensors import load
@@ -197,7 +201,7 @@ def _resumed(out: Path, design: str | None, wanted: dict[str, Any], trust: bool)
 
 
 def _may_run(strange: list[str]) -> bool:
-    """Ask whether Python code that the user has not named may be run; no where nobody answers."""
+    """Ask whether Python code that the user has not named may be run; False without a terminal."""
     if not (sys.stdin.isatty() and sys.stderr.isatty()):
         return False
     messages.print("This study runs Python code that you have not named:", style="yellow")

@@ -13,14 +13,14 @@ if TYPE_CHECKING:
     from optisense.search import SearchResult, Study, Trial
 
 MOST_CAUSES = 4
-"""Causes of failure that are printed; the report lists more."""
+"""Largest number of causes of failure that are printed; the report lists more."""
 
 MOST_VALUES = 12
-"""Parameters of the best trial that are printed; all are in the study."""
+"""Largest number of parameters of the best trial that are printed; all are in the study."""
 
 
 def summary(result: SearchResult) -> dict[str, Any]:
-    """The result, ready for JSON."""
+    """Return the result, ready for JSON."""
     trials = result.trials
     best = result.study.best
     start = result.study.start
@@ -58,7 +58,7 @@ def _several(result: SearchResult) -> bool:
 
 
 def print_result(result: SearchResult, out: Path) -> None:
-    """The best trial, what stands beside it, and what to do next."""
+    """Print the best trial, the numbers beside its score, and the next commands."""
     from optisense.search.study.conditions import kept
 
     study = result.study
@@ -94,7 +94,7 @@ def print_result(result: SearchResult, out: Path) -> None:
 
 
 def _print_nearest(trials: Sequence[Trial]) -> None:
-    """What there is where no trial is the best: the one that comes nearest to the conditions."""
+    """Print the trial that comes nearest to the conditions, if no trial is the best."""
     from optisense.search.study.best import nearest
     from optisense.search.study.conditions import kept
 
@@ -108,7 +108,7 @@ def _print_nearest(trials: Sequence[Trial]) -> None:
 
 
 def _headline(best: Trial, start: Trial | None) -> str:
-    """The best score and the start's, by fresh seeds where they were scored."""
+    """Return the best score and the start's, by fresh seeds if they were scored."""
     text = f"{best.fair_score:.4g}"
     if best.fair_score != best.score:
         spread = best.fresh_spread()
@@ -120,7 +120,7 @@ def _headline(best: Trial, start: Trial | None) -> str:
 
 
 def _failures(failed: Sequence[Trial]) -> str:
-    """How many trials failed, and the commonest causes."""
+    """Return the number of failed trials, and the most frequent causes."""
     from optisense.search.study.failures import by_cause
 
     causes = by_cause((trial.number, trial.failure or "") for trial in failed)
@@ -132,7 +132,7 @@ def _failures(failed: Sequence[Trial]) -> str:
 
 
 def _beside(study: Study, best: Trial, start: Trial | None) -> list[str]:
-    """What must be seen with the score: other objectives, and parts such as the coverage."""
+    """Return the lines beside the score: other objectives, and parts such as the coverage."""
     from optisense.search.study.study import beside
 
     before = {} if start is None else beside(study, start)
@@ -143,7 +143,7 @@ def _beside(study: Study, best: Trial, start: Trial | None) -> list[str]:
 
 
 def _print_front(result: SearchResult) -> None:
-    """The trials that no other beats in all objectives."""
+    """Print the Pareto front: the trials that no other one dominates."""
     names = result.study.settings.names
     table = table_of("trial", *names, texts=0)
     for trial in result.front:

@@ -21,20 +21,22 @@ if TYPE_CHECKING:
 LOADING = "loading"
 
 LOADING_TIME, CMA_LIBRARIES = 0.7, 0.8
-"""Seconds to load the program and a design; and the library of CMA-ES, which loads those for plots
-and statistics."""
+"""Time to load the program and a design, s, and to load the library of CMA-ES, which imports those
+for plots and statistics.
+"""
 
 
 RELIT = ("light-colours",)
 """Methods whose trials take next to no time, since they render nothing."""
 
 USUAL_FRESH, FRESH_SEEDS = 9, 3
-"""Scores with fresh seeds, and these seeds, until the study tells other numbers: those of
-`optisense.search.study.stages`, which loads slowly."""
+"""Number of scores with fresh seeds, and of these seeds, until the study gives other numbers; they
+are those of `optisense.search.study.stages`, which loads slowly.
+"""
 
 
 class SearchLine(NamedTuple):
-    """The line of a search, and what shows its progress there."""
+    """Progress line of a search, and the function that shows its progress there."""
 
     line: ProgressLine
     show: Callable[[SearchProgress], None]
@@ -42,9 +44,10 @@ class SearchLine(NamedTuple):
 
 @contextmanager
 def search_progress(workers: int) -> Iterator[SearchLine]:
-    """Trials done and the time left, with the best score so far, failures and trials an hour.
+    """Show the number of trials and the time left, with the best score so far, failures and trials
+    per hour.
 
-    With one worker Ctrl-C waits for the trial at hand; others drop theirs at once.
+    With one worker Ctrl-C waits for the current trial; several workers drop theirs at once.
     """
     last: list[SearchProgress] = []
     waits = (lambda line: _waits(last)) if workers == 1 else None
@@ -61,10 +64,10 @@ def search_progress(workers: int) -> Iterator[SearchLine]:
 
 
 def expect_search(line: ProgressLine, design: SensorDesign, options: SearchOptions) -> None:
-    """Tell a time left before the study is made, which takes a while, from what is asked for.
+    """Estimate the time left from the options, before the study is created, which takes a while.
 
-    What can't be known without the study (how many trials there will be where no budget is given)
-    or makes no sense is left to it.
+    Errors in the options are left to the study, and so is the number of trials if no budget is
+    given.
     """
     expect = line.time_left.expect
     if options.method in (None, "cma-es"):
@@ -84,7 +87,9 @@ def expect_search(line: ProgressLine, design: SensorDesign, options: SearchOptio
 def usual_trials(
     design: SensorDesign, objectives: list[str], settings: Mapping[str, object]
 ) -> UsualTrials | None:
-    """What trials of a design usually take; None where that can't be known from these words."""
+    """Return the usual duration of trials of a design, or None if it can't be estimated from the
+    options.
+    """
     from optisense.errors import OptiSenseError
     from optisense.objectives.settings import Settings
     from optisense.objectives.usual_score import UsualTrials, usual_score
@@ -93,13 +98,13 @@ def usual_trials(
     given: dict[str, Any] = {name: value for name, value in settings.items() if name in shared}
     try:
         usual = usual_score(design, objectives, Settings(**given))
-    except (OptiSenseError, TypeError, ValueError):  # told later, by what reads it in full
+    except (OptiSenseError, TypeError, ValueError):  # reported later, where it is read in full
         return None
     return UsualTrials.of(usual, usual.building + usual.whole, usual.whole)
 
 
 def what(progress: SearchProgress) -> tuple[str, int | None, int | None]:
-    """What is being done, how many are done and of how many."""
+    """Return the text of the current stage, the number of finished pieces and that of all."""
     if progress.stage == "start":
         return "scoring the start", None, None
     if progress.stage == "trials":
@@ -110,7 +115,7 @@ def what(progress: SearchProgress) -> tuple[str, int | None, int | None]:
 
 
 def notes(progress: SearchProgress) -> list[str]:
-    """What stands beside the bar, the foremost first."""
+    """Return the notes beside the bar, the most important first."""
     parts = []
     if math.isfinite(progress.best):
         parts.append(f"best {_score(progress.best)} (start {_score(progress.start)})")
@@ -130,7 +135,7 @@ def notes(progress: SearchProgress) -> list[str]:
 
 
 def _waits(last: list[SearchProgress]) -> str:
-    """What a first Ctrl-C waits for where trials are worked out in this process."""
+    """Return what a first Ctrl-C waits for if trials are scored in this process."""
     if not last or last[0].stage == "start":
         return "finishing the score of the start"
     if last[0].stage != "trials":

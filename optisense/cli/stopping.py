@@ -1,12 +1,13 @@
-"""Ctrl-C and SIGTERM: an answer at once, an end at the next safe point, or at once if asked again.
+"""Ctrl-C and SIGTERM: an answer at once, an end at the next safe point, or at once after a second
+signal.
 
 Python runs its signal handlers in the main thread and between two of its own instructions, so they
-wait while the renderer compiles or computes. A thread is told of the signal at once: it says what
-the command waits for, and ends the process a little after a second signal.
+wait while the renderer compiles or computes. A thread is told of the signal at once: it prints what
+the command waits for, and ends the process shortly after a second signal.
 
 Before a command begins, and after its end, a signal ends the process at once. While a command
-imports a package, it waits: an exception amid an import comes out as an error of another kind, and
-of compiled packages as an abort.
+imports a package, the signal waits: an exception amid an import becomes an error of another kind,
+and an abort in compiled packages.
 """
 
 from __future__ import annotations
@@ -29,21 +30,21 @@ EXIT_TERMINATED = 143
 """Exit code after SIGTERM: 128 and the number of the signal, as shells count."""
 
 SILENCE = 1.0
-"""Seconds after Ctrl-C in which a command may end without having to say what it waits for."""
+"""Time after Ctrl-C in which a command may end without printing what it waits for, s."""
 
 GRACE = 1.5
-"""Seconds after a second signal in which the command may still end by itself."""
+"""Time after a second signal in which the command may still end by itself, s."""
 
 
 AGAIN = 0.02
-"""Seconds after which a signal that came amid an import is looked at again."""
+"""Interval until a signal that came amid an import is delivered again, s."""
 
 _IMPORTS = ("<frozen importlib._bootstrap>", "<frozen importlib._bootstrap_external>")
-"""Files of the functions that import."""
+"""Files of Python's import functions."""
 
 
 class _State:
-    """The signals that this process has received, and what a first one waits for."""
+    """Signals that this process has received, and what a first one waits for."""
 
     def __init__(self) -> None:
         self.signals = 0
@@ -58,9 +59,9 @@ _state = _State()
 
 @contextmanager
 def waiting(waits: Callable[[], str] | None) -> Iterator[None]:
-    """While this lasts, a first Ctrl-C waits for something, which ``waits`` tells in words.
+    """Context in which a first Ctrl-C waits for something, which ``waits`` tells in words.
 
-    Such as "finishing trial 7, about 12 s". None where Ctrl-C acts at once.
+    An example is "finishing trial 7, about 12 s"; None if Ctrl-C acts at once.
     """
     before, _state.waits = _state.waits, waits
     try:
@@ -70,7 +71,7 @@ def waiting(waits: Callable[[], str] | None) -> Iterator[None]:
 
 
 def say() -> None:
-    """Say what a first Ctrl-C waits for; said once."""
+    """Print once what a first Ctrl-C waits for."""
     if _state.said:
         return
     _state.said = True
@@ -83,21 +84,22 @@ def say() -> None:
 
 
 def exit_code(code: int) -> int:
-    """What a process ends with that would end with ``code``: 143 where SIGTERM stopped it."""
+    """Return the exit code for a process that would exit with ``code``: 143 if SIGTERM stopped
+    it.
+    """
     return EXIT_TERMINATED if _state.terminated and code == EXIT_INTERRUPTED else code
 
 
 def requested() -> bool:
-    """Whether Ctrl-C was pressed, or SIGTERM came."""
+    """Return whether Ctrl-C was pressed, or SIGTERM came."""
     return _state.signals > 0
 
 
 def watch() -> None:
-    """Answer signals in this process from here on: called once, by the command line's start.
+    """Handle signals in this process from here on; called once, at the start of the command line.
 
-    SIGTERM then stops a command as Ctrl-C does. A SIGINT that is ignored, as of programs that a
-    shell runs in the background, stays so: this process no longer gets any, and what stops a
-    command at Ctrl-C is there for SIGTERM.
+    SIGTERM then stops a command as Ctrl-C does. A SIGINT that is ignored, as in programs that a
+    shell runs in the background, stays ignored: it is blocked, and its handler serves SIGTERM only.
     """
     reader, writer = os.pipe()
     os.set_blocking(writer, False)
@@ -112,15 +114,16 @@ def watch() -> None:
 
 
 def over(code: int) -> None:
-    """From here on, a signal ends the process at once, with the code of the finished command."""
+    """Let a signal end the process at once from here on, with the code of the finished command."""
     for number in (signal.SIGINT, signal.SIGTERM):
         if signal.getsignal(number) in (_interrupt, _terminate):
             signal.signal(number, lambda *_: os._exit(code))
 
 
 def _interrupt(number: int, frame: FrameType | None) -> None:
-    """Ctrl-C: a KeyboardInterrupt once a command has begun, unless it would come out of an
-    import."""
+    """Handle Ctrl-C: raise KeyboardInterrupt once a command has begun, unless Python is
+    importing.
+    """
     if not starting.has_begun():
         starting.leave(signal.SIGTERM if _state.terminated else signal.SIGINT)
     if _imports(frame):
@@ -132,7 +135,7 @@ def _interrupt(number: int, frame: FrameType | None) -> None:
 
 
 def _imports(frame: FrameType | None) -> bool:
-    """Whether a frame, or one that called it, imports."""
+    """Return whether a frame, or one of its callers, imports a module."""
     while frame is not None:
         if frame.f_code.co_filename in _IMPORTS:
             return True
@@ -141,13 +144,13 @@ def _imports(frame: FrameType | None) -> bool:
 
 
 def _repeat() -> None:
-    """Let Python handle Ctrl-C once more; it is no second one."""
+    """Let Python handle Ctrl-C once more; it does not count as a second one."""
     _state.repeated += 1
     _thread.interrupt_main()
 
 
 def _terminate(number: int, frame: FrameType | None) -> None:
-    """SIGTERM does what Ctrl-C does at this moment."""
+    """Handle SIGTERM as Ctrl-C is handled at this moment."""
     _state.terminated = True
     handler = signal.getsignal(signal.SIGINT)
     if callable(handler):
@@ -157,7 +160,9 @@ def _terminate(number: int, frame: FrameType | None) -> None:
 
 
 def _answer(reader: int) -> None:
-    """Say at once what is waited for, and end the process a little after a second signal."""
+    """Print at once what the command waits for, and end the process shortly after a second
+    signal.
+    """
     while True:
         for number in os.read(reader, 16):
             if number not in (signal.SIGINT, signal.SIGTERM):
@@ -176,9 +181,11 @@ def _answer(reader: int) -> None:
 
 
 def _leave() -> NoReturn:
-    """End this process as it is. Files are written whole or not at all, so none is left half."""
+    """End this process at once. Files are written whole or not at all, so none is left
+    incomplete.
+    """
     if sys.stderr.isatty():
-        sys.stderr.write("\r\x1b[2K\x1b[?25h")  # the live line goes, the cursor comes back
+        sys.stderr.write("\r\x1b[2K\x1b[?25h")  # remove the live line, show the cursor
     sys.stderr.write("stopped at once\n")
     sys.stderr.flush()
     os._exit(exit_code(EXIT_INTERRUPTED))

@@ -1,4 +1,4 @@
-"""``optisense studio``: the sensor bench in Blender."""
+"""``optisense studio``: install and start the sensor bench in Blender."""
 
 from __future__ import annotations
 
@@ -75,20 +75,20 @@ def studio(
 
 
 def engine_command() -> str:
-    """How the extension starts this installation's engine, as a line of shell."""
+    """Return the shell command by which the extension starts this installation's engine."""
     return shlex.join([sys.executable, "-m", "optisense.cli", "engine"])
 
 
 def _to_open(design: str) -> str:
-    """The design as the extension is told it: a built-in's name, or an absolute path."""
+    """Return the design as the extension takes it: a built-in's name, or an absolute path."""
     from optisense import sensors
 
-    sensors.load(design)  # says what is wrong before Blender starts
+    sensors.load(design)  # reports errors before Blender starts
     return os.path.realpath(design) if Path(design).exists() else design
 
 
 def _start(blender: Path, design: str | None) -> int:
-    """Run Blender until it is closed; its exit code."""
+    """Run Blender until it is closed, and return its exit code."""
     try:
         return subprocess.run([str(blender)], env=_environment(design), check=False).returncode
     except OSError as error:
@@ -96,7 +96,7 @@ def _start(blender: Path, design: str | None) -> int:
 
 
 def _environment(design: str | None) -> dict[str, str]:
-    """What Blender is told: where the engine is, and which design to open."""
+    """Return Blender's environment, with the engine's command and the design to open."""
     environment = {**os.environ, ENGINE: engine_command()}
     environment.pop(OPEN, None)
     if design is not None:

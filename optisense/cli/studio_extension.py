@@ -1,4 +1,4 @@
-"""The Blender extension as a zip, and the Blender that it goes into."""
+"""The Blender extension as a zip file, and its installation in Blender."""
 
 from __future__ import annotations
 
@@ -17,15 +17,15 @@ from optisense.writing import written_whole
 
 MANIFEST = "blender_manifest.toml"
 OLDEST = (4, 2)
-"""The oldest version of Blender that the studio runs in: the first one that has extensions."""
+"""Oldest version of Blender that the studio runs in: the first one that has extensions."""
 
 HELP = (
     "studio", "cages", "library", "simulation", "objectives", "search", "workshop", "calibration",
 )  # fmt: skip
-"""Pages of the documentation that come with the extension; its buttons *Help* show them."""
+"""Pages of the documentation that are part of the extension; its buttons *Help* show them."""
 
 NOT_THERE = "should have been installed but not found"
-"""The message of Blender when it has installed nothing, although it reports success."""
+"""Message of Blender when it has installed nothing, although it reports success."""
 
 HOW_TO_GET = (
     "Get Blender 4.2 or newer from https://www.blender.org/download, then name it: "
@@ -51,11 +51,12 @@ PLACES = {
         "C:/Program Files (x86)/Steam/steamapps/common/Blender/blender.exe",
     ),
 }
-"""The usual places of Blender's executable, by `sys.platform`."""
+"""Usual places of Blender's executable, by `sys.platform`."""
 
 
 def source_folder() -> Path:
-    """The extension's files: beside the package in a checkout, else where the wheel put them.
+    """Return the folder of the extension's files: beside the package in a checkout, else where the
+    wheel has installed them.
 
     Raises:
         SetupError: they are in neither place.
@@ -73,9 +74,9 @@ def source_folder() -> Path:
 
 
 def help_pages() -> Iterator[tuple[str, bytes]]:
-    """The pages of the documentation that the extension shows, by their names in the zip.
+    """Yield the pages of the documentation that the extension shows, with their names in the zip.
 
-    They are beside the package in a checkout, else where the wheel put them.
+    They are beside the package in a checkout, else where the wheel has installed them.
 
     Raises:
         SetupError: they are in neither place.
@@ -95,7 +96,7 @@ def help_pages() -> Iterator[tuple[str, bytes]]:
 
 
 def version_of(folder: Path) -> str:
-    """The extension's version, from its manifest."""
+    """Return the extension's version, from its manifest."""
     with (folder / MANIFEST).open("rb") as file:
         return str(tomllib.load(file)["version"])
 
@@ -130,10 +131,11 @@ def _files(folder: Path) -> Iterator[Path]:
 
 
 def find_blender(named: Path | None = None) -> tuple[Path, str]:
-    """The Blender to use and its version.
+    """Return the Blender to use and its version.
 
     Args:
-        named: by the user; else the search path and the usual places are looked through.
+        named: path given by the user; without it, the search path and the usual places are
+            searched.
 
     Raises:
         SetupError: there is none, it does not start, or it is too old.
@@ -162,7 +164,7 @@ def _candidates() -> Iterator[Path]:
 
 
 def _fitting(blender: Path) -> str:
-    """The version of a Blender that is new enough."""
+    """Return the version of a Blender that is new enough."""
     try:
         text = subprocess.run(
             [str(blender), "--version"], capture_output=True, text=True, timeout=60, check=False
@@ -183,12 +185,12 @@ def install(blender: Path, archive: Path, environment: dict[str, str]) -> None:
     """Install the extension for the user and enable it, in place of an older one.
 
     Args:
-        blender: the program.
-        archive: the extension's zip.
-        environment: for Blender; the extension keeps from it where the engine is.
+        blender: executable of Blender.
+        archive: zip of the extension.
+        environment: environment for Blender; the extension stores the engine's command from it.
 
     Raises:
-        SetupError: Blender refuses it.
+        SetupError: Blender refuses the extension.
     """
     command = ["--command", "extension", "install-file", "-r", "user_default", "--enable"]
     done = subprocess.run(
@@ -199,7 +201,7 @@ def install(blender: Path, archive: Path, environment: dict[str, str]) -> None:
         check=False,
         env=environment,
     )
-    # Blender ends with 0 even where its own Python could not unpack the extension.
+    # Blender ends with 0 even if its own Python could not unpack the extension.
     if done.returncode != 0 or NOT_THERE in done.stdout + done.stderr:
         lines = (done.stderr + done.stdout).strip().splitlines()
         raise SetupError(

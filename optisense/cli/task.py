@@ -1,4 +1,4 @@
-"""``optisense task``: what a robot would read from a sensor."""
+"""``optisense task``: measure what a robot could read from a sensor."""
 
 from __future__ import annotations
 
@@ -51,19 +51,23 @@ OutOption = Annotated[
 JsonOption = Annotated[bool, typer.Option("--json", help="Print JSON instead of a table.")]
 
 PICTURES = "pictures"
-"""The step of the progress of reconstructions."""
+"""Name of the progress step of reconstructions."""
 
 SAMPLE_WORK, PICTURE_WORK = 0.23, 0.25
-"""Processor seconds that a sample of the tasks, and a picture of a reconstruction, usually take."""
+"""Processor time of a sample of the tasks, and of a picture of a reconstruction, s; measured on
+GelSight Mini.
+"""
 
 LIBRARIES_TIME = 1.0
-"""Seconds that the libraries of the tasks take to load."""
+"""Time to load the libraries of the tasks, s."""
 
 USUAL_OBJECTS = 3
-"""Number of unseen objects that a reconstruction task presses where none is named."""
+"""Number of unseen objects that a reconstruction task presses by default."""
 
 READING_TIME, FITTING_TIME = 1.0, 3.0
-"""Seconds that usually follow the samples of the tasks, and the pictures of a reconstruction."""
+"""Time after the samples of the tasks to read them, and after the pictures of a reconstruction to
+fit them, s.
+"""
 
 
 @task_app.command()
@@ -270,7 +274,7 @@ def _perceive(
 
 @contextmanager
 def _keeping(out: Path | None) -> Iterator[None]:
-    """Say after Ctrl-C what becomes of finished samples."""
+    """Print after Ctrl-C that finished samples are kept."""
     try:
         yield
     except KeyboardInterrupt:

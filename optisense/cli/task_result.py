@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 
 def print_perception(results: Iterable[PerceptionResult]) -> None:
-    """A row for each task."""
+    """Print a row for each task."""
     heads = ("mean error", "among folds", "of guessing", "signal to noise", "samples")
     table = table_of("task", *heads)
     for result in results:
@@ -30,7 +30,7 @@ def print_perception(results: Iterable[PerceptionResult]) -> None:
 
 
 def print_reconstruction(result: ReconstructionResult) -> None:
-    """A row for each object, and their mean: degrees of normals, and mm of depths."""
+    """Print a row for each object, and their mean: degrees of normals, and mm of depths."""
     heads = ("normals off (°)", "if flat (°)", "ring (°)", "depth off (mm)", "ring (mm)")
     table = table_of("object", *heads, "deepest (mm)", "read (mm)")
     table.columns[0].overflow = "fold"  # long names go on in the next line
@@ -59,5 +59,5 @@ def print_reconstruction(result: ReconstructionResult) -> None:
 
 
 def _or_none(value: float, digits: str) -> str:
-    """A number; a dash where there is none."""
+    """Return a number as text; a dash for NaN."""
     return "-" if math.isnan(value) else f"{value:{digits}}"

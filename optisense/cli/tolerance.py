@@ -1,4 +1,4 @@
-"""``optisense tolerance``: what manufacturing errors do to a design's score."""
+"""``optisense tolerance``: compute the effect of manufacturing errors on a design's score."""
 
 from __future__ import annotations
 
@@ -31,7 +31,9 @@ if TYPE_CHECKING:
     from optisense.search.tolerance.sensitivity import Estimate
 
 LOADING, FIRST, SENSORS = "loading", "the design itself", "sensors"
-"""Steps; the last two are those of `optisense.search.tolerance.analysis`, which loads slowly."""
+"""Steps of the progress; the last two are those of `optisense.search.tolerance.analysis`, which
+loads slowly.
+"""
 
 JSON_FILE = "tolerance.json"
 REPORT_FILE = "tolerance.html"
@@ -118,9 +120,9 @@ def tolerance(
 
 
 def what(done: int, count: int) -> tuple[str, int, int]:
-    """What is being scored, how many of it are done and of how many.
+    """Return the text of what is being scored, the number of finished scores and that of all.
 
-    The scores of the design itself come first, and are not counted as sensors.
+    The scores of the nominal design come first, and are not counted as sensors.
     """
     from optisense.search.tolerance.analysis import OWN_SCORES
 
@@ -130,7 +132,7 @@ def what(done: int, count: int) -> tuple[str, int, int]:
 
 
 def _waits(last: list[tuple[int, float]]) -> str:
-    """What a first Ctrl-C waits for: the score at hand."""
+    """Return what a first Ctrl-C waits for: the current score."""
     if not last:
         return "finishing the score at hand"
     done, each = last[0]
@@ -148,7 +150,7 @@ def _write(found: Tolerance, folder: Path, text: str, report: bool) -> None:
 
 
 def _print(found: Tolerance) -> None:
-    """One table of percentiles, and one of shares for each objective."""
+    """Print one table of percentiles, and one of shares for each objective."""
     table = table_of("objective", "as designed", "P10", "P50", "P90", "spread", "noise")
     for name, each in found.results.items():
         table.add_row(

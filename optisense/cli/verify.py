@@ -1,4 +1,4 @@
-"""``optisense verify``: whether what a search found reads better, by things no score has seen."""
+"""``optisense verify``: compare two sensors on objects that no score has used."""
 
 from __future__ import annotations
 
@@ -28,13 +28,13 @@ JSON_FILE = "verify.json"
 REPORT_FILE = "verify.html"
 
 PICTURE_WORK = 0.4
-"""Processor seconds that a picture with an object, and reading it, usually take."""
+"""Processor time of a picture with an object and of reading it, s; measured on GelSight Mini."""
 
 LIBRARIES_TIME = 1.0
-"""Seconds that the libraries of the tasks take to load."""
+"""Time to load the libraries of the tasks, s."""
 
 FITTING_TIME = 5.0
-"""Seconds that the fits of the readers usually take."""
+"""Time of the fits of the readers, s."""
 
 
 @ends_well
@@ -78,18 +78,18 @@ def verify(
 
 
 class Compared(NamedTuple):
-    """The result of a comparison.
+    """Result of a comparison.
 
     Attributes:
-        found: what both sensors read.
-        conditions: those of the study, as of `conditions_of`.
+        found: errors of what is read from both sensors.
+        conditions: conditions of the study, as from `conditions_of`.
     """
 
     found: Verification
     conditions: list[dict[str, Any]]
 
     def to_dict(self) -> dict[str, Any]:
-        """Ready for JSON."""
+        """Return the result, ready for JSON."""
         plain = self.found.to_dict()
         return {**plain, "conditions": self.conditions} if self.conditions else plain
 
@@ -144,7 +144,7 @@ def compare(
 
 
 def print_comparison(compared: Compared, out: Path | None) -> None:
-    """What both sensors read, whether conditions are kept, and what was written."""
+    """Print the errors of both sensors, the conditions, and the files that were written."""
     print_verification(compared.found)
     print_conditions(compared.conditions)
     if out is not None:
@@ -153,7 +153,7 @@ def print_comparison(compared: Compared, out: Path | None) -> None:
 
 
 SIDES = ("first sensor", "second sensor")
-"""The steps of the progress in which each sensor is pressed."""
+"""Steps of the progress in which each sensor is pressed."""
 
 
 def _steps(options: VerifyOptions, times: UsualTimes) -> list[TimedStep]:
@@ -165,7 +165,7 @@ def _steps(options: VerifyOptions, times: UsualTimes) -> list[TimedStep]:
 
 
 def _expect(line: ProgressLine, options: VerifyOptions, design: SensorDesign, label: str) -> None:
-    """Expect the times of this sensor on this machine."""
+    """Set the expected durations for this sensor on this machine."""
     times = UsualTimes.here(design.sensing_area, len(design.lights))
     for step in _steps(options, times):
         if label in step.name:
@@ -175,7 +175,7 @@ def _expect(line: ProgressLine, options: VerifyOptions, design: SensorDesign, la
 def _designs(
     first: str, second: str | None, trial: str
 ) -> tuple[tuple[str, str], tuple[SensorDesign, SensorDesign]]:
-    """What is compared, and what it is called.
+    """Return the names and the designs that are compared.
 
     Raises:
         SearchError: there is no such trial, or it is the start itself.
@@ -211,7 +211,7 @@ def _designs(
 
 
 def _model(name: str, design: SensorDesign, variant: str) -> OpticalModel:
-    """The sensor as a scene.
+    """Return the optical model of a sensor.
 
     Raises:
         SetupError: the renderer can't run on this machine.

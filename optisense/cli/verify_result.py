@@ -11,7 +11,7 @@ if TYPE_CHECKING:
 
 
 def print_verification(found: Verification) -> None:
-    """What each sensor reads, and the verdict."""
+    """Print the errors of each sensor, and the verdict."""
     first, second = found.names
     table = table_of("", first, second, "change", "95 % interval")
     for label, change, digits, unit in (
@@ -43,8 +43,8 @@ def print_verification(found: Verification) -> None:
 
 
 def conditions_of(folder: str, which: str) -> list[dict[str, Any]]:
-    """The conditions of a study: each with the value of the start and that of a trial, which are
-    None where nothing was measured, and whether the trial keeps it.
+    """Return the conditions of a study: each with the value of the start and that of a trial, which
+    are None if nothing was measured, and whether the trial meets it.
 
     Raises:
         SearchError: there is no such study or trial.
@@ -65,7 +65,7 @@ def conditions_of(folder: str, which: str) -> list[dict[str, Any]]:
 
 
 def print_conditions(conditions: list[dict[str, Any]]) -> None:
-    """Whether the trial of a study keeps the conditions of the search, beside the start."""
+    """Print whether the trial of a study meets the conditions of the search, beside the start."""
     if not conditions:
         return
     table = table_of("condition", "start", "trial", "margin")

@@ -1,4 +1,4 @@
-"""The options of a comparison with photographs."""
+"""Options of a comparison with photographs."""
 
 from __future__ import annotations
 
@@ -11,11 +11,13 @@ from optisense.commands.options import CommandOptions, Photons, Seed, Written
 from optisense.quality import PICTURE_PHOTONS
 
 LARGEST_BALL = 1000.0
-"""Largest diameter in mm of a ball; a sensor is far smaller, so more is a slip of the unit."""
+"""Largest diameter of a ball, mm; sensors are far smaller, so a larger value is an error of the
+unit.
+"""
 
 
 class PhotographOptions(CommandOptions):
-    """How photographs are read."""
+    """Options of how photographs are read."""
 
     ball: Annotated[float, Ge(0.01), Le(LARGEST_BALL), Written("MM")] | None = Field(
         None, description="Diameter of the ball, where the photographs' folder does not say it."
@@ -28,14 +30,14 @@ class PhotographOptions(CommandOptions):
 
 
 class CompareOptions(PhotographOptions):
-    """How a design is compared with photographs."""
+    """Options of a comparison of a design with photographs."""
 
     photons: Photons = Field(PICTURE_PHOTONS, description="Photons to trace for the pictures.")
     seed: Seed = Field(0, description="The same seed gives the same light.")
 
 
 class CalibrateOptions(PhotographOptions):
-    """What of a design is fitted to photographs, and how."""
+    """Options of a fit of a design to photographs."""
 
     keep: Annotated[list[str], Written("NAME")] = Field(
         [],

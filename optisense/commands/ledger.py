@@ -1,4 +1,4 @@
-"""The options of a light ledger."""
+"""Options of a light ledger."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from optisense.quality import PICTURE_PHOTONS
 
 
 class LedgerOptions(CommandOptions):
-    """How many photons are followed."""
+    """Options of the photons that are followed."""
 
     photons: Photons = Field(PICTURE_PHOTONS, description="Photons to follow, of all lights.")
     seed: Seed = Field(0, description="The same seed gives the same photons.")

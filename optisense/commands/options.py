@@ -15,36 +15,38 @@ from optisense.mechanics.skins import SKINS
 from optisense.quality import LEVELS, photons_of
 
 MOST_PIXELS = 20_000_000
-"""Largest number of pixels of a picture; more is a slip, and would take all memory."""
+"""Largest number of pixels of a picture; more would take all memory, and is a typing error."""
 
 LONGEST_RENDER = 7 * 24 * 3600.0
-"""Longest time in seconds that a picture may be asked to take: a week, so more is a slip."""
+"""Longest time that a picture may be asked to take, s: a week; more is a typing error."""
 
 MOST_THINGS = 10_000_000
-"""Largest number of samples, trials or sensors that may be asked for; they would take years."""
+"""Largest number of samples, trials or sensors that may be asked for; more would take years."""
 
 EXPOSURES = (1e-9, 1e9)
-"""Least and largest factor on the radiance; those of the built-in sensors are from 10 to 1000."""
+"""Smallest and largest factor on the radiance; those of the built-in sensors are from 10 to
+1000.
+"""
 
 MOST_SEED = 2**32 - 1
-"""The largest seed of NumPy's older generators and of Mitsuba's samplers: 32 bits."""
+"""Largest seed of NumPy's older generators and of Mitsuba's samplers: 32 bits."""
 
 
 class CommandOptions(BaseModel):
-    """Options of a command; those that it does not have are refused."""
+    """Base class of the options of a command; unknown options are refused."""
 
     model_config = ConfigDict(extra="forbid", strict=False)
 
 
 @dataclass(frozen=True)
 class Written:
-    """The notation of an option on the command line.
+    """Notation of an option on the command line.
 
     Attributes:
-        form: what stands for its value in help texts, such as WIDTHxHEIGHT.
-        flags: its names; made of the field's name if there are none.
-        usual: what help texts say of the default where the field has none.
-        is_text: whether it is read from text, by the field's own validator.
+        form: placeholder of its value in help texts, such as WIDTHxHEIGHT.
+        flags: names of the option; made from the field's name if empty.
+        usual: description of the default in help texts, if the field has none.
+        is_text: whether its value is text that the field's own validator parses.
     """
 
     form: str | None = None
@@ -54,10 +56,10 @@ class Written:
 
 
 def read_resolution(value: Any) -> Any:
-    """Width and height in pixels, from a pair of numbers or WIDTHxHEIGHT.
+    """Return width and height in pixels, from a pair of numbers or WIDTHxHEIGHT.
 
     Raises:
-        ValueError: the text is something else, or there are too many pixels.
+        ValueError: the text has another form, or there are too many pixels.
     """
     if not isinstance(value, str):
         return value
@@ -71,10 +73,10 @@ def read_resolution(value: Any) -> Any:
 
 
 def read_exposure(value: Any) -> float | Literal["auto"]:
-    """A positive factor, or "auto".
+    """Return a positive factor, or "auto".
 
     Raises:
-        ValueError: it is something else.
+        ValueError: the value is neither.
     """
     if isinstance(value, str) and value.strip().lower() == "auto":
         return "auto"
@@ -90,10 +92,10 @@ def read_exposure(value: Any) -> float | Literal["auto"]:
 
 
 def read_range(value: Any) -> Any:
-    """Two numbers, from a pair, LOW:HIGH or one number.
+    """Return two numbers, from a pair, LOW:HIGH or one number.
 
     Raises:
-        ValueError: the text is something else.
+        ValueError: the text has another form.
     """
     if not isinstance(value, str):
         return value
@@ -108,12 +110,12 @@ def read_range(value: Any) -> Any:
 
 
 def read_named(value: Any) -> Any:
-    """Values by name, from a mapping or NAME=VALUE texts.
+    """Return values by name, from a mapping or NAME=VALUE texts.
 
-    Values are read as those of a design file are: 1e-3 is a number.
+    Values are parsed as in a design file: 1e-3 is a number.
 
     Raises:
-        ValueError: a text is something else.
+        ValueError: a text has another form.
     """
     if not isinstance(value, list):
         return value
@@ -134,7 +136,7 @@ def read_named(value: Any) -> Any:
 
 
 def one_of(names: Collection[str]) -> Callable[[str], str]:
-    """A validator that takes one of some names.
+    """Return a validator that accepts one of several names.
 
     It raises a ValueError for any other.
     """

@@ -1,4 +1,4 @@
-"""The options of a rendered picture."""
+"""Options of a rendered picture."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from optisense.quality import PICTURE_PHOTONS, photons_of
 
 
 class RenderOptions(CommandOptions):
-    """What a picture is like, and when its light is good enough."""
+    """Options of a picture, and of when its light is good enough."""
 
     resolution: Resolution | None = Field(
         None,
@@ -46,12 +46,14 @@ class RenderOptions(CommandOptions):
     skin: Skin = Field(ELASTIC, description=SKIN_HELP)
 
     def photons_to_trace(self, usual: str = "normal") -> int | None:
-        """Those asked for, or of the usual level; None where another limit is given."""
+        """Return the number of photons asked for, or of the level `usual`; None if another limit is
+        given.
+        """
         limited = self.photons or self.noise or self.seconds
         return self.photons if limited else photons_of(usual)
 
 
 class BeforeAndAfterOptions(CommandOptions):
-    """The pictures of a study's page."""
+    """Options of the pictures on a study's page."""
 
     photons: Photons = Field(PICTURE_PHOTONS, description="Photons to trace for each picture.")

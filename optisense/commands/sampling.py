@@ -1,4 +1,4 @@
-"""The options of commands that press things into a sensor at random places."""
+"""Options of commands that press objects into a sensor at random places."""
 
 from __future__ import annotations
 
@@ -24,14 +24,16 @@ from optisense.optics.estimators import ESTIMATORS, RADIANCE_CACHE
 from optisense.quality import SAMPLE_PHOTONS
 
 NOISE = 1.5
-"""Levels of 255: the noise of pictures that tasks are read from, as of a real GelSight Mini."""
+"""Noise of the pictures that tasks are read from, standard deviation in levels of 255, as of a real
+GelSight Mini.
+"""
 
 CameraNoise = Annotated[float, Ge(0.0), Le(255.0), Written("LEVELS")]
 NOISE_HELP = "Noise of the camera to add, of 255; a real GelSight Mini shows 1.1 to 1.9."
 
 
 class PictureOptions(CommandOptions):
-    """How the pictures of a task are made."""
+    """Options of the pictures of a task."""
 
     seed: Seed = Field(0, description="The same seed, the same contacts.")
     camera_noise: CameraNoise = Field(NOISE, description=NOISE_HELP)
@@ -47,7 +49,7 @@ class PictureOptions(CommandOptions):
 
 
 class EstimatorOptions(PictureOptions):
-    """The same, by either estimator."""
+    """Options of pictures that either estimator can render."""
 
     estimator: Annotated[str, Written("|".join(ESTIMATORS))] = Field(
         RADIANCE_CACHE, description="sppm is slow, and exact where plates cover the gel."
@@ -55,7 +57,7 @@ class EstimatorOptions(PictureOptions):
 
 
 class SampleOptions(EstimatorOptions):
-    """The samples of a perception task."""
+    """Options of the samples of a perception task."""
 
     samples: Annotated[int, Ge(10), Le(MOST_THINGS), Written("N", ("--samples", "-n"))] = Field(
         200, description="Random contacts."
@@ -65,19 +67,21 @@ class SampleOptions(EstimatorOptions):
     )
 
     def settings(self) -> dict[str, Any]:
-        """The arguments of `optisense.tasks.SampleSettings`, which takes a second to load."""
+        """Return the arguments of `optisense.tasks.SampleSettings`, which takes a second to
+        load.
+        """
         made = self.model_dump(include=set(EstimatorOptions.model_fields))
         return made | {"count": self.samples}
 
 
 class CylinderOptions(SampleOptions):
-    """The samples of the task that tells the radius of a cylinder."""
+    """Options of the samples of the task that reads the radius of a cylinder."""
 
     radius: Range = Field("1:6", validate_default=True, description="mm.")
 
 
 class DatasetOptions(EstimatorOptions):
-    """The samples of a dataset."""
+    """Options of the samples of a dataset."""
 
     indenter: Annotated[list[str], Written("KIND:SIZE")] = Field(
         ["sphere:1.5"],
@@ -110,7 +114,9 @@ class DatasetOptions(EstimatorOptions):
     radiance: bool = Field(False, description="Also write linear radiance as EXR files.")
 
     def settings(self) -> dict[str, Any]:
-        """The arguments of `optisense.tasks.DatasetSettings`, which takes a second to load."""
+        """Return the arguments of `optisense.tasks.DatasetSettings`, which takes a second to
+        load.
+        """
         from optisense.tasks import ContactDraw
 
         drawn = {"indenter", "depth", "rotation", "tilt", "margin"}
@@ -122,7 +128,7 @@ class DatasetOptions(EstimatorOptions):
 
 
 class ReconstructionOptions(PictureOptions):
-    """How colours are read that tell the shape of what presses."""
+    """Options of reconstructions, which read the shape of an object from colours."""
 
     method: Annotated[str, Written("network|table")] = Field(
         "network", description="What colours are read with."
@@ -137,27 +143,34 @@ class ReconstructionOptions(PictureOptions):
 
 
 ALL_OBJECTS = 12
-"""Number of objects of `optisense.geometry.objects`, which is not loaded here: it takes long."""
+"""Number of objects in `optisense.geometry.objects`, which is not imported here because it is
+slow.
+"""
 
 QUICK_OBJECTS = ("screw-head", "coin", "cable", "wedge", "nut", "bean")
-"""Objects of a quick verification: the fewest by which a difference can be told, and unlike each
-other."""
+"""Objects of a quick verification: the fewest by which a difference can be detected, with different
+shapes.
+"""
 
 QUICK_PHOTONS = 500_000
-"""Photons of a quick verification: a tenth of the usual light."""
+"""Photons of a quick verification: a tenth of the usual number."""
 
 QUICK_WIDTH = 160
-"""Pixels across the pictures of a quick verification; objects of 5 mm then cover 1000 or more."""
+"""Width of the pictures of a quick verification, in pixels; objects of 5 mm then cover 1000 or
+more.
+"""
 
 PLACES, QUICK_PLACES = 3, 2
-"""Presses of each object: the fewest whose spread tells something, and the fewest that have one."""
+"""Presses of each object, usual and quick: the fewest whose spread is informative, and the fewest
+that have one.
+"""
 
 PRESSES, QUICK_PRESSES = 40, 20
-"""Balls that readers are fitted to, as of a reconstruction, and half of them."""
+"""Balls that readers are fitted to, usual and quick: as for a reconstruction, and half of them."""
 
 
 class VerifyOptions(CommandOptions):
-    """How two sensors are compared on things that no score has seen."""
+    """Options of a comparison of two sensors on objects that no score has used."""
 
     quick: bool = Field(False, description="Six objects, small pictures and few photons.")
     objects: Annotated[list[str], Written("NAME", ("--object",), "all twelve")] = Field(
@@ -184,19 +197,19 @@ class VerifyOptions(CommandOptions):
     )
 
     def wanted_photons(self) -> int:
-        """Photons of the light of each sensor."""
+        """Return the number of photons of the light of each sensor."""
         return self.photons or (QUICK_PHOTONS if self.quick else SAMPLE_PHOTONS)
 
     def pictures(self) -> int:
-        """Pictures of each sensor."""
+        """Return the number of pictures of each sensor."""
         objects = len(self.objects) or (len(QUICK_OBJECTS) if self.quick else ALL_OBJECTS)
         return self._presses() + objects * self._places()
 
     def settings(self) -> Any:
-        """The settings of `optisense.tasks.verify`, which takes a second to load.
+        """Return the settings of `optisense.tasks.verify`, which takes a second to load.
 
         Raises:
-            TaskError: they make no sense.
+            TaskError: a setting is invalid.
         """
         from optisense.tasks import ReconstructionSettings, VerificationSettings
 

@@ -1,4 +1,4 @@
-"""The options of scores."""
+"""Options of scores."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ ScorePhotons = Annotated[Photons, Written(f"N|{LEVELS}", usual="fine, 5 million"
 
 
 def _with_photons(settings: dict[str, Any]) -> dict[str, Any]:
-    """Settings whose photons, if there are any, are a number."""
+    """Return the settings with the photons, if there are any, as a number."""
     given = settings.get("photons")
     return settings if given is None else {**settings, "photons": photons_of(given)}
 
@@ -33,7 +33,7 @@ ObjectiveSettings = Annotated[
 
 
 class ScoreOptions(CommandOptions):
-    """How the images and rays of objectives are made."""
+    """Options of the images and rays of objectives."""
 
     settings: ObjectiveSettings = Field(
         {},
@@ -47,7 +47,7 @@ class ScoreOptions(CommandOptions):
     photons: ScorePhotons | None = Field(None, description="Photons to trace.")
 
     def for_objectives(self) -> dict[str, Any]:
-        """All of them as settings of objectives."""
+        """Return all options as settings of objectives."""
         found = dict(self.settings)
         if self.photons is not None:
             found["photons"] = self.photons
@@ -57,7 +57,7 @@ class ScoreOptions(CommandOptions):
 
 
 class EvaluateOptions(ScoreOptions):
-    """The scores of a design."""
+    """Options of the scores of a design."""
 
     objectives: Annotated[list[str], Written("NAME", ("--objective", "-b"), "all four")] = Field(
         [],
@@ -71,7 +71,7 @@ class EvaluateOptions(ScoreOptions):
 
 
 class ToleranceOptions(ScoreOptions):
-    """The scores of a design whose sensors come out a little other than designed."""
+    """Options of the scores of a design with manufacturing errors."""
 
     objectives: Annotated[list[str], Written("NAME", ("--objective", "-b"))] = Field(
         ["rgb2normal"],

@@ -1,4 +1,4 @@
-"""The options of searches, and the plan of a study that they make."""
+"""Options of searches, and the plan of a study that they make."""
 
 from __future__ import annotations
 
@@ -17,7 +17,9 @@ ScoreSettings = ScoreOptions.model_fields["settings"]
 
 
 class SearchOptions(CommandOptions):
-    """What may change, what is maximised and how. None is the usual value of a new study."""
+    """Options of a search: parameters, objectives and method. None is the default of a new
+    study.
+    """
 
     vary: Annotated[list[str], Written("PATH=LO:HI[:N]")] = Field(
         [],
@@ -75,10 +77,10 @@ class SearchOptions(CommandOptions):
     )
 
     def plan(self) -> Plan:
-        """The plan of a new study.
+        """Return the plan of a new study.
 
         Raises:
-            SearchError: something can't be read, or a rule can't be loaded.
+            SearchError: an option can't be read, or a rule can't be loaded.
         """
         from optisense.search import Plan, SearchSpace
         from optisense.search.space.constraints import UserRule
@@ -86,7 +88,7 @@ class SearchOptions(CommandOptions):
 
         rules = [UserRule(text) for text in self.rules]
         for rule in rules:
-            rule.load()  # a missing file is told now, not by trials that fail
+            rule.load()  # a missing file is an error now, and not in trials
         space = SearchSpace(parse_space(self.vary), rules)
         errors = parse_errors(self.errors) if self.errors else None
         names = ("method", "options", "budget", "seed", "settings", "samples")
@@ -101,10 +103,10 @@ class SearchOptions(CommandOptions):
         )
 
     def as_stored(self) -> dict[str, Any]:
-        """What was given, as a study keeps it.
+        """Return the given options in the form in which a study stores them.
 
         Raises:
-            SearchError: something can't be read.
+            SearchError: an option can't be read.
         """
         from optisense.search import SearchSpace
         from optisense.search.evaluation.requirements import requirements_of
