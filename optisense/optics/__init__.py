@@ -1,6 +1,6 @@
-"""The one package that knows the renderer: from a design to a tactile image.
+"""Optics: rendering tactile images of designs; the only package that imports the renderer.
 
-Names load on first use: whoever asks for one gets libLLVM checked before Mitsuba is imported.
+Names load on first use, so that libLLVM is checked before Mitsuba is imported.
 """
 
 from __future__ import annotations
@@ -52,5 +52,5 @@ def _check_llvm() -> None:
     select_variant("auto")
 
 
-if not TYPE_CHECKING:  # type checkers would take any name for one of the package's
+if not TYPE_CHECKING:  # with __getattr__, type checkers would accept any name
     __getattr__, __dir__ = load_on_first_use(__name__, _HOMES, before=_check_llvm)

@@ -1,10 +1,9 @@
-"""Drafts: a model for interactive editing, coarser in space, that keeps what it may between
-designs.
+"""Drafts: coarse images for interactive editing, by a model that reuses data between designs.
 
-What a changed design makes new costs more than the light of a small picture, so a draft keeps the
-shapes of cages that did not move, contacts where the surface did not move, the cells of surfaces
-that did not move, and the emission guide, which stays right for lights that moved (no direction is
-left out) and only loses effect. Contacts are pressed in coarsely and get few camera samples.
+Preparing a changed design takes longer than tracing the light of a small picture. A draft model
+therefore keeps the shapes of cages that did not move, contacts and surface cells where the surface
+did not move, and the emission guide, which stays unbiased when lights move (no direction is left
+out) and only becomes less efficient. Contacts are pressed in coarsely and get few camera samples.
 """
 
 from __future__ import annotations
@@ -29,9 +28,9 @@ from optisense.optics.scene.sensor_scenes import SensorScenes
 from optisense.optics.skin_view import VIEW_RESOLUTION, SkinView
 
 DRAFT_CELL_SCALE = 2.4
-"""Ratio of a draft's cell size to that of a full image. With as few photons as a draft has, wider
-cells give a picture that is nearer to the full one: 9 % off instead of 14 % with cells half as
-wide. Smoothing them also costs a small part."""
+"""Ratio of a draft's cell size to that of a full image. With the few photons of a draft, wider
+cells give a smaller error against the full image: 9 % instead of 14 % with cells half as wide. They
+also take much less time to smooth."""
 
 
 PLACED_CONTACTS = 64
@@ -45,8 +44,9 @@ learned before the shapes changed: half of `VIEW_MARGIN`."""
 
 @dataclass(frozen=True)
 class _Shown:
-    """The last draft, with all that was asked; ``kept`` is whether layers or media of it are those
-    of a draft before."""
+    """The last draft with its arguments; ``kept`` tells whether it reused layers or media of an
+    earlier draft.
+    """
 
     asked: tuple[Any, ...]
     design: SensorDesign
@@ -55,18 +55,16 @@ class _Shown:
 
 
 class DraftCacheStore(CacheStore):
-    """Radiance caches in coarse cells, which takes over what it may from the store before it."""
+    """Store of radiance caches in coarse cells that reuses data of the store before it."""
 
     cell_size = DRAFT_CELL_SCALE * CELL_SIZE
     tells_curved = False
-    uses_pilot = False  # half of the light's time, for some per cent on flanks of contacts
+    uses_pilot = False  # saves half of the tracing time, for some per cent on flanks of contacts
 
     def __init__(
         self, lit: LitScene, seen: NDArray[np.floating], before: DraftCacheStore | None
     ) -> None:
-        """Keep what `CacheStore` keeps; `before` is the store of the design before, if there is
-        one.
-        """
+        """Create an empty store; `before` is the store of the previous design, if there is one."""
         super().__init__(lit, seen)
         self.seen = seen
         self._learned_on = lit.opaque
@@ -80,15 +78,15 @@ class DraftCacheStore(CacheStore):
             self._guide, self._learned_on = before._guide, before._learned_on
 
     def aims_at(self, lit: LitScene) -> bool:
-        """Whether it knows where lights should send photons in this sensor."""
+        """Return whether the store has an emission guide for the lights of this sensor."""
         known = self._guide is not None and lit.table.count == self._lit.table.count
         return known and _apart(lit.opaque, self._learned_on) < GUIDE_TOLERANCE
 
 
 class DraftView(SkinView):
-    """A view for drafts, which keeps where contacts were placed."""
+    """A view for drafts, which caches placed contacts."""
 
-    facet_error = 10 * FACET_ERROR  # still far below a pixel; normals are those of the exact shape
+    facet_error = 10 * FACET_ERROR  # still far below a pixel; shading normals are exact
     coarse = True
 
     def __init__(self, design: SensorDesign, scenes: SensorScenes) -> None:
@@ -103,8 +101,8 @@ class DraftView(SkinView):
 
 
 class DraftModel(OpticalModel):
-    """An `OpticalModel` for drafts: the same picture, a little blurred, several times sooner where
-    designs differ by little.
+    """An `OpticalModel` for drafts: it renders a slightly blurred picture several times faster if
+    successive designs differ by little.
     """
 
     is_draft = True
@@ -125,21 +123,21 @@ class DraftModel(OpticalModel):
 
     def _view_of(self, design: SensorDesign, scenes: SensorScenes) -> SkinView:
         if _all_but_lights_same(self.design, design):
-            return self._view  # what the camera sees does not depend on the lights
+            return self._view  # the view does not depend on the lights
         return super()._view_of(design, scenes)
 
     def render(self, contacts: Sequence[Contact] = (), *args: Any, **kwargs: Any) -> TactileImage:
-        """See `OpticalModel.render`; layers of light groups whose lights are where they were in the
-        draft before are taken from it, where all else is the same.
+        """Render a draft; see `OpticalModel.render`.
 
-        What is missed by that is the shadow of moved lights in the light of the others. The same
-        draft, asked for once more, is made anew in full, its media resolved as well;
-        ``settings["kept_layers"]`` and ``settings["kept_media"]`` say what was not.
+        If only lights have moved since the previous draft, the layers of the other light groups are
+        reused. This ignores the shadows that moved lights cast in the light of the others. A second
+        request for the same draft renders it completely, with its media resolved;
+        ``settings["kept_layers"]`` and ``settings["kept_media"]`` record what was reused.
         """
         asked = tuple(contacts), args, {k: v for k, v in kwargs.items() if k != "progress"}
         before = self._shown if self._shown is not None and self._shown.asked == asked else None
         moved = None if before is None else _moved(before.design, self.design)
-        if before is not None and not moved:  # no light was, or more than lights
+        if before is not None and not moved:  # no light moved, or more than lights
             if moved is not None and not before.kept:
                 return self._relit(before.image)
             if moved is not None:
@@ -160,14 +158,14 @@ class DraftModel(OpticalModel):
         return image
 
     def _resolve(self) -> None:
-        """Resolve media that were only taken along."""
+        """Resolve media that were only moved along with bent parts."""
         if self.scenes.assembly.media.bent:
             assembly = assemble(self.design, self.scenes.assembly)
             scenes = SensorScenes(assembly, self.design.coating, self.scenes)
             self._set(self.design, scenes, self.view_type(self.design, scenes))
 
     def _relit(self, image: TactileImage) -> TactileImage:
-        """The same under the design's own lights."""
+        """Return the same image under the design's own lights."""
         return image.relight(
             {name: self.design.lights[name].channel_flux() for name in image.unit_layers}
         )
@@ -185,8 +183,10 @@ class DraftModel(OpticalModel):
         return DraftCacheStore(lit, rays.points[rays.hit], before)
 
     def _straightened(self, design: SensorDesign) -> SensorDesign:
-        """The same sensor without cages: its meshes as they are bent, the same objects as before
-        where nothing moved, by which a model knows what it need not build again.
+        """Return the same sensor with bent meshes instead of cages.
+
+        Meshes that did not move are the same objects as before, by which a model recognises the
+        data that it can reuse.
         """
         shapes = design.deformed_meshes()
         for name, mesh in shapes.items():
@@ -206,7 +206,7 @@ class DraftModel(OpticalModel):
 
 
 def _all_but_lights_same(one: SensorDesign, other: SensorDesign) -> bool:
-    """Whether designs without cages have the same shapes, materials and camera."""
+    """Return whether designs without cages have the same shapes, materials and camera."""
     return (
         one.meshes == other.meshes  # the same objects
         and (one.parts, one.materials, one.camera) == (other.parts, other.materials, other.camera)
@@ -214,8 +214,10 @@ def _all_but_lights_same(one: SensorDesign, other: SensorDesign) -> bool:
 
 
 def _moved(one: SensorDesign, other: SensorDesign) -> frozenset[int] | None:
-    """The numbers of the light groups of which anything but flux and colour differs; None where
-    all do, or more than lights differs."""
+    """Return the numbers of the light groups that differ in more than flux and colour.
+
+    The result is None if all groups differ, or if anything other than lights differs.
+    """
     if (
         list(one.lights) != list(other.lights)
         or one.coating != other.coating
@@ -232,7 +234,9 @@ def _moved(one: SensorDesign, other: SensorDesign) -> frozenset[int] | None:
 
 
 def _apart(one: list[Piece], other: list[Piece]) -> float:
-    """mm between the vertices that are farthest apart; infinite where the faces differ."""
+    """Return the largest distance (mm) between corresponding vertices; infinite if the faces
+    differ.
+    """
     if len(one) != len(other):
         return np.inf
     farthest = 0.0

@@ -1,4 +1,4 @@
-"""The light ledger of a sensor: where the milliwatts of each light group go."""
+"""The light ledger of a sensor: a balance of the power of each light group by where it ends."""
 
 from __future__ import annotations
 
@@ -22,14 +22,15 @@ if TYPE_CHECKING:
     from optisense.optics.model import OpticalModel
 
 LEDGER_PHOTONS = 1_000_000
-"""Photons of a ledger: shares of a hundredth are then right to some per cent of themselves."""
+"""Number of photons of a ledger; shares of a hundredth then have a relative error of some per
+cent."""
 
 VIEW_CELL = 0.5
-"""mm: side of the cells of the sensing surface by which it is known where the camera looks."""
+"""Side (mm) of the cells of the sensing surface that record the part in the camera's view."""
 
 IN_VIEW = 1.0
-"""mm: largest distance from the middle of a cell in view to the nearest point that a ray of a
-96 x 72 picture meets; on the largest sensor these are 0.9 mm apart."""
+"""Largest distance (mm) from the middle of a cell in view to the nearest end point of the rays of a
+96 x 72 picture; on the largest sensor the end points are 0.9 mm apart."""
 
 
 class LightEnd(StrEnum):
@@ -56,10 +57,10 @@ class LedgerEntry:
 
     Attributes:
         group: the light group.
-        where: what the light meets in the end, in words.
-        kind: in what way the light ends there.
-        power: mW, over all channels and lights of the group.
-        share: of the group's power, 0 to 1.
+        where: name of the part or medium at which the light ends.
+        kind: the way in which the light ends.
+        power: power (mW), over all channels and lights of the group.
+        share: share of the group's power, 0 to 1.
         noise: standard deviation of the share.
     """
 
@@ -80,8 +81,8 @@ class LedgerExit:
         part: the part, or its faces by their name in the design ("guide.edge").
         side: the axis of the design's frame that the faces' outward normals are nearest to, of
             `SIDES`.
-        power: mW, over all channels and lights of the group.
-        share: of the group's power, 0 to 1.
+        power: power (mW), over all channels and lights of the group.
+        share: share of the group's power, 0 to 1.
         noise: standard deviation of the share.
     """
 
@@ -94,7 +95,7 @@ class LedgerExit:
 
     @property
     def face(self) -> str:
-        """The faces by their name, as text."""
+        """The name of the faces."""
         return f"{self.part}, {self.side}"
 
 
@@ -103,10 +104,10 @@ class LightLedger:
     """The balance of each light group's power: the places where its light ends.
 
     Attributes:
-        emitted: mW of each light group.
+        emitted: power (mW) of each light group.
         entries: its lines, the largest of each group first.
-        photons: that were followed.
-        exits: what escapes, divided by faces; the largest of each group first.
+        photons: number of photons that were traced.
+        exits: the escaping light by faces, the largest share of each group first.
     """
 
     emitted: dict[str, float]
@@ -115,22 +116,21 @@ class LightLedger:
     exits: list[LedgerExit]
 
     def places(self) -> list[str]:
-        """All that light meets in the end, what takes most of it first."""
+        """The places where light ends, in order of decreasing power."""
         total: dict[str, float] = {}
         for entry in self.entries:
             total[entry.where] = total.get(entry.where, 0.0) + entry.power
         return sorted(total, key=lambda where: -total[where])
 
     def kinds(self) -> dict[str, LightEnd]:
-        """The way in which light ends at each place."""
+        """Return the way in which light ends at each place."""
         return {entry.where: entry.kind for entry in self.entries}
 
     def faces(self, least: float = 0.0) -> dict[str, list[float]]:
-        """Shares of each group that escape through faces, what lets most of it out first.
+        """Return the shares of each group that escape through faces, in order of decreasing light.
 
         Args:
-            least: share of a group's light; faces through which less of every group goes are left
-                out.
+            least: smallest share of a group's light; faces below it for every group are left out.
         """
         found: dict[str, dict[str, float]] = {}
         for each in self.exits:
@@ -140,16 +140,16 @@ class LightLedger:
         return {face: rows[face] for face in sorted(shown, key=lambda face: -sum(rows[face]))}
 
     def share(self, group: str, where: str) -> float:
-        """Share of a group's power; 0 where none of it goes."""
+        """Return the share of a group's power that ends at a place; 0 if there is none."""
         found = (e.share for e in self.entries if (e.group, e.where) == (group, where))
         return next(found, 0.0)
 
     def closing_sum(self, group: str) -> float:
-        """The sum of all shares of a group: 1 up to rounding."""
+        """Return the sum of all shares of a group, which is 1 up to rounding."""
         return sum(entry.share for entry in self.entries if entry.group == group)
 
     def as_data(self) -> dict[str, Any]:
-        """The ledger as plain numbers and names, to be written as JSON."""
+        """Return the ledger as plain numbers and names, ready for JSON."""
         return {
             "units": {"power": "mW"},
             "photons": self.photons,
@@ -165,16 +165,16 @@ def light_ledger(
     seed: int = 0,
     seen: TargetCells | None = None,
 ) -> LightLedger:
-    """Follow photons from all lights, and sum up where their light goes.
+    """Trace photons from all lights in the untouched sensor, and sum their power by where it ends.
 
-    No contact presses. What a photon loses at each place adds up to its power, so that the ledger
-    closes, whatever the noise of its lines.
+    The losses of a photon at all places add up to its power, so that the ledger balances exactly
+    despite the noise of its lines.
 
     Args:
         model: the sensor.
-        photons: of all lights together.
-        seed: another one gives other photons.
-        seen: `cells_in_view` of the model, if they are known.
+        photons: number of photons of all lights together.
+        seed: seed of the photons.
+        seen: result of `cells_in_view` for the model, if it is known.
 
     Raises:
         RenderError: there are too few photons.
@@ -226,7 +226,9 @@ def _entries(
 def _told(
     lines: dict[Line, NDArray[np.float64]], emitted: float
 ) -> Iterator[tuple[Line, tuple[float, float, float]]]:
-    """Power, share and noise of lines that are not empty, from their batches."""
+    """Yield the power (mW), share and noise of lines that are not empty, computed from their
+    batches.
+    """
     for line, batches in lines.items():
         power = float(batches.mean())
         if power != 0.0:
@@ -235,14 +237,16 @@ def _told(
 
 
 def _face_owner(piece: Piece) -> str:
-    """The solid that a surface belongs to, or its faces that have a name in the design."""
+    """Return the name of the solid that a surface belongs to, or of its faces if the design names
+    them.
+    """
     solids, _, rest = piece.name.partition("|")
     frosted = rest.partition(":")[2]
     return frosted or solids.split("/")[0]
 
 
 def cells_in_view(model: OpticalModel) -> TargetCells:
-    """Where on the sensing surface the camera looks."""
+    """Return the cells of the sensing surface, with flags for those in the camera's view."""
     mesh = model.sensing
     cells = build_cells(mesh.vertices, mesh.faces, VIEW_CELL)
     rays = model.chief_rays((96, 72))
@@ -256,10 +260,11 @@ class LedgerPlace:
     """The meaning of a row of the ledger's sums.
 
     Attributes:
-        surface: its number; the one after the last stands for the lights themselves.
-        fate: what happens to light there.
-        where: the same in words.
-        kind: in what way light ends there.
+        surface: number of the surface; the number after the last surface stands for the lights
+            themselves.
+        fate: the fate of light at the surface.
+        where: name of the part or medium at which the light ends.
+        kind: the way in which the light ends.
     """
 
     surface: int
@@ -269,7 +274,7 @@ class LedgerPlace:
 
 
 def places_of(pieces: list[Piece]) -> Iterator[LedgerPlace]:
-    """The places of all rows of the sums; several rows may belong to the same place."""
+    """Yield the places of all rows of the sums; several rows may belong to the same place."""
     for number, piece in enumerate(pieces):
         solid, around, (name, kind) = _names(piece)
         yield LedgerPlace(number, Fate.SEEN, SEEN, LightEnd.SEEN)
@@ -285,7 +290,9 @@ def places_of(pieces: list[Piece]) -> Iterator[LedgerPlace]:
 
 
 def _names(piece: Piece) -> tuple[str, str, tuple[str, LightEnd]]:
-    """Names of a surface: the solid behind it, what is in front of it, and who absorbs at it."""
+    """Return the names of the solid behind a surface, of the medium in front of it, and of the part
+    that absorbs at it.
+    """
     kind = piece.surface.kind
     if kind is SurfaceKind.LIGHT:
         return "a light", "front of a light", ("absorbed by lights", LightEnd.PART)

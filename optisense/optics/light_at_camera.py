@@ -17,28 +17,31 @@ if TYPE_CHECKING:
     from optisense.optics.model import OpticalModel
 
 WIDTH = 96
-"""Pixels: width of the picture that is summed up. Radiance varies over more than one of them."""
+"""Width (pixels) of the picture that is summed up. Radiance varies over more than one such
+pixel."""
 
 
 @dataclass(frozen=True)
 class CameraLight:
-    """Light at the camera's place, nothing pressed in.
+    """The light that reaches the camera in the untouched sensor.
 
     Attributes:
-        irradiance: mW/mm^2 of each light group on the plane of the lens, from all that the picture
-            shows.
-        pupil: mm^2 of the lens's opening; None where the design does not give its lens.
+        irradiance: irradiance (mW/mm^2) by each light group on the plane of the lens, from the
+            field of view of the picture.
+        pupil: area (mm^2) of the lens's entrance pupil; None if the design does not specify it.
     """
 
     irradiance: dict[str, float]
     pupil: float | None
 
     def power(self, group: str) -> float | None:
-        """The mW of a group that the lens lets in; None where the design does not give its lens."""
+        """Return the power (mW) of a group that enters the lens; None if the design does not
+        specify the pupil.
+        """
         return None if self.pupil is None else self.irradiance[group] * self.pupil
 
     def as_text(self) -> dict[str, dict[str, str]]:
-        """Numbers of each group as text, under a title with their unit."""
+        """Return the values of each group as text, by a title with the unit."""
         rows = {
             "at the lens (µW/mm²)": {
                 group: f"{1000 * value:.3g}" for group, value in self.irradiance.items()
@@ -52,7 +55,7 @@ class CameraLight:
         return rows
 
     def as_data(self) -> dict[str, Any]:
-        """The values as plain numbers and names, to be written as JSON."""
+        """Return the values as plain numbers and names, ready for JSON."""
         return {
             "units": {"irradiance": "mW/mm^2", "area": "mm^2", "power": "mW"},
             "irradiance": self.irradiance,
@@ -62,15 +65,15 @@ class CameraLight:
 
 
 def camera_light(model: OpticalModel, photons: int = PICTURE_PHOTONS, seed: int = 0) -> CameraLight:
-    """Sum up the light of a picture, as it reaches the lens.
+    """Compute the irradiance of the lens from a rendered picture.
 
     The irradiance of the lens is the sum of radiance times projected solid angle over the pixels.
-    The pupil of a lens follows from its blur by defocus, as focal length over f-number.
+    The diameter of the pupil is the focal length over the f-number of the lens's depth of field.
 
     Args:
         model: the sensor.
-        photons: to trace.
-        seed: another one gives other photons.
+        photons: number of photons to trace.
+        seed: seed of the photons.
     """
     width, height = model.design.camera.resolution
     resolution = (WIDTH, max(1, round(WIDTH * height / width)))
@@ -89,9 +92,9 @@ def camera_light(model: OpticalModel, photons: int = PICTURE_PHOTONS, seed: int 
 
 
 def projected_solid_angles(camera: RayCamera) -> NDArray[np.float64]:
-    """(h, w) solid angles of pixels times the cosine with the camera's axis, in steradians.
+    """Return the solid angle (h, w), sr, of each pixel times the cosine with the camera's axis.
 
-    They are the areas of the pixels on the plane of direction cosines.
+    It is the area of the pixel on the plane of direction cosines.
     """
     rows, columns = np.indices((camera.height + 1, camera.width + 1), dtype=np.float32)
     _, ways = camera.rays(mi.Float(columns.ravel()), mi.Float(rows.ravel()))

@@ -1,4 +1,4 @@
-"""The paths of typical photons of each light group, and where each ends, for drawing."""
+"""The paths of typical photons of each light group and their ends, for drawing."""
 
 from __future__ import annotations
 
@@ -17,12 +17,13 @@ if TYPE_CHECKING:
     from optisense.optics.transport.photons import TargetCells
 
 TYPICAL = 100
-"""Photons of a group that are drawn: the eye still tells them apart, and a place that takes a
-hundredth of the light is likely to get one."""
+"""Number of photons of a group that are drawn: few enough to be distinguished by eye, and enough
+that a place that takes a hundredth of the light is likely to get one."""
 
 CANDIDATES = 4
-"""Photons traced for each one that is drawn. Where indices differ between channels a photon is
-light of one channel, and those of the channels that a group emits are drawn."""
+"""Number of photons traced for each one that is drawn. If refractive indices differ between
+channels, a photon carries light of one channel, and only photons of the channels that a group emits
+are drawn."""
 
 
 @dataclass(frozen=True)
@@ -31,9 +32,9 @@ class PhotonPath:
 
     Attributes:
         group: the light group.
-        where: where it ends, in the words of the light ledger.
-        points: (n, 3) float32, mm: the light, the surfaces that the photon meets, and its end. That
-            of a photon that escapes is a little outside the sensor.
+        where: the place where it ends, named as in the light ledger.
+        points: (n, 3) float32, points (mm) on the light and on the surfaces that the photon meets,
+            and its end. The end of a photon that escapes lies a little outside the sensor.
     """
 
     group: str
@@ -47,19 +48,20 @@ def photon_paths(
     seed: int = 0,
     seen: TargetCells | None = None,
 ) -> dict[str, list[PhotonPath]]:
-    """Paths of photons, drawn in proportion to power; each stands for an equal share of it.
+    """Return paths of photons in the untouched sensor, each of which stands for an equal share of
+    its group's power.
 
-    No contact presses. The number of a group's photons that end at a place is, up to the noise of
-    so few, the share that the light ledger has there.
+    The number of a group's photons that end at a place is proportional to the share in the light
+    ledger, up to the noise of so few photons.
 
     Args:
         model: the sensor.
-        per_group: photons of each light group.
-        seed: another one gives other photons.
-        seen: `cells_in_view` of the model, if they are known.
+        per_group: number of photons of each light group.
+        seed: seed of the photons.
+        seen: result of `cells_in_view` for the model, if it is known.
 
     Returns:
-        For each light group its photons; none where it is dark.
+        The photons of each light group; an empty list for a group that is off.
     """
     lights = model.design.lights
     fewest = min((len(group.lights) for group in lights.values() if group.lights), default=1)
@@ -75,8 +77,8 @@ def photon_paths(
     rng = np.random.default_rng(seed)
     found = {}
     for number, name in enumerate(lights):
-        # In no order: every fourth photon of a low-discrepancy sequence leaves in a part only of
-        # all directions.
+        # The order is random, as every fourth photon of a low-discrepancy sequence covers only a
+        # part of all directions.
         own = rng.permutation(np.flatnonzero(traced.group == number))
         chosen = own[_in_proportion(traced.power[own], per_group, rng)]
         found[name] = [_path(traced, index, name, words) for index in chosen]
@@ -93,7 +95,7 @@ def _path(
 def _in_proportion(
     power: NDArray[np.float64], count: int, rng: np.random.Generator
 ) -> NDArray[np.int64]:
-    """Indices drawn with a probability in proportion to power, by systematic sampling."""
+    """Draw indices with probabilities in proportion to power, by systematic sampling."""
     total = power.sum()
     if total <= 0.0:
         return np.empty(0, dtype=np.int64)

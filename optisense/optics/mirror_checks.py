@@ -1,4 +1,4 @@
-"""Whether the camera looks by the mirrors of its design."""
+"""Check that the camera sees the sensing surface by the mirrors of the design."""
 
 from __future__ import annotations
 
@@ -8,27 +8,29 @@ from optisense.design.problems import Diagnostic
 from optisense.optics.scene.assembly import is_mirror
 
 CHECK_RAYS = (96, 72)
-"""Width and height of the chief rays of a check; a column of the picture is 0.01 of them."""
+"""Numbers of chief rays of a check along the width and height of the picture; a column is then
+about 0.01 of all rays."""
 
 LEAST_BY_MIRROR = 0.1
-"""Share of the chief rays that reach the sensing surface by which a mirror counts as used. All of
-GelSight Svelte's go by both of its mirrors; a camera that looks past them sees 0.006 by them."""
+"""Smallest share of the chief rays on the sensing surface that a mirror must reflect to count as
+used. In GelSight Svelte both mirrors reflect all of them; of a camera that looks past the mirrors,
+they reflect 0.006."""
 
 
 def mirror_problems(design: SensorDesign, views: dict[frozenset[str], float]) -> list[Diagnostic]:
-    """Warnings about mirrors by which the camera sees next to nothing of the sensing surface.
+    """Return warnings about mirrors by which the camera sees almost none of the sensing surface.
 
-    A part counts as a mirror where its role says so and its metal is smooth; a rough or white one
-    shows the camera no image.
+    A part counts as a mirror if that is its role and its metal is smooth; a rough or white one
+    reflects no image.
 
     Args:
-        design: with or without mirrors.
-        views: by which mirrors the camera sees the sensing surface, from
-            `RayModel.views_by_mirrors` with `CHECK_RAYS`.
+        design: a design, with or without mirrors.
+        views: shares of the view by set of mirrors, from `RayModel.views_by_mirrors` with
+            `CHECK_RAYS`.
 
     Returns:
-        A warning for each unused mirror, or one for all where the camera sees nothing of the
-        sensing surface.
+        A warning for each unused mirror, or a single one if the camera sees nothing of the sensing
+        surface.
     """
     mirrors = [
         name
@@ -60,7 +62,9 @@ def mirror_problems(design: SensorDesign, views: dict[frozenset[str], float]) ->
 
 
 def views_in_words(views: dict[frozenset[str], float]) -> str:
-    """The sets of mirrors by which the camera sees the sensing surface, the most used first."""
+    """Describe the sets of mirrors by which the camera sees the sensing surface, the most used
+    first.
+    """
     told = []
     for way, share in sorted(views.items(), key=lambda each: -each[1]):
         names = " and ".join(f"'{name}'" for name in sorted(way))

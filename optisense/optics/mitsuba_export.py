@@ -1,8 +1,8 @@
 """A sensor's surfaces, lights and camera as an ordinary Mitsuba scene.
 
-Mitsuba's own ``path`` integrator then renders what this package renders, with Mitsuba's BSDFs,
-emitters and sensor: a second opinion for tests, and a rival for benchmarks. A path tracer finds
-an area light through smooth glass only by chance, and never a point light or a spot.
+Mitsuba's own ``path`` integrator renders this scene with Mitsuba's BSDFs, emitters and sensor, as a
+reference for tests and benchmarks. A path tracer finds an area light through smooth glass only by
+chance, and never a point light or a spot.
 """
 
 from __future__ import annotations
@@ -24,14 +24,14 @@ from optisense.optics.scene.surfaces import CLEAR, Surface, SurfaceKind
 Colour = tuple[float, float, float]
 
 PATH_DEPTH = 64
-"""Largest number of surfaces of a path in the exported scene; the light beyond is far below a
-thousandth."""
+"""Largest number of surfaces of a path in the exported scene; longer paths carry far less than a
+thousandth of the light."""
 
 SPOT_PIXELS = 512
 """Side (pixels) of the bitmap that holds the profile of a spot light."""
 MAX_SPOT_ANGLE = 80.0
-"""Largest cut-off angle (degrees) of an exported spot light: Mitsuba paints its profile on a plane
-across the axis, which can't reach 90."""
+"""Largest cut-off angle (degrees) of an exported spot light: Mitsuba maps its profile to a plane
+across the axis, which cannot reach 90."""
 
 BLACK = {"type": "diffuse", "reflectance": {"type": "rgb", "value": 0.0}}
 """Mitsuba's BSDF of a surface that absorbs all light."""
@@ -47,23 +47,23 @@ def mitsuba_scene(
     max_depth: int = PATH_DEPTH,
     channel: int | None = None,
 ) -> dict[str, Any]:
-    """A dictionary for ``mi.load_dict``.
+    """Return a dictionary for ``mi.load_dict``.
 
-    Where a medium absorbs, the integrator is ``volpath``, which follows media, and else ``path``.
+    If a medium absorbs, the integrator is ``volpath``, which follows media, otherwise ``path``.
 
     Args:
-        pieces: all surfaces; the emitting faces among them are left out, the emitters bring theirs.
+        pieces: all surfaces; emitting faces are left out, as the emitters include them.
         emitters: the lights.
-        camera: must be perspective.
-        flux: mW per channel of each light of a group, in the order of the groups.
-        samples: per pixel.
-        max_depth: as Mitsuba counts it.
-        channel: 0 to 2 for a scene whose indices are those of R, G or B; the picture is right in
-            that channel. By default all light has the mean index, as Mitsuba's dielectrics have one
-            index each.
+        camera: a perspective camera.
+        flux: power (mW) per channel of each light of a group, in the order of the groups.
+        samples: number of samples per pixel.
+        max_depth: largest path depth, counted as in Mitsuba.
+        channel: channel (0 to 2 for R, G, B) whose refractive indices the scene has; the picture is
+            exact in that channel only. By default all light has the mean index, as Mitsuba's
+            dielectrics have a single index.
 
     Raises:
-        RenderError: Mitsuba has no such camera, or a light's profile reaches too far from its axis.
+        RenderError: Mitsuba has no such camera, or a light's profile extends too far from its axis.
     """
     absorbing = any(piece.surface.absorbs for piece in pieces)
     integrator = "volpath" if absorbing else "path"
@@ -81,7 +81,9 @@ def mitsuba_scene(
 
 
 def surface_bsdf(surface: Surface, channel: int | None = None) -> dict[str, Any]:
-    """Mitsuba's description of a surface. Indices are relative to the medium before it already."""
+    """Return Mitsuba's description of a surface; its indices are already relative to the medium in
+    front of it.
+    """
     if surface.kind is SurfaceKind.DIELECTRIC:
         own = channel is not None and surface.etas is not None
         eta = surface.etas[channel] if own else surface.eta  # type: ignore[index]
@@ -121,7 +123,7 @@ def _rgb(values: Sequence[float] | NDArray[np.floating]) -> dict[str, Any]:
 
 
 def _medium(absorption: Colour) -> Any:
-    """Mitsuba's medium that absorbs and scatters nothing."""
+    """Return a Mitsuba medium that absorbs and does not scatter."""
     return mi.load_dict(
         {"type": "homogeneous", "albedo": _rgb((0.0,) * 3), "sigma_t": _rgb(absorption)}
     )
@@ -206,7 +208,7 @@ def _point(emitter: Emitter, power: NDArray[np.floating]) -> dict[str, Any]:
             where=f"group {emitter.group}",
         )
     cutoff = float(profile.polar[-1])
-    # Mitsuba multiplies a spot's intensity by a texture over the plane across the axis.
+    # Mitsuba multiplies the intensity of a spot by a texture on the plane across its axis.
     reach = np.tan(np.radians(cutoff))
     steps = (np.arange(SPOT_PIXELS) + 0.5) * (2 / SPOT_PIXELS) - 1
     x, y = np.meshgrid(steps * reach, steps * reach)
@@ -226,7 +228,9 @@ def _point(emitter: Emitter, power: NDArray[np.floating]) -> dict[str, Any]:
 
 
 def _pose(emitter: Emitter, half: NDArray[np.floating]) -> Any:
-    """Transformation from the light's own frame (shining along +z, half sizes 1) to the scene."""
+    """Return the transformation from the light's own frame (axis along +z, half sizes 1) to the
+    scene.
+    """
     frame = emitter.frame
     matrix = np.eye(4)
     matrix[:3, 0], matrix[:3, 1], matrix[:3, 2] = frame[0] * half[0], frame[1] * half[1], frame[2]

@@ -1,4 +1,4 @@
-"""A sensor design made ready to render: its scenes, emission guide and radiance caches."""
+"""A sensor design prepared for rendering: its scenes, emission guide and radiance caches."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ MAX_PHOTONS = 512_000_000
 """Number of photons at which tracing ends even if the wanted noise is not reached."""
 
 SPPM_PASS_PHOTONS = 1_000_000
-"""Photons of one pass of the `sppm` estimator."""
+"""Number of photons of one pass of the `sppm` estimator."""
 
 
 @dataclass(frozen=True)
@@ -45,12 +45,12 @@ class RenderProgress:
     """The progress of a render.
 
     Attributes:
-        stage: what is being done.
-        part: how much of the photons is traced, 0 to 1.
-        fraction: of the whole render, 0 to 1, roughly.
-        photons: traced so far.
-        noise: relative, in per cent; None if it is not known.
-        seconds: so far.
+        stage: the current stage.
+        part: traced part of the photons, 0 to 1.
+        fraction: approximate completed fraction of the render, 0 to 1.
+        photons: number of photons traced so far.
+        noise: relative noise, per cent; None if it is not known.
+        seconds: time since the start, s.
     """
 
     stage: Stage
@@ -62,26 +62,26 @@ class RenderProgress:
 
 
 class OpticalModel(RayModel):
-    """A sensor whose image can be rendered, again and again.
+    """A sensor prepared for rendering many images.
 
-    The scene of the sensor itself, the emission guide and the radiance cache are made once; a
-    contact adds only its own surface, a light's flux or colour only scales its layer, a
-    coating's specularity only rewrites its row of the surface table.
+    The scene of the sensor, the emission guide and the radiance cache are computed once. A contact
+    adds only its own surface, a light's flux or colour only scales its layer, and a coating's
+    specularity only changes its row of the surface table.
     """
 
     is_draft = False
-    """Whether images may be coarse for the sake of speed."""
+    """Whether images are drafts, coarser and faster."""
 
     listener: Callable[[RenderProgress], None] | None = None
-    """Called with the progress of images for which `render` is given nobody else."""
+    """A function that is called with the progress of images if `render` is given no other."""
 
     _caches: CacheStore | None = None
-    """The radiance caches, once they are asked for."""
+    """The radiance caches, once they are used."""
 
     @property
     def _store(self) -> CacheStore:
         if self._caches is None:
-            bound_memory()  # of the models before this one
+            bound_memory()  # memory of earlier models
             self._caches = self._new_store()
         return self._caches
 
@@ -98,10 +98,10 @@ class OpticalModel(RayModel):
         super()._set(design, scenes, view)
 
     def forget_light(self, guide: bool = False) -> None:
-        """Drop the radiance caches (hundreds of MB); the next image traces its light anew.
+        """Drop the radiance caches (hundreds of MB); the next image traces its light again.
 
         Args:
-            guide: drop the emission guide and the surface cells as well.
+            guide: whether the emission guide and the surface cells are dropped as well.
         """
         if self._caches is not None:
             self._caches = None if guide else self._caches.coated(LitScene.of(self.scenes))
@@ -127,37 +127,38 @@ class OpticalModel(RayModel):
         partial: bool = True,
         skin: str = ELASTIC,
     ) -> TactileImage:
-        """Render what the camera sees while ``contacts`` press into the skin.
+        """Render the camera's image while ``contacts`` press into the skin.
 
         Args:
             contacts: indenters, places and depths; none for the untouched sensor.
             resolution: (width, height) pixels; the camera's own by default.
-            photons: to trace in all, as a number or a level of `optisense.quality`; normal if no
-                other limit is given.
-            noise: per cent; trace until the relative RMS noise of the light on the sensing
-                surface is this small.
-            seconds: stop tracing in time to be ready then.
-            seed: the same seed and settings give the same image, whatever was rendered before, but
-                for rounding, which in single pixels at the edge of a contact turns a shadow ray.
-            progress: called now and then.
+            photons: number of photons to trace, or a level of `optisense.quality`; the normal level
+                if no other limit is given.
+            noise: relative RMS noise (per cent) of the light on the sensing surface at which
+                tracing stops.
+            seconds: time limit (s) of the whole render.
+            seed: seed of all random numbers. The same seed and settings give the same image
+                regardless of earlier renders, except for rounding, which may change a shadow ray in
+                single pixels at the edge of a contact.
+            progress: function that is called with the progress during the render.
             estimator: "radiance-cache" (fast) or "sppm" (progressive photon mapping, to check it).
-            only_contacts: light only the pixels that see an indenter and leave the others dark,
-                several times sooner; for scores that read nothing else.
-            pixel_importance: with ``only_contacts``, a function of the chief rays that gives the
-                share (h, w), 0 to 1, of the camera samples that each pixel gets; each gets a few.
-            partial: whether Ctrl-C after the first photons gives an image of those so far; else
-                it is raised at once.
-            skin: "elastic" deforms as a gel does, around contacts as well; "conforming" takes the
-                shape of the indenters where they overlap it and stays flat around them, as the
-                objectives of the OptiSense paper have it.
+            only_contacts: whether only the pixels that see an indenter are shaded and the others
+                stay dark; several times faster, for scores that read no other pixels.
+            pixel_importance: function of the chief rays that gives, with ``only_contacts``, the
+                share (h, w), 0 to 1, of the camera samples of each pixel; each pixel gets at least
+                a few.
+            partial: whether Ctrl-C after the first photons returns an image of the photons so far;
+                otherwise KeyboardInterrupt is raised at once.
+            skin: "elastic" for a skin that deforms like a gel, also around contacts; "conforming"
+                for a skin that takes the shape of the indenters where they overlap and stays flat
+                around them, as in the objectives of the OptiSense paper.
 
         Returns:
             The image; ``interrupted`` is set if Ctrl-C ended the tracing early.
 
         Raises:
             ContactError: a contact is off the surface or deeper than the gel.
-            RenderError: the camera sees nothing of the sensing surface, or a setting makes no
-                sense.
+            RenderError: the camera sees nothing of the sensing surface, or a setting is invalid.
         """
         if estimator not in ESTIMATORS:
             raise RenderError(
@@ -272,7 +273,9 @@ class OpticalModel(RayModel):
     def _marked(
         self, layers: ImageLayers, pressed: PressedSkin | None, camera: RayCamera
     ) -> tuple[NDArray[np.float32], MarkerPlaces]:
-        """What the markers leave of each pixel's light (h, w, 3), and where they are seen."""
+        """Return the factors (h, w, 3) by which the markers darken each pixel, and the markers'
+        positions.
+        """
         markers = self.design.markers
         assert markers is not None
         points = layers.points.astype(np.float64)
@@ -319,7 +322,7 @@ class OpticalModel(RayModel):
 
 
 def _named(contacts: Sequence[Contact], placed: list[TriangleMesh]) -> dict[str, TriangleMesh]:
-    """What presses, by its kind and a number."""
+    """Return the indenters' meshes by name: the kind and a number."""
     named = {}
     for number, (contact, mesh) in enumerate(zip(contacts, placed, strict=True), start=1):
         kind = type(contact.indenter).__name__.removesuffix("Indenter").lower()

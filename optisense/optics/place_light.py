@@ -1,6 +1,6 @@
 """The light at a place of the sensing surface: its power, light groups, paths and directions.
 
-It answers why a place is as bright or as dark as it is, nothing pressed in.
+It explains the brightness of a place in the untouched sensor.
 """
 
 from __future__ import annotations
@@ -28,14 +28,14 @@ if TYPE_CHECKING:
     from optisense.optics.model import OpticalModel
 
 Place = tuple[float, float] | tuple[float, float, float]
-"""mm, coordinates on the sensing surface, or a point in the frame of the design."""
+"""Coordinates (mm) on the sensing surface, or a point (mm) in the frame of the design."""
 
 PLACE_RADIUS = 1.0
-"""mm: photons that land within this radius count as its light. A million photons on GelSight Mini
-then bring some thousand landings; light varies by some per cent over such a disc."""
+"""Radius (mm) around a place within which landings count as its light. A million photons on
+GelSight Mini then give some thousand landings; light varies by some per cent over such a disc."""
 
 AREA_STEP = 0.02
-"""mm: distance of the samples that measure the area of skin within the disc, to about 0.2 %."""
+"""Spacing (mm) of the samples that measure the area of skin within the disc, to about 0.2 %."""
 
 WAY_WORDS = {
     LightWay.REFRACTED: "refracted only",
@@ -52,12 +52,12 @@ class GroupLight:
     """The light that one light group brings to a place.
 
     Attributes:
-        irradiance: mW/mm^2 on the skin, over all channels and lights of the group.
+        irradiance: irradiance (mW/mm^2) on the skin, over all channels and lights of the group.
         noise: standard deviation of the irradiance, relative to it.
         of_mean: the irradiance over its mean on the skin in the camera's view.
-        ways: shares of the irradiance by way, of `WAY_WORDS`; they add up to 1.
-        sky: (9, 12) shares of the irradiance by the direction that light comes from: the angle to
-            the normal of the skin in steps of 10 degrees, and the azimuth in steps of 30 degrees,
+        ways: shares of the irradiance by kind of path (see `WAY_WORDS`); they add up to 1.
+        sky: (9, 12) shares of the irradiance by the direction of incidence: the angle to the normal
+            of the skin in steps of 10 degrees, and the azimuth in steps of 30 degrees,
             anticlockwise from the picture's right.
     """
 
@@ -69,14 +69,14 @@ class GroupLight:
 
     @property
     def mean_angle(self) -> float:
-        """Degrees: the mean angle between the light and the normal of the skin."""
+        """Mean angle (degrees) between the light and the normal of the skin."""
         middles = (np.arange(TILT_BINS) + 0.5) * 90.0 / TILT_BINS
         return float(self.sky.sum(axis=1) @ middles)
 
     @property
     def main_azimuth(self) -> float:
-        """Degrees anticlockwise from the picture's right, -180 to 180: where most light comes
-        from.
+        """Azimuth (degrees) from which most light comes, anticlockwise from the picture's right,
+        -180 to 180.
         """
         turns = (np.arange(TURN_BINS) + 0.5) * 2 * np.pi / TURN_BINS
         by_turn = self.sky.sum(axis=0)
@@ -88,10 +88,10 @@ class PlaceLight:
     """The light at a place.
 
     Attributes:
-        at: mm, the place as it was asked for.
-        point: (3,) mm, in the design's frame.
-        groups: by light group; groups that are off are left out.
-        photons: number of photons that were followed.
+        at: the requested place, mm.
+        point: (3,) position (mm) in the design's frame.
+        groups: the light of each light group; groups that are off are left out.
+        photons: number of photons that were traced.
     """
 
     at: Place
@@ -100,7 +100,7 @@ class PlaceLight:
     photons: int
 
     def as_data(self) -> dict[str, Any]:
-        """The values as plain numbers and names, to be written as JSON."""
+        """Return the values as plain numbers and names, ready for JSON."""
         return {
             "units": {"irradiance": "mW/mm^2", "length": "mm", "angle": "degree"},
             "at": list(self.at),
@@ -128,15 +128,15 @@ def light_at(
     seed: int = 0,
     seen: TargetCells | None = None,
 ) -> PlaceLight:
-    """Follow photons from all lights, and look at those that land at a place of the skin.
+    """Trace photons from all lights, and analyse those that land at a place of the untouched skin.
 
     Args:
-        model: the sensor; nothing presses.
-        at: mm, as of contacts: two coordinates on the sensing surface, or a point near it in the
-            frame of the design.
-        photons: of all lights together.
-        seed: another one gives other photons.
-        seen: `cells_in_view` of the model, if they are known.
+        model: the sensor.
+        at: the place, given like that of a contact: two coordinates (mm) on the sensing surface, or
+            a point (mm) near it in the frame of the design.
+        photons: number of photons of all lights together.
+        seed: seed of the photons.
+        seen: result of `cells_in_view` for the model, if it is known.
 
     Raises:
         ContactError: the place is off the surface.
@@ -172,7 +172,12 @@ def light_at(
 
 
 def _group_light(power: NDArray[np.float64], area: float, mean: float) -> GroupLight:
-    """What batches (n, ways, tilts, turns) of mW in a disc of mm^2 say; ``mean`` is in mW/mm^2."""
+    """Return the light of a group from the power (n, ways, tilts, turns), mW, of n batches in a
+    disc.
+
+    ``area`` is the area of the disc's skin (mm^2), and ``mean`` the mean irradiance in view
+    (mW/mm^2).
+    """
     shares = power.mean(axis=0)
     total = float(shares.sum())
     batches = power.sum(axis=(1, 2, 3))
@@ -188,11 +193,11 @@ def _group_light(power: NDArray[np.float64], area: float, mean: float) -> GroupL
 
 
 def _area_within(triangles: NDArray[np.floating], disc: Disc) -> float:
-    """mm^2 of triangles (n, 3, 3) within a ball around the middle of a disc."""
+    """Return the area (mm^2) of triangles (n, 3, 3) within a ball around the centre of a disc."""
     low, high = triangles.min(axis=1), triangles.max(axis=1)
     near = ((low < disc.middle + disc.radius) & (high > disc.middle - disc.radius)).all(axis=1)
     chosen = np.asarray(triangles[near], dtype=np.float64)
-    # The part of large triangles that can lie within, in pieces.
+    # Large triangles near the disc are divided until they are smaller than it.
     while len(chosen) and (sides := _longest(chosen)).max() > disc.radius:
         chosen = np.concatenate([chosen[sides <= disc.radius], _quarters(chosen, sides, disc)])
     faces = np.arange(3 * len(chosen)).reshape(-1, 3)
@@ -208,7 +213,9 @@ def _longest(triangles: NDArray[np.float64]) -> NDArray[np.float64]:
 def _quarters(
     triangles: NDArray[np.float64], sides: NDArray[np.float64], disc: Disc
 ) -> NDArray[np.float64]:
-    """The quarters of triangles that are longer than the disc's radius, as far as they are near."""
+    """Divide triangles that are larger than the disc's radius into quarters, and drop those that
+    are far away.
+    """
     a, b, c = np.moveaxis(triangles[sides > disc.radius], 1, 0)
     ab, bc, ca = (a + b) / 2, (b + c) / 2, (c + a) / 2
     pieces = [(a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca)]

@@ -1,4 +1,4 @@
-"""A design made ready for rays, whatever its lights give."""
+"""A design prepared for ray tracing, without its light."""
 
 from __future__ import annotations
 
@@ -31,28 +31,28 @@ if TYPE_CHECKING:
 
 
 class RayModel:
-    """A sensor that rays can be sent through, whatever its lights give.
+    """A sensor prepared for ray tracing, without its light.
 
-    What a design is made into, its scenes and what its camera sees of them, never changes; another
-    design replaces what depends on the values that differ.
+    The scenes of a design and the camera's view of them never change; another design replaces those
+    that depend on the values that differ.
     """
 
     bends_media = False
-    """Whether boundaries between media go along with parts that bend (`Media.bend`)."""
+    """Whether boundaries between media are moved along with parts that bend (`Media.bend`)."""
     view_type: type[SkinView] = SkinView
-    """What is made of the camera's view of each shape."""
+    """The class of the camera's view of a shape."""
 
     def __init__(self, design: SensorDesign, variant: str = "auto") -> None:
         """Resolve media and build the scene.
 
         Args:
-            design: the sensor; not changed, and later changes of it are not seen (see
+            design: the sensor. It is not modified, and later changes of it have no effect (see
                 ``update``).
-            variant: "auto" (what was selected before, else CUDA where there is a GPU), "llvm" or
+            variant: "auto" (the variant selected before, else CUDA if there is a GPU), "llvm" or
                 "cuda".
 
         Raises:
-            SetupError: the variant is not to be had on this machine.
+            SetupError: the variant is not available on this machine.
             DesignError, MeshError, LibraryError: the design can't be built.
         """
         from optisense.optics.backend.variant import use_variant
@@ -66,7 +66,7 @@ class RayModel:
         self._chain: PictureChain | None = None
 
     def _set(self, design: SensorDesign, scenes: SensorScenes, view: SkinView) -> None:
-        """Take on a design with all that has been made of it."""
+        """Adopt a design with its scenes and its view."""
         if view is not self._view or design.camera != self.design.camera:
             self._chain = None
         self.design, self.scenes, self._view = design, scenes, view
@@ -88,11 +88,11 @@ class RayModel:
 
     @property
     def scene(self) -> RayScene:
-        """All that light meets in the sensor, nothing pressed in."""
+        """All surfaces of the sensor without contacts."""
         return self.scenes.full
 
     def update(self, path: str, value: Any) -> None:
-        """Change one value of the design by its dotted path, redoing only what depends on it.
+        """Change one value of the design by its dotted path, and recompute only what depends on it.
 
         Raises:
             DesignError: there is no such value, or it does not fit.
@@ -100,14 +100,14 @@ class RayModel:
         self.set_design(set_value(self.design, path, value))
 
     def set_design(self, design: SensorDesign) -> None:
-        """Take on another design, redoing only what depends on the values that differ.
+        """Adopt another design, and recompute only what depends on the values that differ.
 
-        Fluxes and colours cost nothing, a coating or a camera little; a mirror or blocker that
-        touches no transparent part is bent or moved without resolving the media again. A design
-        that can't be built leaves the model as it was.
+        Changes of fluxes and colours take no time, changes of a coating or a camera little. A
+        mirror or blocker that touches no transparent part is bent or moved without resolving the
+        media again. A design that can't be built leaves the model unchanged.
 
         Args:
-            design: most useful when it is like the one before and shares its meshes.
+            design: the design; the more meshes it shares with the current one, the more is reused.
 
         Raises:
             DesignError, MeshError, LibraryError: the design can't be built.
@@ -123,20 +123,21 @@ class RayModel:
         self._set(new, scenes, self._view_of(new, scenes))
 
     def _view_of(self, design: SensorDesign, scenes: SensorScenes) -> SkinView:
-        """The view as it is where the camera and all shapes are as before, else another one."""
+        """Return the current view if the camera and all shapes are unchanged, else a new one."""
         same = scenes.assembly is self.scenes.assembly
         if same and design.camera.view() == self.design.camera.view():
             return self._view
         return self.view_type(design, scenes)
 
     def camera(self, resolution: tuple[int, int] | None = None) -> RayCamera:
-        """The design's camera, at another resolution (width, height) if asked."""
+        """Return the design's camera, at the given resolution (width, height) if there is one."""
         return ray_camera(self.design, resolution)
 
     @property
     def picture_chain(self) -> PictureChain:
-        """The camera's response to radiance; where its blur depends on depth, with the depths that
-        it sees in the untouched sensor."""
+        """The camera's picture chain; if its blur depends on depth, with the depths of the
+        untouched sensor.
+        """
         if self._chain is None:
             self._chain = focused_chain(
                 self.design.camera, lambda: self.scenes.fine.scene, self.camera
@@ -159,11 +160,11 @@ class RayModel:
         contacts: Sequence[Contact] = (),
         skin: str = ELASTIC,
     ) -> ChiefRays:
-        """Where each pixel looks, by ideal refraction and reflection; (h, w, ...) arrays.
+        """Trace the chief ray of each pixel, with ideal refraction and reflection.
 
         Args:
             resolution: (width, height) pixels; the camera's own by default.
-            contacts: what presses in.
+            contacts: the contacts.
             skin: "conforming" or "elastic", as in `OpticalModel.render`. On an elastic skin
                 triangles have no numbers.
         """
@@ -176,14 +177,14 @@ class RayModel:
         return trace_chief_rays(self.scenes.with_indenters(placed), camera, fine.sensing_faces)
 
     def views_by_mirrors(self, resolution: tuple[int, int]) -> dict[frozenset[str], float]:
-        """Share of the view that the camera has by each set of mirrors.
+        """Return the shares of the camera's view by set of mirrors.
 
         Args:
             resolution: (width, height) of the chief rays.
 
         Returns:
-            For each set of parts that reflect a ray on its way to the sensing surface, its share
-            of the rays that arrive there; the empty set stands for those that no mirror reflects.
+            The share of the rays that arrive at the sensing surface by each set of parts that
+            reflect them; the empty set stands for the rays that no mirror reflects.
         """
         rays = self.chief_rays(resolution)
         mirrors = [
@@ -198,10 +199,11 @@ class RayModel:
         moving: Sequence[str] = (),
         resolution: tuple[int, int] | None = None,
     ) -> DifferentiableRays:
-        """Chief rays, with derivatives by the shapes of surfaces and by the camera.
+        """Trace chief rays, with derivatives with respect to the shapes of surfaces and the camera.
 
         Args:
-            moving: parts whose vertices are asked about: mirrors, blockers, sensing surfaces.
+            moving: names of the parts with respect to whose vertices derivatives are computed:
+                mirrors, blockers, sensing surfaces.
             resolution: (width, height) pixels; the camera's own by default.
 
         Raises:
@@ -214,17 +216,18 @@ class RayModel:
         return DifferentiableRays(self.scenes.fine.scene, self.camera(resolution), chosen)
 
     def nine_contacts(self, indenter: Indenter | None = None, depth: float = 0.8) -> list[Contact]:
-        """One contact at each of nine places that cover the visible sensing surface evenly.
+        """Return one contact at each of nine places that cover the visible sensing surface evenly.
 
         The default indenter is the OptiSense paper's ball of radius 1.5 mm.
         """
         return self._view.nine_contacts(indenter, depth)
 
     def place(self, contact: Contact) -> TriangleMesh:
-        """The part of an indenter that can touch, where a contact puts it in the design's frame.
+        """Return the part of an indenter that can touch the skin, placed by a contact in the
+        design's frame (mm).
 
         Raises:
-            ContactError: the contact is off the surface or deeper than the gel, or no depth takes
+            ContactError: the contact is off the surface or deeper than the gel, or no depth gives
                 its force.
         """
         return self._view.place(contact)
@@ -232,28 +235,28 @@ class RayModel:
     def pressed(
         self, contacts: Sequence[Contact], placed: Sequence[TriangleMesh] | None = None
     ) -> PressedSkin:
-        """The elastic skin with contacts pressed in: its shape, pressures and forces.
+        """Solve for the elastic skin under contacts: its shape, pressures and forces.
 
         Args:
-            contacts: what presses where.
-            placed: their meshes as `place` gives them, if they are known.
+            contacts: the contacts.
+            placed: their meshes from `place`, if they are known.
 
         Raises:
-            ContactError: a contact is off the surface or deeper than the gel, or its pressure is
-                not found.
+            ContactError: a contact is off the surface or deeper than the gel, or its pressure does
+                not converge.
         """
         return self._view.gel.pressed(contacts, placed)
 
     def _deformed_scenes(
         self, contacts: Sequence[Contact], placed: Sequence[TriangleMesh] | None = None
     ) -> ContactScenes:
-        """The scenes of one image on an elastic skin; `placed` are the contacts' meshes."""
+        """Return the scenes of one image on an elastic skin; `placed` are the contacts' meshes."""
         pressed = self.pressed(contacts, placed)
         return self.scenes.deformed(self._view.gel.mesh(contacts), pressed)
 
 
 def _shapes(design: SensorDesign) -> tuple[Any, ...]:
-    """What of a design its geometry and its lights' places depend on."""
+    """Return the values of a design that its geometry and the positions of its lights depend on."""
     lights = {
         name: (group.model, group.emitter, group.lights) for name, group in design.lights.items()
     }

@@ -1,4 +1,4 @@
-"""The paths of chief rays from the camera to where they end, for drawing."""
+"""The paths of chief rays from the camera to their ends, for drawing."""
 
 from __future__ import annotations
 
@@ -25,12 +25,12 @@ ESCAPE_LENGTH = 5.0
 
 @dataclass(frozen=True)
 class RayPaths:
-    """Polylines, one after the other.
+    """The polylines of rays, one after the other.
 
     Attributes:
-        vertices: (n, 3) float32, mm.
-        counts: (rays,) int32, the vertices of each, at least two.
-        outcomes: (rays,) uint8, of `RayOutcome`.
+        vertices: (n, 3) float32, the vertices of all polylines, mm.
+        counts: (rays,) int32, the number of vertices of each polyline, at least two.
+        outcomes: (rays,) uint8, the `RayOutcome` of each ray.
     """
 
     vertices: NDArray[np.float32]
@@ -41,16 +41,16 @@ class RayPaths:
 def trace_paths(
     model: OpticalModel, resolution: tuple[int, int], contacts: Sequence[Contact] = ()
 ) -> RayPaths:
-    """The path of the ray through the middle of each pixel, row by row.
+    """Trace the path of the ray through the middle of each pixel, row by row.
 
     Args:
         model: a sensor.
         resolution: (width, height) of the grid of pixels.
-        contacts: what presses.
+        contacts: the contacts.
 
     Raises:
         ContactError: a contact is off the surface or deeper than the gel.
-        RenderError: the resolution makes no sense.
+        RenderError: the resolution is invalid.
     """
     camera = model.camera(resolution)
     scene = model.scenes.fine.scene
@@ -88,5 +88,5 @@ def trace_paths(
 
 
 def _rows(values: object) -> NDArray[np.float32]:
-    """(n, 3) of a Dr.Jit vector."""
+    """Return the array (n, 3) of a Dr.Jit vector."""
     return np.asarray(values, dtype=np.float32).T.reshape(-1, 3)

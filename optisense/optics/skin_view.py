@@ -25,14 +25,15 @@ from optisense.optics.transport.chief_rays import (
 )
 
 LEAST_SEEN = 9
-"""Number of chief rays that must arrive for nine contacts to be placed: one each."""
+"""Number of chief rays that must arrive for nine contacts to be placed: one for each."""
 
 VIEW_RESOLUTION = (96, 72)
-"""Pixels (width, height) of the chief rays that show which part of the surface the camera sees."""
+"""Resolution (width, height) of the chief rays that find the part of the surface that the camera
+sees."""
 
 
 def ray_camera(design: SensorDesign, resolution: tuple[int, int] | None = None) -> RayCamera:
-    """The design's camera, at another resolution (width, height) if asked.
+    """Return the design's camera, at the given resolution (width, height) if there is one.
 
     Raises:
         RenderError: the resolution is below one pixel.
@@ -56,14 +57,15 @@ def ray_camera(design: SensorDesign, resolution: tuple[int, int] | None = None) 
 
 
 class SkinView:
-    """The undeformed sensing surface as the camera sees it, and its gel. It never changes: another
-    shape or camera has another view.
+    """The camera's view of the undeformed sensing surface, and the gel.
+
+    A view never changes: another shape or camera has another view.
     """
 
     facet_error = FACET_ERROR
-    """mm, how far indenters' meshes may be off their exact shapes."""
+    """Largest distance (mm) of indenters' meshes from their exact shapes."""
     coarse = False
-    """Whether contacts are pressed in roughly, as drafts have them."""
+    """Whether contacts are solved coarsely, as in drafts."""
 
     def __init__(self, design: SensorDesign, scenes: SensorScenes) -> None:
         """Prepare the view of a sensor with these scenes; nothing is traced yet."""
@@ -71,7 +73,7 @@ class SkinView:
         self._scenes = scenes
 
     def chief_rays(self, resolution: tuple[int, int]) -> ChiefRays:
-        """Where each pixel looks in the untouched sensor."""
+        """Return the chief rays of the untouched sensor."""
         fine = self._scenes.fine
         return trace_chief_rays(
             fine.scene, ray_camera(self._design, resolution), fine.sensing_faces
@@ -86,7 +88,7 @@ class SkinView:
             RenderError: the camera sees nothing of the sensing surface.
         """
         axes = self._design.camera.axes()
-        # Of a lens without distortion, which may show its axis beside the picture's middle.
+        # The lens has no distortion here, as distortion may move the axis off the picture's middle.
         straight = replace(ray_camera(self._design, (3, 3)), distortion=None)
         rays = trace_chief_rays(self._scenes.fine.scene, straight)
         if rays.hit[1, 1]:
@@ -114,22 +116,23 @@ class SkinView:
         )
 
     def place(self, contact: Contact) -> TriangleMesh:
-        """The part of an indenter that can touch, where a contact puts it in the design's frame.
+        """Return the part of an indenter that can touch the skin, placed by a contact in the
+        design's frame (mm).
 
         Raises:
-            ContactError: the contact is off the surface or deeper than the gel, or no depth takes
+            ContactError: the contact is off the surface or deeper than the gel, or no depth gives
                 its force.
         """
         contact = self.gel.at_depth(contact)
         return place_on_gels(contact, self.surface, self._scenes.assembly.gels, self.facet_error)
 
     def nine_contacts(self, indenter: Indenter | None, depth: float) -> list[Contact]:
-        """One contact at each of nine places; see `RayModel.nine_contacts`."""
+        """Return one contact at each of nine places; see `RayModel.nine_contacts`."""
         rays = self.chief_rays(VIEW_RESOLUTION)
         if rays.hit.sum() < LEAST_SEEN:
             raise sees_nothing(rays)
         points = rays.points[rays.hit].astype(np.float64)
-        # Each pixel stands for the area that its solid angle cuts out of the surface.
+        # Each pixel is weighted with the area of surface that it sees.
         weights = pixel_areas(rays)[rays.hit]
         chosen = nine_places(points, weights)
         ball = indenter if indenter is not None else Sphere(radius=1.5)

@@ -1,4 +1,4 @@
-"""The surfaces, emitters and camera of a sensor design, as light meets them."""
+"""The surfaces and emitters of a sensor design, prepared for ray tracing."""
 
 from __future__ import annotations
 
@@ -36,24 +36,24 @@ FLAT = 1e-6
 DISC_CORNERS = 12
 """Corners of the polygon that represents a round light window."""
 PROBE = 0.02
-"""Distance (mm) off a coating at which the medium before it is looked up."""
+"""Distance (mm) off a coating at which the medium in front of it is looked up."""
 
 
 @dataclass(frozen=True)
 class Assembly:
-    """A design as ray tracing needs it.
+    """A design prepared for ray tracing.
 
     Attributes:
-        pieces: all fixed surfaces; flat faces in as few triangles as will do.
+        pieces: all fixed surfaces; flat faces are merged into few triangles.
         sensing: the deformed sensing surface, with all its triangles.
         gels: the elastomers.
         emitters: all lights; ``group`` counts in the order of ``groups``.
-        light_areas: mm^2 of the lights' windows, 0 for points.
-        fine: for pieces of the sensing surface, by number, the same with all its triangles.
+        light_areas: areas (mm^2) of the lights' windows, 0 for points.
+        fine: by number of a piece of the sensing surface, that piece with all its triangles.
         ior_before: refractive index on the inner side of the (first) sensing surface.
-        absorption_before: what the medium there absorbs, per mm at R, G, B.
+        absorption_before: absorption coefficients (1/mm) of the medium on that side at R, G, B.
         media: the resolved boundaries.
-        kept: what else the assembly of a similar design can take over.
+        kept: shapes that the assembly of a similar design can reuse.
     """
 
     pieces: list[Piece]
@@ -71,15 +71,18 @@ class Assembly:
 
 @dataclass
 class Kept:
-    """Shapes worked out from meshes, with the meshes, which are recognised by identity."""
+    """Shapes computed from meshes, with the meshes that they were computed from, which are
+    recognised by identity.
+    """
 
     finishes: MadeBefore = field(default_factory=MadeBefore)
     merged: list[tuple[TriangleMesh, TriangleMesh]] = field(default_factory=list)
     pieces: list[tuple[TriangleMesh, Piece]] = field(default_factory=list)
 
     def merge(self, mesh: TriangleMesh, before: Kept, bend: bool = False) -> TriangleMesh:
-        """A part's mesh, its flat faces merged; not if ``bend`` and one of the same faces had
-        none."""
+        """Return a part's mesh with its flat faces merged; unchanged if ``bend`` and an earlier
+        mesh with the same faces had no flat ones.
+        """
         known = next((merged for old, merged in before.merged if old is mesh), None)
         if known is None and bend:
             bent = (merged is old and same_faces(old, mesh) for old, merged in before.merged)
@@ -88,7 +91,7 @@ class Kept:
         return self.merged[-1][1]
 
     def piece(self, name: str, mesh: TriangleMesh, surface: Surface, before: Kept) -> Piece:
-        """A mesh and its surface, for ray tracing."""
+        """Return the piece of a mesh and its surface, reused if it is known."""
         known = next((piece for old, piece in before.pieces if old is mesh), None)
         if known is None or (known.name, known.surface) != (name, surface):
             known = _piece(name, mesh, surface)
@@ -101,8 +104,9 @@ def assemble(design: SensorDesign, before: Assembly | None = None, bend: bool = 
 
     Args:
         design: the sensor.
-        before: the assembly of a similar design, from which what is the same is taken.
-        bend: take boundaries between media along with parts that bend, for drafts.
+        before: the assembly of a similar design, whose unchanged shapes are reused.
+        bend: whether boundaries between media are moved along with parts that bend instead of being
+            resolved again, for drafts.
 
     Raises:
         DesignError: solids overlap without priority, or a light is not in the library.
@@ -192,7 +196,7 @@ def _medium(design: SensorDesign, part: str, material: Material | None) -> Mediu
 
 
 def coating_surface(coating: CoatingModel, ior: float, region: Region) -> Surface:
-    """The coating as seen from a medium of refractive index ``ior``."""
+    """Return the coating as seen from a medium of refractive index ``ior``."""
     return _reflecting(SurfaceKind.OPAQUE, coating.reflection().seen_in(ior), region)
 
 
@@ -209,13 +213,15 @@ def _reflecting(kind: SurfaceKind, reflection: Reflection, region: Region) -> Su
 
 
 def indenter_piece(mesh: TriangleMesh, coating: Surface) -> Piece:
-    """An indenter that carries the coating."""
+    """Return the piece of an indenter that carries the coating."""
     surface = replace(coating, region=Region.INDENTER)
     return Piece("indenter", mesh.vertices, mesh.faces, surface, mesh.normals)
 
 
 def is_mirror(reflection: Reflection) -> bool:
-    """Whether a surface is a metal so smooth that it counts as a mirror, which shows images."""
+    """Return whether a surface is a metal that is smooth enough to reflect images, and so counts as
+    a mirror.
+    """
     return reflection.is_metal and reflection.roughness < SMOOTH_METAL
 
 
@@ -238,13 +244,15 @@ def _interface_surface(face: Interface) -> Surface:
 
 
 def _refracting_sheet(medium: Medium, design: SensorDesign) -> Surface:
-    """A part that is a sheet; what is behind it is not known, so nothing is absorbed there."""
+    """Return the surface of a refracting sheet; the medium behind it is unknown and absorbs
+    nothing.
+    """
     etas = medium.indices if design.dispersion else None
     return Surface(SurfaceKind.DIELECTRIC, eta=medium.ior, alpha=medium.roughness, etas=etas)
 
 
 def _solid_before(mesh: TriangleMesh, solids: list[Solid]) -> Solid | None:
-    """The solid on the side that the largest face's normal points to; None for air."""
+    """Return the solid on the side that the normal of the largest face points to; None for air."""
     face = int(np.argmax(mesh.face_areas))
     probe = (mesh.triangles[face].mean(axis=0) + PROBE * mesh.face_normals[face])[None]
     around = [solid for solid in solids if inside(probe, solid.mesh)[0]]
@@ -252,14 +260,16 @@ def _solid_before(mesh: TriangleMesh, solids: list[Solid]) -> Solid | None:
 
 
 def _merged(mesh: TriangleMesh) -> TriangleMesh:
-    """A mesh with flat facets in as few triangles as will do: fewer to trace, fewer to compare."""
+    """Return a mesh with its flat facets merged into few triangles, which saves time in tracing and
+    in comparisons.
+    """
     smooth = mesh if mesh.normals is not None else mesh.vertex_normals()
     assert smooth.normals is not None
     bend = np.abs(smooth.normals[smooth.faces] - smooth.face_normals[:, None]).max(axis=(1, 2))
     if bend.max() < FLAT:
         return merge_coplanar(mesh)
-    # A curved mesh may still have flat walls; shading normals would be lost, so only these are
-    # merged.
+    # Only flat meshes are merged, as merging drops shading normals; a curved mesh may still have
+    # flat walls.
     return mesh
 
 
@@ -284,7 +294,9 @@ class _Lamp:
 
 
 def _absorption_at(places: list[Light], solids: list[Solid]) -> list[RGB]:
-    """What the media absorb that lights stand in, per mm at R, G, B."""
+    """Return the absorption coefficients (1/mm) at R, G, B of the medium that each light shines
+    into.
+    """
     found = [(-np.inf, CLEAR)] * len(places)
     if all(solid.absorption == CLEAR for solid in solids):
         return [CLEAR] * len(places)
@@ -341,7 +353,9 @@ def _lamp(model: LightModel) -> _Lamp:
 
 
 def _window(number: int, emitter: Emitter) -> Piece:
-    """The emitting face of a light, facing the way it shines; the same object for the same one."""
+    """Return the emitting face of a light, which faces its direction; equal lights share one
+    object.
+    """
     return _window_of(
         number, emitter.shape, emitter.size, emitter.position, emitter.direction, emitter.up
     )

@@ -18,7 +18,7 @@ from optisense.optics.scene.surfaces import CLEAR, Surface, SurfaceKind
 
 FLOATS_PER_SURFACE = 16
 """Number of floats of a surface in the table of optical data; four gathers of four floats read
-it."""
+them."""
 SMOOTH_ALPHA = 1e-3
 """GGX roughness below which a dielectric is treated as smooth."""
 MIN_DISC_COSINE = 0.1
@@ -34,11 +34,12 @@ def surface_table(surfaces: list[Surface]) -> mi.Float:
 
 
 def surface_rows(surfaces: list[Surface]) -> np.ndarray:
-    """(n, 16) float32: kind (as bits), eta, alpha, specularity | reflectance, region | metal
-    eta, light | metal k.
+    """Return the rows (n, 16) float32 of the table of optical data.
 
-    Of a dielectric: etas of the channels, in place of the reflectance, the absorption coefficients
-    inside and outside, in place of eta and k of a metal, and at last whether these are known.
+    The four groups of four floats are: kind (as bits), eta, alpha, specularity | reflectance,
+    region | metal eta, light | metal k. Dielectrics have the etas of the channels in place of the
+    reflectance, the absorption coefficients inside and outside in place of the metal's eta and k,
+    and in the last float a flag that these are known.
     """
     rows = np.zeros((len(surfaces), FLOATS_PER_SURFACE), dtype=np.float32)
     for row, surface in zip(rows, surfaces, strict=True):
@@ -57,11 +58,11 @@ def surface_rows(surfaces: list[Surface]) -> np.ndarray:
 
 @dataclass
 class CoatingBsdf:
-    """Opaque reflectance of hits: per-lane parameters of the blend.
+    """The reflectance of opaque surfaces at hits: per-lane parameters of the blend of two lobes.
 
-    ``metallic`` is False where it is known that no surface has a metallic lobe, which then is not
-    compiled into kernels. ``light_radius2`` is the squared angular radius (radians squared) of the
-    disc of light over which the metallic lobe is averaged; None for light of a single direction.
+    ``metallic`` is False if no surface has a metallic lobe, which is then not compiled into
+    kernels. ``light_radius2`` is the squared angular radius (radians squared) of the disc of light
+    over which the metallic lobe is averaged; None for light of a single direction.
     """
 
     reflectance: mi.Color3f
@@ -76,7 +77,7 @@ class CoatingBsdf:
 def surface_kind(
     table: mi.Float, surface: mi.UInt32, active: mi.Bool
 ) -> tuple[mi.UInt32, mi.Float, mi.Float]:
-    """kind, eta, alpha of surfaces."""
+    """Return the kind, eta and alpha of surfaces."""
     row = dr.gather(mi.Vector4f, table, surface * 4, active)
     return dr.reinterpret_array(mi.UInt32, row.x), row.y, row.z
 
@@ -84,15 +85,15 @@ def surface_kind(
 def channel_eta(
     table: mi.Float, surface: mi.UInt32, channel: mi.UInt32, active: mi.Bool
 ) -> mi.Float:
-    """eta of dielectrics for light of one channel, 0 to 2."""
+    """Return the eta of dielectrics for light of one channel, 0 to 2."""
     return dr.gather(mi.Float, table, surface * FLOATS_PER_SURFACE + 4 + channel, active)
 
 
 def media_absorption(
     table: mi.Float, surface: mi.UInt32, active: mi.Bool
 ) -> tuple[mi.Bool, mi.Color3f, mi.Color3f]:
-    """Whether the media of dielectrics are known, and what they absorb (per mm) in front of the
-    face normal and behind it.
+    """Return whether the media of dielectrics are known, and their absorption coefficients (1/mm)
+    in front of the face normal and behind it.
     """
     inside = dr.gather(mi.Vector4f, table, surface * 4 + 2, active)
     outside = dr.gather(mi.Vector4f, table, surface * 4 + 3, active)
@@ -101,14 +102,14 @@ def media_absorption(
 
 
 def surface_region(table: mi.Float, surface: mi.UInt32, active: mi.Bool) -> mi.UInt32:
-    """The region (sensing surface, indenter, other) of surfaces."""
+    """Return the region (sensing surface, indenter, other) of surfaces."""
     return dr.reinterpret_array(
         mi.UInt32, dr.gather(mi.Float, table, surface * FLOATS_PER_SURFACE + 7, active)
     )
 
 
 def surface_light(table: mi.Float, surface: mi.UInt32, active: mi.Bool) -> mi.UInt32:
-    """The number of the light whose emitting face a surface is."""
+    """Return the number of the light whose emitting face a surface is."""
     return dr.reinterpret_array(
         mi.UInt32, dr.gather(mi.Float, table, surface * FLOATS_PER_SURFACE + 11, active)
     )
@@ -117,7 +118,7 @@ def surface_light(table: mi.Float, surface: mi.UInt32, active: mi.Bool) -> mi.UI
 def coating_of(
     table: mi.Float, surface: mi.UInt32, active: mi.Bool, metallic: bool = True
 ) -> CoatingBsdf:
-    """The reflective parameters of surfaces."""
+    """Return the reflectance parameters of surfaces."""
     first = dr.gather(mi.Vector4f, table, surface * 4, active)
     base = dr.gather(mi.Vector4f, table, surface * 4 + 1, active)
     eta = dr.gather(mi.Vector4f, table, surface * 4 + 2, active)
@@ -133,18 +134,22 @@ def coating_of(
 
 
 def grey(colour: mi.Color3f) -> mi.Float:
-    """The mean of three channels. (``dr.mean`` writes the number of lanes into kernels.)"""
+    """Return the mean of three channels. (``dr.mean`` would make kernels depend on the number of
+    lanes.)
+    """
     return (colour.x + colour.y + colour.z) * (1 / 3)
 
 
 def albedo_of(coating: CoatingBsdf) -> mi.Color3f:
-    """About how much light the coating sends back, per channel (its metal at normal incidence)."""
+    """Return the approximate albedo of a coating per channel, with its metal at normal
+    incidence.
+    """
     metal = fresnel_metal(mi.Float(1), coating.metal_eta, coating.metal_k)
     return coating.reflectance * (1 - coating.specularity) + metal * coating.specularity
 
 
 def fresnel_metal(cosine: mi.Float, eta: mi.Color3f, k: mi.Color3f) -> mi.Color3f:
-    """Unpolarised Fresnel reflectance of a metal, per channel (Born & Wolf, 13.2)."""
+    """Return the unpolarised Fresnel reflectance of a metal, per channel (Born & Wolf, 13.2)."""
     cos2 = cosine * cosine
     sin2 = 1 - cos2
     eta2, k2 = eta * eta, k * k
@@ -206,10 +211,11 @@ def evaluate_coating(
     towards_eye: mi.Vector3f,
     reach: mi.Float | None = None,
 ) -> mi.Color3f:
-    """BSDF times the cosine at the light, for unit directions away from the surface; 0 below it.
+    """Return the BSDF times the cosine at the light, for unit directions away from the surface; 0
+    below it.
 
-    With ``reach``, the diffuse lobe's cosine is the mean over light whose cosines are spread evenly
-    so far to both sides, of which only what comes from above counts.
+    With ``reach``, the diffuse lobe's cosine is the mean over a uniform distribution of cosines of
+    this half-width; cosines below 0 count as 0.
     """
     cos_i = dr.dot(normal, towards_light)
     cos_o = dr.dot(normal, towards_eye)
@@ -244,7 +250,7 @@ def sample_coating(
     pick: mi.Float,
     sample: mi.Point2f,
 ) -> tuple[mi.Vector3f, mi.Color3f]:
-    """A scattered direction and its weight, for light that travels along ``incoming``."""
+    """Draw a scattered direction and its weight, for light that travels along ``incoming``."""
     frame = mi.Frame3f(normal)
     local = frame.to_local(-incoming)
     metallic = pick < coating.specularity
@@ -260,7 +266,7 @@ def sample_coating(
 
 
 def sample_ggx(local: mi.Vector3f, alpha: mi.Float, sample: mi.Point2f) -> mi.Vector3f:
-    """A visible GGX normal for a viewer at ``local`` (Heitz 2018, listing 1)."""
+    """Draw a visible GGX normal for a viewer in direction ``local`` (Heitz 2018, listing 1)."""
     stretched = dr.normalize(mi.Vector3f(alpha * local.x, alpha * local.y, local.z))
     length2 = stretched.x * stretched.x + stretched.y * stretched.y
     inverse = dr.select(length2 > 0, dr.rsqrt(dr.maximum(length2, 1e-20)), 0)
@@ -281,9 +287,10 @@ def sample_ggx(local: mi.Vector3f, alpha: mi.Float, sample: mi.Point2f) -> mi.Ve
 def refract(
     incoming: mi.Vector3f, normal: mi.Vector3f, eta: mi.Float
 ) -> tuple[mi.Float, mi.Vector3f, mi.Vector3f, mi.Float]:
-    """Ideal interface: reflectance, reflected direction, transmitted direction, relative index.
+    """Return reflectance, reflected direction, transmitted direction and relative index at an ideal
+    interface.
 
-    ``eta`` is the index behind the normal over the index before it. The relative index is that
+    ``eta`` is the index behind the normal over the index in front of it. The relative index is that
     of the far side over the near side. At total internal reflection the reflectance is 1.
     """
     cosine = -dr.dot(incoming, normal)
@@ -301,8 +308,8 @@ def sample_rough_interface(
     pick: mi.Float,
     sample: mi.Point2f,
 ) -> tuple[mi.Vector3f, mi.Float, mi.Bool, mi.Float]:
-    """Rough (GGX) interface: direction, weight, whether it was transmitted, and the relative
-    index.
+    """Draw a direction at a rough (GGX) interface; return it with its weight, whether it is
+    transmitted, and the relative index.
     """
     facing = normal * dr.sign(-dr.dot(incoming, normal))
     frame = mi.Frame3f(facing)

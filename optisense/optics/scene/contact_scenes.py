@@ -21,13 +21,14 @@ class ContactScenes:
     """Ray scenes of one image.
 
     Attributes:
-        full: everything, indenters or the deformed skin included.
+        full: all surfaces, including indenters or the deformed skin.
         fixed: the opaque surfaces without indenters.
-        indenters: the indenters alone, or the skin that they bend; None without contacts.
-        balls: a bounding ball around each of them; centre (3) and radius, four floats (mm) each.
-        convex: whether each of them is convex, so that none can shadow itself.
-        absorption: coefficient of the gel before the sensing surface, per mm and channel; None
-            where it is clear.
+        indenters: the indenters alone, or the part of the skin that they bend; None without
+            contacts.
+        balls: a bounding ball around each indenter; centre (3) and radius, four floats (mm) each.
+        convex: whether each indenter is convex and therefore cannot shadow itself.
+        absorption: absorption coefficient (1/mm, per channel) of the gel in front of the sensing
+            surface; None if it is clear.
     """
 
     full: RayScene
@@ -43,10 +44,10 @@ class SensorPieces:
     """The pieces of a sensor, to which contacts are added.
 
     Attributes:
-        pieces: nothing pressed in.
-        surfaces: those of the pieces, then the coating where indenters touch it, and where it is
-            bent beside them.
-        table: of these surfaces.
+        pieces: the pieces of the sensor without contacts.
+        surfaces: the surfaces of the pieces, then the coating where indenters touch it, and the
+            coating where it is bent beside them.
+        table: the table of these surfaces.
     """
 
     pieces: list[Piece]
@@ -54,7 +55,7 @@ class SensorPieces:
     table: mi.Float
 
     def with_indenters(self, placed: Sequence[TriangleMesh]) -> RayScene:
-        """The sensor and coated indenters; the surface that a ray meets first is the one seen."""
+        """Return the sensor with coated indenters; rays see the surface that they meet first."""
         count = len(self.pieces)
         pieces = [indenter_piece(mesh, self.surfaces[count]) for mesh in placed]
         numbers = [*range(count), *[count] * len(pieces)]
@@ -63,12 +64,12 @@ class SensorPieces:
     def with_skin(
         self, skin: SkinShapes, fixed: RayScene, absorption: mi.Color3f | None
     ) -> ContactScenes:
-        """The sensor with a deformed skin in the place of its sensing surface.
+        """Return the sensor with a deformed skin in place of its sensing surface.
 
         Args:
             skin: the deformed skin.
-            fixed: the opaque surfaces with nothing pressed in.
-            absorption: of the gel, as in `ContactScenes`.
+            fixed: the opaque surfaces without contacts.
+            absorption: absorption coefficient of the gel, as in `ContactScenes`.
         """
         others = [i for i, p in enumerate(self.pieces) if p.surface.region is not Region.SENSING]
         return ContactScenes(
@@ -86,7 +87,7 @@ class SensorPieces:
 
     @property
     def skin_surfaces(self) -> tuple[tuple[int, Surface], ...]:
-        """The surface of a deformed skin, and its number, in each `SkinState`."""
+        """Return, for each `SkinState`, the number and the surface of a deformed skin."""
         count = len(self.pieces)
         sensing = next(i for i, p in enumerate(self.pieces) if p.surface.region is Region.SENSING)
         numbers = {
@@ -99,12 +100,13 @@ class SensorPieces:
 
 @dataclass(frozen=True)
 class SkinShapes:
-    """A deformed skin, made ready for ray tracing. It depends on no other part of the sensor.
+    """A deformed skin prepared for ray tracing, independent of the other parts of the sensor.
 
     Attributes:
-        pieces: its parts, one for each state that there is.
-        numbers: their surfaces' numbers.
-        raised: the parts that are touched or bent; None without any. It has no table of its own.
+        pieces: its pieces, one for each state that occurs.
+        numbers: the numbers of their surfaces.
+        raised: the scene of the pieces that are touched or bent; None if there are none. It has no
+            table of its own.
         balls: a bounding ball around each contact, as in `ContactScenes`.
     """
 
@@ -121,8 +123,8 @@ class SkinShapes:
 
         Args:
             mesh: the deformed skin.
-            pressed: what deforms it.
-            surfaces: those of each state (`SensorPieces.skin_surfaces`).
+            pressed: the contacts that deform it.
+            surfaces: number and surface for each state (`SensorPieces.skin_surfaces`).
         """
         skin = {}
         for state, (_, surface) in zip(SkinState, surfaces, strict=True):
@@ -141,13 +143,13 @@ class SkinShapes:
 
 
 def bounding_ball(points: NDArray[np.floating]) -> NDArray[np.float64]:
-    """(4,) centre and radius of a ball around points (n, 3)."""
+    """Return the centre and radius (4,), mm, of a ball around points (n, 3)."""
     centre = (points.min(axis=0) + points.max(axis=0)) / 2.0
     return np.append(centre, np.linalg.norm(points - centre, axis=1).max())
 
 
 def _balls(raised: TriangleMesh | None, pressed: PressedSkin) -> NDArray[np.float64]:
-    """A ball around the raised skin that is nearest to each contact."""
+    """Return a ball for each contact around the raised skin that is nearest to it."""
     if raised is None:
         return np.zeros((0, 4))
     points = raised.vertices

@@ -1,9 +1,10 @@
-"""Light sources that emit photons: where they sit, how large they are, and how they radiate.
+"""Light sources that emit photons: their positions, sizes and angular profiles.
 
 A light is a rectangle, a disc or a point with an angular profile that is rotationally exact: a
-power of the cosine (1 is Lambertian), or a table of radiant intensity over true angles (IES,
-spot). Emission is importance sampled so that every photon carries the same power; a *guide*
-(see ``guide.py``) may redistribute photons towards what matters.
+power of the cosine (1 is Lambertian), or a table of radiant intensity over true angles (IES, spot).
+Emission is importance sampled so that every photon carries the same power; a *guide* (see
+``emission_guide.py``) may send more photons in directions from which they arrive at the sensing
+surface.
 """
 
 from __future__ import annotations
@@ -23,11 +24,11 @@ from optisense.optics.scene.surfaces import CLEAR, RAY_OFFSET, RGB
 FloatArray = NDArray[np.floating]
 
 POLAR_CELLS = 512
-"""Polar cells of a tabulated profile; they hold less power towards the rim."""
+"""Number of polar cells of a tabulated profile; cells towards the rim hold less power."""
 AZIMUTH_CELLS = 128
-"""Azimuthal cells of each polar cell, all of equal power."""
+"""Number of azimuthal cells of each polar cell, all of equal power."""
 FLOATS_PER_EMITTER = 20
-"""Number of floats of a light in the emitter table; five gathers of four floats read it."""
+"""Number of floats of a light in the emitter table; five gathers of four floats read them."""
 
 
 class EmitterShape(IntEnum):
@@ -40,11 +41,19 @@ class EmitterShape(IntEnum):
 
 @dataclass(frozen=True)
 class Emitter:
-    """One light. Lengths mm; ``direction`` and ``up`` need not be unit vectors; size is (width,
-    height).
+    """One light.
 
-    ``exponent`` is the power of the cosine of a profile without a table, and ``absorption`` the
-    coefficient (per mm, at R, G, B) of the medium that it shines into.
+    Attributes:
+        group: number of its light group.
+        position: position, mm.
+        direction: direction of the profile's axis, of any length.
+        up: direction of the face's height axis, of any length.
+        shape: outline of the emitting face.
+        size: width and height of the emitting face, mm.
+        exponent: power of the cosine of a profile without a table (1 is Lambertian).
+        intensity: table of the angular profile; None for a power of the cosine.
+        absorption: absorption coefficient (1/mm, at R, G, B) of the medium that the light shines
+            into.
     """
 
     group: int
@@ -59,7 +68,7 @@ class Emitter:
 
     @property
     def area(self) -> float:
-        """mm^2 of the emitting face, 0 for a point."""
+        """Area (mm^2) of the emitting face, 0 for a point."""
         filled = {
             EmitterShape.POINT: 0.0,
             EmitterShape.RECTANGLE: 1.0,
@@ -69,7 +78,7 @@ class Emitter:
 
     @property
     def frame(self) -> FloatArray:
-        """(3, 3): width axis, height axis, direction as rows."""
+        """Return the unit vectors (3, 3) of width axis, height axis and direction, as rows."""
         return frame_of(self.direction, self.up)
 
 
@@ -77,7 +86,10 @@ class Emitter:
 def frame_of(
     direction: tuple[float, float, float], up: tuple[float, float, float] | None
 ) -> FloatArray:
-    """(3, 3): width axis, height axis and direction of a light, as rows; not to be changed."""
+    """Return the unit vectors (3, 3) of width axis, height axis and direction of a light, as rows.
+
+    The array is shared between calls and must not be changed.
+    """
     n = np.asarray(direction, float)
     n = n / np.linalg.norm(n)
     s = np.cross(np.asarray(up if up is not None else (0.0, 0.0, 1.0), float), n)
@@ -91,8 +103,10 @@ def frame_of(
 
 @dataclass
 class EmitterTable:
-    """All lights on the device: ``rows`` of `FLOATS_PER_EMITTER` floats, and inverse profile
-    tables; ``absorption`` holds three floats a light.
+    """All lights on the device.
+
+    ``rows`` holds `FLOATS_PER_EMITTER` floats per light, ``polar`` and ``azimuth`` the inverse
+    tables of the profiles, and ``absorption`` three floats per light (1/mm at R, G, B).
     """
 
     count: int
@@ -105,11 +119,15 @@ class EmitterTable:
 
 
 def inverse_tables(intensity: Intensity) -> tuple[FloatArray, FloatArray]:
-    """Cosines at the borders of cells (POLAR_CELLS+1,), and azimuths / 2 pi (POLAR_CELLS,
-    AZIMUTH_CELLS+1).
+    """Return the inverse tables of an angular profile.
+
+    Returns:
+        Cosines (POLAR_CELLS + 1,) at the borders of the polar cells, and azimuths divided by 2 pi
+        (POLAR_CELLS, AZIMUTH_CELLS + 1) at the borders of the azimuthal cells.
     """
     fine = 8192
-    # Cells are even in angle near the axis, where narrow beams live, and exact in solid angle.
+    # Cells are evenly spaced in angle, which resolves narrow beams near the axis, and weighted with
+    # their exact solid angle.
     angles = np.linspace(0.0, np.radians(intensity.polar[-1]), fine + 1)
     edges = np.cos(angles)
     middle = np.degrees(0.5 * (angles[1:] + angles[:-1]))
@@ -127,7 +145,7 @@ def inverse_tables(intensity: Intensity) -> tuple[FloatArray, FloatArray]:
     power = np.concatenate([[0.0], np.cumsum(ring * -np.diff(edges))])
     power /= power[-1]
     keep = np.concatenate([[True], np.diff(power) > 0])
-    # Cells get smaller towards the rim, where intensity falls to nothing.
+    # Cells get smaller towards the rim, where the intensity falls to zero.
     share = 1 - (1 - np.linspace(0, 1, POLAR_CELLS + 1)) ** 2
     cosines = np.interp(share, power[keep], edges[keep])
     steps = np.linspace(0.0, 1.0, AZIMUTH_CELLS + 1)
@@ -143,7 +161,7 @@ def inverse_tables(intensity: Intensity) -> tuple[FloatArray, FloatArray]:
 
 
 def emitter_table(emitters: list[Emitter], groups: int) -> EmitterTable:
-    """Put lights on the device; lights that share an intensity table share its inverse."""
+    """Copy lights to the device; lights that share an intensity table share its inverse."""
     rows = np.zeros((len(emitters), FLOATS_PER_EMITTER), dtype=np.float32)
     profiles: dict[int, int] = {}
     polar: list[FloatArray] = []
@@ -179,8 +197,8 @@ def emitter_table(emitters: list[Emitter], groups: int) -> EmitterTable:
 def profile_direction(
     table: EmitterTable, profile: mi.UInt32, exponent: mi.Float, sample: mi.Point2f
 ) -> mi.Vector3f:
-    """Local direction (axis = +z) of equal-power samples; ``profile`` 0 is a power of the
-    cosine.
+    """Return local directions (axis along +z) of samples of equal power; ``profile`` 0 is a power
+    of the cosine.
     """
     tabulated = profile > 0
     base = dr.maximum(profile, 1) - 1
@@ -209,9 +227,9 @@ def profile_direction(
 def emit(
     table: EmitterTable, light: mi.UInt32, angle: mi.Point2f, place: mi.Point2f
 ) -> tuple[mi.Point3f, mi.Vector3f, mi.UInt32]:
-    """Start, unit direction and light group of photons of equal power.
+    """Return origin (mm), unit direction and light group of photons of equal power.
 
-    ``light`` is the number of the light, ``angle`` and ``place`` points in the unit square.
+    ``light`` is the number of the light; ``angle`` and ``place`` are points in the unit square.
     """
     a = dr.gather(mi.Vector4f, table.rows, light * 5)
     b = dr.gather(mi.Vector4f, table.rows, light * 5 + 1)

@@ -18,7 +18,7 @@ class FineScene(NamedTuple):
     Attributes:
         pieces: its pieces.
         scene: the ray scene.
-        sensing_faces: for each triangle of the scene the number of that of the sensing surface,
+        sensing_faces: number of the triangle of the sensing surface for each triangle of the scene,
             or -1.
     """
 
@@ -28,7 +28,7 @@ class FineScene(NamedTuple):
 
 
 def fine_scene(pieces: list[Piece], table: mi.Float) -> FineScene:
-    """The scene of pieces, whose surfaces ``table`` holds in the same order."""
+    """Return the scene of pieces whose surfaces ``table`` holds in the same order."""
     numbers, start = [], 0
     for piece in pieces:
         count = len(piece.faces)

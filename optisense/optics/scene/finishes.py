@@ -1,7 +1,7 @@
 """Frosted and painted faces of transparent solids.
 
-Paint is a sheet that lies on the solid, as the coating does. Frost divides interfaces: what of one
-lies on frosted faces is rough, and the rest stays as it is.
+Paint is a sheet that lies on the solid, like the coating. Frost divides interfaces: the part on
+frosted faces is rough, and the rest does not change.
 """
 
 from __future__ import annotations
@@ -24,8 +24,8 @@ class Frost:
     """Faces of a solid with a roughness of their own.
 
     Attributes:
-        name: part and faces.
-        solid: the part.
+        name: name of the part and of its faces.
+        solid: name of the part.
         mesh: the faces, mm.
         roughness: GGX alpha.
     """
@@ -41,9 +41,9 @@ class Paint:
     """Opaque paint on faces of a solid.
 
     Attributes:
-        sheet: the paint; its normals look into the solid.
-        solid: the part.
-        material: the paint's, in the design.
+        sheet: the paint; its normals point into the solid.
+        solid: name of the part.
+        material: name of the paint's material in the design.
     """
 
     sheet: Sheet
@@ -53,12 +53,12 @@ class Paint:
 
 @dataclass
 class MadeBefore:
-    """Shapes by what they were made of; meshes are recognised by identity."""
+    """Cache of shapes by their inputs; meshes are recognised by identity."""
 
     made: list[tuple[tuple[Any, ...], Any]] = field(default_factory=list)
 
     def once(self, before: MadeBefore, key: tuple[Any, ...], make: Callable[[], Any]) -> Any:
-        """The result of ``make``, kept for further calls with the same key."""
+        """Return the result of ``make``, which is kept for further calls with the same key."""
         known = next((value for old, value in before.made if old == key), None)
         self.made.append((key, make() if known is None else known))
         return self.made[-1][1]
@@ -71,17 +71,18 @@ def finishes_of(
     kept: MadeBefore,
     before: MadeBefore,
 ) -> tuple[list[Frost], list[Paint]]:
-    """The frosted and the painted faces of a design.
+    """Return the frosted and the painted faces of a design.
 
     Args:
         design: the sensor.
         meshes: its parts in their current shape.
         sheets: the opaque parts, which cover paint and frost where they lie on the same faces.
-        kept: collects the shapes.
-        before: those of a similar design.
+        kept: cache to which the shapes are added.
+        before: cache of a similar design, whose shapes are reused.
 
     Raises:
-        DesignError: no triangle is as the design says, or a sheet covers all that are.
+        DesignError: no triangle matches the design's description of the faces, or a sheet covers
+            all that do.
     """
     frosts: list[Frost] = []
     paints: list[Paint] = []
@@ -130,12 +131,12 @@ def frosted(
     kept: MadeBefore,
     before: MadeBefore,
 ) -> Iterator[tuple[str, Interface]]:
-    """An interface in pieces: what lies on frosted faces, and the rest.
+    """Divide an interface into the parts on frosted faces, and the rest.
 
     Where a frosted face touches another solid, the rougher of both counts.
 
     Yields:
-        The name of the frost, empty for none, and the piece.
+        The name of the frost (empty for none) and the part of the interface.
     """
     own = [frost for frost in frosts if frost.solid in interface.names]
     if not own:

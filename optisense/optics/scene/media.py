@@ -1,7 +1,8 @@
 """The optical media on both sides of each face of touching, nested solids.
 
-A user brings closed solids (gel, acrylic, a film of air) that touch, nest or overlap; a renderer
-needs each boundary once, with the medium before and behind it. The way there:
+A design has closed solids (gel, acrylic, a film of air) that touch, nest or overlap; a renderer
+needs each boundary once, with the media in front of and behind it. The boundaries are resolved in
+three steps:
 
 1. Where solids overlap, the one of higher priority keeps the place and is cut out of the other
    (the priorities of Schmidt and Budge, "Simple nested dielectrics in ray traced images",
@@ -31,15 +32,16 @@ from optisense.geometry.mesh import TriangleMesh
 from optisense.optics.scene.solids import AROUND, Interface, Sheet, Solid
 
 COINCIDENCE_TOLERANCE = 0.002
-"""Faces closer than this (mm) touch; overlaps thinner than this are contacts. A gap that is
-meant (a film of air) must be wider."""
+"""Distance (mm) below which faces touch, and thickness below which an overlap is a contact. An
+intended gap (a film of air) must be wider."""
 
 CUT_CLEARANCE = 2e-5
-"""A solid is cut out with this much room (mm): more than rounding, far less than a contact."""
+"""Clearance (mm) with which a solid is cut out of another: more than rounding, far less than a
+contact."""
 
 BENT_TOLERANCE = 0.02
-"""mm that surfaces which touch may come apart while they bend: triangles of two tessellations
-differ by less over one shape."""
+"""Largest distance (mm) by which touching surfaces may separate while they bend: triangles of two
+tessellations of one shape differ by less."""
 
 
 def resolve_media(
@@ -52,11 +54,11 @@ def resolve_media(
     Args:
         solids: closed parts; they may touch with any tessellation, nest and overlap.
         sheets: opaque surfaces; solid faces that lie on one are left out.
-        tolerance: mm; faces closer than this touch.
+        tolerance: distance (mm) below which faces touch.
 
     Returns:
-        One interface a pair of touching solids and one for what of each solid meets the air,
-        save between equal refractive indices.
+        One interface for each pair of touching solids, and one for the part of each solid that
+        borders on air; none between equal refractive indices.
 
     Raises:
         MeshError: a mesh is not closed or cuts through itself.
@@ -66,19 +68,19 @@ def resolve_media(
 
 
 class Bending:
-    """Interfaces and sheets as points of the solids that they are on."""
+    """The positions of interfaces and sheets relative to the solids that they lie on."""
 
     def __init__(
         self, solids: Sequence[Solid], sheets: Sequence[Sheet], faces: Sequence[Interface]
     ) -> None:
-        """Of resolved media, before anything bends."""
+        """Record the positions for resolved media, before any solid bends."""
         self._solids = {solid.name: solid for solid in solids}
         self._sheets = {sheet.name: sheet for sheet in sheets}
         self._faces = list(faces)
         self._found: dict[tuple[int, str], tuple[Anchors, NDArray[np.bool_]]] = {}
 
     def bent(self, solids: Sequence[Solid], sheets: Sequence[Sheet]) -> list[Interface] | None:
-        """The interfaces of solids that have bent; see `Media.bend`."""
+        """Return the interfaces of solids that have bent; see `Media.bend`."""
         new = {solid.name: solid for solid in solids}
         skins = {sheet.name: sheet for sheet in sheets}
         if list(new) != list(self._solids) or skins.keys() != self._sheets.keys():
@@ -109,7 +111,7 @@ class Bending:
             if np.abs(places[0] - places[-1]).max(initial=0.0) > BENT_TOLERANCE:
                 return None
             if all(new[name].mesh is self._solids[name].mesh for name in face.names):
-                result.append(face)  # with all that is known of its mesh
+                result.append(face)  # the same mesh, with its cached properties
             else:
                 result.append(replace(face, mesh=face.mesh.with_vertices(places[0])))
         return result
@@ -124,11 +126,11 @@ class Bending:
 
 
 class Media:
-    """The resolved boundaries of solids and sheets, which knows whether others give the same.
+    """The resolved boundaries of solids and sheets.
 
     Attributes:
-        interfaces: as `resolve_media` returns them.
-        bent: whether they were taken along with solids that bend; see `bend`.
+        interfaces: the interfaces, as `resolve_media` returns them.
+        bent: whether the interfaces were moved along with solids that bend; see `bend`.
     """
 
     def __init__(
@@ -137,7 +139,7 @@ class Media:
         sheets: Sequence[Sheet] = (),
         tolerance: float = COINCIDENCE_TOLERANCE,
     ) -> None:
-        """Resolve; arguments and errors are those of `resolve_media`."""
+        """Resolve the boundaries; arguments and errors are those of `resolve_media`."""
         self._solids = list(solids)
         self._tolerance = tolerance
         closed = [replace(s, mesh=s.mesh.validate(s.name, closed=True)) for s in solids]
@@ -164,7 +166,7 @@ class Media:
             pieces = cut(solid.mesh, overlays)[len(sheets) :]
             neighbours = [solids[j] if j > i else None for j in partners]
             for piece, neighbour in zip(pieces[:-1], neighbours, strict=True):
-                if neighbour is not None:  # each contact once, from the solid that comes first
+                if neighbour is not None:  # each contact once, from its first solid
                     interfaces.append(_interface(piece, solid, neighbour))
             interfaces.append(_interface(pieces[-1], solid, None))
         self._lying = [sheet for sheet, lies in zip(sheets, lying, strict=True) if lies]
@@ -172,10 +174,11 @@ class Media:
         return interfaces
 
     def holds_for(self, solids: Sequence[Solid], sheets: Sequence[Sheet]) -> bool:
-        """Whether these have the same interfaces, as far as can be told without resolving them.
+        """Return whether other solids and sheets certainly have the same interfaces.
 
-        So it is with the very same solids, when all sheets that lie on one are the same and
-        any others (a mirror in the open, say) touch none.
+        This is the case if the solids are the same objects, the sheets that lie on a solid are the
+        same, and any other sheets (such as a mirror in air) touch no solid. It is decided without
+        resolving the media.
         """
         if self.bent or list(solids) != self._solids:
             return False
@@ -190,10 +193,10 @@ class Media:
         )
 
     def bend(self, solids: Sequence[Solid], sheets: Sequence[Sheet]) -> Media | None:
-        """The same boundaries on solids that have bent, each taken along by the faces it is on.
+        """Return the same boundaries on solids that have bent, each moved along with its faces.
 
-        It is not noticed where solids touch or overlap that did not before. None where other
-        things than places have changed, or where what touched has come apart.
+        New contacts or overlaps between solids are not detected. The result is None if anything but
+        positions has changed, or if touching surfaces have separated.
         """
         if self._bending is None:
             self._bending = Bending(self._solids, [*self._lying, *self._loose], self._faces)
@@ -235,14 +238,18 @@ def _interface(mesh: TriangleMesh, solid: Solid, neighbour: Solid | None) -> Int
 
 
 def same_faces(one: TriangleMesh, other: TriangleMesh) -> bool:
-    """Whether meshes have the same triangles, wherever their vertices are."""
+    """Return whether meshes have the same triangles, regardless of the positions of their
+    vertices.
+    """
     return one is other or (
         len(one.vertices) == len(other.vertices) and np.array_equal(one.faces, other.faces)
     )
 
 
 def _refracts(interface: Interface) -> bool:
-    """Whether light notices an interface: its index changes there, or what absorbs it."""
+    """Return whether an interface affects light: whether the index or the absorption changes
+    there.
+    """
     step = abs(interface.ior_inside - interface.ior_outside)
     if interface.etas is not None:
         step = max(step, *(abs(eta - 1.0) for eta in interface.etas))
@@ -251,7 +258,7 @@ def _refracts(interface: Interface) -> bool:
 
 
 def _contacts(solids: list[Solid], tolerance: float) -> dict[tuple[int, int], Overlay]:
-    """Faces that lie against each other, both ways round."""
+    """Return the faces of each solid that lie against another one, for both orders of each pair."""
     contacts = {}
     for i, j in combinations(range(len(solids)), 2):
         overlay = find_coincident(solids[i].mesh, solids[j].mesh, tolerance, facing=True)
@@ -267,7 +274,7 @@ def _disjoint(solids: list[Solid], tolerance: float) -> list[Solid]:
     for i, j in combinations(range(len(solids)), 2):
         if not boxes_overlap(result[i].mesh, result[j].mesh, tolerance):
             continue
-        # Where faces lie on one another a cut takes ten times as long; a little room parts them.
+        # A cut along coincident faces takes ten times as long; a small clearance separates them.
         smaller = _manifold(_grown(result[j], -CUT_CLEARANCE))
         place = thick_place(_manifold(result[i]) ^ smaller, tolerance - CUT_CLEARANCE)
         if place is None:
@@ -287,17 +294,19 @@ def _disjoint(solids: list[Solid], tolerance: float) -> list[Solid]:
 
 
 def _alike(one: Solid, other: Solid) -> bool:
-    """Whether light does not notice which of two media it is in."""
+    """Return whether two media are optically equal."""
     same_index = all(abs(one.index(k) - other.index(k)) <= EQUAL_INDEX for k in range(3))
     return same_index and one.absorption == other.absorption
 
 
 def _grown(solid: Solid, room: float) -> Solid:
-    """Larger by so many mm all round, so that faces in one plane up to rounding are cut cleanly."""
+    """Return a solid grown by ``room`` (mm), so that faces that are coplanar up to rounding are cut
+    cleanly.
+    """
     mesh = solid.mesh.welded()
     normal = mesh.face_normals
     sums, rights = np.zeros((len(mesh.vertices), 3, 3)), np.zeros((len(mesh.vertices), 3))
-    for corner in mesh.faces.T:  # each vertex moves by the same step off all of its faces
+    for corner in mesh.faces.T:  # each vertex moves by the same distance off all of its faces
         np.add.at(sums, corner, normal[:, :, None] * normal[:, None])
         np.add.at(rights, corner, normal)
     step = np.linalg.solve(sums + 1e-3 * np.eye(3), rights[:, :, None])[:, :, 0]

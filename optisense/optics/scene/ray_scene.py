@@ -29,15 +29,20 @@ SMOOTH_FACE = 1 << 16
 """Bit in a face's record that marks interpolated normals."""
 
 SAME_WAY = 1e-4
-"""Flat facets whose unit normals agree to about this (0.006 degrees) are one plane to rays."""
+"""Largest difference of the unit normals of flat facets (0.006 degrees) that form one plane for
+rays."""
 
 
 @dataclass(frozen=True)
 class Piece:
     """A triangle mesh with one surface.
 
-    vertices (n, 3) mm, faces (m, 3), corner normals (n, 3) or None for flat facets. Face
-    normals point to the outside of a dielectric.
+    Attributes:
+        name: name of the part.
+        vertices: (n, 3) mm.
+        faces: (m, 3) indices of vertices; face normals point to the outside of a dielectric.
+        surface: optical data of the surface.
+        normals: (n, 3) shading normals at the vertices; None for flat facets.
     """
 
     name: str
@@ -48,19 +53,23 @@ class Piece:
 
     @cached_property
     def rows(self) -> NDArray[np.float32]:
-        """(m, 4) unit normals, and room for the surface's number."""
+        """Return rows (m, 4): the unit normal of each face, and a place for the surface's
+        number.
+        """
         a, b, c = (self.vertices[self.faces[:, i]] for i in range(3))
         cross = np.cross(b - a, c - a)
         length = np.linalg.norm(cross, axis=1)
-        # A triangle without area is never hit; it keeps its place so that numbers stay those of
-        # the piece.
+        # A triangle without area is never hit; it keeps its row, so that triangles keep their
+        # numbers.
         rows = np.zeros((len(self.faces), 4), dtype=np.float32)
         rows[:, :3] = cross / np.where(length > 0, length, 1.0)[:, None]
         return rows
 
     @cached_property
     def corners(self) -> NDArray[np.float32]:
-        """(m, 3, 4) corner normals, on the side of the face normal, and padding."""
+        """Return the corner normals (m, 3, 4) on the side of the face normal, padded to four
+        floats.
+        """
         corners = np.zeros((len(self.faces), 3, 4), dtype=np.float32)
         if self.normals is not None:
             corners[:, :, :3] = self.normals[self.faces]
@@ -70,8 +79,10 @@ class Piece:
 
     @cached_property
     def patches(self) -> NDArray[np.int64]:
-        """(m,) the number of the smooth patch that each triangle belongs to, from 0: triangles
-        that share vertices and their normals, or, of flat facets, those that face the same way.
+        """Return the number (m,), from 0, of the smooth patch that each triangle belongs to.
+
+        A patch consists of triangles that share vertices and their normals or, for flat facets, of
+        triangles with the same normal.
         """
         if self.normals is None:
             way = np.round(self.rows[:, :3] / SAME_WAY).astype(np.int64)
@@ -86,17 +97,17 @@ class Piece:
 
 @dataclass
 class Ray:
-    """Rays on their way.
+    """Rays that are traced.
 
     Attributes:
-        origin: mm.
+        origin: origin, mm.
         direction: unit vector.
-        active: which of them are followed.
+        active: mask of the rays that are followed.
         depth: number of surfaces that they have met.
-        absorption: coefficient (per mm, per channel) of the medium that they are in, where the
-            scene absorbs.
-        channel: of the light, 0 to 2 for R, G, B; None for light of all channels, which has the
-            mean index.
+        absorption: absorption coefficient (1/mm, per channel) of the medium that they are in; None
+            in a scene without absorption.
+        channel: channel of the light, 0 to 2 for R, G, B; None for light of all channels, which has
+            the mean index.
     """
 
     origin: mi.Point3f
@@ -111,7 +122,14 @@ class Ray:
 class SurfaceHit:
     """Intersections of rays with a surface.
 
-    ``normal`` is the face normal, ``shading_normal`` the smooth one.
+    Attributes:
+        valid: mask of the rays that hit a surface.
+        distance: distance (mm) along the ray.
+        point: point of intersection, mm.
+        normal: unit face normal.
+        shading_normal: unit normal, interpolated on smooth surfaces.
+        surface: number of the surface.
+        face: number of the triangle in the scene.
     """
 
     valid: mi.Bool
@@ -126,9 +144,9 @@ class SurfaceHit:
 class RayScene:
     """A merged mesh for ray tracing, with its tables on the device.
 
-    ``rows`` holds four floats a face: the normal, and surface number (with ``SMOOTH_FACE`` set
-    where the shading normal varies) as bits; ``corners`` twelve floats a face: three corner
-    normals, padded to four.
+    ``rows`` holds four floats per face: the normal, and as bits the surface's number (with
+    ``SMOOTH_FACE`` set where the shading normal varies). ``corners`` holds twelve floats per face:
+    three corner normals, padded to four floats.
     """
 
     def __init__(
@@ -140,9 +158,14 @@ class RayScene:
     ) -> None:
         """Build the mesh and its acceleration structure.
 
-        Several scenes of one sensor share a ``table`` (see ``surface_table``); ``numbers`` then
-        says which of its surfaces each piece has. By default a scene numbers its own. In a
-        ``robust`` one no ray slips through between two triangles, which takes a little longer.
+        Args:
+            pieces: the meshes.
+            numbers: the number in ``table`` of each piece's surface; in the order of the pieces if
+                None.
+            table: the table of surfaces (see ``surface_table``) that several scenes of one sensor
+                share; built from the pieces if None.
+            robust: whether no ray may pass between two adjacent triangles, which takes a little
+                longer.
         """
         self.pieces = pieces
         surfaces = [piece.surface for piece in pieces]
@@ -171,7 +194,9 @@ class RayScene:
 
     @property
     def channels(self) -> tuple[int | None, ...]:
-        """The channels that have rays of their own; None stands for all that share theirs."""
+        """The channels that need separate rays; None stands for all channels that share their
+        rays.
+        """
         return (0, 1, 2) if self.dispersive else (None,)
 
     @cached_property
@@ -184,17 +209,17 @@ class RayScene:
         return indices(np.concatenate(numbers))
 
     def with_table(self, table: mi.Float) -> RayScene:
-        """The same triangles with other optical data."""
+        """Return a scene of the same triangles with other optical data."""
         other = copy(self)
         other.table = table
         return other
 
     def intersect(self, ray: Ray, coherent: bool = False) -> SurfaceHit:
-        """First hit along rays, with normals; symbolic loops may call it.
+        """Return the first hits along rays, with normals; symbolic loops may call it.
 
         Args:
             ray: the rays.
-            coherent: whether those of neighbouring lanes are alike, which saves time.
+            coherent: whether rays of neighbouring lanes are similar, which saves time.
         """
         origin, direction = ray.origin, ray.direction
         found = self.scene.ray_intersect_preliminary(
@@ -222,7 +247,9 @@ class RayScene:
 
 
 def leave(point: mi.Point3f, normal: mi.Vector3f, direction: mi.Vector3f) -> mi.Point3f:
-    """Start of a ray from a surface: moved off it to the side that ``direction`` points to."""
+    """Return the origin of a ray that leaves a surface, `RAY_OFFSET` off it on the side that
+    ``direction`` points to.
+    """
     side = dr.select(dr.dot(direction, normal) > 0, RAY_OFFSET, -RAY_OFFSET)
     return mi.Point3f(point + normal * side)
 

@@ -1,4 +1,4 @@
-"""The ray scenes of one sensor: the whole, parts of it, and with contacts pressed in."""
+"""The ray scenes of one sensor: complete, in part, and with contacts."""
 
 from __future__ import annotations
 
@@ -28,15 +28,15 @@ from optisense.optics.scene.surfaces import Region, Surface, SurfaceKind, is_col
 PILOT_COATING = Surface(
     SurfaceKind.OPAQUE, alpha=1.0, reflectance=(0.5,) * 3, region=Region.SENSING
 )
-"""The coating that pilot photons meet, whichever the sensor has: grey and diffuse, and neither so
-dark that scattered light would be missing nor so bright that it would prevail."""
+"""The coating that pilot photons meet, regardless of the sensor's own: grey and diffuse, neither so
+dark that scattered light would be missing nor so bright that it would dominate."""
 
 
 class _Shapes:
-    """The ray scenes of an assembly's shapes, each built when it is first asked for.
+    """The ray scenes of an assembly's shapes, each built on first use.
 
-    Their tables of surfaces are those of the first coating; who uses a scene gives it the table of
-    the coating that is meant (`RayScene.with_table`), which copies no shape.
+    Their tables of surfaces are those of the first coating. For another coating, a scene is given
+    another table (`RayScene.with_table`), which copies no shape.
     """
 
     def __init__(self, assembly: Assembly, table: mi.Float, before: _Shapes | None) -> None:
@@ -49,7 +49,7 @@ class _Shapes:
             and before._opaque_numbers == numbers
             and all(a is b for a, b in zip(before.opaque, self.opaque, strict=True))
         )
-        # Scenes that depend on no other shapes are handed on from sensor to sensor.
+        # Scenes of unchanged shapes are passed on from sensor to sensor.
         self.fixed: Callable[[], RayScene]
         self.indenters: Callable[[int, tuple[TriangleMesh, ...]], RayScene]
         self.skin: Callable[[SkinMesh, PressedSkin, tuple[tuple[int, Surface], ...]], SkinShapes]
@@ -79,15 +79,17 @@ class _Shapes:
 
 
 class SensorScenes:
-    """A sensor's surfaces and lights as rays meet them. It never changes: a sensor with another
-    coating has another object (`coated`), which shares the shapes.
+    """A sensor's surfaces and lights, prepared for ray tracing.
+
+    An object never changes: a sensor with another coating is another object (`coated`), which
+    shares the shapes.
 
     Attributes:
         assembly: the surfaces, lights and media.
-        surfaces: those of the assembly's pieces, then the coating where indenters touch it, and
-            where it is bent beside them.
-        table: of these surfaces, on the device.
-        coloured: whether any of them is coloured.
+        surfaces: the surfaces of the assembly's pieces, then the coating where indenters touch it,
+            and the coating where it is bent beside them.
+        table: the table of these surfaces, on the device.
+        coloured: whether any of the surfaces is coloured.
         roughness: GGX alpha of the sharpest metallic lobe; None without metal.
     """
 
@@ -96,12 +98,12 @@ class SensorScenes:
     def __init__(
         self, assembly: Assembly, coating: CoatingModel, before: SensorScenes | None = None
     ) -> None:
-        """Prepare the scenes, of which each is built when it is first asked for.
+        """Prepare the scenes; each is built on first use.
 
         Args:
-            assembly: of the design.
-            coating: of its sensing surface.
-            before: the scenes of a similar design, from which those of the same shapes are taken.
+            assembly: the assembly of the design.
+            coating: the coating of its sensing surface.
+            before: the scenes of a similar design; those of unchanged shapes are reused.
         """
         self.assembly = assembly
         self.surfaces = [
@@ -127,28 +129,31 @@ class SensorScenes:
         self._shapes = known if known and same else _Shapes(assembly, self.table, known)
 
     def coated(self, coating: CoatingModel) -> SensorScenes:
-        """The same sensor with another coating."""
+        """Return the same sensor with another coating."""
         return SensorScenes(self.assembly, coating, self)
 
     @property
     def pieces(self) -> list[Piece]:
-        """All fixed surfaces; flat faces in as few triangles as will do."""
+        """All fixed surfaces; flat faces are merged into few triangles."""
         return self.assembly.pieces
 
     @property
     def opaque(self) -> list[Piece]:
-        """The opaque ones of them."""
+        """The opaque pieces."""
         return self._shapes.opaque
 
     @cached_property
     def full(self) -> RayScene:
-        """All that light meets in the sensor, nothing pressed in."""
+        """All surfaces of the sensor without contacts."""
         return self._shapes.full.with_table(self.table)
 
     @cached_property
     def watched(self) -> RayScene:
-        """The same for the camera: a ray that slips through is a black pixel, while of photons it
-        is one in millions, and they take a third longer where none does."""
+        """All surfaces of the sensor without contacts, in a robust scene for camera rays.
+
+        A camera ray that passes between two triangles gives a black pixel. For photons the effect
+        is one in millions, and a robust scene would take a third longer.
+        """
         return self._shapes.watched.with_table(self.table)
 
     @cached_property
@@ -185,20 +190,20 @@ class SensorScenes:
         return emitter_table(self.assembly.emitters, len(self.assembly.groups))
 
     def with_indenters(self, placed: Sequence[TriangleMesh]) -> RayScene:
-        """The sensor with every triangle of its sensing surface, and coated indenters.
+        """Return the sensor with every triangle of its sensing surface, and coated indenters.
 
         Args:
-            placed: their meshes, in the design's frame.
+            placed: meshes of the indenters in the design's frame, mm.
         """
         pieces = SensorPieces(self.fine.pieces, self.surfaces, self.table)
         return pieces.with_indenters(placed)
 
     def touched(self, contacts: Sequence[Contact], placed: Sequence[TriangleMesh]) -> ContactScenes:
-        """The scenes of an image in which the skin takes the shape of what touches it.
+        """Return the scenes of an image in which the skin takes the shape of the indenters.
 
         Args:
-            contacts: what presses; none for the untouched sensor.
-            placed: their meshes, in the design's frame.
+            contacts: the contacts; none for the untouched sensor.
+            placed: meshes of the indenters in the design's frame, mm.
         """
         if not contacts:
             return ContactScenes(self.watched, self.fixed, None, mi.Float())
@@ -214,11 +219,11 @@ class SensorScenes:
         )
 
     def deformed(self, mesh: SkinMesh, pressed: PressedSkin) -> ContactScenes:
-        """The scenes of an image with a deformed skin in the place of the sensing surface.
+        """Return the scenes of an image with a deformed skin in place of the sensing surface.
 
         Args:
             mesh: the deformed skin.
-            pressed: what deforms it.
+            pressed: the contacts that deform it.
         """
         pieces = self._sensor_pieces
         skin = self._shapes.skin(mesh, pressed, pieces.skin_surfaces)
@@ -229,12 +234,16 @@ class SensorScenes:
         return SensorPieces(self.pieces, self.surfaces, self.table)
 
     def _absorption(self) -> mi.Color3f | None:
-        """Coefficient of the gel before the sensing surface; None where it is clear."""
+        """Absorption coefficient (1/mm, per channel) of the gel in front of the sensing surface;
+        None if it is clear.
+        """
         absorption = self.assembly.absorption_before
         return dr.opaque(mi.Color3f, absorption) if max(absorption) > 0.0 else None
 
 
 def _indenters(number: int, placed: tuple[TriangleMesh, ...]) -> RayScene:
-    """Indenters alone, whose coating has this number in the table of surfaces."""
+    """Return the scene of indenters alone, whose coating has the given number in the table of
+    surfaces.
+    """
     pieces = [indenter_piece(mesh, PILOT_COATING) for mesh in placed]
     return RayScene(pieces, [number] * len(pieces))

@@ -19,13 +19,13 @@ class Solid:
 
     Attributes:
         name: the part's name, for messages.
-        mesh: closed, mm.
+        mesh: closed mesh, mm.
         medium: the name of its optical material.
         ior: its refractive index.
-        roughness: of its surface (microfacet alpha), 0 for smooth.
-        priority: where solids overlap, the larger number keeps the place.
-        absorption: of the medium, per mm at R, G, B.
-        indices: its refractive index at R, G, B; None for `ior` at all.
+        roughness: roughness of its surface (microfacet alpha), 0 for smooth.
+        priority: rank among overlapping solids; the one with the larger number fills the overlap.
+        absorption: absorption coefficient of the medium at R, G, B, 1/mm.
+        indices: refractive index at R, G, B; None if it is `ior` in all channels.
     """
 
     name: str
@@ -38,7 +38,7 @@ class Solid:
     indices: RGB | None = None
 
     def index(self, channel: int) -> float:
-        """The refractive index at R, G or B (0 to 2)."""
+        """Return the refractive index at R, G or B (0 to 2)."""
         return self.ior if self.indices is None else self.indices[channel]
 
 
@@ -52,8 +52,8 @@ class Sheet:
 
     Attributes:
         name: the part's name.
-        mesh: open or closed, mm.
-        kind: what it is, for messages.
+        mesh: open or closed mesh, mm.
+        kind: name of the kind of sheet, for messages.
     """
 
     name: str
@@ -66,14 +66,14 @@ class Interface:
     """A refracting surface between two media.
 
     Attributes:
-        mesh: open or closed, mm; its normals point from `inside` to `outside`.
+        mesh: open or closed mesh, mm; its normals point from `inside` to `outside`.
         inside, outside: names of the media; "air" where there is no solid.
         ior_inside, ior_outside: their refractive indices.
-        roughness: microfacet alpha: the rougher one of the two solids that touch.
+        roughness: microfacet alpha, that of the rougher of the two solids that touch.
         names: the solids that it bounds, the one on its inside first.
-        etas: at R, G, B, the index on the inside over that on the outside; None where the ratio of
-            `ior_inside` and `ior_outside` stands for all.
-        absorption: per mm at R, G, B, on the inside and on the outside.
+        etas: index on the inside over that on the outside, at R, G, B; None if the ratio of
+            `ior_inside` and `ior_outside` holds for all channels.
+        absorption: absorption coefficients (1/mm) at R, G, B, on the inside and on the outside.
     """
 
     mesh: TriangleMesh

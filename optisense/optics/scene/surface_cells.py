@@ -1,4 +1,4 @@
-"""A mesh cut into the cells of a uniform grid."""
+"""The cells of a uniform grid that a mesh passes through."""
 
 from __future__ import annotations
 
@@ -24,9 +24,17 @@ SEARCH_CELLS = 3
 class SurfaceCells:
     """Cells of a uniform 3-D grid that surfaces pass through.
 
-    ``index`` is the number + 1 of the cell at each grid place (0: none); ``centres`` (cells, 3)
-    mm, ``normals`` (cells, 3) and ``areas`` (cells,) mm^2 are those of the surface in each;
-    ``axes`` (3, 3) the frame of the bins.
+    Attributes:
+        lower: lower corner of the grid, mm.
+        inverse_size: inverse of the side of a cell, 1/mm.
+        counts: number of grid places along each axis.
+        index: number + 1 of the cell at each grid place (0: none).
+        cells: number of cells.
+        planes: normal and offset of the plane of each cell, four floats.
+        centres: (cells, 3) centre of the surface in each cell, mm.
+        normals: (cells, 3) mean unit normal of the surface in each cell.
+        areas: (cells,) area of the surface in each cell, mm^2.
+        axes: (3, 3) frame of the direction bins, as rows.
     """
 
     lower: mi.Point3f
@@ -44,16 +52,19 @@ class SurfaceCells:
 def surface_samples(
     vertices: FloatArray, faces: NDArray[np.integer], spacing: float
 ) -> tuple[FloatArray, NDArray[np.integer], FloatArray]:
-    """Points (3, n) mm, the face (n,) that each lies on and its share (n,) mm^2 of the face's
-    area: spread over a mesh, about one per spacing^2.
+    """Spread sample points evenly over a mesh, about one per ``spacing`` squared.
+
+    Returns:
+        Points (3, n), mm; the face (n,) that each lies on; and its share (n,), mm^2, of the area of
+        the face.
     """
     a, b, c = (vertices[faces[:, k]].T.copy() for k in range(3))
     area = _twice_areas(vertices, faces)[1] / 2
     count = np.maximum(1, np.ceil(area / spacing**2)).astype(int)
     owner = np.repeat(np.arange(len(faces)), count)
     # The R2 sequence (Roberts 2018), folded into the triangle by the square-root map. One sequence
-    # goes through all faces: begun anew in each it would favour the same corner of small ones, and
-    # heap up area in the middle of a fan.
+    # runs through all faces; restarted in each, it would favour the same corner of small faces and
+    # concentrate area in the middle of a fan.
     order = np.arange(1, len(owner) + 1)
     u = np.mod(0.5 + 0.7548776662466927 * order, 1.0)
     v = np.mod(0.5 + 0.5698402909980532 * order, 1.0)
@@ -66,17 +77,20 @@ def surface_samples(
 
 
 def _twice_areas(vertices: FloatArray, faces: NDArray[np.integer]) -> tuple[FloatArray, FloatArray]:
-    """Normals of faces as long as twice their areas (m, 3), and these lengths (m,)."""
+    """Return the normals (m, 3) of faces with lengths of twice their areas (mm^2), and these
+    lengths (m,).
+    """
     a, b, c = (vertices[faces[:, k]] for k in range(3))
     cross = np.cross(b - a, c - a)
     return cross, np.linalg.norm(cross, axis=1)
 
 
 def build_cells(vertices: FloatArray, faces: NDArray[np.integer], size: float) -> SurfaceCells:
-    """Cells of ``size`` mm over a mesh."""
+    """Divide a mesh into cells of side ``size`` (mm)."""
     vertices = np.asarray(vertices, dtype=np.float64)
     points, face, areas = surface_samples(vertices, faces, size / SAMPLES_ACROSS)
-    # Off any round number, so that a plane does not run along the border between two cells.
+    # The offset is not a round number, so that a plane of the design does not coincide with a
+    # border between cells.
     lower = points.min(axis=1) - (0.37 + SEARCH_CELLS) * size
     counts = np.floor((points.max(axis=1) - lower) / size).astype(int) + 1 + SEARCH_CELLS
     x, y, z = (((points[k] - lower[k]) / size).astype(int) for k in range(3))
@@ -116,7 +130,9 @@ def build_cells(vertices: FloatArray, faces: NDArray[np.integer], size: float) -
 
 
 def _index(used: NDArray[np.int64], counts: NDArray[np.int64]) -> NDArray[np.uint32]:
-    """Number + 1 of the nearest cell of each grid place within SEARCH_CELLS places, else 0."""
+    """Return the number + 1 of the nearest cell of each grid place within SEARCH_CELLS places, else
+    0.
+    """
     numbers = np.zeros(int(np.prod(counts)), dtype=np.uint32)
     numbers[used] = np.arange(len(used)) + 1
     grid = numbers.reshape(counts[::-1])
@@ -133,14 +149,16 @@ def _frame(z: FloatArray) -> FloatArray:
 
 
 def bin_axis(cells: SurfaceCells, number: int) -> mi.Vector3f:
-    """One axis of the frame of the direction bins, as an opaque array, so that kernels do not
-    depend on its numbers: every design with a slightly bent surface would compile its own.
+    """Return one axis of the frame of the direction bins.
+
+    It is an opaque array, so that kernels do not depend on its values; otherwise every design with
+    a slightly different surface would compile its own kernels.
     """
     return mi.Vector3f(*[dr.opaque(mi.Float, float(part)) for part in cells.axes[number]])
 
 
 def cell_at(cells: SurfaceCells, point: mi.Point3f, active: mi.Bool) -> tuple[mi.UInt32, mi.Bool]:
-    """Number of the cell that holds a point, and whether there is one."""
+    """Return the number of the cell that holds each point, and whether there is one."""
     relative = (point - cells.lower) * cells.inverse_size
     inside = mi.Bool(active)
     for i in range(3):
@@ -151,7 +169,9 @@ def cell_at(cells: SurfaceCells, point: mi.Point3f, active: mi.Bool) -> tuple[mi
 
 
 def plane_of(cells: SurfaceCells, cell: mi.UInt32, active: mi.Bool) -> tuple[mi.Vector3f, mi.Float]:
-    """Normal and offset of the plane of cells: points x on it have dot(normal, x) = offset."""
+    """Return the unit normal and offset (mm) of the planes of cells: points x on a plane have
+    dot(normal, x) = offset.
+    """
     plane = dr.gather(mi.Vector4f, cells.planes, cell, active)
     return mi.Vector3f(plane.x, plane.y, plane.z), plane.w
 
@@ -159,7 +179,9 @@ def plane_of(cells: SurfaceCells, cell: mi.UInt32, active: mi.Bool) -> tuple[mi.
 def cells_near(
     cells: SurfaceCells, points: NDArray[np.floating], distance: float
 ) -> NDArray[np.bool_]:
-    """(cells,) whether a cell's centre lies within ``distance`` mm of any of the points (n, 3)."""
+    """Return a mask (cells,) of the cells whose centre lies within ``distance`` (mm) of any of the
+    points (n, 3).
+    """
     if len(points) == 0:
         return np.ones(cells.cells, dtype=bool)
     nearest, _ = cKDTree(points).query(cells.centres, distance_upper_bound=distance)

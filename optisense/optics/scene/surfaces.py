@@ -32,18 +32,26 @@ class Region(IntEnum):
 RGB = tuple[float, float, float]
 
 CLEAR: RGB = (0.0, 0.0, 0.0)
-"""The absorption coefficient of a medium that absorbs nothing, per mm at R, G, B."""
+"""Absorption coefficient (1/mm) at R, G, B of a medium that absorbs nothing."""
 
 
 @dataclass(frozen=True)
 class Surface:
     """Optical data of one surface.
 
-    For a dielectric ``eta`` is the index on the inside (behind the face normal) over the index
-    on the outside, and ``etas`` the same per channel where it differs between them.
-    ``absorption`` is the absorption coefficient (per mm, per channel) inside and outside; None
-    where the media are not known, which then are those that a ray comes from. ``reflectance``,
-    ``metal_eta`` and ``metal_k`` are per channel R, G, B.
+    Attributes:
+        kind: the interaction of light with the surface.
+        eta: for a dielectric, the index on the inside (behind the face normal) over the index on
+            the outside.
+        alpha: roughness (GGX alpha), 0 for smooth.
+        specularity: weight of the metallic lobe of an opaque surface, 0 to 1.
+        reflectance: reflectance of the diffuse lobe at R, G, B.
+        metal_eta, metal_k: real and imaginary part of the metal's refractive index at R, G, B.
+        region: function of the surface in the sensor.
+        light: number of the light whose emitting face the surface is.
+        etas: values of ``eta`` at R, G, B; None if they do not differ.
+        absorption: absorption coefficients (1/mm, per channel) inside and outside; None if the
+            media are unknown, and rays stay in the medium that they come from.
     """
 
     kind: SurfaceKind
@@ -65,7 +73,9 @@ class Surface:
 
 
 def is_coloured(surface: Surface) -> bool:
-    """Whether a surface, or a medium beside it, treats some channels otherwise than others."""
+    """Return whether the properties of a surface or of a medium beside it differ between
+    channels.
+    """
     if surface.etas is not None:
         return True
     metal = surface.specularity > 0 or surface.kind is SurfaceKind.MIRROR
