@@ -1,7 +1,7 @@
-"""How the skin of a gel deforms under contacts, and the forces that it takes.
+"""Mechanics of the gel: deformation of its skin under contacts, pressures and forces.
 
-The mechanics know nothing of light: from a design and its contacts they make the deformed skin.
-Names load on first use, as SciPy takes a while.
+The functions compute the deformed skin of a design and its contacts, and do not depend on optics.
+Names load on first use, as SciPy takes a while to import.
 """
 
 from __future__ import annotations
@@ -56,5 +56,5 @@ __all__ = [
     "youngs_modulus_of_shore_a",
 ]
 
-if not TYPE_CHECKING:  # type checkers would take any name for one of the package's
+if not TYPE_CHECKING:  # with __getattr__, type checkers would accept any name
     __getattr__, __dir__ = load_on_first_use(__name__, _HOMES)

@@ -1,4 +1,6 @@
-"""Whether something holds a gel: a gel that is bonded to nothing resists no press."""
+"""Check that a gel is held by a part of its design: a gel that is bonded to nothing resists no
+press.
+"""
 
 from __future__ import annotations
 
@@ -10,12 +12,12 @@ from optisense.geometry.coincidence import boxes_overlap, find_coincident
 from optisense.geometry.meeting import find_meeting, resting_on
 
 GLUE = 0.05
-"""mm; a part whose faces are this near to a gel's holds it: as thick as a film of glue, and more
-than the faces of two models of one curved surface differ by."""
+"""Largest distance (mm) between the faces of a gel and of a part that holds it: the thickness of a
+film of glue, and more than the difference of two meshes of one curved surface."""
 
 
 def is_attached(design: SensorDesign) -> bool:
-    """Whether a part of a design touches its gel, other than the skin."""
+    """Return whether any part of a design other than the skin touches its gel."""
     meshes = design.deformed_meshes()
     gels = [meshes[name] for name in design.parts_of(Role.ELASTOMER)]
     others = [

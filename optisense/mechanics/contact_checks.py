@@ -1,4 +1,6 @@
-"""Contacts that no elastic skin can take: two indenters in one place, and a hole that touches."""
+"""Checks for contacts that are impossible on an elastic skin: overlapping indenters, and holes in
+an indenter where it touches.
+"""
 
 from __future__ import annotations
 
@@ -12,7 +14,8 @@ from optisense.mechanics.footprint import Footprint
 FloatArray = NDArray[np.float64]
 
 SHALLOWEST = 1e-3
-"""mm; how far skin lies inside both of two indenters before they count as overlapping."""
+"""Depth (mm) of skin inside both of two indenters above which they count as overlapping; smaller
+depths are rounding."""
 
 
 def refuse_shared_skin(one: Footprint, other: Footprint) -> None:
@@ -37,11 +40,11 @@ def refuse_shared_skin(one: Footprint, other: Footprint) -> None:
 
 
 def refuse_holes(place: Footprint, indenter: TriangleMesh) -> None:
-    """Raise if a mesh ends where it touches the skin; one that is open elsewhere does no harm.
+    """Raise if the mesh of an indenter has an open edge where it touches the skin.
 
     Args:
-        place: of the contact.
-        indenter: its mesh where it is pressed in, in the design's frame.
+        place: the footprint of the contact.
+        indenter: the placed mesh of the indenter in the design's frame, mm.
 
     Raises:
         ContactError: an edge of a single face lies inside the undeformed skin.
@@ -61,7 +64,9 @@ def refuse_holes(place: Footprint, indenter: TriangleMesh) -> None:
 
 
 def _overlap_at(place: Footprint, local: FloatArray) -> FloatArray:
-    """(n,) the greatest overlap (mm) at the grid points around points of a contact's frame."""
+    """Return the greatest overlap (n,), mm, at the grid points around points of a contact's
+    frame.
+    """
     column = np.floor((local[:, 0] - place.x[0]) / place.pitch).astype(np.int64)
     row = np.floor((local[:, 1] - place.y[0]) / place.pitch).astype(np.int64)
     rows, columns = place.overlap.shape

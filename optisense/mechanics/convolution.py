@@ -22,7 +22,7 @@ ODD = {
     "yy": (False, False),
     "xy": (True, True),
 }
-"""Whether each of `LoadKernels` changes its sign with that of x, and with that of y."""
+"""Symmetry of each kernel of `LoadKernels`: whether it is odd in x, and whether it is odd in y."""
 
 
 class GridResponse:
@@ -38,9 +38,9 @@ class GridResponse:
 
         Args:
             shape: (rows, columns); rows follow y and columns follow x.
-            pitch: mm, side of a square.
-            thickness: mm, of the layer.
-            elasticity: of the layer.
+            pitch: side of a square, mm.
+            thickness: thickness of the layer, mm.
+            elasticity: elastic constants of the layer.
         """
         self.shape, self.pitch = shape, pitch
         self._load = SquareLoad(
@@ -50,7 +50,7 @@ class GridResponse:
         self._padded = fft.next_fast_len(2 * shape[0]), fft.next_fast_len(2 * shape[1], real=True)
 
     def _quadrant(self) -> tuple[FloatArray, FloatArray]:
-        """Offsets (mm) along x and y from 0 on; kernels are even or odd in each."""
+        """Return the non-negative offsets (mm) along x and y; kernels are even or odd in each."""
         rows, columns = (np.arange(size // 2 + 1) * self.pitch for size in self._padded)
         shape = len(rows), len(columns)
         return np.broadcast_to(columns, shape), np.broadcast_to(rows[:, None], shape)
@@ -58,7 +58,7 @@ class GridResponse:
     def _spectrum(
         self, quadrant: FloatArray, odd_in_x: bool = False, odd_in_y: bool = False
     ) -> NDArray[np.complex128]:
-        """The transform of a kernel that is known for offsets from 0 on."""
+        """Return the Fourier transform of a kernel that is given for non-negative offsets."""
         offset = [fft.ifftshift(np.arange(size) - size // 2) for size in self._padded]
         whole = quadrant[np.ix_(np.abs(offset[0]), np.abs(offset[1]))]
         if odd_in_x:
@@ -78,11 +78,13 @@ class GridResponse:
         return LoadKernels(*spectra)
 
     def normal(self, pressure: FloatArray) -> FloatArray:
-        """Normal displacement (mm), into the layer, by a pressure (MPa) on each square."""
+        """Return the normal displacement (mm), into the layer, due to a pressure (MPa) on each
+        square.
+        """
         return self._back(self._pressure_kernel * self._there(pressure))
 
     def displacement(self, pressure: FloatArray, shear: FloatArray | None = None) -> FloatArray:
-        """(3, rows, columns) displacement (mm) along x, y and into the layer."""
+        """Return the displacement (3, rows, columns), mm, along x, y and into the layer."""
         p = self._there(pressure)
         kernels = self._kernels
         x, y, z = kernels.xz * p, kernels.yz * p, kernels.zz * p
@@ -90,12 +92,15 @@ class GridResponse:
             along_x, along_y = self._there(shear[0]), self._there(shear[1])
             x += kernels.xx * along_x + kernels.xy * along_y
             y += kernels.xy * along_x + kernels.yy * along_y
-            # Betti's theorem: what pressure moves sideways, shear moves inward, mirrored.
+            # By Betti's theorem, the normal displacement due to shear is the mirrored tangential
+            # displacement due to pressure.
             z -= kernels.xz * along_x + kernels.yz * along_y
         return np.stack([self._back(each) for each in (x, y, z)])
 
     def sideways(self, shear: FloatArray) -> FloatArray:
-        """(2, rows, columns) displacement (mm) along x and y by a shear of this shape (MPa)."""
+        """Return the displacement (2, rows, columns), mm, along x and y due to a shear (2, rows,
+        columns), MPa.
+        """
         kernels = self._kernels
         along_x, along_y = self._there(shear[0]), self._there(shear[1])
         return np.stack(
@@ -106,7 +111,9 @@ class GridResponse:
         )
 
     def largest_sideways(self) -> float:
-        """mm by a shear of 1 MPa: no shear moves more than this over its own size (RMS)."""
+        """Largest ratio (mm/MPa) of the RMS displacement along the surface to the RMS of the shear
+        that causes it.
+        """
         kernels = self._kernels
         crossed = np.abs(kernels.xy)
         return float(max((np.abs(each) + crossed).max() for each in (kernels.xx, kernels.yy)))

@@ -1,4 +1,4 @@
-"""The mesh of a skin with indenters pressed in: fine where it bends, as it was elsewhere."""
+"""The mesh of a skin under contacts, refined where it bends and unchanged elsewhere."""
 
 from __future__ import annotations
 
@@ -16,26 +16,28 @@ from optisense.mechanics.pressed_skin import Pressed, PressedSkin
 FloatArray = NDArray[np.float64]
 
 EDGE_IN_CONTACT = 1.5
-"""Greatest edge length in a contact, in distances of the points of its grid. Shading normals vary
-smoothly over triangles, so that their facets are not seen."""
+"""Greatest edge length in a contact, in units of the pitch of its grid. Shading normals vary
+smoothly over triangles, so that facets are not visible."""
 EDGE_AT_RIM = 0.6
-"""The same within `RIM` of a contact's rim, where slopes jump: coarser ones show it as a saw."""
+"""Greatest edge length within `RIM` of a contact's rim, in units of the grid's pitch. Slopes jump
+at the rim, and larger triangles would make it jagged."""
 RIM = 1.5
-"""Distance from the rim, in distances of grid points, within which triangles are finer."""
+"""Distance from the rim, in units of the grid's pitch, within which triangles are finer."""
 GROWTH = 0.3
 """Increase of the greatest edge length with the distance from a contact: displacements change over
 lengths of about that distance."""
 LONGEST_EDGE = 0.25
-"""Greatest edge length where the skin is displaced at all, in thicknesses of the gel."""
+"""Greatest edge length in displaced parts of the skin, in thicknesses of the gel."""
 MAX_FACES = 600_000
-"""Most triangles of a deformed skin; more points of contacts than these can show are left out."""
+"""Largest number of triangles of a deformed skin; finer detail of contacts is left out."""
 BENT_SHARE = 0.1
-"""Share of the greatest depth of a contact from which skin that is pushed in around it counts as
-bent: such skin casts shadows, and is lit as indenters are. Skin that bulges outward does not."""
+"""Share of the greatest depth of a contact from which on inward-displaced skin around it counts as
+bent. Bent skin casts shadows and is lit like indenters; skin that bulges outward never counts as
+bent."""
 
 
 class SkinState(IntEnum):
-    """What became of a triangle of the skin."""
+    """The state of a triangle of the deformed skin."""
 
     RESTING = 0  # displaced by little or nothing
     BENT = 1  # beside a contact, and displaced by much
@@ -47,10 +49,10 @@ class SkinMesh:
     """A deformed sensing surface.
 
     Attributes:
-        vertices: (n, 3) mm; faces share them.
-        faces: (m, 3) rows of ``vertices``, wound as those of the sensing surface.
+        vertices: (n, 3) positions, mm; faces share them.
+        faces: (m, 3) rows of ``vertices``, wound like those of the sensing surface.
         corner_normals: (m, 3, 3) unit shading normals of the corners, into the gel.
-        state: (m,) of `SkinState`.
+        state: (m,) the `SkinState` of each face.
     """
 
     vertices: FloatArray
@@ -59,7 +61,9 @@ class SkinMesh:
     state: NDArray[np.uint8]
 
     def part(self, *states: SkinState) -> TriangleMesh | None:
-        """The triangles in one of some states, with shading normals; None if there are none."""
+        """Return the triangles in any of the given states, with shading normals; None if there are
+        none.
+        """
         chosen = np.isin(self.state, states)
         if not chosen.any():
             return None
@@ -70,13 +74,13 @@ class SkinMesh:
 
 
 def skin_mesh(skin: TriangleMesh, pressed: PressedSkin) -> SkinMesh:
-    """The sensing surface with its displacement.
+    """Return the deformed mesh of the sensing surface.
 
-    The border of the surface stays where it is, as it is joined to other parts.
+    The border of the surface does not move, as it is joined to other parts.
 
     Args:
-        skin: the undeformed sensing surface, faces wound to look into the gel.
-        pressed: what presses on it.
+        skin: the undeformed sensing surface, with face normals into the gel.
+        pressed: the solved contacts.
     """
     smooth = skin.vertex_normals()
     assert smooth.normals is not None
@@ -125,7 +129,7 @@ def skin_mesh(skin: TriangleMesh, pressed: PressedSkin) -> SkinMesh:
 
 
 def _near(mesh: TriangleMesh, pressed: PressedSkin) -> NDArray[np.bool_]:
-    """Which faces may be displaced by a contact."""
+    """Return a mask of the faces that a contact may displace."""
     near = np.zeros(len(mesh.faces), dtype=bool)
     for contact in pressed.contacts:
         place = contact.place
@@ -144,7 +148,7 @@ def _near(mesh: TriangleMesh, pressed: PressedSkin) -> NDArray[np.bool_]:
 
 
 def _wanted(points: FloatArray, pressed: PressedSkin) -> FloatArray:
-    """Greatest edge length (mm) at places of the skin."""
+    """Return the greatest edge length (mm) at points of the skin."""
     result = np.full(len(points), np.inf)
     for contact in pressed.contacts:
         place = contact.place
@@ -158,13 +162,15 @@ def _wanted(points: FloatArray, pressed: PressedSkin) -> FloatArray:
 
 
 def _distance(points: FloatArray, contact: Pressed) -> FloatArray:
-    """Distance (mm) of places from the touching points of a contact, in its tangent plane."""
+    """Return the distance (mm) of points from the touching points of a contact, in its tangent
+    plane.
+    """
     local = contact.place.local(points)
     return contact.field.distance(local[:, 0], local[:, 1])
 
 
 def _on_border(faces: NDArray[np.int64], count: int) -> NDArray[np.bool_]:
-    """(count,) which vertices lie on an edge that only one face has."""
+    """Return a mask (count,) of the vertices on edges that belong to a single face."""
     ends = np.sort(faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
     edges, times = np.unique(ends[:, 0] * count + ends[:, 1], return_counts=True)
     border = np.zeros(count, dtype=bool)

@@ -1,4 +1,4 @@
-"""How a flat gel is displaced around one contact, between the points of its grids."""
+"""The displacement of a gel around one contact, interpolated between the points of its grids."""
 
 from __future__ import annotations
 
@@ -23,14 +23,14 @@ RING = 1.0
 """Width of the fine grid around a footprint, over the footprint's shorter side or, if that is less,
 the gel's thickness; displacements vary slowly farther out."""
 DECAY = 6.0
-"""Distance from a footprint, in thicknesses, beyond which displacements are left out. They are less
-than 0.3 % of those at half a thickness there, for any Poisson ratio."""
+"""Distance from a footprint, in thicknesses, beyond which displacements are neglected. They are
+less than 0.3 % there of those at half a thickness, for any Poisson ratio."""
 COARSE_POINTS = 20
-"""Points of the coarse grid for one thickness; it shows bulges, which are as wide as the gel is
-thick."""
+"""Number of points of the coarse grid per thickness of the gel; the grid resolves bulges, which are
+as wide as the gel is thick."""
 COARSE_STEP = 16
 """Step in which the number of points of the coarse grid along a side grows, so that contacts of
-other sizes find its kernels made."""
+similar sizes share its kernels."""
 MAX_COARSE = 400
 """Largest number of points of the coarse grid along a side, which bounds the time of its
 transform."""
@@ -43,8 +43,8 @@ class DisplacementField:
 
     Attributes:
         place: the grid of the pressure.
-        shear: (2, rows, columns) MPa of a dragged indenter, if it is set before `sideways` is
-            asked for.
+        shear: (2, rows, columns) shear (MPa) of a dragged indenter; it must be set before
+            `sideways` is called.
     """
 
     def __init__(
@@ -56,15 +56,16 @@ class DisplacementField:
         beyond: GridSpline | None = None,
         patch: GelPatch | None = None,
     ) -> None:
-        """Sum what a pressure does.
+        """Compute the displacement due to a pressure.
 
         Args:
             place: the grid of the pressure.
-            overlap: (rows, columns) mm, of the place, less what other contacts displace.
-            pressure: (rows, columns) MPa.
-            elasticity: of the gel.
-            beyond: what the gel yields beyond a flat layer; `overlap` is less this as well.
-            patch: the shape of the gel that this comes from.
+            overlap: (rows, columns) overlap (mm) of the place, minus the displacement due to other
+                contacts and minus ``beyond``.
+            pressure: (rows, columns) pressure, MPa.
+            elasticity: elastic constants of the gel.
+            beyond: normal displacement of the gel in addition to that of a flat layer.
+            patch: the shape of the gel, from which ``beyond`` was computed.
         """
         self._beyond, self._patch = beyond, patch
         self._shear_modulus = elasticity.shear_modulus
@@ -90,7 +91,7 @@ class DisplacementField:
         coarse = binned(pressure, place, (ends[0][0], ends[1][0]), step, (counts[1], counts[0]))
         wide = grid_response((counts[1], counts[0]), step, thickness, elasticity)
         self._coarse = GridSpline(wide.normal(coarse), ends[0][0], ends[1][0], step)
-        # What `sideways` needs; it is asked for less often than normal displacements.
+        # Inputs of `sideways`, which is called less often than normal displacements.
         self.shear: FloatArray | None = None
         self._ring = ring
         self._loads = (
@@ -99,9 +100,10 @@ class DisplacementField:
         )
 
     def at(self, x: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Displacement into the gel (mm) at points of the tangent plane, and its slopes by x, y.
+        """Return the displacement (mm) into the gel at points of the tangent plane, and its slopes
+        by x and y.
 
-        The slope jumps at the edge of a contact; inside, it is that of the indenter.
+        The slope jumps at the edge of a contact; inside, it equals that of the indenter.
         """
         result = np.zeros((3, len(x)))
         near = self._fine.holds(x, y)
@@ -123,7 +125,7 @@ class DisplacementField:
         return result[0], result[1], result[2]
 
     def sideways(self, x: FloatArray, y: FloatArray) -> FloatArray:
-        """(2, n) mm that points of the tangent plane move along x and y."""
+        """Return the displacement (2, n), mm, of points of the tangent plane along x and y."""
         result = np.zeros((2, len(x)))
         (near, near_y), (far, far_y) = self._sideways_splines
         close = near.holds(x, y)
@@ -140,7 +142,7 @@ class DisplacementField:
 
     @cached_property
     def _sideways_beyond(self) -> tuple[GridSpline, GridSpline]:
-        """What the shape of the gel adds to displacements along x and y."""
+        """Return the contribution of the gel's shape to displacements along x and y."""
         assert self._patch is not None
         shear = np.zeros((2, *self._pressure.shape)) if self.shear is None else self.shear
         loads = np.concatenate([shear, self._pressure[None]])
@@ -148,7 +150,9 @@ class DisplacementField:
 
     @cached_property
     def _sideways_splines(self) -> list[tuple[GridSpline, GridSpline]]:
-        """Splines of the displacements along x and along y on the fine and the coarse grid."""
+        """Return splines of the displacements along x and along y on the fine and the coarse
+        grid.
+        """
         found = []
         shears: list[FloatArray | None] = [None, None]
         if self.shear is not None:
@@ -163,48 +167,55 @@ class DisplacementField:
         return found
 
     def pressure(self, x: FloatArray, y: FloatArray) -> FloatArray:
-        """(n,) MPa at points of the tangent plane."""
+        """Return the pressure (n,), MPa, at points of the tangent plane."""
         return self._between(self._pressure, x, y)
 
     def penetration(self, x: FloatArray, y: FloatArray) -> FloatArray:
-        """(n,) mm that points of the undeformed skin lie inside the indenter, or 0."""
+        """Return the depth (n,), mm, of points of the undeformed skin inside the indenter; 0
+        outside.
+        """
         return self._between(np.maximum(self.place.overlap, 0.0), x, y)
 
     def _between(self, values: FloatArray, x: FloatArray, y: FloatArray) -> FloatArray:
-        """Values of the contact's grid, linearly between its points and 0 beside it."""
+        """Interpolate values of the contact's grid linearly; 0 beside the grid."""
         pitch = self.place.pitch
         column, row = (x - self.place.x[0]) / pitch, (y - self.place.y[0]) / pitch
         return np.asarray(map_coordinates(values, [row, column], order=1, mode="constant"))
 
     @cached_property
     def _indenter_slopes(self) -> tuple[FloatArray, FloatArray]:
-        """(rows, columns) each: slopes of the overlap by x and by y.
+        """Return the slopes of the overlap by x and by y, (rows, columns) each.
 
-        Where an indenter ends in a wall, they are those of what touches beside it.
+        Where an indenter ends in a steep wall, they are the slopes of the touching points beside
+        it.
         """
         known = np.where(self.place.overlap > NO_OVERLAP / 2, self._overlap, np.nan)
         by_x, by_y = slopes(known, self.place.pitch)
         return np.nan_to_num(by_x), np.nan_to_num(by_y)
 
     def touching(self, x: FloatArray, y: FloatArray) -> NDArray[np.bool_]:
-        """Which points of the tangent plane lie in the contact."""
+        """Return a mask of the points of the tangent plane that lie in the contact."""
         rows, columns, inside = self._cells(x, y)
         return inside & self._touching[rows, columns]
 
     def distance(self, x: FloatArray, y: FloatArray) -> FloatArray:
-        """Distance (mm) of points of the tangent plane from the contact, to about a pitch."""
+        """Return the distance (mm) of points of the tangent plane from the contact, accurate to
+        about a pitch.
+        """
         rows, columns, _ = self._cells(x, y)
         beyond = np.hypot(x - self.place.x[columns], y - self.place.y[rows])
         return self._away[rows, columns] + np.where(beyond > self.place.pitch, beyond, 0.0)
 
     def distance_from_rim(self, x: FloatArray, y: FloatArray) -> FloatArray:
-        """The same from the rim of the contact, on either side of it."""
+        """Return the distance (mm) of points from the rim of the contact, on either side of it."""
         rows, columns, _ = self._cells(x, y)
         return np.maximum(self.distance(x, y), self._depth[rows, columns])
 
     @cached_property
     def _depth(self) -> FloatArray:
-        """(rows, columns) mm from points of the contact to the nearest one beside it."""
+        """Return the distance (rows, columns), mm, from points of the contact to the nearest point
+        outside it.
+        """
         inside = distance_transform_edt(np.pad(self._touching, 1))[1:-1, 1:-1]
         return np.asarray(inside) * self.place.pitch
 
@@ -215,7 +226,9 @@ class DisplacementField:
     def _cells(
         self, x: FloatArray, y: FloatArray
     ) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.bool_]]:
-        """Nearest row and column of the pressure's grid, and whether points lie on it."""
+        """Return the nearest row and column of the pressure's grid, and whether each point lies on
+        the grid.
+        """
         column = np.round((x - self.place.x[0]) / self.place.pitch).astype(np.int64)
         row = np.round((y - self.place.y[0]) / self.place.pitch).astype(np.int64)
         rows, columns = self._touching.shape
@@ -227,19 +240,21 @@ class GridSpline:
     """A cubic spline through values on a regular grid."""
 
     def __init__(self, values: FloatArray, x0: float, y0: float, pitch: float) -> None:
-        """Take (rows, columns) values of points from (x0, y0) on, at a pitch in mm."""
+        """Fit the spline to values (rows, columns) at points from (x0, y0) on, with a pitch
+        (mm).
+        """
         self._coefficients = spline_filter(values, order=3, mode="mirror")
         self._start, self._pitch = (x0, y0), pitch
         self._shape = values.shape
 
     def holds(self, x: FloatArray, y: FloatArray) -> NDArray[np.bool_]:
-        """Which points lie on the grid, a point from its rim."""
+        """Return a mask of the points on the grid that are at least one grid point from its rim."""
         column, row = self._place(x, y)
         rows, columns = self._shape
         return (column >= 1) & (column <= columns - 2) & (row >= 1) & (row <= rows - 2)
 
     def at(self, x: FloatArray, y: FloatArray) -> FloatArray:
-        """(3, n): the value, and its slopes by x and y from points half a pitch aside."""
+        """Return (3, n): the value, and its slopes by x and y from differences over one pitch."""
         column, row = self._place(x, y)
         half = 0.5
         rows = np.concatenate([row, row, row, row - half, row + half])
@@ -263,7 +278,9 @@ class GridSpline:
 def grid_response(
     shape: tuple[int, int], pitch: float, thickness: float, elasticity: Elasticity
 ) -> GridResponse:
-    """The same object for the same grid and gel; it keeps its kernels (16 bytes a grid point)."""
+    """Return the response of a grid; equal arguments share one object, which keeps its kernels (16
+    bytes per grid point).
+    """
     return GridResponse(shape, pitch, thickness, elasticity)
 
 
@@ -274,7 +291,7 @@ def binned(
     step: float,
     shape: tuple[int, int],
 ) -> FloatArray:
-    """A pressure on a coarser grid, with the same force and centre, shared out linearly."""
+    """Return a pressure on a coarser grid with the same force and centre, distributed linearly."""
     column = (place.x - start[0]) / step
     row = (place.y - start[1]) / step
     result = np.zeros(shape)
@@ -293,13 +310,13 @@ def binned(
 def sideways_beyond(
     patch: GelPatch, loads: FloatArray, place: Footprint, shear_modulus: float
 ) -> tuple[GridSpline, GridSpline]:
-    """Splines of what the shape of a gel adds to displacements along x and y, in mm.
+    """Return splines of the contribution (mm) of a gel's shape to displacements along x and y.
 
     Args:
         patch: the gel's shape.
-        loads: (3, rows, columns) MPa along x and y and into the gel.
+        loads: (3, rows, columns) loads (MPa) along x and y and into the gel.
         place: the grid of the loads.
-        shear_modulus: MPa.
+        shear_modulus: shear modulus of the gel, MPa.
     """
     columns = patch.columns
     start = columns.x[0], columns.y[0]

@@ -14,8 +14,8 @@ class Elasticity:
     """Linear isotropic elasticity of a gel, and its friction.
 
     Attributes:
-        youngs_modulus: MPa, which is N/mm^2.
-        poisson_ratio: 0 to `MAX_POISSON_RATIO`.
+        youngs_modulus: Young's modulus, MPa (N/mm^2).
+        poisson_ratio: Poisson's ratio, 0 to `MAX_POISSON_RATIO`.
         friction: coefficient of Coulomb friction between the skin and what touches it.
     """
 
@@ -47,12 +47,14 @@ class Elasticity:
 
     @property
     def shear_modulus(self) -> float:
-        """MPa."""
+        """Shear modulus (MPa), E / (2 (1 + nu))."""
         return self.youngs_modulus / (2.0 * (1.0 + self.poisson_ratio))
 
     @property
     def plane_modulus(self) -> float:
-        """E / (1 - nu^2), MPa: the modulus of Hertz's contact with a rigid body."""
+        """Plane-strain modulus (MPa), E / (1 - nu^2), which governs Hertzian contact with a rigid
+        body.
+        """
         return self.youngs_modulus / (1.0 - self.poisson_ratio**2)
 
 

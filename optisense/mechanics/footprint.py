@@ -1,4 +1,6 @@
-"""Where a contact meets the skin: a grid on its tangent plane, and how far both overlap there."""
+"""The footprint of a contact: the overlap of indenter and undeformed skin on a grid of their
+tangent plane.
+"""
 
 from __future__ import annotations
 
@@ -16,30 +18,31 @@ from optisense.mechanics.height_map import heights
 FloatArray = NDArray[np.float64]
 
 MARGIN = 1.15
-"""Sides of a grid over those of the overlap of the undeformed shapes. The true contact of a convex
-indenter lies inside of it, but for thin gels that bulge."""
+"""Ratio of the sides of a grid to those of the overlap of the undeformed shapes. The contact area
+of a convex indenter lies inside the overlap, except on thin gels that bulge."""
 POINTS_ACROSS = 64
-"""Grid points across the shorter side of a contact. The force of a ball is then right to 0.1 %, its
-contact radius to 0.2 %."""
+"""Number of grid points across the shorter side of a contact. The error of a ball's force is then
+0.1 %, and that of its contact radius 0.2 %."""
 FINEST_PITCH = 0.01
-"""mm; least distance of grid points: a tenth of the finest textures that cameras resolve."""
+"""Smallest distance (mm) of grid points: a tenth of the finest textures that cameras resolve."""
 COARSEST_PITCH = 0.1
-"""mm; greatest distance of grid points: one and a half pixels of a usual picture, so that rims of
-wide contacts are not seen to be made of squares."""
+"""Largest distance (mm) of grid points: one and a half pixels of a usual picture, so that the
+squares of the grid are not visible at rims of wide contacts."""
 MAX_POINTS = 480
-"""Most grid points along a side; an iteration takes about 40 ms then."""
+"""Largest number of grid points along a side; an iteration then takes about 40 ms."""
 NO_OVERLAP = -1e3
-"""mm; the overlap where there is no skin or no indenter: a gap that nothing closes."""
+"""Value of the overlap (mm) where there is no skin or no indenter: a gap that no displacement
+closes."""
 DOES_NOT_REACH = "an indenter does not reach the sensing surface"
-"""What is said where nothing overlaps."""
+"""Message of the error for a contact without overlap."""
 PITCHES_PER_OCTAVE = 8
-"""Pitches between one and its double. With few pitches and sizes of grids, presses of other depths
-find their kernels made; a press then takes half the time."""
+"""Number of grid pitches per factor of two. With few pitches and sizes of grids, presses of similar
+depths share kernels, and a press takes half the time."""
 POINTS_STEP = 4
-"""Step in which the number of grid points along a side grows; the least number, too: an overlap
-finer than the grid still has a point to each side."""
+"""Step in which the number of grid points along a side grows, and the smallest number, with which
+an overlap finer than the grid still has a point on each side."""
 SEARCH_POINTS = 96
-"""Grid points along a side when the extent of the overlap is looked for."""
+"""Number of grid points along a side of the first grid, which finds the extent of the overlap."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,12 +50,12 @@ class Footprint:
     """The overlap of an indenter and the undeformed skin on a regular grid of their tangent plane.
 
     Attributes:
-        origin: (3,) mm, in the design's frame; where the contact sits.
+        origin: (3,) place of the contact in the design's frame, mm.
         axes: (3, 3): columns are x and y along the skin and z out of the sensor.
-        x, y: (columns,) and (rows,) mm, in this frame.
-        overlap: (rows, columns) mm along z, negative where there is a gap; `NO_OVERLAP` where there
-            is no skin or no indenter.
-        thickness: mm, of the gel under the contact.
+        x, y: (columns,) and (rows,) grid coordinates in this frame, mm.
+        overlap: (rows, columns) overlap along z (mm), negative where there is a gap; `NO_OVERLAP`
+            where there is no skin or no indenter.
+        thickness: thickness of the gel under the contact, mm.
     """
 
     origin: FloatArray
@@ -64,11 +67,11 @@ class Footprint:
 
     @property
     def pitch(self) -> float:
-        """mm between neighbouring points."""
+        """Distance (mm) between neighbouring points."""
         return float(self.x[1] - self.x[0])
 
     def local(self, points: FloatArray) -> FloatArray:
-        """(n, 3) points of the design's frame in this frame."""
+        """Transform points (n, 3), mm, of the design's frame to this frame."""
         return (points - self.origin) @ self.axes
 
 
@@ -79,19 +82,19 @@ def footprint(
     thickness: float,
     points_across: int = POINTS_ACROSS,
 ) -> Footprint:
-    """The overlap of a placed indenter with the skin.
+    """Return the overlap of a placed indenter with the skin.
 
     Args:
-        indenter: where it is pressed in, in the design's frame, with shading normals if its exact
-            shape is smooth.
+        indenter: the placed mesh of the indenter in the design's frame (mm), with shading normals
+            if its exact shape is smooth.
         skin: the undeformed sensing surface, in the same frame.
-        spot: where the contact sits.
-        thickness: mm, of the gel there.
-        points_across: grid points across the shorter side of the overlap, where neither of the
-            bounds on their distance holds.
+        spot: the place of the contact on the skin.
+        thickness: thickness of the gel there, mm.
+        points_across: number of grid points across the shorter side of the overlap, within the
+            bounds on their distance (`FINEST_PITCH`, `COARSEST_PITCH`).
 
     Raises:
-        ContactError: they do not overlap.
+        ContactError: indenter and skin do not overlap.
     """
     axes = _tangent_axes(spot.inward)
     pose = np.eye(4)
@@ -127,7 +130,7 @@ def footprint(
 
 
 def _step_below(pitch: float) -> float:
-    """The nearest pitch (mm) on the ladder of `PITCHES_PER_OCTAVE` that is not greater."""
+    """Round a pitch (mm) down to the geometric series of `PITCHES_PER_OCTAVE`."""
     step = math.floor(PITCHES_PER_OCTAVE * math.log2(pitch / FINEST_PITCH) + 1e-9)
     return float(FINEST_PITCH * 2.0 ** (step / PITCHES_PER_OCTAVE))
 
@@ -138,15 +141,17 @@ def _overlap(body: TriangleMesh, skin: TriangleMesh, x: FloatArray, y: FloatArra
 
 
 def outer_faces(skin: TriangleMesh, x: FloatArray, y: FloatArray) -> TriangleMesh:
-    """The faces of a skin that look outward and lie in the rectangle of a grid."""
+    """Return the faces of a skin that face outward and lie in the rectangle of a grid."""
     low, high = skin.triangles.min(axis=1), skin.triangles.max(axis=1)
     near = (high[:, 0] >= x[0]) & (low[:, 0] <= x[-1]) & (high[:, 1] >= y[0]) & (low[:, 1] <= y[-1])
-    near &= skin.face_normals[:, 2] < 0.0  # sensing surfaces are wound to look into the gel
+    near &= skin.face_normals[:, 2] < 0.0  # face normals of sensing surfaces point into the gel
     return TriangleMesh(skin.vertices, skin.faces[near], skin.normals)
 
 
 def _tangent_axes(inward: FloatArray) -> FloatArray:
-    """(3, 3): columns x, y, z, right-handed; z is outward, and x lies near the frame's x axis."""
+    """Return right-handed axes (3, 3) as columns x, y, z: z points outward, and x is close to the
+    design's x axis.
+    """
     z = -inward
     x = np.eye(3)[int(np.argmin(np.abs(z)))]
     x = x - (x @ z) * z

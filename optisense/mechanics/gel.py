@@ -22,38 +22,42 @@ from optisense.mechanics.pressed_skin import PressedSkin, press
 from optisense.mechanics.tangential_contact import Drag
 
 USUAL_GEL = Elasticity(youngs_modulus=0.435, poisson_ratio=0.49, friction=1.0)
-"""Elasticity of a gel whose material does not tell: that of the GelSight Mini's. Its modulus was
-fitted to measured forces (the FEATS project: Neo-Hooke, C10 = 0.0725 MPa, so E = 6 C10). The
-Poisson ratio and the friction are assumptions, usual for silicone and for a matt coating."""
+"""Elastic constants of a gel whose material does not specify them: those of the GelSight Mini. Its
+modulus was fitted to measured forces (the FEATS project: Neo-Hooke, C10 = 0.0725 MPa, so E = 6
+C10). The Poisson ratio and the friction are assumptions, usual for silicone and for a matt
+coating."""
 
 DEEPEST_SHARE = 0.6
-"""Share of the gel's thickness up to which a depth is looked for that takes a given force. At half
-of it, linear elasticity says little already."""
+"""Largest depth, as a share of the gel's thickness, of the search for the depth of a given force.
+Linear elasticity is inaccurate already at half the thickness."""
 LEAST_DEPTH = 1e-4
-"""mm; the least depth that is looked for, a fortieth of the wavelength of light in the gel."""
+"""Smallest depth (mm) of the search for the depth of a given force, a fourth of the wavelength of
+light in the gel."""
 LEAST_FORCE_SHARE = 1e-6
-"""Share of the wanted force that stands for none, in logarithms."""
+"""Share of the wanted force that replaces a force of 0 before its logarithm is taken."""
 FORCE_TOLERANCE = 2e-4
 """Relative error of the depth at which a wanted force counts as found: 0.03 % of the force."""
 
 KEPT_DEPTHS = 256
-"""Number of contacts whose depths, found for their forces, a gel keeps; a contact is a few
+"""Number of contacts for which a gel keeps the depth found for their force; an entry is a few
 numbers."""
 
 USUAL_THICKNESS = 4.0
-"""mm; thickness of the gel in designs without an elastomer, about that of a GelSight Mini."""
+"""Thickness (mm) of the gel in designs without an elastomer, about that of a GelSight Mini."""
 
 COARSE_POINTS_ACROSS = 24
-"""Grid points across the shorter side of a contact that is pressed in coarsely. The contact radius
-of a ball is then right to about 1 %, a fraction of a pixel of a draft."""
+"""Number of grid points across the shorter side of a contact in coarse mode. The error of a ball's
+contact radius is then about 1 %, a fraction of a pixel of a draft."""
 COARSE_THICKNESS = 0.1
-"""mm; step of the thicknesses of layers that contacts are pressed into coarsely. The kernels of a
-thickness take a tenth of a second to make, and a skin that is bent by little keeps them; forces
-change by 1 to 2 % from step to step."""
+"""Step (mm) of the thicknesses of layers in coarse mode. The kernels of a thickness take a tenth of
+a second to compute, and a slightly bent skin keeps its step; forces change by 1 to 2 % from step to
+step."""
 
 
 def elasticity_of(design: SensorDesign) -> Elasticity:
-    """The elastic constants of a design's first elastomer; `USUAL_GEL` where it gives none."""
+    """Return the elastic constants of a design's first elastomer; `USUAL_GEL` if it specifies
+    none.
+    """
     for name in design.parts_of(Role.ELASTOMER):
         material = design.materials.get(design.parts[name].material or "")
         if isinstance(material, Dielectric) and material.elasticity is not None:
@@ -63,7 +67,7 @@ def elasticity_of(design: SensorDesign) -> Elasticity:
 
 
 def elasticity_in_words(design: SensorDesign) -> str:
-    """The elastic constants that are used for a design's gel, and the status of each."""
+    """Describe the elastic constants that are used for a design's gel, and the status of each."""
     used = elasticity_of(design)
     given = next(
         (
@@ -91,7 +95,7 @@ def elasticity_in_words(design: SensorDesign) -> str:
 
 
 def _drag(contact: Contact, surface: SensingSurface, place: Footprint) -> Drag | None:
-    """The drag of a contact in the frame of its footprint; None if it has none."""
+    """Return the drag of a contact in the frame of its footprint; None if it has none."""
     if contact.shift == (0.0, 0.0) and contact.twist == 0.0:
         return None
     u, v, _ = surface_axes(-place.axes[:, 2], surface).T
@@ -102,7 +106,7 @@ def _drag(contact: Contact, surface: SensingSurface, place: Footprint) -> Drag |
 class Gel:
     """The gel of a sensor, into which contacts are pressed.
 
-    The last press is kept, and so are depths that were found for forces.
+    The last press and the depths found for forces are kept.
     """
 
     def __init__(
@@ -115,18 +119,19 @@ class Gel:
         check: Callable[[], None] | None = None,
         coarse: bool = False,
     ) -> None:
-        """Take a sensor's gel.
+        """Create the gel of a sensor.
 
         Args:
             surface: the undeformed sensing surface.
             skin: its mesh, with all its triangles.
             elastomers: the gels under it; without any the gel is `USUAL_THICKNESS` thick.
-            elasticity: of the gel.
-            place: gives the mesh of an indenter where a contact presses it in, in the design's
-                frame.
-            check: called before the first press; raises if the gel can't be pressed at all.
-            coarse: press in a third of the time, for drafts: on coarser grids, and into a flat
-                layer as thick as the gel is under the contact.
+            elasticity: elastic constants of the gel.
+            place: function that returns the placed mesh of a contact's indenter in the design's
+                frame (mm).
+            check: function that is called before the first press and raises if the gel cannot be
+                pressed at all.
+            coarse: whether contacts are solved on coarser grids, and in a flat layer as thick as
+                the gel under the contact; a press then takes a third of the time, for drafts.
         """
         self._check, self._coarse = check, coarse
         self._surface, self._skin, self._elastomers = surface, skin, elastomers
@@ -139,16 +144,16 @@ class Gel:
     def pressed(
         self, contacts: Sequence[Contact], placed: Sequence[TriangleMesh] | None = None
     ) -> PressedSkin:
-        """The skin under contacts.
+        """Solve for the skin under contacts.
 
         Args:
-            contacts: what presses where.
-            placed: their meshes, if they are known.
+            contacts: the contacts.
+            placed: their placed meshes, if they are known.
 
         Raises:
-            ContactError: an indenter does not reach the surface or has a hole where it touches,
-                two of them share skin, no depth takes a force, a pressure is not found, or nothing
-                holds the gel.
+            ContactError: an indenter does not reach the surface or has a hole where it touches, two
+                indenters overlap on the skin, no depth gives a force, a pressure does not converge,
+                or nothing holds the gel.
         """
         if self._check is not None:
             self._check()
@@ -181,19 +186,19 @@ class Gel:
         return self._last[1]
 
     def mesh(self, contacts: Sequence[Contact]) -> SkinMesh:
-        """The deformed sensing surface; raises as `pressed` does."""
+        """Return the deformed sensing surface; raises the errors of `pressed`."""
         pressed = self.pressed(contacts)
         if self._mesh is None or self._mesh[0] is not pressed:
             self._mesh = pressed, skin_mesh(self._skin, pressed)
         return self._mesh[1]
 
     def at_depth(self, contact: Contact) -> Contact:
-        """A contact with a force, as one with the depth that takes it when pressed alone.
+        """Return a contact with the depth that gives its force when it is pressed in alone.
 
-        Contacts without a force are given back as they are.
+        Contacts without a force are returned unchanged.
 
         Raises:
-            ContactError: the gel is too thin to take the force.
+            ContactError: the gel is too thin for the force.
         """
         if contact.force is None:
             return contact
@@ -236,18 +241,18 @@ class Gel:
         return at(math.exp(float(brentq(excess, low, high, xtol=FORCE_TOLERANCE))))
 
     def _layer(self, contact: Contact) -> float:
-        """mm, thickness of the layer that a contact is pressed into."""
+        """Return the thickness (mm) of the layer that a contact is pressed into."""
         thickness = self._thickness(contact)
         if not self._coarse:
             return thickness
         return COARSE_THICKNESS * max(1, round(thickness / COARSE_THICKNESS))
 
     def _thickness(self, contact: Contact) -> float:
-        """mm of gel under a contact."""
+        """Return the thickness (mm) of the gel under a contact."""
         spot = locate(contact, self._surface)
         for elastomer in self._elastomers:
             try:
                 return available_depth(spot.point, spot.inward, elastomer)
             except ContactError:
-                continue  # it lies under another one
+                continue  # this elastomer lies under another one
         return USUAL_THICKNESS

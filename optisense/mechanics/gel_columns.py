@@ -1,4 +1,4 @@
-"""The gel around a contact as columns of hexahedra, from the skin to what holds the gel."""
+"""Columns of hexahedra that model the gel around a contact, from the skin to the base."""
 
 from __future__ import annotations
 
@@ -18,30 +18,29 @@ FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
 
 PITCH = 1.0 / 3.0
-"""Distance of columns over the thickness of the gel. What a gel's shape changes varies over lengths
-of a thickness."""
+"""Distance of columns over the thickness of the gel. The effect of the gel's shape varies over
+lengths of a thickness."""
 REACH = 3.0
-"""Thicknesses beside a footprint that are modelled. Displacements of a bonded gel are below 1 % of
-those at half a thickness there."""
+"""Distance from a footprint, in thicknesses, up to which the gel is modelled. Displacements of a
+bonded gel are below 1 % there of those at half a thickness."""
 MOST_COLUMNS = 33
-"""Most columns along a side, which bounds the time of a factorisation; they are wider beside large
-contacts."""
+"""Largest number of columns along a side, which bounds the time of a factorisation; columns are
+wider around large contacts."""
 LAYERS = 4
-"""Elements from the skin to the base. With eight, corrections change by less than 2 % of
-themselves."""
+"""Number of elements from the skin to the base. With eight, corrections change by less than 2 %."""
 FINER = 8
-"""Steps between two columns in which the border of the skin is looked for."""
+"""Number of steps between two columns in which the border of the skin is located."""
 LEAST_UPRIGHT = 0.5
 """Cosine of the steepest slope of the skin against the tangent plane that is modelled, 60 degrees;
 beyond it a dome's skin is too steep for columns over the tangent plane."""
 TILE = 0.3
-"""Side of squares, over the longest column, whose columns are followed together; it bounds the
-number of faces that are tried."""
+"""Side of the squares whose columns are traced together, over the longest column; it bounds the
+number of faces that are tested."""
 NEAREST_EXIT = 1e-3
-"""mm behind the skin below which a face is the skin itself, seen from behind."""
+"""Distance (mm) behind the skin below which a face counts as the skin itself."""
 THINNEST, THICKEST = 0.15, 3.0
-"""Lengths of columns, over the thickness under the contact, between which they are modelled: others
-miss the base, as at the side of a gel."""
+"""Smallest and largest length of a column, over the thickness under the contact; columns of other
+lengths miss the base, as at the side of a gel."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,15 +48,17 @@ class GelColumns:
     """Columns over a regular grid of the tangent plane of a contact; lengths in mm, in its frame.
 
     Attributes:
-        x, y: (columns,) and (rows,), the grid.
-        solid: (rows, columns) where there is a column.
-        cells: (rows - 1, columns - 1) where there are four columns around a body of gel.
-        held: (rows, columns) columns at which the gel goes on and is taken to be at rest.
+        x, y: (columns,) and (rows,) coordinates of the grid.
+        solid: (rows, columns) mask of the grid points that have a column.
+        cells: (rows - 1, columns - 1) mask of the cells with gel between their four columns.
+        held: (rows, columns) mask of the columns at the rim of the model, beyond which the gel
+            continues; they are fixed.
         top: (rows, columns, 3) points of the skin.
         inward: (rows, columns, 3) unit normals of the skin, into the gel.
-        length: (rows, columns) of the columns, along these normals.
-        uneven: how far the gel is from a flat layer near the contact, as a share of its thickness:
-            the skin's height, or the change of thickness; infinite if the gel ends there.
+        length: (rows, columns) lengths of the columns along these normals.
+        uneven: deviation of the gel from a flat layer near the contact, as a share of its
+            thickness: the larger of the skin's height and the change of thickness; infinite if the
+            gel ends there.
     """
 
     x: FloatArray
@@ -72,7 +73,7 @@ class GelColumns:
 
     @property
     def pitch(self) -> float:
-        """mm between columns."""
+        """Distance (mm) between columns."""
         return float(self.x[1] - self.x[0])
 
 
@@ -82,11 +83,11 @@ def gel_columns(
     skin: TriangleMesh,
     elastomers: Sequence[TriangleMesh],
 ) -> GelColumns | None:
-    """The columns around a contact; None where there are too few to make a body of.
+    """Return the columns around a contact; None if there are too few for a body.
 
     Args:
-        place: of the contact.
-        loaded: mm, half of the sides of the rectangle around the contact that carries loads.
+        place: the footprint of the contact.
+        loaded: half sides (mm) of the rectangle around the contact that carries loads.
         skin: the undeformed sensing surface, in the design's frame.
         elastomers: the gels under it.
     """
@@ -144,19 +145,19 @@ def gel_columns(
 def _to_the_border(
     there: BoolArray, fine: BoolArray, inward: FloatArray
 ) -> tuple[BoolArray, NDArray[np.int64], FloatArray]:
-    """Put the outermost columns on the border of the skin.
+    """Move the outermost columns to the border of the skin.
 
-    A column that is less than half a pitch from the border moves there; beyond others, another
-    column is added.
+    A column that is less than half a pitch from the border moves there; elsewhere a column is
+    added.
 
     Args:
-        there: (rows, columns) where there is skin at a grid point.
-        fine: the same, `FINER` times as fine.
-        inward: (rows, columns, 3) normals.
+        there: (rows, columns) mask of the grid points that have skin.
+        fine: the same mask on a grid `FINER` times as fine.
+        inward: (rows, columns, 3) unit normals.
 
     Returns:
-        Where there are columns, (2, rows, columns) the steps of the fine grid along x and y by
-        which they have moved, and their normals.
+        The mask (rows, columns) of columns, their displacement (2, rows, columns) along x and y in
+        steps of the fine grid, and their normals.
     """
     there, inward = there.copy(), inward.copy()
     steps = np.zeros((2, *there.shape), dtype=np.int64)
@@ -184,7 +185,7 @@ def _to_the_border(
 
 
 def _inward(height: FloatArray, pitch: float) -> FloatArray:
-    """(rows, columns, 3) unit normals into the gel; one-sided slopes at borders."""
+    """Return the unit normals (rows, columns, 3) into the gel, from one-sided slopes at borders."""
     by_x, by_y = slopes(height, pitch)
     normals = np.stack([by_x, by_y, -np.ones_like(height)], axis=2)
     return np.asarray(normals / np.linalg.norm(normals, axis=2, keepdims=True))
@@ -193,7 +194,9 @@ def _inward(height: FloatArray, pitch: float) -> FloatArray:
 def _lengths(
     starts: FloatArray, ways: FloatArray, bodies: Sequence[TriangleMesh], longest: float
 ) -> FloatArray:
-    """(n,) mm from points of the skin to where straight ways leave the gel; infinite if not."""
+    """Return the distance (n,), mm, from points of the skin to the exit of straight lines from the
+    gel; infinite if there is none.
+    """
     result = np.full(len(starts), np.inf)
     tiles = np.floor(starts[:, :2] / (TILE * longest)).astype(np.int64)
     _, tile = np.unique(tiles, axis=0, return_inverse=True)
@@ -205,7 +208,8 @@ def _lengths(
         for group in groups:
             ends = np.concatenate([starts[group], starts[group] + longest * ways[group]])
             near = ((highest >= ends.min(axis=0)) & (lowest <= ends.max(axis=0))).all(axis=1)
-            # Most faces look another way; those of the skin itself are left through its back.
+            # Only faces that the lines can leave through are tested; the skin itself is met from
+            # behind.
             near &= leaves @ ways[group].mean(axis=0) > 0.0
             if not near.any():
                 continue
@@ -217,10 +221,11 @@ def _lengths(
 
 
 def _folded(top: FloatArray, inward: FloatArray, length: FloatArray) -> BoolArray:
-    """(rows - 1, columns - 1) cells whose columns cross, as some do where the skin ends.
+    """Return a mask (rows - 1, columns - 1) of the cells whose columns cross, as some do where the
+    skin ends.
 
-    A cell is whole where its area, seen along its columns, has one sign at all its corners, on the
-    skin and on the base.
+    A cell is valid if its area, seen along its columns, has the same sign at all its corners, on
+    the skin and on the base.
     """
     folded = np.zeros((top.shape[0] - 1, top.shape[1] - 1), dtype=bool)
     for share in (0.0, 1.0):
@@ -240,7 +245,9 @@ def _folded(top: FloatArray, inward: FloatArray, length: FloatArray) -> BoolArra
 
 
 def _around_the_middle(cells: BoolArray) -> tuple[BoolArray, BoolArray] | None:
-    """The cells that hang together with the middle and their columns; None if there are none."""
+    """Return the cells that are connected with the middle, and their columns; None if there are
+    none.
+    """
     labels, count = ndimage.label(cells)
     if count == 0:
         return None
@@ -263,7 +270,9 @@ def _uneven(
     solid: BoolArray,
     held: BoolArray,
 ) -> float:
-    """How far from a flat layer the gel is within a thickness of the loads."""
+    """Return the deviation of the gel from a flat layer within a thickness of the loads (see
+    `GelColumns.uneven`).
+    """
     near = np.ones(solid.shape, dtype=bool)
     for axis, half in enumerate(loaded):
         near &= np.abs(top[:, :, axis]) <= half + thickness

@@ -1,10 +1,11 @@
-"""What the shape of a gel changes about how it yields, by finite elements around a contact.
+"""Corrections of a flat layer's response for the shape of the gel, by finite elements around a
+contact.
 
-A flat layer's response (`layer`) is right where the gel is flat, as thick everywhere, and wide. For
-other gels the response is written as that of a half-space in the tangent plane of each load, which
-has the singularity, and a smooth rest. The rest is a displacement field of the gel without a load
-on the contact: on the base it cancels the half-space's displacements, and on free faces its
-stresses. Linear hexahedra with few elements through the thickness resolve it.
+A flat layer's response (`layer`) is exact if the gel is flat, of uniform thickness, and wide. For
+other gels the response is the sum of that of a half-space in the tangent plane of each load, which
+contains the singularity, and a smooth remainder. The remainder is a displacement field of the gel
+without a load on the contact: it cancels the half-space's displacements on the base, and its
+stresses on free faces. Linear hexahedra with few elements through the thickness resolve it.
 """
 
 from __future__ import annotations
@@ -30,14 +31,15 @@ IntArray = NDArray[np.int64]
 BoolArray = NDArray[np.bool_]
 
 TAPER = 1.0
-"""Thicknesses over which the correction fades at the rim of what is modelled."""
+"""Distance, in thicknesses, over which the correction falls to 0 at the rim of the modelled
+region."""
 BLIND = 0.5
-"""Distance from a load, in pitches, below which its stresses on the skin are left out: facets are
-not known as finely."""
+"""Distance from a load, in pitches, below which its stresses on the skin are neglected, as the
+facets are not known more finely."""
 
 
 class GelPatch:
-    """The gel around one contact: what it yields more, or less, than a flat layer.
+    """The difference of the response of the gel around one contact from that of a flat layer.
 
     The stiffness matrix is factorised once; each pressure then takes one solution.
     """
@@ -52,10 +54,10 @@ class GelPatch:
         """Set up the elements.
 
         Args:
-            columns: of the gel.
-            loaded: mm, half of the sides of the rectangle in which loads lie.
-            thickness: mm, of the flat layer that stands for the gel.
-            poisson_ratio: of the gel.
+            columns: the columns of the gel.
+            loaded: half sides (mm) of the rectangle in which loads lie.
+            thickness: thickness (mm) of the flat layer to which the response is compared.
+            poisson_ratio: Poisson's ratio of the gel.
         """
         self.columns, self._thickness, self._nu = columns, thickness, poisson_ratio
         rows, cols = np.nonzero(columns.solid)
@@ -76,14 +78,15 @@ class GelPatch:
         self._known_beside: dict[int, FloatArray] = {}
 
     def correction(self, force: FloatArray) -> FloatArray:
-        """What the gel yields beyond a flat layer, along the normal of the tangent plane.
+        """Return the displacement beyond that of a flat layer, along the normal of the tangent
+        plane.
 
         Args:
-            force: (rows, columns) on the columns, along this normal: N over the shear modulus in
-                MPa.
+            force: (rows, columns) force on each column along this normal, N over the shear modulus
+                in MPa.
 
         Returns:
-            (rows, columns) mm into the gel, times MPa over MPa: as of a shear modulus of 1.
+            The displacement (rows, columns) into the gel, mm.
         """
         loads = self._on_sources(force[None])[0] / -self._inward[self._sources, 2]
         rest = self._solve(self._right_sides(INTO) @ loads)
@@ -92,15 +95,15 @@ class GelPatch:
         return self._on_grid(inside + self._beside @ loads)
 
     def sideways(self, force: FloatArray) -> FloatArray:
-        """What the skin moves along the tangent plane beyond that of a flat layer.
+        """Return the displacement beyond that of a flat layer, along the tangent plane.
 
         Args:
-            force: (3, rows, columns) on the columns, along x and y of the contact's frame and into
-                the gel: N over the shear modulus in MPa. Those along x and y push along the skin,
-                the others along its normals.
+            force: (3, rows, columns) forces on each column along x and y of the contact's frame and
+                into the gel, N over the shear modulus in MPa. The forces along x and y act along
+                the skin, the others along its normals.
 
         Returns:
-            (2, rows, columns) mm along x and y, as of a shear modulus of 1.
+            The displacement (2, rows, columns) along x and y, mm.
         """
         given = self._on_sources(force)
         normals = self._inward[self._sources]
@@ -116,10 +119,11 @@ class GelPatch:
         return np.stack([self._on_grid(each) for each in rest[:, :2].T + beside])
 
     def _beside_along(self, axis: int) -> FloatArray:
-        """(2, columns, sources) along x and y of the half-spaces less the flat layer.
+        """Return the displacement (2, columns, sources) along x and y of the half-spaces minus that
+        of the flat layer.
 
         Args:
-            axis: of the forces, in the frames of the sources.
+            axis: axis of the forces in the frames of the sources.
         """
         if axis not in self._known_beside:
             moved = self._in_frame(
@@ -127,7 +131,7 @@ class GelPatch:
             )
             x, y = np.moveaxis(self._apart, 2, 0) / self._thickness
             moved[((x == 0.0) & (y == 0.0)).T] = 0.0
-            # The flat layer carries forces along normals by their share along its own.
+            # The flat layer is loaded with the components of the forces along its own normal.
             share = self._frames[:, :, axis].T.copy()
             share[slice(0, 2) if axis == INTO else 2] = 0.0
             share[2] = -share[2]
@@ -137,7 +141,9 @@ class GelPatch:
         return self._known_beside[axis]
 
     def _on_grid(self, values: FloatArray) -> FloatArray:
-        """(rows, columns) of (columns,), as the nearest where there is none; 0 at the rim."""
+        """Return values (columns,) on the grid (rows, columns): the nearest column's where there is
+        none, and 0 at the rim.
+        """
         result = np.zeros(self.columns.solid.shape)
         result[self.columns.solid] = values
         nearest = ndimage.distance_transform_edt(
@@ -146,7 +152,9 @@ class GelPatch:
         return np.asarray(result[tuple(nearest)] * self._fade)
 
     def _on_sources(self, force: FloatArray) -> FloatArray:
-        """(n, sources) of forces (n, rows, columns); those beside columns go to the nearest."""
+        """Return forces (n, rows, columns) on the sources (n, sources); forces beside columns act
+        on the nearest.
+        """
         from scipy.spatial import cKDTree
 
         rows, cols = np.nonzero(force.any(axis=0))
@@ -159,7 +167,7 @@ class GelPatch:
 
     @cached_property
     def _fade(self) -> FloatArray:
-        """(rows, columns) 1 inside, falling to 0 at the rim of the grid."""
+        """Return weights (rows, columns), 1 inside and falling to 0 at the rim of the grid."""
         width = max(TAPER * self._thickness / self.columns.pitch, 1.0)
         shares = [
             np.clip(np.minimum(np.arange(n), n - 1 - np.arange(n)) / width, 0.0, 1.0)
@@ -170,7 +178,9 @@ class GelPatch:
 
     @cached_property
     def _beside(self) -> FloatArray:
-        """(columns, sources) of the half-spaces less the flat layer."""
+        """Return the normal displacement (columns, sources) of the half-spaces minus that of the
+        flat layer.
+        """
         offsets = self._offsets(self._top)
         moved = self._in_frame(point_load.displacements(offsets, self._nu))
         upright = -self._inward[:, 2]
@@ -181,28 +191,34 @@ class GelPatch:
         flat = (1.0 - self._nu) / (2.0 * np.pi) / np.where(itself, np.inf, apart)
         far = np.minimum(apart / self._thickness, FARTHEST)
         flat = flat + layer_correction(far, self._nu) / self._thickness
-        # The layer is loaded along its normal: by the share of the force that lies along it.
+        # The layer is loaded with the component of the force along its own normal.
         return np.asarray(np.where(itself, 0.0, into) - flat * upright[source])
 
     @property
     def _apart(self) -> FloatArray:
-        """(columns, sources, 2) mm from sources to columns in the tangent plane."""
+        """Return vectors (columns, sources, 2), mm, from sources to columns in the tangent
+        plane.
+        """
         at = self._top[:, :2]
         return np.asarray(at[:, None] - at[None, self._sources])
 
     def _offsets(self, points: FloatArray) -> FloatArray:
-        """(sources, n, 3) points as the half-space of each source sees them."""
+        """Return points (sources, n, 3), mm, in the frame of each source's half-space."""
         return np.einsum(
             "snk,ski->sni", points[None] - self._top[self._sources][:, None], self._frames
         )
 
     def _in_frame(self, vectors: FloatArray) -> FloatArray:
-        """(sources, n, 3) vectors of the sources' half-spaces in the contact's frame."""
+        """Transform vectors (sources, n, 3) from the frames of the sources' half-spaces to the
+        contact's frame.
+        """
         return np.einsum("sni,ski->snk", vectors, self._frames)
 
     @cached_property
     def _frames(self) -> FloatArray:
-        """(sources, 3, 3): columns along the skin, across, and into the gel."""
+        """Return the axes (sources, 3, 3) of the half-spaces, as columns: two along the skin, and
+        one into the gel.
+        """
         z = self._inward[self._sources]
         x = np.array([1.0, 0.0, 0.0]) - z[:, :1] * z
         x /= np.linalg.norm(x, axis=1, keepdims=True)
@@ -210,14 +226,14 @@ class GelPatch:
 
     @cached_property
     def _cells(self) -> IntArray:
-        """(cells, 4) columns at the corners, x running first."""
+        """Return the columns (cells, 4) at the corners of each cell, x running first."""
         n = self._number
         corners = np.stack([n[:-1, :-1], n[:-1, 1:], n[1:, :-1], n[1:, 1:]], axis=2)
         return corners[self.columns.cells]
 
     @cached_property
     def _elements(self) -> IntArray:
-        """(elements, 8) nodes: the lower four, then the upper four."""
+        """Return the nodes (elements, 8) of each element: the lower four, then the upper four."""
         base = self._cells[:, None, :] * (LAYERS + 1) + np.arange(LAYERS)[None, :, None]
         return np.concatenate([base + 1, base], axis=2).reshape(-1, 8)
 
@@ -251,16 +267,17 @@ class GelPatch:
         )
 
     def _solve(self, right_side: FloatArray) -> FloatArray:
-        """(columns, 3) displacements of the skin, but for those that are held."""
+        """Return the displacements (columns, 3) of the skin; 0 for columns that are fixed."""
         moved = np.zeros(3 * len(self._nodes))
         moved[self._free] = self._factor.solve(right_side)
         return np.asarray(moved.reshape(-1, LAYERS + 1, 3)[:, 0])
 
     def _right_sides(self, axis: int) -> FloatArray:
-        """(free, sources): what cancels the half-spaces on the base and on free faces.
+        """Return the right sides (free, sources) that cancel the half-spaces' fields on the base
+        and on free faces.
 
         Args:
-            axis: of the forces, in the frames of the sources.
+            axis: axis of the forces in the frames of the sources.
         """
         if axis in self._known_sides:
             return self._known_sides[axis]
@@ -278,11 +295,15 @@ class GelPatch:
         return self._known_sides[axis]
 
     def _skin_faces(self) -> tuple[IntArray, FloatArray]:
-        """(faces, 4) nodes, and the sign that turns their normals outward."""
+        """Return the nodes (faces, 4) of the skin's faces, and the signs that turn their normals
+        outward.
+        """
         return self._cells * (LAYERS + 1), np.ones(len(self._cells))
 
     def _side_faces(self) -> tuple[IntArray, FloatArray]:
-        """The same of the sides of the gel that are free."""
+        """Return the nodes (faces, 4) of the free sides of the gel, and the signs that turn their
+        normals outward.
+        """
         cells = self._cells
         held = self._fixed[:, 0]
         found, signs = [], []

@@ -1,4 +1,4 @@
-"""Patches of a gel around contacts, kept while contacts come back to the same places."""
+"""A cache of gel patches for contacts that return to the same places."""
 
 from __future__ import annotations
 
@@ -16,39 +16,44 @@ from optisense.mechanics.gel_columns import gel_columns
 from optisense.mechanics.gel_patch import GelPatch
 
 FLAT = 0.02
-"""Rise of the skin or change of thickness within a thickness of a contact, as a share of it, up to
-which a gel is a flat layer. Forces change by less than half as much."""
+"""Largest deviation from a flat layer (see `GelColumns.uneven`) at which a gel is treated as one.
+Forces change by less than half of this share."""
 MOST_KEPT = 12
-"""Patches that are kept: nine places and some more. Each takes about 20 MB, and three times as much
-once it was dragged."""
+"""Number of patches that are kept: nine places and some more. Each takes about 20 MB, and three
+times as much after a drag."""
 STEP = 0.5
 """Step in which the loaded rectangle around a place grows, in thicknesses, so that presses of
 several depths at one place share a patch."""
 SAME_PLACE = 6
-"""Decimals of mm at which places are the same."""
+"""Number of decimals (of mm) to which equal places agree."""
 
 
 class _Kept(NamedTuple):
-    """A patch, or None where the gel is a flat layer, and how far from its middle it is loaded."""
+    """A patch (None where the gel is a flat layer) and the half sides (mm) of its loaded
+    rectangle.
+    """
 
     loaded: tuple[float, float]
     patch: GelPatch | None
 
 
 class GelPatches:
-    """Makes patches of one gel."""
+    """Factory and cache of the patches of one gel."""
 
     def __init__(
         self, skin: TriangleMesh, elastomers: Sequence[TriangleMesh], poisson_ratio: float
     ) -> None:
-        """Take the undeformed sensing surface and the gels under it, in the design's frame."""
+        """Create an empty cache for a sensing surface and the gels under it, in the design's
+        frame.
+        """
         self._skin, self._elastomers, self._nu = skin, elastomers, poisson_ratio
         self._kept: OrderedDict[tuple[float, ...], _Kept] = OrderedDict()
 
     def around(self, place: Footprint) -> GelPatch | None:
-        """The patch around a contact; None where the gel is a flat layer, or where there is none.
+        """Return the patch around a contact; None where the gel is a flat layer or no patch can be
+        made.
 
-        A patch takes a second or two to make, and a solution with it some milliseconds.
+        A patch takes a second or two to compute, and a solution with it some milliseconds.
         """
         if not self._elastomers:
             return None

@@ -10,26 +10,28 @@ from optisense.geometry import TriangleMesh
 FloatArray = NDArray[np.float64]
 
 LEAST_UPRIGHT = 0.05
-"""Smallest z of unit shading normals by which a triangle's heights are curved; steeper ones are
-taken as they are."""
+"""Smallest z of unit shading normals with which the heights of a triangle are curved; steeper
+triangles are flat."""
 PIXELS_AT_ONCE = 4_000_000
-"""Pairs of a triangle and a grid point that are looked at together; they take about 200 MB."""
+"""Number of pairs of a triangle and a grid point that are processed together; they take about 200
+MB."""
 
 
 def heights(mesh: TriangleMesh, x: FloatArray, y: FloatArray, highest: bool = False) -> FloatArray:
-    """The lowest (or highest) z of a mesh above each point of a regular grid.
+    """Return the lowest (or highest) z of a mesh at each point of a regular grid.
 
-    Where the mesh has shading normals, heights follow a quadratic surface through each triangle:
-    half of the way from the triangle to the tangent planes of its corners, weighted by barycentric
-    coordinates. It is exact for paraboloids, and continuous across edges.
+    If the mesh has shading normals, heights follow a quadratic surface through each triangle:
+    half-way from the triangle to the tangent planes of its corners, weighted by barycentric
+    coordinates. This is exact for paraboloids, and continuous across edges.
 
     Args:
-        mesh: mm; z is the height. Its shading normals are used if it has any.
-        x, y: (columns,) and (rows,) mm, ascending at one pitch.
-        highest: give the highest instead.
+        mesh: the mesh (mm), with z as the height. Its shading normals are used if it has any.
+        x, y: (columns,) and (rows,) grid coordinates (mm), ascending with a constant pitch.
+        highest: whether the highest z is returned instead of the lowest.
 
     Returns:
-        (rows, columns) mm; infinity (minus infinity for the highest) where no triangle is.
+        Heights (rows, columns), mm; infinity (minus infinity for the highest) where there is no
+        triangle.
     """
     sign = -1.0 if highest else 1.0
     result = np.full(len(x) * len(y), np.inf)
@@ -70,15 +72,15 @@ def heights(mesh: TriangleMesh, x: FloatArray, y: FloatArray, highest: bool = Fa
 
 
 def slopes(height: FloatArray, pitch: float) -> tuple[FloatArray, FloatArray]:
-    """Slopes of heights by x and by y, from the neighbours that have a height.
+    """Return the slopes of heights by x and by y, from the neighbours that have a height.
 
     Args:
-        height: (rows, columns) mm; NaN where there is none.
-        pitch: mm between points.
+        height: (rows, columns) heights, mm; NaN where there is none.
+        pitch: distance between points, mm.
 
     Returns:
-        (rows, columns) each: the mean of the slopes to both neighbours, that to the only one, or
-        NaN where there is none.
+        The slopes, (rows, columns) each: the mean of the slopes to both neighbours, the slope to
+        the only one, or NaN where there is none.
     """
     found = []
     for axis in (1, 0):
@@ -101,7 +103,9 @@ def _on_triangles(
     x: FloatArray,
     y: FloatArray,
 ) -> FloatArray:
-    """Heights (n,) of points on faces, by the barycentric shares of the second and third corner."""
+    """Return the heights (n,), mm, of points on faces, from the barycentric coordinates of the
+    second and third corner.
+    """
     second, third = shares
     all_three = 1.0 - second - third, second, third
     flat = sum(share * corners[face, k, 2] for k, share in enumerate(all_three))

@@ -1,4 +1,4 @@
-"""Linear elasticity of hexahedra with eight corners, which do not lock near incompressibility."""
+"""Linear elasticity of eight-node hexahedra that do not lock near incompressibility."""
 
 from __future__ import annotations
 
@@ -8,23 +8,24 @@ from numpy.typing import NDArray
 FloatArray = NDArray[np.float64]
 
 CORNERS = np.array([(x, y, z) for z in (-1, 1) for y in (-1, 1) for x in (-1, 1)], dtype=np.float64)
-"""(8, 3) corners of the unit cell, in the order in which elements list their nodes: x runs first,
-then y, then z."""
+"""Corners (8, 3) of the reference cell, in the order of an element's nodes: x runs first, then y,
+then z."""
 GAUSS = CORNERS / np.sqrt(3.0)
-"""(8, 3) points of the Gauss rule of order 2 in each direction; all weights are 1."""
+"""Points (8, 3) of the Gauss rule of order 2 in each direction; all weights are 1."""
 FACE_GAUSS = np.array([(x, y) for y in (-1, 1) for x in (-1, 1)]) / np.sqrt(3.0)
-"""(4, 2) points of the Gauss rule of order 2 on a face; all weights are 1."""
+"""Points (4, 2) of the Gauss rule of order 2 on a face; all weights are 1."""
 
 
 def stiffnesses(corners: FloatArray, poisson_ratio: float) -> FloatArray:
-    """(m, 24, 24) stiffness matrices for a shear modulus of 1; degrees of freedom node by node.
+    """Return stiffness matrices (m, 24, 24) for a shear modulus of 1; degrees of freedom are
+    ordered node by node.
 
-    The change of volume is the element's mean (Hughes, "Generalization of selective integration
+    The dilatation is the element's mean (Hughes, "Generalization of selective integration
     procedures to anisotropic and nonlinear media", Int. J. Numer. Methods Eng. 15, 1980).
 
     Args:
-        corners: (m, 8, 3) mm.
-        poisson_ratio: below 0.5.
+        corners: (m, 8, 3) corners of each element, mm.
+        poisson_ratio: Poisson's ratio, below 0.5.
     """
     count = len(corners)
     slopes, weights = _shape_slopes(corners)
@@ -45,7 +46,9 @@ def stiffnesses(corners: FloatArray, poisson_ratio: float) -> FloatArray:
 
 
 def _shape_slopes(corners: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """(m, 8, 8, 3) derivatives of the shape functions at the Gauss points, and their weights."""
+    """Return the derivatives (m, 8, 8, 3) of the shape functions at the Gauss points, and the
+    weights of these.
+    """
     local = np.empty((8, 8, 3))
     for axis in range(3):
         others = [k for k in range(3) if k != axis]
@@ -60,14 +63,15 @@ def _shape_slopes(corners: FloatArray) -> tuple[FloatArray, FloatArray]:
 
 
 def face_points(corners: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Where loads on faces are looked up.
+    """Return the Gauss points of faces, at which loads are evaluated.
 
     Args:
-        corners: (m, 4, 3) mm, x running first; the normal is that of x cross y.
+        corners: (m, 4, 3) corners of each face (mm), x running first; the normal is that of x cross
+            y.
 
     Returns:
-        (m, 4, 3) points, (m, 4, 3) normals times their share of the area, and (4, 4) the weights
-        of the corners (columns) at each point (rows).
+        The points (m, 4, 3), mm; normals (m, 4, 3) times each point's share of the area; and the
+        weights (4, 4) of the corners (columns) at each point (rows).
     """
     x, y = FACE_GAUSS.T
     signs = np.array([(-1, -1), (1, -1), (-1, 1), (1, 1)])

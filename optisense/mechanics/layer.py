@@ -1,10 +1,10 @@
-"""An elastic layer on a rigid base: how its surface yields to loads.
+"""The response of the surface of an elastic layer on a rigid base to loads.
 
 A layer of thickness h is bonded to a rigid base and loaded on its surface. For loads that vary as
 exp(i q x), the equations of linear elasticity have a closed solution (its compliances are checked
 in the tests against a numerical solution of the same equations). The response to a load on a small
-square follows as that of a half-space, which is known in closed form, plus a smooth correction,
-which is a Hankel transform.
+square is that of a half-space, which has a closed form, plus a smooth correction, which is a Hankel
+transform.
 """
 
 from __future__ import annotations
@@ -27,17 +27,18 @@ MAX_WAVE_NUMBER = 20.0
 """Largest wave number times thickness in the Hankel transforms. The layer's compliance differs from
 the half-space's by terms of exp(-2 q h), which are 1e-15 there."""
 PANELS, PANEL_POINTS = 100, 8
-"""Panels of the Gauss-Legendre rule of the Hankel transforms, and points in each: twelve points for
-each oscillation of the Bessel function at `FARTHEST`."""
+"""Number of panels of the Gauss-Legendre rule of the Hankel transforms, and of points in each:
+twelve points for each oscillation of the Bessel function at `FARTHEST`."""
 FARTHEST = 20.0
-"""Distance over thickness beyond which the layer's surface is taken to be at rest. Displacements of
-a bonded layer decay exponentially with the distance; at ten thicknesses they are below 1e-4 of
-those at one."""
+"""Distance over thickness beyond which displacements of the layer's surface are neglected.
+Displacements of a bonded layer decay exponentially with the distance; at ten thicknesses they are
+below 1e-4 of those at one."""
 TABLE_POINTS = 1200
-"""Entries of a table of distances from 0 to `FARTHEST`; a cubic spline through them is exact to
-1e-6."""
+"""Number of entries of a table of distances from 0 to `FARTHEST`; a cubic spline through them is
+exact to 1e-6."""
 TINY = 1e-300
-"""Length (mm) that keeps logarithms finite where they are multiplied by zero."""
+"""Length (mm) added to arguments of logarithms, which keeps them finite where they are multiplied
+by zero."""
 
 
 class Compliance(NamedTuple):
@@ -57,11 +58,11 @@ class Compliance(NamedTuple):
 
 
 def layer_compliance(wave_number: ArrayLike, poisson_ratio: float) -> Compliance:
-    """Compliances of a bonded layer of thickness 1.
+    """Return the compliances of a bonded layer of thickness 1.
 
-    With a = q h and k = 3 - 4 nu, all but `across` share the denominator k cosh 2a + 2 a^2 +
-    (k^2 + 1) / 2; their numerators are (1 - nu) (k sinh 2a - 2a), (1 - nu) (k sinh 2a + 2a) and
-    (k (k - 1) (cosh 2a - 1) / 2 - 2 a^2) / 2. `across` is tanh a.
+    With a = q h and k = 3 - 4 nu, all but `across` share the denominator k cosh 2a + 2 a^2 + (k^2 +
+    1) / 2; their numerators are (1 - nu) (k sinh 2a - 2a), (1 - nu) (k sinh 2a + 2a) and (k (k - 1)
+    (cosh 2a - 1) / 2 - 2 a^2) / 2. `across` is tanh a.
 
     Args:
         wave_number: q h, 0 or more.
@@ -69,7 +70,7 @@ def layer_compliance(wave_number: ArrayLike, poisson_ratio: float) -> Compliance
     """
     a = np.asarray(wave_number, dtype=np.float64)
     k = 3.0 - 4.0 * poisson_ratio
-    decay = np.exp(-2.0 * a)  # numerators and denominator are taken times 2 exp(-2a)
+    decay = np.exp(-2.0 * a)  # numerators and denominator are multiplied by 2 exp(-2a)
     denominator = k * (1.0 + decay**2) + (4.0 * a**2 + k**2 + 1.0) * decay
     sinh, cosh = k * (1.0 - decay**2), 1.0 + decay**2 - 2.0 * decay
     cross = 0.25 * (k * (k - 1.0) * cosh - 8.0 * a**2 * decay)
@@ -82,13 +83,14 @@ def layer_compliance(wave_number: ArrayLike, poisson_ratio: float) -> Compliance
 
 
 def half_space_compliance(poisson_ratio: float) -> tuple[float, float, float, float]:
-    """The same as `layer_compliance` for an infinitely thick layer."""
+    """Return the values of `layer_compliance` for an infinitely thick layer."""
     share = 1.0 - poisson_ratio
     return share, share, 1.0, 0.5 * (1.0 - 2.0 * poisson_ratio)
 
 
 class _Corrections(NamedTuple):
-    """Splines of what a layer of thickness and shear modulus 1 adds to a half-space at a distance.
+    """Splines of the difference between a layer of thickness and shear modulus 1 and a half-space,
+    by distance.
 
     `isotropic` and `quadrupole` are the parts of shear compliance that do not depend on the
     direction, and that vary as the cosine of twice its angle.
@@ -102,7 +104,7 @@ class _Corrections(NamedTuple):
 
 @lru_cache(maxsize=32)
 def _corrections(poisson_ratio: float) -> _Corrections:
-    from scipy.interpolate import CubicSpline  # takes a while to load
+    from scipy.interpolate import CubicSpline  # slow to import
 
     nodes, weights = np.polynomial.legendre.leggauss(PANEL_POINTS)
     panel = MAX_WAVE_NUMBER / PANELS
@@ -132,30 +134,30 @@ def _corrections(poisson_ratio: float) -> _Corrections:
 
 
 def layer_correction(distance: FloatArray, poisson_ratio: float) -> FloatArray:
-    """Normal displacement by a point force that a layer has beyond a half-space.
+    """Return the normal displacement of a layer by a point force, minus that of a half-space.
 
     Args:
-        distance: from the force, 0 to `FARTHEST` thicknesses.
-        poisson_ratio: below 0.5.
+        distance: distance from the force, 0 to `FARTHEST` thicknesses.
+        poisson_ratio: Poisson's ratio, below 0.5.
 
     Returns:
-        mm for 1 N, a thickness of 1 mm and a shear modulus of 1 MPa.
+        The displacement (mm) for 1 N, a thickness of 1 mm and a shear modulus of 1 MPa.
     """
     return np.asarray(_corrections(poisson_ratio).normal(distance))
 
 
 def surface_displacement(x: FloatArray, y: FloatArray, poisson_ratio: float) -> FloatArray:
-    """Displacement along the surface of a bonded layer by point forces.
+    """Return the displacement along the surface of a bonded layer by point forces.
 
     At the force itself the infinite part, which is the half-space's, is left out.
 
     Args:
-        x, y: (...) thicknesses from the force, along the surface.
-        poisson_ratio: below 0.5.
+        x, y: (...) position relative to the force along the surface, in thicknesses.
+        poisson_ratio: Poisson's ratio, below 0.5.
 
     Returns:
-        (2, 3, ...) mm along x and y by 1 N along x, along y and into the layer, for a thickness of
-        1 mm and a shear modulus of 1 MPa.
+        The displacement (2, 3, ...), mm, along x and y by 1 N along x, along y and into the layer,
+        for a thickness of 1 mm and a shear modulus of 1 MPa.
     """
     nu, splines = poisson_ratio, _corrections(poisson_ratio)
     r = np.hypot(x, y)
@@ -204,10 +206,10 @@ class SquareLoad:
     correction is that of a point load.
 
     Attributes:
-        side: mm, of the square, which lies around the origin along x and y.
-        thickness: mm, of the layer.
-        shear_modulus: MPa.
-        poisson_ratio: below 0.5.
+        side: side (mm) of the square, which is centred on the origin and parallel to x and y.
+        thickness: thickness of the layer, mm.
+        shear_modulus: shear modulus of the layer, MPa.
+        poisson_ratio: Poisson's ratio of the layer, below 0.5.
     """
 
     side: float
@@ -216,13 +218,15 @@ class SquareLoad:
     poisson_ratio: float
 
     def pressed_in(self, x: FloatArray, y: FloatArray) -> FloatArray:
-        """Normal displacement (mm) of points (arrays of one shape, mm) by a pressure of 1 MPa."""
+        """Return the normal displacement (mm) of points (arrays of one shape, mm) by a pressure of
+        1 MPa.
+        """
         half_space = self._sum(_x_squared, x, y) + self._sum(_y_squared, x, y)
         half_space *= (1.0 - self.poisson_ratio) / (2.0 * np.pi)
         return self._total(half_space + self._corrected("normal", x, y), x, y)
 
     def kernels(self, x: FloatArray, y: FloatArray) -> LoadKernels:
-        """All displacements of points (arrays of one shape, mm) by loads of 1 MPa."""
+        """Return all displacements (mm) of points (arrays of one shape, mm) by loads of 1 MPa."""
         nu, inverse = self.poisson_ratio, 1.0 / (2.0 * np.pi)
         x_part, y_part = self._sum(_x_squared, x, y), self._sum(_y_squared, x, y)
         r = np.hypot(x, y)
@@ -247,7 +251,7 @@ class SquareLoad:
     def _sum(
         self, term: Callable[[FloatArray, FloatArray], FloatArray], x: FloatArray, y: FloatArray
     ) -> FloatArray:
-        """An antiderivative taken between the corners of the square."""
+        """Return the definite integral over the square, from an antiderivative at its corners."""
         half = self.side / 2.0
         upper = term(x + half, y + half) - term(x - half, y + half)
         return upper - term(x + half, y - half) + term(x - half, y - half)
@@ -263,7 +267,7 @@ class SquareLoad:
 
 
 def _x_squared(x: FloatArray, y: FloatArray) -> FloatArray:
-    """Antiderivative of x^2 / r^3 in x and y."""
+    """Return the antiderivative of x^2 / r^3 in x and y."""
     r = np.hypot(x, y)
     # ln(x + r), without cancellation where x is negative
     logarithm = np.log(np.abs(x) + r + TINY)
@@ -271,20 +275,20 @@ def _x_squared(x: FloatArray, y: FloatArray) -> FloatArray:
 
 
 def _y_squared(x: FloatArray, y: FloatArray) -> FloatArray:
-    """Antiderivative of y^2 / r^3 in x and y."""
+    """Return the antiderivative of y^2 / r^3 in x and y."""
     return _x_squared(y, x)
 
 
 def _mixed(x: FloatArray, y: FloatArray) -> FloatArray:
-    """Antiderivative of x y / r^3 in x and y."""
+    """Return the antiderivative of x y / r^3 in x and y."""
     return -np.hypot(x, y)
 
 
 def _slope_of_y(x: FloatArray, y: FloatArray) -> FloatArray:
-    """Antiderivative of y / r^2 in x and y."""
+    """Return the antiderivative of y / r^2 in x and y."""
     return _slope(y, x)
 
 
 def _slope(x: FloatArray, y: FloatArray) -> FloatArray:
-    """Antiderivative of x / r^2 in x and y."""
+    """Return the antiderivative of x / r^2 in x and y."""
     return y * np.log(np.hypot(x, y) + TINY) + x * np.arctan2(y, np.abs(x)) * np.sign(x)

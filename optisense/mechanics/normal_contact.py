@@ -13,19 +13,20 @@ from optisense.mechanics.convolution import GridResponse
 FloatArray = NDArray[np.float64]
 
 TOLERANCE = 2e-4
-"""Largest remaining gap or overlap inside the contact over the largest overlap at the start, at
-which the iteration ends: 0.16 micrometres for a press of 0.8 mm."""
+"""Ratio of the largest remaining gap or overlap inside the contact to the largest initial overlap
+at which the iteration ends: 0.16 micrometres for a press of 0.8 mm."""
 MAX_ITERATIONS = 400
-"""Iterations after which the solver gives up; smooth contacts take 10 to 30, rough ones 100."""
+"""Number of iterations after which the solver fails; smooth contacts take 10 to 30, rough ones
+100."""
 
 
 class NormalContact(NamedTuple):
     """A solved contact.
 
     Attributes:
-        pressure: (rows, columns) MPa, 0 outside the contact.
-        displacement: (rows, columns) mm into the layer.
-        iterations: how many were needed.
+        pressure: (rows, columns) pressure (MPa), 0 outside the contact.
+        displacement: (rows, columns) displacement into the layer, mm.
+        iterations: number of iterations used.
     """
 
     pressure: FloatArray
@@ -39,7 +40,7 @@ def solve_normal_contact(
     start: FloatArray | None = None,
     tolerance: float = TOLERANCE,
 ) -> NormalContact:
-    """Pressure that keeps the skin from entering an indenter.
+    """Solve for the pressure that keeps the skin from penetrating an indenter.
 
     The pressure is nowhere negative, the displacement equals the overlap where there is pressure,
     and is at least the overlap elsewhere. It minimises the complementary energy; the method is the
@@ -47,11 +48,12 @@ def solve_normal_contact(
     contact problems", Wear 231 (1999), for a given approach in place of a given force.
 
     Args:
-        response: of the layer, on the grid.
-        overlap: (rows, columns) mm, how far the undeformed skin lies inside the indenter; negative
+        response: the response of the layer on the grid.
+        overlap: (rows, columns) depth (mm) of the undeformed skin inside the indenter; negative
             where there is a gap.
-        start: pressure to begin with.
-        tolerance: in place of `TOLERANCE`, of pressures that others follow.
+        start: initial pressure, MPa.
+        tolerance: tolerance at which the iteration ends; larger than `TOLERANCE` for intermediate
+            results.
 
     Raises:
         ContactError: the iteration does not converge.
@@ -62,7 +64,7 @@ def solve_normal_contact(
         return NormalContact(nothing, nothing, 0)
     pressure = np.where(overlap > 0.0, overlap, 0.0) if start is None else start.copy()
     displacement = response.normal(pressure)
-    if start is None:  # the scale at which the energy is least
+    if start is None:  # scaled to the minimum of the energy
         scale = float((pressure * overlap).sum() / (pressure * displacement).sum())
         pressure, displacement = scale * pressure, scale * displacement
     way = np.zeros_like(overlap)
@@ -98,15 +100,15 @@ def solve_normal_contact(
 
 
 def contact_area(pressure: FloatArray, pitch: float) -> float:
-    """The area (mm^2) that is pressed on, to a fraction of the grid's squares.
+    """Return the area (mm^2) of a contact, more finely than the grid's squares.
 
-    Pressure of smooth contacts falls to 0 as the square root of the distance from the rim, so its
-    square is followed to 0 beyond the outermost points, along rows and along columns. Where it
-    does not fall, as at the edge of a flat punch, squares count whole.
+    The pressure of smooth contacts falls to 0 as the square root of the distance from the rim. Its
+    square is therefore extrapolated to 0 beyond the outermost points, along rows and along columns.
+    If it does not fall, as at the edge of a flat punch, squares count whole.
 
     Args:
-        pressure: (rows, columns) MPa.
-        pitch: mm, side of a square.
+        pressure: (rows, columns) pressure, MPa.
+        pitch: side of a square, mm.
     """
     touching = pressure > 0.0
     square = np.pad(pressure, 1) ** 2

@@ -1,4 +1,4 @@
-"""A force on the surface of a half-space: displacements and stresses inside it.
+"""Displacements and stresses inside a half-space due to a force on its surface.
 
 The solutions are Boussinesq's for a force into it and Cerruti's for one along its surface (Johnson,
 Contact Mechanics, 1985, sections 3.2 and 3.6).
@@ -12,22 +12,24 @@ from numpy.typing import NDArray
 FloatArray = NDArray[np.float64]
 
 NEAREST_SQUARE = 1e-12
-"""mm^2; squared distances are kept above it, so that the point of the load itself gives numbers."""
+"""Lower bound on squared distances (mm^2), so that results are finite at the point of the load
+itself."""
 
 
 INTO = 2
 """Axis of a force into the half-space; those of forces along its surface are 0 and 1."""
 SWAPPED = [1, 0, 2]
-"""Axes after x and y have changed places: a force along y is one along x seen so."""
+"""Permutation of axes that exchanges x and y and so turns a force along y into one along x."""
 
 
 def displacements(offsets: FloatArray, poisson_ratio: float, axis: int = INTO) -> FloatArray:
-    """(..., 3) mm by a force of 1 N along an axis, for a shear modulus of 1 MPa.
+    """Return the displacements (..., 3), mm, by a force of 1 N along an axis, for a shear modulus
+    of 1 MPa.
 
     Args:
-        offsets: (..., 3) mm from the load; z points into the half-space.
-        poisson_ratio: of the half-space.
-        axis: of the force.
+        offsets: (..., 3) positions relative to the load, mm; z points into the half-space.
+        poisson_ratio: Poisson's ratio of the half-space.
+        axis: axis of the force.
     """
     if axis == 1:
         return displacements(offsets[..., SWAPPED], poisson_ratio, 0)[..., SWAPPED]
@@ -42,7 +44,7 @@ def displacements(offsets: FloatArray, poisson_ratio: float, axis: int = INTO) -
 
 
 def _displacements_along(offsets: FloatArray, poisson_ratio: float) -> FloatArray:
-    """`displacements` by a force along x."""
+    """Return the displacements by a force along x; see `displacements`."""
     x, y, z = np.moveaxis(offsets, -1, 0)
     r, s = _distances(x, y, z)
     loss = 1.0 - 2.0 * poisson_ratio
@@ -53,7 +55,9 @@ def _displacements_along(offsets: FloatArray, poisson_ratio: float) -> FloatArra
 
 
 def gradients(offsets: FloatArray, poisson_ratio: float, axis: int = INTO) -> FloatArray:
-    """(..., 3, 3) derivatives of `displacements`: row i has those of component i by x, y and z."""
+    """Return the derivatives (..., 3, 3) of `displacements`: row i has those of component i by x, y
+    and z.
+    """
     if axis == 1:
         found = gradients(offsets[..., SWAPPED], poisson_ratio, 0)
         return np.asarray(found[..., SWAPPED, :][..., SWAPPED])
@@ -78,11 +82,11 @@ def gradients(offsets: FloatArray, poisson_ratio: float, axis: int = INTO) -> Fl
 
 
 def _gradients_along(offsets: FloatArray, poisson_ratio: float) -> FloatArray:
-    """`gradients` of a force along x."""
+    """Return the gradients by a force along x; see `gradients`."""
     x, y, z = np.moveaxis(offsets, -1, 0)
     r, s = _distances(x, y, z)
-    # What depends on the Poisson ratio is the gradient of p = x / (r + z), with its last component
-    # turned round. These are the second derivatives of p.
+    # The terms with the Poisson ratio are the gradient of p = x / (r + z) with its last component
+    # negated. These are the second derivatives of p.
     near, far = 1.0 / (r**3 * s**2), 2.0 / (r**2 * s**3)
     both = near + far
     xx = x * (x**2 * both - 3.0 / (r * s**2))
@@ -104,20 +108,22 @@ def _gradients_along(offsets: FloatArray, poisson_ratio: float) -> FloatArray:
 
 
 def stresses(offsets: FloatArray, poisson_ratio: float, axis: int = INTO) -> FloatArray:
-    """(..., 3, 3) MPa of a force of 1 N along an axis; they do not depend on the shear modulus."""
+    """Return the stresses (..., 3, 3), MPa, by a force of 1 N along an axis, for any shear
+    modulus.
+    """
     slopes = gradients(offsets, poisson_ratio, axis)
-    strains = slopes + np.swapaxes(slopes, -1, -2)  # twice
+    strains = slopes + np.swapaxes(slopes, -1, -2)  # twice the strains
     dilatation = np.trace(slopes, axis1=-2, axis2=-1)
     share = 2.0 * poisson_ratio / (1.0 - 2.0 * poisson_ratio)
     return np.asarray(strains + share * dilatation[..., None, None] * np.eye(3))
 
 
 def _inverse_product(r: FloatArray, z: FloatArray) -> FloatArray:
-    """1 / (r (r + z)), bounded above the surface, on the axis of the load."""
+    """Return 1 / (r (r + z)), bounded above the surface on the axis of the load."""
     return 1.0 / (r * np.maximum(r + z, 0.1 * r))
 
 
 def _distances(x: FloatArray, y: FloatArray, z: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """r and r + z, bounded at the load and above the surface, on the axis of the load."""
+    """Return r and r + z, bounded at the load and above the surface on its axis."""
     r = np.sqrt(np.maximum(x**2 + y**2 + z**2, NEAREST_SQUARE))
     return r, np.maximum(r + z, 0.1 * r)

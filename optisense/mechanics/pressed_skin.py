@@ -1,4 +1,4 @@
-"""The skin of a gel with indenters pressed in: its shape, and the pressures and forces on it."""
+"""The skin of a gel under contacts: its shape, and the pressures and forces on it."""
 
 from __future__ import annotations
 
@@ -30,17 +30,20 @@ from optisense.mechanics.tangential_contact import Drag, solve_shear
 FloatArray = NDArray[np.float64]
 
 SETTLED = 1e-4
-"""Change of the displacements that contacts cause each other (mm) at which they are settled."""
+"""Change (mm) of the displacements that contacts cause at each other at which the iteration over
+contacts has converged."""
 FIRST_TOLERANCE = 0.01
-"""Tolerance of pressures that are solved before anything of the gel's shape is known; see
+"""Tolerance of the first pressure, solved before the correction for the gel's shape is known; see
 `normal_contact.TOLERANCE`."""
 ROUGH_SHARE = 0.02
-"""Tolerance of a pressure over the last change of what the gel's shape gives, in mm: each turn is
-solved a little better than the next one changes it."""
+"""Ratio of a pressure's tolerance to the last change (mm) of the correction for the gel's shape, so
+that each iteration is solved somewhat better than the next one changes it."""
 MAX_TURNS = 12
-"""Turns in which pressure and the gel's shape are matched; each is several times nearer."""
+"""Largest number of iterations of the pressure and the correction for the gel's shape; each reduces
+the error several times."""
 MAX_SWEEPS = 8
-"""Sweeps over contacts after which they are taken as they are; distant ones need one or two."""
+"""Number of sweeps over contacts after which the iteration ends; distant contacts need one or
+two."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,9 +52,10 @@ class Pressed:
 
     Attributes:
         place: its grid and overlap.
-        pressure: (rows, columns) MPa on this grid.
+        pressure: (rows, columns) pressure (MPa) on this grid.
         field: the displacement that it causes.
-        shear: (2, rows, columns) MPa along x and y of the grid, if the indenter was dragged.
+        shear: (2, rows, columns) shear (MPa) along x and y of the grid, if the indenter was
+            dragged.
     """
 
     place: Footprint
@@ -61,17 +65,17 @@ class Pressed:
 
     @property
     def force(self) -> float:
-        """N, along the contact's outward normal."""
+        """Force (N) along the contact's outward normal."""
         return float(self.pressure.sum()) * self.place.pitch**2
 
     @property
     def area(self) -> float:
-        """mm^2 of skin that touches."""
+        """Area (mm^2) of the contact."""
         return contact_area(self.pressure, self.place.pitch)
 
     @property
     def shear_force(self) -> FloatArray:
-        """(3,) N by which the indenter drags the skin, in the design's frame."""
+        """Force (3,), N, with which the indenter drags the skin, in the design's frame."""
         if self.shear is None:
             return np.zeros(3)
         along = self.shear.sum(axis=(1, 2)) * self.place.pitch**2
@@ -79,7 +83,9 @@ class Pressed:
 
     @property
     def torque(self) -> float:
-        """N mm by which the indenter turns the skin, counter-clockwise seen from outside."""
+        """Torque (N mm) with which the indenter turns the skin, counter-clockwise seen from
+        outside.
+        """
         if self.shear is None:
             return 0.0
         x, y = np.meshgrid(self.place.x, self.place.y)
@@ -87,13 +93,12 @@ class Pressed:
 
 
 class SkinDisplacement(NamedTuple):
-    """How points of a skin move.
+    """The displacement of points of a skin.
 
     Attributes:
-        displacement: (n, 3) mm.
-        tilt: (n, 3), what their unit normals into the gel change by, before they are made unit
-            vectors again.
-        touching: (n,) whether they touch an indenter.
+        displacement: (n, 3) displacement, mm.
+        tilt: (n, 3) change of the unit normals into the gel, before they are normalised again.
+        touching: (n,) mask of the points that touch an indenter.
     """
 
     displacement: FloatArray
@@ -102,12 +107,12 @@ class SkinDisplacement(NamedTuple):
 
 
 class SkinMaps(NamedTuple):
-    """What is true of points of a pressed skin.
+    """Pressure, penetration and displacement at points of a skin under contacts.
 
     Attributes:
-        pressure: (...) MPa.
-        penetration: (...) mm that the undeformed skin lies inside an indenter there, 0 elsewhere.
-        displacement: (..., 3) mm, in the design's frame.
+        pressure: (...) pressure, MPa.
+        penetration: (...) depth (mm) of the undeformed skin inside an indenter, 0 outside.
+        displacement: (..., 3) displacement in the design's frame, mm.
     """
 
     pressure: FloatArray
@@ -120,17 +125,18 @@ class PressedSkin:
     """A skin under all its contacts.
 
     Attributes:
-        contacts: one for each indenter.
-        elasticity: of the gel.
+        contacts: the solved contacts, one for each indenter.
+        elasticity: elastic constants of the gel.
     """
 
     contacts: tuple[Pressed, ...]
     elasticity: Elasticity
 
     def in_numbers(self) -> list[dict[str, float]]:
-        """Depth (mm), force (N), area (mm^2), greatest pressure (MPa) of each contact, for JSON.
+        """Return depth (mm), force (N), area (mm^2) and greatest pressure (MPa) of each contact,
+        for JSON.
 
-        Of an indenter that was dragged or turned also the shear force (N) and the torque (N mm).
+        For an indenter that was dragged or turned, shear force (N) and torque (N mm) are included.
         """
         return [
             {
@@ -144,14 +150,14 @@ class PressedSkin:
         ]
 
     def maps(self, points: NDArray[np.floating], inward: NDArray[np.floating]) -> SkinMaps:
-        """Pressure, penetration and displacement at points of the deformed skin.
+        """Return pressure, penetration and displacement at points of the deformed skin.
 
-        Displacements along the skin are those of a skin that slides freely along the indenter
-        while it is pressed in, and then sticks to it as far as friction goes.
+        The skin is assumed to slide freely along the indenter while it is pressed in, and then to
+        stick to it as far as friction allows.
 
         Args:
-            points: (..., 3) mm, where the skin is; NaN gives NaN.
-            inward: (..., 3) its normals, into the gel.
+            points: (..., 3) points (mm) of the deformed skin; NaN gives NaN.
+            inward: (..., 3) unit normals of the skin, into the gel.
         """
         shape = points.shape[:-1]
         flat = np.asarray(points, dtype=np.float64).reshape(-1, 3)
@@ -174,7 +180,9 @@ class PressedSkin:
         )
 
     def displaced(self, points: FloatArray, inward: FloatArray) -> SkinDisplacement:
-        """How the skin moves at points (n, 3) mm with unit normals (n, 3) into the gel."""
+        """Return the displacement of the skin at points (n, 3), mm, with unit normals (n, 3) into
+        the gel.
+        """
         moved, tilt = np.zeros_like(points), np.zeros_like(points)
         touching = np.zeros(len(points), dtype=bool)
         for contact in self.contacts:
@@ -199,17 +207,19 @@ def press(
 ) -> PressedSkin:
     """Press indenters into a gel without friction, and then drag them with friction.
 
-    Around each contact the gel is a flat layer of its thickness there, bonded to a rigid base, but
-    for what a patch says of its shape. Contacts change each other's overlap until that settles.
+    Around each contact the gel is a flat layer of the local thickness, bonded to a rigid base,
+    corrected for its shape by a patch. Contacts change each other's overlap, so they are solved in
+    turn until the displacements converge.
 
     Args:
-        places: where each indenter overlaps the undeformed skin.
-        elasticity: of the gel.
+        places: the footprint of each indenter on the undeformed skin.
+        elasticity: elastic constants of the gel.
         patches: the gel's shape around each place; None where it is a flat layer.
-        drags: how each indenter has moved along the skin since; None where it has not.
+        drags: the motion of each indenter along the skin after it was pressed in; None where there
+            is none.
 
     Raises:
-        ContactError: the pressure under an indenter is not found.
+        ContactError: the pressure under an indenter does not converge.
     """
     contacts: list[Pressed | None] = [None] * len(places)
     overlaps = [place.overlap for place in places]
@@ -241,7 +251,9 @@ def press(
 def _dragged(
     contact: Pressed, drag: Drag, elasticity: Elasticity, patch: GelPatch | None
 ) -> Pressed:
-    """A contact after a drag; what the gel's shape changes is found in turns with the shear."""
+    """Return a contact after a drag; shear and the correction for the gel's shape are iterated in
+    turn.
+    """
     place = contact.place
     response = grid_response(contact.pressure.shape, place.pitch, place.thickness, elasticity)
     wanted = drag.displacement(place.x, place.y)
@@ -278,7 +290,7 @@ def _pressed(
     patch: GelPatch | None,
     before: Pressed | None,
 ) -> Pressed:
-    """One contact; what the gel's shape changes is found in turns with the pressure."""
+    """Solve one contact; pressure and the correction for the gel's shape are iterated in turn."""
     pressure = None if before is None else before.pressure
     rough = TOLERANCE if patch is None else FIRST_TOLERANCE
     solved = _solve(place, overlap, elasticity, pressure, rough)
@@ -317,7 +329,9 @@ def _solve(
 
 
 def _caused_by(others: list[Pressed], place: Footprint) -> FloatArray:
-    """(rows, columns) mm that other contacts push the skin in on a contact's grid."""
+    """Return the inward displacement (rows, columns), mm, of the skin on a contact's grid due to
+    other contacts.
+    """
     result = np.zeros(place.overlap.shape)
     if not others:
         return result

@@ -1,7 +1,9 @@
-"""The two ways in which a skin can follow what presses on it."""
+"""The names of the two models of a skin under contacts."""
 
 CONFORMING = "conforming"
-"""The skin takes an indenter's shape where both overlap, and stays as it is elsewhere."""
+"""The model in which the skin takes an indenter's shape where both overlap, and does not move
+elsewhere."""
 ELASTIC = "elastic"
-"""The skin is that of an elastic layer on a rigid base: it is also pulled in around a contact."""
+"""The model in which the skin deforms like an elastic layer on a rigid base, also around a
+contact."""
 SKINS = ELASTIC, CONFORMING

@@ -13,24 +13,27 @@ from optisense.mechanics.convolution import GridResponse
 FloatArray = NDArray[np.float64]
 
 TOLERANCE = 1e-4
-"""Change of the shear in a step, over the shear, at which the iteration ends."""
+"""Relative change of the shear in a step at which the iteration ends."""
 MAX_ITERATIONS = 1000
-"""Iterations after which the solver gives up; contacts of 64 points across take 50 to 150."""
+"""Number of iterations after which the solver fails; contacts of 64 points across take 50 to
+150."""
 
 
 class Drag(NamedTuple):
-    """How an indenter has moved along the skin since it was pressed in.
+    """The motion of an indenter along the skin after it was pressed in.
 
     Attributes:
-        shift: (2,) mm along x and y of the tangent plane.
-        twist: radians about the outward normal, counter-clockwise seen from outside.
+        shift: (2,) translation along x and y of the tangent plane, mm.
+        twist: rotation (radians) about the outward normal, counter-clockwise seen from outside.
     """
 
     shift: FloatArray
     twist: float
 
     def displacement(self, x: FloatArray, y: FloatArray) -> FloatArray:
-        """(2, rows, columns) mm that skin which sticks has moved, at (columns,) x and (rows,) y."""
+        """Return the displacement (2, rows, columns), mm, of sticking skin at x (columns,) and y
+        (rows,).
+        """
         across, along = np.meshgrid(x, y)
         cosine, sine = np.cos(self.twist), np.sin(self.twist)
         return np.stack(
@@ -48,23 +51,24 @@ def solve_shear(
     wanted: FloatArray,
     start: FloatArray | None = None,
 ) -> FloatArray:
-    """The shear on a skin that sticks to an indenter where friction holds it, and slips elsewhere.
+    """Solve for the shear on a skin that sticks to an indenter where friction suffices, and slips
+    elsewhere.
 
     The shear is nowhere larger than friction times pressure. Where it is smaller, the skin has
-    moved with the indenter; where it is as large, it has moved less, and the shear points along the
-    rest. This minimises a convex energy; the method is an accelerated projected gradient (Beck and
-    Teboulle, SIAM J. Imaging Sci. 2, 2009) with restarts. What shear does to the pressure is left
-    out, as usual: it vanishes for an incompressible half-space.
+    moved with the indenter; where it is equal, the skin has moved less, and the shear points along
+    the difference. This minimises a convex energy; the method is an accelerated projected gradient
+    (Beck and Teboulle, SIAM J. Imaging Sci. 2, 2009) with restarts. The effect of shear on the
+    pressure is neglected, as usual; it vanishes for an incompressible half-space.
 
     Args:
-        response: of the layer, on the grid.
-        pressure: (rows, columns) MPa.
-        friction: coefficient.
-        wanted: (2, rows, columns) mm along x and y by which the indenter has moved.
-        start: (2, rows, columns) MPa to begin with.
+        response: the response of the layer on the grid.
+        pressure: (rows, columns) pressure, MPa.
+        friction: coefficient of friction.
+        wanted: (2, rows, columns) displacement of the indenter along x and y, mm.
+        start: (2, rows, columns) initial shear, MPa.
 
     Returns:
-        (2, rows, columns) MPa on the skin.
+        The shear (2, rows, columns), MPa, on the skin.
 
     Raises:
         ContactError: the iteration does not converge.
@@ -81,7 +85,7 @@ def solve_shear(
         slope = response.sideways(ahead) - wanted
         found = _within(ahead - step * slope, limit)
         change = found - shear
-        if ((ahead - found) * change).sum() > 0.0:  # the momentum leads astray: begin anew
+        if ((ahead - found) * change).sum() > 0.0:  # the momentum points uphill: restart
             ahead, momentum = shear, 1.0
             continue
         after = 0.5 * (1.0 + np.sqrt(1.0 + 4.0 * momentum**2))
@@ -98,7 +102,7 @@ def solve_shear(
 
 
 def _within(shear: FloatArray, limit: FloatArray) -> FloatArray:
-    """Shear (2, rows, columns) shortened to the limit (rows, columns) where it is longer."""
+    """Return shear (2, rows, columns), limited in length to ``limit`` (rows, columns)."""
     size = np.hypot(shear[0], shear[1])
     factor = np.divide(limit, size, out=np.ones_like(size), where=size > limit)
     return np.asarray(shear * factor)
