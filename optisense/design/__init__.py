@@ -1,6 +1,6 @@
 """Sensor designs: their parts, the file format, and dotted paths to every value in them.
 
-A design is a folder with `design.yaml` and `meshes/`. Nothing here renders.
+A design is a folder with `design.yaml` and `meshes/`. This package does not render.
 """
 
 from optisense.design.addressing import get_value, numbers, parse_path, set_value, set_values

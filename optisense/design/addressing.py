@@ -1,7 +1,7 @@
-"""Reading and setting any value of a design by a dotted path.
+"""Access to any value of a design by a dotted path.
 
 Grammar: names and list indices, as in `coating.specularity`, `lights.red.flux`,
-`cages.skin.points[13].z`. Three numbers in a row can also be named: `.x .y .z` of a vector,
+`cages.skin.points[13].z`. The three numbers of a triple can also be named: `.x .y .z` of a vector,
 `.r .g .b` of a colour.
 """
 
@@ -25,10 +25,10 @@ Steps = tuple[str | int, ...]
 
 
 def get_value(design: SensorDesign, path: str) -> Any:
-    """The value at `path`: a number, text, vector (tuple), list or a whole section.
+    """Return the value at `path`: a number, text, vector (tuple), list or a whole section.
 
     Raises:
-        DesignError: the path is malformed or leads nowhere; names the near match.
+        DesignError: the path is malformed or names nothing; the message suggests a similar name.
     """
     value: Any = design
     for done, step in _walk(path):
@@ -37,23 +37,23 @@ def get_value(design: SensorDesign, path: str) -> Any:
 
 
 def set_value(design: SensorDesign, path: str, value: object) -> SensorDesign:
-    """A new, checked design with `value` at `path`; the given design is left as it is.
+    """Return a new, checked design with `value` at `path`; the given design is not changed.
 
     Raises:
-        DesignError: the path leads nowhere, or the value does not fit there.
+        DesignError: the path names nothing, or the value does not fit there.
     """
     return set_values(design, {path: value})
 
 
 def set_values(design: SensorDesign, values: Mapping[str, object]) -> SensorDesign:
-    """A new design with all these values by their paths, checked once with all of them.
+    """Return a new design with all these values by their paths, checked once with all of them.
 
     Raises:
-        DesignError: a path leads nowhere, or the values do not fit there.
+        DesignError: a path names nothing, or the values do not fit there.
     """
     data = design.model_dump(mode="json")
     for path, value in values.items():
-        get_value(design, path)  # names the near match when there is no such value
+        get_value(design, path)  # raises an error that suggests a similar name
         target: Any = data
         *way, last = parse_path(path)
         for step in way:
@@ -66,7 +66,7 @@ def set_values(design: SensorDesign, values: Mapping[str, object]) -> SensorDesi
 
 
 def numbers(design: SensorDesign) -> Iterator[tuple[str, float]]:
-    """Every number of the design with its path, in file order."""
+    """Yield every number of the design with its path, in file order."""
     yield from _numbers(design.model_dump(mode="json", exclude={"provenance"}), ())
 
 
@@ -74,7 +74,7 @@ def parse_path(path: str) -> Steps:
     """Split a path into names and indices.
 
     Raises:
-        DesignError: it is malformed.
+        DesignError: the path is malformed.
     """
     steps: list[str | int] = []
     position = 0
@@ -128,14 +128,14 @@ def _child(value: Any, step: str | int, path: str, done: Steps) -> Any:
 
 
 def _key(container: Any, step: str | int) -> str | int:
-    """The key or index of `step`; x, y, z and r, g, b stand for 0, 1, 2 in three numbers."""
+    """Return the key or index of `step`; x, y, z and r, g, b stand for 0, 1, 2 in a triple."""
     if isinstance(container, list | tuple) and len(container) == 3 and step in _LETTERS:
         return _LETTERS[str(step)]
     return step
 
 
 def _plain(value: object) -> object:
-    """Models and NumPy numbers and arrays as plain Python values."""
+    """Return models and NumPy numbers and arrays as plain Python values."""
     if isinstance(value, BaseModel):
         return value.model_dump(mode="json")
     to_list = getattr(value, "tolist", None)  # NumPy scalars and arrays

@@ -1,4 +1,4 @@
-"""Checks of the arrangement: solids that share space, and the picture along straight rays."""
+"""Checks of the arrangement: solids that overlap, and the picture along straight rays."""
 
 from __future__ import annotations
 
@@ -17,17 +17,19 @@ from optisense.geometry.common_space import common_space
 from optisense.geometry.meeting import CONTACT
 
 EQUAL_INDEX = 1e-6
-"""Solids whose refractive indices differ by less are one to the light."""
+"""Largest difference of refractive indices for which solids count as one medium; it covers rounding
+of numbers in files.
+"""
 
 SAMPLES = (8, 6)
-"""Number of places across and down the picture at which the sensing surface is looked for."""
+"""Number of points across and down the picture at which the sensing surface is looked for."""
 
 
 def overlaps(design: SensorDesign, meshes: dict[str, TriangleMesh]) -> list[Diagnostic]:
-    """Solids of different index that share space without a priority that says which one counts.
+    """Return problems of solids of different index that overlap without a priority between them.
 
     Args:
-        meshes: the deformed meshes, mm.
+        meshes: deformed meshes, mm.
     """
     problems: list[Diagnostic] = []
     solids = [n for n in meshes if design.parts[n].role in TRANSPARENT_SOLIDS]
@@ -54,7 +56,7 @@ def overlaps(design: SensorDesign, meshes: dict[str, TriangleMesh]) -> list[Diag
 
 
 def in_picture(camera: Camera, points: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """(n,) whether points lie in the picture, seen straight."""
+    """Return whether points lie in the picture, seen along straight rays, (n,) bool."""
     across, down = picture_places(camera, points)
     with np.errstate(invalid="ignore"):
         inside: NDArray[np.bool_] = (np.abs(across - 0.5) <= 0.5) & (np.abs(down - 0.5) <= 0.5)
@@ -62,6 +64,6 @@ def in_picture(camera: Camera, points: NDArray[np.float64]) -> NDArray[np.bool_]
 
 
 def straight_rays(camera: Camera) -> NDArray[np.float64]:
-    """(k, 3) the directions of some places spread over the picture."""
+    """Return the directions (k, 3) of some points spread over the picture."""
     across, down = np.meshgrid(np.linspace(0.0, 1.0, SAMPLES[0]), np.linspace(0.0, 1.0, SAMPLES[1]))
     return directions(camera, across, down).reshape(-1, 3)

@@ -13,13 +13,14 @@ from optisense.design.fields import Count, Fraction, Model, Name, Number, Vector
 
 MAX_POINTS = 20_000
 """Largest number of control points of one cage. The weights of a mesh of 10,000 vertices take 1.6
-GB with so many."""
+GB with so many.
+"""
 MOST_ALONG = 64
-"""Control points along an axis. Polynomials of so high a degree serve no shape."""
+"""Largest number of control points along an axis; no shape needs polynomials of a higher degree."""
 
 
 class Point(Model):
-    """A control point, mm."""
+    """Control point, mm."""
 
     x: Number
     y: Number
@@ -38,7 +39,7 @@ LatticeCount = Annotated[Count, Field(ge=2, le=MOST_ALONG)]
 
 
 class Cage(Model):
-    """Control points over a box around some parts; equal to the regular lattice, they change
+    """Control points over a box around some parts. At the points of the regular lattice they change
     nothing. Point (i, j, k) has index (i * ny + j) * nz + k: x is slowest, z fastest.
 
     The shape is either given by `points`, or, with `blend` (A in the OptiSense paper, section
@@ -84,7 +85,7 @@ class Cage(Model):
     def around(
         parts: Iterable[str], box: ArrayLike, resolution: tuple[int, int, int] = (3, 3, 3)
     ) -> Cage:
-        """A cage at rest over `box` ((2, 3) mm), which should enclose the parts."""
+        """Return a cage at rest over `box` ((2, 3), mm), which should enclose the parts."""
         from optisense.geometry.cage import cage_points
 
         lower, upper = np.asarray(box, dtype=float).tolist()
@@ -97,24 +98,26 @@ class Cage(Model):
         )
 
     def index(self, i: int, j: int, k: int) -> int:
-        """The position in `points` of control point (i, j, k)."""
+        """Return the index in `points` of control point (i, j, k)."""
         _, ny, nz = self.resolution
         return (i * ny + j) * nz + k
 
     def current_points(self) -> NDArray[np.float64]:
-        """(N, 3) mm: the control points that set the shape now, blended where blend is given."""
+        """Return the control points (N, 3), mm, of the present shape, blended if `blend` is
+        given.
+        """
         if self.blend is None:
             return as_array(self.points)
-        assert self.c_min is not None and self.c_max is not None  # the validator saw to it
+        assert self.c_min is not None and self.c_max is not None  # the validator has checked it
         share = as_array(self.blend) if isinstance(self.blend, list) else self.blend
         return np.asarray((1.0 - share) * as_array(self.c_min) + share * as_array(self.c_max))
 
 
 def as_array(points: Iterable[Point] | Iterable[Share]) -> NDArray[np.float64]:
-    """(N, 3) float64 of a list of points."""
+    """Return a list of points as an array (N, 3), float64."""
     return np.array([(p.x, p.y, p.z) for p in points], dtype=np.float64).reshape(-1, 3)
 
 
 def as_points(array: ArrayLike) -> list[Point]:
-    """A list of points from (N, 3) numbers, mm."""
+    """Return an array (N, 3), mm, as a list of points."""
     return [Point(x=x, y=y, z=z) for x, y, z in np.asarray(array, dtype=float).tolist()]

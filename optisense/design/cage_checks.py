@@ -1,4 +1,4 @@
-"""Checks of parts that cages bend: folds, and parts pushed into others or off them."""
+"""Checks of parts that cages deform: folds, and parts pushed into others or off them."""
 
 from __future__ import annotations
 
@@ -19,10 +19,12 @@ from optisense.geometry.folds import find_fold
 from optisense.geometry.meeting import CONTACT, find_meeting, near_surface, resting_on, touching
 
 AT_REST = 1e-9
-"""mm: a control point that is off its place by less has not moved."""
+"""Largest displacement of a control point that counts as rest, mm; a margin for rounding."""
 
 COARSE = 0.1
-"""mm: a mesh whose straight edges are farther off the shape that its cage gives is told."""
+"""Largest distance, mm, between the straight edges of a mesh and the smooth shape that its cage
+gives; a larger one is reported.
+"""
 
 FOLDS = {
     "inside out": "is turned inside out by cage '{cage}' near {place}: {count} of its vertices",
@@ -35,18 +37,18 @@ Overlap = Literal["no", "odd", "yes"]
 
 
 def cage_problems(design: SensorDesign, meshes: Meshes | None = None) -> list[Diagnostic]:
-    """Problems of the shapes that the cages give the parts.
+    """Return the problems of the shapes that cages give to parts.
 
-    Found are parts that are folded, collapsed, turned inside out or bent through themselves;
-    bent parts that cut into, or lie inside, a part that they kept clear of before; and bent
-    parts that have come off a part they lay on (a warning). Parts in one cage move together and
-    are not compared. Of overlapping solids with different priorities one is cut out of the other,
-    which is a warning; solids of one refractive index may overlap. Made for searches too: bends
-    of ordinary size take milliseconds.
+    They are: parts that are folded, collapsed, turned inside out or bent through themselves;
+    deformed parts that cut into, or lie inside, a part from which they were separate before; and
+    deformed parts that have lost contact with a part that they lay on (a warning). Parts in one
+    cage move together and are not compared. Of overlapping solids with different priorities one is
+    cut out of the other, which is a warning; solids of one refractive index may overlap. The check
+    is fast enough for searches: displacements of ordinary size take milliseconds.
 
     Args:
-        design: the design.
-        meshes: its deformed meshes, when they are there already.
+        design: design to check.
+        meshes: deformed meshes of the design, if they are known already.
 
     Raises:
         DesignError: a vertex of a caged part lies outside the cage's box.
@@ -70,7 +72,8 @@ def cage_problems(design: SensorDesign, meshes: Meshes | None = None) -> list[Di
 
 
 def fold_problems(design: SensorDesign) -> list[Diagnostic]:
-    """Parts that cages have folded, collapsed, turned inside out or bent through themselves.
+    """Return the problems of parts that cages have folded, collapsed, turned inside out or bent
+    through themselves.
 
     Raises:
         DesignError: a vertex of a caged part lies outside the cage's box.
@@ -85,8 +88,10 @@ def fold_problems(design: SensorDesign) -> list[Diagnostic]:
 
 
 def contact_problems(design: SensorDesign) -> list[Diagnostic]:
-    """Bent parts that have come off a part they lay on, or cut into a transparent part that they
-    kept clear of; of `cage_problems` those that a search asks for at every point.
+    """Return the problems of deformed parts that have lost contact with a part that they lay on, or
+    cut into a transparent part from which they were separate.
+
+    These are the problems of `cage_problems` that a search checks at every point.
 
     Raises:
         DesignError: a vertex of a caged part lies outside the cage's box.
@@ -106,9 +111,10 @@ def contact_problems(design: SensorDesign) -> list[Diagnostic]:
 
 
 def half_caged(design: SensorDesign, meshes: Meshes) -> list[Diagnostic]:
-    """Warnings of cages around a sensing surface without the solid that it coats, or around that
-    solid alone: to bend one is to tear the two apart. A cage that has moved is left to
-    `cage_problems`.
+    """Return warnings about cages around a sensing surface without the solid that it coats, or
+    around that solid alone: to deform one is to tear the two apart.
+
+    Cages that have moved are left to `cage_problems`.
     """
     solids = [name for name in meshes if design.parts[name].role in TRANSPARENT_SOLIDS]
     problems: list[Diagnostic] = []
@@ -134,7 +140,7 @@ def half_caged(design: SensorDesign, meshes: Meshes) -> list[Diagnostic]:
 
 
 def _coats(surface: TriangleMesh, solid: TriangleMesh) -> bool:
-    """Whether a surface lies on a solid with whole faces, not with its rim alone."""
+    """Return whether a surface lies on a solid with whole faces, not with its rim alone."""
     rests = np.zeros(len(surface.vertices), dtype=bool)
     rests[resting_on(surface, solid)] = True
     flat = rests[surface.faces].any(axis=1)
@@ -145,8 +151,9 @@ def _coats(surface: TriangleMesh, solid: TriangleMesh) -> bool:
 def _moved_cages(
     design: SensorDesign, meshes: Meshes | None = None
 ) -> tuple[dict[str, Cage], Meshes]:
-    """The cages whose points are no longer at rest, by name, and where there are any the deformed
-    meshes of all parts."""
+    """Return the cages whose points are not at rest, by name, and the deformed meshes of all parts,
+    or no meshes if there is no such cage.
+    """
     moved = {name: cage for name, cage in design.cages.items() if _has_moved(cage)}
     return moved, (meshes or design.deformed_meshes()) if moved else {}
 
@@ -157,7 +164,9 @@ def _has_moved(cage: Cage) -> bool:
 
 
 def _overlap(design: SensorDesign, name: str, other: str) -> Overlap:
-    """Whether two parts can share space: solids may, where a priority says which one counts."""
+    """Return whether two parts can overlap: solids may, if their priorities tell which one
+    counts.
+    """
     parts = design.parts[name], design.parts[other]
     if not all(part.role in TRANSPARENT_SOLIDS for part in parts):
         return "no"
@@ -206,7 +215,7 @@ def _coarse(
 def _meetings(
     design: SensorDesign, cage_name: str, name: str, other: str, bent: Meshes
 ) -> list[Diagnostic]:
-    """What is wrong between a bent part and one that is not in the same cage."""
+    """Return the problems between a deformed part and one that is not in the same cage."""
     if Role.INDENTER in (design.parts[name].role, design.parts[other].role):
         return []
     overlap = _overlap(design, name, other)
@@ -214,7 +223,7 @@ def _meetings(
     if meeting is None:
         return _partings(design, cage_name, name, other, bent, overlap)
     if overlap == "yes" or find_meeting(design.meshes[name], design.meshes[other]) is not None:
-        return []  # of one index, or they share space at rest: it is meant so
+        return []  # equal indices, or an overlap at rest, which is intended
     distance = np.linalg.norm(bent[name].vertices - meeting.place, axis=1)
     mover = _mover(design, cage_name, name, int(np.argmin(distance)))
     return [
@@ -231,7 +240,9 @@ def _meetings(
 def _partings(
     design: SensorDesign, cage_name: str, name: str, other: str, bent: Meshes, overlap: Overlap
 ) -> list[Diagnostic]:
-    """Where a bent part no longer lies on one that it touched at rest."""
+    """Return the problems at places where a deformed part has lost contact with one that it touched
+    at rest.
+    """
     mesh, rest = design.meshes[name], design.meshes[other]
     change = np.linalg.norm(bent[name].vertices - mesh.vertices, axis=1)
     rows = resting_on(mesh, rest)
@@ -259,7 +270,7 @@ def _partings(
 
 
 def _mover(design: SensorDesign, cage_name: str, name: str, vertex: int) -> str:
-    """The control point that moves a vertex the most, in words."""
+    """Return, in words, the control point that moves a vertex the most."""
     cage = design.cages[cage_name]
     offsets = cage.current_points() - cage_points(cage.box, cage.resolution)
     weights = cage_weights(design.meshes[name].vertices[vertex], cage.box, cage.resolution)[0]

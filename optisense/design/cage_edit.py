@@ -1,4 +1,4 @@
-"""Putting cages around parts, moving and refining them; each function returns a new design."""
+"""Functions that put cages around parts, and move and refine them; each returns a new design."""
 
 from __future__ import annotations
 
@@ -20,14 +20,15 @@ from optisense.near import suggestion
 
 Resolution = tuple[int, int, int]
 Shape = Literal["points", "c_min", "c_max"]
-"""The control points of a cage: those of the present shape, or an end of its range."""
+"""Kind of a cage's control points: those of the present shape, or of an end of its range."""
 
 THINNEST = 0.5
-"""mm: a box over a flat part is made at least this thick."""
+"""Smallest thickness of a box, mm; boxes over flat parts are made this thick."""
 
 SAME_SHARE = 1e-9
 """Length of a box along an axis, relative to its largest length, below which it counts as flat
-along this axis; a margin for rounding."""
+along this axis; a margin for rounding.
+"""
 
 
 def add_cage(
@@ -37,15 +38,15 @@ def add_cage(
     resolution: Resolution = (3, 3, 3),
     margin: float = 0.0,
 ) -> SensorDesign:
-    """A cage at rest over the box around some parts; it changes no shape.
+    """Return a design with a cage at rest over the bounding box of some parts; no shape changes.
 
     Args:
-        design: left as it is.
-        name: of the new cage.
-        parts: what it deforms; parts that touch should move together.
+        design: design, which is not changed.
+        name: name of the new cage.
+        parts: parts that it deforms; parts that touch should move together.
         resolution: control points along x, y, z.
-        margin: mm, how much larger the box is than the parts, all round. Along an axis in which
-            the parts are flat it is made `THINNEST` thick.
+        margin: distance, mm, by which the box is larger than the parts on all sides. Along an axis
+            in which the parts are flat it is made `THINNEST` thick.
 
     Raises:
         DesignError: there is a cage of that name, a part is unknown, has no mesh or is in a cage
@@ -79,7 +80,7 @@ def add_cage(
 
 
 def remove_cage(design: SensorDesign, name: str) -> SensorDesign:
-    """The design without a cage: its parts are at rest again.
+    """Return the design without a cage: its parts are at rest again.
 
     Raises:
         DesignError: there is no such cage.
@@ -91,7 +92,8 @@ def remove_cage(design: SensorDesign, name: str) -> SensorDesign:
 
 
 def refine_cage(design: SensorDesign, name: str, resolution: Resolution) -> SensorDesign:
-    """More control points, and exactly the same shape and range of shapes.
+    """Return a design whose cage has more control points, with exactly the same shape and range of
+    shapes.
 
     Raises:
         DesignError: there is no such cage, or `resolution` has fewer points along an axis.
@@ -129,13 +131,13 @@ def move_points(
     moves: Mapping[str, Sequence[float]],
     of: Shape = "points",
 ) -> SensorDesign:
-    """Move control points of a cage.
+    """Return a design with some control points of a cage moved.
 
     Args:
-        design: left as it is.
-        name: the cage.
-        moves: mm along x, y, z, by which points are meant: "13", "1,1,2" or "1,*,2" (a row).
-        of: what is moved: the shape, or an end of its range.
+        design: design, which is not changed.
+        name: name of the cage.
+        moves: displacement along x, y, z, mm, by the points: "13", "1,1,2" or "1,*,2" (a row).
+        of: points to move: those of the shape, or of an end of its range.
 
     Raises:
         DesignError: there is no such cage or point, or the shape is set by a blend.
@@ -173,14 +175,14 @@ def set_range(
     c_max: ArrayLike | None = None,
     blend: float | None = 0.0,
 ) -> SensorDesign:
-    """Give a cage two ends, between which a search may choose.
+    """Return a design whose cage has a range of shapes for a search, given by its two ends.
 
     Args:
-        design: left as it is.
-        name: the cage.
-        c_min, c_max: (N, 3) mm; None takes the shape as it is now.
-        blend: the share of c_max in the shape, for all points; None keeps the points that set
-            the shape now.
+        design: design, which is not changed.
+        name: name of the cage.
+        c_min, c_max: control points (N, 3) of the ends, mm; None takes the present shape.
+        blend: share of c_max in the shape, for all points; None keeps the points of the present
+            shape.
 
     Raises:
         DesignError: there is no such cage, or the numbers do not fit.
@@ -196,7 +198,7 @@ def set_range(
 
 
 def settle_cage(design: SensorDesign, name: str) -> SensorDesign:
-    """The shape that the blend gives now as points of its own; the range stays.
+    """Return a design whose cage has the points of the present blend as its own; the range stays.
 
     Raises:
         DesignError: there is no such cage.
@@ -207,10 +209,10 @@ def settle_cage(design: SensorDesign, name: str) -> SensorDesign:
 
 
 def select_points(resolution: Resolution, which: str) -> list[int]:
-    """The positions of "13", "1,1,2" or, with stars for all of an axis, "1,*,2".
+    """Return the indices of the points "13", "1,1,2" or, with a star for a whole axis, "1,*,2".
 
     Raises:
-        DesignError: it can't be read, or there is no such point.
+        DesignError: the text can't be read, or there is no such point.
     """
     count = int(np.prod(resolution))
     hint = (
@@ -232,7 +234,7 @@ def select_points(resolution: Resolution, which: str) -> list[int]:
 
 
 def offsets_at_rest(cage: Cage) -> NDArray[np.float64]:
-    """(N, 3) mm, how far each control point is from where it is at rest."""
+    """Return the displacement of each control point from rest, (N, 3), mm."""
     return np.asarray(cage.current_points() - cage_points(cage.box, cage.resolution))
 
 
@@ -243,7 +245,7 @@ def _shares(
     elsewhere: NDArray[np.float64],
     where: str,
 ) -> list[dict[str, float]]:
-    """The blend of a refined cage; `elsewhere` counts where both ends are the same."""
+    """Return the blend of a refined cage; `elsewhere` is used where both ends are equal."""
     span = c_max - c_min
     wide = np.abs(span) > SAME_SHARE
     share = np.where(wide, (now - c_min) / np.where(wide, span, 1.0), elsewhere)

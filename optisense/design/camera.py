@@ -1,4 +1,4 @@
-"""The camera of a design: its pose, its lens, and how it makes a picture of the light."""
+"""The camera of a design: its pose, its lens, and how it turns light into a picture."""
 
 from __future__ import annotations
 
@@ -71,18 +71,18 @@ class ImagingModel(Model):
     )
 
     def kinds_of_imaging(self) -> dict[str, KindModel]:
-        """The components that have kinds and are present, by field."""
+        """Return the components that have kinds and are present, by field."""
         given = ((name, getattr(self, name)) for name in ImagingModel.model_fields)
         return {name: value for name, value in given if isinstance(value, KindModel)}
 
     @property
     def is_ideal(self) -> bool:
-        """Whether nothing but the usual response makes its pictures."""
+        """True if nothing but the default response makes its pictures."""
         return all(getattr(self, name) is None for name in ImagingModel.model_fields)
 
     @model_serializer(mode="wrap")
     def _without_the_usual(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        """What is ideal or usual is not written."""
+        """Leave ideal and default components out of the file."""
         values: dict[str, Any] = handler(self)
         for name in ImagingModel.model_fields:
             if values.get(name) is None:
@@ -107,29 +107,29 @@ class Viewpoint(Model):
 
 
 class Camera(ImagingModel, Viewpoint):
-    """A camera with a pose. Image right is direction x up: pictures are never mirrored."""
+    """Camera with a pose. Image right is direction x up: pictures are never mirrored."""
 
     @property
     def any_response(self) -> CameraResponse:
-        """Its response: the usual one where it names none."""
+        """Response of the camera; the default one if it names none."""
         return USUAL_RESPONSE if self.response is None else self.response
 
     def view(self) -> dict[str, Any]:
-        """The numbers that its rays follow from, as plain values."""
+        """Return the numbers that determine its rays, as plain values."""
         return self.model_dump(include={*Viewpoint.model_fields, "distortion"} - {"model"})
 
     @property
     def angle_scale(self) -> float:
-        """Widths of the picture a radian, in its middle."""
+        """Scale in the middle of the picture, in widths of the picture per radian."""
         half = np.radians(0.5 * self.fov)
         return float(0.5 / (half if self.projection == "equidistant" else np.tan(half)))
 
     def picture_chain(self, vergence: NDArray[np.floating] | None = None) -> PictureChain:
-        """The chain that turns radiance into the camera's picture.
+        """Return the chain that turns radiance into the camera's picture.
 
         Args:
-            vergence: (h, w) of any size, 1/mm: one over the distance at which what the camera sees
-                appears to lie. A blur that depends on depth is left out without it.
+            vergence: one over the apparent distance of the scene, (h, w) of any size, 1/mm. Without
+                it a blur that depends on depth is left out.
         """
         focus = None
         if self.blur is not None and (vergence is not None or not self.blur.by_depth):
@@ -165,7 +165,7 @@ class Camera(ImagingModel, Viewpoint):
         return self
 
     def axes(self) -> NDArray[np.float64]:
-        """(3, 3) orthonormal rows: image right, image up, viewing direction."""
+        """Return orthonormal rows (3, 3): image right, image up, viewing direction."""
         forward = np.array(self.direction) / np.linalg.norm(self.direction)
         right = np.cross(forward, np.array(self.up))
         right /= np.linalg.norm(right)

@@ -1,7 +1,7 @@
-"""Checks of the camera: angles without a lens, a place inside a part, a view past the skin.
+"""Checks of the camera: angles that no lens has, a position inside a part, a view past the skin.
 
-A design does not say how large its camera's lens is, so it is taken for as small as the smallest
-camera there is.
+A design does not state the size of its camera's lens, so the size of the smallest camera on sale is
+assumed.
 """
 
 from __future__ import annotations
@@ -21,46 +21,50 @@ from optisense.geometry.rays import ray_hits
 from optisense.geometry.surface import closest_points
 
 WIDEST_PERSPECTIVE = 135.0
-"""Degrees from corner to corner of the widest lens that keeps straight lines straight. Goerz's
-Hypergon of 1900 has 130 (H. H. Nasse, "Distagon, Biogon and Hologon", Carl Zeiss 2011). A 9 mm lens
-for 24 x 36 mm, the shortest on sale (Venus Optics' Laowa 9 mm f/5.6; assumed, as its data sheet was
-not at hand), has 2 atan(21.6 / 9) = 135. At 179 degrees a pixel at the edge of the picture would
-get less than a hundred-millionth of the light of one in the middle (the fourth power of the
-cosine)."""
+"""Angle from corner to corner of the widest lens that keeps straight lines straight, degrees.
+Goerz's Hypergon of 1900 has 130 (H. H. Nasse, "Distagon, Biogon and Hologon", Carl Zeiss 2011). A 9
+mm lens for 24 x 36 mm, the shortest on sale (Venus Optics' Laowa 9 mm f/5.6; assumed, as its data
+sheet was not at hand), has 2 atan(21.6 / 9) = 135. At 179 degrees a pixel at the edge of the
+picture would get less than a hundred-millionth of the light of one in the middle (the fourth power
+of the cosine).
+"""
 
 WIDEST_FISHEYE = 280.0
-"""Degrees across the image of the widest fisheye. C-4 Optics' 4.9 mm f/3.5 has 270 (Lensrentals,
-"Assembling the C-4 Optics 4.9mm f3.5 Hyperfisheye Prototype", 2019). Entaniya's M12 280, a lens for
-small cameras, has 280 by its name (assumed, as its data sheet was not at hand)."""
+"""Angle across the image of the widest fisheye, degrees. C-4 Optics' 4.9 mm f/3.5 has 270
+(Lensrentals, "Assembling the C-4 Optics 4.9mm f3.5 Hyperfisheye Prototype", 2019). Entaniya's M12
+280, a lens for small cameras, has 280 by its name (assumed, as its data sheet was not at hand).
+"""
 
 NARROWEST = 1.0
-"""Degrees across the image. A sensing surface as wide as a fingertip, 17 mm, fills one degree from
-1000 mm away, the farthest that a camera of a design may be (`limits.LARGEST`): a telecentric lens,
-which has no angle, is a pinhole so far away."""
+"""Smallest angle across the image, degrees. A sensing surface as wide as a fingertip, 17 mm, fills
+one degree from 1000 mm away, the farthest that a camera of a design may be (`limits.LARGEST`); a
+telecentric lens, which has no angle, can be given as a pinhole at that distance.
+"""
 
 SMALLEST_CAMERA = 0.65
-"""mm: width of the smallest camera module on sale, OmniVision's OVM6948 of 0.65 x 0.65 x 1.158 mm
-("OmniVision has created the world's smallest commercially available image sensor", DPReview
-2019)."""
+"""Width of the smallest camera module on sale, mm: OmniVision's OVM6948 of 0.65 x 0.65 x 1.158 mm
+("OmniVision has created the world's smallest commercially available image sensor", DPReview 2019).
+"""
 
 LEAST_SKIN = 0.25
-"""Share of the sensing surface's area that the camera should see; no objective scores less. The
-built-in sensors see 0.44 (GelBelt) to 0.76 (GelSight360). Scores reward a camera that looks at one
-spot, and the more the smaller it is, so without a limit a search ends at a field of view of nearly
-nothing."""
+"""Share of the sensing surface's area that the camera must see for a score. The built-in sensors
+see 0.44 (GelBelt) to 0.76 (GelSight360). Scores reward a camera that looks at one spot, the more
+the smaller the spot, so without a limit a search would end at a field of view of nearly nothing.
+"""
 
 LEAST_PICTURE = 0.2
-"""Share of the picture that should show the sensing surface; no objective scores less. The built-in
-sensors have 0.31 (GelSight Svelte) to 1. 2to3PW does not count the other pixels, so without a limit
-the best camera is far away and shows the sensor as a few pixels."""
+"""Share of the picture that must show the sensing surface for a score. The built-in sensors have
+0.31 (GelSight Svelte) to 1. 2to3PW does not count the other pixels, so without a limit the best
+camera would be far away and show the sensor as a few pixels.
+"""
 
 
 def lens_problems(camera: Camera, where: str) -> list[Diagnostic]:
-    """A field of view that no lens has.
+    """Return the problem of a field of view that no lens has.
 
     Args:
-        camera: of the design.
-        where: the place of the field of view in the design.
+        camera: camera of the design.
+        where: place of the field of view in the design.
     """
     if camera.fov < NARROWEST:
         return [
@@ -98,13 +102,15 @@ def lens_problems(camera: Camera, where: str) -> list[Diagnostic]:
 
 
 def place_problems(design: SensorDesign, meshes: dict[str, TriangleMesh]) -> list[Diagnostic]:
-    """A camera inside a transparent solid, or so near to a part that its lens is in it.
+    """Return the problem of a camera inside a transparent solid, or so near to a part that its lens
+    is in it.
 
-    Inside opaque solids it is found with the lights. A camera that is cast into a solid stands in
-    a cavity of it: a sphere about the pupil bends no ray, as the lens is made for that medium.
+    Cameras inside opaque solids are found together with the lights. A camera that is cast into a
+    solid needs a cavity in it: a sphere about the pupil bends no ray, as the lens is made for that
+    medium.
 
     Args:
-        meshes: the deformed meshes, mm.
+        meshes: deformed meshes, mm.
     """
     position = np.array(design.camera.position)
     at = "({:g}, {:g}, {:g})".format(*design.camera.position)
@@ -135,10 +141,10 @@ def place_problems(design: SensorDesign, meshes: dict[str, TriangleMesh]) -> lis
 
 
 def camera_fault(design: SensorDesign, meshes: dict[str, TriangleMesh]) -> Diagnostic | None:
-    """The first reason why there can be no such camera; None when there can.
+    """Return the first reason why the camera can't exist, or None.
 
     Args:
-        meshes: the deformed meshes, mm.
+        meshes: deformed meshes, mm.
     """
     found = lens_problems(design.camera, design.where("camera", "fov"))
     found = found or fold_problems(design.camera, design.where("camera", "distortion"))
@@ -147,13 +153,13 @@ def camera_fault(design: SensorDesign, meshes: dict[str, TriangleMesh]) -> Diagn
 
 
 def view_problems(design: SensorDesign, meshes: dict[str, TriangleMesh]) -> list[Diagnostic]:
-    """A camera in whose straight view there is too little of the sensing surface.
+    """Return a warning if too little of the sensing surface is in the camera's straight view.
 
-    Rays bend on their way, so this is a warning; scores look at the bent ones. With mirrors it
-    says nothing.
+    Refraction is ignored, so this is only a warning; scores use refracted rays. Designs with
+    mirrors are not checked.
 
     Args:
-        meshes: the deformed meshes, mm.
+        meshes: deformed meshes, mm.
     """
     shares = view_shares(design, meshes)
     if shares is None:
@@ -183,14 +189,15 @@ def view_problems(design: SensorDesign, meshes: dict[str, TriangleMesh]) -> list
 def view_shares(
     design: SensorDesign, meshes: dict[str, TriangleMesh]
 ) -> tuple[float, float] | None:
-    """How much of the sensing surface is in the picture, seen straight, and of the picture on it.
+    """Return the share of the sensing surface in the picture, and the share of the picture on it,
+    along straight rays.
 
     Args:
-        meshes: the deformed meshes, mm.
+        meshes: deformed meshes, mm.
 
     Returns:
-        The share of the surface's area, by whole triangles, and that of the picture; None where
-        there is no sensing surface, or a mirror.
+        The share of the surface's area, by whole triangles, and that of the picture; None if there
+        is no sensing surface, or a mirror.
     """
     skins = [meshes[name] for name in design.parts_of(Role.SENSING_SURFACE) if name in meshes]
     if not skins or design.parts_of(Role.MIRROR):
@@ -221,7 +228,9 @@ def _small(message: str, where: str) -> Diagnostic:
 def _first(
     meshes: list[TriangleMesh], position: NDArray[np.float64], rays: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """(k,) mm from a point to the first of some meshes along rays (k, 3), infinite if none."""
+    """Return the distance from a point to the first of some meshes along rays (k, 3), (k,) mm,
+    infinite if none.
+    """
     nearest = np.full(len(rays), np.inf)
     for mesh in meshes:
         hits = ray_hits(mesh, position + 0 * rays, rays)
@@ -230,7 +239,9 @@ def _first(
 
 
 def _distance(point: NDArray[np.float64], mesh: TriangleMesh) -> float:
-    """mm from a point to a mesh; infinite where the mesh is farther than the smallest camera."""
+    """Return the distance from a point to a mesh, mm; infinite if it is larger than the smallest
+    camera.
+    """
     low, high = mesh.face_bounds
     near = ((low < point + SMALLEST_CAMERA) & (high > point - SMALLEST_CAMERA)).all(axis=1)
     if not near.any():

@@ -1,4 +1,4 @@
-"""Checking a whole design without rendering it."""
+"""Check of a whole design without rendering it."""
 
 from __future__ import annotations
 
@@ -29,32 +29,35 @@ __all__ = ["check_design", "inside"]
 OPAQUE_ROLES = frozenset({Role.BLOCKER, Role.MIRROR, Role.INDENTER})
 
 PROBE = 0.05
-"""mm: how far beside the sensing surface its medium is looked up."""
+"""Distance from the sensing surface at which its medium is looked up, mm; less than the thickness
+of any gel.
+"""
 
 PROBES = 64
 """Number of faces, spread over the sensing surface, beside which its medium is looked up; all faces
-of a sound surface have the same one."""
+of a sound surface have the same one.
+"""
 
 
 def check_design(
     design: SensorDesign, light_names: Collection[str] | None = None
 ) -> list[Diagnostic]:
-    """All that can be found wrong with a design without tracing light through it.
+    """Return all problems of a design that can be found without tracing light.
 
-    Meshes that are empty, not closed or not finite, unit slips, missing meshes, unknown lights,
-    lights or a camera inside something opaque, a camera inside a solid or too near to a part, a
-    field of view that no lens has, a lens that shows things twice, a refractive index that no
-    transparent material has, a sensing surface that faces the wrong way, lies off the elastomer,
-    is mostly out of the camera's view or out of its focus, what cages have folded or pushed
-    together, cages that would tear a sensing surface off its elastomer, solids that overlap with
-    one priority, and provenance of values that don't exist.
-    (Fields, ranges and references between parts are checked as soon as a design is made.)
+    They are: meshes that are empty, not closed or not finite, wrong units, missing meshes, unknown
+    lights, lights or a camera inside something opaque, a camera inside a solid or too near to a
+    part, a field of view that no lens has, a distortion that shows a point twice, a refractive
+    index that no transparent material has, a sensing surface that faces the wrong way, lies off the
+    elastomer, is mostly out of the camera's view or out of its focus, parts that cages have folded
+    or pushed together, cages that would tear a sensing surface off its elastomer, solids that
+    overlap with one priority, and provenance of values that don't exist. (Fields, ranges and
+    references between parts are checked when a design is created.)
 
     Args:
-        light_names: the lights of the library; None skips looking up light models.
+        light_names: names of the lights of the library; None skips the check of light models.
 
     Returns:
-        Problems in the order of the design file, an empty list when all is well.
+        Problems in the order of the design file; an empty list if there are none.
     """
     problems: list[Diagnostic] = []
     meshes: dict[str, TriangleMesh] = {}
@@ -91,7 +94,7 @@ def check_design(
 def _check_mesh(
     design: SensorDesign, name: str, meshes: dict[str, TriangleMesh]
 ) -> list[Diagnostic]:
-    """Put the part's mesh into `meshes` unless something is wrong with it."""
+    """Put the part's mesh into `meshes` unless it has a problem."""
     part = design.parts[name]
     place = design.where("parts", name, "mesh")
     if name not in design.meshes:
@@ -114,7 +117,7 @@ def _check_mesh(
 
 
 def _check_finishes(design: SensorDesign, meshes: Collection[str]) -> list[Diagnostic]:
-    """Frosted and painted faces must be there."""
+    """Check that frosted and painted faces exist."""
     problems = []
     for name, part in design.parts.items():
         for label, finish in (part.faces or {}).items():
@@ -152,7 +155,9 @@ def _check_lights(design: SensorDesign, light_names: Collection[str] | None) -> 
 
 
 def _check_kinds(design: SensorDesign) -> list[Diagnostic]:
-    """What lamps, materials and the like find wrong with themselves, such as a missing file."""
+    """Return the problems that emitters, materials and the like report about themselves, such as a
+    missing file.
+    """
     problems: list[Diagnostic] = []
     for path, value in design.values_of_kinds().items():
         try:
@@ -164,7 +169,7 @@ def _check_kinds(design: SensorDesign) -> list[Diagnostic]:
 
 
 def unknown_light_hint(model: str, light_names: Collection[str]) -> str:
-    """The hint for a light that the library lacks; it may be known on another machine."""
+    """Return the hint for a light that the library lacks; it may be known on another machine."""
     near = suggestion(model, light_names) or "Name a light of the library"
     return (
         f"{near}{' ' if near.endswith('?') else '. '}If it is of somebody's own library, add it "
@@ -173,7 +178,7 @@ def unknown_light_hint(model: str, light_names: Collection[str]) -> str:
 
 
 def _check_poses(design: SensorDesign, meshes: dict[str, TriangleMesh]) -> list[Diagnostic]:
-    """No light and no camera may be shut up inside an opaque solid."""
+    """Check that no light and no camera is inside an opaque solid."""
     opaque = {
         name: mesh
         for name, mesh in meshes.items()
@@ -208,7 +213,7 @@ def _check_poses(design: SensorDesign, meshes: dict[str, TriangleMesh]) -> list[
 def _check_sensing_surfaces(
     design: SensorDesign, meshes: dict[str, TriangleMesh]
 ) -> list[Diagnostic]:
-    """Normals of a sensing surface must look into the medium behind it."""
+    """Check that normals of a sensing surface point into the medium behind it."""
     solids = [mesh for n, mesh in meshes.items() if design.parts[n].role in TRANSPARENT_SOLIDS]
     problems: list[Diagnostic] = []
     if not solids:

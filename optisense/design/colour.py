@@ -1,4 +1,4 @@
-"""Colours that have a name, and the sRGB transfer curve (IEC 61966-2-1)."""
+"""Named colours, and the sRGB transfer curve (IEC 61966-2-1)."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ NAMED_COLOURS = {
     "blue": (0.0, 0.0, 1.0),
     "white": (1.0, 1.0, 1.0),
 }
-"""R, G and B of the colours that users name."""
+"""R, G and B of the named colours."""
 
 
 def srgb_curve(linear: NDArray[np.floating]) -> NDArray[np.float64]:
@@ -21,11 +21,11 @@ def srgb_curve(linear: NDArray[np.floating]) -> NDArray[np.float64]:
 
 
 def encode(linear: NDArray[np.floating]) -> NDArray[np.uint8]:
-    """Encode linear values, 0 to 1, with 8 bits; in single precision, for speed."""
+    """Encode linear values, 0 to 1, with 8 bits, in single precision for speed."""
     linear = np.clip(np.asarray(linear, dtype=np.float32), 0.0, 1.0)
     curved = np.power(linear, np.float32(1 / 2.4))
     curved *= np.float32(255 * 1.055)
-    curved += np.float32(0.5 - 255 * 0.055)  # cut off below, which rounds
+    curved += np.float32(0.5 - 255 * 0.055)  # the conversion truncates, so this rounds
     dark = linear <= 0.0031308
     curved[dark] = linear[dark] * np.float32(255 * 12.92) + np.float32(0.5)
     return curved.astype(np.uint8)

@@ -1,4 +1,4 @@
-"""Whether two designs are the same, and where they differ."""
+"""Comparison of two designs: whether they are equal, and where they differ."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ from optisense.design.sensor_design import dotted
 from optisense.geometry import TriangleMesh
 
 SAME_NUMBER = 1e-9
-"""Numbers that differ by less, relative to their size, are the same: rounding in a file."""
+"""Relative difference up to which numbers count as equal; it covers rounding in a file."""
 
 SAME_PLACE = 1e-5
-"""mm: vertices that differ by less are the same: mesh files hold a limited number of digits."""
+"""Distance up to which vertices count as equal, mm; mesh files hold a limited number of digits."""
 
 
 def fingerprint(design: SensorDesign) -> str:
-    """A short text that is the same for designs that are simulated the same."""
+    """Return a short text that is equal for designs whose simulations are equal."""
     digest = hashlib.sha256(json.dumps(_values(design), sort_keys=True).encode())
     for name in sorted(design.meshes):
         mesh = design.meshes[name]
@@ -33,7 +33,7 @@ def fingerprint(design: SensorDesign) -> str:
 
 
 def differences(old: SensorDesign, new: SensorDesign) -> list[str]:
-    """Changes from one design to another, a line each: 'PATH: OLD -> NEW'."""
+    """Return the changes from one design to another, one per line: 'PATH: OLD -> NEW'."""
     found = plain_differences(_values(old), _values(new))
     for name in sorted(set(old.meshes) | set(new.meshes)):
         if name in old.meshes and name in new.meshes:
@@ -44,7 +44,7 @@ def differences(old: SensorDesign, new: SensorDesign) -> list[str]:
 
 
 def notes(design: SensorDesign) -> dict[str, Any]:
-    """A summary of a design (JSON-ready), which later shows where it was edited."""
+    """Return a summary of a design (JSON-ready), from which later edits can be found."""
     return {
         "values": _values(design),
         "meshes": {
@@ -55,7 +55,7 @@ def notes(design: SensorDesign) -> dict[str, Any]:
 
 
 def differences_from(noted: dict[str, Any], new: SensorDesign) -> list[str]:
-    """Changes of a design since its `notes` were written."""
+    """Return the changes of a design since its `notes` were written."""
     found = plain_differences(noted["values"], _values(new))
     now = notes(new)["meshes"]
     for name, (vertices, faces, mark) in noted["meshes"].items():
@@ -67,14 +67,14 @@ def differences_from(noted: dict[str, Any], new: SensorDesign) -> list[str]:
 
 
 def plain_differences(old: Any, new: Any) -> list[str]:
-    """The same for JSON-ready values."""
+    """Return the changes between JSON-ready values, one per line."""
     found: list[str] = []
     _compare(old, new, (), found)
     return found
 
 
 def _values(design: SensorDesign) -> dict[str, Any]:
-    """All that is simulated; names of files and where numbers come from are not."""
+    """Return all values that affect the simulation; names of files and provenance are left out."""
     data = design.model_dump(mode="json", exclude={"provenance", "description", "name"})
     for part in data["parts"].values():
         del part["mesh"]

@@ -17,18 +17,22 @@ from optisense.geometry.rays import ray_hits
 FloatArray = NDArray[np.float64]
 
 SHARP = 2.0
-"""Pixels: the largest circle of confusion of what is called sharp. A disc that is two pixels wide
-has a standard deviation of half a pixel, little more than that of a pixel itself (0.29)."""
+"""Diameter of the largest circle of confusion that counts as sharp, in pixels. A disc that is two
+pixels wide has a standard deviation of half a pixel, little more than that of a pixel itself
+(0.29).
+"""
 
 
 def focus_problems(design: SensorDesign, meshes: dict[str, TriangleMesh]) -> list[Diagnostic]:
-    """A sensing surface that is out of focus, if the camera's blur depends on depth.
+    """Return a warning if the sensing surface is out of focus, for cameras whose blur depends on
+    depth.
 
-    Gel and other solids on the way make things appear nearer: a layer appears as thick as it is
-    over its index. Rays are not bent here, so this is a warning. With mirrors it says nothing.
+    Gel and other solids on the way make objects appear nearer: the apparent thickness of a layer is
+    its thickness divided by its index. Rays are not refracted here, so this is only a warning.
+    Designs with mirrors are not checked.
 
     Args:
-        meshes: the deformed meshes, mm.
+        meshes: deformed meshes, mm.
     """
     camera = design.camera
     if camera.blur is None or not camera.blur.by_depth or design.parts_of(Role.MIRROR):
@@ -57,15 +61,17 @@ def focus_problems(design: SensorDesign, meshes: dict[str, TriangleMesh]) -> lis
 
 
 def apparent_distances(design: SensorDesign, meshes: dict[str, TriangleMesh]) -> FloatArray:
-    """How far away the sensing surface appears along straight rays spread over the picture.
+    """Return the apparent distances of the sensing surface along straight rays spread over the
+    picture.
 
-    Along the axis for perspective lenses, whose field of focus is flat, else along the ray.
+    They are measured along the axis for perspective lenses, whose field of focus is flat, else
+    along the ray.
 
     Args:
-        meshes: the deformed meshes, mm.
+        meshes: deformed meshes, mm.
 
     Returns:
-        (k,) mm, of the rays that meet it before any blocker.
+        Distances (k,), mm, of the rays that meet the surface before any blocker.
     """
     camera, origin = design.camera, np.array(design.camera.position)
     rays = straight_rays(camera)
@@ -93,7 +99,9 @@ def _reduced(
     rays: FloatArray,
     length: FloatArray,
 ) -> FloatArray:
-    """(k,) mm: the lengths of rays (k, 3), each piece over the index of what it is in."""
+    """Return the apparent lengths of rays (k, 3), (k,) mm: each piece divided by the index of its
+    medium.
+    """
     solids = [
         (design.parts[name].priority, getattr(design.materials[material], "ior", 1.0), meshes[name])
         for name in design.parts_of(*TRANSPARENT_SOLIDS)

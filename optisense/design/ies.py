@@ -1,4 +1,4 @@
-"""Reading IES files (ANSI/IESNA LM-63): luminous intensity over direction.
+"""Reader of IES files (ANSI/IESNA LM-63): luminous intensity over direction.
 
 Only type C photometry is read: the vertical angle is measured from the lamp's axis (0 is
 straight ahead), the horizontal angle around it.
@@ -25,14 +25,16 @@ the sphere has a million."""
 
 @dataclass(frozen=True)
 class IesProfile:
-    """Luminous intensity of a lamp, with the symmetries of its file written out.
+    """Luminous intensity of a lamp, with the symmetries of its file expanded.
 
     Attributes:
-        vertical_angles: (nv,) degrees from the axis, ascending, within 0..180. Outside their
-            range the lamp is dark.
-        horizontal_angles: (nh,) degrees around the axis, ascending, from 0 to 360 inclusive.
-        candela: (nh, nv) intensity; multiplier and ballast factor are applied.
-        rated_lumens: lumens the header claims for its bare lamps, or None (absolute photometry).
+        vertical_angles: angles (nv,) from the axis, degrees, ascending, within 0..180. Outside
+            their range the lamp is dark.
+        horizontal_angles: angles (nh,) around the axis, degrees, ascending, from 0 to 360
+            inclusive.
+        candela: intensity (nh, nv), with multiplier and ballast factor applied.
+        rated_lumens: lumens that the header states for its bare lamps, or None (absolute
+            photometry).
     """
 
     vertical_angles: FloatArray
@@ -42,7 +44,9 @@ class IesProfile:
 
     @property
     def lumens(self) -> float:
-        """The flux: the integral of intensity, linear between the angles, over all directions."""
+        """Luminous flux, lm: the integral of intensity, linear between the angles, over all
+        directions.
+        """
         theta = np.radians(self.vertical_angles)
         low, high = theta[:-1], theta[1:]
         # The integrals of the two hat functions times sin(theta) over each interval.
@@ -56,11 +60,11 @@ class IesProfile:
 def read_ies(path: str | Path) -> IesProfile:
     """Read an LM-63 file of 1986, 1991, 1995 or 2002; values may wrap freely.
 
-    TILT=INCLUDE is read, and its factor for the untilted lamp applied.
+    TILT=INCLUDE is read, and its factor for the untilted lamp is applied.
 
     Raises:
-        LibraryError: the file is missing, truncated, malformed or of another photometric type;
-            says the line.
+        LibraryError: the file is missing, truncated, malformed or of another photometric type; the
+            message names the line.
     """
     path = Path(path)
     data = read_bytes(path, MOST_IES, LibraryError, "the IES file")
@@ -115,12 +119,12 @@ def parse_ies(text: str, source: str) -> IesProfile:
 
 
 class _Values:
-    """The numbers of the file in order, each with its line."""
+    """Numbers of the file in order, each with its line."""
 
     def __init__(self, lines: list[str], start: int, source: str) -> None:
         self._source = source
         self._words: list[str] = []
-        self._ends: list[int] = []  # how many words there are up to the end of each line
+        self._ends: list[int] = []  # number of words up to the end of each line
         self._start = start
         for number in range(start, len(lines)):
             self._words += lines[number].replace(",", " ").split()
@@ -175,7 +179,7 @@ class _Values:
 
 
 def _number(word: str) -> float | None:
-    """A word as a number; None, which NumPy makes NaN of, where it is none."""
+    """Return a word as a number, or None, which NumPy turns into NaN."""
     try:
         return float(word)
     except ValueError:
@@ -183,7 +187,7 @@ def _number(word: str) -> float | None:
 
 
 def _tilt_factor(tilt: str, values: _Values, line: int, source: str) -> float:
-    """The factor of the lamp in its untilted position."""
+    """Return the factor of the lamp in its untilted position."""
     if tilt.upper() == "NONE":
         return 1.0
     if tilt.upper() != "INCLUDE":
@@ -211,7 +215,7 @@ def _check_vertical(vertical: FloatArray, values: _Values) -> None:
 def _expanded(
     horizontal: FloatArray, table: FloatArray, values: _Values
 ) -> tuple[FloatArray, FloatArray]:
-    """Write out the symmetry that the last horizontal angle stands for, to 0..360 degrees."""
+    """Expand the symmetry that the last horizontal angle implies, to 0..360 degrees."""
     if (np.diff(horizontal) <= 0.0).any():
         values.fail("horizontal angles must ascend")
     first, last = horizontal[0], horizontal[-1]
@@ -219,7 +223,7 @@ def _expanded(
         return np.array([0.0, 360.0]), np.repeat(table, 2, axis=0)
     if (first, last) == (90.0, 270.0):  # mirrored in the 90-270 plane
         horizontal, table = _mirrored(horizontal, table, 270.0)
-        # Now 90..450: bring the turn beyond 360 back to the front.
+        # Angles are now 90..450: move the part beyond 360 to the front.
         turned = horizontal >= 360.0
         kept = (horizontal <= 360.0) & (horizontal > 90.0)
         first_row = _row_at(360.0, horizontal, table)
@@ -252,7 +256,7 @@ def _row_at(angle: float, horizontal: FloatArray, table: FloatArray) -> FloatArr
 def _with_ends(
     horizontal: FloatArray, table: FloatArray, row: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Add the planes 0 and 360 degrees, which are the same `row`, where they are missing."""
+    """Add the planes 0 and 360 degrees, which are the same `row`, if they are missing."""
     if horizontal[0] != 0.0:
         horizontal = np.concatenate([[0.0], horizontal])
         table = np.concatenate([row[None], table])

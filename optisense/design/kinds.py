@@ -1,4 +1,4 @@
-"""The classes that the word under `kind` in a file chooses, of this package and of others."""
+"""Classes that the field `kind` in a file chooses, of this package and of others."""
 
 from __future__ import annotations
 
@@ -18,16 +18,16 @@ from optisense.untrusted_files import MOST_IES, inside, read_bytes
 
 
 class KindModel(Model):
-    """Base of what comes in several kinds, each a class with its own fields.
+    """Base class of models that come in several kinds, each a class with its own fields.
 
-    A direct subclass with a `kinds` of its own stands for the noun: as the type of a field, it
-    takes any kind of it and finds the class by `kind`. A subclass of that one whose `kind` has a
-    default is a kind.
+    A direct subclass with a `kinds` of its own is a noun (emitter, material, ...): as the type of a
+    field, it accepts any kind of it and finds the class by `kind`. A subclass of that one whose
+    `kind` has a default is a kind.
 
     Attributes:
-        kinds: all kinds of the noun.
-        usual_kind: of a noun, the kind of values that name none; they must name one if left out.
-        title: what a menu calls the kind; its name if left out.
+        kinds: registry of all kinds of the noun.
+        usual_kind: of a noun, the kind of values that name none; if omitted, values must name one.
+        title: name of the kind in menus; the kind's name if omitted.
     """
 
     kinds: ClassVar[Registry[Any]]
@@ -39,7 +39,7 @@ class KindModel(Model):
 
     @classmethod
     def __pydantic_init_subclass__(cls, **kwargs: Any) -> None:
-        """Register a kind when its class is made."""
+        """Register a kind when its class is created."""
         super().__pydantic_init_subclass__(**kwargs)
         if "kinds" not in cls.__dict__ and not cls.model_fields["kind"].is_required():
             cls.kinds.register(cls.model_fields["kind"].default, cls)
@@ -48,7 +48,9 @@ class KindModel(Model):
     def __get_pydantic_core_schema__(
         cls, source: Any, handler: GetCoreSchemaHandler, /
     ) -> CoreSchema:
-        """The schema of a noun takes any of its kinds, those included that are registered later."""
+        """Return the schema of a noun, which accepts any of its kinds, including those registered
+        later.
+        """
         if "kinds" not in cls.__dict__:
             return handler(source)
         return core_schema.no_info_plain_validator_function(
@@ -59,7 +61,7 @@ class KindModel(Model):
     def __get_pydantic_json_schema__(
         cls, schema: CoreSchema, handler: GetJsonSchemaHandler, /
     ) -> dict[str, Any]:
-        """The schema of a noun is one of the schemas of its kinds."""
+        """Return the JSON schema of a noun: one of the schemas of its kinds."""
         if "kinds" not in cls.__dict__:
             return handler(schema)
         kinds = [cls.kinds.find(name) for name in cls.kinds.names()]
@@ -78,7 +80,7 @@ class KindModel(Model):
             kind = cls.kinds.find(str(name))
         except DesignError as error:
             known = cls.kinds.names()
-            if name in known:  # a package names it, and can't be loaded
+            if name in known:  # a package names it, but can't be loaded
                 raise ValueError(str(error)) from error
             raise PydanticKnownError(
                 "union_tag_invalid",
@@ -92,18 +94,18 @@ class KindModel(Model):
 
     @classmethod
     def summary(cls) -> str:
-        """The first sentence of the class's description."""
+        """Return the first sentence of the class's description."""
         return " ".join((inspect.getdoc(cls) or "").split("\n\n")[0].split())
 
     def check(self) -> None:
-        """Find out what the fields alone don't tell, such as whether its files can be read.
+        """Check what the fields alone don't show, such as whether its files can be read.
 
         Raises:
-            OptiSenseError: something is wrong.
+            OptiSenseError: there is a problem.
         """
 
     def files(self) -> dict[str, str]:
-        """The files that it names, relative to its folder: by field."""
+        """Return the files that it names, relative to its folder, by field."""
         return {
             name: getattr(self, name)
             for name, field in type(self).model_fields.items()
@@ -111,10 +113,10 @@ class KindModel(Model):
         }
 
     def path(self, field: str) -> Path:
-        """The file on disk that a field names.
+        """Return the path on disk of the file that a field names.
 
         Raises:
-            LibraryError: it is not known which folder the file is in, or it is not in it.
+            LibraryError: the folder of the file is not known, or the file is not in it.
         """
         file = self.files()[field]
         if self._folder is None:
@@ -132,10 +134,10 @@ class KindModel(Model):
         return path
 
     def contents(self) -> dict[str, bytes]:
-        """Contents of its files, by their names relative to the folder.
+        """Return the contents of its files, by their names relative to the folder.
 
         Raises:
-            LibraryError: one can't be read.
+            LibraryError: a file can't be read.
         """
         return {
             file: read_bytes(self.path(field), MOST_IES, LibraryError)
@@ -144,16 +146,16 @@ class KindModel(Model):
 
     @property
     def folder(self) -> Path | None:
-        """Where its files are; None where that is not known."""
+        """Folder of its files; None if unknown."""
         return self._folder
 
     def located(self, folder: Path | None) -> Self:
-        """The same object, now that it is known which folder its files are in, if it names any."""
+        """Set the folder of its files, if it names any, and return the object."""
         self._folder = folder if self.files() else None
         return self
 
     def renamed(self, name: Callable[[str], str], folder: Path | None = None) -> Self:
-        """The same object with other names of its files, in another folder."""
+        """Rename its files, set their folder, and return the object."""
         for field, file in self.files().items():
             setattr(self, field, name(file))
         return self.located(folder)

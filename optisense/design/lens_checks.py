@@ -1,4 +1,4 @@
-"""Lenses that show a thing twice."""
+"""Check for lenses that show a point twice."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ from optisense.design.projection import folding_angle
 
 
 def fold_problems(camera: Camera, where: str) -> list[Diagnostic]:
-    """A distortion that folds within the picture.
+    """Return the problem of a distortion that folds within the picture.
 
     Args:
-        camera: of the design.
-        where: the place of its distortion in the design.
+        camera: camera of the design.
+        where: place of its distortion in the design.
     """
     angle = folding_angle(camera)
     if angle is None:

@@ -13,11 +13,11 @@ from optisense.design.fields import Colour, Direction, Model, Name, NonNegative,
 from optisense.design.spectrum import LightSpectra
 
 MOST_LIGHTS = 10_000
-"""Lights of one group; the built-in sensors have at most some dozens."""
+"""Largest number of lights of one group; the built-in sensors have at most some dozens."""
 
 
 class Light(Model):
-    """The pose of one light."""
+    """Pose of one light."""
 
     position: Vector = Field(description="mm, x y z")
     direction: Direction = Field(description="where it shines, any length")
@@ -49,7 +49,7 @@ class LightGroup(Model):
         return self
 
     def channel_flux(self) -> NDArray[np.float64]:
-        """(3,) mW: the radiant flux of each light in R, G and B; they sum to `flux`.
+        """Return the radiant flux of each light in R, G and B, (3,) mW; they sum to `flux`.
 
         `colour` shares the flux among the dies, and `spectrum` the light of each die among R, G
         and B.

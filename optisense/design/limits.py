@@ -1,4 +1,4 @@
-"""Sizes that a tactile sensor can have; others come from a slip of units."""
+"""Sizes that a tactile sensor can have; others come from wrong units."""
 
 from __future__ import annotations
 
@@ -8,14 +8,18 @@ from optisense.design.problems import Diagnostic
 from optisense.design.sensor_design import SensorDesign
 
 LARGEST = 1000.0
-"""mm: no part of a sensor is larger, nor any light or camera farther from the origin."""
+"""Largest size of a part, and largest distance of a light or camera from the origin, mm; larger
+numbers come from a wrong unit.
+"""
 
 SMALLEST = 0.5
-"""mm: no part of a sensor is smaller in its largest dimension."""
+"""Smallest size of a part in its largest dimension, mm; thin parts are larger in the others."""
 
 
 def unit_slips(design: SensorDesign) -> list[Diagnostic]:
-    """Parts, lights and a camera whose sizes or distances suggest another unit than mm."""
+    """Return problems of parts, lights and a camera whose sizes or distances suggest another unit
+    than mm.
+    """
     problems: list[Diagnostic] = []
     for name, mesh in design.meshes.items():
         place = design.where("parts", name, "mesh")

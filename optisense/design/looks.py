@@ -1,4 +1,4 @@
-"""Colours and opacities of parts in all drawings of a design."""
+"""Colours and opacities of parts in drawings of a design."""
 
 from __future__ import annotations
 

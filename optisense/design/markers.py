@@ -1,4 +1,4 @@
-"""Dots printed on the skin, whose motion shows how it moves sideways."""
+"""Dots printed on the skin, whose motion shows its lateral displacement."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ from optisense.design.fields import (
 )
 
 MOST_MARKERS = 4000
-"""Dots of one design; sensors have some dozens to some hundreds."""
+"""Largest number of dots of one design; sensors have some dozens to some hundreds."""
 
 Places = Annotated[list[tuple[Number, Number]], Field(min_length=1, max_length=MOST_MARKERS)]
 Side = Annotated[int, Field(strict=True, ge=1, le=200)]
 
 
 class Markers(Model):
-    """Dots on the sensing surface: a grid of them around its middle, or a list of places."""
+    """Dots on the sensing surface: a grid of them around its middle, or a list of positions."""
 
     radius: Positive = Field(description="of a dot", examples=[0.4], json_schema_extra=MILLIMETRES)
     reflectance: Colour = Field(
@@ -61,7 +61,7 @@ class Markers(Model):
         return self
 
     def coordinates(self) -> list[tuple[float, float]]:
-        """Surface coordinates u, v of each dot, mm: row by row from the lowest v."""
+        """Return the surface coordinates u, v of each dot, mm: row by row from the lowest v."""
         if self.places is not None:
             return list(self.places)
         assert self.grid is not None and self.pitch is not None

@@ -8,35 +8,38 @@ from optisense.design.problems import Diagnostic
 from optisense.design.sensor_design import SensorDesign
 
 MOST_OF_A_GAS = 1.002
-"""Refractive index up to which a medium is a gas: air has 1.0003, and at the pressure of a room no
-gas has more than 1.002."""
+"""Largest refractive index of a gas: air has 1.0003, and at atmospheric pressure no gas has more
+than 1.002.
+"""
 
 LEAST_OF_A_SOLID = 1.29
-"""Refractive index of the lowest clear solid, the fluoropolymer Teflon AF 2400 (assumed: its data
-sheet was not at hand). Water has 1.33. Aerogels have less, but they scatter light, and media are
-simulated as clear."""
+"""Smallest refractive index of a clear solid, that of the fluoropolymer Teflon AF 2400 (assumed:
+its data sheet was not at hand). Water has 1.33. Aerogels have less, but they scatter light, and
+media are simulated as clear.
+"""
 
 MOST_OF_A_SOLID = 2.15
-"""Refractive index of the highest clear glass on sale, Sumita's K-PSFn214P, whose name gives 2.14
+"""Largest refractive index of a clear glass on sale, Sumita's K-PSFn214P, whose name gives 2.14
 (its data sheet was not at hand; K-PSFn2 has 1.997 in the maker's catalogue of 2017 by
-refractiveindex.info). Crystals such as diamond, 2.42, have more, but nobody makes a sensor of
-them."""
+refractiveindex.info). Crystals such as diamond, 2.42, have more, but nobody makes a sensor of them.
+"""
 
 MOST_OF_AN_ELASTOMER = 1.65
-"""Refractive index that no clear elastomer exceeds. Silicones for lamps reach 1.62 at 633 nm:
-Mosley et al., "High refractive index thermally stable phenoxyphenyl and phenylthiophenyl silicones
-for light-emitting diode applications", J. Appl. Polym. Sci. 131, 39824 (2014)."""
+"""Largest refractive index of a clear elastomer. Silicones for lamps reach 1.62 at 633 nm: Mosley
+et al., "High refractive index thermally stable phenoxyphenyl and phenylthiophenyl silicones for
+light-emitting diode applications", J. Appl. Polym. Sci. 131, 39824 (2014).
+"""
 
 
 def is_gas(medium: Medium) -> bool:
-    """Whether a medium can only be a gas, such as air."""
+    """Return whether a medium can only be a gas, such as air."""
     return medium.ior <= MOST_OF_A_GAS
 
 
 def index_problems(design: SensorDesign) -> list[Diagnostic]:
-    """Refractive indices that no transparent material has, each material once.
+    """Return problems of refractive indices that no transparent material has, each material once.
 
-    A gas is fine: films of air lie between parts, and a membrane may be filled with it.
+    A gas is allowed: air gaps lie between parts, and a membrane may be filled with it.
     """
     problems: list[Diagnostic] = []
     told: set[str] = set()

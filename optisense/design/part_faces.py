@@ -1,4 +1,4 @@
-"""Frosted and painted faces of parts: which triangles they are, and what can't be."""
+"""Frosted and painted faces of parts: their triangles, and checks of the finishes."""
 
 from __future__ import annotations
 
@@ -16,11 +16,13 @@ from optisense.geometry.patches import angle_to_nearest, faces_towards
 from optisense.near import suggestion
 
 BOX_TOLERANCE = 1e-6
-"""mm that faces may stand out of a box that selects them: rounding of coordinates."""
+"""Distance by which faces may protrude from a box that selects them, mm; it covers rounding of
+coordinates.
+"""
 
 
 def check_finishes(name: str, part: Part, materials: Mapping[str, Material]) -> None:
-    """Refuse finished faces of parts that have none, and paints that are no paints.
+    """Refuse finishes of parts that can't have them, and paints that are no opaque materials.
 
     Raises:
         MisfitError: the part is no transparent solid, or a paint is unknown or transparent.
@@ -61,16 +63,18 @@ def check_finishes(name: str, part: Part, materials: Mapping[str, Material]) -> 
 def finished_faces(
     mesh: TriangleMesh, finish: FaceFinish, name: str, where: str
 ) -> NDArray[np.int64]:
-    """(k,) the triangles of a part at rest that a finish is for, at least one.
+    """Return the indices (k,) of the triangles of a part at rest that a finish selects, at least
+    one.
 
     Args:
-        mesh: of the part, at rest.
-        finish: what was done, and to which faces.
-        name: of part and faces, for messages.
+        mesh: mesh of the part at rest.
+        finish: finish and the faces that it applies to.
+        name: name of part and faces, for messages.
         where: file and line, for messages.
 
     Raises:
-        DesignError: there are none; says which way the nearest ones look.
+        DesignError: the finish selects no face; the message gives the direction of the nearest
+            ones.
     """
     chosen = np.flatnonzero(mesh.face_areas > 0.0)
     hint = None

@@ -1,4 +1,4 @@
-"""The parts of a sensor: a mesh, what it is for, and what it is made of."""
+"""Parts of a sensor: a mesh, its role, and its material."""
 
 from __future__ import annotations
 
@@ -24,22 +24,22 @@ from optisense.design.fields import (
 
 
 class Role(StrEnum):
-    """The function of a part in the sensor."""
+    """Function of a part in the sensor."""
 
     SENSING_SURFACE = "sensing_surface"
-    """The inside of the opaque coating; an open surface whose normals look into the sensor."""
+    """Inside of the opaque coating; an open surface whose normals point into the sensor."""
     ELASTOMER = "elastomer"
-    """A closed, soft, transparent solid."""
+    """Closed, soft, transparent solid."""
     SUPPORT = "support"
-    """A closed, rigid, transparent solid."""
+    """Closed, rigid, transparent solid."""
     MIRROR = "mirror"
-    """A reflecting surface or solid."""
+    """Reflecting surface or solid."""
     BLOCKER = "blocker"
-    """An opaque surface or solid that stops light."""
+    """Opaque surface or solid that stops light."""
     INTERFACE = "interface"
-    """A refracting sheet."""
+    """Refracting sheet."""
     INDENTER = "indenter"
-    """An object that touches the sensor."""
+    """Object that touches the sensor."""
 
 
 TRANSPARENT_SOLIDS = frozenset({Role.ELASTOMER, Role.SUPPORT})
@@ -47,10 +47,10 @@ TRANSPARENT_SOLIDS = frozenset({Role.ELASTOMER, Role.SUPPORT})
 
 
 class FaceFinish(Model):
-    """Some faces of a transparent solid, and what was done to them.
+    """Finish of some faces of a transparent solid.
 
-    The faces are those of the mesh at rest that look along `direction` and lie within `box`; one of
-    the two is enough.
+    The faces are those of the mesh at rest that point along `direction` and lie within `box`; one
+    of the two suffices.
     """
 
     direction: Direction | None = Field(
@@ -85,14 +85,14 @@ class FaceFinish(Model):
 
 
 class Part(Model):
-    """A solid or a surface of the sensor.
+    """Solid or surface of the sensor.
 
-    Which roles take which kind of material: elastomer, support and interface a dielectric;
-    mirror a conductor or a diffuse one; blocker any opaque one (none absorbs everything);
-    sensing_surface none, as it wears the design's coating.
+    The kinds of material by role: elastomer, support and interface take a dielectric; mirror a
+    conductor or a diffuse one; blocker any opaque one (none absorbs everything); sensing_surface
+    none, as it has the design's coating.
 
     A mirror, blocker or interface may be an open sheet. Light meets it as it is drawn; `thickness`
-    is for who makes it: the material lies behind the face, where its normals do not look.
+    is for manufacturing: the material lies behind the face, opposite to its normals.
     """
 
     role: Role = Field(description="; ".join(role.value for role in Role))

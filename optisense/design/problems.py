@@ -1,4 +1,4 @@
-"""Messages for the person who wrote a design file, made of what pydantic reports."""
+"""Messages for the author of a design file, made from pydantic's errors."""
 
 from __future__ import annotations
 
@@ -16,11 +16,14 @@ from optisense.near import near_match, suggestion
 from optisense.text import brief
 
 MAX_SHOWN = 8
-"""Number of problems that one message lists; the rest is counted, so that a message fits a
-terminal."""
+"""Number of problems that one message lists; the others are counted, so that a message fits a
+terminal.
+"""
 
 MAX_EXAMINED = 100
-"""Problems of one file that are put into words; a damaged file may have hundreds of thousands."""
+"""Largest number of problems of one file that are put into words; a damaged file may have hundreds
+of thousands.
+"""
 
 Path = tuple[str | int, ...]
 Lines = dict[Path, int]
@@ -28,13 +31,14 @@ Lines = dict[Path, int]
 
 @dataclass(frozen=True)
 class Diagnostic:
-    """Something that is wrong with a design.
+    """Problem of a design.
 
     Attributes:
-        message: what is wrong.
+        message: description of the problem.
         where: file and line, part name or dotted path.
-        hint: what to do, or None.
-        severity: "error" (it can't be simulated, or wrongly) or "warning" (it looks odd).
+        hint: remedy, or None.
+        severity: "error" (the design can't be simulated, or its simulation would be wrong) or
+            "warning" (it is unusual).
     """
 
     message: str
@@ -48,12 +52,12 @@ class Diagnostic:
 
 
 def raise_problems(problems: list[Diagnostic], source: str, unseen: int = 0) -> None:
-    """Raise one DesignError for all problems of severity "error"; none, and it returns.
+    """Raise one DesignError for all problems of severity "error"; return if there are none.
 
     Args:
-        problems: what is wrong.
-        source: the file, or what else has the problems.
-        unseen: how many more there are.
+        problems: problems.
+        source: file, or other source of the problems.
+        unseen: number of further problems.
     """
     errors = [problem for problem in problems if problem.severity == "error"]
     if not errors:
@@ -76,13 +80,13 @@ def design_error(
     lines: Lines | None = None,
     model: type[BaseModel] = SensorDesign,
 ) -> DesignError:
-    """The DesignError for what pydantic found.
+    """Return the DesignError for an error of pydantic.
 
     Args:
-        data: what was validated.
-        where: the file, or the dotted path that was being set.
-        lines: the line of each path in the file, when there is one.
-        model: what the data were meant to be.
+        data: data that were validated.
+        where: file, or dotted path that was set.
+        lines: line of each path in the file, if there is one.
+        model: model of the data.
     """
     problems = _problems(error, data, where, lines or {}, model)
     try:
@@ -161,7 +165,7 @@ def _sentence(message: str) -> str:
 
 
 def _path_in(data: Any, location: tuple[str | int, ...]) -> Path:
-    """The location without the union members and '[key]' marks that pydantic adds to it."""
+    """Return the location without the union members and '[key]' marks that pydantic adds to it."""
     path: list[str | int] = []
     for step in location:
         known = step in data if isinstance(data, dict) else False
@@ -185,7 +189,7 @@ def _place(path: Path, where: str, lines: Lines) -> str:
 def _fields_at(
     model: type[BaseModel], location: tuple[str | int, ...], data: Any = None
 ) -> list[str]:
-    """The fields of the model at a location inside `model`, where `data` were to be one."""
+    """Return the fields of the model at a location inside `model`, for the given `data`."""
     kind: Any = model
     for step in location:
         kind = _step_into(kind, step)
@@ -219,7 +223,7 @@ def _step_into(kind: Any, step: str | int) -> Any:
 
 
 def _bare(kind: Any) -> Any:
-    """A type without its annotations, and without None where only one other is left."""
+    """Return a type without its annotations, and without None if only one other type is left."""
     while True:
         if get_origin(kind) is Annotated:
             kind = get_args(kind)[0]

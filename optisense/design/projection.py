@@ -1,6 +1,6 @@
 """Projection of points into a design's camera, and its pixels' directions, without refraction.
 
-A place of the picture is given by shares: 0 to 1 across from the left and down from the top.
+A position in the picture is given by shares: 0 to 1 across from the left and down from the top.
 """
 
 from __future__ import annotations
@@ -13,44 +13,51 @@ from optisense.design.camera import Camera
 FloatArray = NDArray[np.float64]
 
 FOLD_PLACES = 13
-"""Places along the picture's width and its height at which a lens is tried for folding; the
-borders and the corners, where lenses fold first, are among them."""
+"""Number of positions along the picture's width and its height at which a lens is tested for
+folding; the borders and the corners, where lenses fold first, are among them.
+"""
 
 FOLD_STEPS = 24
-"""Number of steps from the optical axis to each of the places at which a lens is tried for
-folding."""
+"""Number of steps from the optical axis to each of the positions at which a lens is tested for
+folding.
+"""
 
 UNDISTORTED_TO = 1e-9
-"""Distance on the image plane to which a place that a lens shows is found again; a lens that folds
-has no such place, or another one."""
+"""Largest error on the image plane of a position that is undistorted and distorted again; a lens
+that folds has a larger one, or no such position.
+"""
 
 
 def image_edges(camera: Camera) -> tuple[float, float]:
-    """Half the width and half the height of the picture on the image plane (see `distortion`)."""
+    """Return half the width and half the height of the picture on the image plane (see
+    `distortion`).
+    """
     half = np.radians(0.5 * camera.fov)
     edge = float(half if camera.projection == "equidistant" else np.tan(half))
     return edge, edge * camera.resolution[1] / camera.resolution[0]
 
 
 def shown_places(camera: Camera, across: FloatArray, down: FloatArray) -> FloatArray:
-    """(2, ...) x and y on the image plane, as the lens shows them, of places of the picture."""
+    """Return x and y on the image plane, as the lens shows them, of positions in the picture,
+    (2, ...).
+    """
     edge, tall = image_edges(camera)
     middle = (0.5, 0.5) if camera.distortion is None else camera.distortion.centre
     return np.array([2.0 * edge * (across - middle[0]), 2.0 * tall * (down - middle[1])])
 
 
 def ideal_places(camera: Camera, across: FloatArray, down: FloatArray) -> FloatArray:
-    """(2, ...) x and y on the image plane of an ideal lens of what the picture shows at places."""
+    """Return x and y on the image plane of an ideal lens for positions in the picture, (2, ...)."""
     shown = shown_places(camera, across, down)
     lens = camera.distortion
     if lens is None:
         return shown
-    with np.errstate(all="ignore"):  # a lens that folds has places without any
+    with np.errstate(all="ignore"):  # a lens that folds has positions without any
         return np.array(lens.undistort(shown[0], shown[1], lens.coefficients()))
 
 
 def directions(camera: Camera, across: FloatArray, down: FloatArray) -> FloatArray:
-    """(..., 3) unit vectors in which places of the picture look."""
+    """Return unit vectors (..., 3) in the viewing directions of positions in the picture."""
     x, y = ideal_places(camera, across, down)
     height = np.hypot(x, y)
     angle = height if camera.projection == "equidistant" else np.arctan(height)
@@ -60,13 +67,14 @@ def directions(camera: Camera, across: FloatArray, down: FloatArray) -> FloatArr
 
 
 def picture_places(camera: Camera, points: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Where points are shown: (n,), (n,) across and down; NaN for those that the lens can't show.
+    """Return the positions across (n,) and down (n,) of points in the picture; NaN for those that
+    the lens can't show.
 
-    Places may lie outside of the picture, where they are below 0 or above 1.
+    Positions outside of the picture are below 0 or above 1.
 
     Args:
-        camera: of the design.
-        points: (n, 3) mm.
+        camera: camera of the design.
+        points: points (n, 3), mm.
     """
     right, up, depth = camera.axes() @ (np.asarray(points) - np.array(camera.position)).T
     aside = np.hypot(right, up)
@@ -82,7 +90,7 @@ def picture_places(camera: Camera, points: FloatArray) -> tuple[FloatArray, Floa
     middle = (0.5, 0.5)
     if lens is not None:
         middle = lens.centre
-        # Farther off the axis than any corner of the picture, its polynomial means nothing.
+        # Farther off the axis than any corner of the picture the polynomial is not valid.
         beyond = np.hypot(x, y) > 1.001 * _largest_height(camera)
         with np.errstate(all="ignore"):
             x, y = lens.distort(x, y, lens.coefficients())
@@ -91,7 +99,9 @@ def picture_places(camera: Camera, points: FloatArray) -> tuple[FloatArray, Floa
 
 
 def _largest_height(camera: Camera) -> float:
-    """The largest distance from the axis, on the ideal image plane, that the picture shows."""
+    """Return the largest distance from the axis, on the ideal image plane, that the picture
+    shows.
+    """
     along = np.linspace(0.0, 1.0, FOLD_PLACES)
     across = np.concatenate([along, along, 0.0 * along, 0.0 * along + 1.0])
     down = np.concatenate([0.0 * along, 0.0 * along + 1.0, along, along])
@@ -99,12 +109,14 @@ def _largest_height(camera: Camera) -> float:
 
 
 def folding_angle(camera: Camera) -> float | None:
-    """Degrees off the axis from which on the lens shows things again that are in the picture.
+    """Return the angle off the axis from which on the lens shows points again that are in the
+    picture, degrees.
 
-    There its distortion has no inverse: two directions are shown at one place, and others nowhere.
+    Beyond it the distortion has no inverse: two directions are shown at one position, and others
+    nowhere.
 
     Returns:
-        None for a lens that shows each place of the picture once.
+        The angle, or None for a lens that shows each point of the picture once.
     """
     lens = camera.distortion
     if lens is None:
@@ -125,7 +137,9 @@ def folding_angle(camera: Camera) -> float | None:
 
 
 def _first_fold(camera: Camera, shown: FloatArray) -> float:
-    """Degrees off the axis at which the lens first folds on the way to places that it shows."""
+    """Return the angle off the axis at which the lens first folds on the way to positions that it
+    shows, degrees.
+    """
     lens = camera.distortion
     assert lens is not None
     farthest = shown[:, np.argmax(np.hypot(*shown))]

@@ -9,11 +9,11 @@ FloatArray = NDArray[np.float64]
 
 
 def fresnel_dielectric(cosine: ArrayLike, eta: float | FloatArray) -> FloatArray:
-    """The share of unpolarised light that a smooth face between transparent media reflects.
+    """Return the reflectance of a smooth face between transparent media for unpolarised light.
 
     Args:
-        cosine: of the angle of incidence, 0 to 1.
-        eta: index behind the face over the index in front of it.
+        cosine: cosine of the angle of incidence, 0 to 1.
+        eta: index behind the face divided by the index in front of it.
     """
     ci = np.asarray(cosine, dtype=np.float64)
     sine2 = (1.0 - ci * ci) / (eta * eta)
@@ -24,15 +24,16 @@ def fresnel_dielectric(cosine: ArrayLike, eta: float | FloatArray) -> FloatArray
 
 
 def fresnel_metal(cosine: ArrayLike, eta: ArrayLike, k: ArrayLike) -> FloatArray:
-    """The share of unpolarised light that a smooth metal reflects (Born and Wolf, 13.2).
+    """Return the reflectance of a smooth metal for unpolarised light (Born and Wolf, 13.2).
 
     Args:
-        cosine: of the angle of incidence, of any shape.
-        eta: (c,) real part of the metal's index over the index in front of it, of each channel.
-        k: (c,) imaginary part, likewise.
+        cosine: cosine of the angle of incidence, of any shape.
+        eta: real part (c,) of the metal's index divided by the index in front of it, for each
+            channel.
+        k: imaginary part (c,), divided likewise.
 
     Returns:
-        The shape of `cosine` with (c,) added.
+        Reflectance in the shape of `cosine` with (c,) added.
     """
     ci = np.asarray(cosine, dtype=np.float64)[..., None]
     index = np.asarray(eta, dtype=np.float64) + 1j * np.asarray(k, dtype=np.float64)
@@ -43,29 +44,34 @@ def fresnel_metal(cosine: ArrayLike, eta: ArrayLike, k: ArrayLike) -> FloatArray
 
 
 def ggx_density(cosine: ArrayLike, alpha: float) -> FloatArray:
-    """GGX distribution of facet normals, by the cosine to the mean normal (Walter et al. 2007)."""
+    """Return the GGX distribution of facet normals, by the cosine to the mean normal (Walter et al.
+    2007).
+    """
     cos2 = np.square(np.asarray(cosine, dtype=np.float64))
     return np.asarray(alpha**2 / (np.pi * np.square(cos2 * (alpha**2 - 1.0) + 1.0)))
 
 
 def smith_shadowing(cosine: ArrayLike, alpha: float) -> FloatArray:
-    """Share of the facets that is seen from a direction, by its cosine to the mean normal."""
+    """Return the share of the facets that is visible from a direction, by its cosine to the mean
+    normal.
+    """
     cos2 = np.maximum(np.square(np.asarray(cosine, dtype=np.float64)), 1e-12)
     tan2 = (1.0 - cos2) / cos2
     return np.asarray(2.0 / (1.0 + np.sqrt(1.0 + alpha**2 * tan2)))
 
 
 def sample_facets(view: FloatArray, alpha: float, u: FloatArray) -> FloatArray:
-    """Normals of the facets that a direction sees, in the frame where +z is the mean normal.
+    """Sample normals of the facets visible from a direction, in the frame where +z is the mean
+    normal.
 
     Heitz, "Sampling the GGX distribution of visible normals", JCGT 7 (2018).
 
     Args:
-        view: (n, 3) unit directions, z above 0.
-        u: (n, 2) numbers from 0 to 1.
+        view: unit directions (n, 3), z above 0.
+        u: numbers (n, 2) from 0 to 1.
 
     Returns:
-        (n, 3) unit normals.
+        Unit normals (n, 3).
     """
     stretched = view * [alpha, alpha, 1.0]
     stretched /= np.linalg.norm(stretched, axis=1, keepdims=True)

@@ -1,4 +1,4 @@
-"""A section through a design: the outlines of its parts in a plane through the camera."""
+"""Section through a design: the outlines of its parts in a plane through the camera."""
 
 from __future__ import annotations
 
@@ -18,16 +18,19 @@ if TYPE_CHECKING:
 FloatArray = NDArray[np.float64]
 
 OFF_VERTICES = 1e-7
-"""mm: vertices that lie in the plane are taken to lie this far above it."""
+"""Height, mm, above the plane that is assumed for vertices in the plane, so that no vertex is on
+it.
+"""
 
 
 class Outline(NamedTuple):
-    """A part cut by the plane.
+    """Intersection of a part with the plane.
 
     Attributes:
-        name: of the part.
-        role: of the part.
-        lines: polylines (n, 2), mm; of a solid, closed ones whose last point is the first.
+        name: name of the part.
+        role: role of the part.
+        lines: polylines (n, 2), mm; those of a solid are closed, with the first point repeated at
+            the end.
     """
 
     name: str
@@ -37,16 +40,17 @@ class Outline(NamedTuple):
 
 @dataclass(frozen=True)
 class Section:
-    """The section of a design by a plane through the camera; (across, along the view) in mm.
+    """Section of a design by a plane through the camera; coordinates are (across, along the view)
+    in mm.
 
     Attributes:
-        outlines: parts that the plane meets, in the design's order.
-        missed: names of parts that it does not meet.
-        lights: (k, 2) places of each light group, moved into the plane.
-        colours: of the light groups, channels 0..1.
-        camera: (2,) place of the pupil.
-        half_angle: degrees between the view and its border in the plane.
-        across, along: (3,) unit vectors of the plane in the design's frame.
+        outlines: outlines of the parts that the plane meets, in the design's order.
+        missed: names of the parts that it does not meet.
+        lights: positions (k, 2) of each light group, projected onto the plane.
+        colours: colours of the light groups, channels 0..1.
+        camera: position (2,) of the pupil.
+        half_angle: angle between the view and its border in the plane, degrees.
+        across, along: unit vectors (3,) of the plane in the design's frame.
     """
 
     outlines: list[Outline]
@@ -60,7 +64,7 @@ class Section:
 
     @property
     def bounds(self) -> FloatArray:
-        """(2, 2) mm: lowest and highest coordinates of parts, lights and camera."""
+        """Lowest and highest coordinates of parts, lights and camera, (2, 2) mm."""
         points = [line for outline in self.outlines for line in outline.lines]
         points += [*self.lights.values(), self.camera[None]]
         every = np.concatenate(points)
@@ -68,9 +72,9 @@ class Section:
 
 
 def section(design: SensorDesign) -> Section:
-    """Cut a design by the plane through the camera's axis along which more of it is sensed.
+    """Cut a design by the plane through the camera's axis that shows more of the sensing surface.
 
-    The plane holds the viewing direction, and image right or image up: the one in which the
+    The plane contains the viewing direction, and image right or image up: the one along which the
     sensing surface is longer.
     """
     camera = design.camera
@@ -112,7 +116,7 @@ def section(design: SensorDesign) -> Section:
 
 
 def along_rows(design: SensorDesign) -> bool:
-    """Whether the section runs along the rows of the picture, else along its columns."""
+    """Return whether the section runs along the rows of the picture, else along its columns."""
     right, up, _ = design.camera.axes()
     meshes = design.deformed_meshes()
     sensed = [meshes[name].vertices for name in design.parts_of(Role.SENSING_SURFACE)]
@@ -121,12 +125,12 @@ def along_rows(design: SensorDesign) -> bool:
 
 
 def cut(mesh: TriangleMesh, origin: FloatArray, normal: FloatArray) -> list[FloatArray]:
-    """Where a plane cuts a mesh.
+    """Return the intersection of a plane with a mesh.
 
     Args:
-        mesh: open or closed.
-        origin: (3,) mm, a point of the plane.
-        normal: (3,) of the plane.
+        mesh: open or closed mesh.
+        origin: point (3,) of the plane, mm.
+        normal: normal (3,) of the plane.
 
     Returns:
         Polylines (n, 3) mm; closed ones repeat their first point at the end.
@@ -150,7 +154,7 @@ def cut(mesh: TriangleMesh, origin: FloatArray, normal: FloatArray) -> list[Floa
 
 
 def _chains(links: NDArray[np.int64]) -> list[list[int]]:
-    """Join links (k, 2) between numbered points into chains; ends of open ones come first."""
+    """Join links (k, 2) between numbered points into chains; the ends of open ones come first."""
     beside: dict[int, list[int]] = {}
     for one, other in links.tolist():
         beside.setdefault(one, []).append(other)

@@ -1,4 +1,4 @@
-"""A section as a labelled drawing: SVG text, for notebooks and reports."""
+"""Labelled drawing of a section: SVG text, for notebooks and reports."""
 
 from __future__ import annotations
 
@@ -19,12 +19,14 @@ if TYPE_CHECKING:
 FloatArray = NDArray[np.float64]
 
 WIDTH, LABELS, MARGIN, LINE = 440.0, 190.0, 24.0, 17.0
-"""Pixels: of the drawing and the labels beside it, around both, and between labels."""
+"""Sizes in pixels: width of the drawing, width of the labels beside it, margin around both, and
+distance between labels; a drawing of this size fits a page of text.
+"""
 
 TALLEST = 520.0
 """Largest height of the drawing in pixels, so that it fits a screen below the page's heading."""
 DOT = 3.2
-"""Radius in pixels of the dot that stands for a light."""
+"""Radius of the dot that stands for a light, in pixels."""
 
 INK = "#1c232b"
 RAY, LOST_RAY = "#7a3fb8", "#8d97a3"
@@ -38,11 +40,11 @@ class _Label(NamedTuple):
 
 
 class DrawnRay(NamedTuple):
-    """A chief ray to draw.
+    """Chief ray to draw.
 
     Attributes:
-        points: (n, 3) mm in the design's frame: the camera, where it is refracted or reflected, and
-            where it ends.
+        points: points (n, 3) in the design's frame, mm: the camera, each refraction or reflection,
+            and the end.
         arrived: whether it ends on the sensing surface.
     """
 
@@ -51,12 +53,12 @@ class DrawnRay(NamedTuple):
 
 
 def section_svg(design: SensorDesign, rays: Sequence[DrawnRay] = ()) -> str:
-    """A labelled section through a design as an SVG element.
+    """Return a labelled section through a design as an SVG element.
 
-    The camera's view runs upward. Lights and rays are moved into the plane of the section.
+    The camera's view points upward. Lights and rays are projected onto the plane of the section.
 
     Args:
-        design: the sensor.
+        design: design of the sensor.
         rays: chief rays of the camera to draw, if any.
     """
     found = section(design)
@@ -125,14 +127,14 @@ def section_svg(design: SensorDesign, rays: Sequence[DrawnRay] = ()) -> str:
 
 
 def _path(line: FloatArray) -> str:
-    """SVG path data of a polyline, closed if its last point is its first."""
+    """Return SVG path data of a polyline, closed if its last point is its first."""
     closed = len(line) > 2 and np.array_equal(line[0], line[-1])
     points = line[:-1] if closed else line
     return "M" + "L".join(f"{x:.1f} {y:.1f}" for x, y in points) + ("Z" if closed else "")
 
 
 def _anchor(lines: list[FloatArray], solid: bool) -> tuple[float, float]:
-    """Where a label's line ends: well inside a solid, on its right; else on the outline."""
+    """Return the end of a label's line: well inside a solid, on its right; else on the outline."""
     points = np.concatenate(lines)
     if not solid:
         x, y = points[points[:, 0].argmax()]
@@ -155,7 +157,9 @@ def _anchor(lines: list[FloatArray], solid: bool) -> tuple[float, float]:
 
 
 def _light(x: float, y: float, colours: list[str]) -> str:
-    """A dot; where lights of several colours lie behind one another, a sector for each."""
+    """Return a dot; if lights of several colours lie behind one another, it has a sector for
+    each.
+    """
     circle = f'<circle cx="{x:.1f}" cy="{y:.1f}" r="{DOT}"'
     edge = f'stroke="{INK}" stroke-width="0.7"/>'
     if len(colours) == 1:
@@ -171,13 +175,15 @@ def _light(x: float, y: float, colours: list[str]) -> str:
 
 
 def _labels(labels: list[_Label], column: float, tall: float) -> list[str]:
-    """Labels in a column, in the order of their anchors and near them, with lines to these."""
+    """Return labels in a column, in the order of their anchors and near them, with lines to
+    these.
+    """
     ordered = sorted(labels, key=lambda label: (label.y, -label.x))
     wanted = np.array([label.y for label in ordered])
     spots = np.maximum.accumulate(wanted - LINE * np.arange(len(wanted)))
     spots = spots + LINE * np.arange(len(wanted))
     over = max(0.0, float(spots[-1]) - (tall - MARGIN))
-    # Push up from the bottom whatever would run out of the drawing.
+    # Shift up from the bottom the labels that would leave the drawing.
     limit = spots[-1] - over - LINE * np.arange(len(spots))[::-1]
     spots = np.minimum(spots, limit)
     shapes = []
@@ -192,7 +198,7 @@ def _labels(labels: list[_Label], column: float, tall: float) -> list[str]:
 
 
 def _camera(found: Section, place: Callable[[FloatArray], FloatArray], scale: float) -> list[str]:
-    """The pupil and the borders of the view, a few millimetres long."""
+    """Return the pupil and the borders of the view, a quarter of the drawing long."""
     x, y = place(found.camera)
     angle = np.radians(min(found.half_angle, 120.0))
     length = 0.25 * scale * float(np.ptp(found.bounds[:, 1]))
@@ -207,12 +213,12 @@ def _camera(found: Section, place: Callable[[FloatArray], FloatArray], scale: fl
 
 
 def _flat(points: FloatArray, found: Section) -> FloatArray:
-    """(n, 2): points (n, 3) moved into the plane of a section."""
+    """Return points (n, 3) projected onto the plane of a section, (n, 2)."""
     return np.stack([points @ found.across, points @ found.along], axis=-1)
 
 
 def _rays(ways: list[FloatArray], arrived: list[bool], column: float) -> str:
-    """Polylines, cut off where the labels begin; rays that do not arrive are dashed."""
+    """Return polylines, cut off where the labels begin; rays that do not arrive are dashed."""
     seen, lost = f'stroke="{RAY}"', f'stroke="{LOST_RAY}" stroke-dasharray="3 3"'
     lines = "".join(
         f'<path d="{_path(way)}" {seen if hit else lost}/>'
@@ -223,7 +229,7 @@ def _rays(ways: list[FloatArray], arrived: list[bool], column: float) -> str:
 
 
 def _scale_bar(scale: float, width: float, tall: float) -> str:
-    """A bar of a round length near a fifth of the drawing's width."""
+    """Return a bar of a round length near a fifth of the drawing's width."""
     ideal = width / scale / 5
     power = 10.0 ** np.floor(np.log10(ideal))
     length = max(step * power for step in (1, 2, 5) if step * power <= ideal)

@@ -1,4 +1,4 @@
-"""The sensor design: all that is needed to simulate a sensor, except what touches it."""
+"""The sensor design: all that is needed to simulate a sensor, except the objects that touch it."""
 
 from __future__ import annotations
 
@@ -25,21 +25,26 @@ from optisense.near import suggestion
 from optisense.text import to_html
 
 SCHEMA_VERSION = 1
-"""Version of the design file's format; it is raised when a file of an older version has to be
-converted."""
+"""Version of the design file's format; it is increased when files of an older version have to be
+converted.
+"""
 
 MOST_OF_A_KIND = 1000
-"""Materials, parts, light groups or cages of one design; the built-in sensors have at most some
-dozens, and checks of parts against each other take time that grows with their square."""
+"""Largest number of materials, parts, light groups or cages of one design; the built-in sensors
+have at most some dozens, and checks of parts against each other take time that grows with their
+square.
+"""
 
 MOST_NOTES = 20_000
-"""Values of one design whose source is noted, each in three lines of the file."""
+"""Largest number of values of one design with a recorded source, each in three lines of the
+file.
+"""
 
 MATERIAL_REQUIRED = frozenset({Role.ELASTOMER, Role.SUPPORT, Role.INTERFACE, Role.MIRROR})
 
 
 class Status(StrEnum):
-    """The kind of evidence for a number."""
+    """Kind of evidence for a number."""
 
     MEASURED = "measured"
     CALIBRATED = "calibrated"
@@ -51,17 +56,17 @@ class Status(StrEnum):
 
 
 class Provenance(Model):
-    """The source of a number of the design."""
+    """Source of a number of the design."""
 
     status: Status = Field(description="; ".join(status.value for status in Status))
     source: str = Field(description="where it is from, or how it was derived")
 
 
 class SensorDesign(Model):
-    """A camera-based tactile sensor. Lengths in mm, angles in degrees, powers in mW.
+    """Camera-based tactile sensor. Lengths in mm, angles in degrees, powers in mW.
 
-    `design.meshes` holds the undeformed mesh of each part by name; it is not part of the
-    design file but stored next to it. Changing a field checks it; see also `set_value`.
+    `design.meshes` holds the undeformed mesh of each part by name; it is not part of the design
+    file but stored next to it. Changing a field checks it; see also `set_value`.
     """
 
     schema_version: Literal[1] = Field(default=1, description="version of this file format")
@@ -164,7 +169,7 @@ class SensorDesign(Model):
 
     @property
     def meshes(self) -> dict[str, TriangleMesh]:
-        """The undeformed mesh of each part, by part name."""
+        """Undeformed mesh of each part, by part name."""
         return self._meshes
 
     @property
@@ -174,7 +179,7 @@ class SensorDesign(Model):
         return float(sum(skin.face_areas.sum() for skin in skins if skin is not None))
 
     def deformed_meshes(self) -> dict[str, TriangleMesh]:
-        """The mesh of each part in its current shape: as stored, then moved by its cage.
+        """Return the mesh of each part in its current shape: as stored, then deformed by its cage.
 
         Raises:
             DesignError: a vertex of a caged part lies outside the cage's box.
@@ -196,8 +201,9 @@ class SensorDesign(Model):
         return result
 
     def values_of_kinds(self) -> dict[tuple[str | int, ...], KindModel]:
-        """All that comes in kinds and may name files, by its path: coating, materials, emitters,
-        and what the camera's lens and sensor do."""
+        """Return all components that come in kinds and may name files, by path: coating, materials,
+        emitters, and the effects of the camera's lens and sensor.
+        """
         found: dict[tuple[str | int, ...], KindModel] = {("coating",): self.coating}
         for name, material in self.materials.items():
             found["materials", name] = material
@@ -209,11 +215,11 @@ class SensorDesign(Model):
         return found
 
     def parts_of(self, *roles: Role) -> list[str]:
-        """The names of the parts that have one of the roles, in file order."""
+        """Return the names of the parts that have one of the roles, in file order."""
         return [name for name, part in self.parts.items() if part.role in roles]
 
     def bounds(self) -> NDArray[np.float64]:
-        """(2, 3) mm: the box around all undeformed meshes, indenters left out.
+        """Return the bounding box of all undeformed meshes without indenters, (2, 3) mm.
 
         Raises:
             ValueError: there are no meshes.
@@ -229,22 +235,24 @@ class SensorDesign(Model):
         return np.array([corners[:, 0].min(axis=0), corners[:, 1].max(axis=0)])
 
     def copy(self) -> SensorDesign:  # type: ignore[override]
-        """An independent design; the meshes, which never change, are shared."""
+        """Return an independent design; the meshes, which never change, are shared."""
         return self._replaced(self.model_dump(mode="json"))
 
     def _repr_html_(self) -> str:
-        """A labelled section, for notebooks."""
+        """Return a labelled section, for notebooks."""
 
         from optisense.design.section_drawing import section_svg
 
         try:
             drawing = section_svg(self)
-        except (DesignError, KeyError, ValueError):  # half-made: parts without meshes
+        except (DesignError, KeyError, ValueError):  # incomplete: parts without meshes
             drawing = to_html(", ".join(f"{n} ({p.role.value})" for n, p in self.parts.items()))
         return f"<div><b>{to_html(self.name)}</b><br>{drawing}</div>"
 
     def where(self, *path: str | int) -> str:
-        """File and line of a value when the design was read from a file, else its dotted path."""
+        """Return file and line of a value if the design was read from a file, else its dotted
+        path.
+        """
         if self._source is None:
             return dotted(path)
         for length in range(len(path), -1, -1):
@@ -253,7 +261,7 @@ class SensorDesign(Model):
         return f"{self._source}: {dotted(path)}"
 
     def _replaced(self, data: dict[str, object]) -> SensorDesign:
-        """A design of these values with this one's meshes and files."""
+        """Return a design of these values with this one's meshes and files."""
         design = type(self).model_validate(data)
         design._meshes = {n: m for n, m in self._meshes.items() if n in design.parts}
         design._source = self._source
@@ -266,10 +274,10 @@ class SensorDesign(Model):
 
 
 def refuse_no_design(given: object) -> None:
-    """Refuse what is given in place of a design, such as the name of one.
+    """Refuse an argument that is not a design, such as the name of one.
 
     Raises:
-        DesignError: it is no `SensorDesign`; says how to load one.
+        DesignError: the argument is no `SensorDesign`; the hint says how to load one.
     """
     if isinstance(given, SensorDesign):
         return
@@ -281,7 +289,7 @@ def refuse_no_design(given: object) -> None:
 
 
 def dotted(path: tuple[str | int, ...]) -> str:
-    """'lights.red.lights[0].position' of its keys and indices."""
+    """Return keys and indices as a dotted path such as 'lights.red.lights[0].position'."""
     text = ""
     for step in path:
         text += f"[{step}]" if isinstance(step, int) else f".{step}" if text else step

@@ -1,4 +1,4 @@
-"""Spectra of LEDs in three channels: how much of a red LED is light of other channels."""
+"""Spectra of LEDs in three channels: the shares of a die's light in each channel."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from optisense.design.fields import Model, Number
 from optisense.design.materials.optical_constants import CHANNEL_WAVELENGTHS
 
 GAUSSIAN_WIDTH = 2.0 * np.sqrt(2.0 * np.log(2.0))
-"""Full width at half maximum of a Gaussian over its standard deviation."""
+"""Ratio of the full width at half maximum of a Gaussian to its standard deviation."""
 
 NANOMETRES: dict[str, Any] = {"unit": "nm"}
 
 
 class Spectrum(Model):
-    """The light of one die of an LED: a Gaussian over wavelength."""
+    """Light of one die of an LED: a Gaussian over wavelength."""
 
     wavelength: Annotated[Number, Field(ge=380.0, le=780.0)] = Field(
         description="dominant wavelength by the datasheet, taken as the middle",
@@ -32,11 +32,11 @@ class Spectrum(Model):
     )
 
     def shares(self) -> NDArray[np.float64]:
-        """(3,) the shares of the flux that count as light of R, G and B; they sum to 1.
+        """Return the shares of the flux that count as light of R, G and B, (3,); they sum to 1.
 
-        Light between the wavelengths of two channels is shared between them linearly, by how near
-        it is to each; beyond the last, it is of that channel. What a camera's pixel sees of it, by
-        its response at these wavelengths, is then interpolated between them.
+        Light between the wavelengths of two channels is shared between them linearly by its
+        distance to each; beyond the last it belongs to that channel. The response of a camera's
+        pixel at these wavelengths is thereby interpolated linearly.
         """
         offsets = np.linspace(-4.0, 4.0, 2001)
         light = np.exp(-0.5 * offsets**2)
@@ -48,15 +48,18 @@ class Spectrum(Model):
 
 
 class LightSpectra(Model):
-    """The spectra of a light's dies. Light of a die without one is of its own channel alone."""
+    """Spectra of a light's dies. Light of a die without a spectrum belongs to its own channel
+    alone.
+    """
 
     red: Spectrum | None = None
     green: Spectrum | None = None
     blue: Spectrum | None = None
 
     def spread(self) -> NDArray[np.float64]:
-        """(3, 3): in each row, how the light of the red, green or blue die is shared among R, G
-        and B; rows sum to 1."""
+        """Return the shares of the light of the red, green and blue die (rows) in R, G and B,
+        (3, 3); rows sum to 1.
+        """
         dies = (self.red, self.green, self.blue)
         return np.array(
             [own if die is None else die.shares() for die, own in zip(dies, np.eye(3), strict=True)]

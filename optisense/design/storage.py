@@ -25,7 +25,9 @@ from optisense.writing import inside, written_together
 
 DESIGN_FILE = "design.yaml"
 MOST_TRIANGLES = 3_000_000
-"""Triangles of all parts of a design together; the largest built-in sensor has 53,000."""
+"""Largest number of triangles of all parts of a design together; the largest built-in sensor has
+53,000.
+"""
 
 HEAD = "Sensor design. Lengths in mm, angles in degrees, powers in mW."
 
@@ -35,7 +37,8 @@ def load_design(path: str | Path) -> SensorDesign:
 
     Raises:
         DesignError: a file is missing, a field is missing, misspelt or out of range, a mesh path
-            leaves the folder, or the sizes look like another unit than mm; says file and line.
+            leaves the folder, or the sizes suggest another unit than mm; the message names file and
+            line.
         MeshError: a mesh can't be read, has no triangles, holds numbers that are not finite, or
             is not closed though it is an elastomer or a support.
     """
@@ -76,14 +79,14 @@ def load_design(path: str | Path) -> SensorDesign:
 def save_design(design: SensorDesign, folder: str | Path, *, new: bool = False) -> None:
     """Write a design folder: design.yaml with a comment on each unit, meshes as OBJ.
 
-    Each file is written whole under a temporary name; only when all are there are they renamed
-    into place, design.yaml last. Other files in the folder are left alone.
+    Each file is written whole under a temporary name; only when all exist are they renamed,
+    design.yaml last. Other files in the folder are not touched.
 
     Args:
-        design: what to write.
-        folder: made if need be.
-        new: whether the folder must be empty or absent; a design that can't be written leaves
-            nothing in it then, and what a killed process has left of one is removed first.
+        design: design to write.
+        folder: folder, created if needed.
+        new: whether the folder must be empty or absent; if the design can't be written, the folder
+            is left empty, and files that a killed process has left are removed first.
 
     Raises:
         DesignError: a part has no mesh, or two parts with different meshes (or two lamps
@@ -110,7 +113,7 @@ def save_design(design: SensorDesign, folder: str | Path, *, new: bool = False) 
 
 
 def files_of(design: SensorDesign) -> list[str]:
-    """The files that `save_design` writes, relative to the folder."""
+    """Return the files that `save_design` writes, relative to the folder."""
     meshes = dict.fromkeys(_as_obj(part.mesh) for part in design.parts.values())
     return [*meshes, *_named_files(design), DESIGN_FILE]
 
@@ -136,7 +139,7 @@ def _check_version(data: dict[str, Any], lines: Lines, source: str) -> None:
 
 
 def _inside(folder: Path, relative: str, where: str) -> Path:
-    """The file at a path that must not leave the folder, links followed."""
+    """Return the file at a path, which must not leave the folder after links are resolved."""
     path = inside_folder(folder, relative)
     if path is None:
         raise DesignError(
@@ -196,7 +199,9 @@ def _check_saveable(design: SensorDesign, files: dict[str, str]) -> None:
 
 
 def _named_files(design: SensorDesign) -> dict[str, bytes]:
-    """What is in the files of lamps and materials, by their paths inside the design folder."""
+    """Return the contents of the files of lamps and materials, by their paths inside the design
+    folder.
+    """
     files: dict[str, bytes] = {}
     owner: dict[str, str] = {}
     for path, value in design.values_of_kinds().items():

@@ -1,8 +1,8 @@
-"""Reading YAML that strangers wrote: plain data with the line of each value, and nothing more.
+"""Reader of YAML from untrusted sources: plain data with the line of each value.
 
-Only YAML's events are used, never its object construction; anchors, aliases and tags are
-refused, so no input can run code or grow in memory. What is read is bounded: the bytes of the file,
-the number of its values, and how deeply they are nested.
+Only YAML's events are used, never its object construction; anchors, aliases and tags are refused,
+so no input can run code or grow in memory. The bytes of the file, the number of its values, and the
+depth of their nesting are bounded.
 """
 
 from __future__ import annotations
@@ -47,11 +47,11 @@ def read_yaml(
     """Read a YAML file whose top is a mapping.
 
     Returns:
-        The data (dict, list, str, int, float, bool, None) and the line of each value, by its
-        keys and indices; the line of the whole is under ().
+        The data (dict, list, str, int, float, bool, None) and the line of each value, by its keys
+        and indices; the line of the whole file is under ().
 
     Raises:
-        error: the file is missing, too large, or not plain YAML; says the line.
+        error: the file is missing, too large, or not plain YAML; the message names the line.
     """
     return parse_yaml(read_text(path, MOST_TEXT, error), str(path), error)
 
@@ -59,7 +59,7 @@ def read_yaml(
 def parse_yaml(
     text: str, source: str, error: type[OptiSenseError] = DesignError
 ) -> tuple[dict[str, Any], Lines]:
-    """Read YAML text as `read_yaml` reads a file; `source` names it in errors."""
+    """Parse YAML text as `read_yaml` reads a file; `source` names it in errors."""
     try:
         return _Reader(text, source, error).read()
     except yaml.MarkedYAMLError as found:
@@ -136,7 +136,7 @@ class _Reader:
 
 
 def _scalar(text: str) -> Any:
-    """A plain scalar by YAML 1.2's core schema (so 1e-3 is a number and `no` is text)."""
+    """Return a plain scalar by YAML 1.2's core schema (so 1e-3 is a number and `no` is text)."""
     if text in _WORDS:
         return _WORDS[text]
     if _INTEGER.match(text):

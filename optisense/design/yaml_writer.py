@@ -1,4 +1,4 @@
-"""Writing a design as YAML for people: a comment with the unit behind each number."""
+"""Writer of a design as YAML, with the unit of each number in a comment."""
 
 from __future__ import annotations
 
@@ -19,17 +19,19 @@ _WORDS = {"true", "false", "null", "yes", "no", "on", "off"}
 _NOT_PRINTABLE = re.compile("[\x7f-\x9f\u2028\u2029\ufeff\ufffe\uffff\ud800-\udfff]")
 
 TABLE_ROWS = 5
-"""Lists of so many lists stand on a line each; a matrix of three rows stands on one."""
+"""Number of rows from which on a list of lists is written with one row per line; a matrix of three
+rows is written on one line.
+"""
 
 ONE_LINE = (Point, Share, Light, Provenance)
-"""Models that stand on one line; the list they are in carries their comment."""
+"""Models that are written on one line; the comment is at the list that contains them."""
 
 
 def to_yaml(model: BaseModel, head: str) -> str:
-    """The text of a model, all fields but those that are None.
+    """Return the text of a model with all fields except those that are None.
 
     Args:
-        head: a comment line for the top.
+        head: comment line for the top.
     """
     return "\n".join([f"# {head}", *_model(model, "")]) + "\n"
 
@@ -85,7 +87,9 @@ def _flow(value: Any) -> str:
 
 
 def _text(text: str) -> str:
-    """Bare where that is unmistakable, else quoted (JSON's strings are YAML's)."""
+    """Return a text without quotes if that is unambiguous, else quoted (JSON's strings are
+    YAML's).
+    """
     if _PLAIN.match(text) and text.casefold() not in _WORDS:
         return text
     quoted = json.dumps(text, ensure_ascii=False)

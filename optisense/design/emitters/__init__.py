@@ -1,4 +1,4 @@
-"""Kinds of lamps, a file for each; `LightModel` stands for any of them."""
+"""Kinds of lamps, one file for each; `LightModel` stands for any of them."""
 
 from optisense.design.emitters.area import AreaEmitter
 from optisense.design.emitters.base import LightModel, Window

@@ -35,20 +35,20 @@ class AreaEmitter(LightModel):
         return self
 
     def relative_intensity(self, polar: ArrayLike, azimuth: ArrayLike = 0.0) -> FloatArray:
-        """Radiant intensity over its peak: the cosine (Lambert's law)."""
+        """Return the radiant intensity over its peak: the cosine (Lambert's law)."""
         cosine = np.cos(np.radians(np.asarray(polar, dtype=np.float64)))
         return np.maximum(cosine, 0.0) + 0.0 * np.asarray(azimuth)
 
     def cosine_power(self) -> float:
-        """1: Lambert's law."""
+        """Return 1: Lambert's law."""
         return 1.0
 
     def window(self) -> Window:
-        """The window itself."""
+        """Return the window."""
         return Window(self.shape, self.size)
 
     def in_words(self) -> str:
-        """Its shape and size."""
+        """Return its shape and size as text."""
         width, height = self.size
         size = f"{width:g}" if self.shape == "disc" else f"{width:g} x {height:g}"
         return f"{self.shape} {size} mm"

@@ -19,29 +19,34 @@ from optisense.registry import Registry
 FloatArray = NDArray[np.float64]
 
 HalfAngle = Annotated[Number, Field(gt=0.0, le=90.0, json_schema_extra=DEGREES)]
-"""An angle from the axis, in degrees, of a lamp that shines forward."""
+"""Angle from the axis of a lamp that shines forward, degrees."""
 
 COARSE_POLAR = 0.25
-"""Degrees between the angles at which the end of a beam is looked for: a beam is rarely narrower
-than this, and one that is keeps its axis."""
+"""Step of the polar angles at which the end of a beam is searched, degrees: beams are rarely
+narrower than this, and for narrower ones the axis is kept.
+"""
 
 DARK = 1e-6
-"""A share of the peak: a lamp that sends less than this counts as dark."""
+"""Smallest share of the peak that counts as light; less is dark."""
 
 POLAR_ANGLES = 1025
-"""Polar angles of a table over the beam; a beam of 90 degrees gets one every 0.09 degrees."""
+"""Number of polar angles of a table over the beam; a beam of 90 degrees gets one every 0.09
+degrees.
+"""
 
 AZIMUTHS = 145
-"""Azimuths of a table of a lamp that is not symmetric: one every 2.5 degrees, both 0 and 360."""
+"""Number of azimuths of a table of a lamp that is not symmetric: one every 2.5 degrees, with both 0
+and 360.
+"""
 
 
 @dataclass(frozen=True)
 class Window:
-    """The flat face that a lamp's light leaves through, evenly over its area.
+    """Flat face that a lamp's light leaves through, with uniform density over its area.
 
     Attributes:
         shape: disc (or ellipse) or rectangle.
-        size: mm, width and height.
+        size: width and height, mm.
     """
 
     shape: Literal["disc", "rectangle"]
@@ -49,17 +54,17 @@ class Window:
 
     @property
     def area(self) -> float:
-        """mm^2 of the face."""
+        """Area of the face, mm^2."""
         filled = np.pi / 4 if self.shape == "disc" else 1.0
         return float(self.size[0] * self.size[1] * filled)
 
 
 class LightModel(KindModel):
-    """The emission of a lamp; each kind of lamp is a subclass.
+    """Emission of a lamp; each kind of lamp is a subclass.
 
-    A kind needs its fields and `relative_intensity`; whatever simulates, draws or lists lamps
-    asks the methods below and nothing else. Angles are in degrees: polar from the light's
-    direction, 0 to 180; azimuth about it, 0 at the light's `up`.
+    A kind needs its fields and `relative_intensity`; code that simulates, draws or lists lamps
+    calls only the methods below. Angles are in degrees: polar from the light's direction, 0 to 180;
+    azimuth about it, 0 at the light's `up`.
     """
 
     kinds: ClassVar[Registry[Any]] = Registry(
@@ -75,23 +80,25 @@ class LightModel(KindModel):
 
     @abstractmethod
     def relative_intensity(self, polar: ArrayLike, azimuth: ArrayLike = 0.0) -> FloatArray:
-        """Radiant intensity over its largest value, at angles of any shapes that broadcast.
+        """Return the radiant intensity over its largest value, at angles of any shapes that
+        broadcast.
 
         Raises:
             OptiSenseError: a file of the lamp can't be read.
         """
 
     def window(self) -> Window | None:
-        """The face that the light leaves through; None for a point."""
+        """Return the face that the light leaves through; None for a point."""
         return None
 
     def cosine_power(self) -> float | None:
-        """The power of the cosine that the intensity is, where it is one: it is sampled exactly
-        then. None, and it is sampled from its table."""
+        """Return the exponent p if the intensity is the cosine to the power of p, which is sampled
+        exactly; else None, and the intensity is sampled from its table.
+        """
         return None
 
     def angles(self) -> tuple[FloatArray, FloatArray]:
-        """Polar (n,) and azimuth (m,) angles between which the intensity is nearly linear.
+        """Return polar (n,) and azimuth (m,) angles between which the intensity is nearly linear.
 
         Both ascend; polar angles start at 0 and end where the light does, azimuths run from 0 to
         360 inclusive.
@@ -104,7 +111,7 @@ class LightModel(KindModel):
         return np.linspace(0.0, polar[min(last + 1, len(polar) - 1)], POLAR_ANGLES), azimuth
 
     def intensity(self) -> Intensity:
-        """The intensity as a table, which the simulation samples.
+        """Return the intensity as a table, which the simulation samples.
 
         Raises:
             OptiSenseError: a file of the lamp can't be read.
@@ -115,9 +122,10 @@ class LightModel(KindModel):
         return Intensity(polar, azimuth, np.broadcast_to(values, shape)).without_azimuth()
 
     def half_angle(self, azimuth: float = 0.0) -> float:
-        """Degrees from the axis at which the intensity has fallen to half its value there.
+        """Return the angle from the axis at which the intensity has fallen to half its value there,
+        degrees.
 
-        180 where it never does, or where the axis is dark.
+        The result is 180 if it never does, or if the axis is dark.
         """
         angle = np.linspace(0.0, 180.0, 7201)
         value = self.relative_intensity(angle, azimuth)
@@ -129,11 +137,11 @@ class LightModel(KindModel):
         return float(angle[last] + (value[last] - 0.5 * value[0]) / drop * (angle[1] - angle[0]))
 
     def in_words(self) -> str:
-        """The kind of lamp and its most telling number, in a few words."""
+        """Return the kind of lamp and its most informative number, in a few words."""
         return f"{self.kind}, half at {self.half_angle():.3g} degrees"
 
     def check(self) -> None:
-        """Find out whether the lamp can be simulated.
+        """Check whether the lamp can be simulated.
 
         Raises:
             OptiSenseError: its intensity is not finite, is negative, or is 0 everywhere, or a

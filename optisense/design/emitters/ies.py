@@ -1,4 +1,4 @@
-"""A lamp whose intensity was measured: a profile in an IES file."""
+"""Lamp with a measured intensity: a profile in an IES file."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class IesEmitter(LightModel):
         return read_ies(self.path("file"))
 
     def intensity(self) -> Intensity:
-        """The file's own table.
+        """Return the file's own table.
 
         Raises:
             LibraryError: the file is missing or malformed.
@@ -42,7 +42,7 @@ class IesEmitter(LightModel):
         return whole.without_azimuth()
 
     def relative_intensity(self, polar: ArrayLike, azimuth: ArrayLike = 0.0) -> FloatArray:
-        """Radiant intensity over its peak, linear between the file's angles.
+        """Return the radiant intensity over its peak, linear between the file's angles.
 
         Raises:
             LibraryError: the file is missing or malformed.
@@ -52,5 +52,5 @@ class IesEmitter(LightModel):
         return np.asarray(table.at(polar, turn) / table.values.max())
 
     def in_words(self) -> str:
-        """Where half of its intensity is."""
+        """Return the half angle of its intensity as text."""
         return f"IES, half at {self.half_angle():.3g} degrees"

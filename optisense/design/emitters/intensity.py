@@ -1,4 +1,4 @@
-"""A radiant intensity as a table over directions."""
+"""Radiant intensity as a table over directions."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ FloatArray = NDArray[np.floating]
 class Intensity:
     """Radiant intensity over the polar angle from the axis and the azimuth.
 
-    polar (n,) degrees ascending from 0; azimuth (m,) degrees, [0] alone if symmetric, else
-    covering 0..360; values (m, n) relative intensity, linear between the given angles, zero
+    Attributes: polar (n,) degrees ascending from 0; azimuth (m,) degrees, [0] alone if symmetric,
+    else covering 0..360; values (m, n) relative intensity, linear between the given angles, zero
     beyond the last.
     """
 
@@ -24,7 +24,7 @@ class Intensity:
     values: FloatArray
 
     def at(self, polar: FloatArray, azimuth: FloatArray) -> FloatArray:
-        """Intensity at angles in degrees (arrays of one shape)."""
+        """Return the intensity at angles in degrees (arrays of one shape)."""
         p = np.clip(np.interp(polar, self.polar, np.arange(len(self.polar))), 0, None)
         i = np.minimum(p.astype(int), max(len(self.polar) - 2, 0))
         f = p - i
@@ -42,7 +42,9 @@ class Intensity:
         return np.where(inside, low * (1 - g) + high * g, 0.0)
 
     def without_azimuth(self) -> Intensity:
-        """The same table with one azimuth, where it is symmetric about the axis; else itself."""
+        """Return the table with one azimuth if it is symmetric about the axis, else the table
+        itself.
+        """
         if np.ptp(self.values, axis=0).max() > SYMMETRIC * self.values.max():
             return self
         return Intensity(self.polar, np.zeros(1), self.values[:1])

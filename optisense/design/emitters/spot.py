@@ -1,4 +1,4 @@
-"""A spot."""
+"""Spot lamp."""
 
 from __future__ import annotations
 
@@ -11,8 +11,9 @@ from pydantic import Field, model_validator
 from optisense.design.emitters.base import FloatArray, HalfAngle, LightModel
 
 FALL_ANGLES = 65
-"""Polar angles of the table between the beam and the cut-off, where the intensity is a cubic: the
-lines between them are off by less than 1e-4 of the peak."""
+"""Number of polar angles of the table between the beam and the cut-off, where the intensity is a
+cubic: linear interpolation between them is off by less than 1e-4 of the peak.
+"""
 
 
 class SpotEmitter(LightModel):
@@ -35,8 +36,9 @@ class SpotEmitter(LightModel):
         return self
 
     def relative_intensity(self, polar: ArrayLike, azimuth: ArrayLike = 0.0) -> FloatArray:
-        """Radiant intensity over its peak: a smooth step, 3 t^2 - 2 t^3 with t running from 0 at
-        the cut-off to 1 at the beam."""
+        """Return the radiant intensity over its peak: a smooth step, 3 t^2 - 2 t^3 with t from 0 at
+        the cut-off to 1 at the beam.
+        """
         angle = np.asarray(polar, dtype=np.float64)
         if self.cutoff > self.beam:
             t = np.clip((self.cutoff - angle) / (self.cutoff - self.beam), 0.0, 1.0)
@@ -45,10 +47,10 @@ class SpotEmitter(LightModel):
         return t * t * (3.0 - 2.0 * t) + 0.0 * np.asarray(azimuth)
 
     def angles(self) -> tuple[FloatArray, FloatArray]:
-        """The axis, and angles from the beam to the cut-off; the spot is symmetric."""
+        """Return the axis, and angles from the beam to the cut-off; the spot is symmetric."""
         fall = np.linspace(self.beam, self.cutoff, FALL_ANGLES)
         return np.unique(np.concatenate([[0.0, self.beam], fall])), np.zeros(1)
 
     def in_words(self) -> str:
-        """Its angles."""
+        """Return its angles as text."""
         return f"spot, {self.beam:g} to {self.cutoff:g} degrees"

@@ -1,4 +1,4 @@
-"""Blur: how a lens spreads the light of a point over the picture.
+"""Blur: the spread of a point's light over the picture by a lens.
 
 The spread is a normal distribution, whose standard deviation is given as a share of the picture's
 width, so that it does not depend on the resolution of a render.
@@ -20,17 +20,23 @@ from optisense.registry import Registry
 FloatArray = NDArray[np.floating]
 
 REACH = 4.0
-"""Standard deviations after which a blur ends (SciPy's own choice)."""
+"""Radius at which a blur is cut off, in standard deviations (SciPy's default)."""
 
 LEAST_WIDTH = 0.05
-"""Standard deviation in pixels below which a blur changes a picture by less than 1e-5."""
+"""Smallest standard deviation that is applied, in pixels; smaller blurs change a picture by less
+than 1e-5.
+"""
 
 STEPS = 6
-"""Widths from which a blur that varies over the picture is interpolated. Between two of them the
-variance is right exactly, as it is that of a mixture; only the shape of the spread is between."""
+"""Number of widths from which a blur that varies over the picture is interpolated. Between two of
+them the variance is exact, as it is that of a mixture; only the shape of the spread is
+interpolated.
+"""
 
 LARGEST = 0.25
-"""Standard deviation, a share of the picture's width, of the widest blur: all is blurred away."""
+"""Largest standard deviation of a blur, as a share of the picture's width; with it no detail is
+left.
+"""
 
 
 class LensView(Protocol):
@@ -38,11 +44,11 @@ class LensView(Protocol):
 
     @property
     def resolution(self) -> tuple[int, int]:
-        """Pixels, width and height."""
+        """Width and height of the picture, pixels."""
 
     @property
     def angle_scale(self) -> float:
-        """Widths of the picture a radian, in its middle."""
+        """Scale in the middle of the picture, in widths of the picture per radian."""
 
 
 class LensBlur(KindModel):
@@ -59,33 +65,33 @@ class LensBlur(KindModel):
     )
 
     by_depth: ClassVar[bool] = False
-    """Whether it depends on how far away things are."""
+    """Whether it depends on the distance of the scene."""
 
     @abstractmethod
     def deviation(self, camera: LensView, vergence: FloatArray) -> FloatArray:
-        """Standard deviation as a share of the picture's width.
+        """Return the standard deviation as a share of the picture's width.
 
         Args:
-            camera: whose lens it is.
-            vergence: (...) 1/mm: one over the distance at which what a pixel sees appears to lie.
-                Where `by_depth` is false, it is a single 0.
+            camera: camera of the lens.
+            vergence: one over the apparent distance of what each pixel sees, (...), 1/mm; a single
+                0 if `by_depth` is false.
         """
 
 
 def reach_of(deviation: float, width: int) -> int:
-    """Pixels as far as a blur reaches in a picture so many pixels wide."""
+    """Return the radius of a blur in a picture of this width, in pixels."""
     return int(np.ceil(REACH * min(deviation, LARGEST) * width)) + 1
 
 
 def blurred(
     levels: FloatArray, deviation: FloatArray, span: tuple[float, float] | None = None
 ) -> FloatArray:
-    """Levels blurred by a width that may vary.
+    """Return levels blurred by a width that may vary.
 
     Args:
-        levels: (h, w, 3).
-        deviation: () or (h, w) standard deviation in pixels.
-        span: the least and the largest deviation in the whole picture where this is a part of it,
+        levels: levels (h, w, 3).
+        deviation: standard deviation, () or (h, w), in pixels.
+        span: smallest and largest deviation in the whole picture, if the levels are a part of it,
             which is then blurred as it is in the whole.
     """
     widths = np.asarray(deviation, dtype=np.float64)

@@ -1,4 +1,4 @@
-"""The distortion of perspective lenses: radial and tangential."""
+"""Radial and tangential distortion of perspective lenses."""
 
 from __future__ import annotations
 
@@ -27,12 +27,12 @@ class BrownConrady(LensDistortion):
     k3: Coefficient = Field(default=0.0, description="of the sixth power of the radius")
 
     def coefficients(self) -> tuple[float, ...]:
-        """k1, k2, p1, p2, k3: OpenCV's order."""
+        """Return k1, k2, p1, p2, k3, in OpenCV's order."""
         return self.k1, self.k2, self.p1, self.p2, self.k3
 
     @staticmethod
     def distort(x: Any, y: Any, numbers: tuple[Any, ...]) -> tuple[Any, Any]:
-        """Where the lens shows a place of the ideal image plane."""
+        """Return the position at which the lens shows a point of the ideal image plane."""
         k1, k2, p1, p2, k3 = numbers
         square = x * x + y * y
         radial = 1.0 + square * (k1 + square * (k2 + square * k3))
@@ -43,7 +43,7 @@ class BrownConrady(LensDistortion):
 
     @staticmethod
     def slopes(x: Any, y: Any, numbers: tuple[Any, ...]) -> tuple[Any, Any, Any, Any]:
-        """Derivatives of `distort`."""
+        """Return the derivatives of `distort`."""
         k1, k2, p1, p2, k3 = numbers
         square = x * x + y * y
         radial = 1.0 + square * (k1 + square * (k2 + square * k3))

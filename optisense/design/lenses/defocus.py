@@ -1,4 +1,4 @@
-"""Blur by depth of field."""
+"""Blur by limited depth of field."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from optisense.design.lenses.blur import LensBlur, LensView
 FloatArray = NDArray[np.floating]
 
 DISC_DEVIATION = 0.25
-"""Standard deviation along an axis of a uniformly lit disc, over its diameter."""
+"""Standard deviation along an axis of a uniformly lit disc, divided by its diameter."""
 
 
 class Defocus(LensBlur):
@@ -42,11 +42,11 @@ class Defocus(LensBlur):
     )
 
     def circle(self, camera: LensView, vergence: FloatArray) -> FloatArray:
-        """Diameter of the circle of confusion, as a share of the picture's width."""
+        """Return the diameter of the circle of confusion, as a share of the picture's width."""
         pupil = self.focal_length / self.f_number
         angle = pupil * np.abs(vergence - 1.0 / self.focus_distance)
         return np.asarray(angle * camera.angle_scale)
 
     def deviation(self, camera: LensView, vergence: FloatArray) -> FloatArray:
-        """A quarter of the circle's diameter."""
+        """Return a quarter of the circle's diameter."""
         return DISC_DEVIATION * self.circle(camera, vergence)

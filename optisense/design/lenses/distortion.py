@@ -1,9 +1,9 @@
-"""Lens distortion: where a lens shows what an ideal one would show elsewhere.
+"""Lens distortion: the displacement of image points from those of an ideal lens.
 
-An ideal lens shows a direction at a place of its *image plane*: x to the right and y down. For a
-perspective lens that place is the tangent of the angle to the axis, for an equidistant one the
-angle itself, in radians. `distort` gives the place where the real lens shows it; `undistort` goes
-back.
+An ideal lens maps a direction to a point of its *image plane*, x to the right and y down. For a
+perspective lens that point is the tangent of the angle to the axis, for an equidistant one the
+angle itself, in radians. `distort` returns the point where the real lens shows it; `undistort` is
+the inverse.
 
 Coefficients, signs and axes are those of OpenCV, whose calibrations can be entered as they are.
 """
@@ -25,8 +25,9 @@ from optisense.registry import Registry
 FloatArray = NDArray[np.floating]
 
 NEWTON_STEPS = 12
-"""Steps of Newton's method in `undistort`. Seven reach the rounding of single precision for lenses
-that move the picture's corners by half of their distance from the middle."""
+"""Number of Newton steps in `undistort`. Seven reach single precision for lenses that move the
+picture's corners by half of their distance from the middle.
+"""
 
 Share = Annotated[Number, Field(ge=0.0, le=1.0)]
 
@@ -34,11 +35,11 @@ Coefficient = Annotated[Number, Field(ge=-1e6, le=1e6)]
 
 
 class LensDistortion(KindModel):
-    """The departure of a lens from its projection; each kind is a subclass.
+    """Departure of a lens from its projection; each kind is a subclass.
 
-    `distort` and `slopes` use nothing but the four operations of arithmetic, so that they serve
-    NumPy's arrays and those of the renderer alike. The coefficients are handed to them, as they are
-    numbers of the renderer there.
+    `distort` and `slopes` use only the four arithmetic operations, so that they work for NumPy's
+    arrays and those of the renderer. The coefficients are arguments, because they are arrays of the
+    renderer there.
     """
 
     kinds: ClassVar[Registry[Any]] = Registry(
@@ -52,7 +53,7 @@ class LensDistortion(KindModel):
     )
 
     projection: ClassVar[str] = "perspective"
-    """The projection that it departs from."""
+    """Projection of the lens without distortion."""
 
     kind: str
     centre: tuple[Share, Share] = Field(
@@ -63,25 +64,27 @@ class LensDistortion(KindModel):
 
     @abstractmethod
     def coefficients(self) -> tuple[float, ...]:
-        """The numbers of the model."""
+        """Return the coefficients of the model."""
 
     @staticmethod
     @abstractmethod
     def distort(x: Any, y: Any, numbers: tuple[Any, ...]) -> tuple[Any, Any]:
-        """Where the lens shows a place of the ideal image plane.
+        """Return the position at which the lens shows a point of the ideal image plane.
 
         Args:
-            x, y: the place.
-            numbers: as of `coefficients`.
+            x, y: point of the ideal image plane.
+            numbers: coefficients, as from `coefficients`.
         """
 
     @staticmethod
     @abstractmethod
     def slopes(x: Any, y: Any, numbers: tuple[Any, ...]) -> tuple[Any, Any, Any, Any]:
-        """Derivatives of `distort`: of its x by x and by y, of its y by x and by y."""
+        """Return the derivatives of `distort`: of its x by x and by y, of its y by x and by y."""
 
     def undistort(self, x: Any, y: Any, numbers: tuple[Any, ...]) -> tuple[Any, Any]:
-        """The place of the ideal image plane that the lens shows at a place, by Newton's method."""
+        """Return the point of the ideal image plane that the lens shows at a position, by Newton's
+        method.
+        """
         ideal_x, ideal_y = x, y
         for _ in range(NEWTON_STEPS):
             shown_x, shown_y = self.distort(ideal_x, ideal_y, numbers)

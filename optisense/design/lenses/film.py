@@ -12,11 +12,11 @@ FloatArray = NDArray[np.floating]
 
 @dataclass(frozen=True)
 class PictureWindow:
-    """A part of a picture, pixels.
+    """Part of a picture, in pixels.
 
     Attributes:
-        width, height: of the whole picture.
-        rows, columns: the part.
+        width, height: size of the whole picture.
+        rows, columns: slices of the part.
     """
 
     width: int
@@ -26,27 +26,27 @@ class PictureWindow:
 
     @classmethod
     def whole(cls, height: int, width: int) -> PictureWindow:
-        """All of a picture."""
+        """Return the window of a whole picture."""
         return cls(width, height, slice(0, height), slice(0, width))
 
     @classmethod
     def part(cls, shape: tuple[int, ...], box: tuple[slice, slice]) -> PictureWindow:
-        """The rows and columns of a box in a picture of a shape (height, width)."""
+        """Return the window of a box (rows, columns) in a picture of a shape (height, width)."""
         return cls(shape[1], shape[0], *box)
 
     @property
     def box(self) -> tuple[slice, slice]:
-        """Rows and columns."""
+        """Slices of rows and columns."""
         return self.rows, self.columns
 
 
 @dataclass(frozen=True)
 class FilmPlaces:
-    """Places on the film, arrays of one shape (h, w).
+    """Positions on the film, arrays of one shape (h, w).
 
     Attributes:
-        across, down: 0 to 1 from the left and the top border of the picture.
-        radius: from the middle; 1 in the corners.
+        across, down: coordinates, 0 to 1, from the left and the top border of the picture.
+        radius: distance from the middle; 1 in the corners.
     """
 
     across: FloatArray
@@ -55,7 +55,7 @@ class FilmPlaces:
 
 
 def film_places(height: int, width: int) -> FilmPlaces:
-    """The middles of the pixels of a picture."""
+    """Return the centres of the pixels of a picture."""
     across, down = np.meshgrid((np.arange(width) + 0.5) / width, (np.arange(height) + 0.5) / height)
     x, y = 2.0 * across - 1.0, (2.0 * down - 1.0) * height / width
     return FilmPlaces(across, down, np.hypot(x, y) / np.hypot(1.0, height / width))

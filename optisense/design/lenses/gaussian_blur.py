@@ -1,4 +1,4 @@
-"""Blur of one width over all of the picture."""
+"""Blur of one width over the whole picture."""
 
 from __future__ import annotations
 
@@ -27,5 +27,5 @@ class GaussianBlur(LensBlur):
     )
 
     def deviation(self, camera: LensView, vergence: FloatArray) -> FloatArray:
-        """The width over the pixels across."""
+        """Return the width divided by the number of pixels across."""
         return np.asarray(self.width / camera.resolution[0]) + 0.0 * vergence

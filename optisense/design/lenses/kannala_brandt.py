@@ -1,4 +1,4 @@
-"""The distortion of fisheyes: a polynomial of the angle."""
+"""Distortion of fisheyes: a polynomial of the angle."""
 
 from __future__ import annotations
 
@@ -26,12 +26,12 @@ class KannalaBrandt(LensDistortion):
     k4: Coefficient = Field(default=0.0, description="of the ninth power of the angle")
 
     def coefficients(self) -> tuple[float, ...]:
-        """k1 to k4: OpenCV's order."""
+        """Return k1 to k4, in OpenCV's order."""
         return self.k1, self.k2, self.k3, self.k4
 
     @staticmethod
     def distort(x: Any, y: Any, numbers: tuple[Any, ...]) -> tuple[Any, Any]:
-        """Where the lens shows a place of the ideal image plane."""
+        """Return the position at which the lens shows a point of the ideal image plane."""
         k1, k2, k3, k4 = numbers
         square = x * x + y * y
         radial = 1.0 + square * (k1 + square * (k2 + square * (k3 + square * k4)))
@@ -39,7 +39,7 @@ class KannalaBrandt(LensDistortion):
 
     @staticmethod
     def slopes(x: Any, y: Any, numbers: tuple[Any, ...]) -> tuple[Any, Any, Any, Any]:
-        """Derivatives of `distort`."""
+        """Return the derivatives of `distort`."""
         k1, k2, k3, k4 = numbers
         square = x * x + y * y
         radial = 1.0 + square * (k1 + square * (k2 + square * (k3 + square * k4)))

@@ -29,6 +29,6 @@ class RadialShading(LensShading):
     )
 
     def transmission(self, places: FilmPlaces) -> FloatArray:
-        """1 in the middle, 1 - falloff in the corners."""
+        """Return the transmission: 1 in the middle, 1 - falloff in the corners."""
         share = 1.0 - self.falloff * places.radius**self.power
         return np.repeat(share[..., None], 3, axis=-1)

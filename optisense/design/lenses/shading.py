@@ -1,8 +1,8 @@
-"""Lens shading: the lens and the sensor's pixels dim the picture towards its corners.
+"""Lens shading: the dimming of the picture towards its corners by the lens and the sensor's pixels.
 
-`transmission` is what reaches the sensor, as a share. `corrected` is how much of the dimming the
-camera's processor undoes: its gain at a place is 1 + corrected (1 / transmission - 1), as
-libcamera's `luminance_strength` scales its table. The noise is amplified with it.
+`transmission` is the share of the light that reaches the sensor. `corrected` is the share of the
+dimming that the camera's processor undoes: its gain at a place is 1 + corrected (1 / transmission -
+1), as libcamera's `luminance_strength` scales its table. The noise is amplified with it.
 """
 
 from __future__ import annotations
@@ -43,8 +43,10 @@ class LensShading(KindModel):
 
     @abstractmethod
     def transmission(self, places: FilmPlaces) -> FloatArray:
-        """(h, w, 3) above 0: the share of the light of R, G and B that reaches the sensor."""
+        """Return the share of the light of R, G and B that reaches the sensor, (h, w, 3), above
+        0.
+        """
 
     def correction(self, transmission: FloatArray) -> FloatArray:
-        """(h, w, 3) the gain by which the processor undoes a transmission."""
+        """Return the gain (h, w, 3) by which the processor undoes a transmission."""
         return 1.0 + self.corrected * (1.0 / transmission - 1.0)

@@ -1,4 +1,4 @@
-"""Shading by a table of gains, as tuning files of cameras hold it."""
+"""Shading by a table of gains, as in tuning files of cameras."""
 
 from __future__ import annotations
 
@@ -16,8 +16,9 @@ from optisense.design.lenses.shading import LensShading
 FloatArray = NDArray[np.floating]
 
 TABLE_ROWS, TABLE_COLUMNS = 12, 16
-"""Size of the shading tables that libcamera's tuning files for the Raspberry Pi hold (rpi.alsc on
-the VC4 processor)."""
+"""Size of the shading tables in libcamera's tuning files for the Raspberry Pi (rpi.alsc on the VC4
+processor).
+"""
 
 Gain = Annotated[Number, Field(ge=0.1, le=1000.0)]
 
@@ -72,7 +73,7 @@ class TableShading(LensShading):
         return self
 
     def transmission(self, places: FilmPlaces) -> FloatArray:
-        """The inverse of the gains."""
+        """Return the inverse of the gains."""
         rows, columns = len(self.gain), len(self.gain[0])
         at = np.array([places.down * rows - 0.5, places.across * columns - 0.5])
 
@@ -84,7 +85,7 @@ class TableShading(LensShading):
         return 1.0 / np.stack([green * further[0], green, green * further[1]], axis=-1)
 
     def correction(self, transmission: FloatArray) -> FloatArray:
-        """The gain of green, and the further ones of red and blue, each by its share."""
+        """Return the gain of green, and the further ones of red and blue, each by its share."""
         green = transmission[..., 1:2]
         further = green / transmission
         gain = 1.0 + self.corrected * (1.0 / green - 1.0)

@@ -1,4 +1,4 @@
-"""Materials of parts and coatings of the sensing surface, a file for each kind.
+"""Materials of parts and coatings of the sensing surface, one file for each kind.
 
 `Material` stands for any material of a part, `CoatingModel` for any coating.
 """

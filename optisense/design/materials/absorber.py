@@ -17,5 +17,5 @@ class Absorber(Material):
     kind: Literal["absorber"] = "absorber"
 
     def in_words(self) -> str:
-        """The statement that the material is black."""
+        """Return the text that the material is black."""
         return "reflects nothing"

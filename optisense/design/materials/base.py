@@ -19,20 +19,20 @@ from optisense.registry import Registry
 RGB = tuple[float, float, float]
 
 GEL_INDEX = 1.41
-"""Refractive index of silicone: a coating is seen from inside the gel."""
+"""Refractive index of silicone, the medium in front of a coating in a sensor."""
 
 
 @dataclass(frozen=True)
 class Medium:
-    """The optical medium of a transparent material.
+    """Optical medium of a transparent material.
 
     Attributes:
-        ior: refractive index, of all colours where dispersion is not simulated.
+        ior: refractive index, for all colours if dispersion is not simulated.
         roughness: GGX alpha of its surface; 0 is smooth.
-        absorption: coefficient per mm at R, G, B: of light that has travelled d mm, the share
-            exp(-absorption d) is left (Beer and Lambert).
-        indices: refractive index at R, G, B, for designs that ask for dispersion; None where it is
-            not known, and `ior` stands for all.
+        absorption: absorption coefficient at R, G, B, 1/mm: after d mm the share exp(-absorption d)
+            of the light is left (Beer and Lambert).
+        indices: refractive index at R, G, B, for designs with dispersion; None if unknown, and
+            `ior` holds for all.
     """
 
     ior: float
@@ -43,15 +43,15 @@ class Medium:
 
 @dataclass(frozen=True)
 class Reflection:
-    """Reflection at an opaque surface: a blend of a diffuse lobe and a rough metal's.
+    """Reflection at an opaque surface: a blend of a diffuse lobe and the lobe of a rough metal.
 
-    The weights are 1 - `specularity` and `specularity`. As it stands, the surface is black.
+    The weights are 1 - `specularity` and `specularity`. With the defaults the surface is black.
 
     Attributes:
-        reflectance: of the diffuse lobe, for R, G, B, 0 to 1.
-        specularity: the metal's share, 0 to 1.
+        reflectance: reflectance of the diffuse lobe at R, G, B, 0 to 1.
+        specularity: weight of the metal's lobe, 0 to 1.
         roughness: GGX alpha of the metal's facets.
-        eta, k: the metal's complex refractive index, for R, G, B.
+        eta, k: complex refractive index of the metal at R, G, B.
     """
 
     reflectance: RGB = (0.0, 0.0, 0.0)
@@ -62,16 +62,18 @@ class Reflection:
 
     @property
     def is_black(self) -> bool:
-        """Whether nothing is reflected."""
+        """True if nothing is reflected."""
         return self.specularity == 0.0 and max(self.reflectance) == 0.0
 
     @property
     def is_metal(self) -> bool:
-        """Whether there is no diffuse lobe."""
+        """True if there is no diffuse lobe."""
         return self.specularity == 1.0
 
     def seen_in(self, ior: float) -> Reflection:
-        """The same surface in a medium of this index: the metal's index over it."""
+        """Return the same surface in a medium with this index: the metal's index is divided by
+        it.
+        """
         red, green, blue = (value / ior for value in self.eta)
         k_red, k_green, k_blue = (value / ior for value in self.k)
         return Reflection(
@@ -83,19 +85,19 @@ class Reflection:
         )
 
     def head_on(self) -> NDArray[np.float64]:
-        """(3,) the share of R, G, B light reflected that meets the surface straight on."""
+        """Return the reflectance at normal incidence at R, G, B, (3,)."""
         metal = fresnel_metal(1.0, self.eta, self.k)
         diffuse = np.array(self.reflectance)
         return np.asarray((1.0 - self.specularity) * diffuse + self.specularity * metal)
 
 
 class Material(KindModel):
-    """The material of a part; each kind of material is a subclass.
+    """Material of a part; each kind of material is a subclass.
 
     A kind is transparent, and has a `medium`, or opaque, and has a `reflection`.
 
     Attributes:
-        roles: what parts of it can be.
+        roles: roles of the parts that can be made of it.
     """
 
     kinds: ClassVar[Registry[Any]] = Registry(
@@ -112,27 +114,27 @@ class Material(KindModel):
     roles: ClassVar[tuple[Role, ...]] = (Role.MIRROR, Role.BLOCKER, Role.INDENTER)
 
     def medium(self) -> Medium | None:
-        """The medium inside it; None for an opaque material."""
+        """Return the medium inside it; None for an opaque material."""
         return None
 
     def reflection(self) -> Reflection:
-        """How it reflects, where it is opaque; nothing is reflected as it stands."""
+        """Return its reflection if it is opaque; black by default."""
         return Reflection()
 
     def in_words(self) -> str:
-        """Its most telling number, in a few words."""
+        """Return its most informative number, in a few words."""
         return f"reflects {100 * float(self.reflection().head_on().mean()):.3g} %"
 
     def consequences(self) -> list[str]:
-        """Quantities that follow from its numbers, a line each."""
+        """Return quantities that follow from its numbers, one per line."""
         return []
 
 
 class CoatingModel(KindModel):
-    """The opaque coating of the sensing surface; each kind of coating is a subclass.
+    """Opaque coating of the sensing surface; each kind of coating is a subclass.
 
     Attributes:
-        library: the library coating that it started from.
+        library: name of the library coating that it started from.
     """
 
     kinds: ClassVar[Registry[Any]] = Registry(
@@ -147,22 +149,23 @@ class CoatingModel(KindModel):
 
     @abstractmethod
     def reflection(self) -> Reflection:
-        """How it reflects, its metal's index as in air."""
+        """Return its reflection, with the metal's index as in air."""
 
     def in_words(self) -> str:
-        """Its most telling number, in a few words."""
+        """Return its most informative number, in a few words."""
         share = float(self.reflection().seen_in(GEL_INDEX).head_on().mean())
         return f"reflects {100 * share:.3g} % in silicone"
 
     def consequences(self) -> list[str]:
-        """Quantities that follow from its numbers, a line each."""
+        """Return quantities that follow from its numbers, one per line."""
         return []
 
 
 def kinds_for(role: Role) -> tuple[str, ...]:
-    """The kinds of material that a part of this role can be made of; none of a coated one.
+    """Return the kinds of material that a part of this role can be made of; none for the coated
+    one.
 
-    They are all loaded for this; `role in material.roles` tells it of one.
+    All kinds are loaded for this; `role in material.roles` tests a single one.
     """
     kinds = Material.kinds
     return tuple(name for name in kinds.names() if role in kinds.find(name).roles)

@@ -10,18 +10,20 @@ from optisense.design.fields import Colour, Fraction, Name, NonNegativeRGB, Posi
 from optisense.design.materials.base import CoatingModel, Reflection
 
 SMALLEST_ROUGHNESS = 0.05
-"""GGX alpha of a coating of specularity 1. Smaller values describe polished mirrors, which no
-sprayed or rubbed coating is."""
+"""GGX alpha of a coating with specularity 1. Smaller values describe polished mirrors, which no
+sprayed or rubbed coating is.
+"""
 FIXED_ROUGHNESS = 0.1
-"""GGX alpha of the flake where specularity does not change it: that of Mitsuba's `roughconductor`
-where none is given (its documentation), as the paper names that model and no roughness."""
+"""GGX alpha of the flake if specularity does not change it: the default of Mitsuba's
+`roughconductor` (its documentation), as the paper names that model and no roughness.
+"""
 
 Scattering = Literal["blend", "blend-fixed-roughness", "conductor"]
-"""The model that the specularity of a coating controls; see `flake_lobe`."""
+"""Model that the specularity of a coating controls; see `flake_lobe`."""
 
 
 def _is_usual(scattering: object) -> bool:
-    """Whether it is not written, so that designs of earlier releases stay what they were."""
+    """Return whether it is not written, so that designs of earlier releases are unchanged."""
     return scattering == "blend"
 
 
@@ -59,17 +61,17 @@ class Coating(CoatingModel):
     )
 
     def reflection(self) -> Reflection:
-        """A blend of paint and flake, or flake alone, by specularity."""
+        """Return a blend of paint and flake, or flake alone, by specularity."""
         share, alpha = flake_lobe(self.specularity, self.scattering)
         return Reflection(self.reflectance, share, alpha, self.eta, self.k)
 
     def in_words(self) -> str:
-        """Its specularity, and its scattering law where that is not the usual one."""
+        """Return its specularity as text, with its scattering law if that is not the default."""
         law = "" if _is_usual(self.scattering) else f" ({self.scattering})"
         return f"specularity {self.specularity:g}{law}"
 
     def consequences(self) -> list[str]:
-        """The shares of paint and flake."""
+        """Return the shares of paint and flake."""
         share, alpha = flake_lobe(self.specularity, self.scattering)
         return [
             f"{100 * (1 - share):.0f} % diffuse paint and "
@@ -78,24 +80,24 @@ class Coating(CoatingModel):
 
 
 def flake_lobe(specularity: float, scattering: Scattering = "blend") -> tuple[float, float]:
-    """Share and roughness of the metal flake of a coating with this specularity.
+    """Return share and roughness of the metal flake of a coating with this specularity.
 
     The OptiSense paper varies one specularity s, from 0 to 1, of a rough conductor that also has a
-    reflectance, and does not say what s changes. With w the share of the metal's lobe (GGX of
+    reflectance, and does not state what s changes. With w the weight of the metal's lobe (GGX of
     roughness alpha; the coating's eta and k), and 1 - w that of a diffuse lobe of the coating's
-    reflectance, these are the readings that it allows:
+    reflectance, these are the possible readings:
 
     - `blend`: w = s, alpha = max(0.05, 1 - s)
     - `blend-fixed-roughness`: w = s, alpha = 0.1
     - `conductor`: w = 1, alpha = max(0.05, 1 - s)
 
-    With `conductor` there is no diffuse lobe, and the reflectance is not used. The weights add up
-    to 1, so that no reading reflects more light than arrives; a rough metal reflects less, as GGX
-    leaves out light that meets more than one facet (69 % of it straight on at alpha = 1).
+    With `conductor` there is no diffuse lobe, and the reflectance is not used. The weights sum to
+    1, so that no reading reflects more light than arrives; a rough metal reflects less, as GGX
+    leaves out light that meets more than one facet (69 % of it at normal incidence at alpha = 1).
 
     Args:
-        specularity: 0 to 1.
-        scattering: the reading.
+        specularity: specularity, 0 to 1.
+        scattering: reading of the paper.
 
     Returns:
         The share of the metal's lobe, 0 to 1, and its GGX alpha.
@@ -115,11 +117,11 @@ def flake_lobe(specularity: float, scattering: Scattering = "blend") -> tuple[fl
 
 
 def specularity_to_roughness(specularity: float) -> float:
-    """GGX alpha of the metal-flake lobe of a coating with this specularity (0..1).
+    """Return the GGX alpha of the metal-flake lobe of a coating with this specularity (0..1).
 
-    An assumption: the OptiSense paper varies one specularity of a rough conductor from 0 to 1
-    but does not say how it maps to a roughness. Here alpha = max(0.05, 1 - s), so that 0 is
-    diffuse and 1 is nearly a mirror. What the flake is blended with is told at
+    This is an assumption: the OptiSense paper varies one specularity of a rough conductor from 0 to
+    1 but does not state how it maps to a roughness. Here alpha = max(0.05, 1 - s), so that 0 is
+    diffuse and 1 is nearly a mirror. The lobe that the flake is blended with is described at
     `optisense.design.materials.flake_lobe`.
 
     Raises:

@@ -29,14 +29,14 @@ class Conductor(Material):
     roughness: Fraction = Field(default=0.0, description="GGX alpha, 0 is a perfect mirror")
 
     def reflection(self) -> Reflection:
-        """The metal alone."""
+        """Return the reflection of the metal alone."""
         return Reflection(specularity=1.0, roughness=self.roughness, eta=self.eta, k=self.k)
 
     def in_words(self) -> str:
-        """Its reflectance at normal incidence, as text."""
+        """Return its reflectance at normal incidence, as text."""
         return f"reflects {100 * float(self.reflection().head_on().mean()):.0f} %"
 
     def consequences(self) -> list[str]:
-        """Its reflectance in each colour, a line each."""
+        """Return its reflectance in each colour, one per line."""
         share = 100 * self.reflection().head_on()
         return ["reflects {:.1f}, {:.1f}, {:.1f} % of R, G, B in air".format(*share)]

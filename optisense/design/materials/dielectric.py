@@ -31,19 +31,20 @@ from optisense.design.parts import Role
 from optisense.design.reflectance import fresnel_dielectric
 
 Index = Annotated[Number, Field(ge=1.0, le=4.0)]
-"""A refractive index."""
+"""Refractive index of a transparent material."""
 
 PER_MM: dict[str, Any] = {"unit": "1/mm"}
 
 INDEX_AGREEMENT = 0.02
 """Largest difference between `ior` and a formula of the index at 589 nm. The literature's indices
-of one silicone differ by as much as 0.04, and slips of a digit or a unit by far more."""
+of one silicone differ by as much as 0.04, and errors of a digit or a unit by far more.
+"""
 
 ROUNDING = 1e-9
-"""Per mm: an absorption coefficient that a plate's transmittance gives by rounding alone."""
+"""Largest absorption coefficient, 1/mm, that a plate's transmittance can give by rounding alone."""
 
 ABSORPTIONS = ("absorption", "extinction", "transmittance")
-"""The fields that tell how much is absorbed; a material gives one of them at most."""
+"""Fields that determine the absorption; a material gives at most one of them."""
 
 
 class Dielectric(Material):
@@ -201,14 +202,16 @@ class Dielectric(Material):
         return self.ior
 
     def channel_indices(self) -> RGB:
-        """The refractive index at R, G, B: `ior` for all where nothing else is known."""
+        """Return the refractive index at R, G, B: `ior` for all if nothing else is known."""
         if self.dispersion is not None:
             return self.dispersion
         red, green, blue = (self._index_at(each) for each in CHANNEL_WAVELENGTHS)
         return red, green, blue
 
     def absorption_coefficient(self) -> RGB:
-        """Per mm, at R, G, B: the share exp(-coefficient d) is left after d mm."""
+        """Return the absorption coefficient at R, G, B, 1/mm: the share exp(-coefficient d) is left
+        after d mm.
+        """
         found = np.zeros(3)
         if self.absorption is not None:
             found = np.array(self.absorption)
@@ -216,13 +219,13 @@ class Dielectric(Material):
             found = absorption_of_extinction(self.extinction)
         elif self.transmittance is not None and self.thickness is not None:
             found = absorption_of_plate(self.transmittance, self.thickness, self.channel_indices())
-            # A plate that absorbs nothing may seem to, or to give light, by rounding.
+            # By rounding, a plate without absorption may seem to absorb, or to emit light.
             found = np.where(np.abs(found) < ROUNDING, 0.0, found)
         red, green, blue = found.tolist()
         return red, green, blue
 
     def medium(self) -> Medium:
-        """Its index, the roughness of its surface, and what it absorbs."""
+        """Return its index, the roughness of its surface, and its absorption."""
         indices = self.channel_indices()
         return Medium(
             self.ior,
@@ -232,7 +235,7 @@ class Dielectric(Material):
         )
 
     def in_words(self) -> str:
-        """Its index, and its roughness and absorption where it has any."""
+        """Return its index as text, and its roughness and absorption if it has any."""
         words = f"index {self.ior:g}"
         if self.roughness > 0.0:
             words += f", rough {self.roughness:g}"
@@ -241,7 +244,7 @@ class Dielectric(Material):
         return words
 
     def consequences(self) -> list[str]:
-        """The reflectance of a smooth face, and the critical angle of total reflection."""
+        """Return the reflectance of a smooth face, and the critical angle of total reflection."""
         share = 100 * float(fresnel_dielectric(1.0, self.ior))
         lines = [f"a smooth face reflects {share:.1f} % of light that comes straight from air"]
         limit = critical_angle(self.ior)
@@ -255,5 +258,7 @@ class Dielectric(Material):
 
 
 def critical_angle(ior: float) -> float | None:
-    """Degrees from the normal beyond which light inside is reflected wholly; None for air."""
+    """Return the angle from the normal beyond which light inside is totally reflected, degrees;
+    None for air.
+    """
     return float(np.degrees(np.arcsin(1.0 / ior))) if ior > 1.0 else None

@@ -19,5 +19,5 @@ class Diffuse(Material):
     reflectance: Colour = Field(description="of R, G, B, 0 to 1", examples=[(0.5, 0.5, 0.5)])
 
     def reflection(self) -> Reflection:
-        """The diffuse lobe alone."""
+        """Return the reflection of the diffuse lobe alone."""
         return Reflection(reflectance=self.reflectance)

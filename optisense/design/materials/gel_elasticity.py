@@ -10,7 +10,8 @@ from optisense.design.fields import Model, NonNegative, Number, Positive
 
 MAX_POISSON_RATIO = 0.4999
 """Largest Poisson ratio of a material. At 0.5 it would be incompressible and its bulk modulus
-infinite; silicones are measured between 0.48 and 0.4999."""
+infinite; measured values of silicones are 0.48 to 0.4999.
+"""
 
 
 class GelElasticity(Model):

@@ -1,7 +1,7 @@
-"""The response of a camera to light: `PictureChain` and its pieces.
+"""Response of a camera to light: `PictureChain` and its components.
 
 `CameraResponse` has a file for each kind, `tone_curve` the tone curves, `electronics` noise, black
-level and colours; what the lens does is in `design/lenses`.
+level and colours; the effects of the lens are in `design/lenses`.
 """
 
 from optisense.design.responses.base import CameraResponse

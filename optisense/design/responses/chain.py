@@ -1,6 +1,6 @@
-"""The chain from the light of a scene to the picture that a camera stores.
+"""Picture chain: from the light of a scene to the picture that a camera stores.
 
-In the order of a real camera:
+The order is that of a real camera:
 
 1. the lens: blur;
 2. the sensor: crosstalk between the channels, the shading by lens and pixels, which is measured of
@@ -8,7 +8,7 @@ In the order of a real camera:
 3. its processor: the black level is subtracted, the shading corrected, the colours are balanced and
    mixed by a matrix, levels are clipped, and the tone curve gives what is stored.
 
-A sensor overflows before its processor amplifies, so what is white in the picture may be a clipped
+A sensor saturates before its processor amplifies, so a white pixel of the picture may be a clipped
 red; noise is added before the gains, and grows with them.
 """
 
@@ -40,28 +40,28 @@ from optisense.design.responses.tone_curve import ToneCurve
 FloatArray = NDArray[np.floating]
 
 USUAL_RESPONSE = FullWellResponse()
-"""The response of a camera whose design names none."""
+"""Response of a camera whose design names none."""
 
 
 @dataclass(frozen=True)
 class SoftFocus:
-    """A lens's blur over the picture.
+    """Blur of a lens over the picture.
 
     Attributes:
-        deviation: (h, w) of any size, or (1, 1): the standard deviation as a share of the picture's
-            width.
+        deviation: standard deviation as a share of the picture's width, (h, w) of any size, or
+            (1, 1).
     """
 
     deviation: FloatArray
 
     @classmethod
     def of(cls, blur: LensBlur, camera: LensView, vergence: FloatArray | None = None) -> SoftFocus:
-        """The blur of a lens; `vergence` (h, w), 1/mm, is needed where it depends on depth."""
+        """Return the blur of a lens; `vergence` (h, w), 1/mm, is needed if it depends on depth."""
         given = np.zeros((1, 1)) if vergence is None else vergence
         return cls(np.atleast_2d(blur.deviation(camera, given)))
 
     def in_pixels(self, window: PictureWindow) -> FloatArray:
-        """(h, w) standard deviation in pixels of a window of a picture."""
+        """Return the standard deviation (h, w), in pixels, for a window of a picture."""
         rows, columns = self.deviation.shape
         down = (np.arange(window.height)[window.rows] + 0.5) / window.height * rows - 0.5
         across = (np.arange(window.width)[window.columns] + 0.5) / window.width * columns - 0.5
@@ -69,32 +69,34 @@ class SoftFocus:
         return window.width * map_coordinates(self.deviation, at, order=1, mode="nearest")
 
     def span(self, width: int) -> tuple[float, float]:
-        """The least and the largest standard deviation, in pixels of a picture so many wide."""
+        """Return the smallest and the largest standard deviation, in pixels of a picture of this
+        width.
+        """
         return width * float(self.deviation.min()), width * self.largest
 
     @property
     def largest(self) -> float:
-        """The largest standard deviation, a share of the picture's width."""
+        """Largest standard deviation, as a share of the picture's width."""
         return float(self.deviation.max())
 
 
 @dataclass(frozen=True)
 class PictureChain:
-    """All that a camera does to the light, from radiance to the stored picture.
+    """All steps of a camera from radiance to the stored picture.
 
-    What is None is not done; a chain of nothing but a response does what that response does.
+    Steps that are None are left out; a chain with only a response does what that response does.
 
     Attributes:
-        response: how its sensor is filled and overflows.
-        focus: the blur of its lens.
-        crosstalk: how much of the R, G and B of the light each channel of the sensor sees.
-        shading: how dim each channel is by place, and how much its processor corrects of it.
-        stray_light: what fills the whole sensor alike, R, G and B, shares of a full pixel.
-        noise: of its sensor.
-        black_level: of its sensor, and what is subtracted.
+        response: saturation of its sensor.
+        focus: blur of its lens.
+        crosstalk: shares of the R, G and B of the light in each channel of the sensor.
+        shading: dimming of each channel by position, and the share that its processor corrects.
+        stray_light: uniform light on the sensor at R, G and B, as shares of a full pixel.
+        noise: noise of its sensor.
+        black_level: black level of its sensor, and the share that is subtracted.
         white_balance: gains of R, G and B.
-        colour_matrix: what its processor makes of R, G and B.
-        tone_curve: what is stored of a level, in place of the response's own curve.
+        colour_matrix: matrix by which its processor mixes R, G and B.
+        tone_curve: curve of the stored levels, in place of the response's own curve.
     """
 
     response: CameraResponse = field(default_factory=lambda: USUAL_RESPONSE)
@@ -110,24 +112,24 @@ class PictureChain:
 
     @property
     def is_plain(self) -> bool:
-        """Whether the response alone makes the picture, but for its tone curve."""
+        """True if the response alone makes the picture, apart from its tone curve."""
         lens = (self.shading, self.focus, self.crosstalk, self.stray_light)
         sensor = (self.noise, self.black_level, self.white_balance, self.colour_matrix)
         return all(each is None for each in (*lens, *sensor))
 
     def without_noise(self) -> PictureChain:
-        """The same camera without noise, as the mean of many pictures has none."""
+        """Return the same camera without noise, as the mean of many pictures has none."""
         return self if self.noise is None else replace(self, noise=None)
 
     def respond(
         self, exposed: FloatArray, window: PictureWindow | None = None, seed: NoiseSeed = 0
     ) -> NDArray[np.float32]:
-        """(h, w, 3) linear levels, 0 to 1, of which the tone curve makes the picture.
+        """Return the linear levels (h, w, 3), 0 to 1, from which the tone curve makes the picture.
 
         Args:
-            exposed: (h, w, 3) radiance times the exposure, of a picture or of a part of it.
-            window: which part, where it is one.
-            seed: of the noise; the same one gives a pixel the same noise.
+            exposed: radiance times the exposure, (h, w, 3), of a picture or of a part of it.
+            window: window of the part, if it is one.
+            seed: seed of the noise; the same one gives a pixel the same noise.
         """
         place = window or PictureWindow.whole(*exposed.shape[:2])
         if self.is_plain:
@@ -136,11 +138,11 @@ class PictureChain:
         return self._processed(self._read(level, place, seed), place)
 
     def linear(self, exposed: FloatArray) -> NDArray[np.float32]:
-        """(h, w, 3) levels without noise, overexposure and clipping: those of a sum of lights are
-        the sum of their levels.
+        """Return levels (h, w, 3) without noise, overexposure and clipping, which are additive:
+        those of a sum of lights are the sum of their levels.
 
         Args:
-            exposed: (h, w, 3) radiance times the exposure.
+            exposed: radiance times the exposure, (h, w, 3).
         """
         if self.is_plain:
             return np.asarray(exposed, dtype=np.float32)
@@ -150,7 +152,7 @@ class PictureChain:
         return np.asarray(level, dtype=np.float32)
 
     def _on_sensor(self, exposed: FloatArray, window: PictureWindow) -> FloatArray:
-        """What fills the pixels of the sensor, before they overflow."""
+        """Return the levels that fill the pixels of the sensor, before they saturate."""
         level: FloatArray = np.asarray(exposed, dtype=np.float32)
         if self.focus is not None:
             level = blurred(level, self.focus.in_pixels(window), self.focus.span(window.width))
@@ -159,7 +161,7 @@ class PictureChain:
         return level if self.shading is None else level * self._transmission(window)
 
     def _read(self, level: FloatArray, window: PictureWindow, seed: NoiseSeed) -> FloatArray:
-        """What the sensor gives of filled pixels, less the black level."""
+        """Return the sensor's output for filled pixels, minus the black level."""
         if self.stray_light is not None:
             level = level + np.array(self.stray_light, dtype=np.float32)
         if self.noise is not None:
@@ -170,7 +172,7 @@ class PictureChain:
         return np.clip(level, 0.0, 1.0)
 
     def _processed(self, level: FloatArray, window: PictureWindow) -> NDArray[np.float32]:
-        """What the processor makes of levels above black."""
+        """Return the processor's output for levels above black."""
         level = self._balanced(level, None if self.shading is None else self._transmission(window))
         return np.clip(level, 0.0, 1.0).astype(np.float32, copy=False)
 
@@ -189,14 +191,14 @@ class PictureChain:
     def metered(
         self, radiance: FloatArray, where: NDArray[np.bool_] | None = None
     ) -> NDArray[np.floating]:
-        """The input of automatic exposure: levels that must not exceed the full one.
+        """Return the input of automatic exposure: levels that must not exceed the full one.
 
-        The larger of what fills the sensor's pixels and of what its processor makes of them,
-        without blur, noise and overexposure.
+        They are the larger of the levels on the sensor and those after its processor, without blur,
+        noise and overexposure.
 
         Args:
-            radiance: (h, w, 3) of a picture, or (n, 3) of the pixels of a mask.
-            where: (h, w) the mask.
+            radiance: radiance (h, w, 3) of a picture, or (n, 3) of the pixels of a mask.
+            where: mask (h, w).
         """
         if self.is_plain:
             return radiance
@@ -212,20 +214,24 @@ class PictureChain:
         return np.maximum(level, self._balanced(level, transmission))
 
     def auto_exposure(self, radiance: FloatArray) -> float:
-        """The factor that makes a good picture of a radiance image (h, w, 3)."""
+        """Return the exposure, a factor on radiance, that gives a well exposed picture of radiance
+        (h, w, 3).
+        """
         return self.response.auto_exposure(self.metered(radiance))
 
     def full_level(self) -> float:
-        """The level that automatic exposure must not exceed."""
+        """Return the level that automatic exposure must not exceed."""
         return self.response.full_level()
 
     def reach(self, width: int) -> int:
-        """Pixels as far as light in one pixel changes others, in a picture so many wide."""
+        """Return the distance, in pixels, over which light in one pixel changes others, in a
+        picture of this width.
+        """
         own = self.response.reach(width)
         return own if not self._softens(width) else own + reach_of(self._largest, width)
 
     def spreads(self, exposed: FloatArray, window: PictureWindow | None = None) -> bool:
-        """Whether light in some pixel of a picture, or of a part of it, changes others."""
+        """Return whether light in some pixel of a picture, or of a part of it, changes others."""
         if self.is_plain:
             return self.response.spreads(exposed)
         place = window or PictureWindow.whole(*exposed.shape[:2])
@@ -239,17 +245,17 @@ class PictureChain:
         return self._largest * width >= LEAST_WIDTH
 
     def curve(self, linear: FloatArray) -> NDArray[np.float64]:
-        """The stored levels, 0 to 1 before rounding, of linear levels."""
+        """Return the stored levels, 0 to 1 before rounding, of linear levels."""
         return (self.tone_curve or self.response).curve(linear)
 
     def encode(self, linear: FloatArray) -> NDArray[np.uint8]:
-        """The same in 8 bits."""
+        """Return the stored levels in 8 bits."""
         return (self.tone_curve or self.response).encode(linear)
 
 
 @dataclass(frozen=True)
 class _Shown:
-    """A shading that is compared by its numbers."""
+    """Shading that is compared by its numbers."""
 
     shading: LensShading
     data: str

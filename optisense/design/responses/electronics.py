@@ -20,7 +20,7 @@ FloatArray = NDArray[np.floating]
 Row = tuple[Number, Number, Number]
 
 NoiseSeed = int | tuple[int, ...]
-"""The seed of a noise sequence: one or several numbers from 0 up."""
+"""Seed of a noise sequence: one or several integers from 0 up."""
 
 
 def _invertible(matrix: tuple[Row, Row, Row]) -> tuple[Row, Row, Row]:
@@ -30,11 +30,13 @@ def _invertible(matrix: tuple[Row, Row, Row]) -> tuple[Row, Row, Row]:
 
 
 ChannelMatrix = Annotated[tuple[Row, Row, Row], AfterValidator(_invertible)]
-"""Rows of what R, G and B become: each has the shares of R, G and B in it."""
+"""Rows of the new R, G and B: each has the shares of the old R, G and B in it."""
 
 
 class BlackLevel(Model):
-    """The level that a sensor adds to all that it reads, and how much of it is taken off again."""
+    """Level that a sensor adds to all its readings, and the share of it that is subtracted
+    again.
+    """
 
     level: Annotated[Number, Field(ge=0.0, lt=0.9)] = Field(
         description="what the sensor reads in the dark, a share of its range"
@@ -44,11 +46,11 @@ class BlackLevel(Model):
     )
 
     def read(self, level: FloatArray) -> FloatArray:
-        """The converter's output, 0 to 1, for levels above black, negative ones included."""
+        """Return the converter's output, 0 to 1, for levels above black, negative ones included."""
         return np.clip(self.level + (1.0 - self.level) * level, 0.0, 1.0)
 
     def subtract(self, read: FloatArray) -> FloatArray:
-        """Levels above what is taken for black, scaled so that a full pixel stays at 1."""
+        """Return the levels above the assumed black, scaled so that a full pixel stays at 1."""
         off = self.subtracted * self.level
         return (read - off) / (1.0 - off)
 
@@ -56,9 +58,9 @@ class BlackLevel(Model):
 class SensorNoise(Model):
     """Shot noise of the light and read noise of the sensor (as in the EMVA standard 1288).
 
-    A pixel that is full holds `full_well` / `gain` electrons. The number of electrons varies by its
-    square root from picture to picture (shot noise; a normal distribution stands for Poisson's),
-    and reading adds `read_noise` electrons.
+    A full pixel holds `full_well` / `gain` electrons. The number of electrons varies by its square
+    root from picture to picture (shot noise; a normal distribution stands for Poisson's), and
+    reading adds `read_noise` electrons.
     """
 
     full_well: Positive = Field(
@@ -75,25 +77,25 @@ class SensorNoise(Model):
     )
 
     def deviation(self, level: FloatArray) -> FloatArray:
-        """The standard deviation of levels, as a share of a full pixel."""
+        """Return the standard deviation of levels, as a share of a full pixel."""
         per_electron = self.gain / self.full_well
         shot = np.maximum(level, 0.0) * per_electron
         return np.sqrt((shot + (self.read_noise * per_electron) ** 2) / self.binning)
 
     def add(self, level: FloatArray, normal: FloatArray) -> FloatArray:
-        """Levels with noise.
+        """Return levels with noise.
 
         Args:
-            level: of each pixel and channel.
+            level: level of each pixel and channel.
             normal: as many numbers of the standard normal distribution.
         """
         return level + self.deviation(level) * normal
 
 
 def normal_numbers(seed: NoiseSeed | Sequence[int], height: int, width: int) -> FloatArray:
-    """(h, w, 3) numbers of the standard normal distribution for all pixels of a picture.
+    """Return numbers (h, w, 3) of the standard normal distribution for all pixels of a picture.
 
-    The same seed and size give the same numbers; they are not to be changed.
+    The same seed and size give the same array, which must not be changed.
     """
     return _normal_numbers(seed if isinstance(seed, int) else tuple(seed), height, width)
 
@@ -106,6 +108,6 @@ def _normal_numbers(seed: NoiseSeed, height: int, width: int) -> FloatArray:
 
 
 def mixed(levels: FloatArray, matrix: ChannelMatrix) -> FloatArray:
-    """Levels (..., 3) with their channels mixed by a matrix."""
+    """Return levels (..., 3) with their channels mixed by a matrix."""
     mix: FloatArray = levels @ np.array(matrix, dtype=np.float32).T
     return mix

@@ -1,4 +1,4 @@
-"""A sensor whose pixels overflow into their neighbours.
+"""Sensor whose overexposed pixels spill into their neighbours.
 
 Exposure, then saturation as in the OptiSense paper (section "Camera"): where a channel is
 overexposed, a mask of the excess is blurred and spread over all three channels, which gives the
@@ -20,14 +20,15 @@ from optisense.design.fields import NonNegative, Positive
 from optisense.design.responses.base import CameraResponse, FloatArray, brightest
 
 MAX_EXCESS = 4.0
-"""Largest excess over the full well that the mask counts, so that a lamp in view does not whiten
-the whole picture."""
+"""Largest excess over the full well that the mask counts, as a multiple of a full pixel, so that a
+lamp in view does not whiten the whole picture.
+"""
 
 BLUR_REACH = 4.0
-"""Standard deviations after which the blur of overexposure ends (SciPy's own choice)."""
+"""Radius at which the blur of overexposure is cut off, in standard deviations (SciPy's default)."""
 
 SPARE = 2
-"""Pixels added to the reach of the blur, to be on the safe side of its rounding."""
+"""Margin of the blur's radius, in pixels, for its rounding."""
 
 
 class FullWellResponse(CameraResponse):
@@ -45,15 +46,15 @@ class FullWellResponse(CameraResponse):
     )
 
     def full_level(self) -> float:
-        """The full well."""
+        """Return the full well."""
         return self.full_well
 
     def reach(self, width: int) -> int:
-        """How far the blur reaches."""
+        """Return the radius of the blur, in pixels."""
         return int(BLUR_REACH * self.blur * width) + SPARE
 
     def spreads(self, exposed: FloatArray) -> bool:
-        """Whether a pixel is overexposed."""
+        """Return whether a pixel is overexposed."""
         return bool(exposed.max() > self.full_well)
 
     def respond(self, exposed: FloatArray, width: int | None = None) -> NDArray[np.float32]:
@@ -69,5 +70,5 @@ class FullWellResponse(CameraResponse):
         return np.clip(exposed, 0.0, 1.0, dtype=np.float32)
 
     def encode(self, linear: FloatArray) -> NDArray[np.uint8]:
-        """sRGB curve and 8 bits, in single precision."""
+        """Return the sRGB curve in 8 bits, in single precision."""
         return encode(linear)

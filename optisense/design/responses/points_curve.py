@@ -1,4 +1,4 @@
-"""A tone curve by points."""
+"""Tone curve through given points."""
 
 from __future__ import annotations
 
@@ -45,5 +45,5 @@ class PointsCurve(ToneCurve):
         return self
 
     def curve(self, linear: FloatArray) -> NDArray[np.float64]:
-        """Linear interpolation."""
+        """Return the linear interpolation of linear levels."""
         return np.interp(np.clip(linear, 0.0, 1.0), *np.array(self.points).T)

@@ -1,4 +1,4 @@
-"""The tone curve of sRGB."""
+"""Tone curve of sRGB."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ class SrgbCurve(ToneCurve):
     kind: Literal["srgb"] = "srgb"
 
     def curve(self, linear: FloatArray) -> NDArray[np.float64]:
-        """A power of 1 / 2.4 with a straight piece in the dark."""
+        """Return a power of 1 / 2.4 with a linear piece in the dark."""
         return srgb_curve(linear)
 
     def encode(self, linear: FloatArray) -> NDArray[np.uint8]:
-        """The same in 8 bits, worked out in single precision."""
+        """Return the stored levels in 8 bits, in single precision."""
         return encode(linear)

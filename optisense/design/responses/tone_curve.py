@@ -1,4 +1,4 @@
-"""Tone curves: from the linear level of a channel to the level that is stored."""
+"""Tone curves: from the linear level of a channel to the stored level."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ FloatArray = NDArray[np.floating]
 
 
 class ToneCurve(KindModel):
-    """Turns linear levels, 0 to 1, into stored ones, 0 to 1; each kind is a subclass."""
+    """Conversion of linear levels, 0 to 1, into stored ones, 0 to 1; each kind is a subclass."""
 
     kinds: ClassVar[Registry[Any]] = Registry(
         "kind of tone curve",
@@ -31,8 +31,10 @@ class ToneCurve(KindModel):
 
     @abstractmethod
     def curve(self, linear: FloatArray) -> NDArray[np.float64]:
-        """The stored levels, 0 to 1 before rounding, of linear levels; clipped to 0 and 1 first."""
+        """Return the stored levels, 0 to 1 before rounding, of linear levels, which are clipped to
+        0..1.
+        """
 
     def encode(self, linear: FloatArray) -> NDArray[np.uint8]:
-        """The same in 8 bits."""
+        """Return the stored levels in 8 bits."""
         return np.round(255.0 * self.curve(linear)).astype(np.uint8)
