@@ -10,16 +10,18 @@ from typing import TYPE_CHECKING
 from optisense.lazy_names import load_on_first_use
 
 if TYPE_CHECKING:
-    from optisense.calibration.calibrating import Calibration, CalibrationSettings, calibrate
+    from optisense.calibration.calibrating import calibrate
     from optisense.calibration.comparing import Comparison, compare
     from optisense.calibration.layouts import read_photographs
     from optisense.calibration.photographs import PhotographedPress, Photographs
     from optisense.calibration.realism import Realism
+    from optisense.calibration.result import Calibration
+    from optisense.calibration.settings import CalibrationSettings
     from optisense.calibration.staging import photograph_model, save_photographs
 
 _HOMES = {
-    "Calibration": ".calibrating",
-    "CalibrationSettings": ".calibrating",
+    "Calibration": ".result",
+    "CalibrationSettings": ".settings",
     "Comparison": ".comparing",
     "PhotographedPress": ".photographs",
     "Photographs": ".photographs",

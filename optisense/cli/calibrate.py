@@ -17,8 +17,8 @@ from optisense.time_left import TimedStep
 from optisense.writing import write_json, written_together
 
 if TYPE_CHECKING:
-    from optisense.calibration.calibrating import Calibration
     from optisense.calibration.realism import Realism
+    from optisense.calibration.result import Calibration
 
 LOADING, FITTING = "loading", "fitting"
 """Steps of the progress line."""
@@ -46,10 +46,10 @@ def calibrate(
     with progress_line(TimedStep(LOADING, 1, 3.0), TimedStep(FITTING, 20, 100.0)) as line:
         line.begin(LOADING)
         from optisense.calibration import read_photographs
-        from optisense.calibration.calibrating import CalibrationSettings
         from optisense.calibration.calibrating import calibrate as fit_design
         from optisense.calibration.families import FAMILIES, chosen_families
         from optisense.calibration.kept_renderings import KeptRenderings
+        from optisense.calibration.settings import CalibrationSettings
         from optisense.report.calibration import write_calibration
         from optisense.sensors import load, save_design
 

@@ -39,8 +39,8 @@ def calibration_families(session: Session, fields: Nothing, job: Job) -> dict[st
 def calibrate(session: Session, fields: Calibrate, job: Job) -> dict[str, Any]:
     """Fit a design to photographs, and write the fitted design and its report."""
     from optisense.calibration import read_photographs
-    from optisense.calibration.calibrating import CalibrationSettings
     from optisense.calibration.calibrating import calibrate as fit_design
+    from optisense.calibration.settings import CalibrationSettings
     from optisense.report.calibration import write_calibration
     from optisense.sensors import save_design
 

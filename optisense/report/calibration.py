@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from pathlib import Path
 
-from optisense.calibration.calibrating import Calibration
 from optisense.calibration.realism import PATCH, Realism
+from optisense.calibration.result import Calibration
 from optisense.report.comparison import (
     CONTRAST,
     background_pictures,

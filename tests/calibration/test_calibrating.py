@@ -13,13 +13,14 @@ from typer.testing import CliRunner
 
 import optisense as ots
 from optisense.calibration import Photographs, save_photographs
-from optisense.calibration.calibrating import CalibrationSettings, calibrate
+from optisense.calibration.calibrating import calibrate
 from optisense.calibration.gauss_newton import LayeredFit
 from optisense.calibration.kept_renderings import KeptRenderings
 from optisense.calibration.layered_pictures import LayeredPictures, layered_pictures
 from optisense.calibration.quantities import designed, quantities_of
 from optisense.calibration.realism import distances
 from optisense.calibration.seen_contacts import SeenContact, seen_contacts
+from optisense.calibration.settings import CalibrationSettings
 from optisense.cli import app
 from optisense.design import Status, get_value, set_value
 from optisense.errors import CalibrationError

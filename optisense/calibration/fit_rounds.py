@@ -1,0 +1,185 @@
+"""The rounds of rendering and fitting by which a design comes near to photographs."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from optisense.calibration.gauss_newton import LayeredFit, Solution
+from optisense.calibration.kept_renderings import KeptRenderings
+from optisense.calibration.layered_pictures import LayeredPictures, layered_pictures
+from optisense.calibration.model_pictures import matched_exposure
+from optisense.calibration.photographs import Photographs
+from optisense.calibration.quantities import designed
+from optisense.calibration.quantity import FitQuantity
+from optisense.calibration.seen_contacts import SeenContact
+from optisense.calibration.settings import CalibrationSettings
+from optisense.design import SensorDesign
+
+if TYPE_CHECKING:
+    from optisense.optics import OpticalModel
+
+FloatArray = NDArray[np.float64]
+
+FIT_WIDTH = 160
+"""Pixels across the pictures of the fit: a quarter of the pixels of those that are compared in the
+end, and enough for the smooth responses of balls."""
+
+DIFFERENCE = 0.35
+"""Plausible ranges by which numbers that need a rendering are moved for their difference quotients;
+large, as renderings have noise."""
+
+OUTLYING = 1.7
+"""Error of a press, over the median, from which on it is named as an outlier."""
+
+Progress = Callable[[str, int, int], None]
+"""Called with what is done, how many pieces of the whole are done, and of how many."""
+
+
+class FitRounds:
+    """The rounds of a fit."""
+
+    def __init__(
+        self,
+        design: SensorDesign,
+        model: OpticalModel,
+        photographs: Photographs,
+        seen: list[SeenContact],
+        chosen: list[FitQuantity],
+        settings: CalibrationSettings,
+        kept: KeptRenderings,
+        progress: Progress,
+    ) -> None:
+        self._design, self._model, self._settings = design, model, settings
+        self._chosen, self._kept, self._progress = chosen, kept, progress
+        self._small = photographs.scaled(FIT_WIDTH)
+        factor = self._small.size[0] / photographs.size[0]
+        self._factor = factor
+        self._seen = [_scaled(place, factor) for place in seen]
+        count = len(photographs.presses)
+        self.held_out = settings.indices_held_out(photographs)
+        self._used = [index for index in range(count) if index not in self.held_out]
+        self._rendering = [number for number, each in enumerate(chosen) if each.renders]
+        self.exposure = 1.0
+        self._done = 0
+        self._count = 2 * settings.rounds + len(self._rendering) + 3
+
+    def told(self, what: str) -> None:
+        """Tell the progress, one piece on."""
+        self._progress(what, self._done, self._count)
+        self._done += 1
+
+    def run(self) -> Solution:
+        """All rounds; the contacts of the photographs that are fitted move along.
+
+        Difference quotients by numbers that need a rendering are taken in the first round only;
+        later rounds start from new renderings, and what they correct is small.
+        """
+        steps = np.zeros(len(self._chosen))
+        small = self._small.subset(self._used)
+        solution: Solution | None = None
+        slopes: dict[int, list[NDArray[np.float32]]] = {}
+        for number in range(self._settings.rounds):
+            seen = [self._seen[index] for index in self._used]
+            self.told("rendering")
+            layers = self._layers(small, seen, steps)
+            if number == 0:
+                total = layers.background.sum(axis=0)
+                self.exposure = matched_exposure(total, layers.chain, small.background)
+                slopes = self._slopes(small, seen, steps, layers)
+            self.told("fitting")
+            fit = LayeredFit(small, seen, layers, self._chosen, self.exposure, steps, slopes)
+            solution = fit.solve(steps, np.zeros((len(seen), 3)))
+            steps = solution.steps
+            for index, moved in zip(self._used, solution.contacts, strict=True):
+                self._seen[index] = _moved(self._seen[index], moved)
+        assert solution is not None
+        return solution
+
+    def places(self, fitted: SensorDesign, exposure: float) -> list[SeenContact]:
+        """Where each photograph shows its contact by the fitted model, at the full size.
+
+        Those that were held out are placed here, with nothing else fitted.
+        """
+        if self.held_out:
+            self.told("placing what was held out")
+            small = self._small.subset(self.held_out)
+            self._model.set_design(fitted)
+            for _ in range(2):
+                seen = [self._seen[index] for index in self.held_out]
+                layers = layered_pictures(
+                    self._model, small, seen, self._settings.photons, self._settings.seed,
+                    kept=self._kept,
+                )  # fmt: skip
+                none: FloatArray = np.zeros(0)
+                fit = LayeredFit(small, seen, layers, [], exposure, none, {})
+                found = fit.solve(none, np.zeros((len(seen), 3)))
+                for index, moved in zip(self.held_out, found.contacts, strict=True):
+                    self._seen[index] = _moved(self._seen[index], moved)
+        return [_scaled(place, 1.0 / self._factor) for place in self._seen]
+
+    def doubts(self, solution: Solution) -> list[str]:
+        """Presses that the fit explains far worse than the others."""
+        names = [self._small.presses[index].name for index in self._used]
+        usual = float(np.median(solution.outlying))
+        return [
+            f"{name}: it is explained worse than the others, by {error:.1f} levels where they have "
+            f"{usual:.1f}; check its ball and whether it slipped"
+            for name, error in zip(names, solution.outlying, strict=True)
+            if error > OUTLYING * usual
+        ]
+
+    def _layers(
+        self,
+        small: Photographs,
+        seen: Sequence[SeenContact],
+        steps: FloatArray,
+        contacts: LayeredPictures | None = None,
+    ) -> LayeredPictures:
+        """Layers at the values of what needs a rendering; all else is as the design has it."""
+        moved = [self._chosen[number] for number in self._rendering]
+        self._model.set_design(designed(self._design, moved, steps[self._rendering]))
+        return layered_pictures(
+            self._model, small, seen, self._settings.photons, self._settings.seed,
+            None if contacts is None else contacts.contacts, self._kept,
+        )  # fmt: skip
+
+    def _slopes(
+        self,
+        small: Photographs,
+        seen: Sequence[SeenContact],
+        steps: FloatArray,
+        layers: LayeredPictures,
+    ) -> dict[int, list[NDArray[np.float32]]]:
+        found: dict[int, list[NDArray[np.float32]]] = {}
+        for number in self._rendering:
+            each = self._chosen[number]
+            self.told(f"rendering another {each.words}")
+            other = steps.copy()
+            other[number] += DIFFERENCE
+            if each.value(float(other[number])) == each.value(float(steps[number])):
+                other[number] -= 2.0 * DIFFERENCE
+            size = float(other[number] - steps[number])
+            same = None if each.moves_contacts else layers
+            moved = self._layers(small, seen, other, same)
+            pairs = zip(
+                [moved.background, *moved.presses], [layers.background, *layers.presses],
+                strict=True,
+            )  # fmt: skip
+            found[number] = [((one - two) / size).astype(np.float32) for one, two in pairs]
+        return found
+
+
+def _scaled(place: SeenContact, factor: float) -> SeenContact:
+    column, row = place.centre
+    return SeenContact((column * factor, row * factor), place.radius * factor)
+
+
+def _moved(place: SeenContact, amount: FloatArray) -> SeenContact:
+    column, row, wider = (float(value) for value in amount)
+    grown = place.radius * math.exp(min(max(wider, -0.5), 0.5))
+    return SeenContact((place.centre[0] + column, place.centre[1] + row), grown)

@@ -1,0 +1,58 @@
+"""What came of a fit of a design to photographs."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass, field, replace
+from typing import Any
+
+from optisense.calibration.comparing import Comparison
+from optisense.calibration.fitted_numbers import FittedNumber
+from optisense.calibration.realism import Realism
+from optisense.design import SensorDesign
+
+
+@dataclass(frozen=True)
+class Calibration:
+    """A design that was fitted to photographs.
+
+    Attributes:
+        design: the fitted one.
+        exposure: at which its pictures are as bright as the photographs.
+        numbers: what was fitted.
+        alike: pairs of them, in words, that the photographs can't tell apart, and their
+            correlation.
+        before, after: the design as it was and as it is, beside all photographs.
+        held_out: names of the presses that the fit did not see.
+        notes: what is doubtful, one sentence each.
+    """
+
+    design: SensorDesign
+    exposure: float
+    numbers: tuple[FittedNumber, ...]
+    alike: tuple[tuple[str, str, float], ...]
+    before: Comparison = field(repr=False)
+    after: Comparison = field(repr=False)
+    held_out: tuple[str, ...]
+    notes: tuple[str, ...]
+
+    def of_presses(self, found: Realism, *, held_out: bool) -> Realism:
+        """The figures of the presses that were held out, or of those that were not."""
+        presses = [p for p in found.presses if (p.name in self.held_out) == held_out]
+        readings = [r for r in found.readings if (r.name in self.held_out) == held_out]
+        return replace(found, presses=tuple(presses), readings=tuple(readings))
+
+    def as_data(self) -> dict[str, Any]:
+        """All numbers and figures, ready for JSON."""
+        return {
+            "exposure": self.exposure,
+            "numbers": [asdict(each) for each in self.numbers],
+            "not_told_apart": [list(pair) for pair in self.alike],
+            "held_out": list(self.held_out),
+            "notes": list(self.notes),
+            "photographs": {
+                "background": self.after.photographs.fingerprint,
+                **{press.name: press.fingerprint for press in self.after.photographs.presses},
+            },
+            "before": self.before.realism.as_data(),
+            "after": self.after.realism.as_data(),
+        }

@@ -1,0 +1,60 @@
+"""What a calibration may change, and how it goes about it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from optisense.calibration.families import USUAL
+from optisense.calibration.photographs import Photographs
+from optisense.errors import CalibrationError
+from optisense.near import suggestion
+
+FIT_PHOTONS = 300_000
+"""Photons of the light of the fit; its noise is a few per cent and smooth, and the same in all
+rounds."""
+
+ROUNDS = 3
+"""Rounds of rendering and fitting, by default; contacts move by less than half a pixel in a third
+round."""
+
+HELD_OUT = 3
+"""Every third press is held out and only judged, where there are at least as many."""
+
+
+@dataclass(frozen=True)
+class CalibrationSettings:
+    """Settings of a calibration.
+
+    Attributes:
+        families: what may change, of `families.FAMILIES`.
+        asked: path, least and largest value of further numbers of the design.
+        rounds: of rendering and fitting.
+        photons: of the light of the fit; that of the comparison has as many or more.
+        seed: of the light.
+        refine: whether labelled contacts are looked for near their labels first.
+        held_out: names of the presses that are held out; every third one if None.
+    """
+
+    families: tuple[str, ...] = USUAL
+    asked: tuple[tuple[str, float, float], ...] = ()
+    rounds: int = ROUNDS
+    photons: int = FIT_PHOTONS
+    seed: int = 0
+    refine: bool = True
+    held_out: tuple[str, ...] | None = None
+
+    def indices_held_out(self, photographs: Photographs) -> list[int]:
+        """Indices of the presses that are held out.
+
+        Raises:
+            CalibrationError: there is no press of a name.
+        """
+        names = [press.name for press in photographs.presses]
+        if self.held_out is None:
+            return list(range(HELD_OUT - 1, len(names), HELD_OUT))
+        for name in self.held_out:
+            if name not in names:
+                raise CalibrationError(
+                    f"there is no press '{name}' to hold out", hint=suggestion(name, names)
+                )
+        return [index for index, name in enumerate(names) if name in self.held_out]
