@@ -15,8 +15,9 @@ if TYPE_CHECKING:
     from optisense.tasks.calibration import CalibratedSensor, ReconstructionSettings
     from optisense.tasks.cylinder_radius import CylinderRadius
     from optisense.tasks.dataset import Dataset, Sample
+    from optisense.tasks.dataset_settings import DatasetSettings
     from optisense.tasks.draws import ContactDraw
-    from optisense.tasks.generation import DatasetSettings, generate
+    from optisense.tasks.generation import generate
     from optisense.tasks.misalignment import Misalignment
     from optisense.tasks.perception import (
         PerceptionResult,
@@ -35,7 +36,7 @@ _HOMES = {
     "BallShear": ".ball_shear",
     "CylinderRadius": ".cylinder_radius",
     "Dataset": ".dataset",
-    "DatasetSettings": ".generation",
+    "DatasetSettings": ".dataset_settings",
     "Misalignment": ".misalignment",
     "PerceptionResult": ".perception",
     "PerceptionTask": ".perception",

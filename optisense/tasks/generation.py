@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from contextlib import closing
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import asdict, replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -18,10 +18,9 @@ from optisense.errors import ContactError, TaskError
 from optisense.folders import LOCK_FILE, FolderLock, held
 from optisense.geometry import Contact, Indenter
 from optisense.library import with_own_lights
-from optisense.mechanics import CONFORMING, ELASTIC
-from optisense.optics.estimators import RADIANCE_CACHE, current_name
+from optisense.mechanics import CONFORMING
+from optisense.optics.estimators import current_name
 from optisense.picture_files import write_picture
-from optisense.quality import SAMPLE_PHOTONS
 from optisense.reading.camera_noise import add_camera_noise
 from optisense.reading.untouched import UntouchedSurface
 from optisense.sensors import save_design
@@ -41,8 +40,9 @@ from optisense.tasks.dataset import (
     read_info,
     read_labels,
 )
+from optisense.tasks.dataset_settings import DatasetSettings
 from optisense.tasks.digests import design_values, file_digest, mesh_digests
-from optisense.tasks.draws import ContactDraw, DrawnContact, Places, is_cut, keeps_margin
+from optisense.tasks.draws import DrawnContact, Places, is_cut, keeps_margin
 from optisense.tasks.records import CsvTable, refuse_differences, write_whole
 from optisense.tasks.splits import split_of
 from optisense.writing import inside, write_json, written_whole
@@ -61,49 +61,6 @@ LEAST_PIXELS = 4
 _CONTACT, _CAMERA, _SENSOR = 1, 2, 8
 """Numbers that are mixed into a seed, one for each thing that is drawn, so that none depends on
 another. No two modules of this package share one."""
-
-
-@dataclass(frozen=True)
-class DatasetSettings:
-    """Settings of the samples. Another number of samples does not change the first ones.
-
-    Attributes:
-        contacts: what contacts are drawn from.
-        resolution: (width, height) pixels; None for the camera's own.
-        photons: of the radiance cache that all samples share.
-        seed: of everything; sample i depends on it and on i only.
-        exposure: a factor on the radiance, or "auto": what suits the untouched sensor. One for
-            all samples, as a camera with a fixed exposure.
-        camera_noise: standard deviation in levels of 255 (see `camera_noise`); 0 leaves pictures
-            clean, so that noise can be added when they are used.
-        radiance: also write linear radiance as EXR.
-        estimator: "radiance-cache" or "sppm"; see docs/simulation.md.
-        hold_out: texts of indenters that are in the test split only.
-        skin: "elastic" or "conforming"; see docs/mechanics.md.
-    """
-
-    contacts: ContactDraw = field(default_factory=ContactDraw)
-    resolution: tuple[int, int] | None = None
-    photons: int = SAMPLE_PHOTONS
-    seed: int = 0
-    exposure: float | str = "auto"
-    camera_noise: float = 0.0
-    radiance: bool = False
-    estimator: str = RADIANCE_CACHE
-    skin: str = ELASTIC
-    hold_out: tuple[str, ...] = ()
-
-    def __post_init__(self) -> None:
-        if not 0 <= self.camera_noise < 256:
-            raise TaskError(f"the camera noise is {self.camera_noise}", hint="Give 0 to 255")
-        if self.seed < 0:
-            raise TaskError(f"the seed is {self.seed}", hint="Give 0 or more")
-        for text in self.hold_out:
-            if text not in self.contacts.indenters:
-                raise TaskError(
-                    f"'{text}' is held out, but nothing is pressed in with it",
-                    hint="Indenters: " + ", ".join(self.contacts.indenters),
-                )
 
 
 def generate(
@@ -198,7 +155,7 @@ class _Maker:
         try:
             dataset.background()
         except TaskError:
-            self._write_background(self._untouched_image(), self._exposure)
+            self._write_background(self._image(), self._exposure)
         try:
             dataset.camera_rays()
         except TaskError:
@@ -228,7 +185,7 @@ class _Maker:
                 reason = error.message
             if reason:
                 continue
-            image = self._render(drawn)
+            image = self._image(drawn.contact)
             if image.contact_mask.sum() >= LEAST_PIXELS:
                 self._write(index, attempt, drawn, image)
                 return
@@ -301,7 +258,7 @@ class _Maker:
 
     def _begin(self, common: dict[str, Any]) -> float:
         """Write what is common to all samples; returns the exposure."""
-        image = self._untouched_image()
+        image = self._image()
         asked = self._settings.exposure
         exposure = float(image.auto_exposure() if asked == "auto" else asked)
         save_design(self._model.design, self._folder / DESIGN)
@@ -320,8 +277,9 @@ class _Maker:
         write_json(self._folder / INFO, info, "the dataset")  # last: now it is a dataset
         return exposure
 
-    def _untouched_image(self) -> TactileImage:
+    def _image(self, *contacts: Contact) -> TactileImage:
         return self._model.render(
+            contacts,
             resolution=self._resolution,
             photons=self._settings.photons,
             seed=self._settings.seed,
@@ -360,18 +318,6 @@ class _Maker:
             },
             "meshes": mesh_digests(self._model.design),
         }
-
-    def _render(self, drawn: DrawnContact) -> TactileImage:
-        image = self._model.render(
-            [drawn.contact],
-            resolution=self._resolution,
-            photons=self._settings.photons,
-            seed=self._settings.seed,
-            estimator=self._settings.estimator,
-            skin=self._settings.skin,
-            partial=False,
-        )
-        return image
 
     def _write(self, index: int, attempt: int, drawn: DrawnContact, image: TactileImage) -> None:
         settings = self._settings
