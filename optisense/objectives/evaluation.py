@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
 from functools import partial
-from typing import TYPE_CHECKING, Any, TypeVar, cast
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,10 +15,11 @@ from optisense.design.camera_checks import camera_fault
 from optisense.design.lenses.film import PictureWindow
 from optisense.design.material_checks import index_problems
 from optisense.design.problems import Diagnostic
-from optisense.errors import ObjectiveError, OptiSenseError
+from optisense.errors import ObjectiveError
 from optisense.geometry import Contact, Sphere
 from optisense.objectives.exposure import exposure_for
 from optisense.objectives.frames import frame_of, nearest_press
+from optisense.objectives.made_once import MadeOnce
 from optisense.objectives.press import Press
 from optisense.objectives.settings import VIEW_ACROSS, Settings, size_for
 from optisense.objectives.unexposed import (
@@ -34,8 +34,6 @@ from optisense.quality import SCORE_PHOTONS
 if TYPE_CHECKING:
     from optisense.optics import ChiefRays, OpticalModel, RenderProgress, TactileImage
 
-_T = TypeVar("_T")
-
 ProgressCallback = Callable[[float, str], None]
 """Called with the finished fraction (0 to 1) of the work and a few words on what is being done."""
 
@@ -44,7 +42,7 @@ Reads = Callable[[Press], NDArray[np.float64]]
 of the camera samples will do."""
 
 
-class Evaluation:
+class Evaluation(MadeOnce):
     """One sensor, ready to be judged by several objectives.
 
     Attributes:
@@ -69,12 +67,11 @@ class Evaluation:
             reads: which pixels of a press the objectives read, if not all one by one. The others
                 decide about the exposure only, and are rendered roughly (`registry.pixels_read`).
         """
+        super().__init__()
         self.model = model
         self._reads = reads
         self.settings = settings or Settings()
-        self.seconds: dict[str, float] = {}
         self._progress = progress or (lambda fraction, text: None)
-        self._made: dict[str, Any] = {}
         self._untouched_responses: dict[tuple[float, bool], NDArray[np.float32]] = {}
 
     @property
@@ -100,7 +97,7 @@ class Evaluation:
     @property
     def chief_rays(self) -> ChiefRays:
         """One chief ray a pixel of `ray_resolution`, of the untouched sensor."""
-        return self._once("chief rays", lambda: self.model.chief_rays(self.ray_resolution))
+        return self.shared("chief rays", lambda: self.model.chief_rays(self.ray_resolution))
 
     def check_possible(self) -> None:
         """Make sure that there can be such a camera and such materials.
@@ -109,7 +106,7 @@ class Evaluation:
             ObjectiveError: the camera is inside a part, no lens has its field of view, or no
                 material has the refractive index of a part.
         """
-        fault = self._once("faults", self._fault)
+        fault = self.shared("faults", self._fault)
         if fault is not None:
             raise ObjectiveError(fault.message, hint=fault.hint)
 
@@ -123,7 +120,7 @@ class Evaluation:
     def view(self) -> View:
         """How much the camera sees, by rays of its own (see `settings.VIEW_ACROSS`)."""
         size = size_for(self.design.camera.resolution, VIEW_ACROSS)
-        return self._once(
+        return self.shared(
             "view", lambda: view_of(self.model.chief_rays(size), self.model.sensing.face_areas)
         )
 
@@ -140,7 +137,7 @@ class Evaluation:
     @property
     def untouched(self) -> TactileImage:
         """The image of the untouched sensor."""
-        return self._once("untouched image", lambda: self._render((), 0.0, self._first_image))
+        return self.shared("untouched image", lambda: self._render((), 0.0, self._first_image))
 
     @property
     def exposure(self) -> float:
@@ -149,7 +146,7 @@ class Evaluation:
         Automatic: see `exposure_for`.
         """
         if self.settings.exposure == "auto":
-            return self._once("exposure", self._auto_exposure)
+            return self.shared("exposure", self._auto_exposure)
         return float(self.settings.exposure)
 
     @property
@@ -157,7 +154,7 @@ class Evaluation:
         """The factor that suits the untouched sensor, whatever contacts look like."""
         if self.settings.exposure == "auto":
             chain = self.model.picture_chain
-            return self._once(
+            return self.shared(
                 "untouched exposure", lambda: chain.auto_exposure(self._untouched_radiance)
             )
         return float(self.settings.exposure)
@@ -165,7 +162,7 @@ class Evaluation:
     @property
     def contacts(self) -> list[Contact]:
         """The ball at each place."""
-        return self._once("contacts", self._contacts)
+        return self.shared("contacts", self._contacts)
 
     @property
     def presses(self) -> list[Press]:
@@ -174,7 +171,7 @@ class Evaluation:
         Raises:
             ObjectiveError: a place is not seen, overexposed or black.
         """
-        return self._once("presses", self._presses)
+        return self.shared("presses", self._presses)
 
     @property
     def calibration_presses(self) -> list[Press]:
@@ -186,33 +183,8 @@ class Evaluation:
         """
         exposure = self.untouched_exposure
         if exposure == self.exposure:
-            return self._once("exposed presses", lambda: self._exposed(exposure))
-        return self._once("calibration presses", lambda: self._exposed(exposure))
-
-    def shared(self, name: str, make: Callable[[], _T]) -> _T:
-        """A value that several objectives need, made once per evaluation; an error is kept too.
-
-        Args:
-            name: of it, with the settings that it depends on.
-            make: makes it.
-        """
-        return self._once(name, make)
-
-    def _once(self, name: str, make: Callable[[], _T]) -> _T:
-        """Make something on first use; an error is kept too, and raised again."""
-        if name not in self._made:
-            began = time.perf_counter()
-            inner = sum(self.seconds.values())
-            try:
-                self._made[name] = make()
-            except OptiSenseError as error:
-                self._made[name] = error
-            spent_inside = sum(self.seconds.values()) - inner
-            self.seconds[name] = round(time.perf_counter() - began - spent_inside, 4)
-        made = self._made[name]
-        if isinstance(made, OptiSenseError):
-            raise made
-        return cast("_T", made)
+            return self.shared("exposed presses", lambda: self._exposed(exposure))
+        return self.shared("calibration presses", lambda: self._exposed(exposure))
 
     def _contacts(self) -> list[Contact]:
         """Presses at the places that the user named, or at nine that cover what is seen.
@@ -306,7 +278,7 @@ class Evaluation:
         from optisense.objectives.usual_score import usual_score
 
         usual = usual_score(self.design, BUILT_IN[:1], self.settings)
-        return self._once("first image", lambda: usual.share_of_first_image)
+        return self.shared("first image", lambda: usual.share_of_first_image)
 
     def _unexposed(self) -> list[UnexposedPress]:
         self.untouched  # noqa: B018  light is traced for it, which progress counts first
@@ -317,10 +289,10 @@ class Evaluation:
 
     @property
     def _untouched_radiance(self) -> NDArray[np.float32]:
-        return self._once("untouched radiance", lambda: self.untouched.radiance)
+        return self.shared("untouched radiance", lambda: self.untouched.radiance)
 
     def _auto_exposure(self) -> float:
-        seen = self._once("pressed images", self._unexposed)
+        seen = self.shared("pressed images", self._unexposed)
         camera = self.model.picture_chain
         pressed = [
             camera.metered(each.radiance[each.press.mask[each.touched]], each.press.mask)
@@ -329,7 +301,7 @@ class Evaluation:
         return exposure_for(self._untouched_radiance, pressed, camera)
 
     def _presses(self) -> list[Press]:
-        presses = self._once("exposed presses", lambda: self._exposed(self.exposure))
+        presses = self.shared("exposed presses", lambda: self._exposed(self.exposure))
         for press in presses:
             press.check()
         return presses
@@ -341,7 +313,7 @@ class Evaluation:
                 response=self._response(each.touched, each.radiance, exposure),
                 respond_untouched=partial(self._untouched_response, exposure),
             )
-            for each in self._once("pressed images", self._unexposed)
+            for each in self.shared("pressed images", self._unexposed)
         ]
 
     def _untouched_response(self, exposure: float, noisy: bool = False) -> NDArray[np.float32]:

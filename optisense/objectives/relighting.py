@@ -275,14 +275,14 @@ class _Relit(Evaluation):
     @property
     def untouched(self) -> TactileImage:
         """The image of the untouched sensor under these lights."""
-        return self._once("untouched image", lambda: self._relighting.image(self._flux))
+        return self.shared("untouched image", lambda: self._relighting.image(self._flux))
 
     def _auto_exposure(self) -> float:
         return self._relighting.exposure(self._flux)
 
     @property
     def _untouched_radiance(self) -> NDArray[np.float32]:
-        return self._once("untouched radiance", lambda: self._relighting.untouched(self._flux))
+        return self.shared("untouched radiance", lambda: self._relighting.untouched(self._flux))
 
     def _presses(self) -> list[Press]:
         return self._relighting.presses(self._flux, whole=self._whole)
