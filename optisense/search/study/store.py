@@ -21,10 +21,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from optisense.errors import OptiSenseError, OutputError, SearchError
+from optisense.errors import OutputError, SearchError
 from optisense.objectives.registry import CONDITIONS
 from optisense.search.evaluation.outcome import Outcome
 from optisense.search.study.reader import Reader
+from optisense.search.study.store_errors import damaged, told
 from optisense.untrusted_files import MOST_STORE, check_size
 
 FloatArray = NDArray[np.float64]
@@ -107,7 +108,7 @@ class Store:
             OutputError: the file can't be written.
         """
         store = Store(path, objectives)
-        with _told(path):
+        with told(path):
             store._connect("rwc")
             with store._together() as db:
                 for statement in _TABLES.split(";"):
@@ -153,7 +154,7 @@ class Store:
                     where=str(self.path),
                     hint="Put the file itself into the study's folder",
                 )
-            with _told(self.path):
+            with told(self.path):
                 self._connect("rw")
                 if not _has_conditions(self._writer):
                     self._writer.execute("alter table fresh_scores add column conditions text")
@@ -166,7 +167,7 @@ class Store:
     def close(self) -> None:
         """Close the file; the content of a store in memory is lost."""
         if self._db is not None:
-            with _told(self.path):
+            with told(self.path):
                 self._db.close()
             self._db = None
 
@@ -186,7 +187,7 @@ class Store:
     @contextmanager
     def _read(self) -> Iterator[sqlite3.Connection]:
         """Yield a connection for reading."""
-        with _told(self.path):
+        with told(self.path):
             if self._db is not None:
                 yield self._db
             else:
@@ -196,7 +197,7 @@ class Store:
 
     def set_fact(self, name: str, value: object) -> None:
         """Store a JSON-ready value under a name."""
-        with _told(self.path):
+        with told(self.path):
             self._writer.execute(
                 "insert or replace into facts values (?, ?)", (name, json.dumps(value))
             )
@@ -221,7 +222,7 @@ class Store:
             (first + k, generation, place + k, np.ascontiguousarray(vector, "<f8").tobytes())
             for k, vector in enumerate(vectors)
         ]
-        with _told(self.path), self._together() as db:
+        with told(self.path), self._together() as db:
             db.executemany(
                 "insert into trials (number, generation, place, vector) values (?, ?, ?, ?)", rows
             )
@@ -238,7 +239,7 @@ class Store:
             time.time(),
             number,
         )
-        with _told(self.path):
+        with told(self.path):
             changed = self._writer.execute(
                 "update trials set done = 1, scores = ?, failure = ?, parts = ?, gradient = ?, "
                 "seconds = ?, worker = ?, finished = ? where number = ? and done = 0",
@@ -249,7 +250,7 @@ class Store:
 
     def finish_fresh(self, number: int, seed: int, outcome: Outcome) -> None:
         """Write the outcome of a trial with another seed."""
-        with _told(self.path):
+        with told(self.path):
             self._writer.execute(
                 "insert or replace into fresh_scores (number, seed, scores, failure, conditions) "
                 "values (?, ?, ?, ?, ?)",
@@ -393,49 +394,3 @@ def _objects(parts: Any) -> dict[str, Any]:
         if value is not None and not isinstance(value, int | float):
             raise TypeError("a condition's value is no number")
     return parts
-
-
-def damaged(what: str, path: Path | None, why: str) -> SearchError:
-    """Return the error for a store with unexpected content."""
-    return SearchError(
-        f"{what} can't be read: {why}",
-        where=None if path is None else str(path),
-        hint="The file is damaged: use a copy of it, or begin a new study",
-    )
-
-
-@contextmanager
-def _told(path: Path | None) -> Iterator[None]:
-    """Turn errors of SQLite and of the file system into errors of this package."""
-    try:
-        yield
-    except (sqlite3.Error, OSError, MemoryError, UnicodeDecodeError) as error:
-        raise _error(error, path) from error
-
-
-def _error(error: Exception, path: Path | None) -> OptiSenseError:
-    where = None if path is None else str(path)
-    text = str(error)
-    if isinstance(error, MemoryError | UnicodeDecodeError):
-        # SQLite also reports pages with impossible content like this.
-        return damaged("the study's store", path, text or "its pages make no sense")
-    if "full" in text:
-        return OutputError("the disk is full", where=where, hint="Free some space on it")
-    if any(sign in text for sign in ("not a database", "malformed", "no such table")):
-        return SearchError(
-            f"this is not a study's store, or it is damaged: {text}",
-            where=where,
-            hint="Use a copy of it, or begin a new study",
-        )
-    hint = next((hint for sign, hint in REMEDIES.items() if sign in text), None)
-    return OutputError(f"the store can't be used: {text}", where=where, hint=hint)
-
-
-REMEDIES = {
-    "disk I/O error": "The disk is full, was disconnected or fails: free space on it and check it",
-    "unable to open": "Check that the file may be read, and its folder be written to for a search",
-    "readonly": "Copy the study to a folder that may be written to",
-    "locked": "End the other program that has the file open",
-    "Permission denied": "Ask its owner for the right to read it",
-}
-"""Hints for other errors of SQLite, by words in their message."""
