@@ -21,8 +21,7 @@ from optisense.search.executors.base import outcome_of
 from optisense.search.methods import Method, Problem, make
 from optisense.search.space.manufacturing import ManufacturingErrors
 from optisense.search.study.best import tie_note
-from optisense.search.study.conditions import condition_note, lost, lost_note, unmet
-from optisense.search.study.failures import cause_of
+from optisense.search.study.conditions import condition_note, lost_note
 from optisense.search.study.progress import SearchProgress, SearchProgressCallback, SearchResult
 from optisense.search.study.rescoring import SEEDS as FRESH_SEEDS
 from optisense.search.study.rescoring import rescore
@@ -37,18 +36,9 @@ from optisense.search.study.stages import (
 )
 from optisense.search.study.store import START, Row
 from optisense.search.study.study import Study
+from optisense.search.study.tally import Tally
 from optisense.search.study.trial import Trial
 from optisense.time_left import TimeLeft
-
-ALL_FAIL = 20
-"""Number of first trials that must all fail for a study to stop early, if the starting design has a
-score.
-"""
-
-ALL_FAIL_WITH_START = 5
-"""Number of first trials that must all fail for a study to stop early, if the starting design fails
-too; then an error in the set-up is likely.
-"""
 
 SAME_POINT = 1e-9
 """Largest difference, as a share of the range, between proposals that count as the same point;
@@ -127,14 +117,8 @@ class StudyRun:
         self._progress = progress or (lambda progress: None)
         self._notes: list[str] = []
         self._finished: queue.SimpleQueue[tuple[int, Future[Outcome]]] = queue.SimpleQueue()
-        self._done = self._failed = self._broken = 0
-        self._nearest: Outcome | None = None
-        self._best_outcome: Outcome | None = None
-        self._start_outcome: Outcome | None = None
+        self._tally = Tally(study.objective)
         self._first_seconds = 0.0
-        self._reasons: dict[str, list[str]] = {}
-        self._scored: dict[bytes, Outcome] = {}
-        self._best = self._start_score = math.nan
         self._told = time.monotonic()
         self._stage = START_STAGE
         self._plain = self._evaluator is usual or settings.errors is not None
@@ -158,7 +142,9 @@ class StudyRun:
         study = self.study
         study.lock()
         interrupted, ended = False, ""
-        self._count_known()
+        for row in study.store.rows():
+            if row.outcome is not None:
+                self._tally.count(row, row.outcome)
         with self._make_runner(self._evaluator) as runner:
             self._time_left.workers = runner.workers
             expect_stages(
@@ -175,7 +161,7 @@ class StudyRun:
                     self._expect_fresh_scores(USUAL_FRESH)
                 self._begin(START_STAGE)
                 self._score_start(runner)
-                self._begin(TRIALS, self._done)
+                self._begin(TRIALS, self._tally.done)
                 ended = self._search(runner)
                 self._report(now=True)
                 self._begin(FRESH)
@@ -183,8 +169,8 @@ class StudyRun:
             except KeyboardInterrupt:
                 interrupted, ended = True, "interrupted"
         study.store.set_fact("ended", ended)
-        if not interrupted and self._done == self._failed > 0 and math.isnan(self._start_score):
-            raise self._all_failed()
+        if not interrupted and self._tally.has_no_score:
+            raise self._tally.all_failed()
         several = self.method.several  # the result is a front, not one best trial
         tie = None if several else tie_note(study.trials)
         told = [tie, condition_note(study.trials)]
@@ -237,9 +223,9 @@ class StudyRun:
 
         def finished(number: int, outcome: Outcome) -> None:
             self.study.store.finish(number, outcome)
-            self._count(by_number[number], outcome)
+            self._tally.count(by_number[number], outcome)
             if self._stage == TRIALS:
-                self._time_left.advance(self._done, outcome.seconds, outcome.worker)
+                self._time_left.advance(self._tally.done, outcome.seconds, outcome.worker)
             else:
                 self._time_left.advance(1.0, outcome.seconds, outcome.worker)
             self._expect_fresh(outcome)
@@ -247,7 +233,7 @@ class StudyRun:
 
         jobs = []
         for row in by_number.values():
-            known = self._scored.get(row.vector.tobytes())
+            known = self._tally.scored.get(row.vector.tobytes())
             if known is None:
                 jobs.append((row.number, row.vector, self.study.settings.seed))
             else:
@@ -305,46 +291,6 @@ class StudyRun:
     def _hand_over(self, number: int, done: Future[Outcome]) -> None:
         """Queue a finished trial; it is called in the thread where the trial finished."""
         self._finished.put((number, done))
-
-    def _count_known(self) -> None:
-        for row in self.study.store.rows():
-            if row.outcome is not None:
-                self._count(row, row.outcome)
-
-    def _count(self, row: Row, outcome: Outcome) -> None:
-        """Count a finished trial, and stop a study in which every trial fails.
-
-        Raises:
-            SearchError: the first trials all failed; the message says why.
-        """
-        score = outcome.scores.get(self.study.objective, math.nan)
-        if row.generation == START:
-            self._start_score, self._start_outcome = score, outcome
-        else:
-            self._done += 1
-            self._failed += outcome.failed
-            self._broken += not outcome.failed and not outcome.is_feasible
-            if outcome.failure is not None:
-                self._reasons.setdefault(cause_of(outcome.failure), []).append(outcome.failure)
-        if not outcome.failed:
-            self._scored[row.vector.tobytes()] = outcome
-            if outcome.is_feasible and not score <= self._best:
-                self._best, self._best_outcome = score, outcome
-            if self._nearest is None or outcome.breach < self._nearest.breach:
-                self._nearest = outcome
-        enough = ALL_FAIL_WITH_START if math.isnan(self._start_score) else ALL_FAIL
-        if self._failed == self._done >= enough:
-            raise self._all_failed()
-
-    def _all_failed(self) -> SearchError:
-        """Return the error for a study in which no trial has a score."""
-        reasons = max(self._reasons.values(), key=len)
-        return SearchError(
-            f"all {self._done} trials so far have failed, {len(reasons)} of them because: "
-            f"{reasons[0]}",
-            hint="Change the bounds, or see with `optisense evaluate` whether the design can be "
-            "scored at all",
-        )
 
     def _compare(self, asked: np.ndarray, rows: Sequence[Row]) -> None:
         """Note if the method proposes other points than it did before."""
@@ -416,40 +362,21 @@ class StudyRun:
         if not now and clock - self._told < TICK / 2:
             return
         self._told = clock
-        fresh = self._stage == FRESH
+        fresh, tally = self._stage == FRESH, self._tally
         self._progress(
             SearchProgress(
                 stage=self._stage,
-                done=self._fresh_done if fresh else self._done,
+                done=self._fresh_done if fresh else tally.done,
                 total=self._fresh_count if fresh else self.limit,
-                failed=self._failed,
-                broken=self._broken,
-                nearest=_nearest_note(self._nearest),
-                lost=self._lost(),
-                best=self._best,
-                start=self._start_score,
+                failed=tally.failed,
+                broken=tally.broken,
+                nearest=tally.nearest_note(),
+                lost=tally.lost(),
+                best=tally.best,
+                start=tally.start,
                 trials_per_hour=self._trials_an_hour,
                 seconds_left=self._time_left.seconds_left,
                 facts=self.method.describe(),
                 doing=self._doing,
             )
         )
-
-    def _lost(self) -> tuple[str, ...]:
-        """Return the watched quantities that are worse in the best trial so far than in the
-        start.
-        """
-        best, start = self._best_outcome, self._start_outcome
-        if best is None or start is None or start.failed or not self._best > self._start_score:
-            return ()
-        worse = lost(best, start)
-        return tuple(f"{name} {now:.3g} (start {was:.3g})" for name, (now, was) in worse.items())
-
-
-def _nearest_note(outcome: Outcome | None) -> str:
-    """Return the conditions that the trial nearest to feasibility breaks, or "" if a trial is
-    feasible.
-    """
-    if outcome is None or outcome.is_feasible:
-        return ""
-    return ", ".join(unmet(outcome.conditions))

@@ -1,0 +1,102 @@
+"""Counts of a study's trials, and the best of them."""
+
+from __future__ import annotations
+
+import math
+
+from optisense.errors import SearchError
+from optisense.search.evaluation.outcome import Outcome
+from optisense.search.study.conditions import lost, unmet
+from optisense.search.study.failures import cause_of
+from optisense.search.study.store import START, Row
+
+ALL_FAIL = 20
+"""Number of first trials that must all fail for a study to stop early, if the starting design has a
+score.
+"""
+
+ALL_FAIL_WITH_START = 5
+"""Number of first trials that must all fail for a study to stop early, if the starting design fails
+too; then an error in the set-up is likely.
+"""
+
+
+class Tally:
+    """Counts of the finished trials of a study.
+
+    Attributes:
+        done, failed, broken: number of finished trials, of failed ones, and of those that break a
+            condition, each without the start.
+        best, start: highest score of a trial that meets all conditions, and score of the start;
+            NaN if there is none.
+        scored: outcomes by the bytes of their points.
+    """
+
+    def __init__(self, objective: str) -> None:
+        """Args: objective: name of the objective that `best` and `start` are scores of."""
+        self.done = self.failed = self.broken = 0
+        self.best = self.start = math.nan
+        self.scored: dict[bytes, Outcome] = {}
+        self._objective = objective
+        self._nearest: Outcome | None = None
+        self._best_outcome: Outcome | None = None
+        self._start_outcome: Outcome | None = None
+        self._reasons: dict[str, list[str]] = {}
+
+    def count(self, row: Row, outcome: Outcome) -> None:
+        """Count a finished trial, and stop a study in which every trial fails.
+
+        Raises:
+            SearchError: the first trials all failed; the message says why.
+        """
+        score = outcome.scores.get(self._objective, math.nan)
+        if row.generation == START:
+            self.start, self._start_outcome = score, outcome
+        else:
+            self.done += 1
+            self.failed += outcome.failed
+            self.broken += not outcome.failed and not outcome.is_feasible
+            if outcome.failure is not None:
+                self._reasons.setdefault(cause_of(outcome.failure), []).append(outcome.failure)
+        if not outcome.failed:
+            self.scored[row.vector.tobytes()] = outcome
+            if outcome.is_feasible and not score <= self.best:
+                self.best, self._best_outcome = score, outcome
+            if self._nearest is None or outcome.breach < self._nearest.breach:
+                self._nearest = outcome
+        enough = ALL_FAIL_WITH_START if math.isnan(self.start) else ALL_FAIL
+        if self.failed == self.done >= enough:
+            raise self.all_failed()
+
+    @property
+    def has_no_score(self) -> bool:
+        """Whether there are trials, but neither they nor the start have a score."""
+        return self.done == self.failed > 0 and math.isnan(self.start)
+
+    def all_failed(self) -> SearchError:
+        """Return the error for a study in which no trial has a score."""
+        reasons = max(self._reasons.values(), key=len)
+        return SearchError(
+            f"all {self.done} trials so far have failed, {len(reasons)} of them because: "
+            f"{reasons[0]}",
+            hint="Change the bounds, or see with `optisense evaluate` whether the design can be "
+            "scored at all",
+        )
+
+    def nearest_note(self) -> str:
+        """Return the conditions that the trial nearest to feasibility breaks, or "" if a trial is
+        feasible.
+        """
+        if self._nearest is None or self._nearest.is_feasible:
+            return ""
+        return ", ".join(unmet(self._nearest.conditions))
+
+    def lost(self) -> tuple[str, ...]:
+        """Return the watched quantities that are worse in the best trial so far than in the
+        start.
+        """
+        best, start = self._best_outcome, self._start_outcome
+        if best is None or start is None or start.failed or not self.best > self.start:
+            return ()
+        worse = lost(best, start)
+        return tuple(f"{name} {now:.3g} (start {was:.3g})" for name, (now, was) in worse.items())
