@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import time
 from typing import Any
 
 import bpy
 
-from ..core.engine import EngineError, Request
-from ..engine import catalogue, handing, session
+from ..engine import catalogue, session
+from ..engine.latest import LatestRequest
 from ..scene.collections import is_edited
 from . import prop
 from .operator import chosen, take_live
@@ -19,9 +18,7 @@ REST = 0.2
 """Seconds without a change after which an edited sensor is scored: a score takes the engine some
 hundredths of a second and checks the sensor first, which pictures of a drag need not wait for."""
 
-_open: Request | None = None
-_when: float | None = None
-"""When to score, if nothing changes before."""
+_request = LatestRequest(REST)
 
 
 def objectives(context: bpy.types.Context) -> list[str]:
@@ -32,40 +29,20 @@ def objectives(context: bpy.types.Context) -> list[str]:
 
 def wanted() -> None:
     """The sensor changed, or scoring while editing was switched on."""
-    global _when
-    values = bpy.context.window_manager.optisense_evaluation
-    _when = time.monotonic() + REST if values.live else None
+    if bpy.context.window_manager.optisense_evaluation.live:
+        _request.want()
+    else:
+        _request.drop()
 
 
 def _ask() -> None:
-    global _open, _when
-    scene = bpy.context.scene
-    if _when is None or time.monotonic() < _when or session.is_busy():
+    if not _request.is_due:
         return
-    if _open is not None and not _open.done:
-        return
-    _when = None
-    names = objectives(bpy.context)
-    if scene is None or not scene.optisense.is_open or not names:
-        return
-    try:
-        design = handing.design(scene)
-    except EngineError:  # the buttons say that
-        return
-    _open = session.ask(
-        "evaluate", take_live, _refused, design=design, objectives=names, name="live"
-    )
-
-
-def _refused(error: EngineError) -> None:
-    """What is wrong in the middle of an edit, Check and Evaluate tell."""
-
-
-def _leave() -> None:
-    global _open, _when
-    if _open is not None:
-        _open.ignore()
-    _open = _when = None
+    scene, names = bpy.context.scene, objectives(bpy.context)
+    if scene is not None and scene.optisense.is_open and names:
+        _request.send("evaluate", take_live, objectives=names, name="live")
+    else:
+        _request.drop()
 
 
 @bpy.app.handlers.persistent
@@ -77,10 +54,10 @@ def _changed(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
 HOOKS: tuple[tuple[Any, Any], ...] = (
     (prop.when_live_changed, wanted),
     (session.when_ticking, _ask),
-    (session.when_leaving, _leave),
+    (session.when_leaving, _request.leave),
     (bpy.app.handlers.depsgraph_update_post, _changed),
 )
 
 
 def unregister() -> None:
-    _leave()
+    _request.leave()

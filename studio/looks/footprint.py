@@ -10,8 +10,9 @@ from bpy.props import StringProperty
 from numpy.typing import NDArray
 
 from ..core import outlines
-from ..core.engine import EngineError, Request
-from ..engine import handing, session
+from ..core.engine import EngineError
+from ..engine import session
+from ..engine.latest import LatestRequest
 from ..scene.collections import is_edited
 from ..scene.contacts import sensing_surface
 from . import drawing, section
@@ -32,8 +33,7 @@ _shown: dict[str, Any] = {}
 """The footprint that is drawn: `seen` and `border`, arrays of corners (n, 3) in mm, and the sensing
 surface that it is `of`."""
 
-_open: Request | None = None
-_wanted = False
+_request = LatestRequest()
 
 
 class OPTISENSE_PG_footprint(bpy.types.PropertyGroup):
@@ -49,8 +49,7 @@ def is_on(scene: bpy.types.Scene | None) -> bool:
 
 def wanted() -> None:
     """Something changed that the camera sees, or the footprint was switched on or off."""
-    global _wanted
-    _wanted = True
+    _request.want()
     if not is_on(bpy.context.scene):
         _leave()
         session.redraw()
@@ -59,26 +58,16 @@ def wanted() -> None:
 
 
 def _ask() -> None:
-    """One request at a time; what changes meanwhile goes into the next."""
-    global _open, _wanted
     scene = bpy.context.scene
-    if not _wanted or not is_on(scene) or session.is_busy():
+    if not is_on(scene) or not _request.is_due:
         return
-    if _open is not None and not _open.done:
-        return
-    _wanted = False
     name = scene.name
-    try:
-        design = handing.design(scene)
-    except EngineError as error:
-        _refused(error)
-        return
 
     def seen(result: dict[str, Any]) -> None:
         if bpy.context.scene is not None and bpy.context.scene.name == name:
             _take(result)
 
-    _open = session.ask("footprint", seen, _refused, design=design, name="footprint")
+    _request.send("footprint", seen, _refused, name="footprint")
 
 
 def _take(result: dict[str, Any]) -> None:
@@ -183,19 +172,15 @@ def face_normals(corners: NDArray[np.float32]) -> NDArray[np.float32]:
 
 def _leave() -> None:
     """Draw no footprint any more."""
-    global _open, _wanted
-    if _open is not None:
-        _open.ignore()
-    _open, _wanted = None, False
+    _request.leave()
     _shown.clear()
     bpy.context.window_manager.optisense_footprint.text = ""
 
 
 @bpy.app.handlers.persistent
 def _changed(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
-    global _wanted
     if is_on(scene) and is_edited(depsgraph, *KINDS):
-        _wanted = True  # asked at the next tick: Blender is in the middle of an edit
+        _request.want()  # asked at the next tick: Blender is in the middle of an edit
 
 
 @bpy.app.handlers.persistent

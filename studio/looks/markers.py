@@ -11,8 +11,8 @@ import numpy as np
 from bpy.props import FloatProperty, IntProperty
 from numpy.typing import NDArray
 
-from ..core.engine import EngineError, Request
-from ..engine import handing, polls, session
+from ..engine import polls, session
+from ..engine.latest import LatestRequest
 from ..engine.layout import labelled
 from ..engine.operators import ChoosingProperties
 from ..scene.collections import is_edited
@@ -30,8 +30,7 @@ LIFT = 0.03
 """mm: how far beside the skin dots are drawn, on both sides, so that it does not hide them."""
 
 _shown: dict[str, Any] = {}
-_open: Request | None = None
-_wanted = False
+_request = LatestRequest()
 
 
 def of_design(scene: bpy.types.Scene) -> dict[str, Any] | None:
@@ -52,26 +51,15 @@ def is_on(scene: bpy.types.Scene | None) -> bool:
 
 def wanted() -> None:
     """Something changed that markers depend on; asked at the next look at the engine."""
-    global _wanted
-    _wanted = True
+    _request.want()
     if not is_on(bpy.context.scene):
         _shown.clear()
         session.redraw()
 
 
 def _ask() -> None:
-    global _open, _wanted
-    scene = bpy.context.scene
-    if not _wanted or not is_on(scene) or session.is_busy():
-        return
-    if _open is not None and not _open.done:
-        return
-    _wanted = False
-    try:
-        design = handing.design(scene)
-    except EngineError:  # the buttons say that
-        return
-    _open = session.ask("markers", _take, lambda _: None, design=design, name="markers")
+    if is_on(bpy.context.scene) and _request.is_due:
+        _request.send("markers", _take, name="markers")
 
 
 def _take(result: dict[str, Any]) -> None:
@@ -172,8 +160,8 @@ def _set(scene: bpy.types.Scene, values: dict[str, Any] | None) -> None:
 
 @bpy.app.handlers.persistent
 def _changed(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
-    global _wanted
-    _wanted = _wanted or (is_on(scene) and is_edited(depsgraph, *KINDS))
+    if not _request.is_wanted and is_on(scene) and is_edited(depsgraph, *KINDS):
+        _request.want()
 
 
 @bpy.app.handlers.persistent
@@ -182,8 +170,7 @@ def _again(*_: Any) -> None:
 
 
 def _leave() -> None:
-    if _open is not None:
-        _open.ignore()
+    _request.leave()
     _shown.clear()
 
 

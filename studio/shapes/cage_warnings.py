@@ -3,22 +3,18 @@
 from __future__ import annotations
 
 import re
-import time
 from typing import Any
 
 import bpy
 
-from ..core.engine import EngineError, Request
-from ..engine import handing, session
+from ..engine import session
+from ..engine.latest import LatestRequest
 from ..scene import cages
 
 REST = 0.3
 """Seconds without a change after which it is looked at: drafts of what is moved go first."""
 
-_bent: float | None = None
-"""When a cage was changed last, if that was not looked at yet."""
-
-_open: Request | None = None
+_request = LatestRequest(REST)
 _found: dict[str, list[dict[str, Any]]] = {}
 
 
@@ -27,24 +23,14 @@ def warnings_of(key: str) -> list[dict[str, Any]]:
     return _found.get(key, [])
 
 
-def _wanted() -> None:
-    global _bent
-    _bent = time.monotonic()
-
-
 def _look() -> None:
-    global _bent, _open
-    waits = _open is not None and not _open.done
-    if _bent is None or waits or time.monotonic() - _bent < REST or session.is_busy():
+    if not _request.is_due:
         return
-    _bent, scene = None, bpy.context.scene
-    if scene is None or not scene.optisense.is_open:
-        return
-    try:
-        design = handing.design(scene)
-    except EngineError:  # the buttons say that
-        return
-    _open = session.ask("check", _take, lambda _: _found.clear(), design=design)
+    scene = bpy.context.scene
+    if scene is not None and scene.optisense.is_open:
+        _request.send("check", _take, lambda error: _found.clear())
+    else:
+        _request.drop()
 
 
 def _take(result: dict[str, Any]) -> None:
@@ -56,10 +42,9 @@ def _take(result: dict[str, Any]) -> None:
     session.redraw()
 
 
-HOOKS = ((cages.when_bent, _wanted), (session.when_ticking, _look))
+HOOKS = ((cages.when_bent, _request.want), (session.when_ticking, _look))
 
 
 def unregister() -> None:
-    global _bent, _open
-    _bent = _open = None
+    _request.leave()
     _found.clear()

@@ -26,7 +26,8 @@ def text() -> str:
 
 
 def seen_per_cent() -> float:
-    until(lambda: footprint._open is not None and footprint._open.done and not footprint._wanted)
+    request = footprint._request
+    until(lambda: request.open is not None and request.open.done and not request.is_wanted)
     return float(text().partition(" %")[0].rpartition(" ")[2])
 
 
@@ -80,7 +81,7 @@ def test_switched_off_nothing_is_asked_or_drawn(shown: Any) -> None:
     assert not footprint._shown and not text()
     objects_of(shown, "CAMERA")[0].location += Vector((1.0, 0.0, 0.0))
     bpy.context.view_layer.update()
-    assert footprint._open is None and not footprint._wanted
+    assert footprint._request.open is None and not footprint._request.is_wanted
 
 
 def test_the_section_cuts_it(shown: Any) -> None:

@@ -85,5 +85,5 @@ def test_scores_by_rays_follow_while_one_edits(mini: Any) -> None:
         assert layout is not None and any("Scored while editing" in text for text in layout.texts)
     finally:
         values.live = False
-    assert live._when is None
+    assert not live._request.is_wanted
     assert not evaluated("aoap").scores["aoap"].is_live

@@ -1,0 +1,82 @@
+"""A request to the engine that follows the changes of a scene's design."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from typing import Any
+
+import bpy
+
+from ..core.engine import EngineError, Request
+from . import handing, session
+
+
+class LatestRequest:
+    """A request that is sent again after each change of the design.
+
+    One request is open at a time; the next one has all changes that were made meanwhile.
+
+    Attributes:
+        open: the request that was sent last; None before the first one.
+    """
+
+    def __init__(self, rest: float = 0.0) -> None:
+        """Args: rest: seconds without a change after which the request is sent."""
+        self.open: Request | None = None
+        self._rest = rest
+        self._when: float | None = None
+
+    @property
+    def is_wanted(self) -> bool:
+        """Whether there was a change since the last request."""
+        return self._when is not None
+
+    @property
+    def is_due(self) -> bool:
+        """Whether the request can be sent now."""
+        return (
+            self._when is not None
+            and time.monotonic() >= self._when
+            and (self.open is None or self.open.done)
+            and not session.is_busy()
+        )
+
+    def want(self) -> None:
+        """Note a change."""
+        self._when = time.monotonic() + self._rest
+
+    def drop(self) -> None:
+        """Send no further request until the next change."""
+        self._when = None
+
+    def leave(self) -> None:
+        """Drop the request, and ignore the answer of the open one."""
+        self.drop()
+        if self.open is not None:
+            self.open.ignore()
+        self.open = None
+
+    def send(
+        self,
+        what: str,
+        take: session.Answer,
+        refused: Callable[[EngineError], None] = lambda error: None,
+        **fields: Any,
+    ) -> None:
+        """Send the request with the scene's design.
+
+        Args:
+            what: kind of the request.
+            take: function that is called with the answer.
+            refused: function that is called with an error; none is shown by default, as the
+                buttons show those of the design.
+            fields: further fields of the request.
+        """
+        self.drop()
+        try:
+            design = handing.design(bpy.context.scene)
+        except EngineError as error:
+            refused(error)
+            return
+        self.open = session.ask(what, take, refused, design=design, **fields)
