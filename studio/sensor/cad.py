@@ -59,7 +59,14 @@ def now() -> bpy.types.PropertyGroup:
 
 
 class ChoosingFiles:
-    """Operators that ask for one file or several of a folder, or for the folder itself."""
+    """Operators that ask for one CAD file or several of a folder, or for the folder itself."""
+
+    filepath: StringProperty(name="File", description="A CAD file", subtype="FILE_PATH")
+    directory: StringProperty(name="Folder", description="Of the files", subtype="DIR_PATH")
+    files: CollectionProperty(
+        type=bpy.types.OperatorFileListElement, name="Files", description="In the folder"
+    )
+    filter_glob: StringProperty(default=FORMATS, options={"HIDDEN"})
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         context.window_manager.fileselect_add(self)
@@ -79,13 +86,6 @@ class OPTISENSE_OT_cad_files(polls.Replacing, ChoosingFiles, bpy.types.Operator)
     bl_idname = "optisense.cad_files"
     bl_label = "From CAD Files ..."
     bl_options = {"REGISTER"}
-
-    filepath: StringProperty(name="File", description="A CAD file", subtype="FILE_PATH")
-    directory: StringProperty(name="Folder", description="Of the files", subtype="DIR_PATH")
-    files: CollectionProperty(
-        type=bpy.types.OperatorFileListElement, name="Files", description="In the folder"
-    )
-    filter_glob: StringProperty(default=FORMATS, options={"HIDDEN"})
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         paths = self.paths()

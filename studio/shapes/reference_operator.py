@@ -7,7 +7,7 @@ from typing import Any
 
 import bpy
 import numpy as np
-from bpy.props import CollectionProperty, EnumProperty, FloatProperty, StringProperty
+from bpy.props import EnumProperty, FloatProperty
 
 from ..core.mesh_file import Mesh
 from ..engine import polls, session
@@ -18,7 +18,7 @@ from ..scene.collections import REFERENCE, collection, select_only
 from ..scene.contacts import add_contact, sensing_surface
 from ..scene.gather import free_name, part_names
 from ..scene.meshes import new_mesh, part_mesh
-from ..sensor.cad import FORMATS, ChoosingFiles
+from ..sensor.cad import ChoosingFiles
 
 READING = "Reading the mesh"
 """What messages are about, so that they are told beside the button that was pressed."""
@@ -51,12 +51,6 @@ class OPTISENSE_OT_add_mesh(polls.Replacing, ChoosingFiles, bpy.types.Operator):
     bl_label = "Add CAD Files"
     bl_options = {"REGISTER"}
 
-    filepath: StringProperty(name="File", description="A CAD file", subtype="FILE_PATH")
-    directory: StringProperty(name="Folder", description="Of the files", subtype="DIR_PATH")
-    files: CollectionProperty(
-        type=bpy.types.OperatorFileListElement, name="Files", description="In the folder"
-    )
-    filter_glob: StringProperty(default=FORMATS, options={"HIDDEN"})
     scale: FloatProperty(
         name="Scale",
         description="From the file's units to mm: 1000 for metres, 25.4 for inches",
