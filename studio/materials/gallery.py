@@ -24,19 +24,26 @@ def items(kind: str) -> list[tuple[Any, ...]]:
     # at each drawing of the panel.
     made_for, found = _items.get(kind, (None, []))
     if made_for is not plain:
-        numbers = _numbers.setdefault(kind, {})
+        numbers = _numbered(kind, [name for name, *_ in plain])
         found = [
-            (
-                name,
-                title,
-                text,
-                file_icon(picture(kind, name)),
-                numbers.setdefault(name, len(numbers)) if catalogue.entries(kind) else 0,
-            )
+            (name, title, text, file_icon(picture(kind, name)), numbers.get(name, 0))
             for name, title, text in plain
         ]
         _items[kind] = plain, found
     return found
+
+
+def _numbered(kind: str, names: list[str]) -> dict[str, int]:
+    """The numbers of a kind's entries; those that have gone are forgotten."""
+    if not catalogue.entries(kind):
+        return {}
+    numbers = _numbers.setdefault(kind, {})
+    for gone in numbers.keys() - set(names):
+        del numbers[gone]
+        forget(kind, gone)
+    for name in names:
+        numbers.setdefault(name, max(numbers.values(), default=-1) + 1)
+    return numbers
 
 
 def picture(kind: str, name: str) -> str:

@@ -71,6 +71,12 @@ def test_an_own_material_does_not_change_what_is_chosen(
     assert bpy.ops.optisense.apply_material() == {"FINISHED"}
     assert gel.optisense.material == "my-gel"
     assert mini.optisense.materials["my-gel"].value("ior") == pytest.approx(1.43)
+    choice.material = "pdms-soft"
+    (own_library / "materials" / "my-gel.yaml").unlink()
+    catalogue.refresh_library(session.engine(), "material")
+    until(lambda: "my-gel" not in [row["name"] for row in catalogue.entries("material")])
+    assert choice.material == "pdms-soft", "the numbers of the others stay as they were"
+    assert gallery.picture("material", "my-gel") == "", "nothing is kept of one that has gone"
 
 
 def test_a_material_needs_a_name_that_files_can_have(
