@@ -14,7 +14,7 @@ WAIT = 0.2
 """Seconds until an area that was made or changed has its size."""
 
 _fitted: dict[int, tuple[int, ...]] = {}
-"""By editor: its size and that of its picture, in pixels, when the picture was made to fit."""
+"""By open editor: its size and that of its picture, in pixels, when the picture was made to fit."""
 
 _handle: object | None = None
 
@@ -81,6 +81,9 @@ def _fit_when_resized() -> None:
         return
     size = (context.region.width, context.region.height, *image.size)
     if _fitted.get(context.area.as_pointer()) != size:
+        areas = {area.as_pointer() for screen in bpy.data.screens for area in screen.areas}
+        for gone in _fitted.keys() - areas:
+            del _fitted[gone]
         _fitted[context.area.as_pointer()] = size
         name = image.name
         bpy.app.timers.register(lambda: _fit(name), first_interval=0.0)
